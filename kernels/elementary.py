@@ -1,0 +1,130 @@
+"""Branch-free double-precision elementary functions.
+
+A library call or a branch in a loop over links keeps the CPU compiler from vectorising it (a factor of 3 to 4 in
+speed), and on a GPU ``sin``, ``cos`` and ``tanh`` are the dearest operations of a stage. All functions below are
+polynomials with selections, the same source for both devices.
+
+Coefficients of sine and cosine on [-π/4, π/4]: FreeBSD msun ``k_sin.c``, ``k_cos.c`` (Sun Microsystems, 1993).
+"""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+# A Python float inside a wp.func would be rounded to float32 first; wp.constant keeps all 53 bits.
+ZERO = wp.constant(wp.float64(0.0))
+HALF = wp.constant(wp.float64(0.5))
+ONE = wp.constant(wp.float64(1.0))
+TWO = wp.constant(wp.float64(2.0))
+
+# Adding 1.5·2⁵² leaves the nearest integer in the low bits of the mantissa.
+ROUNDER = wp.constant(wp.float64(6755399441055744.0))
+ROUNDER_BITS = wp.constant(wp.int64(0x4338000000000000))
+EXPONENT_BIAS = wp.constant(wp.int64(1023))
+EXPONENT_SHIFT = wp.constant(wp.int64(52))
+SIGN_SHIFT = wp.constant(wp.int64(63))
+MAGNITUDE_BITS = wp.constant(wp.int64(0x7FFFFFFFFFFFFFFF))
+
+TWO_OVER_PI = wp.constant(wp.float64(6.36619772367581382433e-01))
+HALF_PI_1 = wp.constant(wp.float64(1.57079632673412561417e00))
+HALF_PI_2 = wp.constant(wp.float64(6.07710050630396597660e-11))
+HALF_PI_3 = wp.constant(wp.float64(2.02226624871116645580e-21))
+
+S1 = wp.constant(wp.float64(-1.66666666666666324348e-01))
+S2 = wp.constant(wp.float64(8.33333333332248946124e-03))
+S3 = wp.constant(wp.float64(-1.98412698298579493134e-04))
+S4 = wp.constant(wp.float64(2.75573137070700676789e-06))
+S5 = wp.constant(wp.float64(-2.50507602534068634195e-08))
+S6 = wp.constant(wp.float64(1.58969099521155010221e-10))
+C1 = wp.constant(wp.float64(4.16666666666666019037e-02))
+C2 = wp.constant(wp.float64(-1.38888888888741095749e-03))
+C3 = wp.constant(wp.float64(2.48015872894767294178e-05))
+C4 = wp.constant(wp.float64(-2.75573143513906633035e-07))
+C5 = wp.constant(wp.float64(2.08757232129817482790e-09))
+C6 = wp.constant(wp.float64(-1.13596475577881948265e-11))
+
+# Taylor coefficients, for the small turns within a step and for exp on [-ln2/2, ln2/2].
+T2 = wp.constant(wp.float64(1.0 / 2.0))
+T3 = wp.constant(wp.float64(1.0 / 6.0))
+T4 = wp.constant(wp.float64(1.0 / 24.0))
+T5 = wp.constant(wp.float64(1.0 / 120.0))
+T6 = wp.constant(wp.float64(1.0 / 720.0))
+T7 = wp.constant(wp.float64(1.0 / 5040.0))
+T8 = wp.constant(wp.float64(1.0 / 40320.0))
+T9 = wp.constant(wp.float64(1.0 / 362880.0))
+T10 = wp.constant(wp.float64(1.0 / 3628800.0))
+T11 = wp.constant(wp.float64(1.0 / 39916800.0))
+T12 = wp.constant(wp.float64(1.0 / 479001600.0))
+
+LOG2_E = wp.constant(wp.float64(1.44269504088896338700e00))
+LN2_HIGH = wp.constant(wp.float64(6.93147180369123816490e-01))
+LN2_LOW = wp.constant(wp.float64(1.90821492927058770002e-10))
+TANH_LIMIT = wp.constant(wp.float64(20.0))
+
+LARGEST_TURN = wp.constant(wp.float64(0.05))
+"""Largest turn of a link [rad] within one step for which :func:`small_turn` is exact to rounding."""
+
+
+@wp.func
+def cos_sin(angle: wp.float64):
+    """Cosine and sine of an angle [rad], to about one unit in the last place for |angle| < 1e5."""
+    shifted = angle * TWO_OVER_PI + ROUNDER
+    quarter = shifted - ROUNDER
+    turns = wp.cast(shifted, wp.int64)
+    r = ((angle - quarter * HALF_PI_1) - quarter * HALF_PI_2) - quarter * HALF_PI_3
+    z = r * r
+    s = r + r * z * (S1 + z * (S2 + z * (S3 + z * (S4 + z * (S5 + z * S6)))))
+    c = ONE - (HALF * z - z * z * (C1 + z * (C2 + z * (C3 + z * (C4 + z * (C5 + z * C6))))))
+    odd = (turns & wp.int64(1)) != wp.int64(0)
+    cosine = wp.where(odd, s, c)
+    sine = wp.where(odd, c, s)
+    cosine_negative = ((turns + wp.int64(1)) & wp.int64(2)) != wp.int64(0)
+    sine_negative = (turns & wp.int64(2)) != wp.int64(0)
+    return wp.where(cosine_negative, -cosine, cosine), wp.where(sine_negative, -sine, sine)
+
+
+@wp.func
+def small_turn(turn: wp.float64):
+    """1 − cos and sin of a small turn [rad]; exact to rounding up to ``LARGEST_TURN``."""
+    z = turn * turn
+    versine = z * (T2 - z * (T4 - z * (T6 - z * T8)))
+    sine = turn - turn * z * (T3 - z * (T5 - z * T7))
+    return versine, sine
+
+
+@wp.func
+def tanh(x: wp.float64):
+    """Hyperbolic tangent to 1e-15 absolute: 1 − 2/(exp(2|x|) + 1), with |x| capped where the result is 1."""
+    y = TWO * wp.min(wp.abs(x), TANH_LIMIT)
+    shifted = y * LOG2_E + ROUNDER
+    power = shifted - ROUNDER
+    r = (y - power * LN2_HIGH) - power * LN2_LOW
+    series = T8 + r * (T9 + r * (T10 + r * (T11 + r * T12)))
+    series = T4 + r * (T5 + r * (T6 + r * (T7 + r * series)))
+    series = ONE + r * (ONE + r * (T2 + r * (T3 + r * series)))
+    exponent = wp.cast(shifted, wp.int64) - ROUNDER_BITS + EXPONENT_BIAS
+    exponential = series * wp.cast(exponent << EXPONENT_SHIFT, wp.float64)
+    value = ONE - TWO / (exponential + ONE)
+    return wp.where(x < ZERO, -value, value)
+
+
+@wp.func
+def order_bits(x: wp.float64):
+    """Bits of a number ≥ 0 as an integer that orders as the number does, NaN above infinity.
+
+    Integer maxima vectorise and let no NaN slip through; floating-point ones do neither.
+    """
+    return wp.cast(wp.abs(x), wp.int64)
+
+
+@wp.func
+def order_key(x: wp.float64):
+    """A number of any sign as an integer that orders as the number does."""
+    bits = wp.cast(x, wp.int64)
+    return bits ^ ((bits >> SIGN_SHIFT) & MAGNITUDE_BITS)
+
+
+@wp.func
+def from_order_key(key: wp.int64):
+    """Inverse of :func:`order_key`."""
+    return wp.cast(key ^ ((key >> SIGN_SHIFT) & MAGNITUDE_BITS), wp.float64)

@@ -1,0 +1,288 @@
+"""Embedded explicit Runge–Kutta methods: one loop over stages for every tableau.
+
+Written for one CPU thread per chain. The loops over links keep to the form that clang vectorises: ``while`` loops
+with an integer of their own, one scratch block of static shape, no branch and no library call inside.
+"""
+
+import functools
+
+import warp as wp
+
+from . import layout
+from .elementary import HALF, LARGEST_TURN, ONE, TWO, ZERO, cos_sin, order_bits, small_turn
+from .joint import friction_torque, joint_force, link_acceleration
+from .layout import STAGE_ROWS, STAGES
+from .tableaus import TABLEAUS
+from .types import Chain
+
+wp.set_module_options({"enable_backward": False})
+
+X, Y, THETA, U, V, OMEGA = (wp.constant(row) for row in range(6))
+COSINE, SINE = wp.constant(layout.COSINE), wp.constant(layout.SINE)
+INVERSE_MASS, INVERSE_INERTIA = wp.constant(layout.INVERSE_MASS), wp.constant(layout.INVERSE_INERTIA)
+LEFT_X, LEFT_Y = wp.constant(layout.LEFT_X), wp.constant(layout.LEFT_Y)
+LEFT_U, LEFT_V = wp.constant(layout.LEFT_U), wp.constant(layout.LEFT_V)
+RIGHT_X, RIGHT_Y = wp.constant(layout.RIGHT_X), wp.constant(layout.RIGHT_Y)
+RIGHT_U, RIGHT_V = wp.constant(layout.RIGHT_U), wp.constant(layout.RIGHT_V)
+STAGE_COSINE, STAGE_SINE = wp.constant(layout.STAGE_COSINE), wp.constant(layout.STAGE_SINE)
+STAGE_SPIN = wp.constant(layout.STAGE_SPIN)
+FORCE_X, FORCE_Y, TORQUE = wp.constant(layout.FORCE_X), wp.constant(layout.FORCE_Y), wp.constant(layout.TORQUE)
+NEW_X, NEW_Y, NEW_THETA = wp.constant(layout.NEW_X), wp.constant(layout.NEW_Y), wp.constant(layout.NEW_THETA)
+NEW_U, NEW_V, NEW_OMEGA = wp.constant(layout.NEW_U), wp.constant(layout.NEW_V), wp.constant(layout.NEW_OMEGA)
+ERROR = wp.constant(layout.ERROR)
+LOST_FRICTION, LOST_DAMPING = wp.constant(layout.LOST_FRICTION), wp.constant(layout.LOST_DAMPING)
+
+
+@wp.func
+def place_ends(K: wp.array2d(dtype=wp.float64), chain: Chain):
+    """Directions and end positions of the links, exactly, from the state rows."""
+    n = chain.link_count
+    a = chain.half_length
+    i = int(0)
+    while i < n:
+        c, s = cos_sin(K[THETA, i])
+        K[COSINE, i] = c
+        K[SINE, i] = s
+        K[LEFT_X, i] = K[X, i] - a * c
+        K[LEFT_Y, i] = K[Y, i] - a * s
+        K[RIGHT_X, i] = K[X, i] + a * c
+        K[RIGHT_Y, i] = K[Y, i] + a * s
+        i += 1
+    K[LEFT_X, n] = K[LEFT_X, 0]
+    K[LEFT_Y, n] = K[LEFT_Y, 0]
+
+
+@wp.func
+def begin_stages(K: wp.array2d(dtype=wp.float64), chain: Chain):
+    """First stage's rows from the state: end velocities and directions; ``place_ends`` did the positions."""
+    n = chain.link_count
+    a = chain.half_length
+    i = int(0)
+    while i < n:
+        c = K[COSINE, i]
+        s = K[SINE, i]
+        w = K[OMEGA, i]
+        K[STAGE_COSINE, i] = c
+        K[STAGE_SINE, i] = s
+        K[STAGE_SPIN, i] = w
+        K[LEFT_U, i] = K[U, i] + a * w * s
+        K[LEFT_V, i] = K[V, i] - a * w * c
+        K[RIGHT_U, i] = K[U, i] - a * w * s
+        K[RIGHT_V, i] = K[V, i] + a * w * c
+        i += 1
+    K[LEFT_U, n] = K[LEFT_U, 0]
+    K[LEFT_V, n] = K[LEFT_V, 0]
+    K[STAGE_SPIN, n] = K[STAGE_SPIN, 0]
+
+
+@functools.cache
+def explicit_method(name: str):
+    """Warp functions of one tableau: (evaluate the first stage, try a step, commit it).
+
+    Args:
+        name: Key of :data:`TABLEAUS`.
+
+    Returns:
+        ``first_stage(K, chain)``, ``attempt(K, chain, h, tolerance)`` → bits of the greatest error ratio (see
+        :func:`order_bits`), ``commit(K, chain, h)``.
+    """
+    tableau = TABLEAUS[name]
+    stages = tableau.stages
+    reuses_last = tableau.first_same_as_last
+    velocity, position = tableau.velocity, tableau.position
+    nodes = tableau.nodes
+    velocity_weights, position_weights = tableau.velocity_weights, tableau.position_weights
+    velocity_errors, position_errors = tableau.velocity_errors, tableau.position_errors
+    last_row = STAGES + STAGE_ROWS * (stages - 1)
+    power_needed = tuple(
+        weight != 0.0 or (reuses_last and velocity_weights[0] != 0.0 and stage == stages - 1)
+        for stage, weight in enumerate(velocity_weights)
+    )
+
+    @wp.func
+    def derivatives(K: wp.array2d(dtype=wp.float64), chain: Chain, row: int, needs_power: bool):
+        n = chain.link_count
+        i = int(0)
+        while i < n:
+            cx = K[LEFT_X, i + 1] - K[RIGHT_X, i]
+            cy = K[LEFT_Y, i + 1] - K[RIGHT_Y, i]
+            cu = K[LEFT_U, i + 1] - K[RIGHT_U, i]
+            cv = K[LEFT_V, i + 1] - K[RIGHT_V, i]
+            spin = K[STAGE_SPIN, i] - K[STAGE_SPIN, i + 1]
+            torque = friction_torque(chain, spin)
+            K[FORCE_X, i + 1] = joint_force(chain, cx, cu)
+            K[FORCE_Y, i + 1] = joint_force(chain, cy, cv)
+            K[TORQUE, i + 1] = torque
+            if needs_power:
+                K[row + 3, i] = torque * spin
+                K[row + 4, i] = chain.joint_damping * (cu * cu + cv * cv)
+            i += 1
+        K[FORCE_X, 0] = K[FORCE_X, n]
+        K[FORCE_Y, 0] = K[FORCE_Y, n]
+        K[TORQUE, 0] = K[TORQUE, n]
+        i = int(0)
+        while i < n:
+            ax, ay, spin_rate = link_acceleration(
+                chain,
+                K[INVERSE_MASS, i],
+                K[INVERSE_INERTIA, i],
+                K[STAGE_COSINE, i],
+                K[STAGE_SINE, i],
+                K[FORCE_X, i],
+                K[FORCE_Y, i],
+                K[FORCE_X, i + 1],
+                K[FORCE_Y, i + 1],
+                K[TORQUE, i],
+                K[TORQUE, i + 1],
+            )
+            K[row, i] = ax
+            K[row + 1, i] = ay
+            K[row + 2, i] = spin_rate
+            i += 1
+
+    @wp.func
+    def first_stage(K: wp.array2d(dtype=wp.float64), chain: Chain):
+        begin_stages(K, chain)
+        derivatives(K, chain, wp.static(STAGES), wp.static(power_needed[0]))
+
+    @wp.func
+    def attempt(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64, tolerance: wp.float64):
+        n = chain.link_count
+        a = chain.half_length
+        hh = h * h
+        turned = wp.int64(0)
+        for s in range(1, wp.static(stages)):
+            ch = wp.static(wp.float64(nodes[s])) * h
+            i = int(0)
+            while i < n:
+                du = ZERO
+                dv = ZERO
+                dw = ZERO
+                dx = ZERO
+                dy = ZERO
+                turn = ZERO
+                for j in range(wp.static(s)):
+                    if wp.static(velocity[s][j] != 0.0):
+                        du += wp.static(wp.float64(velocity[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
+                        dv += wp.static(wp.float64(velocity[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                        dw += wp.static(wp.float64(velocity[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                    if wp.static(position[s][j] != 0.0):
+                        dx += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
+                        dy += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                        turn += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                turn = ch * K[OMEGA, i] + hh * turn
+                versine, sine = small_turn(turn)
+                c = K[COSINE, i] - (K[COSINE, i] * versine + K[SINE, i] * sine)
+                q = K[SINE, i] - (K[SINE, i] * versine - K[COSINE, i] * sine)
+                x = K[X, i] + (ch * K[U, i] + hh * dx)
+                y = K[Y, i] + (ch * K[V, i] + hh * dy)
+                u = K[U, i] + h * du
+                v = K[V, i] + h * dv
+                w = K[OMEGA, i] + h * dw
+                K[STAGE_COSINE, i] = c
+                K[STAGE_SINE, i] = q
+                K[STAGE_SPIN, i] = w
+                K[LEFT_X, i] = x - a * c
+                K[LEFT_Y, i] = y - a * q
+                K[LEFT_U, i] = u + a * w * q
+                K[LEFT_V, i] = v - a * w * c
+                K[RIGHT_X, i] = x + a * c
+                K[RIGHT_Y, i] = y + a * q
+                K[RIGHT_U, i] = u - a * w * q
+                K[RIGHT_V, i] = v + a * w * c
+                i += 1
+            K[LEFT_X, n] = K[LEFT_X, 0]
+            K[LEFT_Y, n] = K[LEFT_Y, 0]
+            K[LEFT_U, n] = K[LEFT_U, 0]
+            K[LEFT_V, n] = K[LEFT_V, 0]
+            K[STAGE_SPIN, n] = K[STAGE_SPIN, 0]
+            derivatives(K, chain, wp.static(STAGES + STAGE_ROWS * s), wp.static(power_needed[s]))
+        # new state and error ratio, odeint's norm: |e| / (tol + tol (|y| + h |ẏ|))
+        i = int(0)
+        while i < n:
+            du = ZERO
+            dv = ZERO
+            dw = ZERO
+            dx = ZERO
+            dy = ZERO
+            turn = ZERO
+            eu = ZERO
+            ev = ZERO
+            ew = ZERO
+            ex = ZERO
+            ey = ZERO
+            et = ZERO
+            for j in range(wp.static(stages)):
+                if wp.static(velocity_weights[j] != 0.0):
+                    du += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
+                    dv += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                    dw += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                if wp.static(position_weights[j] != 0.0):
+                    dx += wp.static(wp.float64(position_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
+                    dy += wp.static(wp.float64(position_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                    turn += wp.static(wp.float64(position_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                if wp.static(velocity_errors[j] != 0.0):
+                    eu += wp.static(wp.float64(velocity_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
+                    ev += wp.static(wp.float64(velocity_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                    ew += wp.static(wp.float64(velocity_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                if wp.static(position_errors[j] != 0.0):
+                    ex += wp.static(wp.float64(position_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
+                    ey += wp.static(wp.float64(position_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                    et += wp.static(wp.float64(position_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+            u = K[U, i]
+            v = K[V, i]
+            w = K[OMEGA, i]
+            K[NEW_X, i] = K[X, i] + (h * u + hh * dx)
+            K[NEW_Y, i] = K[Y, i] + (h * v + hh * dy)
+            K[NEW_THETA, i] = K[THETA, i] + (h * w + hh * turn)
+            K[NEW_U, i] = u + h * du
+            K[NEW_V, i] = v + h * dv
+            K[NEW_OMEGA, i] = w + h * dw
+            ex = wp.abs(hh * ex) / (ONE + wp.abs(K[X, i]) + h * wp.abs(u))
+            ey = wp.abs(hh * ey) / (ONE + wp.abs(K[Y, i]) + h * wp.abs(v))
+            et = wp.abs(hh * et) / (ONE + wp.abs(K[THETA, i]) + h * wp.abs(w))
+            eu = wp.abs(h * eu) / (ONE + wp.abs(u) + h * wp.abs(K[wp.static(STAGES), i]))
+            ev = wp.abs(h * ev) / (ONE + wp.abs(v) + h * wp.abs(K[wp.static(STAGES + 1), i]))
+            ew = wp.abs(h * ew) / (ONE + wp.abs(w) + h * wp.abs(K[wp.static(STAGES + 2), i]))
+            # sums would overestimate, maxima of integers see NaN; below, one reduction over links
+            worst = wp.max(wp.max(order_bits(ex), order_bits(ey)), order_bits(et))
+            worst = wp.max(worst, wp.max(wp.max(order_bits(eu), order_bits(ev)), order_bits(ew)))
+            K[ERROR, i] = wp.cast(worst, wp.float64) / tolerance
+            i += 1
+        turned = wp.int64(0)
+        greatest = wp.int64(0)
+        i = int(0)
+        while i < n:
+            greatest = wp.max(greatest, order_bits(K[ERROR, i]))
+            turned = wp.max(turned, order_bits(K[NEW_THETA, i] - K[THETA, i]))
+            i += 1
+        # a turn beyond the polynomials' range is refused as an error of 2: the step shrinks
+        if wp.cast(turned, wp.float64) > LARGEST_TURN:
+            greatest = wp.max(greatest, order_bits(TWO))
+        return greatest
+
+    @wp.func
+    def commit(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64):
+        n = chain.link_count
+        i = int(0)
+        while i < n:
+            friction = ZERO
+            damping = ZERO
+            for j in range(wp.static(stages)):
+                if wp.static(velocity_weights[j] != 0.0):
+                    friction += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 3), i]
+                    damping += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 4), i]
+            K[LOST_FRICTION, i] = K[LOST_FRICTION, i] + h * friction
+            K[LOST_DAMPING, i] = K[LOST_DAMPING, i] + h * damping
+            K[X, i] = K[NEW_X, i]
+            K[Y, i] = K[NEW_Y, i]
+            K[THETA, i] = K[NEW_THETA, i]
+            K[U, i] = K[NEW_U, i]
+            K[V, i] = K[NEW_V, i]
+            K[OMEGA, i] = K[NEW_OMEGA, i]
+            if wp.static(reuses_last):
+                for row in range(wp.static(STAGE_ROWS)):
+                    K[wp.static(STAGES + row), i] = K[wp.static(last_row + row), i]
+            i += 1
+
+    return first_stage, attempt, commit

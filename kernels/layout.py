@@ -1,0 +1,69 @@
+"""Where a chain's numbers lie in its scratch block: rows are quantities, columns links or joints.
+
+One block of static shape per chain is what lets the CPU compiler vectorise: with run-time strides or several arrays
+it would have to allow for aliasing. Joint i joins the right end of link i to the left end of link i + 1.
+"""
+
+# State at the start of the step.
+X, Y, THETA, U, V, OMEGA = 0, 1, 2, 3, 4, 5
+COSINE, SINE = 6, 7
+# Constants of the links.
+MASS, INERTIA, INVERSE_MASS, INVERSE_INERTIA = 8, 9, 10, 11
+# A stage: link ends (left rows are padded: column n repeats column 0), direction, spin (padded).
+LEFT_X, LEFT_Y, LEFT_U, LEFT_V = 12, 13, 14, 15
+RIGHT_X, RIGHT_Y, RIGHT_U, RIGHT_V = 16, 17, 18, 19
+STAGE_COSINE, STAGE_SINE, STAGE_SPIN = 20, 21, 22
+# Joint forces and torques, shifted by one: column i + 1 is joint i, column 0 repeats column n.
+FORCE_X, FORCE_Y, TORQUE = 23, 24, 25
+# A finished try: candidate state and its error ratio.
+NEW_X, NEW_Y, NEW_THETA, NEW_U, NEW_V, NEW_OMEGA = 26, 27, 28, 29, 30, 31
+ERROR = 32
+# Energy [J] lost so far: per joint to friction and damping, per link to floor or sprocket.
+LOST_FRICTION, LOST_DAMPING, LOST_FIXED = 33, 34, 35
+# Joint positions when the neighbour list was built.
+LISTED_X, LISTED_Y = 36, 37
+# Per stage: accelerations, and the power [W] lost in each joint to friction and damping.
+STAGES = 38
+STAGE_ROWS = 5
+ACCELERATION_X, ACCELERATION_Y, ACCELERATION_SPIN, POWER_FRICTION, POWER_DAMPING = 0, 1, 2, 3, 4
+
+# State.watch
+STEADY_TIME, WINDOW_START, WINDOW_COUNT, SUM_HEIGHT, SUM_WIDTH, SUM_SPEED = 0, 1, 2, 3, 4, 5
+LAST_HEIGHT, LAST_WIDTH, REST_SINCE, LAST_FLOOR_IMPULSE = 6, 7, 8, 9
+WATCH_ROWS = 10
+
+# State.counts
+ACCEPTED, REJECTED, FLOOR_IMPULSES, SPROCKET_IMPULSES, SELF_IMPULSES, BOUNCES, LIST_BUILDS = 0, 1, 2, 3, 4, 5, 6
+COUNT_ROWS = 7
+
+# State.extremes
+OPENING, FLOOR_DEPTH, SPROCKET_DEPTH, SELF_DEPTH = 0, 1, 2, 3
+EXTREME_ROWS = 4
+
+# State.losses
+LOSS_FRICTION, LOSS_DAMPING, LOSS_FLOOR, LOSS_SPROCKET, LOSS_SELF = 0, 1, 2, 3, 4
+LOSS_ROWS = 5
+
+# Record.samples
+TIME, CENTER_X, CENTER_Y, CENTER_U, CENTER_V = 0, 1, 2, 3, 4
+KINETIC, GRAVITATIONAL, SPRING, LOWEST, RMS_SPEED = 5, 6, 7, 8, 9
+HEIGHT, WIDTH, LOOP_SPEED = 10, 11, 12
+SAMPLE_COLUMNS = 13
+
+# Neighbour list: integers of one chain, in units of the list's capacity and the table's size (see broadphase).
+PAIRS_PER_LINK = 8
+
+
+def scratch_rows(stages: int) -> int:
+    """Rows of a chain's scratch block for a method with this many stages."""
+    return STAGES + STAGE_ROWS * stages
+
+
+def padded_width(link_count: int) -> int:
+    """Static number of columns that serves a chain of this many links.
+
+    200 columns serve every chain of the paper's range without a row stride that maps rows onto the same cache sets
+    (powers of two are 1.3 to 2 times slower); longer chains get the next odd multiple of 200 that fits.
+    """
+    blocks = -(-(link_count + 2) // 200)
+    return 200 * (blocks + 1 - blocks % 2)

@@ -1,0 +1,201 @@
+"""What is looked at every sample interval: sums over a chain, the watches that end a phase, time series, frames."""
+
+import warp as wp
+
+from . import layout
+from .elementary import HALF, ZERO, from_order_key, order_key
+from .types import Chain, Control, Program, Record, State
+
+wp.set_module_options({"enable_backward": False})
+
+X, Y, THETA, U, V, OMEGA = (wp.constant(row) for row in range(6))
+COSINE, SINE = wp.constant(layout.COSINE), wp.constant(layout.SINE)
+MASS, INERTIA = wp.constant(layout.MASS), wp.constant(layout.INERTIA)
+LEFT_X, LEFT_Y = wp.constant(layout.LEFT_X), wp.constant(layout.LEFT_Y)
+RIGHT_X, RIGHT_Y = wp.constant(layout.RIGHT_X), wp.constant(layout.RIGHT_Y)
+
+STEADY_TIME, WINDOW_START = wp.constant(layout.STEADY_TIME), wp.constant(layout.WINDOW_START)
+WINDOW_COUNT, SUM_HEIGHT = wp.constant(layout.WINDOW_COUNT), wp.constant(layout.SUM_HEIGHT)
+SUM_WIDTH, SUM_SPEED = wp.constant(layout.SUM_WIDTH), wp.constant(layout.SUM_SPEED)
+LAST_HEIGHT, LAST_WIDTH = wp.constant(layout.LAST_HEIGHT), wp.constant(layout.LAST_WIDTH)
+REST_SINCE = wp.constant(layout.REST_SINCE)
+
+ONE_PERCENT = wp.constant(wp.float64(0.01))
+SLOWEST_STEADY = wp.constant(wp.float64(0.02))
+
+# Codes shared with warpchain.status.
+RUNNING = wp.constant(0)
+AT_REST = wp.constant(1)
+FINISHED = wp.constant(2)
+
+
+@wp.struct
+class Summary:
+    """Sums over one chain at one moment; units as in :data:`layout` sample columns."""
+
+    center_x: wp.float64
+    center_y: wp.float64
+    center_u: wp.float64
+    center_v: wp.float64
+    kinetic: wp.float64
+    gravitational: wp.float64
+    spring: wp.float64
+    lowest: wp.float64
+    rms_speed: wp.float64
+    height: wp.float64
+    width: wp.float64
+    loop_speed: wp.float64
+
+
+@wp.func
+def summarise(K: wp.array2d(dtype=wp.float64), chain: Chain) -> Summary:
+    """Sums over the placed links. Loop speed: mean of v·u over links, positive from link i towards link i + 1."""
+    n = chain.link_count
+    mass = ZERO
+    mx = ZERO
+    my = ZERO
+    mu = ZERO
+    mv = ZERO
+    kinetic = ZERO
+    spring = ZERO
+    along = ZERO
+    square = ZERO
+    left = order_key(K[RIGHT_X, 0])
+    right = left
+    bottom = order_key(K[RIGHT_Y, 0])
+    top = bottom
+    i = int(0)
+    while i < n:
+        m = K[MASS, i]
+        speed = K[U, i] * K[U, i] + K[V, i] * K[V, i]
+        mass += m
+        mx += m * K[X, i]
+        my += m * K[Y, i]
+        mu += m * K[U, i]
+        mv += m * K[V, i]
+        kinetic += HALF * (m * speed + K[INERTIA, i] * K[OMEGA, i] * K[OMEGA, i])
+        square += speed
+        along += K[U, i] * K[COSINE, i] + K[V, i] * K[SINE, i]
+        cx = K[LEFT_X, i + 1] - K[RIGHT_X, i]
+        cy = K[LEFT_Y, i + 1] - K[RIGHT_Y, i]
+        spring += HALF * chain.joint_stiffness * (cx * cx + cy * cy)
+        left = wp.min(left, order_key(K[RIGHT_X, i]))
+        right = wp.max(right, order_key(K[RIGHT_X, i]))
+        bottom = wp.min(bottom, wp.min(order_key(K[LEFT_Y, i]), order_key(K[RIGHT_Y, i])))
+        top = wp.max(top, order_key(K[RIGHT_Y, i]))
+        i += 1
+    summary = Summary()
+    summary.center_x = mx / mass
+    summary.center_y = my / mass
+    summary.center_u = mu / mass
+    summary.center_v = mv / mass
+    summary.kinetic = kinetic
+    summary.gravitational = chain.gravity * my
+    summary.spring = spring
+    summary.lowest = from_order_key(bottom) - chain.circle_radius
+    summary.rms_speed = wp.sqrt(square / wp.float64(n))
+    summary.height = from_order_key(top) - from_order_key(bottom)
+    summary.width = from_order_key(right) - from_order_key(left)
+    summary.loop_speed = along / wp.float64(n)
+    return summary
+
+
+@wp.func
+def watch_rest(state: State, control: Control, world: int, time: wp.float64, summary: Summary):
+    """Status: at rest once the centre's speed and the rms speed have both been low for the rest time."""
+    speed = wp.sqrt(summary.center_u * summary.center_u + summary.center_v * summary.center_v)
+    if wp.max(speed, summary.rms_speed) < control.rest_speed:
+        if state.watch[world, REST_SINCE] < ZERO:
+            state.watch[world, REST_SINCE] = time
+        if time - state.watch[world, REST_SINCE] >= control.rest_time:
+            return AT_REST
+    else:
+        state.watch[world, REST_SINCE] = wp.float64(-1.0)
+    return RUNNING
+
+
+@wp.func
+def watch_steadiness(state: State, program: Program, world: int, time: wp.float64, summary: Summary):
+    """Sets the moment of release once the loop runs steadily on its sprocket.
+
+    Means over windows of one loop period: the speed along the loop within 1 % (or 0.02 m/s) of the sprocket's, and
+    height and width of the loop each within 1 % of the window before. Release follows after the drawn fraction of a
+    loop period. Nothing is done once that moment is set.
+    """
+    if state.stop_status[world] == FINISHED or time < program.hold_start[world]:
+        return
+    if state.watch[world, WINDOW_START] < ZERO:
+        state.watch[world, WINDOW_START] = time
+    state.watch[world, WINDOW_COUNT] = state.watch[world, WINDOW_COUNT] + wp.float64(1.0)
+    state.watch[world, SUM_HEIGHT] = state.watch[world, SUM_HEIGHT] + summary.height
+    state.watch[world, SUM_WIDTH] = state.watch[world, SUM_WIDTH] + summary.width
+    state.watch[world, SUM_SPEED] = state.watch[world, SUM_SPEED] + summary.loop_speed
+    if time - state.watch[world, WINDOW_START] < program.loop_period[world]:
+        return
+    count = state.watch[world, WINDOW_COUNT]
+    height = state.watch[world, SUM_HEIGHT] / count
+    width = state.watch[world, SUM_WIDTH] / count
+    speed = state.watch[world, SUM_SPEED] / count
+    target = program.loop_speed[world]
+    fast_enough = wp.abs(speed - target) <= wp.max(ONE_PERCENT * target, SLOWEST_STEADY)
+    height_kept = wp.abs(height - state.watch[world, LAST_HEIGHT]) <= ONE_PERCENT * height
+    width_kept = wp.abs(width - state.watch[world, LAST_WIDTH]) <= ONE_PERCENT * width
+    if fast_enough and height_kept and width_kept:
+        state.watch[world, STEADY_TIME] = time
+        state.stop_time[world] = time + program.release_phase[world] * program.loop_period[world]
+        state.stop_status[world] = FINISHED
+    state.watch[world, WINDOW_START] = time
+    state.watch[world, WINDOW_COUNT] = ZERO
+    state.watch[world, SUM_HEIGHT] = ZERO
+    state.watch[world, SUM_WIDTH] = ZERO
+    state.watch[world, SUM_SPEED] = ZERO
+    state.watch[world, LAST_HEIGHT] = height
+    state.watch[world, LAST_WIDTH] = width
+
+
+@wp.func
+def write_sample(record: Record, world: int, time: wp.float64, summary: Summary):
+    """Appends one row to the time series, if it is kept."""
+    if record.samples.shape[1] == 0:
+        return
+    row = record.sample_count[world]
+    record.samples[world, row, wp.static(layout.TIME)] = time
+    record.samples[world, row, wp.static(layout.CENTER_X)] = summary.center_x
+    record.samples[world, row, wp.static(layout.CENTER_Y)] = summary.center_y
+    record.samples[world, row, wp.static(layout.CENTER_U)] = summary.center_u
+    record.samples[world, row, wp.static(layout.CENTER_V)] = summary.center_v
+    record.samples[world, row, wp.static(layout.KINETIC)] = summary.kinetic
+    record.samples[world, row, wp.static(layout.GRAVITATIONAL)] = summary.gravitational
+    record.samples[world, row, wp.static(layout.SPRING)] = summary.spring
+    record.samples[world, row, wp.static(layout.LOWEST)] = summary.lowest
+    record.samples[world, row, wp.static(layout.RMS_SPEED)] = summary.rms_speed
+    record.samples[world, row, wp.static(layout.HEIGHT)] = summary.height
+    record.samples[world, row, wp.static(layout.WIDTH)] = summary.width
+    record.samples[world, row, wp.static(layout.LOOP_SPEED)] = summary.loop_speed
+    record.sample_count[world] = row + 1
+
+
+@wp.func
+def write_frame(
+    record: Record, K: wp.array2d(dtype=wp.float64), chain: Chain, world: int, time: wp.float64
+):
+    """Appends all joint positions, if frames are kept."""
+    if record.frames.shape[1] == 0:
+        return
+    n = chain.link_count
+    row = record.frame_count[world]
+    i = int(0)
+    while i < n:
+        record.frames[world, row, i] = K[RIGHT_X, i]
+        record.frames[world, row, n + i] = K[RIGHT_Y, i]
+        i += 1
+    record.frame_times[world, row] = time
+    record.frame_count[world] = row + 1
+
+
+@wp.func
+def record_is_full(record: Record, world: int):
+    """True when the host must drain the record before this world goes on."""
+    samples_full = record.samples.shape[1] > 0 and record.sample_count[world] >= record.samples.shape[1]
+    frames_full = record.frames.shape[1] > 0 and record.frame_count[world] >= record.frames.shape[1]
+    return samples_full or frames_full

@@ -1,0 +1,164 @@
+"""Butcher tableaus of the embedded explicit Runge–Kutta methods, as data.
+
+A new explicit method is a new entry of :data:`TABLEAUS`; no other file changes.
+"""
+
+from dataclasses import dataclass
+from fractions import Fraction as F
+from functools import cached_property
+
+
+@dataclass(frozen=True)
+class Tableau:
+    """One embedded explicit Runge–Kutta pair.
+
+    The chain's equations are of second order, q'' = a(q, q'), and the positions' rows are integrated with the
+    products A·A and b·A (the Nyström form). Since every row sum of A is the stage's time and the weights add up to
+    one, this is the same method on (q, q') with half of the derivatives to store.
+
+    Attributes:
+        name: What a user writes for ``method``.
+        order: Order of the solution that is propagated.
+        error_order: Order of the embedded solution; sets the exponent of the step controller after a rejection.
+        matrix: Lower-triangular stage coefficients A; row s has s entries.
+        weights: Weights b of the propagated solution.
+        embedded: Weights of the embedded solution.
+        source: Where the coefficients were published.
+    """
+
+    name: str
+    order: int
+    error_order: int
+    matrix: tuple[tuple[F, ...], ...]
+    weights: tuple[F, ...]
+    embedded: tuple[F, ...]
+    source: str
+
+    @property
+    def stages(self) -> int:
+        """Number of stages, the one that is reused by the next step included."""
+        return len(self.matrix)
+
+    @property
+    def first_same_as_last(self) -> bool:
+        """True when the last stage is evaluated at the new state, so that the next step can start from it."""
+        return self.matrix[-1] == self.weights[:-1]
+
+    @cached_property
+    def nodes(self) -> tuple[float, ...]:
+        """Stage times c as fractions of the step."""
+        return tuple(float(sum(row)) for row in self.matrix)
+
+    @cached_property
+    def velocity(self) -> tuple[tuple[float, ...], ...]:
+        """A as floats: what the accelerations contribute to a stage's velocities, per step h."""
+        return tuple(tuple(float(a) for a in row) for row in self.matrix)
+
+    @cached_property
+    def position(self) -> tuple[tuple[float, ...], ...]:
+        """A·A: what the accelerations contribute to a stage's positions, per h²."""
+        return tuple(tuple(float(x) for x in self._times_matrix(row)) for row in self.matrix)
+
+    @cached_property
+    def velocity_weights(self) -> tuple[float, ...]:
+        """b as floats."""
+        return tuple(float(b) for b in self.weights)
+
+    @cached_property
+    def position_weights(self) -> tuple[float, ...]:
+        """b·A: weights of the accelerations in the new positions, per h²."""
+        return tuple(float(x) for x in self._times_matrix(self.weights))
+
+    @cached_property
+    def velocity_errors(self) -> tuple[float, ...]:
+        """b − b̂: weights of the velocities' error estimate, per h."""
+        return tuple(float(x) for x in self._error_weights)
+
+    @cached_property
+    def position_errors(self) -> tuple[float, ...]:
+        """(b − b̂)·A: weights of the positions' error estimate, per h²."""
+        return tuple(float(x) for x in self._times_matrix(self._error_weights))
+
+    @property
+    def _error_weights(self) -> tuple[F, ...]:
+        return tuple(b - e for b, e in zip(self.weights, self.embedded, strict=True))
+
+    def _times_matrix(self, row: tuple[F, ...]) -> tuple[F, ...]:
+        products = [F(0)] * len(row)
+        for factor, lower in zip(row, self.matrix, strict=False):
+            for column, value in enumerate(lower):
+                products[column] += factor * value
+        return tuple(products)
+
+
+RKF78 = Tableau(
+    name="rkf78",
+    order=8,
+    error_order=7,
+    matrix=(
+        (),
+        (F(2, 27),),
+        (F(1, 36), F(1, 12)),
+        (F(1, 24), F(0), F(1, 8)),
+        (F(5, 12), F(0), F(-25, 16), F(25, 16)),
+        (F(1, 20), F(0), F(0), F(1, 4), F(1, 5)),
+        (F(-25, 108), F(0), F(0), F(125, 108), F(-65, 27), F(125, 54)),
+        (F(31, 300), F(0), F(0), F(0), F(61, 225), F(-2, 9), F(13, 900)),
+        (F(2), F(0), F(0), F(-53, 6), F(704, 45), F(-107, 9), F(67, 90), F(3)),
+        (F(-91, 108), F(0), F(0), F(23, 108), F(-976, 135), F(311, 54), F(-19, 60), F(17, 6), F(-1, 12)),
+        (
+            *(F(2383, 4100), F(0), F(0), F(-341, 164), F(4496, 1025), F(-301, 82), F(2133, 4100)),
+            *(F(45, 82), F(45, 164), F(18, 41)),
+        ),
+        (
+            *(F(3, 205), F(0), F(0), F(0), F(0), F(-6, 41), F(-3, 205)),
+            *(F(-3, 41), F(3, 41), F(6, 41), F(0)),
+        ),
+        (
+            *(F(-1777, 4100), F(0), F(0), F(-341, 164), F(4496, 1025), F(-289, 82), F(2193, 4100)),
+            *(F(51, 82), F(33, 164), F(12, 41), F(0), F(1)),
+        ),
+    ),
+    weights=(
+        *(F(0), F(0), F(0), F(0), F(0), F(34, 105), F(9, 35), F(9, 35), F(9, 280), F(9, 280), F(0)),
+        *(F(41, 840), F(41, 840)),
+    ),
+    embedded=(
+        *(F(41, 840), F(0), F(0), F(0), F(0), F(34, 105), F(9, 35), F(9, 35), F(9, 280), F(9, 280)),
+        *(F(41, 840), F(0), F(0)),
+    ),
+    source="E. Fehlberg, NASA TR R-287 (1968), table X; the higher-order solution is propagated",
+)
+
+DP5 = Tableau(
+    name="dp5",
+    order=5,
+    error_order=4,
+    matrix=(
+        (),
+        (F(1, 5),),
+        (F(3, 40), F(9, 40)),
+        (F(44, 45), F(-56, 15), F(32, 9)),
+        (F(19372, 6561), F(-25360, 2187), F(64448, 6561), F(-212, 729)),
+        (F(9017, 3168), F(-355, 33), F(46732, 5247), F(49, 176), F(-5103, 18656)),
+        (F(35, 384), F(0), F(500, 1113), F(125, 192), F(-2187, 6784), F(11, 84)),
+    ),
+    weights=(F(35, 384), F(0), F(500, 1113), F(125, 192), F(-2187, 6784), F(11, 84), F(0)),
+    embedded=(
+        *(F(5179, 57600), F(0), F(7571, 16695), F(393, 640), F(-92097, 339200), F(187, 2100)),
+        F(1, 40),
+    ),
+    source="J. R. Dormand, P. J. Prince, J. Comput. Appl. Math. 6 (1980) 19-26",
+)
+
+BS32 = Tableau(
+    name="bs32",
+    order=3,
+    error_order=2,
+    matrix=((), (F(1, 2),), (F(0), F(3, 4)), (F(2, 9), F(1, 3), F(4, 9))),
+    weights=(F(2, 9), F(1, 3), F(4, 9), F(0)),
+    embedded=(F(7, 24), F(1, 4), F(1, 3), F(1, 8)),
+    source="P. Bogacki, L. F. Shampine, Appl. Math. Lett. 2 (1989) 321-325",
+)
+
+TABLEAUS = {tableau.name: tableau for tableau in (RKF78, DP5, BS32)}

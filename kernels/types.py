@@ -1,0 +1,156 @@
+"""Structs that cross the border between host and device.
+
+World (one chain instance) is always axis 0; W worlds, n links (the world's own, ``link_count``), N the longest.
+"""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.struct
+class Model:
+    """What a chain is made of: constant during a run. Every array has shape (W,)."""
+
+    link_count: wp.array(dtype=wp.int32)  # n
+    link_length: wp.array(dtype=wp.float64)  # ℓ [m], joint to joint
+    inner_mass: wp.array(dtype=wp.float64)  # [kg], links 0, 2, 4, …
+    outer_mass: wp.array(dtype=wp.float64)  # [kg], links 1, 3, 5, …
+    inner_inertia: wp.array(dtype=wp.float64)  # [kg m²]
+    outer_inertia: wp.array(dtype=wp.float64)  # [kg m²]
+    joint_stiffness: wp.array(dtype=wp.float64)  # k [N/m]
+    joint_damping: wp.array(dtype=wp.float64)  # b [N s/m]
+    viscous_friction: wp.array(dtype=wp.float64)  # β [N m s]
+    coulomb_friction: wp.array(dtype=wp.float64)  # τ_c [N m]
+    friction_smoothing: wp.array(dtype=wp.float64)  # ω_c [rad/s]
+    gravity: wp.array(dtype=wp.float64)  # g [m/s²], along −y
+    circle_radius: wp.array(dtype=wp.float64)  # r [m], of a link's two circles
+    tangential_restitution: wp.array(dtype=wp.float64)  # e_t
+    floor_restitution: wp.array(dtype=wp.float64)  # e_fc
+    floor_friction: wp.array(dtype=wp.float64)  # μ_fc
+    chain_restitution: wp.array(dtype=wp.float64)  # e_cc
+    chain_friction: wp.array(dtype=wp.float64)  # μ_cc
+    sprocket_restitution: wp.array(dtype=wp.float64)  # e_sc
+    sprocket_friction: wp.array(dtype=wp.float64)  # μ_sc
+    sprocket_radius: wp.array(dtype=wp.float64)  # [m], the radius that link circles touch; centre at the origin
+
+
+@wp.struct
+class Program:
+    """What happens to a chain and when its run ends. Every array has shape (W,)."""
+
+    sprocket_speed: wp.array(dtype=wp.float64)  # final angular velocity Ω [rad/s], counter-clockwise positive
+    spin_up_start: wp.array(dtype=wp.float64)  # [s]
+    spin_up_time: wp.array(dtype=wp.float64)  # [s]; 0: at full speed from the start
+    hold_start: wp.array(dtype=wp.float64)  # [s]; the steady-state watch begins here
+    loop_speed: wp.array(dtype=wp.float64)  # speed along the loop that counts as steady [m/s]
+    loop_period: wp.array(dtype=wp.float64)  # length of a watch window [s]
+    release_phase: wp.array(dtype=wp.float64)  # release this fraction of a loop period after steadiness
+
+
+@wp.struct
+class State:
+    """What evolves. Shapes (W,) unless given.
+
+    A run is bit-identical however it is cut into launches: what the loop over steps remembers between two tries is
+    kept here and in the chain's scratch block, which therefore belongs to its world until the run ends.
+    """
+
+    links: wp.array3d(dtype=wp.float64)  # (W, 6, N): x, y [m], θ [rad], and their rates
+    time: wp.array(dtype=wp.float64)  # [s]
+    stop_time: wp.array(dtype=wp.float64)  # the run lands on this time exactly and ends [s]
+    stop_status: wp.array(dtype=wp.int32)  # status it then gets
+    is_fresh: wp.array(dtype=wp.int32)  # 1: links were set by the host, the scratch block is void
+    has_first_stage: wp.array(dtype=wp.int32)  # 1: the scratch block holds the first stage of the next step
+    gap: wp.array(dtype=wp.float64)  # least distance to floor or sprocket [m]
+    step: wp.array(dtype=wp.float64)  # step that the controller proposes [s]
+    last_error: wp.array(dtype=wp.float64)  # error ratio of the last accepted step (PI controller)
+    next_sample: wp.array(dtype=wp.int64)  # index of the next sample mark
+    status: wp.array(dtype=wp.int32)
+    watch: wp.array2d(dtype=wp.float64)  # (W, WATCH_ROWS): memory of the steadiness and rest watches
+    counts: wp.array2d(dtype=wp.int64)  # (W, COUNT_ROWS)
+    extremes: wp.array2d(dtype=wp.float64)  # (W, EXTREME_ROWS) [m]
+    losses: wp.array2d(dtype=wp.float64)  # (W, LOSS_ROWS) [J]
+
+
+@wp.struct
+class Record:
+    """Time series that the host drains between launches; a full one ends the launch, nothing is dropped."""
+
+    sample_count: wp.array(dtype=wp.int32)  # (W,)
+    frame_count: wp.array(dtype=wp.int32)  # (W,)
+    samples: wp.array3d(dtype=wp.float64)  # (W, capacity, SAMPLE_COLUMNS); capacity 0: not recorded
+    frames: wp.array3d(dtype=wp.float64)  # (W, capacity, 2 N): joint x …, joint y …; capacity 0: not recorded
+    frame_times: wp.array2d(dtype=wp.float64)  # (W, capacity) [s]
+
+
+@wp.struct
+class Control:
+    """Numerical settings of a launch, the same for all its worlds."""
+
+    tolerance: wp.float64  # absolute and relative
+    proportional: wp.int32  # 1: proportional-integral controller, 0: odeint's standard one
+    contact_step: wp.float64  # longest step near a contact [s]
+    skin: wp.float64  # margin of the neighbour list [m]
+    smallest_step: wp.float64  # [s]
+    step_limit: wp.int64  # tries in all
+    tries: wp.int32  # tries in this launch
+    sample_interval: wp.float64  # [s]
+    frame_every: wp.int64  # samples per frame
+    rest_speed: wp.float64  # [m/s]
+    rest_time: wp.float64  # [s]
+
+
+@wp.struct
+class Chain:
+    """One world's constants, read once per launch."""
+
+    link_count: wp.int32
+    half_length: wp.float64
+    inner_mass: wp.float64
+    outer_mass: wp.float64
+    inner_inertia: wp.float64
+    outer_inertia: wp.float64
+    joint_stiffness: wp.float64
+    joint_damping: wp.float64
+    viscous_friction: wp.float64
+    coulomb_friction: wp.float64
+    inverse_smoothing: wp.float64
+    gravity: wp.float64
+    circle_radius: wp.float64
+    tangential_restitution: wp.float64
+    floor_restitution: wp.float64
+    floor_friction: wp.float64
+    chain_restitution: wp.float64
+    chain_friction: wp.float64
+    sprocket_restitution: wp.float64
+    sprocket_friction: wp.float64
+    sprocket_radius: wp.float64
+
+
+@wp.func
+def read_chain(model: Model, world: int) -> Chain:
+    """Constants of one world."""
+    chain = Chain()
+    chain.link_count = model.link_count[world]
+    chain.half_length = wp.float64(0.5) * model.link_length[world]
+    chain.inner_mass = model.inner_mass[world]
+    chain.outer_mass = model.outer_mass[world]
+    chain.inner_inertia = model.inner_inertia[world]
+    chain.outer_inertia = model.outer_inertia[world]
+    chain.joint_stiffness = model.joint_stiffness[world]
+    chain.joint_damping = model.joint_damping[world]
+    chain.viscous_friction = model.viscous_friction[world]
+    chain.coulomb_friction = model.coulomb_friction[world]
+    chain.inverse_smoothing = wp.float64(1.0) / model.friction_smoothing[world]
+    chain.gravity = model.gravity[world]
+    chain.circle_radius = model.circle_radius[world]
+    chain.tangential_restitution = model.tangential_restitution[world]
+    chain.floor_restitution = model.floor_restitution[world]
+    chain.floor_friction = model.floor_friction[world]
+    chain.chain_restitution = model.chain_restitution[world]
+    chain.chain_friction = model.chain_friction[world]
+    chain.sprocket_restitution = model.sprocket_restitution[world]
+    chain.sprocket_friction = model.sprocket_friction[world]
+    chain.sprocket_radius = model.sprocket_radius[world]
+    return chain

@@ -1,0 +1,599 @@
+"""Parameters, scene, options and random samples: values, refusals and distributions."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import BaseModel, ValidationError
+
+from warpchain.options import (
+    Options,
+    Scene,
+    Setup,
+    check_scene,
+    contact_radius,
+    fewest_links,
+    joint_radius,
+    load_setup,
+    resolve,
+)
+from warpchain.parameters import PRESETS, InputError, Parameters, preset
+from warpchain.sampling import DRAW_LIMIT, random_generator, sample_parameters, sample_scene
+
+# Typed from Table 1 of the paper: (mantissa, uncertainty, power of ten), independently of the package.
+TABLE_1 = {
+    "link_length": (1.268, 0.001, -2),
+    "sprocket_radius": (5.56, 0.05, -2),
+    "inner_mass": (3.700, 0.002, -3),
+    "inner_inertia": (1.69, 0.01, -7),
+    "outer_mass": (3.147, 0.002, -3),
+    "outer_inertia": (1.292, 0.009, -7),
+    "viscous_friction": (9, 1, -5),
+    "coulomb_friction": (1.10, 0.09, -4),
+    "floor_restitution": (0.018, 0.004, 0),
+    "floor_friction": (0.27, 0.02, 0),
+    "gravity": (9.809, 0, 0),
+    "chain_restitution": (0.80, 0, 0),
+    "chain_friction": (0.62, 0, 0),
+    "joint_stiffness": (1, 0, 9),
+    "joint_damping": (1, 0, 3),
+    "friction_smoothing": (1, 0, -3),
+    "tangential_restitution": (0, 0, 0),
+    "sprocket_restitution": (0.01, 0, 0),
+    "sprocket_friction": (0.99, 0, 0),
+}
+UNCERTAIN = [name for name, (_, sigma, _) in TABLE_1.items() if sigma]
+
+
+def refused(section: str, values: object) -> str:
+    """Message with which the door refuses the values of one section."""
+    sections: dict[str, Any] = {"scene": {}, "options": {}, "parameters": {}, section: values}
+    with pytest.raises(InputError) as caught:
+        resolve("paper", **sections)
+    message = str(caught.value)
+    assert "\n" not in message
+    return message
+
+
+@pytest.mark.parametrize("name", TABLE_1)
+def test_table_1(name: str) -> None:
+    """Value and uncertainty of each quantity in the paper's table are those of the preset `paper`."""
+    mantissa, uncertainty, power = TABLE_1[name]
+    quantity = Parameters.quantities()[name]
+    assert getattr(preset("paper"), name) == quantity.value
+    assert quantity.value == pytest.approx(mantissa * 10.0**power, rel=1e-14)
+    assert quantity.sigma == pytest.approx(uncertainty * 10.0**power, rel=1e-14)
+
+
+def test_table_complete() -> None:
+    """The table holds the paper's quantities and the circle radius, each with symbol, unit and meaning."""
+    quantities = Parameters.quantities()
+    assert set(quantities) == {*TABLE_1, "circle_radius"} == set(Parameters.model_fields)
+    assert quantities["circle_radius"].value == 4.2e-3
+    assert [name for name, q in quantities.items() if q.source == "assumed"] == ["circle_radius"]
+    assert len({q.symbol for q in quantities.values()}) == len(quantities)
+    assert all(q.unit and q.meaning for q in quantities.values())
+
+
+def test_soft_preset_differs_in_joints_only() -> None:
+    """The preset `soft` changes the joint spring and the friction smoothing and nothing else."""
+    changed = {"joint_stiffness": 1e7, "joint_damping": 100.0, "friction_smoothing": 0.1}
+    assert preset("soft").model_dump() == {**preset("paper").model_dump(), **changed}
+
+
+def test_unknown_preset_lists_known() -> None:
+    """An unknown preset is refused with the list of those that exist."""
+    with pytest.raises(InputError, match="preset: 'papr' is unknown; presets are paper, soft"):
+        preset("papr")
+    assert list(PRESETS) == ["paper", "soft"]
+
+
+def test_parameters_have_no_defaults_and_are_frozen() -> None:
+    """A parameter set names every value, and none can be changed afterwards."""
+    with pytest.raises(ValidationError):
+        Parameters.model_validate({})
+    with pytest.raises(ValidationError):
+        preset("paper").link_length = 0.01
+
+
+def test_whole_numbers_are_numbers() -> None:
+    """An integer is taken where a number is asked for, and becomes a float."""
+    changed = preset("paper").with_values({"gravity": 10})
+    assert changed.gravity == 10.0
+    assert isinstance(changed.gravity, float)
+    assert preset("paper").gravity == 9.809
+
+
+@pytest.mark.parametrize("name", ["frequency", "phase", "clearance", "ellipse_aspect", "settle_time"])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, True, "15", None, [15.0]])
+def test_scene_numbers_strict(name: str, value: object) -> None:
+    """A number of a scene is finite and no text, truth value or list; the message names its path."""
+    assert refused("scene", {name: value}).startswith(f"scene.{name}: ")
+
+
+@pytest.mark.parametrize("name", Parameters.model_fields)
+@pytest.mark.parametrize("value", [math.nan, math.inf, True, "0.5", None])
+def test_parameter_numbers_strict(name: str, value: object) -> None:
+    """A parameter is finite and no text, truth value or nothing; the message names its path."""
+    assert refused("parameters", {name: value}).startswith(f"parameters.{name}: ")
+
+
+@pytest.mark.parametrize(
+    ("name", "accepted", "rejected"),
+    [
+        *[(name, 1e-9, 0.0) for name in ("inner_mass", "outer_mass", "inner_inertia", "outer_inertia")],
+        ("circle_radius", 1e-9, 0.0),
+        ("circle_radius", 6.339e-3, 6.34e-3),
+        ("link_length", 8.41e-3, 8.4e-3),
+        ("sprocket_radius", 1e-3, 0.0),
+        ("joint_stiffness", 1e-9, 0.0),
+        ("joint_stiffness", 1e12, 1.001e12),
+        ("friction_smoothing", 1e-9, 0.0),
+        *[
+            (name, 0.0, -1e-9)
+            for name in ("joint_damping", "viscous_friction", "coulomb_friction", "gravity")
+        ],
+        *[(f"{pair}_restitution", 0.0, -0.001) for pair in ("floor", "chain", "sprocket")],
+        *[(f"{pair}_restitution", 1.0, 1.001) for pair in ("floor", "chain", "sprocket")],
+        *[(f"{pair}_friction", 1.0, 1.001) for pair in ("floor", "chain", "sprocket")],
+        *[(f"{pair}_friction", 0.0, -0.001) for pair in ("floor", "chain", "sprocket")],
+        ("tangential_restitution", -1.0, -1.001),
+        ("tangential_restitution", 1.0, 1.001),
+    ],
+)
+def test_parameter_bounds(name: str, accepted: float, rejected: float) -> None:
+    """Each bound of a parameter admits the value at or inside it and refuses the one outside."""
+    assert getattr(preset("paper").with_values({name: accepted}), name) == accepted
+    path = "circle_radius" if name == "link_length" else name
+    assert refused("parameters", {name: rejected}).startswith(f"parameters.{path}: ")
+
+
+@pytest.mark.parametrize(
+    ("section", "values", "message"),
+    [
+        (
+            "scene",
+            {"links": 61},
+            "scene.links: 61 is odd; a chain alternates inner and outer links, so give an even number",
+        ),
+        ("scene", {"links": 2}, "scene.links: 2 is less than 4; give 4 or more"),
+        ("scene", {"links": 60.0}, "scene.links: 60.0 is of type float; give a whole number"),
+        ("scene", {"links": True}, "scene.links: True is of type bool; give a whole number"),
+        ("scene", {"frequncy": 15.0}, "scene.frequncy: unknown key; did you mean frequency?"),
+        ("scene", {"frequency": -5}, "scene.frequency: -5 is less than 0 Hz; give 0 or more"),
+        (
+            "scene",
+            {"frequency": "15 Hz"},
+            "scene.frequency: '15 Hz' has its unit written with it; give a plain number in Hz: 15",
+        ),
+        (
+            "scene",
+            {"frequency": "900 rpm"},
+            "scene.frequency: '900 rpm' has a unit written with it; convert it and give a plain number in Hz",
+        ),
+        (
+            "scene",
+            {"frequency": "15"},
+            "scene.frequency: '15' is text; give a plain number in Hz, without quotes or leading zeros",
+        ),
+        ("scene", {"frequency": "fast"}, "scene.frequency: 'fast' is text; give a plain number in Hz"),
+        ("scene", {"frequency": None}, "scene.frequency: empty; give a plain number in Hz"),
+        ("scene", {"frequency": math.nan}, "scene.frequency: nan is not finite; give a plain number in Hz"),
+        (
+            "scene",
+            {"frequency": [5, 10]},
+            "scene.frequency: [5, 10] is of type list; give a plain number in Hz",
+        ),
+        ("scene", {"phase": 1.0}, "scene.phase: 1.0 is not less than 1; give a smaller value"),
+        (
+            "scene",
+            {"clearance": "10mm"},
+            "scene.clearance: '10mm' has a unit written with it; convert it and give a plain number in m",
+        ),
+        ("scene", {"start": "elipse"}, "scene.start: 'elipse' is unknown; did you mean ellipse?"),
+        ("scene", {"start": 7}, "scene.start: 7 is unknown; give one of rest, spinning, ellipse"),
+        (
+            "scene",
+            {"clearance_of": "hanging", "start": "spinning"},
+            "scene.clearance_of: 'hanging' needs a chain that hangs, but start is 'spinning'; "
+            "give 'spinning' here, or start: rest",
+        ),
+        (
+            "scene",
+            {"frequency": -1.0, "phase": 2.0, "walk_limit": 0},
+            "scene.frequency: -1.0 is less than 0 Hz; give 0 or more (and 2 more)",
+        ),
+        ("scene", {"spin_up_time": 0}, "scene.spin_up_time: 0 is not greater than 0 s; give a positive time"),
+        ("scene", {3: 4}, "scene.3: unknown key; give one of " + ", ".join(Scene.model_fields)),
+        ("scene", [60], "scene: [60] is not a mapping; give names with values"),
+        ("scene", None, "scene: None is not a mapping; give names with values"),
+        (
+            "parameters",
+            {"inner_mass": -0.1},
+            "parameters.inner_mass: -0.1 is not greater than 0 kg; give a positive mass",
+        ),
+        (
+            "parameters",
+            {"circle_radius": 0.007},
+            "parameters.circle_radius: 0.007 is not smaller than half the link length 0.00634; "
+            "give a smaller radius",
+        ),
+        (
+            "parameters",
+            {"joint_stiffness": 1e13},
+            "parameters.joint_stiffness: 10000000000000.0 is greater than 1e+12 N/m; give 1e+12 or less",
+        ),
+        (
+            "parameters",
+            {"floor_friction": "27 %"},
+            "parameters.floor_friction: '27 %' has a unit written with it; give a plain number",
+        ),
+        (
+            "parameters",
+            {"link_lenght": 0.01},
+            "parameters.link_lenght: unknown key; did you mean link_length?",
+        ),
+        ("options", {"method": "rk45"}, "options.method: 'rk45' is unknown; give one of rkf78, dp5, bs32"),
+        ("options", {"tolerance": 1e-14}, "options.tolerance: 1e-14 is less than 1e-13; give 1e-13 or more"),
+        ("options", {"tolerance": 0.2}, "options.tolerance: 0.2 is greater than 0.1; give 0.1 or less"),
+        ("options", {"controller": "pid"}, "options.controller: 'pid' is unknown; did you mean pi?"),
+        ("options", {"step_limit": 0}, "options.step_limit: 0 is less than 1; give 1 or more"),
+        (
+            "options",
+            {"step_limit": 2**31},
+            "options.step_limit: 2147483648 is greater than 2147483647; give 2147483647 or less",
+        ),
+        (
+            "options",
+            {"self_contact": "yes"},
+            "options.self_contact: 'yes' is not a truth value; give true or false",
+        ),
+        ("options", {"self_contact": 1}, "options.self_contact: 1 is not a truth value; give true or false"),
+        ("options", {"device": "cuda"}, "options.device: 'cuda' is not supported; give cpu"),
+        ("options", {"device": 0}, "options.device: 0 is not text; give a name"),
+        ("options", {"skin": 0.0}, "options.skin: 0.0 is not greater than 0 m; give a positive skin"),
+        (
+            "options",
+            {"contact_step": 1e-13},
+            "options.smallest_step: 1e-12 is not smaller than contact_step 1e-13 s; give a smaller step",
+        ),
+    ],
+)
+def test_refusals(section: str, values: object, message: str) -> None:
+    """Each bad input is refused in one line with the field's path, the problem and the remedy."""
+    assert refused(section, values) == message
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [(name, 0) for name in ("hold_limit", "walk_limit", "ellipse_aspect")]
+)
+def test_scene_positive(name: str, value: float) -> None:
+    """Times that limit a phase, and the aspect of the ellipse, are positive."""
+    assert refused("scene", {name: value}).startswith(f"scene.{name}: 0 is not greater than 0")
+
+
+@pytest.mark.parametrize(
+    "name", ["contact_step", "skin", "smallest_step", "rest_speed", "rest_time", "record_interval"]
+)
+def test_options_positive(name: str) -> None:
+    """Steps, speeds and intervals of the options are positive."""
+    assert refused("options", {name: 0}).startswith(f"options.{name}: 0 is not greater than 0")
+
+
+def test_long_values_are_cut() -> None:
+    """A huge or many-line value does not make the message long or break its line."""
+    assert len(refused("scene", {"start": "a\n" * 1000})) < 200
+    assert len(refused("scene", {"x\ny" * 1000: 1})) < 400
+
+
+@pytest.mark.parametrize("model", [Scene, Options])
+def test_fields_described(model: type[BaseModel]) -> None:
+    """Every field of scene and options has a description, and every number a unit."""
+    for name, field in model.model_fields.items():
+        assert field.description, name
+        if field.annotation in (int, float):
+            assert isinstance(field.json_schema_extra, dict)
+            assert field.json_schema_extra["unit"], name
+
+
+def test_contact_and_pitch_radius() -> None:
+    """The sprocket radius is where circles touch, or one circle radius further out where joints ride."""
+    parameters = preset("paper")
+    contact, pitch = Scene(sprocket_radius_is="contact"), Scene(sprocket_radius_is="pitch")
+    assert contact_radius(contact, parameters) == 5.56e-2
+    assert joint_radius(contact, parameters) == pytest.approx(5.98e-2, rel=1e-14)
+    assert contact_radius(pitch, parameters) == pytest.approx(5.14e-2, rel=1e-14)
+    assert joint_radius(pitch, parameters) == 5.56e-2
+
+
+def test_pitch_needs_a_sprocket_larger_than_a_circle() -> None:
+    """With the radius of the joints, a sprocket no larger than a circle is refused; otherwise it is not."""
+    small = preset("paper").with_values({"sprocket_radius": 4.2e-3})
+    with pytest.raises(InputError, match=r"^parameters\.sprocket_radius: 0\.0042 is not greater"):
+        check_scene(Scene(sprocket_radius_is="pitch"), small)
+    check_scene(Scene(sprocket_radius_is="contact"), small)
+    check_scene(Scene(sprocket_radius_is="pitch", start="ellipse"), small)
+
+
+@pytest.mark.parametrize("sides", [6, 8, 30, 60])
+@pytest.mark.parametrize("kind", ["contact", "pitch"])
+def test_fewest_links_is_the_polygon(sides: int, kind: str) -> None:
+    """A loop of n links reaches round a sprocket just inside its regular polygon, and round no larger one."""
+    parameters = preset("paper").with_values({"link_length": 0.02, "circle_radius": 0.002})
+    scene = Scene.model_validate({"links": sides, "sprocket_radius_is": kind})
+    corner_radius = 0.02 / (2 * math.sin(math.pi / sides)) - (0.002 if kind == "contact" else 0.0)
+    inside = parameters.with_values({"sprocket_radius": corner_radius * (1 - 1e-9)})
+    outside = parameters.with_values({"sprocket_radius": corner_radius * (1 + 1e-9)})
+    check_scene(scene, inside)
+    assert fewest_links(scene, inside) == sides
+    assert fewest_links(scene, outside) == sides + 2
+    with pytest.raises(InputError, match=rf"^scene\.links: {sides} links .* give at least {sides + 2}$"):
+        check_scene(scene, outside)
+    check_scene(Scene.model_validate({**scene.model_dump(), "start": "ellipse"}), outside)
+
+
+def test_fewest_links_of_a_tiny_sprocket() -> None:
+    """Round a sprocket smaller than a link goes the shortest chain there is."""
+    parameters = preset("paper").with_values({"sprocket_radius": 1e-4})
+    assert fewest_links(Scene(links=4), parameters) == 4
+
+
+def test_chain_too_short_is_refused_at_the_door() -> None:
+    """With the values of Table 1 a chain needs 30 links to reach round the sprocket."""
+    assert refused("scene", {"links": 28}).endswith("give at least 30")
+    assert resolve("paper", scene={"links": 30}, options={}, parameters={}).scene.links == 30
+
+
+def test_resolve_completes() -> None:
+    """Values that are not given come from the preset and from the defaults."""
+    setup = resolve("soft", scene={"links": 80}, options={"method": "dp5"}, parameters={"gravity": 1.62})
+    assert setup == Setup(
+        preset="soft",
+        parameters=PRESETS["soft"].with_values({"gravity": 1.62}),
+        scene=Scene(links=80),
+        options=Options(method="dp5"),
+    )
+
+
+def written(folder: Path, text: str) -> Path:
+    """A YAML file with the text."""
+    path = folder / "walk.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_load_setup(tmp_path: Path) -> None:
+    """A YAML file gives the same setup as the same values given as arguments; 1e7 is a number."""
+    text = """
+    preset: paper
+    scene: {links: 80, frequency: 2e1, start: ellipse}
+    options:
+      tolerance: 1.0e-7
+      step_limit: 1_000_000
+      self_contact: no
+    parameters:
+      joint_stiffness: 1e7
+      tangential_restitution: -.5
+      gravity: 10
+    """
+    assert load_setup(written(tmp_path, text)) == resolve(
+        "paper",
+        scene={"links": 80, "frequency": 20.0, "start": "ellipse"},
+        options={"tolerance": 1e-7, "step_limit": 1_000_000, "self_contact": False},
+        parameters={"joint_stiffness": 1e7, "tangential_restitution": -0.5, "gravity": 10.0},
+    )
+
+
+def test_load_setup_with_empty_sections(tmp_path: Path) -> None:
+    """A section without values, or no section at all, leaves the defaults."""
+    expected = resolve("soft", scene={}, options={}, parameters={})
+    assert load_setup(written(tmp_path, "preset: soft")) == expected
+    assert load_setup(str(written(tmp_path, "preset: soft\nscene:\noptions: {}\n"))) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("preset: paper\nscene: {links: 61}", "scene.links: 61 is odd"),
+        ("preset: paper\nscene: {links: 060}", "scene.links: '060' is text; give a whole number"),
+        (
+            "preset: paper\nscene: {frequency: 1:30}",
+            "scene.frequency: '1:30' is text; give a plain number in Hz",
+        ),
+        ("preset: paper\nscene: {frequency: 15 Hz}", "scene.frequency: '15 Hz' has its unit written"),
+        ("preset: paper\nscene: {frequency: .nan}", "scene.frequency: nan is not finite"),
+        ("preset: paper\nscene: {frequency: -.inf}", "scene.frequency: -inf is not finite"),
+        ("preset: paper\nscene: {frequency: }", "scene.frequency: empty"),
+        ("preset: paper\nscene: [1]", "scene: [1] is not a mapping"),
+        ("preset: papr", "preset: 'papr' is unknown; presets are paper, soft"),
+        ("preset: [paper]", "preset: ['paper'] is unknown"),
+        ("scene: {links: 60}", "preset: missing"),
+        ("preset: paper\nsceen: {}", "'sceen': unknown key; did you mean scene?"),
+        ("preset: paper\n7: {}", "7: unknown key; give one of preset, scene, options, parameters"),
+        ("preset: paper\nscene: {links: 60, links: 80}", "{path}, line 2: key 'links' is given twice"),
+        ("preset: paper\nscene: {links: 60, 'links': 60}", "{path}, line 2: key 'links' is given twice"),
+        ("preset: paper\npreset: soft", "{path}, line 2: key 'preset' is given twice"),
+        ("preset: paper\nscene: {links: 60", "{path}, line 2: "),
+        ("preset: paper\n---\npreset: soft", "{path}, line 2: "),
+        ("preset: paper\nscene: {? [1, 2] : 3}", "{path}, line 2: "),
+        ("preset: !!python/object:os.system x", "{path}, line 1: "),
+        ("preset: !!map [a]", "{path}, line 1: "),
+        ("preset: !!int abc", "{path}: "),
+        ("preset: \x00", "{path}: "),
+        ("[" * 5000, "{path}: "),
+        ("", "{path}: no mapping at the top"),
+        ("- paper", "{path}: no mapping at the top"),
+    ],
+)
+def test_load_setup_refusals(tmp_path: Path, text: str, message: str) -> None:
+    """A bad file is refused in one line that says where and why."""
+    path = written(tmp_path, text)
+    with pytest.raises(InputError) as caught:
+        load_setup(path)
+    assert str(caught.value).startswith(message.replace("{path}", str(path)))
+    assert "\n" not in str(caught.value)
+
+
+def test_load_setup_unreadable(tmp_path: Path) -> None:
+    """A missing file, a folder and a file that is no text are refused in one line."""
+    binary = tmp_path / "binary.yaml"
+    binary.write_bytes(b"\xff\xfe\xff")
+    for path in (tmp_path / "none.yaml", tmp_path, binary):
+        with pytest.raises(InputError) as caught:
+            load_setup(path)
+        assert str(caught.value).startswith(f"{path}: ")
+        assert "\n" not in str(caught.value)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 2**128 - 1),
+    cell=st.integers(0, 2**32 - 1),
+    restitution=st.floats(0, 1),
+    friction=st.floats(0, 1),
+    mass=st.floats(1e-9, 1e-2),
+    radius=st.floats(6.3e-3, 6.3399e-3),
+)
+def test_samples_are_physical(
+    seed: int, cell: int, restitution: float, friction: float, mass: float, radius: float
+) -> None:
+    """Samples about any physical values stay physical, and what has no uncertainty stays as it is."""
+    base = preset("paper").with_values(
+        {
+            "floor_restitution": restitution,
+            "floor_friction": friction,
+            "inner_mass": mass,
+            "viscous_friction": 0.0,
+            "circle_radius": radius,
+        }
+    )
+    drawn = sample_parameters(base, random_generator(seed, cell))
+    for name, quantity in Parameters.quantities().items():
+        assert quantity.bounds.admit(getattr(drawn, name))
+        assert (getattr(drawn, name) != getattr(base, name)) == (name in UNCERTAIN)
+    assert drawn.circle_radius < drawn.link_length / 2
+
+
+def test_sample_distribution() -> None:
+    """Mean and standard deviation of 4000 draws are those of the table; quantities are independent."""
+    count = 4000
+    base = preset("soft").with_values({"floor_friction": 0.5, "link_length": 0.014})
+    rng = random_generator(1)
+    samples = [sample_parameters(base, rng) for _ in range(count)]
+    draws = np.array([[getattr(sample, name) for name in UNCERTAIN] for sample in samples])
+    for column, name in zip(draws.T, UNCERTAIN, strict=True):
+        _, uncertainty, power = TABLE_1[name]
+        sigma = uncertainty * 10.0**power
+        assert abs(column.mean() - getattr(base, name)) < 4 * sigma / math.sqrt(count), name
+        assert abs(column.std(ddof=1) / sigma - 1) < 4 / math.sqrt(2 * count), name
+    correlation = np.corrcoef(draws.T) - np.eye(len(UNCERTAIN))
+    assert np.abs(correlation).max() < 5 / math.sqrt(count)
+
+
+def test_truncation_redraws_and_never_clips() -> None:
+    """Near a bound the draws follow the half Gaussian: none at the bound, mean and spread as they must be."""
+    count, sigma = 4000, 0.02
+    base = preset("paper").with_values({"floor_friction": 0.0})
+    rng = random_generator(2)
+    friction = np.array([sample_parameters(base, rng).floor_friction for _ in range(count)])
+    assert friction.min() > 0
+    assert len(np.unique(friction)) == count
+    mean, spread = sigma * math.sqrt(2 / math.pi), sigma * math.sqrt(1 - 2 / math.pi)
+    assert abs(friction.mean() - mean) < 4 * spread / math.sqrt(count)
+    assert abs(friction.std() / spread - 1) < 0.06
+
+
+def test_draw_order() -> None:
+    """Quantities are drawn in the order of the table, one Gaussian each while none is out of bounds."""
+    base = preset("paper")
+    drawn = sample_parameters(base, random_generator(3, 1, 2))
+    rng = np.random.default_rng(np.random.SeedSequence(3, spawn_key=(1, 2)))
+    for name, quantity in Parameters.quantities().items():
+        if quantity.sigma:
+            assert getattr(drawn, name) == rng.normal(quantity.value, quantity.sigma), name
+    assert [name for name, quantity in Parameters.quantities().items() if quantity.sigma] == [
+        "link_length",
+        "sprocket_radius",
+        "inner_mass",
+        "outer_mass",
+        "inner_inertia",
+        "outer_inertia",
+        "viscous_friction",
+        "coulomb_friction",
+        "floor_restitution",
+        "floor_friction",
+    ]
+
+
+def test_redraw_takes_the_next_number_of_the_stream() -> None:
+    """A draw out of bounds is followed by the next one of the same stream."""
+    base = preset("paper").with_values({"floor_friction": 0.0})
+    rejections = 0
+    for sample in range(20):
+        drawn = sample_parameters(base, random_generator(5, 0, sample))
+        numbers = iter(random_generator(5, 0, sample).standard_normal(100))
+        for _ in range(9):
+            next(numbers)
+        while (value := 0.02 * float(next(numbers))) < 0:
+            rejections += 1
+        assert drawn.floor_friction == value
+    assert rejections > 5
+
+
+def test_hopeless_draw_is_an_error() -> None:
+    """A mean far outside the bounds ends in a clear error after a limited number of draws."""
+    base = Parameters.model_construct(**{**preset("paper").model_dump(), "inner_mass": -1.0})
+    with pytest.raises(InputError, match=rf"^parameters\.inner_mass: {DRAW_LIMIT} draws about -1\.0 kg"):
+        sample_parameters(base, random_generator(0))
+
+
+def test_samples_depend_on_their_name_only() -> None:
+    """The same (seed, cell, sample) gives the same sample in any order; another name gives another."""
+    base = preset("paper")
+    names = [(seed, cell, sample) for seed in (0, 7) for cell in (0, 1) for sample in (0, 1, 2)]
+    forwards = {name: sample_parameters(base, random_generator(*name)) for name in names}
+    backwards = {name: sample_parameters(base, random_generator(*name)) for name in reversed(names)}
+    assert forwards == backwards
+    assert len({tuple(p.model_dump().values()) for p in forwards.values()}) == len(names)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((-1,), "seed: -1 "),
+        ((2**128,), "seed: "),
+        ((None,), "seed: None "),
+        ((1.0,), "seed: 1.0 "),
+        ((True,), "seed: True "),
+        ((0, -1), "cell: -1 "),
+        ((0, 2**32), "cell: "),
+        ((0, 0, -1), "sample: -1 "),
+        ((0, 0, 2**32), "sample: "),
+    ],
+)
+def test_generator_refusals(arguments: tuple[Any, ...], message: str) -> None:
+    """A seed or index that would not name one stream is refused."""
+    with pytest.raises(InputError) as caught:
+        random_generator(*arguments)
+    assert str(caught.value).startswith(message)
+
+
+def test_sample_scene() -> None:
+    """Phase and clearance are uniform in their intervals; the rest of the scene stays."""
+    count = 4000
+    base = Scene(links=80, frequency=20.0, start="spinning")
+    rng = random_generator(4)
+    samples = [sample_scene(base, rng) for _ in range(count)]
+    kept = base.model_dump(exclude={"phase", "clearance"})
+    assert all(sample.model_dump(exclude={"phase", "clearance"}) == kept for sample in samples)
+    for name, low, high in (("phase", 0.0, 1.0), ("clearance", 0.005, 0.015)):
+        drawn = np.array([getattr(sample, name) for sample in samples])
+        spread = (high - low) / math.sqrt(12)
+        assert low <= drawn.min() < low + 0.01 * (high - low)
+        assert high - 0.01 * (high - low) < drawn.max() < high
+        assert abs(drawn.mean() - (low + high) / 2) < 4 * spread / math.sqrt(count)
+        assert abs(drawn.std() / spread - 1) < 0.05

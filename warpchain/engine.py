@@ -1,0 +1,262 @@
+"""The one module that launches kernels: a batch of chains in arrays on a device, carried on in bounded launches."""
+
+import functools
+import importlib.metadata
+import platform
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpchain.kernels import layout
+from warpchain.kernels.broadphase import list_layout
+from warpchain.kernels.driver import Features, make_advance
+from warpchain.kernels.tableaus import TABLEAUS
+from warpchain.kernels.types import Control, Model, Program, Record, State
+from warpchain.options import Options
+from warpchain.parameters import Parameters
+from warpchain.status import Status
+
+Array = NDArray[np.float64]
+
+FIRST_STEP = 1e-7  # s; the controller grows it fivefold per step
+LAUNCH_SECONDS = 0.1  # how long a launch should take: the grain of progress and of Ctrl-C
+CAPACITY_SAMPLES = 512
+CAPACITY_FRAMES = 64
+
+_MODEL_FIELDS = [name for name in Parameters.model_fields if name != "sprocket_radius"]
+
+
+@functools.cache
+def start_device(device: str) -> wp.Device:
+    """Start Warp, quietly, and return the device.
+
+    Raises:
+        ValueError: Warp knows no such device on this machine.
+    """
+    wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING) if hasattr(wp, "LOG_WARNING") else wp.config.log_level
+    wp.init()
+    return wp.get_device(device)
+
+
+def versions() -> dict[str, str]:
+    """Versions of all that may change a number: for the provenance of a result."""
+    packages = ("warpchain", "warp-lang", "numpy")
+    return {name: importlib.metadata.version(name) for name in packages} | {"python": platform.python_version()}
+
+
+class Batch:
+    """W chains on one device, each with parameters, state and statistics of its own.
+
+    Arrays are filled and read through the methods; between launches the host may look at any world.
+    """
+
+    def __init__(
+        self,
+        parameters: Sequence[Parameters],
+        links: Sequence[int],
+        contact_radius: Sequence[float],
+        options: Options,
+        *,
+        keeps_samples: bool,
+        keeps_frames: bool,
+        frame_every: int = 1,
+    ) -> None:
+        """Allocate a batch; all worlds are idle (status FINISHED) until loaded.
+
+        Args:
+            parameters: One per world.
+            links: Number of links of each world.
+            contact_radius: Radius [m] at which each world's sprocket is touched.
+            options: Shared by all worlds.
+            keeps_samples: Keep the time series.
+            keeps_frames: Keep all joint positions at every ``frame_every``-th sample.
+            frame_every: Samples per frame.
+        """
+        self.options = options
+        self.device = start_device(options.device)
+        self.links = list(links)
+        worlds, longest = len(self.links), max(self.links)
+        self.columns = layout.padded_width(longest)
+        rows = layout.scratch_rows(TABLEAUS[options.method].stages)
+
+        self.model = Model()
+        self.model.link_count = self._array(np.asarray(links, dtype=np.int32))
+        for name in _MODEL_FIELDS:
+            setattr(self.model, name, self._array(np.array([getattr(p, name) for p in parameters], dtype=float)))
+        self.model.sprocket_radius = self._array(np.asarray(contact_radius, dtype=float))
+
+        self.program = Program()
+        for name in Program.vars:
+            setattr(self.program, name, self._array(np.zeros(worlds)))
+
+        self.state = State()
+        self.state.links = self._array(np.zeros((worlds, 6, longest)))
+        for name in ("time", "stop_time", "gap", "step", "last_error"):
+            setattr(self.state, name, self._array(np.zeros(worlds)))
+        for name in ("stop_status", "is_fresh", "has_first_stage"):
+            setattr(self.state, name, self._array(np.zeros(worlds, dtype=np.int32)))
+        self.state.status = self._array(np.full(worlds, int(Status.FINISHED), dtype=np.int32))
+        self.state.next_sample = self._array(np.zeros(worlds, dtype=np.int64))
+        self.state.watch = self._array(np.zeros((worlds, layout.WATCH_ROWS)))
+        self.state.counts = self._array(np.zeros((worlds, layout.COUNT_ROWS), dtype=np.int64))
+        self.state.extremes = self._array(np.zeros((worlds, layout.EXTREME_ROWS)))
+        self.state.losses = self._array(np.zeros((worlds, layout.LOSS_ROWS)))
+
+        samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * keeps_frames
+        self.record = Record()
+        self.record.sample_count = self._array(np.zeros(worlds, dtype=np.int32))
+        self.record.frame_count = self._array(np.zeros(worlds, dtype=np.int32))
+        self.record.samples = self._array(np.zeros((worlds, samples, layout.SAMPLE_COLUMNS)))
+        self.record.frames = self._array(np.zeros((worlds, frames, 2 * longest)))
+        self.record.frame_times = self._array(np.zeros((worlds, frames)))
+
+        self.control = Control()
+        self.control.tolerance = options.tolerance
+        self.control.proportional = int(options.controller == "pi")
+        self.control.contact_step = options.contact_step
+        self.control.skin = options.skin
+        self.control.smallest_step = options.smallest_step
+        self.control.step_limit = options.step_limit
+        self.control.tries = 500
+        self.control.sample_interval = options.record_interval
+        self.control.frame_every = frame_every
+        self.control.rest_speed = options.rest_speed
+        self.control.rest_time = options.rest_time
+
+        self.scratch = wp.zeros((worlds, rows, self.columns), dtype=wp.float64, device=self.device)
+        self.lists = wp.zeros((worlds, list_layout(self.columns).size), dtype=wp.int32, device=self.device)
+
+    def _array(self, values: NDArray[np.generic]) -> wp.array:
+        return wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device=self.device)
+
+    def load(
+        self, world: int, position: Array, velocity: Array, *, stop_time: float, stop_status: Status
+    ) -> None:
+        """Set a world's chain and start its clock at zero; its statistics and watches start anew.
+
+        Args:
+            world: Index.
+            position: (n, 3): x, y [m], θ [rad].
+            velocity: (n, 3), their rates.
+            stop_time: The run lands on this time [s] and ends.
+            stop_status: Status it then has.
+        """
+        state = self.state
+        n = self.links[world]
+        state.links.numpy()[world, :3, :n] = position.T
+        state.links.numpy()[world, 3:, :n] = velocity.T
+        for array in (state.time, state.gap, state.counts, state.extremes, state.losses, state.next_sample):
+            array.numpy()[world] = 0
+        state.watch.numpy()[world] = 0
+        state.watch.numpy()[world, [layout.WINDOW_START, layout.REST_SINCE]] = -1.0
+        state.watch.numpy()[world, layout.LAST_FLOOR_IMPULSE] = -np.inf
+        state.has_first_stage.numpy()[world] = 0
+        state.is_fresh.numpy()[world] = 1
+        state.step.numpy()[world] = FIRST_STEP
+        state.last_error.numpy()[world] = 1.0
+        self.record.sample_count.numpy()[world] = 0
+        self.record.frame_count.numpy()[world] = 0
+        self.resume(world, stop_time, stop_status)
+
+    def resume(self, world: int, stop_time: float, stop_status: Status) -> None:
+        """Let a world that has stopped run on to a later time, as if it had not stopped there."""
+        self.state.stop_time.numpy()[world] = stop_time
+        self.state.stop_status.numpy()[world] = int(stop_status)
+        self.state.status.numpy()[world] = int(Status.RUNNING)
+
+    def set_program(self, world: int, **values: float) -> None:
+        """Set fields of :class:`Program` of a world."""
+        for name, value in values.items():
+            getattr(self.program, name).numpy()[world] = value
+
+    def features(self, *, fixed_body: str, watch: str, broad_phase: str = "grid") -> Features:
+        """Kernel features for these worlds."""
+        return Features(
+            method=self.options.method,
+            columns=self.columns,
+            fixed_body=fixed_body,
+            self_contact=self.options.self_contact,
+            broad_phase=broad_phase,
+            watch=watch,
+        )
+
+    def run(
+        self, worlds: Sequence[int], features: Features, after_launch: Callable[[], None] | None = None
+    ) -> None:
+        """Carry worlds on until none of them is running.
+
+        Args:
+            worlds: Indices.
+            features: What the kernel is compiled for.
+            after_launch: Called after each launch; it drains the record. Results do not depend on how a run is cut
+                into launches.
+        """
+        kernel = make_advance(features)
+        wp.load_module(kernel.module, device=self.device)
+        status = self.state.status.numpy()
+        while True:
+            active = [world for world in worlds if status[world] == Status.RUNNING]
+            if not active:
+                return
+            indices = self._array(np.asarray(active, dtype=np.int32))
+            before = time.perf_counter()
+            arrays = [indices, self.model, self.program, self.state, self.record, self.scratch, self.lists]
+            wp.launch(kernel, dim=len(active), inputs=[*arrays, self.control], device=self.device)
+            wp.synchronize_device(self.device)
+            seconds = time.perf_counter() - before
+            if seconds < LAUNCH_SECONDS / 2:
+                self.control.tries = min(2 * self.control.tries, 1_000_000)
+            elif seconds > 2 * LAUNCH_SECONDS:
+                self.control.tries = max(self.control.tries // 2, 1)
+            if after_launch is not None:
+                after_launch()
+
+    def position(self, world: int) -> Array:
+        """(n, 3): x, y [m], θ [rad]."""
+        return self.state.links.numpy()[world, :3, : self.links[world]].T.copy()
+
+    def velocity(self, world: int) -> Array:
+        """(n, 3): their rates."""
+        return self.state.links.numpy()[world, 3:, : self.links[world]].T.copy()
+
+    def status(self, world: int) -> Status:
+        """How the world stands."""
+        return Status(int(self.state.status.numpy()[world]))
+
+    def time(self, world: int) -> float:
+        """Time [s] since loading."""
+        return float(self.state.time.numpy()[world])
+
+    def counts(self, world: int) -> dict[str, int]:
+        """Counters since loading."""
+        row = self.state.counts.numpy()[world]
+        names = ("accepted", "rejected", "floor", "sprocket", "self", "bounces", "list_builds")
+        return {name: int(value) for name, value in zip(names, row, strict=True)}
+
+    def extremes(self, world: int) -> dict[str, float]:
+        """Greatest joint opening and depths [m] since loading."""
+        row = self.state.extremes.numpy()[world]
+        return {name: float(v) for name, v in zip(("opening", "floor", "sprocket", "self"), row, strict=True)}
+
+    def losses(self, world: int) -> dict[str, float]:
+        """Energy [J] lost since loading, by cause."""
+        row = self.state.losses.numpy()[world]
+        names = ("joint_friction", "joint_damping", "floor", "sprocket", "self_contact")
+        return {name: float(v) for name, v in zip(names, row, strict=True)}
+
+    def drain_samples(self, world: int) -> Array:
+        """Take the time series kept so far: (t, SAMPLE_COLUMNS), see :mod:`warpchain.kernels.layout`."""
+        count = int(self.record.sample_count.numpy()[world])
+        self.record.sample_count.numpy()[world] = 0
+        return self.record.samples.numpy()[world, :count].copy()
+
+    def drain_frames(self, world: int) -> tuple[Array, Array]:
+        """Take the frames kept so far: times (f,) [s], joint positions (f, n, 2) [m]."""
+        count = int(self.record.frame_count.numpy()[world])
+        self.record.frame_count.numpy()[world] = 0
+        n = self.links[world]
+        rows = self.record.frames.numpy()[world, :count, : 2 * n].reshape(count, 2, n)
+        return self.record.frame_times.numpy()[world, :count].copy(), rows.transpose(0, 2, 1).copy()

@@ -1,0 +1,209 @@
+"""Closed chains of rigid links laid along a curve, at rest or circulating.
+
+Joints must close the loop to rounding: at k = 1e9 N/m an opening of 0.1 mm holds 5 J. So the joints' places on the
+curve and the curve's size are solved for together (Newton), and the circulating velocities are the exact rigid motion
+that carries the joints along the curve: the derivative of that solution with respect to the first joint's place.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CurvePoints:
+    """Points of a family of closed curves P(s, size), which are run through clockwise.
+
+    Attributes:
+        point: P, shape (m, 2) [m].
+        along: ∂P/∂s, shape (m, 2).
+        growth: ∂P/∂size at fixed s, shape (m, 2).
+    """
+
+    point: Array
+    along: Array
+    growth: Array
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A family of closed curves.
+
+    Attributes:
+        points: Maps (s, size) to points; s of shape (m,), any real number before ``period``.
+        period: Length of the parameter's period as a function of size, and its derivative.
+        first_size: A starting value for Newton's method, given the chain's length [m].
+    """
+
+    points: Callable[[Array, float], CurvePoints]
+    period: Callable[[float], tuple[float, float]]
+    first_size: Callable[[float], float]
+
+
+def stadium(radius: float) -> Curve:
+    """Upper half circle about the origin, two vertical straights, lower half circle: a chain hung on a sprocket.
+
+    Args:
+        radius: Radius of both half circles [m]. The curve's size is the length of a straight [m], s its arc length
+            from the top.
+    """
+    quarter = np.pi * radius / 2
+
+    def points(s: Array, size: float) -> CurvePoints:
+        turn = 4 * quarter + 2 * size
+        s = np.mod(s, turn)
+        right, lower, left, last = quarter, quarter + size, 3 * quarter + size, 3 * quarter + 2 * size
+        piece = np.digitize(s, [right, lower, left, last])
+        zero, one = np.zeros_like(s), np.ones_like(s)
+        first = s / radius
+        below = (s - lower) / radius
+        final = (s - last) / radius
+
+        def pick(*rows: tuple[Array, Array]) -> Array:
+            x = np.choose(piece, [row[0] for row in rows])
+            y = np.choose(piece, [row[1] for row in rows])
+            return np.stack([x, y], axis=1)
+
+        return CurvePoints(
+            point=pick(
+                (radius * np.sin(first), radius * np.cos(first)),
+                (radius * one, -(s - right)),
+                (radius * np.cos(below), -size - radius * np.sin(below)),
+                (-radius * one, -size + (s - left)),
+                (-radius * np.cos(final), radius * np.sin(final)),
+            ),
+            along=pick(
+                (np.cos(first), -np.sin(first)),
+                (zero, -one),
+                (-np.sin(below), -np.cos(below)),
+                (zero, one),
+                (np.sin(final), np.cos(final)),
+            ),
+            growth=pick(
+                (zero, zero),
+                (zero, zero),
+                (np.sin(below), np.cos(below) - 1),
+                (zero, -2 * one),
+                (-2 * np.sin(final), -2 * np.cos(final)),
+            ),
+        )
+
+    return Curve(
+        points=points,
+        period=lambda size: (4 * quarter + 2 * size, 2.0),
+        first_size=lambda length: max((length - 4 * quarter) / 2, 0.0),
+    )
+
+
+def ellipse(aspect: float) -> Curve:
+    """An ellipse about the origin.
+
+    Args:
+        aspect: Height over width. The curve's size is the geometric mean of its semi-axes [m], s the angle of its
+            parametric form from the top [rad].
+    """
+    wide, high = 1 / np.sqrt(aspect), np.sqrt(aspect)
+
+    def points(s: Array, size: float) -> CurvePoints:
+        unit = np.stack([wide * np.sin(s), high * np.cos(s)], axis=1)
+        along = np.stack([wide * np.cos(s), -high * np.sin(s)], axis=1)
+        return CurvePoints(point=size * unit, along=size * along, growth=unit)
+
+    angles = np.linspace(0, 2 * np.pi, 4096, endpoint=False)
+    unit_length = float(np.mean(np.hypot(wide * np.cos(angles), high * np.sin(angles))) * 2 * np.pi)
+    return Curve(
+        points=points, period=lambda size: (2 * np.pi, 0.0), first_size=lambda length: length / unit_length
+    )
+
+
+def lay_chain(
+    curve: Curve, links: int, link_length: float, speed: float = 0.0, phase: float = 0.0
+) -> tuple[Array, Array]:
+    """Lay a closed chain along a curve.
+
+    Args:
+        curve: Where the joints lie.
+        links: Number of links n.
+        link_length: ℓ [m].
+        speed: Mean speed of the joints along the curve, clockwise [m/s].
+        phase: Place of the first joint as a fraction of the curve's period.
+
+    Returns:
+        position (n, 3): x, y [m], θ [rad] of the links, numbered clockwise, and velocity (n, 3), their rates.
+
+    Raises:
+        ValueError: No closed chain of these links fits the curve.
+    """
+    size = curve.first_size(links * link_length)
+    s = curve.period(size)[0] * (phase + np.arange(links) / links)
+    if curve.period(size)[1] == 0.0:  # equal steps of the parameter are not equal chords: even them out first
+        s = _spread_evenly(curve, size, s)
+    jacobian = np.zeros((links, links))
+    rows = np.arange(links)
+    for _ in range(50):
+        period, period_growth = curve.period(size)
+        s[0] = phase * period
+        here = curve.points(s, size)
+        following = curve.points(np.append(s[1:], s[0] + period), size)
+        chord = following.point - here.point
+        residual = np.sum(chord**2, axis=1) - link_length**2
+        to_here = -2 * np.sum(chord * here.along, axis=1)
+        to_following = 2 * np.sum(chord * following.along, axis=1)
+        to_size = 2 * np.sum(chord * (following.growth - here.growth), axis=1)
+        # the first joint moves with the period, the last chord ends on it one period later
+        to_size[0] += to_here[0] * phase * period_growth
+        to_size[-1] += to_following[-1] * (1 + phase) * period_growth
+        # unknowns: s[1:], then the size
+        jacobian[:] = 0.0
+        jacobian[rows[1:], rows[1:] - 1] = to_here[1:]
+        jacobian[rows[:-1], rows[:-1]] += to_following[:-1]
+        jacobian[:, -1] = to_size
+        change = np.linalg.solve(jacobian, -residual)
+        s[1:] += change[:-1]
+        size += float(change[-1])
+        if np.max(np.abs(residual)) < 1e-14 * link_length**2 or np.max(np.abs(change)) < 1e-16 * period:
+            break
+    joints = curve.points(s, size)
+    closed = np.linalg.norm(joints.point - np.roll(joints.point, 1, axis=0), axis=1)
+    if not np.allclose(closed, link_length, rtol=1e-9, atol=0.0):
+        raise ValueError(f"a closed chain of {links} links of {link_length} m does not fit this curve")
+    # rigid motion along the curve: s[0] moves at unit rate, the chords keep their lengths
+    drive = np.zeros(links)
+    drive[0] = -to_here[0]
+    drive[-1] -= to_following[-1]
+    rates = np.linalg.solve(jacobian, drive)
+    first_rate = 1.0 + phase * period_growth * rates[-1]
+    joint_rate = np.append(first_rate, rates[:-1])[:, None] * joints.along + rates[-1] * joints.growth
+    joint_rate *= speed / np.mean(np.linalg.norm(joint_rate, axis=1))
+    return links_between(joints.point, joint_rate)
+
+
+def links_between(joints: Array, joint_rate: Array) -> tuple[Array, Array]:
+    """Links that span the joints: link i from joint i − 1 to joint i.
+
+    Args:
+        joints: (n, 2) [m].
+        joint_rate: (n, 2) [m/s], keeping all distances of neighbours.
+
+    Returns:
+        position (n, 3), velocity (n, 3).
+    """
+    before, before_rate = np.roll(joints, 1, axis=0), np.roll(joint_rate, 1, axis=0)
+    span, span_rate = joints - before, joint_rate - before_rate
+    angle = np.unwrap(np.arctan2(span[:, 1], span[:, 0]))
+    spin = (span[:, 0] * span_rate[:, 1] - span[:, 1] * span_rate[:, 0]) / np.sum(span**2, axis=1)
+    position = np.column_stack([(joints + before) / 2, angle])
+    velocity = np.column_stack([(joint_rate + before_rate) / 2, spin])
+    return position, velocity
+
+
+def _spread_evenly(curve: Curve, size: float, s: Array) -> Array:
+    """Parameters at equal arc lengths, starting at s[0]."""
+    fine = s[0] + np.linspace(0.0, curve.period(size)[0], 8192)
+    speed = np.linalg.norm(curve.points(fine, size).along, axis=1)
+    arc = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(fine))])
+    return np.interp(arc[-1] * np.arange(len(s)) / len(s), arc, fine)

@@ -1,0 +1,67 @@
+"""How a run ended.
+
+Kernels and saved files hold these codes as plain integers, so the numbers are fixed: a code is never renumbered
+or reused, and a new one gets the next number.
+"""
+
+from enum import IntEnum
+from typing import Final
+
+
+class Status(IntEnum):
+    """What ended the run of one chain; the first error of a run is the one that stays."""
+
+    RUNNING = 0
+    AT_REST = 1
+    FINISHED = 2
+    TIME_LIMIT = 3
+    STEP_LIMIT = 4
+    STEP_TOO_SMALL = 5
+    NOT_FINITE = 6
+    NOT_STEADY = 7
+    LIST_OVERFLOW = 8
+
+    @property
+    def label(self) -> str:
+        """Name in files and tables, such as `at_rest`."""
+        return self.name.lower()
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run ended as it should: at rest, or at the end of its duration."""
+        return self in (Status.AT_REST, Status.FINISHED)
+
+    @property
+    def sentence(self) -> str:
+        """What happened and, after a failure, what to try."""
+        return _SENTENCES[self]
+
+
+_SENTENCES: Final[dict[Status, str]] = {
+    Status.RUNNING: "The run has not ended yet; let it go on.",
+    Status.AT_REST: "The chain came to rest.",
+    Status.FINISHED: "The simulation reached its duration.",
+    Status.TIME_LIMIT: (
+        "The chain was still moving at the time limit of the walk; raise scene.walk_limit, "
+        "or give the floor more friction if the chain slides without end."
+    ),
+    Status.STEP_LIMIT: (
+        "The walk used up its steps; raise options.step_limit, loosen options.tolerance or soften the joints."
+    ),
+    Status.STEP_TOO_SMALL: (
+        "The error stayed too large down to options.smallest_step; loosen options.tolerance, "
+        "or lower joint_stiffness and joint_damping or raise friction_smoothing."
+    ),
+    Status.NOT_FINITE: (
+        "A position or velocity stopped being a finite number; tighten options.tolerance, "
+        "or bring extreme parameters closer to those of a preset."
+    ),
+    Status.NOT_STEADY: (
+        "The chain did not circulate steadily on the sprocket within scene.hold_limit; "
+        "raise that limit or scene.spin_up_time, or lower scene.frequency."
+    ),
+    Status.LIST_OVERFLOW: (
+        "More links came close to one another than the neighbour list can hold; "
+        "lower options.skin or circle_radius."
+    ),
+}
