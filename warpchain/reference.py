@@ -137,7 +137,7 @@ def linear_momentum(velocity: Array, parameters: Parameters) -> Array:
 def angular_momentum(position: Array, velocity: Array, parameters: Parameters) -> float:
     """Σ m (X − X_cm) × (Ẋ − Ẋ_cm) + I θ̇, about the chain's centre of mass, kg m²/s, anticlockwise > 0.
 
-    Free flight keeps it for b = 0. A damper acts across an open joint, so each joint adds the torque b C × Ċ.
+    Free flight keeps it for b = 0. A damper acts across an open joint, so each joint adds the torque −b C × Ċ.
     """
     n = len(position)
     mass = link_masses(n, parameters)
@@ -176,7 +176,7 @@ def solve_flight(
 
     Raises:
         ImportError: SciPy is not installed.
-        ValueError: `times` is not a strictly increasing sequence.
+        ValueError: `times` is not a strictly increasing sequence, or the start is not finite.
         RuntimeError: the solver failed.
     """
     try:

@@ -1,8 +1,9 @@
 """What a run returns, and the HDF5 file that keeps a walk.
 
-Unit and meaning of every field stand beside it, once; the file repeats them on each dataset. A saved walk has the
-groups `series` (time series), `frames` (joint positions), `summary` (numbers) and `parameters` (the chain's
-quantities with symbols); the root attributes `setup`, `seed` and `versions` (JSON) say how to make it again.
+Unit and meaning of every field stand beside it, once; the file repeats them on each dataset. A saved walk
+has the groups `series` (time series), `frames` (joint positions), `summary` (numbers) and `parameters` (the
+chain's quantities with their symbols); its attributes `setup`, `seed` and `versions`, in JSON, say how to
+make it again.
 """
 
 import dataclasses
@@ -11,10 +12,10 @@ import math
 import os
 import secrets
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,75 +50,101 @@ ENERGIES: Final = {
     "joint_damping": "energy lost to the damping of the joint springs",
     "floor": "energy lost in impacts on the floor",
     "self_contact": "energy lost in impacts of links on one another",
-    "residual": "energy at release, less that at the end and all losses; integration error",
+    "residual": "energy at release, less that at the end and all losses: the error of the integration",
 }
-"""Keys of `WalkResult.energy`; losses count as positive."""
+"""Keys of `WalkResult.energy`. Losses count as positive."""
 
 
-def _quantity(unit: str, meaning: str, path: str = "", keys: Mapping[str, str] | None = None) -> Any:
-    """A field with its unit and meaning; `path` is where a file keeps it, `keys` what a dictionary must hold."""
-    metadata = {"unit": unit, "meaning": meaning, "path": path, "keys": keys}
-    return field(metadata=metadata, repr=path.startswith("summary/") and keys is None)
+@dataclass(frozen=True)
+class Stored:
+    """Annotation of a field that a file keeps.
+
+    Attributes:
+        path: dataset in the file, or group when the field is a dictionary.
+        unit: SI unit, "1" for pure numbers.
+        meaning: one line saying what the numbers are.
+        keys: for a dictionary, its keys and their meanings.
+    """
+
+    path: str
+    unit: str
+    meaning: str
+    keys: Mapping[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class WalkResult:
     """One walk, from the release to its end: t instants and f frames of a chain of n links.
 
-    Time counts from the release, y from the floor upwards. Unit and meaning of each field are its metadata.
+    Time counts from the release, x from wherever the release put it, y from the floor upwards. The other
+    fields say their units and shapes themselves. `setup` is complete; `seed` is that of the parameters'
+    random draw, None if nothing was drawn; `versions` names the software.
 
     Raises:
-        ValueError: arrays or dictionaries don't have the shapes or keys given beside the fields.
+        ValueError: an array has another shape, or a dictionary other keys, than stands beside its field.
     """
 
     status: Status
-    dx: float = _quantity(
-        "m", "x of the centre of mass at rest less x of the sprocket; NaN unless at rest", "summary/dx"
-    )
-    walk_time: float = _quantity("s", "from release to the end", "summary/walk_time")
-    simulated_time: float = _quantity("s", "of all phases, the sprocket's included", "summary/simulated_time")
-    wall_time: float = _quantity("s", "that the computer needed", "summary/wall_time")
-    bounces: int = _quantity("1", "number of bounces off the floor", "summary/bounces")
-    steps_accepted: int = _quantity("1", "accepted steps of all phases", "summary/steps_accepted")
-    steps_rejected: int = _quantity("1", "rejected steps of all phases", "summary/steps_rejected")
-    impulses: dict[str, int] = _quantity("1", "number of impulses", "summary/impulses", CONTACTS)
-    greatest_opening: float = _quantity(
-        "m", "greatest distance between the two ends that a joint holds together", "summary/greatest_opening"
-    )
-    greatest_penetration: dict[str, float] = _quantity(
-        "m", "greatest overlap", "summary/greatest_penetration", CONTACTS
-    )
-    energy: dict[str, float] = _quantity("J", "energy of the walk", "summary/energy", ENERGIES)
-    sprocket_center: Array | None = _quantity(
-        "m", "centre of the sprocket, shape (2,); absent without sprocket", "summary/sprocket_center"
-    )
-    sprocket_radius: float = _quantity(
-        "m", "radius of the sprocket that the links touch", "summary/sprocket_radius"
-    )
-    setup: Setup = _quantity("", "parameters, scene and options, complete")
-    seed: int | None = _quantity("", "seed that the parameters were drawn with, if any")
-    versions: dict[str, str] = _quantity("", "versions of the software, by name")
-    time: Array = _quantity("s", "time since release, shape (t,)", "series/time")
-    center: Array = _quantity("m", "centre of mass x, y, shape (t, 2)", "series/center")
-    center_velocity: Array = _quantity(
-        "m/s", "velocity of the centre of mass x, y, shape (t, 2)", "series/center_velocity"
-    )
-    kinetic_energy: Array = _quantity("J", "kinetic energy, shape (t,)", "series/kinetic_energy")
-    gravitational_energy: Array = _quantity(
-        "J", "energy in the gravity field, shape (t,)", "series/gravitational_energy"
-    )
-    spring_energy: Array = _quantity("J", "energy of the joint springs, shape (t,)", "series/spring_energy")
-    lowest: Array = _quantity("m", "height of the lowest point of the circles, shape (t,)", "series/lowest")
-    rms_speed: Array = _quantity("m/s", "root mean square speed of the links, shape (t,)", "series/rms_speed")
-    frame_time: Array = _quantity("s", "time since release, shape (f,)", "frames/time")
-    frame_joints: Array = _quantity(
-        "m", "joints x, y, shape (f, n, 2); joint i ends link i, even links are inner", "frames/joints"
-    )
+    dx: Annotated[
+        float,
+        Stored("summary/dx", "m", "x of the centre of mass less x of the sprocket; NaN unless at rest"),
+    ]
+    walk_time: Annotated[float, Stored("summary/walk_time", "s", "from the release to the end")]
+    simulated_time: Annotated[
+        float, Stored("summary/simulated_time", "s", "simulated, the phases before the release included")
+    ]
+    wall_time: Annotated[float, Stored("summary/wall_time", "s", "that the computer took")]
+    bounces: Annotated[int, Stored("summary/bounces", "1", "number of bounces off the floor")]
+    steps_accepted: Annotated[int, Stored("summary/steps_accepted", "1", "accepted steps, all phases")]
+    steps_rejected: Annotated[int, Stored("summary/steps_rejected", "1", "rejected steps, all phases")]
+    impulses: Annotated[dict[str, int], Stored("summary/impulses", "1", "number of impulses", CONTACTS)]
+    greatest_opening: Annotated[
+        float, Stored("summary/greatest_opening", "m", "greatest distance between two joined link ends")
+    ]
+    greatest_penetration: Annotated[
+        dict[str, float], Stored("summary/greatest_penetration", "m", "greatest overlap", CONTACTS)
+    ]
+    energy: Annotated[dict[str, float], Stored("summary/energy", "J", "ledger of the walk", ENERGIES)]
+    sprocket_center: Annotated[
+        Array | None,
+        Stored("summary/sprocket_center", "m", "centre of the sprocket, shape (2,); absent without one"),
+    ]
+    sprocket_radius: Annotated[
+        float, Stored("summary/sprocket_radius", "m", "radius of the sprocket that links touch")
+    ]
+    setup: Setup
+    seed: int | None
+    versions: dict[str, str]
+    time: Annotated[Array, Stored("series/time", "s", "time since the release, shape (t,)")]
+    center: Annotated[Array, Stored("series/center", "m", "centre of mass x, y, shape (t, 2)")]
+    center_velocity: Annotated[
+        Array, Stored("series/center_velocity", "m/s", "velocity of the centre of mass x, y, shape (t, 2)")
+    ]
+    kinetic_energy: Annotated[Array, Stored("series/kinetic_energy", "J", "kinetic energy, shape (t,)")]
+    gravitational_energy: Annotated[
+        Array, Stored("series/gravitational_energy", "J", "energy in the field of gravity, shape (t,)")
+    ]
+    spring_energy: Annotated[
+        Array, Stored("series/spring_energy", "J", "energy of the joint springs, shape (t,)")
+    ]
+    lowest: Annotated[
+        Array, Stored("series/lowest", "m", "height of the lowest point of all circles, shape (t,)")
+    ]
+    rms_speed: Annotated[
+        Array, Stored("series/rms_speed", "m/s", "root mean square speed of the links, shape (t,)")
+    ]
+    frame_time: Annotated[Array, Stored("frames/time", "s", "time since the release, shape (f,)")]
+    frame_joints: Annotated[
+        Array,
+        Stored("frames/joints", "m", "joints x, y, shape (f, n, 2); joint i ends link i, even links inner"),
+    ]
 
     def __post_init__(self) -> None:
-        """Check that the arrays and dictionaries fit together."""
+        """Check that arrays and dictionaries fit together."""
         instants, frames = len(self.time), len(self.frame_time)
-        shapes: dict[str, tuple[int, ...]] = {item.name: (instants,) for item in _fields("series/")}
+        shapes: dict[str, tuple[int, ...]] = {
+            name: (instants,) for name, stored in STORED.items() if stored.path.startswith("series/")
+        }
         shapes["center"] = shapes["center_velocity"] = (instants, 2)
         shapes["frame_time"] = (frames,)
         shapes["frame_joints"] = (frames, self.setup.scene.links, 2)
@@ -126,25 +153,35 @@ class WalkResult:
         for name, shape in shapes.items():
             given = np.shape(getattr(self, name))
             if given != shape:
-                raise ValueError(f"{name}: shape {given} is not {shape}; give an array of that shape")
-        for item in _fields("summary/"):
-            keys = item.metadata["keys"]
-            if keys is not None and set(getattr(self, item.name)) != set(keys):
-                raise ValueError(f"{item.name}: keys differ; give exactly {', '.join(keys)}")
+                raise ValueError(f"{name}: its shape is {given}; give an array of shape {shape}")
+        for name, stored in STORED.items():
+            if stored.keys and set(getattr(self, name)) != set(stored.keys):
+                raise ValueError(f"{name}: wrong keys; give exactly {', '.join(stored.keys)}")
+
+    def __repr__(self) -> str:
+        """One line with what one wants to know first."""
+        scene = self.setup.scene
+        return (
+            f"<WalkResult {self.status.label}: dx {self.dx:.4g} m in {self.walk_time:.4g} s, "
+            f"{self.bounces} bounces, {scene.links} links at {scene.frequency:g} Hz, {self.setup.preset}>"
+        )
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything but the arrays, ready for `json.dumps(…, allow_nan=False)`; what is not finite is None."""
-        summary = {item.name: getattr(self, item.name) for item in _fields("summary/")}
-        described = {
-            "dx": summary.pop("dx"),
-            "status": self.status.label,
-            "status_sentence": self.status.sentence,
-            **summary,
-            **_setup_as_dict(self.setup),
-            "seed": self.seed,
-            "versions": self.versions,
+        """Everything but time series and frames, as JSON has it; a number that is not finite is None."""
+        summary = {
+            name: getattr(self, name) for name, stored in STORED.items() if stored.path.startswith("summary/")
         }
-        plain: dict[str, Any] = _plain(described)
+        plain: dict[str, Any] = _plain(
+            {
+                "dx": summary.pop("dx"),
+                "status": self.status.label,
+                "status_sentence": self.status.sentence,
+                **summary,
+                **_setup_as_dict(self.setup),
+                "seed": self.seed,
+                "versions": self.versions,
+            }
+        )
         return plain
 
     def plot(
@@ -153,25 +190,25 @@ class WalkResult:
         """Draw the walk.
 
         Args:
-            kind: `figure5` for height and speed of the centre of mass against time, `film_strip` for the chain.
-            figure: an empty matplotlib figure to draw into; a new one by default.
+            kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself.
+            figure: an empty matplotlib figure to draw into; by default a new one.
 
         Raises:
             ValueError: the kind is unknown, or a film strip is asked of a walk without frames.
         """
-        from warpchain import plots
+        from warpchain.plots import figure5, film_strip
 
         if kind == "figure5":
-            return plots.figure5([self], figure=figure)
+            return figure5([self], figure=figure)
         if kind == "film_strip":
-            return plots.film_strip(self, figure=figure)
+            return film_strip(self, figure=figure)
         raise ValueError(f"kind: {kind!r} is unknown; give 'figure5' or 'film_strip'")
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the walk to an HDF5 file, whole or not at all; an older file of that name is replaced.
 
         Raises:
-            OSError: the file cannot be written; one line naming it.
+            OSError: the file cannot be written; one line that names it.
         """
         import h5py
 
@@ -183,33 +220,52 @@ class WalkResult:
 class Trajectory:
     """Motion of a chain of n links at t chosen instants, as `warpchain.simulate` returns it.
 
-    Unit and meaning of each field are its metadata.
+    Attributes:
+        status: how the simulation ended.
+        time: instants [s], shape (t,).
+        position: x, y [m] and θ [rad] of each link's centre of mass, shape (t, n, 3).
+        velocity: their rates [m/s, m/s, rad/s], shape (t, n, 3).
+        steps_accepted: number of accepted steps.
+        steps_rejected: number of rejected steps.
+        impulses: number of impulses by kind of contact.
+        losses: energy lost by cause [J], positive.
+        greatest_opening: greatest distance between two joined link ends [m].
+        greatest_penetration: greatest overlap by kind of contact [m].
     """
 
     status: Status
-    time: Array = _quantity("s", "instants, shape (t,)")
-    position: Array = _quantity("m, m, rad", "x, y, θ of the links' centres of mass, shape (t, n, 3)")
-    velocity: Array = _quantity("m/s, m/s, rad/s", "time derivative of position, shape (t, n, 3)")
-    steps_accepted: int = _quantity("1", "accepted steps")
-    steps_rejected: int = _quantity("1", "rejected steps")
-    impulses: dict[str, int] = _quantity("1", "number of impulses by kind of contact")
-    losses: dict[str, float] = _quantity("J", "energy lost by cause, positive")
-    greatest_opening: float = _quantity("m", "greatest distance between the two ends that a joint holds")
-    greatest_penetration: dict[str, float] = _quantity("m", "greatest overlap by kind of contact")
+    time: Array
+    position: Array
+    velocity: Array
+    steps_accepted: int
+    steps_rejected: int
+    impulses: dict[str, int]
+    losses: dict[str, float]
+    greatest_opening: float
+    greatest_penetration: dict[str, float]
+
+
+STORED: Final[dict[str, Stored]] = {
+    item.name: note
+    for item in dataclasses.fields(WalkResult)
+    for note in get_args(item.type)
+    if isinstance(note, Stored)
+}
+"""Fields of `WalkResult` that a file keeps as datasets: name → where, in which unit, what."""
 
 
 def load_walk(path: str | os.PathLike[str]) -> WalkResult:
-    """Read a walk that `WalkResult.save` wrote; numbers come back to the bit.
+    """Read a walk that `WalkResult.save` wrote; every number comes back to the bit.
 
     Raises:
         OSError: the file cannot be opened.
-        ValueError: the file is not a walk, is damaged, or was written by another version of the format.
+        ValueError: the file is no walk, is damaged, or belongs to another version of warpchain.
     """
     import h5py
 
     try:
-        with open(path, "rb") as file:
-            file.read(1)
+        with open(path, "rb") as content:
+            content.read(1)
     except OSError as error:
         raise OSError(f"{path}: {_reason(error)}; give the path of a readable walk file") from None
     if not h5py.is_hdf5(path):
@@ -221,7 +277,7 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
                 return _read(file)
     except ValidationError as error:
         first = ".".join(str(part) for part in error.errors()[0]["loc"])
-        refusal = f"its setup does not suit this warpchain ({first}); read it with the version that wrote it"
+        refusal = f"this warpchain refuses its setup ({first}); read it with the version that wrote it"
     except (OSError, RuntimeError, KeyError, TypeError, ValueError):
         refusal = "damaged or cut short; fetch another copy of the file or run the walk again"
     raise ValueError(f"{path}: {refusal}")
@@ -229,42 +285,34 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
 
 @contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary path in the same folder; it becomes `path` when the block ends without an error.
+    """Yield a temporary path in the same folder, which becomes `path` if the block ends without an error.
 
-    The data are on the disk before the name changes hands, so at any moment, even through a power cut, `path` is
-    either the old file or the whole new one.
+    The data reach the disk before the name changes hands. So `path` is at any moment, even after a power
+    cut, either what it was or the whole new file.
 
     Raises:
-        OSError: the file cannot be written; one line naming it. The temporary file is removed after any error.
+        OSError: the file cannot be written; one line that names it. No temporary file is left.
     """
     target = Path(path)
     part = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.part{target.suffix}")
     try:
         os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
         yield part
-        with open(part, "r+b") as file:
-            os.fsync(file.fileno())
+        with open(part, "r+b") as content:
+            os.fsync(content.fileno())
         os.replace(part, target)
     except OSError as error:
         raise OSError(
-            f"{target}: cannot be written ({_reason(error)}); choose another path or make room"
+            f"{target}: cannot be written ({_reason(error)}); give a path in a folder that can take it"
         ) from error
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
 
 
 def _reason(error: OSError) -> str:
-    """What went wrong, in the system's own few words; HDF5 buries them in a paragraph."""
+    """What went wrong in the system's few words; HDF5 buries them in a paragraph."""
     return os.strerror(error.errno) if error.errno else " ".join(str(error).split())
-
-
-def _fields(group: str) -> list["dataclasses.Field[Any]"]:
-    """The fields of `WalkResult` that a file keeps under `group`; an empty one stands for all groups."""
-    return [
-        item
-        for item in dataclasses.fields(WalkResult)
-        if item.metadata.get("path") and item.metadata["path"].startswith(group)
-    ]
 
 
 def _setup_as_dict(setup: Setup) -> dict[str, Any]:
@@ -284,9 +332,7 @@ def _plain(value: Any) -> Any:
         return _plain(value.tolist())
     if isinstance(value, list | tuple):
         return [_plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _write(walk: WalkResult, file: "h5py.File") -> None:
@@ -296,33 +342,32 @@ def _write(walk: WalkResult, file: "h5py.File") -> None:
     file.attrs["status"] = walk.status.label
     file.attrs["status_sentence"] = walk.status.sentence
     file.attrs["setup"] = json.dumps(_setup_as_dict(walk.setup), allow_nan=False)
-    file.attrs["seed"] = json.dumps(walk.seed)
+    file.attrs["seed"] = json.dumps(_plain(walk.seed))
     file.attrs["versions"] = json.dumps(walk.versions)
-    for item in _fields(""):
-        path, unit, meaning = item.metadata["path"], item.metadata["unit"], item.metadata["meaning"]
-        value = getattr(walk, item.name)
-        if isinstance(value, dict):
-            for key, number in value.items():
-                _put(file, f"{path}/{key}", number, unit, f"{meaning}: {item.metadata['keys'][key]}")
+    for name, stored in STORED.items():
+        value = getattr(walk, name)
+        if stored.keys:
+            for key, meaning in stored.keys.items():
+                _put(file, f"{stored.path}/{key}", value[key], stored.unit, f"{stored.meaning}: {meaning}")
         elif value is not None:
-            _put(file, path, value, unit, meaning)
+            _put(file, stored.path, value, stored.unit, stored.meaning)
     for name, quantity in Parameters.quantities().items():
-        number = getattr(walk.setup.parameters, name)
-        node = _put(file, f"parameters/{name}", number, quantity.unit, quantity.meaning)
-        node.attrs["symbol"] = quantity.symbol
+        value = getattr(walk.setup.parameters, name)
+        dataset = _put(file, f"parameters/{name}", value, quantity.unit, quantity.meaning)
+        dataset.attrs["symbol"] = quantity.symbol
 
 
-def _put(file: "h5py.File", path: str, value: "float | Array", unit: str, description: str) -> "h5py.Dataset":
+def _put(file: "h5py.File", path: str, value: float | Array, unit: str, meaning: str) -> "h5py.Dataset":
     """Write one dataset; arrays are compressed without loss and carry checksums."""
     filters = {"compression": "gzip", "shuffle": True, "fletcher32": True} if np.size(value) > 1 else {}
-    node = file.create_dataset(path, data=value, **filters)
-    node.attrs["unit"] = unit
-    node.attrs["description"] = description
-    return node
+    dataset = file.create_dataset(path, data=value, **filters)
+    dataset.attrs["unit"] = unit
+    dataset.attrs["description"] = meaning
+    return dataset
 
 
 def _refusal(file: "h5py.File") -> str | None:
-    """Why this file can't be read as a walk, if it can't."""
+    """Why this file cannot be a walk for us, or None."""
     version = file.attrs.get("format_version")
     if file.attrs.get("format") != FORMAT:
         return "HDF5, but not a walk; give a file written by WalkResult.save"
@@ -332,26 +377,25 @@ def _refusal(file: "h5py.File") -> str | None:
 
 
 def _read(file: "h5py.File") -> WalkResult:
-    """The walk in a file of the right format."""
+    """The walk in a file of our format."""
     setup = json.loads(file.attrs["setup"])
     values: dict[str, Any] = {
         "status": Status[file.attrs["status"].upper()],
-        "seed": json.loads(file.attrs["seed"]),
-        "versions": json.loads(file.attrs["versions"]),
         "setup": Setup(
             preset=setup["preset"],
             parameters=Parameters.model_validate(setup["parameters"]),
             scene=Scene.model_validate(setup["scene"]),
             options=Options.model_validate(setup["options"]),
         ),
+        "seed": json.loads(file.attrs["seed"]),
+        "versions": json.loads(file.attrs["versions"]),
     }
-    for item in _fields(""):
-        path, keys = item.metadata["path"], item.metadata["keys"]
-        if keys is not None:
-            values[item.name] = {key: file[f"{path}/{key}"][()].item() for key in keys}
-        elif item.name == "sprocket_center" and path not in file:
-            values[item.name] = None
+    for name, stored in STORED.items():
+        if stored.keys:
+            values[name] = {key: file[f"{stored.path}/{key}"][()].item() for key in stored.keys}
+        elif name == "sprocket_center" and stored.path not in file:
+            values[name] = None
         else:
-            number = file[path][()]
-            values[item.name] = number if number.shape else number.item()
+            number = file[stored.path][()]
+            values[name] = number if number.shape else number.item()
     return WalkResult(**values)

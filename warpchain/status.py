@@ -1,7 +1,7 @@
 """How a run ended.
 
-Kernels and saved files hold these codes as plain integers, so the numbers are fixed: a code is never renumbered
-or reused, and a new one gets the next number.
+Kernels hold these codes as plain integers, so the numbers are fixed: a code is never renumbered or reused,
+and a new one gets the next number.
 """
 
 from enum import IntEnum
