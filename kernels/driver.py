@@ -64,7 +64,7 @@ SELF_IMPULSES, BOUNCES = wp.constant(layout.SELF_IMPULSES), wp.constant(layout.B
 LIST_BUILDS = wp.constant(layout.LIST_BUILDS)
 OPENING, FLOOR_DEPTH = wp.constant(layout.OPENING), wp.constant(layout.FLOOR_DEPTH)
 SPROCKET_DEPTH, SELF_DEPTH = wp.constant(layout.SPROCKET_DEPTH), wp.constant(layout.SELF_DEPTH)
-LAST_FLOOR_IMPULSE = wp.constant(layout.LAST_FLOOR_IMPULSE)
+LAST_FLOOR_IMPULSE, LAST_LOOK = wp.constant(layout.LAST_FLOOR_IMPULSE), wp.constant(layout.LAST_LOOK)
 LOSS_FRICTION, LOSS_DAMPING = wp.constant(layout.LOSS_FRICTION), wp.constant(layout.LOSS_DAMPING)
 LOSS_SELF = wp.constant(layout.LOSS_SELF)
 
@@ -234,6 +234,7 @@ def make_advance(features: Features):
         mark = state.next_sample[world]
         summary = summarise(K, chain)
         write_sample(record, world, time, summary)
+        state.watch[world, LAST_LOOK] = time
         if mark % control.frame_every == wp.int64(0):
             write_frame(record, K, chain, world, time)
         passed = wp.int64(wp.floor(time / control.sample_interval))
@@ -374,6 +375,10 @@ def make_advance(features: Features):
                 total = state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
                 if total >= control.step_limit:
                     status = int(STEP_LIMIT)
+        if status != RUNNING and status != NOT_FINITE and state.watch[world, LAST_LOOK] != time:
+            # the series ends with the state in which the run ends
+            place_ends(K, chain)
+            write_sample(record, world, time, summarise(K, chain))
         store_state(K, state, chain, world, wp.static(fixed_loss))
         state.gap[world] = gap
         state.has_first_stage[world] = has_first_stage

@@ -36,8 +36,10 @@ class Collision:
 
     def relative_velocity_after(self, impulse: Array) -> Array:
         """v_A − v_B at P after B got `impulse` and A its opposite, from each body's own equations."""
-        return np.array(self.v_rel) + self._change_at(self.lever_a, self.inv_mass_a, self.inv_inertia_a, -impulse) - (
-            self._change_at(self.lever_b, self.inv_mass_b, self.inv_inertia_b, impulse)
+        return (
+            np.array(self.v_rel)
+            + self._change_at(self.lever_a, self.inv_mass_a, self.inv_inertia_a, -impulse)
+            - (self._change_at(self.lever_b, self.inv_mass_b, self.inv_inertia_b, impulse))
         )
 
     def kinetic_energy_change(self, impulse: Array) -> float:
@@ -159,22 +161,24 @@ def collisions(draw: st.DrawFn) -> Collision:
     angle, slope = draw(st.floats(-np.pi, np.pi)), draw(st.floats(-1.57, 1.57))
     speed = draw(_spread(1e-3, 10.0))
     direction = angle + slope
-    inverses, levers = [], []
     immovable = draw(st.sampled_from(["neither", "neither", "A", "B"]))
+    levers: list[Vector] = []
+    inverses: list[tuple[float, float]] = []
     for body in "AB":
         mass, gyration = draw(_spread(1e-3, 1.0)), draw(_spread(1e-3, 1.0))
-        levers.append(tuple(gyration * draw(st.floats(-4.0, 4.0)) for _ in range(2)))
-        inverses += [0.0, 0.0] if body == immovable else [1 / mass, 1 / (mass * gyration**2)]
+        levers.append((gyration * draw(st.floats(-4.0, 4.0)), gyration * draw(st.floats(-4.0, 4.0))))
+        inverses.append((0.0, 0.0) if body == immovable else (1 / mass, 1 / (mass * gyration**2)))
     unit = st.one_of(st.sampled_from([0.0, 1.0]), st.floats(1e-3, 1.0))
     return Collision(
         (speed * float(np.cos(direction)), speed * float(np.sin(direction))),
         (float(np.cos(angle)), float(np.sin(angle))),
         levers[0],
         levers[1],
-        *inverses,
-        restitution=draw(unit),
-        friction=draw(unit),
-        tangential_restitution=draw(st.one_of(st.sampled_from([-1.0, 0.0, 1.0]), st.floats(-1.0, 1.0))),
+        *inverses[0],
+        *inverses[1],
+        draw(unit),
+        draw(unit),
+        draw(st.one_of(st.sampled_from([-1.0, 0.0, 1.0]), st.floats(-1.0, 1.0))),
     )
 
 

@@ -26,6 +26,13 @@ LAUNCH_SECONDS = 0.1  # how long a launch should take: the grain of progress and
 CAPACITY_SAMPLES = 512
 CAPACITY_FRAMES = 64
 
+COUNTS = ("accepted", "rejected", "floor", "sprocket", "self", "bounces", "list_builds")
+"""Counters of a world, in the order of :mod:`warpchain.kernels.layout`."""
+EXTREMES = ("opening", "floor", "sprocket", "self")
+"""Greatest joint opening and depths of a world, likewise."""
+LOSSES = ("joint_friction", "joint_damping", "floor", "sprocket", "self_contact")
+"""Losses of energy of a world, likewise."""
+
 _MODEL_FIELDS = [name for name in Parameters.model_fields if name != "sprocket_radius"]
 
 
@@ -36,7 +43,7 @@ def start_device(device: str) -> wp.Device:
     Raises:
         ValueError: Warp knows no such device on this machine.
     """
-    wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING) if hasattr(wp, "LOG_WARNING") else wp.config.log_level
+    wp.config.log_level = wp.LOG_ERROR
     wp.init()
     return wp.get_device(device)
 
@@ -151,7 +158,7 @@ class Batch:
         for array in (state.time, state.gap, state.counts, state.extremes, state.losses, state.next_sample):
             array.numpy()[world] = 0
         state.watch.numpy()[world] = 0
-        state.watch.numpy()[world, [layout.WINDOW_START, layout.REST_SINCE]] = -1.0
+        state.watch.numpy()[world, [layout.WINDOW_START, layout.REST_SINCE, layout.LAST_LOOK]] = -1.0
         state.watch.numpy()[world, layout.LAST_FLOOR_IMPULSE] = -np.inf
         state.has_first_stage.numpy()[world] = 0
         state.is_fresh.numpy()[world] = 1
@@ -233,19 +240,22 @@ class Batch:
     def counts(self, world: int) -> dict[str, int]:
         """Counters since loading."""
         row = self.state.counts.numpy()[world]
-        names = ("accepted", "rejected", "floor", "sprocket", "self", "bounces", "list_builds")
-        return {name: int(value) for name, value in zip(names, row, strict=True)}
+        return {name: int(value) for name, value in zip(COUNTS, row, strict=True)}
+
+    def tries(self, world: int) -> int:
+        """Steps tried since loading, accepted or not."""
+        counts = self.counts(world)
+        return counts["accepted"] + counts["rejected"]
 
     def extremes(self, world: int) -> dict[str, float]:
         """Greatest joint opening and depths [m] since loading."""
         row = self.state.extremes.numpy()[world]
-        return {name: float(v) for name, v in zip(("opening", "floor", "sprocket", "self"), row, strict=True)}
+        return {name: float(value) for name, value in zip(EXTREMES, row, strict=True)}
 
     def losses(self, world: int) -> dict[str, float]:
         """Energy [J] lost since loading, by cause."""
         row = self.state.losses.numpy()[world]
-        names = ("joint_friction", "joint_damping", "floor", "sprocket", "self_contact")
-        return {name: float(v) for name, v in zip(names, row, strict=True)}
+        return {name: float(value) for name, value in zip(LOSSES, row, strict=True)}
 
     def drain_samples(self, world: int) -> Array:
         """Take the time series kept so far: (t, SAMPLE_COLUMNS), see :mod:`warpchain.kernels.layout`."""
