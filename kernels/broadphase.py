@@ -13,12 +13,15 @@ import warp as wp
 
 from . import layout
 from .elementary import HALF, TWO, order_bits
+from .layout import (
+    LISTED_X,
+    LISTED_Y,
+    RIGHT_X,
+    RIGHT_Y,
+)
 from .types import Chain
 
 wp.set_module_options({"enable_backward": False})
-
-RIGHT_X, RIGHT_Y = wp.constant(layout.RIGHT_X), wp.constant(layout.RIGHT_Y)
-LISTED_X, LISTED_Y = wp.constant(layout.LISTED_X), wp.constant(layout.LISTED_Y)
 
 
 @dataclass(frozen=True)
@@ -210,7 +213,9 @@ def neighbour_list(columns: int):
                                 # insertion keeps this joint's partners in ascending order
                                 k = total
                                 while k > start and L[wp.static(lists.found_second) + wp.max(k - 1, 0)] > q:
-                                    L[wp.static(lists.found_second) + k] = L[wp.static(lists.found_second) + k - 1]
+                                    L[wp.static(lists.found_second) + k] = L[
+                                        wp.static(lists.found_second) + k - 1
+                                    ]
                                     k -= 1
                                 L[wp.static(lists.found_second) + k] = q
                                 L[wp.static(lists.found_first) + total] = p
@@ -259,8 +264,6 @@ def neighbour_list(columns: int):
 
 
 @wp.func
-def list_is_stale(
-    K: wp.array2d(dtype=wp.float64), chain: Chain, skin: wp.float64, opening: wp.float64
-):
+def list_is_stale(K: wp.array2d(dtype=wp.float64), chain: Chain, skin: wp.float64, opening: wp.float64):
     """True when the list no longer holds every pair that may touch."""
     return not (greatest_displacement(K, chain) < HALF * skin - opening)

@@ -10,20 +10,26 @@ import functools
 
 import warp as wp
 
-from . import layout
 from .broadphase import list_layout
 from .elementary import HALF, ONE, TWO, ZERO, from_order_key, order_bits, order_key
 from .impulse import collision_impulse, fixed_contact
+from .layout import (
+    INVERSE_INERTIA,
+    INVERSE_MASS,
+    LEFT_X,
+    LEFT_Y,
+    LOST_FIXED,
+    OMEGA,
+    RIGHT_X,
+    RIGHT_Y,
+    U,
+    V,
+    X,
+    Y,
+)
 from .types import Chain
 
 wp.set_module_options({"enable_backward": False})
-
-X, Y, THETA, U, V, OMEGA = (wp.constant(row) for row in range(6))
-MASS, INERTIA = wp.constant(layout.MASS), wp.constant(layout.INERTIA)
-INVERSE_MASS, INVERSE_INERTIA = wp.constant(layout.INVERSE_MASS), wp.constant(layout.INVERSE_INERTIA)
-LEFT_X, LEFT_Y = wp.constant(layout.LEFT_X), wp.constant(layout.LEFT_Y)
-RIGHT_X, RIGHT_Y = wp.constant(layout.RIGHT_X), wp.constant(layout.RIGHT_Y)
-LOST_FIXED = wp.constant(layout.LOST_FIXED)
 
 
 @wp.func

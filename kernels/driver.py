@@ -23,6 +23,32 @@ from .contact import (
 )
 from .elementary import HALF, ONE, TWO, ZERO
 from .explicit import explicit_method, place_ends
+from .layout import (
+    ACCEPTED,
+    BOUNCES,
+    FLOOR_DEPTH,
+    FLOOR_IMPULSES,
+    INERTIA,
+    INVERSE_INERTIA,
+    INVERSE_MASS,
+    LAST_FLOOR_IMPULSE,
+    LAST_LOOK,
+    LIST_BUILDS,
+    LOSS_DAMPING,
+    LOSS_FRICTION,
+    LOSS_SELF,
+    LOST_DAMPING,
+    LOST_FIXED,
+    LOST_FRICTION,
+    MASS,
+    OPENING,
+    REJECTED,
+    SELF_DEPTH,
+    SELF_IMPULSES,
+    SPROCKET_DEPTH,
+    SPROCKET_IMPULSES,
+    STAGES,
+)
 from .record import (
     record_is_full,
     summarise,
@@ -51,22 +77,6 @@ LEAST_SHRINKAGE = wp.constant(wp.float64(0.2))
 SAFETY = wp.constant(wp.float64(0.9))
 BOUNCE_PAUSE = wp.constant(wp.float64(0.01))
 """A floor impulse this long [s] after the one before it begins a new bounce."""
-
-MASS, INERTIA = wp.constant(layout.MASS), wp.constant(layout.INERTIA)
-INVERSE_MASS, INVERSE_INERTIA = wp.constant(layout.INVERSE_MASS), wp.constant(layout.INVERSE_INERTIA)
-OMEGA = wp.constant(layout.OMEGA)
-STAGES = wp.constant(layout.STAGES)
-LOST_FRICTION, LOST_DAMPING = wp.constant(layout.LOST_FRICTION), wp.constant(layout.LOST_DAMPING)
-LOST_FIXED = wp.constant(layout.LOST_FIXED)
-ACCEPTED, REJECTED = wp.constant(layout.ACCEPTED), wp.constant(layout.REJECTED)
-FLOOR_IMPULSES, SPROCKET_IMPULSES = wp.constant(layout.FLOOR_IMPULSES), wp.constant(layout.SPROCKET_IMPULSES)
-SELF_IMPULSES, BOUNCES = wp.constant(layout.SELF_IMPULSES), wp.constant(layout.BOUNCES)
-LIST_BUILDS = wp.constant(layout.LIST_BUILDS)
-OPENING, FLOOR_DEPTH = wp.constant(layout.OPENING), wp.constant(layout.FLOOR_DEPTH)
-SPROCKET_DEPTH, SELF_DEPTH = wp.constant(layout.SPROCKET_DEPTH), wp.constant(layout.SELF_DEPTH)
-LAST_FLOOR_IMPULSE, LAST_LOOK = wp.constant(layout.LAST_FLOOR_IMPULSE), wp.constant(layout.LAST_LOOK)
-LOSS_FRICTION, LOSS_DAMPING = wp.constant(layout.LOSS_FRICTION), wp.constant(layout.LOSS_DAMPING)
-LOSS_SELF = wp.constant(layout.LOSS_SELF)
 
 
 @dataclass(frozen=True)
@@ -187,7 +197,9 @@ def step_controller(order: int, error_order: int):
 
     @wp.func
     def shrinkage(error: wp.float64):
-        return wp.max(SAFETY * wp.pow(error, wp.static(wp.float64(-1.0 / (error_order - 1)))), LEAST_SHRINKAGE)
+        return wp.max(
+            SAFETY * wp.pow(error, wp.static(wp.float64(-1.0 / (error_order - 1)))), LEAST_SHRINKAGE
+        )
 
     return growth, shrinkage
 
@@ -354,7 +366,9 @@ def make_advance(features: Features):
                 if wp.static(has_sprocket):
                     gap = sprocket_gap(K, chain)
                     if gap < ZERO:
-                        state.extremes[world, SPROCKET_DEPTH] = wp.max(state.extremes[world, SPROCKET_DEPTH], -gap)
+                        state.extremes[world, SPROCKET_DEPTH] = wp.max(
+                            state.extremes[world, SPROCKET_DEPTH], -gap
+                        )
                         hits = resolve_sprocket(K, chain, sprocket_turning(program, world, time))
                         state.counts[world, SPROCKET_IMPULSES] = state.counts[world, SPROCKET_IMPULSES] + hits
                         impulses += hits

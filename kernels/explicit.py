@@ -8,29 +8,49 @@ import functools
 
 import warp as wp
 
-from . import layout
-from .elementary import HALF, LARGEST_TURN, ONE, TWO, ZERO, cos_sin, order_bits, small_turn
+from .elementary import LARGEST_TURN, ONE, TWO, ZERO, cos_sin, order_bits, small_turn
 from .joint import friction_torque, joint_force, link_acceleration
-from .layout import STAGE_ROWS, STAGES
+from .layout import (
+    COSINE,
+    ERROR,
+    FORCE_X,
+    FORCE_Y,
+    INVERSE_INERTIA,
+    INVERSE_MASS,
+    LEFT_U,
+    LEFT_V,
+    LEFT_X,
+    LEFT_Y,
+    LOST_DAMPING,
+    LOST_FRICTION,
+    NEW_OMEGA,
+    NEW_THETA,
+    NEW_U,
+    NEW_V,
+    NEW_X,
+    NEW_Y,
+    OMEGA,
+    RIGHT_U,
+    RIGHT_V,
+    RIGHT_X,
+    RIGHT_Y,
+    SINE,
+    STAGE_COSINE,
+    STAGE_ROWS,
+    STAGE_SINE,
+    STAGE_SPIN,
+    STAGES,
+    THETA,
+    TORQUE,
+    U,
+    V,
+    X,
+    Y,
+)
 from .tableaus import TABLEAUS
 from .types import Chain
 
 wp.set_module_options({"enable_backward": False})
-
-X, Y, THETA, U, V, OMEGA = (wp.constant(row) for row in range(6))
-COSINE, SINE = wp.constant(layout.COSINE), wp.constant(layout.SINE)
-INVERSE_MASS, INVERSE_INERTIA = wp.constant(layout.INVERSE_MASS), wp.constant(layout.INVERSE_INERTIA)
-LEFT_X, LEFT_Y = wp.constant(layout.LEFT_X), wp.constant(layout.LEFT_Y)
-LEFT_U, LEFT_V = wp.constant(layout.LEFT_U), wp.constant(layout.LEFT_V)
-RIGHT_X, RIGHT_Y = wp.constant(layout.RIGHT_X), wp.constant(layout.RIGHT_Y)
-RIGHT_U, RIGHT_V = wp.constant(layout.RIGHT_U), wp.constant(layout.RIGHT_V)
-STAGE_COSINE, STAGE_SINE = wp.constant(layout.STAGE_COSINE), wp.constant(layout.STAGE_SINE)
-STAGE_SPIN = wp.constant(layout.STAGE_SPIN)
-FORCE_X, FORCE_Y, TORQUE = wp.constant(layout.FORCE_X), wp.constant(layout.FORCE_Y), wp.constant(layout.TORQUE)
-NEW_X, NEW_Y, NEW_THETA = wp.constant(layout.NEW_X), wp.constant(layout.NEW_Y), wp.constant(layout.NEW_THETA)
-NEW_U, NEW_V, NEW_OMEGA = wp.constant(layout.NEW_U), wp.constant(layout.NEW_V), wp.constant(layout.NEW_OMEGA)
-ERROR = wp.constant(layout.ERROR)
-LOST_FRICTION, LOST_DAMPING = wp.constant(layout.LOST_FRICTION), wp.constant(layout.LOST_DAMPING)
 
 
 @wp.func
@@ -164,12 +184,24 @@ def explicit_method(name: str):
                 for j in range(wp.static(s)):
                     if wp.static(velocity[s][j] != 0.0):
                         du += wp.static(wp.float64(velocity[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                        dv += wp.static(wp.float64(velocity[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                        dw += wp.static(wp.float64(velocity[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                        dv += (
+                            wp.static(wp.float64(velocity[s][j]))
+                            * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                        )
+                        dw += (
+                            wp.static(wp.float64(velocity[s][j]))
+                            * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                        )
                     if wp.static(position[s][j] != 0.0):
                         dx += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                        dy += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                        turn += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                        dy += (
+                            wp.static(wp.float64(position[s][j]))
+                            * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                        )
+                        turn += (
+                            wp.static(wp.float64(position[s][j]))
+                            * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                        )
                 turn = ch * K[OMEGA, i] + hh * turn
                 versine, sine = small_turn(turn)
                 c = K[COSINE, i] - (K[COSINE, i] * versine + K[SINE, i] * sine)
@@ -214,21 +246,49 @@ def explicit_method(name: str):
             et = ZERO
             for j in range(wp.static(stages)):
                 if wp.static(velocity_weights[j] != 0.0):
-                    du += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                    dv += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                    dw += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                    du += (
+                        wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
+                    )
+                    dv += (
+                        wp.static(wp.float64(velocity_weights[j]))
+                        * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                    )
+                    dw += (
+                        wp.static(wp.float64(velocity_weights[j]))
+                        * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                    )
                 if wp.static(position_weights[j] != 0.0):
-                    dx += wp.static(wp.float64(position_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                    dy += wp.static(wp.float64(position_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                    turn += wp.static(wp.float64(position_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                    dx += (
+                        wp.static(wp.float64(position_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
+                    )
+                    dy += (
+                        wp.static(wp.float64(position_weights[j]))
+                        * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                    )
+                    turn += (
+                        wp.static(wp.float64(position_weights[j]))
+                        * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                    )
                 if wp.static(velocity_errors[j] != 0.0):
                     eu += wp.static(wp.float64(velocity_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                    ev += wp.static(wp.float64(velocity_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                    ew += wp.static(wp.float64(velocity_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                    ev += (
+                        wp.static(wp.float64(velocity_errors[j]))
+                        * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                    )
+                    ew += (
+                        wp.static(wp.float64(velocity_errors[j]))
+                        * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                    )
                 if wp.static(position_errors[j] != 0.0):
                     ex += wp.static(wp.float64(position_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                    ey += wp.static(wp.float64(position_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                    et += wp.static(wp.float64(position_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                    ey += (
+                        wp.static(wp.float64(position_errors[j]))
+                        * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                    )
+                    et += (
+                        wp.static(wp.float64(position_errors[j]))
+                        * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                    )
             u = K[U, i]
             v = K[V, i]
             w = K[OMEGA, i]
@@ -270,8 +330,14 @@ def explicit_method(name: str):
             damping = ZERO
             for j in range(wp.static(stages)):
                 if wp.static(velocity_weights[j] != 0.0):
-                    friction += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 3), i]
-                    damping += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 4), i]
+                    friction += (
+                        wp.static(wp.float64(velocity_weights[j]))
+                        * K[wp.static(STAGES + STAGE_ROWS * j + 3), i]
+                    )
+                    damping += (
+                        wp.static(wp.float64(velocity_weights[j]))
+                        * K[wp.static(STAGES + STAGE_ROWS * j + 4), i]
+                    )
             K[LOST_FRICTION, i] = K[LOST_FRICTION, i] + h * friction
             K[LOST_DAMPING, i] = K[LOST_DAMPING, i] + h * damping
             K[X, i] = K[NEW_X, i]

@@ -4,21 +4,34 @@ import warp as wp
 
 from . import layout
 from .elementary import HALF, ZERO, from_order_key, order_key
+from .layout import (
+    COSINE,
+    INERTIA,
+    LAST_HEIGHT,
+    LAST_WIDTH,
+    LEFT_X,
+    LEFT_Y,
+    MASS,
+    OMEGA,
+    REST_SINCE,
+    RIGHT_X,
+    RIGHT_Y,
+    SINE,
+    STEADY_TIME,
+    SUM_HEIGHT,
+    SUM_SPEED,
+    SUM_WIDTH,
+    WINDOW_COUNT,
+    WINDOW_START,
+    U,
+    V,
+    X,
+    Y,
+)
 from .types import Chain, Control, Program, Record, State
 
 wp.set_module_options({"enable_backward": False})
 
-X, Y, THETA, U, V, OMEGA = (wp.constant(row) for row in range(6))
-COSINE, SINE = wp.constant(layout.COSINE), wp.constant(layout.SINE)
-MASS, INERTIA = wp.constant(layout.MASS), wp.constant(layout.INERTIA)
-LEFT_X, LEFT_Y = wp.constant(layout.LEFT_X), wp.constant(layout.LEFT_Y)
-RIGHT_X, RIGHT_Y = wp.constant(layout.RIGHT_X), wp.constant(layout.RIGHT_Y)
-
-STEADY_TIME, WINDOW_START = wp.constant(layout.STEADY_TIME), wp.constant(layout.WINDOW_START)
-WINDOW_COUNT, SUM_HEIGHT = wp.constant(layout.WINDOW_COUNT), wp.constant(layout.SUM_HEIGHT)
-SUM_WIDTH, SUM_SPEED = wp.constant(layout.SUM_WIDTH), wp.constant(layout.SUM_SPEED)
-LAST_HEIGHT, LAST_WIDTH = wp.constant(layout.LAST_HEIGHT), wp.constant(layout.LAST_WIDTH)
-REST_SINCE = wp.constant(layout.REST_SINCE)
 
 ONE_PERCENT = wp.constant(wp.float64(0.01))
 SLOWEST_STEADY = wp.constant(wp.float64(0.02))
@@ -176,9 +189,7 @@ def write_sample(record: Record, world: int, time: wp.float64, summary: Summary)
 
 
 @wp.func
-def write_frame(
-    record: Record, K: wp.array2d(dtype=wp.float64), chain: Chain, world: int, time: wp.float64
-):
+def write_frame(record: Record, K: wp.array2d(dtype=wp.float64), chain: Chain, world: int, time: wp.float64):
     """Appends all joint positions, if frames are kept."""
     if record.frames.shape[1] == 0:
         return

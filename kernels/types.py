@@ -32,7 +32,9 @@ class Model:
     chain_friction: wp.array(dtype=wp.float64)  # μ_cc
     sprocket_restitution: wp.array(dtype=wp.float64)  # e_sc
     sprocket_friction: wp.array(dtype=wp.float64)  # μ_sc
-    sprocket_radius: wp.array(dtype=wp.float64)  # [m], the radius that link circles touch; centre at the origin
+    sprocket_radius: wp.array(
+        dtype=wp.float64
+    )  # [m], the radius that link circles touch; centre at the origin
 
 
 @wp.struct

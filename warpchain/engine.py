@@ -51,7 +51,9 @@ def start_device(device: str) -> wp.Device:
 def versions() -> dict[str, str]:
     """Versions of all that may change a number: for the provenance of a result."""
     packages = ("warpchain", "warp-lang", "numpy")
-    return {name: importlib.metadata.version(name) for name in packages} | {"python": platform.python_version()}
+    return {name: importlib.metadata.version(name) for name in packages} | {
+        "python": platform.python_version()
+    }
 
 
 class Batch:
@@ -92,7 +94,9 @@ class Batch:
         self.model = Model()
         self.model.link_count = self._array(np.asarray(links, dtype=np.int32))
         for name in _MODEL_FIELDS:
-            setattr(self.model, name, self._array(np.array([getattr(p, name) for p in parameters], dtype=float)))
+            setattr(
+                self.model, name, self._array(np.array([getattr(p, name) for p in parameters], dtype=float))
+            )
         self.model.sprocket_radius = self._array(np.asarray(contact_radius, dtype=float))
 
         self.program = Program()

@@ -15,6 +15,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Colormap, ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from warpchain.status import Status
@@ -49,12 +50,15 @@ def figure5(
         figure: an empty figure to draw into; by default a new one.
 
     Raises:
-        ValueError: no walk is given, or not as many labels as walks.
+        ValueError: no walk is given, one has no time series, or there are not as many labels as walks.
     """
     if not walks:
         raise ValueError("walks: empty; give at least one walk")
     if labels is not None and len(labels) != len(walks):
         raise ValueError(f"labels: {len(labels)} for {len(walks)} walks; give one for each walk")
+    for index, walk in enumerate(walks):
+        if len(walk.time) == 0:
+            raise ValueError(f"walks[{index}]: it has no time series. {walk.status.sentence}")
     figure = Figure(figsize=(6.4, 5.0), layout="constrained") if figure is None else figure
     height, speed = figure.subplots(2, 1, sharex=True)
     settings = [f"n = {walk.setup.scene.links}, ν = {walk.setup.scene.frequency:g} Hz" for walk in walks]
@@ -93,10 +97,12 @@ def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure |
         figure: an empty figure to draw into; by default a new one that suits the walk.
 
     Raises:
-        ValueError: the walk has no frames, or fewer than 2 instants are asked for.
+        ValueError: the walk has no frames or broken ones, or fewer than 2 instants are asked for.
     """
     if len(walk.frame_time) == 0:
-        raise ValueError("walk: it has no frames; run it again with frames recorded")
+        raise ValueError(f"walk: it has no frames ({walk.status.label}); run it again with frames recorded")
+    if not np.all(np.isfinite(walk.frame_joints)):
+        raise ValueError(f"walk: its frames are not all finite numbers. {walk.status.sentence}")
     if count is not None and count < 2:
         raise ValueError(f"count: {count} is too few; give 2 or more")
     close_ups = _close_ups(walk)
@@ -111,13 +117,13 @@ def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure |
     strip_width, strip_height = scale * (right - left), scale * (top + depth)
     close_up_width = min((_WIDTH - 0.3) / len(close_ups), _WIDTH / 3)
     close_up_height = (close_up_width - 0.1) / _CLOSE_UP_ASPECT
-    paper = np.array([_WIDTH, strip_height + close_up_height + 1.2])
+    paper = np.array([_WIDTH, strip_height + close_up_height + 1.1])
     figure = Figure(tuple(paper)) if figure is None else figure
     ends = float(walk.frame_time[0]), float(walk.frame_time[-1])
     color_of = ScalarMappable(Normalize(*ends), _time_colors())
 
     inner_width = _WIDTH - 1.6
-    place = (0.65 + (inner_width - strip_width) / 2, close_up_height + 1.05, strip_width, strip_height)
+    place = (0.65 + (inner_width - strip_width) / 2, close_up_height + 0.95, strip_width, strip_height)
     strip = figure.add_axes(tuple(np.array(place) / np.tile(paper, 2)))
     _draw_ground(strip, left, right, -depth)
     for frame in _instants(walk, count):
@@ -141,7 +147,8 @@ def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure |
         strip.add_patch(Rectangle((x, y), width, height, fill=False, edgecolor=_INK, linewidth=0.8, zorder=5))
         # Neighbouring boxes often overlap: their letters stand at alternate corners.
         side = {"ha": "right", "x": x + width} if column % 2 else {"ha": "left", "x": x}
-        strip.text(y=y + height, s=letter, va="bottom", color=_INK, zorder=5, **side)
+        halo = [withStroke(linewidth=3.0, foreground="white")]
+        strip.text(y=y + height, s=letter, va="bottom", zorder=5, path_effects=halo, **side)
     return figure
 
 

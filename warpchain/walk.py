@@ -135,7 +135,9 @@ def run_walk(
     report = on_progress or (lambda progress: None)
     scene, options, parameters = setup.scene, setup.options, setup.parameters
     if frame_interval is not None and not (math.isfinite(frame_interval) and frame_interval > 0):
-        raise InputError(f"frame_interval: {shown(frame_interval)} is not a positive time in s; give one, or None")
+        raise InputError(
+            f"frame_interval: {shown(frame_interval)} is not a positive time in s; give one, or None"
+        )
     touched = 0.0 if scene.start == "ellipse" else contact_radius(scene, parameters)
     batch = Batch(
         [parameters],
