@@ -28,9 +28,10 @@ Array = NDArray[np.float64]
 LINE_COLORS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008)."""
 
-_INK: Final = "#222222"
-_FAINT: Final = "#777777"
-_GROUND: Final = "#E3E3E3"
+# Text and lines, what stands back, the floor.
+INK: Final = "#222222"
+FAINT: Final = "#777777"
+GROUND: Final = "#E3E3E3"
 
 # A film strip: inches, and close-ups so many links wide, this many times wider than high.
 _WIDTH: Final = 10.0
@@ -100,7 +101,7 @@ def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure |
         ValueError: the walk has no frames or broken ones, or fewer than 2 instants are asked for.
     """
     if len(walk.frame_time) == 0:
-        raise ValueError(f"walk: it has no frames ({walk.status.label}); run it again with frames recorded")
+        raise ValueError(f"walk: it has no frames ({walk.status.label}); run it again with a frame_interval")
     if not np.all(np.isfinite(walk.frame_joints)):
         raise ValueError(f"walk: its frames are not all finite numbers. {walk.status.sentence}")
     if count is not None and count < 2:
@@ -144,7 +145,7 @@ def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure |
         axes.set(xlim=(x, x + width), ylim=(y, y + height), aspect="equal", xticks=[], yticks=[])
         title = f"{letter}  {close_up.title}, {walk.frame_time[close_up.frame]:.3f} s"
         axes.set_title(title, fontsize="medium", loc="left")
-        strip.add_patch(Rectangle((x, y), width, height, fill=False, edgecolor=_INK, linewidth=0.8, zorder=5))
+        strip.add_patch(Rectangle((x, y), width, height, fill=False, edgecolor=INK, linewidth=0.8, zorder=5))
         # Neighbouring boxes often overlap: their letters stand at alternate corners.
         side = {"ha": "right", "x": x + width} if column % 2 else {"ha": "left", "x": x}
         halo = [withStroke(linewidth=3.0, foreground="white")]
@@ -258,8 +259,8 @@ def _time_colors() -> Colormap:
 
 
 def _draw_ground(axes: Axes, left: float, right: float, bottom: float) -> None:
-    axes.add_patch(Rectangle((left, bottom), right - left, -bottom, facecolor=_GROUND, zorder=3))
-    axes.plot([left, right], [0.0, 0.0], color=_INK, linewidth=1.0, zorder=3)
+    axes.add_patch(Rectangle((left, bottom), right - left, -bottom, facecolor=GROUND, zorder=3))
+    axes.plot([left, right], [0.0, 0.0], color=INK, linewidth=1.0, zorder=3)
 
 
 def _draw_chain(axes: Axes, walk: "WalkResult", frame: int, color_of: ScalarMappable, edge: float) -> None:
@@ -280,30 +281,31 @@ def _draw_chain(axes: Axes, walk: "WalkResult", frame: int, color_of: ScalarMapp
 
 def _annotate_strip(axes: Axes, walk: "WalkResult", depth: float) -> None:
     """The sprocket, the path of the centre of mass, and the distance walked, at height `depth` [m]."""
-    start, end = walk.center[0, 0], walk.center[-1, 0]
     if walk.sprocket_center is not None:
-        start, y = walk.sprocket_center
+        x, y = walk.sprocket_center
         angle, dashes = np.linspace(0.0, 2 * np.pi, 100), (0, (4, 3))
-        style: dict[str, Any] = {"color": _FAINT, "linewidth": 1.0, "linestyle": dashes, "zorder": 1.5}
+        style: dict[str, Any] = {"color": FAINT, "linewidth": 1.0, "linestyle": dashes, "zorder": 1.5}
         circle = walk.sprocket_radius * np.array([np.cos(angle), np.sin(angle)])
-        axes.plot(start + circle[0], y + circle[1], label="sprocket until release", **style)
-        axes.plot([start, start], [0.0, y], **style)
+        axes.plot(x + circle[0], y + circle[1], label="sprocket until release", **style)
+        axes.plot([x, x], [0.0, y], **style)
     dots = (0, (1, 1.5))
-    axes.plot(*walk.center.T, color=_INK, linewidth=1.4, linestyle=dots, label="centre of mass", zorder=4)
+    axes.plot(*walk.center.T, color=INK, linewidth=1.4, linestyle=dots, label="centre of mass", zorder=4)
     scene = walk.setup.scene
     title = f"{scene.links} links, {scene.frequency:g} Hz"
     axes.legend(loc="upper right", frameon=False, title=title, alignment="left")
     if not np.isfinite(walk.dx):
         return
-    arrow = {"arrowstyle": "<|-|>", "color": _INK, "shrinkA": 0, "shrinkB": 0}
+    end = float(walk.center[-1, 0])
+    start = end - walk.dx
+    arrow = {"arrowstyle": "<|-|>", "color": INK, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", (end, depth), (start, depth), arrowprops=arrow, zorder=4)
     for x in (start, end):
-        axes.plot([x, x], [0.0, 1.6 * depth], color=_INK, linewidth=0.8, zorder=4)
-    box = {"facecolor": _GROUND, "edgecolor": "none", "pad": 2.0}
+        axes.plot([x, x], [0.0, 1.6 * depth], color=INK, linewidth=0.8, zorder=4)
+    box = {"facecolor": GROUND, "edgecolor": "none", "pad": 2.0}
     text = f"$\\Delta x$ = {walk.dx:.3f} m"
     axes.text((start + end) / 2, depth, text, ha="center", va="center", bbox=box, zorder=4)
 
 
 def _tidy(axes: Axes) -> None:
     axes.spines[["top", "right"]].set_visible(False)
-    axes.tick_params(color=_FAINT)
+    axes.tick_params(color=FAINT)

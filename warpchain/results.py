@@ -316,12 +316,8 @@ def _reason(error: OSError) -> str:
 
 
 def _setup_as_dict(setup: Setup) -> dict[str, Any]:
-    return {
-        "preset": setup.preset,
-        "parameters": setup.parameters.model_dump(),
-        "scene": setup.scene.model_dump(),
-        "options": setup.options.model_dump(),
-    }
+    models = {name: getattr(setup, name).model_dump() for name in ("parameters", "scene", "options")}
+    return {"preset": setup.preset, **models}
 
 
 def _plain(value: Any) -> Any:
