@@ -1,10 +1,14 @@
 """The one module that launches kernels: a batch of chains in arrays on a device, carried on in bounded launches."""
 
+import contextlib
 import functools
 import importlib.metadata
+import os
 import platform
+import sys
+import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import warp as wp
@@ -38,14 +42,37 @@ _MODEL_FIELDS = [name for name in Parameters.model_fields if name != "sprocket_r
 
 @functools.cache
 def start_device(device: str) -> wp.Device:
-    """Start Warp, quietly, and return the device.
+    """Start Warp and return the device.
 
     Raises:
         ValueError: Warp knows no such device on this machine.
     """
     wp.config.log_level = wp.LOG_ERROR
-    wp.init()
+    with _without_driver_warning():
+        wp.init()
     return wp.get_device(device)
+
+
+@contextlib.contextmanager
+def _without_driver_warning() -> Iterator[None]:
+    """Pass on what Warp's native code writes to stderr, but for its line about a missing NVIDIA driver.
+
+    That line appears on every machine without a GPU, where it says nothing that the user asked for; whoever asks for
+    a missing GPU gets an error.
+    """
+    sys.stderr.flush()
+    kept = os.dup(2)
+    with tempfile.TemporaryFile() as caught:
+        os.dup2(caught.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+            caught.seek(0)
+            for line in caught:
+                if b"NVIDIA CUDA driver" not in line:
+                    os.write(2, line)
 
 
 def versions() -> dict[str, str]:
@@ -131,12 +158,13 @@ class Batch:
         self.control.skin = options.skin
         self.control.smallest_step = options.smallest_step
         self.control.step_limit = options.step_limit
-        self.control.tries = 500
+        self.control.tries = 0
         self.control.sample_interval = options.record_interval
         self.control.frame_every = frame_every
         self.control.rest_speed = options.rest_speed
         self.control.rest_time = options.rest_time
 
+        self._tries = 500
         self.scratch = wp.zeros((worlds, rows, self.columns), dtype=wp.float64, device=self.device)
         self.lists = wp.zeros((worlds, list_layout(self.columns).size), dtype=wp.int32, device=self.device)
 
@@ -205,25 +233,37 @@ class Batch:
             after_launch: Called after each launch; it drains the record. Results do not depend on how a run is cut
                 into launches.
         """
-        kernel = make_advance(features)
-        wp.load_module(kernel.module, device=self.device)
+        self.compile(features)
         status = self.state.status.numpy()
         while True:
             active = [world for world in worlds if status[world] == Status.RUNNING]
             if not active:
                 return
-            indices = self._array(np.asarray(active, dtype=np.int32))
-            before = time.perf_counter()
-            arrays = [indices, self.model, self.program, self.state, self.record, self.scratch, self.lists]
-            wp.launch(kernel, dim=len(active), inputs=[*arrays, self.control], device=self.device)
-            wp.synchronize_device(self.device)
-            seconds = time.perf_counter() - before
+            seconds = self.launch(active, features, self._tries)
             if seconds < LAUNCH_SECONDS / 2:
-                self.control.tries = min(2 * self.control.tries, 1_000_000)
+                self._tries = min(2 * self._tries, 1_000_000)
             elif seconds > 2 * LAUNCH_SECONDS:
-                self.control.tries = max(self.control.tries // 2, 1)
+                self._tries = max(self._tries // 2, 1)
             if after_launch is not None:
                 after_launch()
+
+    def compile(self, features: Features) -> None:
+        """Make sure that the kernel for these features is ready; takes seconds the first time on a machine."""
+        wp.load_module(make_advance(features).module, device=self.device)
+
+    def launch(self, worlds: Sequence[int], features: Features, tries: int) -> float:
+        """Carry worlds on by at most this many tries each; returns the wall time [s]."""
+        self.control.tries = tries
+        indices = self._array(np.asarray(worlds, dtype=np.int32))
+        arrays = [indices, self.model, self.program, self.state, self.record, self.scratch, self.lists]
+        before = time.perf_counter()
+        wp.launch(make_advance(features), dim=len(worlds), inputs=[*arrays, self.control], device=self.device)
+        wp.synchronize_device(self.device)
+        return time.perf_counter() - before
+
+    def listed_pairs(self, world: int) -> int:
+        """Pairs of joints in a world's neighbour list."""
+        return int(self.lists.numpy()[world, list_layout(self.columns).count])
 
     def position(self, world: int) -> Array:
         """(n, 3): x, y [m], θ [rad]."""
