@@ -32,7 +32,6 @@ from .layout import (
     INVERSE_INERTIA,
     INVERSE_MASS,
     LAST_FLOOR_IMPULSE,
-    LAST_LOOK,
     LIST_BUILDS,
     LOSS_DAMPING,
     LOSS_FRICTION,
@@ -48,6 +47,7 @@ from .layout import (
     SPROCKET_DEPTH,
     SPROCKET_IMPULSES,
     STAGES,
+    TIME,
 )
 from .record import (
     record_is_full,
@@ -245,8 +245,7 @@ def make_advance(features: Features):
         """One sample: time series, frame, watches; returns the status."""
         mark = state.next_sample[world]
         summary = summarise(K, chain)
-        write_sample(record, world, time, summary)
-        state.watch[world, LAST_LOOK] = time
+        write_sample(state, record, world, time, summary)
         if mark % control.frame_every == wp.int64(0):
             write_frame(record, K, chain, world, time)
         passed = wp.int64(wp.floor(time / control.sample_interval))
@@ -389,10 +388,10 @@ def make_advance(features: Features):
                 total = state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
                 if total >= control.step_limit:
                     status = int(STEP_LIMIT)
-        if status != RUNNING and status != NOT_FINITE and state.watch[world, LAST_LOOK] != time:
+        if status != RUNNING and status != NOT_FINITE and state.last_look[world, TIME] != time:
             # the series ends with the state in which the run ends
             place_ends(K, chain)
-            write_sample(record, world, time, summarise(K, chain))
+            write_sample(state, record, world, time, summarise(K, chain))
         store_state(K, state, chain, world, wp.static(fixed_loss))
         state.gap[world] = gap
         state.has_first_stage[world] = has_first_stage

@@ -2,25 +2,37 @@
 
 import warp as wp
 
-from . import layout
 from .elementary import HALF, ZERO, from_order_key, order_key
 from .layout import (
+    CENTER_U,
+    CENTER_V,
+    CENTER_X,
+    CENTER_Y,
     COSINE,
+    GRAVITATIONAL,
+    HEIGHT,
     INERTIA,
+    KINETIC,
     LAST_HEIGHT,
     LAST_WIDTH,
     LEFT_X,
     LEFT_Y,
+    LOOP_SPEED,
+    LOWEST,
     MASS,
     OMEGA,
     REST_SINCE,
     RIGHT_X,
     RIGHT_Y,
+    RMS_SPEED,
     SINE,
+    SPRING,
     STEADY_TIME,
     SUM_HEIGHT,
     SUM_SPEED,
     SUM_WIDTH,
+    TIME,
+    WIDTH,
     WINDOW_COUNT,
     WINDOW_START,
     U,
@@ -44,7 +56,7 @@ FINISHED = wp.constant(2)
 
 @wp.struct
 class Summary:
-    """Sums over one chain at one moment; units as in :data:`layout` sample columns."""
+    """Sums over one chain at one moment; see ``Record.samples`` in :mod:`types`."""
 
     center_x: wp.float64
     center_y: wp.float64
@@ -167,25 +179,33 @@ def watch_steadiness(state: State, program: Program, world: int, time: wp.float6
 
 
 @wp.func
-def write_sample(record: Record, world: int, time: wp.float64, summary: Summary):
-    """Appends one row to the time series, if it is kept."""
-    if record.samples.shape[1] == 0:
-        return
-    row = record.sample_count[world]
-    record.samples[world, row, wp.static(layout.TIME)] = time
-    record.samples[world, row, wp.static(layout.CENTER_X)] = summary.center_x
-    record.samples[world, row, wp.static(layout.CENTER_Y)] = summary.center_y
-    record.samples[world, row, wp.static(layout.CENTER_U)] = summary.center_u
-    record.samples[world, row, wp.static(layout.CENTER_V)] = summary.center_v
-    record.samples[world, row, wp.static(layout.KINETIC)] = summary.kinetic
-    record.samples[world, row, wp.static(layout.GRAVITATIONAL)] = summary.gravitational
-    record.samples[world, row, wp.static(layout.SPRING)] = summary.spring
-    record.samples[world, row, wp.static(layout.LOWEST)] = summary.lowest
-    record.samples[world, row, wp.static(layout.RMS_SPEED)] = summary.rms_speed
-    record.samples[world, row, wp.static(layout.HEIGHT)] = summary.height
-    record.samples[world, row, wp.static(layout.WIDTH)] = summary.width
-    record.samples[world, row, wp.static(layout.LOOP_SPEED)] = summary.loop_speed
-    record.sample_count[world] = row + 1
+def write_row(rows: wp.array2d(dtype=wp.float64), row: int, time: wp.float64, summary: Summary):
+    """Writes a summary as one row of SAMPLE_COLUMNS numbers."""
+    rows[row, TIME] = time
+    rows[row, CENTER_X] = summary.center_x
+    rows[row, CENTER_Y] = summary.center_y
+    rows[row, CENTER_U] = summary.center_u
+    rows[row, CENTER_V] = summary.center_v
+    rows[row, KINETIC] = summary.kinetic
+    rows[row, GRAVITATIONAL] = summary.gravitational
+    rows[row, SPRING] = summary.spring
+    rows[row, LOWEST] = summary.lowest
+    rows[row, RMS_SPEED] = summary.rms_speed
+    rows[row, HEIGHT] = summary.height
+    rows[row, WIDTH] = summary.width
+    rows[row, LOOP_SPEED] = summary.loop_speed
+
+
+@wp.func
+def write_sample(state: State, record: Record, world: int, time: wp.float64, summary: Summary):
+    """Notes the first and the last look at a chain, and appends to the time series if it is kept."""
+    if state.last_look[world, TIME] < ZERO:
+        write_row(state.first_look, world, time, summary)
+    write_row(state.last_look, world, time, summary)
+    if record.samples.shape[1] > 0:
+        row = record.sample_count[world]
+        write_row(record.samples[world], row, time, summary)
+        record.sample_count[world] = row + 1
 
 
 @wp.func

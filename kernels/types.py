@@ -70,6 +70,10 @@ class State:
     next_sample: wp.array(dtype=wp.int64)  # index of the next sample mark
     status: wp.array(dtype=wp.int32)
     watch: wp.array2d(dtype=wp.float64)  # (W, WATCH_ROWS): memory of the steadiness and rest watches
+    first_look: wp.array2d(dtype=wp.float64)  # (W, SAMPLE_COLUMNS): the chain when its run began …
+    last_look: wp.array2d(
+        dtype=wp.float64
+    )  # … and when it was last looked at, at the end of the run the last time
     counts: wp.array2d(dtype=wp.int64)  # (W, COUNT_ROWS)
     extremes: wp.array2d(dtype=wp.float64)  # (W, EXTREME_ROWS) [m]
     losses: wp.array2d(dtype=wp.float64)  # (W, LOSS_ROWS) [J]

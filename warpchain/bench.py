@@ -229,9 +229,8 @@ class _Stepper:
         velocity: Array,
         broad_phase: str = "grid",
     ) -> None:
-        self.batch = Batch(
-            [parameters], [len(position)], [0.0], options, keeps_samples=False, keeps_frames=False
-        )
+        self.batch = Batch(1, len(position), options)
+        self.batch.set_chain(0, parameters, len(position))
         self.batch.load(0, position, velocity, stop_time=FAR, stop_status=Status.FINISHED)
         self.features = self.batch.features(fixed_body="floor", watch="none", broad_phase=broad_phase)
         self.batch.compile(self.features)

@@ -37,8 +37,6 @@ EXTREMES = ("opening", "floor", "sprocket", "self")
 LOSSES = ("joint_friction", "joint_damping", "floor", "sprocket", "self_contact")
 """Losses of energy of a world, likewise."""
 
-_MODEL_FIELDS = [name for name in Parameters.model_fields if name != "sprocket_radius"]
-
 
 @functools.cache
 def start_device(device: str) -> wp.Device:
@@ -91,40 +89,32 @@ class Batch:
 
     def __init__(
         self,
-        parameters: Sequence[Parameters],
-        links: Sequence[int],
-        contact_radius: Sequence[float],
+        worlds: int,
+        longest: int,
         options: Options,
         *,
-        keeps_samples: bool,
-        keeps_frames: bool,
-        frame_every: int = 1,
+        keeps_samples: bool = False,
+        frame_every: int | None = None,
     ) -> None:
-        """Allocate a batch; all worlds are idle (status FINISHED) until loaded.
+        """Allocate a batch; all worlds are idle (status FINISHED) until a chain is loaded.
 
         Args:
-            parameters: One per world.
-            links: Number of links of each world.
-            contact_radius: Radius [m] at which each world's sprocket is touched.
+            worlds: Number of chains W that are carried on together.
+            longest: Greatest number of links of a chain that will be loaded.
             options: Shared by all worlds.
             keeps_samples: Keep the time series.
-            keeps_frames: Keep all joint positions at every ``frame_every``-th sample.
-            frame_every: Samples per frame.
+            frame_every: Keep all joint positions at every so many samples; None keeps none.
         """
         self.options = options
         self.device = start_device(options.device)
-        self.links = list(links)
-        worlds, longest = len(self.links), max(self.links)
+        self.links = [0] * worlds
         self.columns = layout.padded_width(longest)
         rows = layout.scratch_rows(TABLEAUS[options.method].stages)
 
         self.model = Model()
-        self.model.link_count = self._array(np.asarray(links, dtype=np.int32))
-        for name in _MODEL_FIELDS:
-            setattr(
-                self.model, name, self._array(np.array([getattr(p, name) for p in parameters], dtype=float))
-            )
-        self.model.sprocket_radius = self._array(np.asarray(contact_radius, dtype=float))
+        self.model.link_count = self._array(np.zeros(worlds, dtype=np.int32))
+        for name in Parameters.model_fields:
+            setattr(self.model, name, self._array(np.ones(worlds)))
 
         self.program = Program()
         for name in Program.vars:
@@ -139,11 +129,13 @@ class Batch:
         self.state.status = self._array(np.full(worlds, int(Status.FINISHED), dtype=np.int32))
         self.state.next_sample = self._array(np.zeros(worlds, dtype=np.int64))
         self.state.watch = self._array(np.zeros((worlds, layout.WATCH_ROWS)))
+        for name in ("first_look", "last_look"):
+            setattr(self.state, name, self._array(np.zeros((worlds, layout.SAMPLE_COLUMNS))))
         self.state.counts = self._array(np.zeros((worlds, layout.COUNT_ROWS), dtype=np.int64))
         self.state.extremes = self._array(np.zeros((worlds, layout.EXTREME_ROWS)))
         self.state.losses = self._array(np.zeros((worlds, layout.LOSS_ROWS)))
 
-        samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * keeps_frames
+        samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * (frame_every is not None)
         self.record = Record()
         self.record.sample_count = self._array(np.zeros(worlds, dtype=np.int32))
         self.record.frame_count = self._array(np.zeros(worlds, dtype=np.int32))
@@ -160,7 +152,7 @@ class Batch:
         self.control.step_limit = options.step_limit
         self.control.tries = 0
         self.control.sample_interval = options.record_interval
-        self.control.frame_every = frame_every
+        self.control.frame_every = frame_every or 1
         self.control.rest_speed = options.rest_speed
         self.control.rest_time = options.rest_time
 
@@ -171,10 +163,28 @@ class Batch:
     def _array(self, values: NDArray[np.generic]) -> wp.array:
         return wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device=self.device)
 
+    def set_chain(
+        self, world: int, parameters: Parameters, links: int, sprocket_radius: float | None = None
+    ) -> None:
+        """Say what a world's chain is made of.
+
+        Args:
+            world: Index.
+            parameters: Of the chain.
+            links: Number of links.
+            sprocket_radius: Radius [m] at which circles touch the sprocket; None: the parameter's.
+        """
+        self.links[world] = links
+        self.model.link_count.numpy()[world] = links
+        for name, value in parameters:
+            getattr(self.model, name).numpy()[world] = value
+        if sprocket_radius is not None:
+            self.model.sprocket_radius.numpy()[world] = sprocket_radius
+
     def load(
         self, world: int, position: Array, velocity: Array, *, stop_time: float, stop_status: Status
     ) -> None:
-        """Set a world's chain and start its clock at zero; its statistics and watches start anew.
+        """Set the state of a world's chain and start its clock at zero; its statistics and watches start anew.
 
         Args:
             world: Index.
@@ -190,7 +200,8 @@ class Batch:
         for array in (state.time, state.gap, state.counts, state.extremes, state.losses, state.next_sample):
             array.numpy()[world] = 0
         state.watch.numpy()[world] = 0
-        state.watch.numpy()[world, [layout.WINDOW_START, layout.REST_SINCE, layout.LAST_LOOK]] = -1.0
+        state.watch.numpy()[world, [layout.WINDOW_START, layout.REST_SINCE]] = -1.0
+        state.last_look.numpy()[world, layout.TIME] = -1.0
         state.watch.numpy()[world, layout.LAST_FLOOR_IMPULSE] = -np.inf
         state.has_first_stage.numpy()[world] = 0
         state.is_fresh.numpy()[world] = 1
@@ -300,6 +311,14 @@ class Batch:
         """Energy [J] lost since loading, by cause."""
         row = self.state.losses.numpy()[world]
         return {name: float(value) for name, value in zip(LOSSES, row, strict=True)}
+
+    def first_look(self, world: int) -> Array:
+        """Sums over the chain when its run began: (SAMPLE_COLUMNS,), see :mod:`warpchain.kernels.layout`."""
+        return self.state.first_look.numpy()[world].copy()
+
+    def last_look(self, world: int) -> Array:
+        """The same when the chain was last looked at; at the end of the run if that has ended."""
+        return self.state.last_look.numpy()[world].copy()
 
     def drain_samples(self, world: int) -> Array:
         """Take the time series kept so far: (t, SAMPLE_COLUMNS), see :mod:`warpchain.kernels.layout`."""

@@ -60,7 +60,8 @@ def simulate(
         chain = chain.with_values({"gravity": 0.0})
     start, rates = _checked_state(position, velocity)
     instants = _checked_times(duration, times)
-    batch = Batch([chain], [len(start)], [0.0], options, keeps_samples=False, keeps_frames=False)
+    batch = Batch(1, len(start), options)
+    batch.set_chain(0, chain, len(start))
     batch.load(0, start, rates, stop_time=instants[0], stop_status=Status.FINISHED)
     features = batch.features(fixed_body="floor" if floor else "none", watch="none")
     reached, positions, velocities = [], [], []

@@ -1,0 +1,214 @@
+"""The course of one walk on one world of a batch: which phase follows which, and what remains in the end.
+
+The drive (settle, spin-up, hold until steady) needs a sprocket and no floor, the walk a floor and no sprocket. The
+equations do not know where the floor is, so the chain is driven about the origin and raised to its clearance at the
+release.
+"""
+
+import math
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.engine import COUNTS, EXTREMES, Batch
+from warpchain.kernels import layout
+from warpchain.kernels.driver import Features
+from warpchain.options import Setup, contact_radius, joint_radius
+from warpchain.parameters import Parameters
+from warpchain.shapes import ellipse, lay_chain, stadium
+from warpchain.status import Status
+
+Array = NDArray[np.float64]
+
+STILL_WINDOW = 0.25
+"""Length [s] of a window of the steadiness watch when the sprocket stands still."""
+
+
+class Phase(Enum):
+    """Phases of a walk; the values are their names for people."""
+
+    SETTLE = "settle"
+    SPIN_UP = "spin up"
+    HOLD = "hold"
+    WALK = "walk"
+
+
+class Course:
+    """One walk: loads a world, and takes it into its next phase whenever it has stopped.
+
+    Attributes:
+        setup: What the walk is.
+        status: RUNNING until the course is over.
+        raised: Height [m] by which the chain was raised at the release, where the sprocket's centre was then; NaN
+            before the release.
+        drive_time: Simulated time [s] before the release.
+        drive_counts: Counters (:data:`warpchain.engine.COUNTS`) of the time before the release.
+        drive_extremes: Greatest opening and depths [m] of the time before the release.
+    """
+
+    def __init__(self, batch: Batch, world: int, setup: Setup) -> None:
+        """Place the chain of a walk in a world; the batch has the walk's options."""
+        self.setup = setup
+        self.status = Status.RUNNING
+        self.raised = math.nan
+        self.drive_time = 0.0
+        self.drive_counts = dict.fromkeys(COUNTS, 0)
+        self.drive_extremes = dict.fromkeys(EXTREMES, 0.0)
+        self._batch, self._world = batch, world
+        self._hanging_lowest = math.nan
+        self._released = False
+
+        scene, parameters = setup.scene, setup.parameters
+        from_rest = scene.start == "rest"
+        speed = 2 * math.pi * scene.frequency * joint_radius(scene, parameters)
+        if scene.start == "ellipse":
+            batch.set_chain(world, parameters, scene.links)
+            position, velocity = lay_chain(
+                ellipse(scene.ellipse_aspect), scene.links, parameters.link_length, speed, scene.phase
+            )
+            self._settled = self._at_full_speed = 0.0
+            self._release(position, velocity)
+            return
+        batch.set_chain(world, parameters, scene.links, contact_radius(scene, parameters))
+        self._settled = scene.settle_time if from_rest else 0.0
+        spin_up = scene.spin_up_time if from_rest and speed > 0 else 0.0
+        self._at_full_speed = self._settled + spin_up
+        position, velocity = lay_chain(
+            stadium(joint_radius(scene, parameters)),
+            scene.links,
+            parameters.link_length,
+            0.0 if from_rest else speed,
+        )
+        batch.load(world, position, velocity, stop_time=self._settled, stop_status=Status.FINISHED)
+        batch.set_program(
+            world,
+            sprocket_speed=-2 * math.pi * scene.frequency,  # clockwise, so that the walk goes towards +x
+            spin_up_start=self._settled,
+            spin_up_time=spin_up,
+            hold_start=self._at_full_speed,
+            loop_speed=speed,
+            loop_period=scene.links * parameters.link_length / speed if speed > 0 else STILL_WINDOW,
+            release_phase=scene.phase,
+        )
+        if not from_rest:
+            self._start_drive()
+
+    @property
+    def phase(self) -> Phase:
+        """The phase that the world is in."""
+        if self._released:
+            return Phase.WALK
+        now = self._batch.time(self._world)
+        if now < self._settled:
+            return Phase.SETTLE
+        return Phase.SPIN_UP if now < self._at_full_speed else Phase.HOLD
+
+    @property
+    def features(self) -> Features:
+        """What the kernel that carries the world on must be compiled for."""
+        if self._released:
+            return self._batch.features(fixed_body="floor", watch="rest")
+        return self._batch.features(fixed_body="sprocket", watch="steady")
+
+    @property
+    def tries(self) -> int:
+        """Steps tried so far, accepted or not."""
+        counts = self.counts
+        return counts["accepted"] + counts["rejected"]
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Counters of all phases so far."""
+        if not self._released:
+            return self._batch.counts(self._world)
+        now = self._batch.counts(self._world)
+        return {name: self.drive_counts[name] + now[name] for name in COUNTS}
+
+    @property
+    def extremes(self) -> dict[str, float]:
+        """Greatest opening and depths [m] of all phases so far."""
+        if not self._released:
+            return self._batch.extremes(self._world)
+        now = self._batch.extremes(self._world)
+        return {name: max(self.drive_extremes[name], now[name]) for name in EXTREMES}
+
+    @property
+    def walk_time(self) -> float:
+        """Time [s] since the release."""
+        return self._batch.time(self._world) if self._released else 0.0
+
+    @property
+    def simulated_time(self) -> float:
+        """Time [s] simulated so far."""
+        return self.drive_time + self.walk_time if self._released else self._batch.time(self._world)
+
+    @property
+    def speed(self) -> float:
+        """Speed [m/s] of the centre of mass in the walk, along the loop before."""
+        look = self._batch.last_look(self._world)
+        if self._released:
+            return math.hypot(look[layout.CENTER_U], look[layout.CENTER_V])
+        return float(look[layout.LOOP_SPEED])
+
+    @property
+    def dx(self) -> float:
+        """Δx [m]; NaN unless the chain is at rest."""
+        if self.status != Status.AT_REST:
+            return math.nan
+        return float(self._batch.last_look(self._world)[layout.CENTER_X])
+
+    def energy(self) -> dict[str, float]:
+        """Where the energy of the walk went [J]; NaN before the release. Keys: ``results.ENERGIES``."""
+        first, last = self._batch.first_look(self._world), self._batch.last_look(self._world)
+        losses = self._batch.losses(self._world)
+        lost = {name: losses[name] for name in ("joint_friction", "joint_damping", "floor", "self_contact")}
+        ledger = {
+            "kinetic_at_release": float(first[layout.KINETIC]),
+            "potential_at_release": float(first[layout.GRAVITATIONAL] + first[layout.SPRING]),
+            "kinetic_at_end": float(last[layout.KINETIC]),
+            "potential_at_end": float(last[layout.GRAVITATIONAL] + last[layout.SPRING]),
+            **lost,
+        }
+        at_release = ledger["kinetic_at_release"] + ledger["potential_at_release"]
+        at_end = ledger["kinetic_at_end"] + ledger["potential_at_end"]
+        ledger["residual"] = at_release - at_end - sum(lost.values())
+        return ledger if self._released else dict.fromkeys(ledger, math.nan)
+
+    def next_phase(self) -> bool:
+        """Take a world that has stopped into its next phase; False if the course is over."""
+        status = self._batch.status(self._world)
+        if self._released or status != Status.FINISHED:
+            self.status = status
+            return False
+        if self._batch.time(self._world) <= self._settled and math.isnan(self._hanging_lowest):
+            position = self._batch.position(self._world)
+            self._hanging_lowest = lowest_point(position, self.setup.parameters)
+            self._start_drive()
+        else:
+            self.drive_time = self._batch.time(self._world)
+            self.drive_counts = self._batch.counts(self._world)
+            self.drive_extremes = self._batch.extremes(self._world)
+            self._release(self._batch.position(self._world), self._batch.velocity(self._world))
+        return True
+
+    def _start_drive(self) -> None:
+        limit = self._at_full_speed + self.setup.scene.hold_limit
+        self._batch.resume(self._world, limit, Status.NOT_STEADY)
+
+    def _release(self, position: Array, velocity: Array) -> None:
+        scene = self.setup.scene
+        lowest = lowest_point(position, self.setup.parameters)
+        measured = self._hanging_lowest if scene.clearance_of == "hanging" else lowest
+        self.raised = scene.clearance - measured
+        position[:, 1] += self.raised
+        self._batch.load(
+            self._world, position, velocity, stop_time=scene.walk_limit, stop_status=Status.TIME_LIMIT
+        )
+        self._released = True
+
+
+def lowest_point(position: Array, parameters: Parameters) -> float:
+    """Height [m] of the lowest point of a chain's circles; position (n, 3)."""
+    ends = position[:, 1] - parameters.link_length / 2 * np.abs(np.sin(position[:, 2]))
+    return float(np.min(ends)) - parameters.circle_radius
