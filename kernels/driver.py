@@ -62,7 +62,10 @@ from .types import Chain, Control, Model, Program, Record, State, read_chain
 
 wp.set_module_options({"enable_backward": False})
 
-COMPILER_FLAGS = "-march=native -ffp-contract=fast -mllvm=-inline-threshold=9000 -mllvm=-inline-cold-callsite-threshold=3000"
+COMPILER_FLAGS = (
+    "-march=native -ffp-contract=fast"
+    " -mllvm=-inline-threshold=9000 -mllvm=-inline-cold-callsite-threshold=3000"
+)
 """Clang flags of the step kernels. Fusing a product and a sum makes a stage 1.7 times faster."""
 
 # Codes shared with warpchain.status.

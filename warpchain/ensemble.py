@@ -1,0 +1,56 @@
+"""Many walks on the worlds of a batch: finished ones make room for waiting ones."""
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+
+from warpchain.course import Course
+from warpchain.engine import Batch
+from warpchain.kernels import layout
+from warpchain.kernels.driver import Features
+from warpchain.options import Options, Setup
+from warpchain.status import Status
+
+TRIES = 20_000
+"""Tries of each chain per launch; what a walk gives does not depend on it."""
+
+
+def run_setups(setups: Sequence[Setup], *, slots: int = 1) -> Iterator[tuple[int, Course]]:
+    """Run walks and yield each when it is over, as (place in ``setups``, course).
+
+    A course must be read before the next one is asked for: its world is used again. What a walk gives does not depend,
+    to the bit, on the others or on the number of slots.
+
+    Args:
+        setups: The walks, samples drawn.
+        slots: Chains that are carried on together in one launch. On a CPU a launch is one core's work, so one chain
+            at a time, which stays in the cache, is best.
+    """
+    buckets: dict[tuple[Options, int], list[int]] = defaultdict(list)
+    for place, setup in enumerate(setups):
+        buckets[setup.options, layout.padded_width(setup.scene.links)].append(place)
+    for (options, _), places in buckets.items():
+        longest = max(setups[place].scene.links for place in places)
+        yield from _run_bucket(setups, places, Batch(min(slots, len(places)), longest, options))
+
+
+def _run_bucket(setups: Sequence[Setup], places: Sequence[int], batch: Batch) -> Iterator[tuple[int, Course]]:
+    """Run walks that share options and the width of their arrays."""
+    waiting = iter(places)
+    running: dict[int, tuple[int, Course]] = {}
+    for world, place in zip(range(len(batch.links)), waiting, strict=False):
+        running[world] = place, Course(batch, world, setups[place])
+    while running:
+        together: dict[Features, list[int]] = defaultdict(list)
+        for world, (_, course) in running.items():
+            together[course.features].append(world)
+        for features, worlds in together.items():
+            batch.compile(features)
+            batch.launch(worlds, features, TRIES)
+        for world, (place, course) in list(running.items()):
+            if batch.status(world) == Status.RUNNING or course.next_phase():
+                continue
+            yield place, course
+            del running[world]
+            following = next(waiting, None)
+            if following is not None:
+                running[world] = following, Course(batch, world, setups[following])
