@@ -213,9 +213,7 @@ def neighbour_list(columns: int):
                                 # insertion keeps this joint's partners in ascending order
                                 k = total
                                 while k > start and L[wp.static(lists.found_second) + wp.max(k - 1, 0)] > q:
-                                    L[wp.static(lists.found_second) + k] = L[
-                                        wp.static(lists.found_second) + k - 1
-                                    ]
+                                    L[wp.static(lists.found_second) + k] = L[wp.static(lists.found_second) + k - 1]
                                     k -= 1
                                 L[wp.static(lists.found_second) + k] = q
                                 L[wp.static(lists.found_first) + total] = p

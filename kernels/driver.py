@@ -63,8 +63,7 @@ from .types import Chain, Control, Model, Program, Record, State, read_chain
 wp.set_module_options({"enable_backward": False})
 
 COMPILER_FLAGS = (
-    "-march=native -ffp-contract=fast"
-    " -mllvm=-inline-threshold=9000 -mllvm=-inline-cold-callsite-threshold=3000"
+    "-march=native -ffp-contract=fast -mllvm=-inline-threshold=9000 -mllvm=-inline-cold-callsite-threshold=3000"
 )
 """Clang flags of the step kernels. Fusing a product and a sum makes a stage 1.7 times faster."""
 
@@ -200,9 +199,7 @@ def step_controller(order: int, error_order: int):
 
     @wp.func
     def shrinkage(error: wp.float64):
-        return wp.max(
-            SAFETY * wp.pow(error, wp.static(wp.float64(-1.0 / (error_order - 1)))), LEAST_SHRINKAGE
-        )
+        return wp.max(SAFETY * wp.pow(error, wp.static(wp.float64(-1.0 / (error_order - 1)))), LEAST_SHRINKAGE)
 
     return growth, shrinkage
 
@@ -368,9 +365,7 @@ def make_advance(features: Features):
                 if wp.static(has_sprocket):
                     gap = sprocket_gap(K, chain)
                     if gap < ZERO:
-                        state.extremes[world, SPROCKET_DEPTH] = wp.max(
-                            state.extremes[world, SPROCKET_DEPTH], -gap
-                        )
+                        state.extremes[world, SPROCKET_DEPTH] = wp.max(state.extremes[world, SPROCKET_DEPTH], -gap)
                         hits = resolve_sprocket(K, chain, sprocket_turning(program, world, time))
                         state.counts[world, SPROCKET_IMPULSES] = state.counts[world, SPROCKET_IMPULSES] + hits
                         impulses += hits

@@ -184,24 +184,12 @@ def explicit_method(name: str):
                 for j in range(wp.static(s)):
                     if wp.static(velocity[s][j] != 0.0):
                         du += wp.static(wp.float64(velocity[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                        dv += (
-                            wp.static(wp.float64(velocity[s][j]))
-                            * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                        )
-                        dw += (
-                            wp.static(wp.float64(velocity[s][j]))
-                            * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
-                        )
+                        dv += wp.static(wp.float64(velocity[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                        dw += wp.static(wp.float64(velocity[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
                     if wp.static(position[s][j] != 0.0):
                         dx += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                        dy += (
-                            wp.static(wp.float64(position[s][j]))
-                            * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                        )
-                        turn += (
-                            wp.static(wp.float64(position[s][j]))
-                            * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
-                        )
+                        dy += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                        turn += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
                 turn = ch * K[OMEGA, i] + hh * turn
                 versine, sine = small_turn(turn)
                 c = K[COSINE, i] - (K[COSINE, i] * versine + K[SINE, i] * sine)
@@ -246,49 +234,21 @@ def explicit_method(name: str):
             et = ZERO
             for j in range(wp.static(stages)):
                 if wp.static(velocity_weights[j] != 0.0):
-                    du += (
-                        wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                    )
-                    dv += (
-                        wp.static(wp.float64(velocity_weights[j]))
-                        * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                    )
-                    dw += (
-                        wp.static(wp.float64(velocity_weights[j]))
-                        * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
-                    )
+                    du += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
+                    dv += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                    dw += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
                 if wp.static(position_weights[j] != 0.0):
-                    dx += (
-                        wp.static(wp.float64(position_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                    )
-                    dy += (
-                        wp.static(wp.float64(position_weights[j]))
-                        * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                    )
-                    turn += (
-                        wp.static(wp.float64(position_weights[j]))
-                        * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
-                    )
+                    dx += wp.static(wp.float64(position_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
+                    dy += wp.static(wp.float64(position_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                    turn += wp.static(wp.float64(position_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
                 if wp.static(velocity_errors[j] != 0.0):
                     eu += wp.static(wp.float64(velocity_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                    ev += (
-                        wp.static(wp.float64(velocity_errors[j]))
-                        * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                    )
-                    ew += (
-                        wp.static(wp.float64(velocity_errors[j]))
-                        * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
-                    )
+                    ev += wp.static(wp.float64(velocity_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                    ew += wp.static(wp.float64(velocity_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
                 if wp.static(position_errors[j] != 0.0):
                     ex += wp.static(wp.float64(position_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                    ey += (
-                        wp.static(wp.float64(position_errors[j]))
-                        * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                    )
-                    et += (
-                        wp.static(wp.float64(position_errors[j]))
-                        * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
-                    )
+                    ey += wp.static(wp.float64(position_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                    et += wp.static(wp.float64(position_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
             u = K[U, i]
             v = K[V, i]
             w = K[OMEGA, i]
@@ -331,13 +291,9 @@ def explicit_method(name: str):
             for j in range(wp.static(stages)):
                 if wp.static(velocity_weights[j] != 0.0):
                     friction += (
-                        wp.static(wp.float64(velocity_weights[j]))
-                        * K[wp.static(STAGES + STAGE_ROWS * j + 3), i]
+                        wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 3), i]
                     )
-                    damping += (
-                        wp.static(wp.float64(velocity_weights[j]))
-                        * K[wp.static(STAGES + STAGE_ROWS * j + 4), i]
-                    )
+                    damping += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 4), i]
             K[LOST_FRICTION, i] = K[LOST_FRICTION, i] + h * friction
             K[LOST_DAMPING, i] = K[LOST_DAMPING, i] + h * damping
             K[X, i] = K[NEW_X, i]

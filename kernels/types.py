@@ -32,9 +32,7 @@ class Model:
     chain_friction: wp.array(dtype=wp.float64)  # μ_cc
     sprocket_restitution: wp.array(dtype=wp.float64)  # e_sc
     sprocket_friction: wp.array(dtype=wp.float64)  # μ_sc
-    sprocket_radius: wp.array(
-        dtype=wp.float64
-    )  # [m], the radius that link circles touch; centre at the origin
+    sprocket_radius: wp.array(dtype=wp.float64)  # [m], the radius that link circles touch; centre at the origin
 
 
 @wp.struct
@@ -71,9 +69,7 @@ class State:
     status: wp.array(dtype=wp.int32)
     watch: wp.array2d(dtype=wp.float64)  # (W, WATCH_ROWS): memory of the steadiness and rest watches
     first_look: wp.array2d(dtype=wp.float64)  # (W, SAMPLE_COLUMNS): the chain when its run began …
-    last_look: wp.array2d(
-        dtype=wp.float64
-    )  # … and when it was last looked at, at the end of the run the last time
+    last_look: wp.array2d(dtype=wp.float64)  # … and when it was last looked at, at the end of the run the last time
     counts: wp.array2d(dtype=wp.int64)  # (W, COUNT_ROWS)
     extremes: wp.array2d(dtype=wp.float64)  # (W, EXTREME_ROWS) [m]
     losses: wp.array2d(dtype=wp.float64)  # (W, LOSS_ROWS) [J]

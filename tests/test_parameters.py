@@ -133,10 +133,7 @@ def test_parameter_numbers_strict(name: str, value: object) -> None:
         ("joint_stiffness", 1e-9, 0.0),
         ("joint_stiffness", 1e12, 1.001e12),
         ("friction_smoothing", 1e-9, 0.0),
-        *[
-            (name, 0.0, -1e-9)
-            for name in ("joint_damping", "viscous_friction", "coulomb_friction", "gravity")
-        ],
+        *[(name, 0.0, -1e-9) for name in ("joint_damping", "viscous_friction", "coulomb_friction", "gravity")],
         *[(f"{pair}_restitution", 0.0, -0.001) for pair in ("floor", "chain", "sprocket")],
         *[(f"{pair}_restitution", 1.0, 1.001) for pair in ("floor", "chain", "sprocket")],
         *[(f"{pair}_friction", 1.0, 1.001) for pair in ("floor", "chain", "sprocket")],
@@ -219,8 +216,7 @@ def test_parameter_bounds(name: str, accepted: float, rejected: float) -> None:
         (
             "parameters",
             {"circle_radius": 0.007},
-            "parameters.circle_radius: 0.007 is not smaller than half the link length 0.00634; "
-            "give a smaller radius",
+            "parameters.circle_radius: 0.007 is not smaller than half the link length 0.00634; give a smaller radius",
         ),
         (
             "parameters",
@@ -268,9 +264,7 @@ def test_refusals(section: str, values: object, message: str) -> None:
     assert refused(section, values) == message
 
 
-@pytest.mark.parametrize(
-    ("name", "value"), [(name, 0) for name in ("hold_limit", "walk_limit", "ellipse_aspect")]
-)
+@pytest.mark.parametrize(("name", "value"), [(name, 0) for name in ("hold_limit", "walk_limit", "ellipse_aspect")])
 def test_scene_positive(name: str, value: float) -> None:
     """Times that limit a phase, and the aspect of the ellipse, are positive."""
     assert refused("scene", {name: value}).startswith(f"scene.{name}: 0 is not greater than 0")

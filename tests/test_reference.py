@@ -123,18 +123,12 @@ def test_acceleration_is_gradient_of_potential_and_rayleigh_function(parameters)
             rate_x = vx_next - vx + half * (np.sin(angle) * spin + np.sin(angle_next) * spin_next)
             rate_y = vy_next - vy - half * (np.cos(angle) * spin + np.cos(angle_next) * spin_next)
             relative = spin - spin_next
-            dissipation += (
-                p.joint_damping / 2 * (rate_x**2 + rate_y**2) + p.viscous_friction / 2 * relative**2
-            )
-            dissipation += (
-                p.coulomb_friction * p.friction_smoothing * np.log(np.cosh(relative / p.friction_smoothing))
-            )
+            dissipation += p.joint_damping / 2 * (rate_x**2 + rate_y**2) + p.viscous_friction / 2 * relative**2
+            dissipation += p.coulomb_friction * p.friction_smoothing * np.log(np.cosh(relative / p.friction_smoothing))
         return dissipation
 
     position, velocity = disturbed_loop(n, p)
-    force = -complex_gradient(potential, position) - complex_gradient(
-        lambda v: rayleigh(position, v), velocity
-    )
+    force = -complex_gradient(potential, position) - complex_gradient(lambda v: rayleigh(position, v), velocity)
     expected = force / np.column_stack([masses, masses, inertias])
     result = reference.acceleration(position, velocity, p)
     assert_allclose(result, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
@@ -190,9 +184,7 @@ def test_energies_and_momenta_by_hand():
 
 def test_friction_torque_by_hand():
     """f is odd, β w + τ_c beyond ω_c, and (β + τ_c/ω_c) w within."""
-    assert_allclose(
-        reference.friction_torque(np.array([10.0, -10.0]), PAPER), [1.01e-3, -1.01e-3], rtol=1e-14
-    )
+    assert_allclose(reference.friction_torque(np.array([10.0, -10.0]), PAPER), [1.01e-3, -1.01e-3], rtol=1e-14)
     assert_allclose(reference.friction_torque(np.array(1e-9), PAPER), (9e-5 + 0.11) * 1e-9, rtol=1e-10)
 
 
@@ -236,9 +228,7 @@ def test_joint_friction_keeps_momenta():
     positions, velocities, _ = reference.solve_flight(
         position, velocity, np.array([0.0, 3e-3]), parameters, gravity=False
     )
-    before, after = (
-        reference.total_energy(positions[t], velocities[t], parameters, gravity=False) for t in (0, 1)
-    )
+    before, after = (reference.total_energy(positions[t], velocities[t], parameters, gravity=False) for t in (0, 1))
     assert after < 0.9999 * before
     momentum = reference.linear_momentum(velocity, parameters)
     assert_allclose(reference.linear_momentum(velocities[1], parameters), momentum, rtol=1e-10)
@@ -326,15 +316,9 @@ def test_energy_change_is_the_stated_sum_of_losses(collision: Collision):
     rest = impulse - (1 + collision.restitution) * stop_approach
     size = np.linalg.norm(slide) * (np.linalg.norm(slide) + np.linalg.norm(impulse))
     assert abs(rest[0] * slide[1] - rest[1] * slide[0]) <= 1e-11 * size
-    assert (
-        -1e-11 * size
-        <= rest @ slide
-        <= (1 + collision.tangential_restitution) * (slide @ slide) + 1e-11 * size
-    )
+    assert -1e-11 * size <= rest @ slide <= (1 + collision.tangential_restitution) * (slide @ slide) + 1e-11 * size
     # With rest = κ D: κ(2 − κ) DᵀWD = (2 D − rest)ᵀ W rest.
-    losses = (1 - collision.restitution**2) * (stop_approach @ w @ stop_approach) + (
-        2 * slide - rest
-    ) @ w @ rest
+    losses = (1 - collision.restitution**2) * (stop_approach @ w @ stop_approach) + (2 * slide - rest) @ w @ rest
     scale = np.linalg.norm(v) * np.linalg.norm(impulse) + impulse @ w @ impulse
     assert_allclose(collision.kinetic_energy_change(impulse), -losses / 2, atol=1e-11 * scale)
 
@@ -439,9 +423,7 @@ def test_each_kind_of_contact_has_its_own_coefficients(kind):
     """An upright link that lands on its lower circle slides, or sticks, by the coefficients of what it lands on."""
     # Lever (0, −1.5): W_nn = 1, W_nt = 0, W_tt = 1 + 1.5² = 3.25. e = 0.3: J_n = 1.3·3 = 3.9. At 10 m/s it slides,
     # J_t = 3.9/4; at 0.5 m/s it sticks, J_t = (1 + e_t)·0.5/3.25. Landing on an equal link doubles W: half of both.
-    parameters = UNIT.with_values(
-        {f"{kind}_restitution": 0.3, f"{kind}_friction": 0.25, "tangential_restitution": 0.5}
-    )
+    parameters = UNIT.with_values({f"{kind}_restitution": 0.3, f"{kind}_friction": 0.25, "tangential_restitution": 0.5})
     height = {"floor": 1.5, "sprocket": 84.5, "chain": 103.0}[kind] - 1e-9
     share = 0.5 if kind == "chain" else 1.0
     for speed, pull in ((10.0, 3.9 / 4), (0.5, 1.5 * 0.5 / 3.25)):
@@ -637,9 +619,7 @@ def test_stretched_loop_turns_like_a_rigid_body():
     parameters = PAPER.with_values({"joint_stiffness": 1e5, "joint_damping": 0.0})
     position, velocity = reference.circular_loop(12, parameters, 5.0, stretched=True)
     end = 0.05 * 2 * np.pi / velocity[0, 2]
-    positions, _, _ = reference.solve_flight(
-        position, velocity, np.array([0.0, end]), parameters, gravity=False
-    )
+    positions, _, _ = reference.solve_flight(position, velocity, np.array([0.0, end]), parameters, gravity=False)
     turn = velocity[0, 2] * end
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     assert_allclose(positions[1, :, :2], position[:, :2] @ rotation.T, atol=1e-11)

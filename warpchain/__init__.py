@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from warpchain.results import Trajectory, WalkResult, load_walk
     from warpchain.status import Status
     from warpchain.trajectory import simulate
-    from warpchain.walk import walk
+    from warpchain.walker import walk
 
 _HOMES = {
     "InputError": "parameters",
@@ -26,7 +26,7 @@ _HOMES = {
     "load_walk": "results",
     "preset": "parameters",
     "simulate": "trajectory",
-    "walk": "walk",
+    "walk": "walker",
 }
 
 __all__ = [

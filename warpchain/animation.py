@@ -40,9 +40,7 @@ _GIF_PICTURES: Final = 1200
 _PLAYER_FRAMES: Final = 2000
 
 
-def animate(
-    walk: "WalkResult", path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0
-) -> None:
+def animate(walk: "WalkResult", path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
     """Write a moving picture of a walk; the suffix of `path` says which kind: .gif, .mp4 or .html.
 
     Where frames were recorded less often than pictures are wanted, a frame is shown until the next one.
@@ -92,9 +90,7 @@ def _write_gif(walk: "WalkResult", path: Path, fps: float, slow: float) -> None:
     pictures = [frame for frame, _ in itertools.groupby(chosen)]
     repeats = [len(list(group)) for _, group in itertools.groupby(chosen)]
     if len(pictures) > _GIF_PICTURES:
-        raise ValueError(
-            f"{path}: {len(pictures)} pictures are too many for a GIF; lower fps or slow, or give .mp4"
-        )
+        raise ValueError(f"{path}: {len(pictures)} pictures are too many for a GIF; lower fps or slow, or give .mp4")
     ends = np.rint(np.cumsum([0, *repeats]) * 100 / fps)
     durations = [int(hundredths) * 10 for hundredths in np.diff(ends)]
     durations[-1] = int(_HOLD * 1000)

@@ -123,7 +123,7 @@ def step_costs(
         scipy_starts[n] = starts["flight"]
         for scene, (position, velocity) in starts.items():
             for method in TABLEAUS:
-                stepper = _Stepper(parameters, Options(method=method), position, velocity)
+                stepper = _Stepper(parameters, Options.model_validate({"method": method}), position, velocity)
                 stepper.run(tries)  # past the first, small steps
                 runs[scene, method, n] = stepper
     seconds: dict[tuple[str, str, int], list[float]] = {key: [] for key in runs}

@@ -202,9 +202,7 @@ class Course:
         measured = self._hanging_lowest if scene.clearance_of == "hanging" else lowest
         self.raised = scene.clearance - measured
         position[:, 1] += self.raised
-        self._batch.load(
-            self._world, position, velocity, stop_time=scene.walk_limit, stop_status=Status.TIME_LIMIT
-        )
+        self._batch.load(self._world, position, velocity, stop_time=scene.walk_limit, stop_status=Status.TIME_LIMIT)
         self._released = True
 
 

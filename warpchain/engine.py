@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -25,6 +26,11 @@ from warpchain.status import Status
 
 Array = NDArray[np.float64]
 
+PROGRAM = (
+    *("sprocket_speed", "spin_up_start", "spin_up_time", "hold_start"),
+    *("loop_speed", "loop_period", "release_phase"),
+)
+"""Fields of :class:`warpchain.kernels.types.Program`."""
 FIRST_STEP = 1e-7  # s; the controller grows it fivefold per step
 LAUNCH_SECONDS = 0.1  # how long a launch should take: the grain of progress and of Ctrl-C
 CAPACITY_SAMPLES = 512
@@ -76,9 +82,13 @@ def _without_driver_warning() -> Iterator[None]:
 def versions() -> dict[str, str]:
     """Versions of all that may change a number: for the provenance of a result."""
     packages = ("warpchain", "warp-lang", "numpy")
-    return {name: importlib.metadata.version(name) for name in packages} | {
-        "python": platform.python_version()
-    }
+    return {name: importlib.metadata.version(name) for name in packages} | {"python": platform.python_version()}
+
+
+def _view(array: wp.array) -> NDArray[Any]:
+    """The elements of an array in the CPU's memory, to read and to write."""
+    values: NDArray[Any] = array.numpy()
+    return values
 
 
 class Batch:
@@ -117,7 +127,7 @@ class Batch:
             setattr(self.model, name, self._array(np.ones(worlds)))
 
         self.program = Program()
-        for name in Program.vars:
+        for name in PROGRAM:
             setattr(self.program, name, self._array(np.zeros(worlds)))
 
         self.state = State()
@@ -163,9 +173,7 @@ class Batch:
     def _array(self, values: NDArray[np.generic]) -> wp.array:
         return wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device=self.device)
 
-    def set_chain(
-        self, world: int, parameters: Parameters, links: int, sprocket_radius: float | None = None
-    ) -> None:
+    def set_chain(self, world: int, parameters: Parameters, links: int, sprocket_radius: float | None = None) -> None:
         """Say what a world's chain is made of.
 
         Args:
@@ -175,15 +183,13 @@ class Batch:
             sprocket_radius: Radius [m] at which circles touch the sprocket; None: the parameter's.
         """
         self.links[world] = links
-        self.model.link_count.numpy()[world] = links
+        _view(self.model.link_count)[world] = links
         for name, value in parameters:
-            getattr(self.model, name).numpy()[world] = value
+            _view(getattr(self.model, name))[world] = value
         if sprocket_radius is not None:
-            self.model.sprocket_radius.numpy()[world] = sprocket_radius
+            _view(self.model.sprocket_radius)[world] = sprocket_radius
 
-    def load(
-        self, world: int, position: Array, velocity: Array, *, stop_time: float, stop_status: Status
-    ) -> None:
+    def load(self, world: int, position: Array, velocity: Array, *, stop_time: float, stop_status: Status) -> None:
         """Set the state of a world's chain and start its clock at zero; its statistics and watches start anew.
 
         Args:
@@ -195,32 +201,32 @@ class Batch:
         """
         state = self.state
         n = self.links[world]
-        state.links.numpy()[world, :3, :n] = position.T
-        state.links.numpy()[world, 3:, :n] = velocity.T
+        _view(state.links)[world, :3, :n] = position.T
+        _view(state.links)[world, 3:, :n] = velocity.T
         for array in (state.time, state.gap, state.counts, state.extremes, state.losses, state.next_sample):
-            array.numpy()[world] = 0
-        state.watch.numpy()[world] = 0
-        state.watch.numpy()[world, [layout.WINDOW_START, layout.REST_SINCE]] = -1.0
-        state.last_look.numpy()[world, layout.TIME] = -1.0
-        state.watch.numpy()[world, layout.LAST_FLOOR_IMPULSE] = -np.inf
-        state.has_first_stage.numpy()[world] = 0
-        state.is_fresh.numpy()[world] = 1
-        state.step.numpy()[world] = FIRST_STEP
-        state.last_error.numpy()[world] = 1.0
-        self.record.sample_count.numpy()[world] = 0
-        self.record.frame_count.numpy()[world] = 0
+            _view(array)[world] = 0
+        _view(state.watch)[world] = 0
+        _view(state.watch)[world, [layout.WINDOW_START, layout.REST_SINCE]] = -1.0
+        _view(state.last_look)[world, layout.TIME] = -1.0
+        _view(state.watch)[world, layout.LAST_FLOOR_IMPULSE] = -np.inf
+        _view(state.has_first_stage)[world] = 0
+        _view(state.is_fresh)[world] = 1
+        _view(state.step)[world] = FIRST_STEP
+        _view(state.last_error)[world] = 1.0
+        _view(self.record.sample_count)[world] = 0
+        _view(self.record.frame_count)[world] = 0
         self.resume(world, stop_time, stop_status)
 
     def resume(self, world: int, stop_time: float, stop_status: Status) -> None:
         """Let a world that has stopped run on to a later time, as if it had not stopped there."""
-        self.state.stop_time.numpy()[world] = stop_time
-        self.state.stop_status.numpy()[world] = int(stop_status)
-        self.state.status.numpy()[world] = int(Status.RUNNING)
+        _view(self.state.stop_time)[world] = stop_time
+        _view(self.state.stop_status)[world] = int(stop_status)
+        _view(self.state.status)[world] = int(Status.RUNNING)
 
     def set_program(self, world: int, **values: float) -> None:
         """Set fields of :class:`Program` of a world."""
         for name, value in values.items():
-            getattr(self.program, name).numpy()[world] = value
+            _view(getattr(self.program, name))[world] = value
 
     def features(self, *, fixed_body: str, watch: str, broad_phase: str = "grid") -> Features:
         """Kernel features for these worlds."""
@@ -233,9 +239,7 @@ class Batch:
             watch=watch,
         )
 
-    def run(
-        self, worlds: Sequence[int], features: Features, after_launch: Callable[[], None] | None = None
-    ) -> None:
+    def run(self, worlds: Sequence[int], features: Features, after_launch: Callable[[], None] | None = None) -> None:
         """Carry worlds on until none of them is running.
 
         Args:
@@ -245,7 +249,7 @@ class Batch:
                 into launches.
         """
         self.compile(features)
-        status = self.state.status.numpy()
+        status = _view(self.state.status)
         while True:
             active = [world for world in worlds if status[world] == Status.RUNNING]
             if not active:
@@ -274,27 +278,27 @@ class Batch:
 
     def listed_pairs(self, world: int) -> int:
         """Pairs of joints in a world's neighbour list."""
-        return int(self.lists.numpy()[world, list_layout(self.columns).count])
+        return int(_view(self.lists)[world, list_layout(self.columns).count])
 
     def position(self, world: int) -> Array:
         """(n, 3): x, y [m], θ [rad]."""
-        return self.state.links.numpy()[world, :3, : self.links[world]].T.copy()
+        return _view(self.state.links)[world, :3, : self.links[world]].T.copy()
 
     def velocity(self, world: int) -> Array:
         """(n, 3): their rates."""
-        return self.state.links.numpy()[world, 3:, : self.links[world]].T.copy()
+        return _view(self.state.links)[world, 3:, : self.links[world]].T.copy()
 
     def status(self, world: int) -> Status:
         """How the world stands."""
-        return Status(int(self.state.status.numpy()[world]))
+        return Status(int(_view(self.state.status)[world]))
 
     def time(self, world: int) -> float:
         """Time [s] since loading."""
-        return float(self.state.time.numpy()[world])
+        return float(_view(self.state.time)[world])
 
     def counts(self, world: int) -> dict[str, int]:
         """Counters since loading."""
-        row = self.state.counts.numpy()[world]
+        row = _view(self.state.counts)[world]
         return {name: int(value) for name, value in zip(COUNTS, row, strict=True)}
 
     def tries(self, world: int) -> int:
@@ -304,32 +308,32 @@ class Batch:
 
     def extremes(self, world: int) -> dict[str, float]:
         """Greatest joint opening and depths [m] since loading."""
-        row = self.state.extremes.numpy()[world]
+        row = _view(self.state.extremes)[world]
         return {name: float(value) for name, value in zip(EXTREMES, row, strict=True)}
 
     def losses(self, world: int) -> dict[str, float]:
         """Energy [J] lost since loading, by cause."""
-        row = self.state.losses.numpy()[world]
+        row = _view(self.state.losses)[world]
         return {name: float(value) for name, value in zip(LOSSES, row, strict=True)}
 
     def first_look(self, world: int) -> Array:
         """Sums over the chain when its run began: (SAMPLE_COLUMNS,), see :mod:`warpchain.kernels.layout`."""
-        return self.state.first_look.numpy()[world].copy()
+        return _view(self.state.first_look)[world].copy()
 
     def last_look(self, world: int) -> Array:
         """The same when the chain was last looked at; at the end of the run if that has ended."""
-        return self.state.last_look.numpy()[world].copy()
+        return _view(self.state.last_look)[world].copy()
 
     def drain_samples(self, world: int) -> Array:
         """Take the time series kept so far: (t, SAMPLE_COLUMNS), see :mod:`warpchain.kernels.layout`."""
-        count = int(self.record.sample_count.numpy()[world])
-        self.record.sample_count.numpy()[world] = 0
-        return self.record.samples.numpy()[world, :count].copy()
+        count = int(_view(self.record.sample_count)[world])
+        _view(self.record.sample_count)[world] = 0
+        return _view(self.record.samples)[world, :count].copy()
 
     def drain_frames(self, world: int) -> tuple[Array, Array]:
         """Take the frames kept so far: times (f,) [s], joint positions (f, n, 2) [m]."""
-        count = int(self.record.frame_count.numpy()[world])
-        self.record.frame_count.numpy()[world] = 0
+        count = int(_view(self.record.frame_count)[world])
+        _view(self.record.frame_count)[world] = 0
         n = self.links[world]
-        rows = self.record.frames.numpy()[world, :count, : 2 * n].reshape(count, 2, n)
-        return self.record.frame_times.numpy()[world, :count].copy(), rows.transpose(0, 2, 1).copy()
+        rows = _view(self.record.frames)[world, :count, : 2 * n].reshape(count, 2, n)
+        return _view(self.record.frame_times)[world, :count].copy(), rows.transpose(0, 2, 1).copy()

@@ -1,7 +1,8 @@
 """Many walks on the worlds of a batch: finished ones make room for waiting ones."""
 
+import threading
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from warpchain.course import Course
 from warpchain.engine import Batch
@@ -14,7 +15,9 @@ TRIES = 20_000
 """Tries of each chain per launch; what a walk gives does not depend on it."""
 
 
-def run_setups(setups: Sequence[Setup], *, slots: int = 1) -> Iterator[tuple[int, Course]]:
+def run_setups(
+    setups: Sequence[Setup], *, slots: int = 1, stop: threading.Event | None = None
+) -> Iterator[tuple[int, Course]]:
     """Run walks and yield each when it is over, as (place in ``setups``, course).
 
     A course must be read before the next one is asked for: its world is used again. What a walk gives does not depend,
@@ -24,22 +27,38 @@ def run_setups(setups: Sequence[Setup], *, slots: int = 1) -> Iterator[tuple[int
         setups: The walks, samples drawn.
         slots: Chains that are carried on together in one launch. On a CPU a launch is one core's work, so one chain
             at a time, which stays in the cache, is best.
+        stop: When set, the walks are abandoned after the launch that is under way.
     """
     buckets: dict[tuple[Options, int], list[int]] = defaultdict(list)
     for place, setup in enumerate(setups):
         buckets[setup.options, layout.padded_width(setup.scene.links)].append(place)
     for (options, _), places in buckets.items():
         longest = max(setups[place].scene.links for place in places)
-        yield from _run_bucket(setups, places, Batch(min(slots, len(places)), longest, options))
+        yield from _run_bucket(setups, places, Batch(min(slots, len(places)), longest, options), stop)
 
 
-def _run_bucket(setups: Sequence[Setup], places: Sequence[int], batch: Batch) -> Iterator[tuple[int, Course]]:
+def compile_kernels(setups: Iterable[Setup]) -> None:
+    """Make sure that every kernel these walks need is ready, before threads or processes ask for it at once."""
+    ready: set[Features] = set()
+    for setup in setups:
+        batch = Batch(1, setup.scene.links, setup.options)
+        bodies = [("floor", "rest")] + [("sprocket", "steady")] * (setup.scene.start != "ellipse")
+        for fixed_body, watch in bodies:
+            features = batch.features(fixed_body=fixed_body, watch=watch)
+            if features not in ready:
+                batch.compile(features)
+                ready.add(features)
+
+
+def _run_bucket(
+    setups: Sequence[Setup], places: Sequence[int], batch: Batch, stop: threading.Event | None
+) -> Iterator[tuple[int, Course]]:
     """Run walks that share options and the width of their arrays."""
     waiting = iter(places)
     running: dict[int, tuple[int, Course]] = {}
     for world, place in zip(range(len(batch.links)), waiting, strict=False):
         running[world] = place, Course(batch, world, setups[place])
-    while running:
+    while running and not (stop is not None and stop.is_set()):
         together: dict[Features, list[int]] = defaultdict(list)
         for world, (_, course) in running.items():
             together[course.features].append(world)

@@ -104,9 +104,7 @@ class Scene(BaseModel):
     @classmethod
     def _links_even(cls, links: int) -> int:
         if links % 2:
-            raise refusal(
-                "links", f"{links} is odd; a chain alternates inner and outer links, so give an even number"
-            )
+            raise refusal("links", f"{links} is odd; a chain alternates inner and outer links, so give an even number")
         return links
 
     @model_validator(mode="after")
@@ -203,8 +201,7 @@ class Options(BaseModel):
         if self.smallest_step >= self.contact_step:
             raise refusal(
                 "smallest_step",
-                f"{self.smallest_step} is not smaller than contact_step {self.contact_step} s; "
-                "give a smaller step",
+                f"{self.smallest_step} is not smaller than contact_step {self.contact_step} s; give a smaller step",
             )
         return self
 

@@ -120,15 +120,11 @@ class Parameters(BaseModel):
     ]
     inner_inertia: Annotated[
         float,
-        Quantity(
-            "I_inner", "kg m²", 1.69e-7, 1e-9, POSITIVE, "measured", "moment of inertia of an inner link"
-        ),
+        Quantity("I_inner", "kg m²", 1.69e-7, 1e-9, POSITIVE, "measured", "moment of inertia of an inner link"),
     ]
     outer_inertia: Annotated[
         float,
-        Quantity(
-            "I_outer", "kg m²", 1.292e-7, 9e-10, POSITIVE, "measured", "moment of inertia of an outer link"
-        ),
+        Quantity("I_outer", "kg m²", 1.292e-7, 9e-10, POSITIVE, "measured", "moment of inertia of an outer link"),
     ]
     viscous_friction: Annotated[
         float,
@@ -140,15 +136,11 @@ class Parameters(BaseModel):
     ]
     floor_restitution: Annotated[
         float,
-        Quantity(
-            "e_fc", DIMENSIONLESS, 0.018, 0.004, FRACTION, "measured", "normal restitution, floor and chain"
-        ),
+        Quantity("e_fc", DIMENSIONLESS, 0.018, 0.004, FRACTION, "measured", "normal restitution, floor and chain"),
     ]
     floor_friction: Annotated[
         float,
-        Quantity(
-            "μ_fc", DIMENSIONLESS, 0.27, 0.02, FRACTION, "measured", "friction coefficient, floor and chain"
-        ),
+        Quantity("μ_fc", DIMENSIONLESS, 0.27, 0.02, FRACTION, "measured", "friction coefficient, floor and chain"),
     ]
     gravity: Annotated[
         float,
@@ -164,15 +156,11 @@ class Parameters(BaseModel):
     ]
     sprocket_restitution: Annotated[
         float,
-        Quantity(
-            "e_sc", DIMENSIONLESS, 0.01, 0.0, FRACTION, "adjusted", "normal restitution, sprocket and chain"
-        ),
+        Quantity("e_sc", DIMENSIONLESS, 0.01, 0.0, FRACTION, "adjusted", "normal restitution, sprocket and chain"),
     ]
     sprocket_friction: Annotated[
         float,
-        Quantity(
-            "μ_sc", DIMENSIONLESS, 0.99, 0.0, FRACTION, "adjusted", "friction coefficient, sprocket and chain"
-        ),
+        Quantity("μ_sc", DIMENSIONLESS, 0.99, 0.0, FRACTION, "adjusted", "friction coefficient, sprocket and chain"),
     ]
     joint_stiffness: Annotated[
         float, Quantity("k", "N/m", 1e9, 0.0, STIFFNESS, "adjusted", "stiffness of a joint's spring")
@@ -194,9 +182,7 @@ class Parameters(BaseModel):
     ]
     tangential_restitution: Annotated[
         float,
-        Quantity(
-            "e_t", DIMENSIONLESS, 0.0, 0.0, SIGNED_FRACTION, "adjusted", "tangential restitution, all pairs"
-        ),
+        Quantity("e_t", DIMENSIONLESS, 0.0, 0.0, SIGNED_FRACTION, "adjusted", "tangential restitution, all pairs"),
     ]
     circle_radius: Annotated[
         float, Quantity("r", "m", 4.2e-3, 0.0, POSITIVE, "assumed", "radius of the circle at a link end")
@@ -336,9 +322,7 @@ def _unit(field: FieldInfo) -> str:
     return str(extra["unit"]) if isinstance(extra, dict) else DIMENSIONLESS
 
 
-_NUMBER_IN_TEXT = re.compile(
-    r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\W\d_].*|[%°].*)?", re.DOTALL
-)
+_NUMBER_IN_TEXT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\W\d_].*|[%°].*)?", re.DOTALL)
 
 
 def _not_a_number(value: object, number: str, unit: str) -> str:

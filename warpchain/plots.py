@@ -269,9 +269,7 @@ def _draw_chain(axes: Axes, walk: "WalkResult", frame: int, color_of: ScalarMapp
     color = np.array(color_of.to_rgba(walk.frame_time[frame])[:3])
     pale, dark = 1 - 0.45 * (1 - color), 0.6 * color
     axes.add_collection(
-        PolyCollection(
-            list(outlines), facecolors="white", edgecolors="white", linewidths=4 * edge + 0.8, zorder=2
-        )
+        PolyCollection(list(outlines), facecolors="white", edgecolors="white", linewidths=4 * edge + 0.8, zorder=2)
     )
     for links, fill in ((outlines[0::2], pale), (outlines[1::2], color)):
         axes.add_collection(

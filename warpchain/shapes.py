@@ -115,9 +115,7 @@ def ellipse(aspect: float) -> Curve:
 
     angles = np.linspace(0, 2 * np.pi, 4096, endpoint=False)
     unit_length = float(np.mean(np.hypot(wide * np.cos(angles), high * np.sin(angles))) * 2 * np.pi)
-    return Curve(
-        points=points, period=lambda size: (2 * np.pi, 0.0), first_size=lambda length: length / unit_length
-    )
+    return Curve(points=points, period=lambda size: (2 * np.pi, 0.0), first_size=lambda length: length / unit_length)
 
 
 def lay_chain(
@@ -206,4 +204,5 @@ def _spread_evenly(curve: Curve, size: float, s: Array) -> Array:
     fine = s[0] + np.linspace(0.0, curve.period(size)[0], 8192)
     speed = np.linalg.norm(curve.points(fine, size).along, axis=1)
     arc = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(fine))])
-    return np.interp(arc[-1] * np.arange(len(s)) / len(s), arc, fine)
+    spread: Array = np.interp(arc[-1] * np.arange(len(s)) / len(s), arc, fine)
+    return spread

@@ -61,7 +61,6 @@ _SENTENCES: Final[dict[Status, str]] = {
         "raise that limit or scene.spin_up_time, or lower scene.frequency."
     ),
     Status.LIST_OVERFLOW: (
-        "More links came close to one another than the neighbour list can hold; "
-        "lower options.skin or circle_radius."
+        "More links came close to one another than the neighbour list can hold; lower options.skin or circle_radius."
     ),
 }

@@ -118,9 +118,7 @@ def _checked_state(position: Array, velocity: Array) -> tuple[Array, Array]:
         checked.append(array)
     links = len(checked[0])
     if len(checked[1]) != links:
-        raise InputError(
-            f"velocity: {len(checked[1])} rows, but position has {links}; give one row per link each"
-        )
+        raise InputError(f"velocity: {len(checked[1])} rows, but position has {links}; give one row per link each")
     if links < 4 or links % 2:
         raise InputError(f"position: {links} links; a closed chain has an even number of at least 4")
     return checked[0], checked[1]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel
 
 from warpchain.course import Course, Phase
 from warpchain.engine import Batch, versions
@@ -87,7 +88,7 @@ def setup_walk(preset: str, settings: Mapping[str, object], seed: int | None) ->
     Raises:
         InputError: A name is unknown or a value is refused.
     """
-    models = {"parameters": Parameters, "scene": Scene, "options": Options}
+    models: dict[str, type[BaseModel]] = {"parameters": Parameters, "scene": Scene, "options": Options}
     sections: dict[str, dict[str, object]] = {name: {} for name in models}
     for name, value in settings.items():
         section = next((key for key, model in models.items() if name in model.model_fields), None)
@@ -95,9 +96,7 @@ def setup_walk(preset: str, settings: Mapping[str, object], seed: int | None) ->
             known = [field for model in models.values() for field in model.model_fields]
             raise InputError(f"{shown(name)}: unknown name; {suggestion(name, known)}")
         sections[section][name] = value
-    setup = resolve(
-        preset, scene=sections["scene"], options=sections["options"], parameters=sections["parameters"]
-    )
+    setup = resolve(preset, scene=sections["scene"], options=sections["options"], parameters=sections["parameters"])
     if seed is None:
         return setup
     rng = random_generator(seed)
@@ -129,9 +128,7 @@ def run_walk(
     frame_every = None
     if frame_interval is not None:
         if not (math.isfinite(frame_interval) and frame_interval > 0):
-            raise InputError(
-                f"frame_interval: {shown(frame_interval)} is not a positive time in s; give one, or None"
-            )
+            raise InputError(f"frame_interval: {shown(frame_interval)} is not a positive time in s; give one, or None")
         frame_every = max(1, round(frame_interval / options.record_interval))
     batch = Batch(1, setup.scene.links, options, keeps_samples=True, frame_every=frame_every)
     course = Course(batch, 0, setup)
@@ -140,11 +137,7 @@ def run_walk(
 
     def after_launch() -> None:
         record.drain()
-        report(
-            Progress(
-                course.phase.value, course.walk_time or course.simulated_time, course.speed, course.tries
-            )
-        )
+        report(Progress(course.phase.value, course.walk_time or course.simulated_time, course.speed, course.tries))
 
     running = True
     while running:

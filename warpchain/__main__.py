@@ -1,0 +1,5 @@
+"""`python -m warpchain` is the command `warpchain`."""
+
+from warpchain.cli import main
+
+main()

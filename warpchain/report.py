@@ -1,0 +1,165 @@
+"""What the command line shows and writes: progress, tables, and a folder with record and pictures."""
+
+import math
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, Literal
+
+from warpchain.parameters import InputError
+from warpchain.results import WalkResult, replacing
+
+if TYPE_CHECKING:
+    from warpchain.bench import BroadPhaseCost, StepCost
+    from warpchain.walker import Progress
+
+PICTURE_DPI: Final = 200
+
+
+def try_folder(folder: Path) -> None:
+    """Find out, before a long run, whether a folder can be written to; nothing is left there.
+
+    Raises:
+        InputError: it cannot.
+    """
+    nearest = folder.absolute()
+    try:
+        while True:
+            try:
+                nearest.lstat()
+                break
+            except FileNotFoundError:
+                nearest = nearest.parent
+        with tempfile.TemporaryDirectory(prefix=".warpchain-", dir=nearest):
+            pass
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"--output: {folder}: {reason}; give a folder that can be written to") from None
+
+
+@contextmanager
+def status_line() -> Iterator[Callable[[str], None]]:
+    """Yield what shows a changing line on a terminal; where there is none, nothing is shown."""
+    if not sys.stderr.isatty():
+        yield lambda text: None
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status("starting") as line:
+        yield line.update
+
+
+def progress_text(progress: "Progress") -> str:
+    """Where a walk is, in columns."""
+    if progress.phase == "compile":
+        return "compiling kernels; later runs find them ready"
+    where, speed = f"{progress.phase:8}{progress.time:8.3f} s", f"{progress.speed:9.3f} m/s"
+    return f"{where}{speed}{progress.tries:14,} steps"
+
+
+def print_walk(result: WalkResult) -> None:
+    """Print on standard output what one wants to know of a walk."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column()
+    for row in _walk_rows(result):
+        table.add_row(*row)
+    Console(highlight=False, markup=False).print(table)
+
+
+def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
+    """Names and values."""
+    status, energy = result.status, result.energy
+    yield "Δx", f"{result.dx:.4f} m" if math.isfinite(result.dx) else "unknown"
+    yield "status", status.label if status.ok else f"{status.label}: {status.sentence}"
+    yield "walk time", f"{result.walk_time:.3f} s"
+    yield "bounces", f"{result.bounces}"
+    yield "steps", f"{result.steps_accepted:,} accepted, {result.steps_rejected:,} rejected"
+    yield "simulated", f"{result.simulated_time:.3f} s in {result.wall_time:.1f} s"
+    yield "greatest joint opening", f"{1e3 * result.greatest_opening:.3g} mm"
+    depths = (f"{kind} {1e3 * depth:.3g} mm" for kind, depth in result.greatest_penetration.items())
+    yield "greatest penetration", ", ".join(depths)
+    released = energy["kinetic_at_release"] + energy["potential_at_release"]
+    if math.isnan(released):
+        return  # the chain never got so far
+    yield "energy at release", f"{released:.5f} J, kinetic {energy['kinetic_at_release']:.5f} J"
+    for cause in ("joint_friction", "joint_damping", "floor", "self_contact"):
+        yield f"  lost to {cause.replace('_', ' ')}", f"{energy[cause]:.5f} J"
+    left = energy["kinetic_at_end"] + energy["potential_at_end"]
+    yield "energy at the end", f"{left:.5f} J, kinetic {energy['kinetic_at_end']:.5f} J"
+    yield "unaccounted for", f"{energy['residual']:.1e} J"
+
+
+def print_costs(
+    machine: Mapping[str, str], steps: "Sequence[StepCost]", broad_phase: "Sequence[BroadPhaseCost]"
+) -> None:
+    """Print on standard output what a bench measured; s/s is wall time per simulated time."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False, markup=False)
+    console.print(", ".join(f"{name} {value}" for name, value in machine.items()), "\n")
+    table = Table(box=None, pad_edge=False)
+    for heading in ("scene", "links", "method"):
+        table.add_column(heading)
+    for heading in ("µs/try", "ns/link/stage", "step µs", "rejected", "s/s"):
+        table.add_column(heading, justify="right")
+    for cost in sorted(steps, key=lambda cost: (cost.scene, cost.links)):
+        rejected = "" if math.isnan(cost.rejected) else f"{cost.rejected:.1%}"
+        times = f"{cost.microseconds:.2f}", f"{cost.per_link_stage:.2f}", f"{1e6 * cost.step:.3g}"
+        last = rejected, f"{cost.wall_per_simulated:.3g}"
+        table.add_row(cost.scene, str(cost.links), cost.method, *times, *last)
+    console.print(table, "\n")
+    table = Table(box=None, pad_edge=False)
+    for heading in ("neighbour list: links", "pairs", "grid µs", "all pairs µs"):
+        table.add_column(heading, justify="right")
+    for list_cost in broad_phase:
+        builds = f"{list_cost.grid_microseconds:.1f}", f"{list_cost.all_pairs_microseconds:.1f}"
+        table.add_row(str(list_cost.links), str(list_cost.pairs), *builds)
+    console.print(table)
+
+
+def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iterator[Path]:
+    """Write the record, then its pictures, each whole or not at all; yield the path of each.
+
+    A failed walk may have nothing to show in a picture. That picture is left out, and so is one of an earlier
+    walk, which does not belong to this record.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    record = folder / "walk.h5"
+    result.save(record)
+    yield record
+    pictures: dict[str, Callable[[WalkResult, Path], None]] = {
+        "figure5.png": partial(_draw, "figure5"),
+        "film_strip.png": partial(_draw, "film_strip"),
+    }
+    if animation is not None:
+        from warpchain.animation import animate
+
+        pictures[f"walk.{animation}"] = animate
+    for name, draw in pictures.items():
+        path = folder / name
+        try:
+            draw(result, path)
+        except ValueError as error:
+            if result.status.ok:
+                raise
+            path.unlink(missing_ok=True)
+            print(f"{path}: not drawn; {error}", file=sys.stderr)
+        else:
+            yield path
+
+
+def _draw(kind: Literal["figure5", "film_strip"], result: WalkResult, path: Path) -> None:
+    figure = result.plot(kind)
+    with replacing(path) as part:
+        figure.savefig(part, dpi=PICTURE_DPI)

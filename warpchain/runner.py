@@ -1,0 +1,237 @@
+"""Runs a sweep: hands its shards to workers, follows their progress, and survives being killed.
+
+A worker runs the walks of one shard and writes them to an immutable file; what it returns is only the shard's key. So
+any executor in the style of ``concurrent.futures`` will do, on this machine or another that sees the same folder.
+"""
+
+import concurrent.futures
+import os
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+from warpchain.course import Course
+from warpchain.ensemble import compile_kernels, run_setups
+from warpchain.load import SweepResult, load
+from warpchain.options import Setup
+from warpchain.parameters import InputError
+from warpchain.status import Status
+from warpchain.store import Store, empty_rows, read_shard, write_shard
+from warpchain.sweep import PlannedWalk, Sweep, load_sweep
+
+SHARD_WALKS = 256
+"""Most walks in a shard."""
+SHARDS = 128
+"""A sweep has at least about this many shards, as far as it has walks: the grain of progress and of a restart."""
+
+
+class Executor(Protocol):
+    """What is needed of an executor: ``concurrent.futures``, ``mpi4py.futures``, Dask's ``get_executor()``."""
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> "concurrent.futures.Future[Any]":
+        """Run ``function(*arguments)`` somewhere."""
+        ...
+
+
+@dataclass
+class SweepProgress:
+    """How far a sweep is.
+
+    Attributes:
+        walks: Walks of the sweep.
+        done: Walks whose results are on disk, those of earlier runs included.
+        before: Walks that were on disk when this run began.
+        seconds: Wall time [s] of this run so far.
+        statuses: Number of walks of this run by status label.
+    """
+
+    walks: int
+    done: int
+    before: int
+    seconds: float = 0.0
+    statuses: Counter[str] = field(default_factory=Counter)
+
+    @property
+    def rate(self) -> float:
+        """Walks per second of this run."""
+        return (self.done - self.before) / self.seconds if self.seconds > 0 else 0.0
+
+    @property
+    def time_left(self) -> float | None:
+        """Seconds to go at this rate; None before the first shard."""
+        return (self.walks - self.done) / self.rate if self.rate > 0 else None
+
+
+def sweep(
+    source: str | os.PathLike[str] | Mapping[str, Any] | Sweep,
+    out: str | os.PathLike[str],
+    *,
+    executor: Executor | None = None,
+    workers: int | None = None,
+    fresh: bool = False,
+    on_progress: Callable[[SweepProgress], None] | None = None,
+) -> SweepResult:
+    """Run a sweep, or what is left of it, and load its results.
+
+    Args:
+        source: A sweep file (YAML), its content, or a :class:`Sweep`.
+        out: Folder of the results. A sweep that was killed goes on where it was; the data come out the same, to the
+            byte.
+        executor: Where shards are run; it must see ``out``. Default: threads of this process.
+        workers: Shards in work at the same time; default: processors of this machine. With an executor, at least the
+            number of its workers.
+        fresh: Discard what another sweep left in the folder.
+        on_progress: Called after each shard.
+
+    Raises:
+        InputError: The sweep or the folder is refused; one line with the remedy. It is a ``ValueError``.
+        OSError: The folder cannot be read or written.
+    """
+    planned = load_sweep(source)
+    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
+        raise InputError(f"workers: {workers!r} is not a number of workers; give a whole number from 1")
+    at_once = workers or len(os.sched_getaffinity(0))
+    with Store.open(Path(out), planned, fresh=fresh, shard_size=shard_size(planned.walk_count)) as store:
+        missing = store.missing()
+        before = planned.walk_count - sum(len(shard) for shard in missing)
+        progress = SweepProgress(walks=planned.walk_count, done=before, before=before)
+        store.log(f"{len(missing)} shards to do, {before} of {planned.walk_count} walks done")
+        if missing:
+            if executor is None:
+                _run_in_threads(planned, store, missing, at_once, progress, on_progress)
+            else:
+                _run(executor, (), planned, store, missing, at_once, progress, on_progress)
+        store.log(f"complete after {progress.seconds:.1f} s: " + _counts(progress.statuses))
+    return load(out)
+
+
+def shard_size(walks: int) -> int:
+    """Walks per shard; it depends on the sweep only, so that the files do not depend on who works on them."""
+    return max(1, min(SHARD_WALKS, walks // SHARDS))
+
+
+def run_shard(
+    sweep: Mapping[str, Any], directory: str, first: int, last: int, stop: threading.Event | None = None
+) -> str:
+    """Run the walks ``first`` … ``last − 1`` of a sweep and write their shard; what a worker does.
+
+    Args:
+        sweep: Canonical form of the sweep.
+        directory: The sweep's folder.
+        first: Index of the first walk.
+        last: Index after the last walk.
+        stop: When set, the work is abandoned: nothing is written.
+
+    Returns:
+        The shard's key; empty if abandoned.
+    """
+    planned = load_sweep(sweep)
+    walks = [planned.planned(index) for index in range(first, last)]
+    rows = empty_rows(planned, range(first, last))
+    for place, course in run_setups([walk.setup for walk in walks], stop=stop):
+        _fill(rows[place], walks[place], course)
+    if stop is not None and stop.is_set():
+        return ""
+    return write_shard(directory, planned.digest(), range(first, last), rows)
+
+
+def _fill(row: Any, walk: PlannedWalk, course: Course) -> None:
+    """Write what is kept of a walk into its row."""
+    counts, extremes, energy = course.counts, course.extremes, course.energy()
+    row["status"] = int(course.status)
+    row["dx"] = course.dx
+    row["walk_time"] = course.walk_time
+    row["simulated_time"] = course.simulated_time
+    row["bounces"] = counts["bounces"]
+    row["steps_accepted"] = counts["accepted"]
+    row["steps_rejected"] = counts["rejected"]
+    row["greatest_opening"] = extremes["opening"]
+    for kind in ("floor", "sprocket", "self"):
+        row[f"impulses_{kind}"] = counts[kind]
+        row[f"penetration_{kind}"] = extremes[kind]
+    row["energy_at_release"] = energy["kinetic_at_release"] + energy["potential_at_release"]
+    for loss in ("joint_friction", "joint_damping", "floor", "self_contact"):
+        row[f"loss_{loss}"] = energy[loss]
+    row["energy_residual"] = energy["residual"]
+    for name, value in walk.drawn.items():
+        row[name] = value
+
+
+def _run_in_threads(
+    planned: Sweep,
+    store: Store,
+    missing: Sequence[range],
+    workers: int,
+    progress: SweepProgress,
+    on_progress: Callable[[SweepProgress], None] | None,
+) -> None:
+    """Run shards in threads of this process; launches run outside of Python's lock."""
+    compile_kernels(_one_of_each_cell(planned))
+    stop = threading.Event()
+    with concurrent.futures.ThreadPoolExecutor(workers) as threads:
+        try:
+            _run(threads, (stop,), planned, store, missing, workers, progress, on_progress)
+        except BaseException:
+            stop.set()
+            raise
+
+
+def _one_of_each_cell(planned: Sweep) -> list[Setup]:
+    """The first walk of every cell."""
+    return [
+        planned.planned(first).setup
+        for block in planned.blocks
+        for first in range(block.first, block.first + block.walk_count, block.samples)
+    ]
+
+
+def _run(
+    executor: Executor,
+    more: tuple[Any, ...],
+    planned: Sweep,
+    store: Store,
+    missing: Sequence[range],
+    workers: int,
+    progress: SweepProgress,
+    on_progress: Callable[[SweepProgress], None] | None,
+) -> None:
+    """Keep the workers busy with two shards each; memory does not grow with the sweep."""
+    began = time.perf_counter()
+    canonical = planned.canonical()
+    waiting = iter(missing)
+    pending: dict[concurrent.futures.Future[str], range] = {}
+
+    def submit() -> bool:
+        shard = next(waiting, None)
+        if shard is None:
+            return False
+        arguments = (canonical, str(store.directory), shard.start, shard.stop, *more)
+        pending[executor.submit(run_shard, *arguments)] = shard
+        return True
+
+    while len(pending) < 2 * workers and submit():
+        pass
+    try:
+        while pending:
+            finished, _ = concurrent.futures.wait(pending, return_when=concurrent.futures.FIRST_COMPLETED)
+            for future in finished:
+                shard = pending.pop(future)
+                future.result()
+                submit()
+                statuses = read_shard(store.directory, planned.digest(), shard)["status"]
+                progress.statuses.update(Status(int(code)).label for code in statuses)
+                progress.done += len(shard)
+            progress.seconds = time.perf_counter() - began
+            if on_progress is not None:
+                on_progress(progress)
+    finally:
+        for future in pending:
+            future.cancel()
+
+
+def _counts(statuses: Counter[str]) -> str:
+    return ", ".join(f"{count} {label}" for label, count in sorted(statuses.items())) or "nothing to do"
