@@ -115,6 +115,19 @@ def greatest_displacement(K: wp.array2d(dtype=wp.float64), chain: Chain):
     return wp.sqrt(wp.cast(greatest, wp.float64))
 
 
+@wp.func
+def listing_reach(chain: Chain, skin: wp.float64, opening: wp.float64):
+    """Distance [m] below which two joints are listed; ``opening``: greatest |C| [m]."""
+    return TWO * chain.circle_radius + skin + TWO * opening
+
+
+@wp.func
+def bucket_of(cell_x: int, cell_y: int, table: int):
+    """Bucket of a cell in a hash table whose size is a power of two."""
+    mixed = cell_x * 73856093 ^ cell_y * 19349663
+    return (mixed ^ (mixed >> 15)) & (table - 1)
+
+
 @functools.cache
 def neighbour_list(columns: int):
     """Warp functions (build by grid, build by testing all pairs) for scratch blocks of this width.
@@ -124,26 +137,12 @@ def neighbour_list(columns: int):
     lists = list_layout(columns)
 
     @wp.func
-    def listing_reach(chain: Chain, skin: wp.float64, opening: wp.float64):
-        return TWO * chain.circle_radius + skin + TWO * opening
-
-    @wp.func
     def remember_positions(K: wp.array2d(dtype=wp.float64), chain: Chain):
         i = int(0)
         while i < chain.link_count:
             K[LISTED_X, i] = K[RIGHT_X, i]
             K[LISTED_Y, i] = K[RIGHT_Y, i]
             i += 1
-
-    @wp.func
-    def is_pair(p: int, q: int, link_count: int):
-        # joints of one link are ℓ > 2r apart
-        return q > p + 1 and not (p == 0 and q == link_count - 1)
-
-    @wp.func
-    def bucket_of(cell_x: int, cell_y: int):
-        mixed = cell_x * 73856093 ^ cell_y * 19349663
-        return (mixed ^ (mixed >> 15)) & wp.static(lists.table - 1)
 
     @wp.func
     def arrange(L: wp.array(dtype=wp.int32), total: int):
@@ -183,7 +182,7 @@ def neighbour_list(columns: int):
         while i < n:
             cell_x = int(wp.floor(K[RIGHT_X, i] / reach))
             cell_y = int(wp.floor(K[RIGHT_Y, i] / reach))
-            bucket = bucket_of(cell_x, cell_y)
+            bucket = bucket_of(cell_x, cell_y, wp.static(lists.table))
             L[wp.static(lists.cell_x) + i] = cell_x
             L[wp.static(lists.cell_y) + i] = cell_y
             L[wp.static(lists.next_joint) + i] = L[wp.static(lists.bucket) + bucket]
@@ -198,14 +197,10 @@ def neighbour_list(columns: int):
             while near < 9:
                 cell_x = L[wp.static(lists.cell_x) + p] + near % 3 - 1
                 cell_y = L[wp.static(lists.cell_y) + p] + near // 3 - 1
-                q = L[wp.static(lists.bucket) + bucket_of(cell_x, cell_y)]
+                q = L[wp.static(lists.bucket) + bucket_of(cell_x, cell_y, wp.static(lists.table))]
                 # joints were put in ascending order, so a bucket is read in descending order
                 while q > p:
-                    if (
-                        L[wp.static(lists.cell_x) + q] == cell_x
-                        and L[wp.static(lists.cell_y) + q] == cell_y
-                        and is_pair(p, q, n)
-                    ):
+                    if L[wp.static(lists.cell_x) + q] == cell_x and L[wp.static(lists.cell_y) + q] == cell_y:
                         dx = K[RIGHT_X, q] - K[RIGHT_X, p]
                         dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
                         if dx * dx + dy * dy < square:
@@ -242,11 +237,11 @@ def neighbour_list(columns: int):
         fits = bool(True)
         p = int(0)
         while p < n:
-            q = p + 2
+            q = p + 1
             while q < n:
                 dx = K[RIGHT_X, q] - K[RIGHT_X, p]
                 dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
-                if dx * dx + dy * dy < square and is_pair(p, q, n):
+                if dx * dx + dy * dy < square:
                     if total < wp.static(lists.capacity):
                         L[wp.static(lists.found_first) + total] = p
                         L[wp.static(lists.found_second) + total] = q
@@ -262,6 +257,6 @@ def neighbour_list(columns: int):
 
 
 @wp.func
-def list_is_stale(K: wp.array2d(dtype=wp.float64), chain: Chain, skin: wp.float64, opening: wp.float64):
-    """True when the list no longer holds every pair that may touch."""
-    return not (greatest_displacement(K, chain) < HALF * skin - opening)
+def list_slack(K: wp.array2d(dtype=wp.float64), chain: Chain, skin: wp.float64, opening: wp.float64):
+    """How far every joint may yet move [m] before the list may lack a pair; 0 or less: the list is stale."""
+    return HALF * skin - opening - greatest_displacement(K, chain)

@@ -31,6 +31,8 @@ from .types import Chain
 
 wp.set_module_options({"enable_backward": False})
 
+SMALLEST = wp.constant(wp.float64(1e-300))
+
 
 @wp.func
 def greatest_opening(K: wp.array2d(dtype=wp.float64), chain: Chain):
@@ -83,54 +85,88 @@ def sprocket_gap(K: wp.array2d(dtype=wp.float64), chain: Chain):
 
 
 @wp.func
-def resolve_floor(K: wp.array2d(dtype=wp.float64), chain: Chain):
-    """Impulses between links and the floor y = 0 (body A; n̂ = ŷ); returns their number."""
+def meet_floor(
+    chain: Chain,
+    left_x: wp.float64,
+    left_y: wp.float64,
+    right_x: wp.float64,
+    right_y: wp.float64,
+    x: wp.float64,
+    y: wp.float64,
+    inverse_mass: wp.float64,
+    inverse_inertia: wp.float64,
+    u: wp.float64,
+    v: wp.float64,
+    omega: wp.float64,
+):
+    """One link against the floor y = 0 (body A; n̂ = ŷ), its left circle first.
+
+    Returns:
+        u, v, ω afterwards, energy lost [J] by the left and the right circle, number of impulses.
+    """
     r = chain.circle_radius
+    u, v, omega, lost_left, hit_left = fixed_contact(
+        chain,
+        left_y - r,
+        ZERO,
+        ONE,
+        left_x - x,
+        left_y - y - r,
+        ZERO,
+        ZERO,
+        inverse_mass,
+        inverse_inertia,
+        chain.floor_restitution,
+        chain.floor_friction,
+        u,
+        v,
+        omega,
+    )
+    u, v, omega, lost_right, hit_right = fixed_contact(
+        chain,
+        right_y - r,
+        ZERO,
+        ONE,
+        right_x - x,
+        right_y - y - r,
+        ZERO,
+        ZERO,
+        inverse_mass,
+        inverse_inertia,
+        chain.floor_restitution,
+        chain.floor_friction,
+        u,
+        v,
+        omega,
+    )
+    return u, v, omega, lost_left, lost_right, hit_left + hit_right
+
+
+@wp.func
+def resolve_floor(K: wp.array2d(dtype=wp.float64), chain: Chain):
+    """Impulses between links and the floor; returns their number."""
     impulses = wp.int64(0)
     i = int(0)
     while i < chain.link_count:
-        u = K[U, i]
-        v = K[V, i]
-        w = K[OMEGA, i]
-        u, v, w, lost_left, hit_left = fixed_contact(
+        u, v, w, lost_left, lost_right, hits = meet_floor(
             chain,
-            K[LEFT_Y, i] - r,
-            ZERO,
-            ONE,
-            K[LEFT_X, i] - K[X, i],
-            K[LEFT_Y, i] - K[Y, i] - r,
-            ZERO,
-            ZERO,
+            K[LEFT_X, i],
+            K[LEFT_Y, i],
+            K[RIGHT_X, i],
+            K[RIGHT_Y, i],
+            K[X, i],
+            K[Y, i],
             K[INVERSE_MASS, i],
             K[INVERSE_INERTIA, i],
-            chain.floor_restitution,
-            chain.floor_friction,
-            u,
-            v,
-            w,
-        )
-        u, v, w, lost_right, hit_right = fixed_contact(
-            chain,
-            K[RIGHT_Y, i] - r,
-            ZERO,
-            ONE,
-            K[RIGHT_X, i] - K[X, i],
-            K[RIGHT_Y, i] - K[Y, i] - r,
-            ZERO,
-            ZERO,
-            K[INVERSE_MASS, i],
-            K[INVERSE_INERTIA, i],
-            chain.floor_restitution,
-            chain.floor_friction,
-            u,
-            v,
-            w,
+            K[U, i],
+            K[V, i],
+            K[OMEGA, i],
         )
         K[U, i] = u
         K[V, i] = v
         K[OMEGA, i] = w
         K[LOST_FIXED, i] = K[LOST_FIXED, i] + lost_left + lost_right
-        impulses += hit_left + hit_right
+        impulses += hits
         i += 1
     return impulses
 
@@ -154,7 +190,8 @@ def sprocket_circle(
     ``arm`` leads from the link's centre to the circle's; ``surface_speed`` is the sprocket's angular velocity. The
     touching point is the circle's nearest to the sprocket's centre.
     """
-    distance = wp.sqrt(circle_x * circle_x + circle_y * circle_y)
+    # a circle exactly at the centre has no normal: zero instead makes it one that does not approach
+    distance = wp.max(wp.sqrt(circle_x * circle_x + circle_y * circle_y), SMALLEST)
     normal_x = circle_x / distance
     normal_y = circle_y / distance
     r = chain.circle_radius
@@ -180,45 +217,77 @@ def sprocket_circle(
 
 
 @wp.func
+def meet_sprocket(
+    chain: Chain,
+    surface_speed: wp.float64,
+    left_x: wp.float64,
+    left_y: wp.float64,
+    right_x: wp.float64,
+    right_y: wp.float64,
+    x: wp.float64,
+    y: wp.float64,
+    inverse_mass: wp.float64,
+    inverse_inertia: wp.float64,
+    u: wp.float64,
+    v: wp.float64,
+    omega: wp.float64,
+):
+    """One link against the sprocket turning at ``surface_speed`` [rad/s]; otherwise as :func:`meet_floor`."""
+    u, v, omega, lost_left, hit_left = sprocket_circle(
+        chain,
+        surface_speed,
+        left_x,
+        left_y,
+        left_x - x,
+        left_y - y,
+        inverse_mass,
+        inverse_inertia,
+        u,
+        v,
+        omega,
+    )
+    u, v, omega, lost_right, hit_right = sprocket_circle(
+        chain,
+        surface_speed,
+        right_x,
+        right_y,
+        right_x - x,
+        right_y - y,
+        inverse_mass,
+        inverse_inertia,
+        u,
+        v,
+        omega,
+    )
+    return u, v, omega, lost_left, lost_right, hit_left + hit_right
+
+
+@wp.func
 def resolve_sprocket(K: wp.array2d(dtype=wp.float64), chain: Chain, surface_speed: wp.float64):
     """Impulses between links and the sprocket turning at ``surface_speed`` [rad/s]; returns their number."""
     impulses = wp.int64(0)
     i = int(0)
     while i < chain.link_count:
-        u = K[U, i]
-        v = K[V, i]
-        w = K[OMEGA, i]
-        u, v, w, lost_left, hit_left = sprocket_circle(
+        u, v, w, lost_left, lost_right, hits = meet_sprocket(
             chain,
             surface_speed,
             K[LEFT_X, i],
             K[LEFT_Y, i],
-            K[LEFT_X, i] - K[X, i],
-            K[LEFT_Y, i] - K[Y, i],
-            K[INVERSE_MASS, i],
-            K[INVERSE_INERTIA, i],
-            u,
-            v,
-            w,
-        )
-        u, v, w, lost_right, hit_right = sprocket_circle(
-            chain,
-            surface_speed,
             K[RIGHT_X, i],
             K[RIGHT_Y, i],
-            K[RIGHT_X, i] - K[X, i],
-            K[RIGHT_Y, i] - K[Y, i],
+            K[X, i],
+            K[Y, i],
             K[INVERSE_MASS, i],
             K[INVERSE_INERTIA, i],
-            u,
-            v,
-            w,
+            K[U, i],
+            K[V, i],
+            K[OMEGA, i],
         )
         K[U, i] = u
         K[V, i] = v
         K[OMEGA, i] = w
         K[LOST_FIXED, i] = K[LOST_FIXED, i] + lost_left + lost_right
-        impulses += hit_left + hit_right
+        impulses += hits
         i += 1
     return impulses
 
@@ -306,6 +375,39 @@ def are_neighbours(link_a: int, link_b: int, link_count: int):
     return apart < 2 or apart > link_count - 2
 
 
+@wp.func
+def resolve_joint_pair(K: wp.array2d(dtype=wp.float64), chain: Chain, p: int, q: int, lost: wp.float64):
+    """The four link pairs of two joints p < q, one after the other.
+
+    Returns:
+        Greatest depth [m], ``lost`` plus the energy lost [J], number of impulses.
+    """
+    n = chain.link_count
+    impulses = wp.int64(0)
+    deepest = ZERO
+    c = int(0)
+    while c < 4:
+        # c = 0 … 3: links (p, q), (p, q + 1), (p + 1, q), (p + 1, q + 1); joint j's left-hand circle
+        # belongs to link j's right end, its right-hand circle to the left end of the link after it
+        after_p = c // 2
+        after_q = c % 2
+        link_a = p + after_p
+        link_b = q + after_q
+        ax = wp.where(after_p == 0, K[RIGHT_X, p], K[LEFT_X, p + 1])
+        ay = wp.where(after_p == 0, K[RIGHT_Y, p], K[LEFT_Y, p + 1])
+        bx = wp.where(after_q == 0, K[RIGHT_X, q], K[LEFT_X, q + 1])
+        by = wp.where(after_q == 0, K[RIGHT_Y, q], K[LEFT_Y, q + 1])
+        if link_b == n:
+            link_b = 0
+        if not are_neighbours(link_a, link_b, n):
+            depth, energy, hits = resolve_link_pair(K, chain, link_a, ax, ay, link_b, bx, by)
+            deepest = wp.max(deepest, depth)
+            lost += energy
+            impulses += hits
+        c += 1
+    return deepest, lost, impulses
+
+
 @functools.cache
 def self_contacts(columns: int):
     """Warp function that resolves a chain's contacts with itself, for scratch blocks of this width.
@@ -322,7 +424,6 @@ def self_contacts(columns: int):
         K: wp.array2d(dtype=wp.float64), L: wp.array(dtype=wp.int32), chain: Chain, opening: wp.float64
     ):
         """Returns impulses, energy lost [J], and the greatest depth [m]; ``opening``: greatest |C| [m]."""
-        n = chain.link_count
         reach = TWO * chain.circle_radius + TWO * opening
         square = reach * reach
         total = L[wp.static(lists.count)]
@@ -344,26 +445,9 @@ def self_contacts(columns: int):
             pair = L[wp.static(lists.touching) + k]
             p = L[wp.static(lists.first) + pair]
             q = L[wp.static(lists.second) + pair]
-            c = int(0)
-            while c < 4:
-                # c = 0 … 3: links (p, q), (p, q + 1), (p + 1, q), (p + 1, q + 1); joint j's left-hand circle
-                # belongs to link j's right end, its right-hand circle to the left end of the link after it
-                after_p = c // 2
-                after_q = c % 2
-                link_a = p + after_p
-                link_b = q + after_q
-                ax = wp.where(after_p == 0, K[RIGHT_X, p], K[LEFT_X, p + 1])
-                ay = wp.where(after_p == 0, K[RIGHT_Y, p], K[LEFT_Y, p + 1])
-                bx = wp.where(after_q == 0, K[RIGHT_X, q], K[LEFT_X, q + 1])
-                by = wp.where(after_q == 0, K[RIGHT_Y, q], K[LEFT_Y, q + 1])
-                if link_b == n:
-                    link_b = 0
-                if not are_neighbours(link_a, link_b, n):
-                    depth, energy, hits = resolve_link_pair(K, chain, link_a, ax, ay, link_b, bx, by)
-                    deepest = wp.max(deepest, depth)
-                    lost += energy
-                    impulses += hits
-                c += 1
+            depth, lost, hits = resolve_joint_pair(K, chain, p, q, lost)
+            deepest = wp.max(deepest, depth)
+            impulses += hits
             k += 1
         return impulses, lost, deepest
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import warp as wp
 
 from . import layout
-from .broadphase import list_is_stale, list_layout, neighbour_list
+from .broadphase import list_layout, list_slack, neighbour_list
 from .contact import (
     floor_gap,
     greatest_opening,
@@ -21,6 +21,7 @@ from .contact import (
     self_contacts,
     sprocket_gap,
 )
+from .controller import LEAST_SHRINKAGE, step_controller
 from .elementary import HALF, ONE, TWO, ZERO
 from .explicit import explicit_method, place_ends
 from .layout import (
@@ -49,14 +50,7 @@ from .layout import (
     STAGES,
     TIME,
 )
-from .record import (
-    record_is_full,
-    summarise,
-    watch_rest,
-    watch_steadiness,
-    write_frame,
-    write_sample,
-)
+from .record import record_is_full, sampling, summarise, write_sample
 from .tableaus import TABLEAUS
 from .types import Chain, Control, Model, Program, Record, State, read_chain
 
@@ -74,9 +68,6 @@ STEP_TOO_SMALL = wp.constant(5)
 NOT_FINITE = wp.constant(6)
 LIST_OVERFLOW = wp.constant(8)
 
-GREATEST_GROWTH = wp.constant(wp.float64(5.0))
-LEAST_SHRINKAGE = wp.constant(wp.float64(0.2))
-SAFETY = wp.constant(wp.float64(0.9))
 BOUNCE_PAUSE = wp.constant(wp.float64(0.01))
 """A floor impulse this long [s] after the one before it begins a new bounce."""
 
@@ -177,34 +168,6 @@ def sprocket_turning(program: Program, world: int, time: wp.float64):
 
 
 @functools.cache
-def step_controller(order: int, error_order: int):
-    """Warp functions (factor after acceptance, factor after rejection) for a method of these orders.
-
-    Standard: Boost odeint's ``default_step_adjuster`` (K. Ahnert, M. Mulansky, AIP Conf. Proc. 1389 (2011) 1586):
-    grow only below half of the tolerance. Proportional-integral: K. Gustafsson, ACM TOMS 17 (1991) 533, with the
-    exponents 0.7/k and 0.4/k of E. Hairer and G. Wanner, Solving ODEs II, section IV.2.
-    """
-    least_error = 5.0**-order
-
-    @wp.func
-    def growth(error: wp.float64, last_error: wp.float64, proportional: wp.int32):
-        bounded = wp.max(error, wp.static(wp.float64(least_error)))
-        if proportional != 0:
-            factor = SAFETY * wp.pow(bounded, wp.static(wp.float64(-0.7 / (error_order + 1))))
-            factor = factor * wp.pow(last_error, wp.static(wp.float64(0.4 / (error_order + 1))))
-            return wp.clamp(factor, LEAST_SHRINKAGE, GREATEST_GROWTH)
-        if error < HALF:
-            return wp.min(SAFETY * wp.pow(bounded, wp.static(wp.float64(-1.0 / order))), GREATEST_GROWTH)
-        return ONE
-
-    @wp.func
-    def shrinkage(error: wp.float64):
-        return wp.max(SAFETY * wp.pow(error, wp.static(wp.float64(-1.0 / (error_order - 1)))), LEAST_SHRINKAGE)
-
-    return growth, shrinkage
-
-
-@functools.cache
 def make_advance(features: Features):
     """Kernel ``advance(worlds, model, program, state, record, scratch, lists, control)``, one thread per chain.
 
@@ -223,38 +186,12 @@ def make_advance(features: Features):
     has_self = features.self_contact
     fixed_loss = layout.LOSS_SPROCKET if has_sprocket else layout.LOSS_FLOOR
     reuses_last = tableau.first_same_as_last
-    watches_rest = features.watch == "rest"
-    watches_steadiness = features.watch == "steady"
+    look = sampling(features.watch)
     first_stage, attempt, commit = explicit_method(features.method)
     growth, shrinkage = step_controller(tableau.order, tableau.error_order)
     build_by_grid, build_by_all_pairs = neighbour_list(columns)
     build_list = build_by_grid if features.broad_phase == "grid" else build_by_all_pairs
     resolve_self_contacts = self_contacts(columns)
-
-    @wp.func
-    def look(
-        K: wp.array2d(dtype=wp.float64),
-        chain: Chain,
-        program: Program,
-        state: State,
-        record: Record,
-        control: Control,
-        world: int,
-        time: wp.float64,
-    ):
-        """One sample: time series, frame, watches; returns the status."""
-        mark = state.next_sample[world]
-        summary = summarise(K, chain)
-        write_sample(state, record, world, time, summary)
-        if mark % control.frame_every == wp.int64(0):
-            write_frame(record, K, chain, world, time)
-        passed = wp.int64(wp.floor(time / control.sample_interval))
-        state.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
-        if wp.static(watches_rest):
-            return watch_rest(state, control, world, time, summary)
-        if wp.static(watches_steadiness):
-            watch_steadiness(state, program, world, time, summary)
-        return RUNNING
 
     @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS})
     def advance(
@@ -286,9 +223,11 @@ def make_advance(features: Features):
             if wp.static(has_self):
                 if not build_list(K, L, chain, control.skin, greatest_opening(K, chain)):
                     status = int(LIST_OVERFLOW)
+                state.slack[world] = list_slack(K, chain, control.skin, greatest_opening(K, chain))
             state.has_first_stage[world] = 0
             state.is_fresh[world] = 0
         gap = state.gap[world]
+        slack = state.slack[world]
         has_first_stage = state.has_first_stage[world]
         time = state.time[world]
         step = state.step[world]
@@ -307,20 +246,21 @@ def make_advance(features: Features):
                 first_stage(K, chain)
                 has_first_stage = int(1)
 
-            # bound of the step near contacts: nothing may pass the skin unseen
-            bound = step
+            # near contacts the step is bounded; far from them nothing may come through the skin unseen
+            h = step
             if wp.static(has_fixed or has_self):
+                room = control.skin
                 near = bool(False)
                 if wp.static(has_fixed):
                     near = gap < control.skin
+                    room = HALF * gap
                 if wp.static(has_self):
                     near = near or L[wp.static(list_count)] > 0
+                    room = wp.min(room, slack)
                 if near:
-                    bound = wp.min(bound, control.contact_step)
+                    h = wp.min(h, control.contact_step)
                 else:
-                    free = HALF * control.skin / greatest_speed(K, chain)
-                    bound = wp.min(bound, wp.max(control.contact_step, free))
-            h = bound
+                    h = wp.min(h, wp.max(control.contact_step, room / greatest_speed(K, chain)))
             lands = time + h >= stop_time
             if lands:
                 h = stop_time - time
@@ -370,10 +310,12 @@ def make_advance(features: Features):
                         state.counts[world, SPROCKET_IMPULSES] = state.counts[world, SPROCKET_IMPULSES] + hits
                         impulses += hits
                 if wp.static(has_self):
-                    if list_is_stale(K, chain, control.skin, opening):
+                    slack = list_slack(K, chain, control.skin, opening)
+                    if not slack > ZERO:
                         state.counts[world, LIST_BUILDS] = state.counts[world, LIST_BUILDS] + wp.int64(1)
                         if not build_list(K, L, chain, control.skin, opening):
                             status = int(LIST_OVERFLOW)
+                        slack = list_slack(K, chain, control.skin, opening)
                     if L[wp.static(list_count)] > 0:
                         hits, lost, depth = resolve_self_contacts(K, L, chain, opening)
                         state.counts[world, SELF_IMPULSES] = state.counts[world, SELF_IMPULSES] + hits
@@ -392,6 +334,7 @@ def make_advance(features: Features):
             write_sample(state, record, world, time, summarise(K, chain))
         store_state(K, state, chain, world, wp.static(fixed_loss))
         state.gap[world] = gap
+        state.slack[world] = slack
         state.has_first_stage[world] = has_first_stage
         state.time[world] = time
         state.step[world] = step

@@ -8,7 +8,9 @@ import functools
 
 import warp as wp
 
-from .elementary import LARGEST_TURN, ONE, TWO, ZERO, cos_sin, order_bits, small_turn
+from .controller import error_bits
+from .elementary import LARGEST_TURN, TWO, ZERO, cos_sin, order_bits
+from .geometry import end_positions, end_velocities, turned_direction
 from .joint import friction_torque, joint_force, link_acceleration
 from .layout import (
     COSINE,
@@ -57,16 +59,16 @@ wp.set_module_options({"enable_backward": False})
 def place_ends(K: wp.array2d(dtype=wp.float64), chain: Chain):
     """Directions and end positions of the links, exactly, from the state rows."""
     n = chain.link_count
-    a = chain.half_length
     i = int(0)
     while i < n:
         c, s = cos_sin(K[THETA, i])
         K[COSINE, i] = c
         K[SINE, i] = s
-        K[LEFT_X, i] = K[X, i] - a * c
-        K[LEFT_Y, i] = K[Y, i] - a * s
-        K[RIGHT_X, i] = K[X, i] + a * c
-        K[RIGHT_Y, i] = K[Y, i] + a * s
+        left_x, left_y, right_x, right_y = end_positions(chain, K[X, i], K[Y, i], c, s)
+        K[LEFT_X, i] = left_x
+        K[LEFT_Y, i] = left_y
+        K[RIGHT_X, i] = right_x
+        K[RIGHT_Y, i] = right_y
         i += 1
     K[LEFT_X, n] = K[LEFT_X, 0]
     K[LEFT_Y, n] = K[LEFT_Y, 0]
@@ -76,7 +78,6 @@ def place_ends(K: wp.array2d(dtype=wp.float64), chain: Chain):
 def begin_stages(K: wp.array2d(dtype=wp.float64), chain: Chain):
     """First stage's rows from the state: end velocities and directions; ``place_ends`` did the positions."""
     n = chain.link_count
-    a = chain.half_length
     i = int(0)
     while i < n:
         c = K[COSINE, i]
@@ -85,10 +86,11 @@ def begin_stages(K: wp.array2d(dtype=wp.float64), chain: Chain):
         K[STAGE_COSINE, i] = c
         K[STAGE_SINE, i] = s
         K[STAGE_SPIN, i] = w
-        K[LEFT_U, i] = K[U, i] + a * w * s
-        K[LEFT_V, i] = K[V, i] - a * w * c
-        K[RIGHT_U, i] = K[U, i] - a * w * s
-        K[RIGHT_V, i] = K[V, i] + a * w * c
+        left_u, left_v, right_u, right_v = end_velocities(chain, K[U, i], K[V, i], w, c, s)
+        K[LEFT_U, i] = left_u
+        K[LEFT_V, i] = left_v
+        K[RIGHT_U, i] = right_u
+        K[RIGHT_V, i] = right_v
         i += 1
     K[LEFT_U, n] = K[LEFT_U, 0]
     K[LEFT_V, n] = K[LEFT_V, 0]
@@ -168,7 +170,6 @@ def explicit_method(name: str):
     @wp.func
     def attempt(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64, tolerance: wp.float64):
         n = chain.link_count
-        a = chain.half_length
         hh = h * h
         turned = wp.int64(0)
         for s in range(1, wp.static(stages)):
@@ -191,9 +192,7 @@ def explicit_method(name: str):
                         dy += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
                         turn += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
                 turn = ch * K[OMEGA, i] + hh * turn
-                versine, sine = small_turn(turn)
-                c = K[COSINE, i] - (K[COSINE, i] * versine + K[SINE, i] * sine)
-                q = K[SINE, i] - (K[SINE, i] * versine - K[COSINE, i] * sine)
+                c, q = turned_direction(K[COSINE, i], K[SINE, i], turn)
                 x = K[X, i] + (ch * K[U, i] + hh * dx)
                 y = K[Y, i] + (ch * K[V, i] + hh * dy)
                 u = K[U, i] + h * du
@@ -202,14 +201,16 @@ def explicit_method(name: str):
                 K[STAGE_COSINE, i] = c
                 K[STAGE_SINE, i] = q
                 K[STAGE_SPIN, i] = w
-                K[LEFT_X, i] = x - a * c
-                K[LEFT_Y, i] = y - a * q
-                K[LEFT_U, i] = u + a * w * q
-                K[LEFT_V, i] = v - a * w * c
-                K[RIGHT_X, i] = x + a * c
-                K[RIGHT_Y, i] = y + a * q
-                K[RIGHT_U, i] = u - a * w * q
-                K[RIGHT_V, i] = v + a * w * c
+                left_x, left_y, right_x, right_y = end_positions(chain, x, y, c, q)
+                left_u, left_v, right_u, right_v = end_velocities(chain, u, v, w, c, q)
+                K[LEFT_X, i] = left_x
+                K[LEFT_Y, i] = left_y
+                K[LEFT_U, i] = left_u
+                K[LEFT_V, i] = left_v
+                K[RIGHT_X, i] = right_x
+                K[RIGHT_Y, i] = right_y
+                K[RIGHT_U, i] = right_u
+                K[RIGHT_V, i] = right_v
                 i += 1
             K[LEFT_X, n] = K[LEFT_X, 0]
             K[LEFT_Y, n] = K[LEFT_Y, 0]
@@ -217,7 +218,7 @@ def explicit_method(name: str):
             K[LEFT_V, n] = K[LEFT_V, 0]
             K[STAGE_SPIN, n] = K[STAGE_SPIN, 0]
             derivatives(K, chain, wp.static(STAGES + STAGE_ROWS * s), wp.static(power_needed[s]))
-        # new state and error ratio, odeint's norm: |e| / (tol + tol (|y| + h |ẏ|))
+        # new state and error ratio
         i = int(0)
         while i < n:
             du = ZERO
@@ -258,15 +259,24 @@ def explicit_method(name: str):
             K[NEW_U, i] = u + h * du
             K[NEW_V, i] = v + h * dv
             K[NEW_OMEGA, i] = w + h * dw
-            ex = wp.abs(hh * ex) / (ONE + wp.abs(K[X, i]) + h * wp.abs(u))
-            ey = wp.abs(hh * ey) / (ONE + wp.abs(K[Y, i]) + h * wp.abs(v))
-            et = wp.abs(hh * et) / (ONE + wp.abs(K[THETA, i]) + h * wp.abs(w))
-            eu = wp.abs(h * eu) / (ONE + wp.abs(u) + h * wp.abs(K[wp.static(STAGES), i]))
-            ev = wp.abs(h * ev) / (ONE + wp.abs(v) + h * wp.abs(K[wp.static(STAGES + 1), i]))
-            ew = wp.abs(h * ew) / (ONE + wp.abs(w) + h * wp.abs(K[wp.static(STAGES + 2), i]))
             # sums would overestimate, maxima of integers see NaN; below, one reduction over links
-            worst = wp.max(wp.max(order_bits(ex), order_bits(ey)), order_bits(et))
-            worst = wp.max(worst, wp.max(wp.max(order_bits(eu), order_bits(ev)), order_bits(ew)))
+            worst = wp.max(
+                wp.max(
+                    error_bits(hh * ex, K[X, i], u, h),
+                    error_bits(hh * ey, K[Y, i], v, h),
+                ),
+                error_bits(hh * et, K[THETA, i], w, h),
+            )
+            worst = wp.max(
+                worst,
+                wp.max(
+                    wp.max(
+                        error_bits(h * eu, u, K[wp.static(STAGES), i], h),
+                        error_bits(h * ev, v, K[wp.static(STAGES + 1), i], h),
+                    ),
+                    error_bits(h * ew, w, K[wp.static(STAGES + 2), i], h),
+                ),
+            )
             K[ERROR, i] = wp.cast(worst, wp.float64) / tolerance
             i += 1
         turned = wp.int64(0)

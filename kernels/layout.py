@@ -29,6 +29,18 @@ STAGES = 38
 STAGE_ROWS = 5
 ACCELERATION_X, ACCELERATION_Y, ACCELERATION_SPIN, POWER_FRICTION, POWER_DAMPING = 0, 1, 2, 3, 4
 
+# The block form keeps most of a chain in registers. The first 18 rows above and the next seven lie on a board that all
+# threads of the block see; the scratch block keeps rows from BOARD_LOST_SELF on between launches.
+BOARD_LOST_SELF, BOARD_LOST_FRICTION, BOARD_LOST_DAMPING, BOARD_LOST_FIXED = 18, 19, 20, 21
+BOARD_LISTED_X, BOARD_LISTED_Y = 22, 23
+# Numbers of the chain rather than of its links, in the first columns of one more row.
+BOARD_NOTES = 24
+NOTE_OPENING, NOTE_FIXED_DEPTH, NOTE_LAST_IMPULSE = 0, 1, 2
+BOARD_ROWS = 25
+# First stage of the next step, in the order of ACCELERATION_X … POWER_DAMPING.
+KEPT_STAGE = 25
+BLOCK_ROWS = 30
+
 # State.watch
 STEADY_TIME, WINDOW_START, WINDOW_COUNT, SUM_HEIGHT, SUM_WIDTH, SUM_SPEED = 0, 1, 2, 3, 4, 5
 LAST_HEIGHT, LAST_WIDTH, REST_SINCE, LAST_FLOOR_IMPULSE = 6, 7, 8, 9

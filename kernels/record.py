@@ -1,5 +1,7 @@
 """What is looked at every sample interval: sums over a chain, the watches that end a phase, time series, frames."""
 
+import functools
+
 import warp as wp
 
 from .elementary import HALF, ZERO, from_order_key, order_key
@@ -230,3 +232,40 @@ def record_is_full(record: Record, world: int):
     samples_full = record.samples.shape[1] > 0 and record.sample_count[world] >= record.samples.shape[1]
     frames_full = record.frames.shape[1] > 0 and record.frame_count[world] >= record.frames.shape[1]
     return samples_full or frames_full
+
+
+@functools.cache
+def sampling(watch: str):
+    """Warp function ``look``, one sample of a placed chain: time series, frame and watch; returns the status.
+
+    Args:
+        watch: ``"rest"``, ``"steady"`` or ``"none"``.
+    """
+    watches_rest = watch == "rest"
+    watches_steadiness = watch == "steady"
+
+    @wp.func
+    def look(
+        K: wp.array2d(dtype=wp.float64),
+        chain: Chain,
+        program: Program,
+        state: State,
+        record: Record,
+        control: Control,
+        world: int,
+        time: wp.float64,
+    ):
+        mark = state.next_sample[world]
+        summary = summarise(K, chain)
+        write_sample(state, record, world, time, summary)
+        if mark % control.frame_every == wp.int64(0):
+            write_frame(record, K, chain, world, time)
+        passed = wp.int64(wp.floor(time / control.sample_interval))
+        state.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
+        if wp.static(watches_rest):
+            return watch_rest(state, control, world, time, summary)
+        if wp.static(watches_steadiness):
+            watch_steadiness(state, program, world, time, summary)
+        return RUNNING
+
+    return look

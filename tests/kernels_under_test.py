@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from warpchain.engine import start_device
 from warpchain.kernels import layout
-from warpchain.kernels.broadphase import greatest_displacement, list_is_stale, list_layout, neighbour_list
+from warpchain.kernels.broadphase import greatest_displacement, list_layout, list_slack, neighbour_list
 from warpchain.kernels.contact import (
     floor_gap,
     greatest_opening,
@@ -151,7 +151,7 @@ GRID, ALL_PAIRS, FLOOR, SPROCKET, SELF = 1, 2, 4, 8, 16
 """Parts of a pass, to be added up: make the neighbour list by the grid or by all pairs; resolve contacts."""
 
 RESULTS = (
-    *("opening", "floor_gap", "sprocket_gap", "fits", "displacement", "stale"),
+    *("opening", "floor_gap", "sprocket_gap", "fits", "displacement", "slack"),
     *("floor", "sprocket", "self", "self_loss", "self_depth"),
 )
 
@@ -193,7 +193,7 @@ def _contact_pass(columns: int) -> wp.Kernel:
                 build_by_all_pairs(block, pairs, chain, skin, opening), wp.float64(1.0), wp.float64(0.0)
             )
         results[world, 4] = greatest_displacement(block, chain)
-        results[world, 5] = wp.where(list_is_stale(block, chain, skin, opening), wp.float64(1.0), wp.float64(0.0))
+        results[world, 5] = list_slack(block, chain, skin, opening)
         if (parts & 4) != 0:
             results[world, 6] = wp.float64(resolve_floor(block, chain))
         if (parts & 8) != 0:

@@ -168,6 +168,22 @@ def test_left_circle_goes_first():
     assert_array_equal(contact_pass.velocity(0)[1:], velocity[1:])
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_circles_almost_as_wide_as_links_meet_past_one_link(seed):
+    """If r is close to ℓ/2, circles at both ends of one link, of the links before and after it, can touch."""
+    wide = PAPER.with_values({"circle_radius": 0.4999 * PAPER.link_length})
+    position, velocity = reference.circular_loop(20, PAPER, 5.0)
+    generator = np.random.default_rng(seed)
+    position[:, :2] += generator.normal(size=(20, 2)) * 1e-5
+    velocity += generator.normal(size=(20, 3))
+    expected, counts = reference.resolve_contacts(position, velocity, wide, floor=False)
+    assert counts["self"] > 3
+    contact_pass = ContactPass([Placed(position, velocity, wide)])
+    (result,) = contact_pass.run(GRID | SELF)
+    assert result["self"] == counts["self"]
+    assert_same_velocity(contact_pass.velocity(0), expected)
+
+
 # --- gaps, energy, what is left alone ---
 
 

@@ -15,12 +15,11 @@ CHAINS = [
     pytest.param(stadium(RADIUS), 60, id="stadium-60"),
     pytest.param(stadium(RADIUS), 180, id="stadium-180"),
     pytest.param(stadium(RADIUS), 30, id="stadium-tight"),
-    pytest.param(stadium(RADIUS), 1000, id="stadium-1000"),
     pytest.param(ellipse(1.5), 4, id="ellipse-4"),
     pytest.param(ellipse(1.0), 6, id="circle-6"),
     pytest.param(ellipse(0.4), 60, id="ellipse-flat"),
     pytest.param(ellipse(8.0), 60, id="ellipse-slender"),
-    pytest.param(ellipse(1.5), 1000, id="ellipse-1000"),
+    pytest.param(ellipse(1.5), 300, id="ellipse-300"),
 ]
 
 
@@ -138,12 +137,11 @@ def test_circle_is_the_regular_polygon():
 
 
 def test_phase_is_a_fraction_of_the_turn():
-    """A whole turn later the chain lies as before, each joint of a stadium one place on after 1/n of the turn."""
-    first, _ = lay_chain(stadium(RADIUS), 60, LENGTH, phase=0.0)
-    turn, _ = lay_chain(stadium(RADIUS), 60, LENGTH, phase=1.0)
-    assert_allclose(joints(turn), joints(first), atol=1e-12)
-    top = joints(first)[np.argmax(joints(first)[:, 1])]
-    assert_allclose(top, [0.0, RADIUS], atol=1e-12)
+    """At phase 0 the first joint is at the top, at 1/2 at the bottom, and at 1 the chain lies as at 0."""
+    first, half, turn = (joints(lay_chain(stadium(RADIUS), 60, LENGTH, phase=phase)[0]) for phase in (0.0, 0.5, 1.0))
+    assert_allclose(first[0], [0.0, RADIUS], atol=1e-12)
+    assert_allclose(half[0], [0.0, first[:, 1].min()], atol=1e-12)
+    assert_allclose(turn, first, atol=1e-12)
 
 
 def test_links_span_their_joints():

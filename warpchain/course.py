@@ -15,7 +15,7 @@ from warpchain.engine import COUNTS, EXTREMES, Batch
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features
 from warpchain.options import Setup, contact_radius, joint_radius
-from warpchain.parameters import Parameters
+from warpchain.parameters import InputError, Parameters
 from warpchain.shapes import ellipse, lay_chain, stadium
 from warpchain.status import Status
 
@@ -64,9 +64,15 @@ class Course:
         speed = 2 * math.pi * scene.frequency * joint_radius(scene, parameters)
         if scene.start == "ellipse":
             batch.set_chain(world, parameters, scene.links)
-            position, velocity = lay_chain(
-                ellipse(scene.ellipse_aspect), scene.links, parameters.link_length, speed, scene.phase
-            )
+            try:
+                position, velocity = lay_chain(
+                    ellipse(scene.ellipse_aspect), scene.links, parameters.link_length, speed, scene.phase
+                )
+            except ValueError:
+                raise InputError(
+                    f"scene.ellipse_aspect: {scene.links} links cannot follow an ellipse of aspect "
+                    f"{scene.ellipse_aspect}; give one closer to 1, or more links"
+                ) from None
             self._settled = self._at_full_speed = 0.0
             self._release(position, velocity)
             return

@@ -132,7 +132,7 @@ class Batch:
 
         self.state = State()
         self.state.links = self._array(np.zeros((worlds, 6, longest)))
-        for name in ("time", "stop_time", "gap", "step", "last_error"):
+        for name in ("time", "stop_time", "gap", "slack", "step", "last_error"):
             setattr(self.state, name, self._array(np.zeros(worlds)))
         for name in ("stop_status", "is_fresh", "has_first_stage"):
             setattr(self.state, name, self._array(np.zeros(worlds, dtype=np.int32)))
@@ -203,7 +203,15 @@ class Batch:
         n = self.links[world]
         _view(state.links)[world, :3, :n] = position.T
         _view(state.links)[world, 3:, :n] = velocity.T
-        for array in (state.time, state.gap, state.counts, state.extremes, state.losses, state.next_sample):
+        for array in (
+            state.time,
+            state.gap,
+            state.slack,
+            state.counts,
+            state.extremes,
+            state.losses,
+            state.next_sample,
+        ):
             _view(array)[world] = 0
         _view(state.watch)[world] = 0
         _view(state.watch)[world, [layout.WINDOW_START, layout.REST_SINCE]] = -1.0
@@ -318,11 +326,11 @@ class Batch:
 
     def first_look(self, world: int) -> Array:
         """Sums over the chain when its run began: (SAMPLE_COLUMNS,), see :mod:`warpchain.kernels.layout`."""
-        return _view(self.state.first_look)[world].copy()
+        return np.array(_view(self.state.first_look)[world])
 
     def last_look(self, world: int) -> Array:
         """The same when the chain was last looked at; at the end of the run if that has ended."""
-        return _view(self.state.last_look)[world].copy()
+        return np.array(_view(self.state.last_look)[world])
 
     def drain_samples(self, world: int) -> Array:
         """Take the time series kept so far: (t, SAMPLE_COLUMNS), see :mod:`warpchain.kernels.layout`."""

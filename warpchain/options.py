@@ -71,7 +71,8 @@ class Scene(BaseModel):
     )
     ellipse_aspect: float = Field(
         default=1.5,
-        gt=0,
+        ge=0.05,
+        le=20,
         description="height over width of the starting ellipse",
         json_schema_extra={"unit": "1"},
     )
@@ -158,7 +159,7 @@ class Options(BaseModel):
     step_limit: int = Field(
         default=2_000_000_000,
         ge=1,
-        le=2**31 - 1,
+        le=2**62,
         description="most steps tried in one walk, accepted and rejected",
         json_schema_extra={"unit": "1"},
     )
@@ -183,7 +184,7 @@ class Options(BaseModel):
     )
     record_interval: float = Field(
         default=1e-3,
-        gt=0,
+        ge=1e-6,
         description="time between two recorded points of the centre of mass",
         json_schema_extra={"unit": "s"},
     )

@@ -180,7 +180,7 @@ def solve_flight(
         RuntimeError: the solver failed.
     """
     try:
-        from scipy.integrate import solve_ivp  # type: ignore[import-untyped]
+        from scipy.integrate import solve_ivp
     except ImportError as error:
         raise ImportError("solve_flight needs SciPy: pip install 'warpchain[scipy]'") from error
 

@@ -16,12 +16,12 @@ from typing import Any, Protocol
 
 from warpchain.course import Course
 from warpchain.ensemble import compile_kernels, run_setups
-from warpchain.load import SweepResult, load
 from warpchain.options import Setup
 from warpchain.parameters import InputError
+from warpchain.planning import PlannedWalk, Sweep, load_sweep
 from warpchain.status import Status
 from warpchain.store import Store, empty_rows, read_shard, write_shard
-from warpchain.sweep import PlannedWalk, Sweep, load_sweep
+from warpchain.sweep_result import SweepResult, load
 
 SHARD_WALKS = 256
 """Most walks in a shard."""

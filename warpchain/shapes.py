@@ -55,7 +55,7 @@ def stadium(radius: float) -> Curve:
 
     def points(s: Array, size: float) -> CurvePoints:
         turn = 4 * quarter + 2 * size
-        s = np.mod(s, turn)
+        laps, s = np.divmod(s, turn)
         right, lower, left, last = quarter, quarter + size, 3 * quarter + size, 3 * quarter + 2 * size
         piece = np.digitize(s, [right, lower, left, last])
         zero, one = np.zeros_like(s), np.ones_like(s)
@@ -68,6 +68,22 @@ def stadium(radius: float) -> Curve:
             y = np.choose(piece, [row[1] for row in rows])
             return np.stack([x, y], axis=1)
 
+        along = pick(
+            (np.cos(first), -np.sin(first)),
+            (zero, -one),
+            (-np.sin(below), -np.cos(below)),
+            (zero, one),
+            (np.sin(final), np.cos(final)),
+        )
+        growth = pick(
+            (zero, zero),
+            (zero, zero),
+            (np.sin(below), np.cos(below) - 1),
+            (zero, -2 * one),
+            (-2 * np.sin(final), -2 * np.cos(final)),
+        )
+        # every lap before grows with the size, too
+        growth -= 2 * laps[:, None] * along
         return CurvePoints(
             point=pick(
                 (radius * np.sin(first), radius * np.cos(first)),
@@ -76,20 +92,8 @@ def stadium(radius: float) -> Curve:
                 (-radius * one, -size + (s - left)),
                 (-radius * np.cos(final), radius * np.sin(final)),
             ),
-            along=pick(
-                (np.cos(first), -np.sin(first)),
-                (zero, -one),
-                (-np.sin(below), -np.cos(below)),
-                (zero, one),
-                (np.sin(final), np.cos(final)),
-            ),
-            growth=pick(
-                (zero, zero),
-                (zero, zero),
-                (np.sin(below), np.cos(below) - 1),
-                (zero, -2 * one),
-                (-2 * np.sin(final), -2 * np.cos(final)),
-            ),
+            along=along,
+            growth=growth,
         )
 
     return Curve(
@@ -160,9 +164,12 @@ def lay_chain(
         jacobian[rows[1:], rows[1:] - 1] = to_here[1:]
         jacobian[rows[:-1], rows[:-1]] += to_following[:-1]
         jacobian[:, -1] = to_size
-        change = np.linalg.solve(jacobian, -residual)
+        try:
+            change = np.linalg.solve(jacobian, -residual)
+        except np.linalg.LinAlgError:
+            raise ValueError(f"a closed chain of {links} links of {link_length} m does not fit this curve") from None
         s[1:] += change[:-1]
-        size += float(change[-1])
+        size = max(size + float(change[-1]), 0.0)
         if np.max(np.abs(residual)) < 1e-14 * link_length**2 or np.max(np.abs(change)) < 1e-16 * period:
             break
     joints = curve.points(s, size)

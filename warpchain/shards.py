@@ -26,7 +26,7 @@ from warpchain.status import Status
 if TYPE_CHECKING:
     import h5py
 
-    from warpchain.sweep import Sweep
+    from warpchain.planning import Sweep
 
 Folder = str | os.PathLike[str]
 
@@ -215,7 +215,7 @@ def write_shard(directory: Folder, digest: str, walks: range, rows: Rows) -> str
         file.attrs["digest"] = digest
         file.attrs["numerics_version"] = NUMERICS_VERSION
         dataset = file.create_dataset("rows", data=rows)
-        dataset.attrs["sha256"] = hashlib.sha256(rows.tobytes()).hexdigest()
+        dataset.attrs["sha256"] = _checksum(rows)
 
     put_file(Path(directory) / "shards" / shard_name(walks), hdf5_image(fill))
     return key
@@ -244,7 +244,7 @@ def read_shard(directory: Folder, digest: str, walks: range, *, numerics_version
     try:
         with h5py.File(io.BytesIO(content), "r") as file:
             key, rows = str(file.attrs["key"]), np.asarray(file["rows"][()])
-            whole = bool(hashlib.sha256(rows.tobytes()).hexdigest() == file["rows"].attrs["sha256"])
+            whole = bool(_checksum(rows) == file["rows"].attrs["sha256"])
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError):
         whole = False
     if not whole:
@@ -253,6 +253,11 @@ def read_shard(directory: Folder, digest: str, walks: range, *, numerics_version
     if key != shard_key(digest, walks, numerics_version):
         raise InputError(f"{path}: a shard of another sweep; move it out of this folder")
     return rows
+
+
+def _checksum(rows: Rows) -> str:
+    """Hexadecimal SHA-256 of rows and their type."""
+    return hashlib.sha256(json.dumps(rows.dtype.descr).encode() + rows.tobytes()).hexdigest()
 
 
 def present_shards(directory: Folder, manifest: Manifest) -> dict[range, Path]:
@@ -265,15 +270,15 @@ def present_shards(directory: Folder, manifest: Manifest) -> dict[range, Path]:
     folder = Path(directory) / "shards"
     named = {shard_name(walks): walks for walks in manifest.shards}
     try:
-        names = sorted(name for name in os.listdir(folder) if not name.startswith("."))
+        names = {name for name in os.listdir(folder) if not name.startswith(".")}
     except FileNotFoundError:
         return {}
     except OSError as error:
         raise _unreadable(folder, error) from error
-    if strange := [name for name in names if name not in named]:
+    if strange := sorted(names - named.keys()):
         more = f" (and {len(strange) - 1} more)" if strange[1:] else ""
         raise InputError(f"{folder / strange[0]}: not a shard of this sweep; move it out of this folder{more}")
-    return {named[name]: folder / name for name in names}
+    return {walks: folder / name for name, walks in named.items() if name in names}
 
 
 def hdf5_image(fill: "Callable[[h5py.File], None]") -> bytes:
@@ -296,6 +301,7 @@ def hdf5_image(fill: "Callable[[h5py.File], None]") -> bytes:
 _REMEDIES: Final = {
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "make room"),
     **dict.fromkeys((errno.EROFS, errno.EACCES, errno.EPERM), "make the folder writable"),
+    **dict.fromkeys((errno.ENOENT, errno.ENOTDIR, errno.EEXIST), "give a folder that is there"),
 }
 
 

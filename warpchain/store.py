@@ -41,7 +41,7 @@ from warpchain.shards import (
 if TYPE_CHECKING:
     from types import TracebackType
 
-    from warpchain.sweep import Sweep
+    from warpchain.planning import Sweep
 
 __all__ = ["Store", "empty_rows", "read_rows", "read_shard", "write_shard"]
 

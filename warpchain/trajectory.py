@@ -13,6 +13,9 @@ from warpchain.status import Status
 
 Array = NDArray[np.float64]
 
+LONGEST = 1e9
+"""Durations [s] from here on are refused."""
+
 
 def simulate(
     parameters: Parameters | str,
@@ -55,6 +58,9 @@ def simulate(
     """
     chosen = {"method": method, "tolerance": tolerance, "device": device, "self_contact": self_contact}
     options = validated(Options, settings | chosen, "options")
+    for name, switch in (("floor", floor), ("gravity", gravity)):
+        if not isinstance(switch, bool):
+            raise InputError(f"{name}: {shown(switch)} is not a truth value; give True or False")
     chain = _chain_parameters(parameters)
     if not gravity:
         chain = chain.with_values({"gravity": 0.0})
@@ -107,10 +113,7 @@ def _checked_state(position: Array, velocity: Array) -> tuple[Array, Array]:
     """
     checked = []
     for name, given in (("position", position), ("velocity", velocity)):
-        try:
-            array = np.array(given, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise InputError(f"{name}: not an array of numbers; give shape (n, 3)") from None
+        array = _real_array(name, given, "shape (n, 3)")
         if array.ndim != 2 or array.shape[1] != 3:
             raise InputError(f"{name}: its shape is {array.shape}; give (n, 3), one row x, y, θ per link")
         if not np.all(np.isfinite(array)):
@@ -130,19 +133,30 @@ def _checked_times(duration: float, times: Sequence[float] | Array | None) -> Ar
     Raises:
         InputError: The duration is not a time, or the instants do not rise within it.
     """
-    if isinstance(duration, bool) or not isinstance(duration, (int, float, np.number)):
+    if isinstance(duration, bool) or not isinstance(duration, (int, float, np.integer, np.floating)):
         raise InputError(f"duration: {shown(duration)} is not a number; give seconds")
-    if not (np.isfinite(duration) and duration >= 0):
-        raise InputError(f"duration: {duration} is not a time; give a number of seconds, at least 0")
+    if not 0 <= duration < LONGEST:
+        raise InputError(f"duration: {shown(duration)} is not a time; give a number of seconds, at least 0")
     if times is None:
         return np.linspace(0.0, float(duration), 101)
-    try:
-        instants = np.array(times, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError("times: not an array of numbers; give rising instants in s") from None
+    instants = _real_array("times", times, "rising instants in s")
     if instants.ndim != 1 or len(instants) == 0:
         raise InputError(f"times: its shape is {instants.shape}; give a row of at least one instant")
     in_range = np.all((instants >= 0) & (instants <= duration))
     if not in_range or np.any(np.diff(instants) <= 0):
         raise InputError(f"times: give rising instants between 0 and the duration of {duration} s")
     return instants
+
+
+def _real_array(name: str, given: object, remedy: str) -> Array:
+    """Anything like an array of real numbers as a new float64 array.
+
+    Raises:
+        InputError: It is not.
+    """
+    try:
+        if np.array(given).dtype.kind in "cSU":  # complex numbers and text would be converted without a word
+            raise TypeError
+        return np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: not an array of numbers; give {remedy}") from None

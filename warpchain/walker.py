@@ -20,6 +20,9 @@ from warpchain.sampling import random_generator, sample_parameters, sample_scene
 
 Array = NDArray[np.float64]
 
+LONGEST_FRAME_INTERVAL = 1000.0
+"""Greatest time [s] between frames."""
+
 
 @dataclass(frozen=True)
 class Progress:
@@ -64,7 +67,8 @@ def walk(
         tolerance: Error allowed in a step, absolute (SI units) and relative alike.
         start: ``"rest"``, ``"spinning"`` or ``"ellipse"``.
         seed: Draw parameters, phase and clearance from their distributions; None: Table 1's means, phase 0.
-        frame_interval: Time between kept frames of all joints [s]; None keeps none. Frames do not change the walk.
+        frame_interval: Time between kept frames of all joints [s], to whole samples; None keeps none. Neither frames
+            nor samples change the walk: they are taken at the first step's end after their time.
         on_progress: Called about ten times a second.
         settings: Any other field of :class:`Parameters`, :class:`Scene` or :class:`Options`, by its name.
 
@@ -125,11 +129,7 @@ def run_walk(
     started = time.perf_counter()
     report = on_progress or (lambda progress: None)
     options = setup.options
-    frame_every = None
-    if frame_interval is not None:
-        if not (math.isfinite(frame_interval) and frame_interval > 0):
-            raise InputError(f"frame_interval: {shown(frame_interval)} is not a positive time in s; give one, or None")
-        frame_every = max(1, round(frame_interval / options.record_interval))
+    frame_every = None if frame_interval is None else _samples_per_frame(frame_interval, options)
     batch = Batch(1, setup.scene.links, options, keeps_samples=True, frame_every=frame_every)
     course = Course(batch, 0, setup)
     record = _Record(batch)
@@ -152,6 +152,26 @@ def run_walk(
     if course.phase != Phase.WALK:
         record.clear()
     return _result(course, record, seed, time.perf_counter() - started)
+
+
+def _samples_per_frame(frame_interval: float, options: Options) -> int:
+    """Whole samples between two kept frames.
+
+    Raises:
+        InputError: The interval is no time, or shorter than that between samples.
+    """
+    is_number = isinstance(frame_interval, (int, float, np.integer, np.floating)) and not isinstance(
+        frame_interval, bool
+    )
+    if not (is_number and 0 < frame_interval < math.inf):
+        raise InputError(f"frame_interval: {shown(frame_interval)} is not a positive time in s; give one, or None")
+    samples = frame_interval / options.record_interval if frame_interval < LONGEST_FRAME_INTERVAL else math.inf
+    if not 0.999 < samples < math.inf:
+        raise InputError(
+            f"frame_interval: {shown(frame_interval)} is not between options.record_interval "
+            f"{options.record_interval} s and {LONGEST_FRAME_INTERVAL} s; give a time between, or None"
+        )
+    return round(samples)
 
 
 def _result(course: Course, record: "_Record", seed: int | None, wall_time: float) -> WalkResult:

@@ -1,0 +1,114 @@
+"""What the threads of a block share: its memory seen as arrays, a barrier, and the greatest of their numbers.
+
+In the block form one block of threads carries one chain, one thread per link. Control flow is the same in all threads
+of a block up to where a comment says otherwise, because every barrier must be reached by all of them.
+
+The native snippets below are all that pure Warp lacks; their CPU branches run where blocks are made of fibers
+(``wp.config.enable_cpu_blocks``), which is how the block form is tested without a GPU.
+"""
+
+import functools
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.func_native("WP_TILE_SYNC();")
+def barrier():
+    """Wait until all threads of the block are here; what they wrote before is seen by all afterwards."""
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    return __reduce_max_sync(0xffffffffu, x);
+#else
+    return x;
+#endif
+""")
+def warp_greatest_int(x: wp.int32) -> wp.int32:
+    """Greatest number of the threads of a hardware warp (compute capability 8.0 and above)."""
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    const int high = static_cast<int>(x >> 32);
+    const int top = __reduce_max_sync(0xffffffffu, high);
+    const unsigned rest = high == top ? static_cast<unsigned>(x) : 0u;
+    return (static_cast<::wp::int64>(top) << 32) | __reduce_max_sync(0xffffffffu, rest);
+#else
+    return x;
+#endif
+""")
+def warp_greatest(x: wp.int64) -> wp.int64:
+    """The same for long integers, exact.
+
+    Two integer reductions of 32 bits cost a fraction of ``wp.tile_max``, which shuffles and needs four barriers.
+    """
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    return 32;
+#else
+    return 1;
+#endif
+""")
+def warp_width() -> int:
+    """Threads in a hardware warp; a fiber is alone."""
+    ...
+
+
+@functools.cache
+def tile_address(dtype: type, size: int):
+    """Warp function ``address(tile)`` of the shared memory behind a tile (size,) of this type.
+
+    Seen as an array, a tile can be written by many threads without a barrier after each element, and by atomics.
+    """
+
+    @wp.func_native("return reinterpret_cast<::wp::uint64>(tile.data.ptr);")
+    def address(tile: wp.tile[dtype, size]) -> wp.uint64: ...
+
+    return address
+
+
+vec4l = wp.types.vector(length=4, dtype=wp.int64)
+
+
+@functools.cache
+def block_maxima(block_dim: int):
+    """Warp functions (greatest of an integer, greatest of each of four long integers) over the threads of a block.
+
+    Both take a shared tile, the thread's number and its value, and return the same result in all threads. A tile may
+    be used again after any other barrier.
+    """
+
+    @wp.func
+    def greatest(tile: wp.tile[wp.int32, block_dim], lane: int, value: wp.int32):
+        tile[lane // warp_width()] = warp_greatest_int(value)
+        top = tile[0]
+        i = int(1)
+        while i < wp.static(block_dim) // warp_width():
+            top = wp.max(top, tile[i])
+            i += 1
+        return top
+
+    @wp.func
+    def greatest_of_four(tile: wp.tile[vec4l, block_dim], lane: int, value: vec4l):
+        tile[lane // warp_width()] = vec4l(
+            warp_greatest(value[0]), warp_greatest(value[1]), warp_greatest(value[2]), warp_greatest(value[3])
+        )
+        top = tile[0]
+        i = int(1)
+        while i < wp.static(block_dim) // warp_width():
+            other = tile[i]
+            top = vec4l(
+                wp.max(top[0], other[0]), wp.max(top[1], other[1]), wp.max(top[2], other[2]), wp.max(top[3], other[3])
+            )
+            i += 1
+        return top
+
+    return greatest, greatest_of_four

@@ -1,0 +1,62 @@
+"""How large the next step is: the error ratio of a try and what the controllers make of it."""
+
+import functools
+
+import warp as wp
+
+from .elementary import ONE, order_bits
+
+wp.set_module_options({"enable_backward": False})
+
+GREATEST_GROWTH = 5.0
+SAFETY = 0.9
+LEAST_SHRINKAGE = wp.constant(wp.float64(0.2))
+
+
+@wp.func
+def error_bits(error: wp.float64, value: wp.float64, rate: wp.float64, h: wp.float64):
+    """Error ratio of one component times the tolerance, odeint's norm |e| / (1 + |y| + h |ẏ|), as ordered bits."""
+    return order_bits(wp.abs(error) / (ONE + wp.abs(value) + h * wp.abs(rate)))
+
+
+@wp.func
+def error_bits_single(error: wp.float64, value: wp.float64, rate: wp.float64, h: wp.float64):
+    """The same to single precision, at a fraction of the cost where divisions are dear."""
+    ratio = wp.float32(error) / wp.float32(ONE + wp.abs(value) + h * wp.abs(rate))
+    return wp.cast(wp.abs(ratio), wp.int32)
+
+
+@functools.cache
+def step_controller(order: int, error_order: int, real: type = wp.float64):
+    """Warp functions (factor after acceptance, factor after rejection) for a method of these orders.
+
+    Standard: Boost odeint's ``default_step_adjuster`` (K. Ahnert, M. Mulansky, AIP Conf. Proc. 1389 (2011) 1586):
+    grow only below half of the tolerance. Proportional-integral: K. Gustafsson, ACM TOMS 17 (1991) 533, with the
+    exponents 0.7/k and 0.4/k of E. Hairer and G. Wanner, Solving ODEs II, section IV.2.
+
+    Args:
+        order: Of the solution that is propagated.
+        error_order: Of the embedded solution.
+        real: Type of errors and factors.
+    """
+    least_error = 5.0**-order
+    least_shrinkage = float(LEAST_SHRINKAGE)
+
+    @wp.func
+    def growth(error: real, last_error: real, proportional: wp.int32):
+        bounded = wp.max(error, wp.static(real(least_error)))
+        if proportional != 0:
+            factor = wp.static(real(SAFETY)) * wp.pow(bounded, wp.static(real(-0.7 / (error_order + 1))))
+            factor = factor * wp.pow(last_error, wp.static(real(0.4 / (error_order + 1))))
+            return wp.clamp(factor, wp.static(real(least_shrinkage)), wp.static(real(GREATEST_GROWTH)))
+        if error < wp.static(real(0.5)):
+            factor = wp.static(real(SAFETY)) * wp.pow(bounded, wp.static(real(-1.0 / order)))
+            return wp.min(factor, wp.static(real(GREATEST_GROWTH)))
+        return wp.static(real(1.0))
+
+    @wp.func
+    def shrinkage(error: real):
+        factor = wp.static(real(SAFETY)) * wp.pow(error, wp.static(real(-1.0 / (error_order - 1))))
+        return wp.max(factor, wp.static(real(least_shrinkage)))
+
+    return growth, shrinkage

@@ -1,0 +1,381 @@
+"""The report of a sweep: one page that holds everything and loads nothing.
+
+Figures and tables of what is there of the sweep, its parameters, its file, where it comes from, which walks failed
+and what to try; on demand one walk in motion, run again for the page. A folder gives the same page each time.
+"""
+
+import base64
+import io
+import math
+import os
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from html import escape
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import yaml
+
+from warpchain.parameters import DIMENSIONLESS, InputError
+from warpchain.planning import load_sweep
+from warpchain.results import replacing
+from warpchain.rows import MISSING, field_column
+from warpchain.shards import Folder
+from warpchain.status import Status
+from warpchain.sweep_file import SECTIONS
+from warpchain.sweep_result import BlockResult, SweepResult, load
+from warpchain.sweep_statistics import axis_symbol, cell_text, number_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from warpchain.results import WalkResult
+
+FRAME_INTERVAL: Final = 2e-3
+"""Time between two pictures of the walk in motion [s]."""
+
+_DPI: Final = 160
+_MOST_FAILED: Final = 100
+"""Most walks of each status that are listed one by one."""
+
+
+def write_report(directory: Folder, path: str | os.PathLike[str], *, animation_of: int | None = None) -> None:
+    """Write the report of a sweep as one HTML page, whole or not at all; an older file is replaced.
+
+    Args:
+        directory: folder of the sweep, which may still be running.
+        path: the file to write.
+        animation_of: number of a walk to run again and to show in motion; None for none.
+
+    Raises:
+        OSError: the folder cannot be read, or the file cannot be written.
+        InputError: there is no sweep in the folder, a shard is damaged or foreign, or there is no such walk.
+    """
+    result = load(directory)
+    if animation_of is not None and not 0 <= animation_of < result.walk_count:
+        raise InputError(f"animation_of: there is no walk {animation_of}; give 0 … {result.walk_count - 1}")
+    sections = {
+        "Figures": _figures(result),
+        "Cells": _cells(result),
+        "Failed walks": _failed(result),
+        "One walk": "" if animation_of is None else _walk(result, animation_of),
+        "Parameters": _parameters(result),
+        "Sweep": f"<pre>{escape(_text(result.sweep))}</pre>",
+        "Provenance": _provenance(result),
+    }
+    page = _page(result, {title: text for title, text in sections.items() if text})
+    with replacing(path) as part:
+        part.write_text(page, encoding="utf-8")
+
+
+def _text(sweep: Mapping[str, Any]) -> str:
+    """The resolved sweep as a YAML file."""
+    return yaml.safe_dump(sweep, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
+
+
+def _page(result: SweepResult, sections: Mapping[str, str]) -> str:
+    """The whole page, from the content of its sections."""
+    counts = result.summary()
+    rested, missing = counts[Status.AT_REST.label], counts["missing"]
+    failed = result.walk_count - rested - missing
+    tiles = {"walks": (result.walk_count, ""), "at rest": (rested, ""), "failed": (failed, "bad" if failed else "")}
+    if missing:
+        tiles["not run yet"] = (missing, "")
+    numbers = [
+        f'<div class="{kind}"><dt>{label}</dt><dd>{count:,}</dd></div>' for label, (count, kind) in tiles.items()
+    ]
+    anchors = {title: title.lower().replace(" ", "-") for title in sections}
+    return _PAGE.format(
+        title=escape(result.name),
+        style=_STYLE,
+        numbers="".join(numbers),
+        links="".join(f'<a href="#{anchor}">{title}</a> ' for title, anchor in anchors.items()),
+        sections="\n".join(
+            f'<section id="{anchors[title]}"><h2>{title}</h2>\n{text}\n</section>' for title, text in sections.items()
+        ),
+    )
+
+
+def _figures(result: SweepResult) -> str:
+    from warpchain.sweep_plots import figures
+
+    return "\n".join(_picture(picture.figure, picture.caption) for picture in figures(result))
+
+
+def _picture(figure: "Figure", caption: str) -> str:
+    """A figure in the page itself."""
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=_DPI, metadata={"Software": None})
+    data = base64.b64encode(content.getvalue()).decode()
+    width = round(96 * figure.get_figwidth())
+    image = f'<img src="data:image/png;base64,{data}" alt="{escape(caption)}" style="width:{width}px">'
+    return f"<figure>{image}<figcaption>{escape(caption)}</figcaption></figure>"
+
+
+def _cells(result: SweepResult) -> str:
+    """Mean and spread of the distance in every cell, a table for each block."""
+    parts = [
+        "<p>Mean, standard deviation (divisor count − 1) and standard error of the mean of the distance walked Δx, "
+        "over the walks at rest.</p>"
+    ]
+    for block in result.blocks.values():
+        found = block.statistics("dx")
+        head = [" / ".join(filter(None, (axis_symbol(name), _unit(name)))) for name in block.axes]
+        head += ["mean Δx / m", "s.d. / m", "s.e. / m", "at rest", "failed", "not run yet"]
+        rows = [
+            [
+                *_axis_values(block, place),
+                *(_meters(float(values[place])) for values in (found.mean, found.sd, found.standard_error)),
+                *(f"{values[place]}" for values in (found.count, found.failed, found.missing)),
+            ]
+            for place in np.ndindex(*block.shape[:-1])
+        ]
+        if not found.missing.any():
+            head, rows = head[:-1], [row[:-1] for row in rows]
+        marked = [bool(count) for count in found.failed.ravel()]
+        parts += [*_heading(result, block.name), _table(head, rows, numbers_from=0, marked=marked)]
+    return "\n".join(parts)
+
+
+def _failed(result: SweepResult) -> str:
+    """For each status of a failure what it means and what to try, and the walks that have it."""
+    parts = []
+    for status in Status:
+        if status == Status.AT_REST:
+            continue
+        rows = [row for block in result.blocks.values() for row in _rows_of(result, block, status)]
+        if not rows:
+            continue
+        parts.append(f"<h3>{status.label}: {len(rows):,}</h3><p>{escape(status.sentence)}</p>")
+        head = ["walk", *(["block"] if len(result.blocks) > 1 else []), "cell", "sample"]
+        parts.append(_table(head, rows[:_MOST_FAILED], numbers_from=len(head)))
+        if len(rows) > _MOST_FAILED:
+            parts.append(f"<p>… and {len(rows) - _MOST_FAILED:,} more.</p>")
+    return "\n".join(parts) or "<p>None.</p>"
+
+
+def _rows_of(result: SweepResult, block: BlockResult, status: Status) -> Iterator[list[str]]:
+    """A line for each walk of a block that ended with a status."""
+    for *place, sample in np.argwhere(block.columns["status"] == status):
+        index = block.columns["index"][(*place, sample)]
+        name = [block.name] if len(result.blocks) > 1 else []
+        yield [f"{index}", *name, _cell(block, tuple(place)) or "–", f"{sample}"]
+
+
+def _walk(result: SweepResult, index: int) -> str:
+    """One walk, run again: what it is, a player, and its pictures."""
+    from warpchain.walker import run_walk
+
+    planned = load_sweep(result.sweep).planned(index)
+    block = list(result.blocks.values())[planned.block]
+    place = (*planned.cell, planned.sample)
+    name = f"block {block.name}, " if len(result.blocks) > 1 else ""
+    cell = _cell(block, planned.cell)
+    walk = run_walk(planned.setup, frame_interval=FRAME_INTERVAL)
+    distance = f"Δx = {walk.dx:.4f} m in {walk.walk_time:.2f} s with {walk.bounces} bounces"
+    text = (
+        f"Walk {index} ({name}{cell + ', ' if cell else ''}sample {planned.sample}), run again for this page: "
+        f"{distance if math.isfinite(walk.dx) else walk.status.label}. {_compared(walk, block, place)}"
+    )
+    parts = [f"<p>{escape(text)}</p>", _player(walk)]
+    if len(walk.frame_time) and np.isfinite(walk.frame_joints).all():
+        parts.append(_picture(walk.plot("film_strip"), "The walk, drawn to scale."))
+        parts.append(
+            _picture(walk.plot("figure5"), "Height and speed of the centre of mass, as in the paper's Figure 5.")
+        )
+    if planned.drawn:
+        rows = [[name, number_text(value), _unit(name)] for name, value in planned.drawn.items()]
+        parts.append("<h3>Drawn for this walk</h3>" + _table(["name", "value", "unit"], rows, numbers_from=3))
+    return "\n".join(parts)
+
+
+def _player(walk: "WalkResult") -> str:
+    """The page with the moving picture, inside this one; why there is none if it can't be made."""
+    from warpchain.animation import animate
+
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / "walk.html"
+        try:
+            animate(walk, page)
+        except ValueError as error:
+            return f'<p class="bad">No moving picture: {escape(str(error))}</p>'
+        content = escape(page.read_text(encoding="utf-8"))
+    return f'<iframe title="the walk in motion" sandbox="allow-scripts" loading="lazy" srcdoc="{content}"></iframe>'
+
+
+def _compared(walk: "WalkResult", block: BlockResult, place: tuple[int, ...]) -> str:
+    """What the sweep says about a walk that was run again."""
+    status, dx = int(block.columns["status"][place]), float(block.columns["dx"][place])
+    if status == MISSING:
+        return "The sweep has not run it yet."
+    if walk.status == status and (walk.dx == dx or math.isnan(walk.dx)):
+        return "The sweep has the same, to the bit."
+    stored = f"Δx = {dx:.4f} m" if math.isfinite(dx) else Status(status).label
+    return f"The sweep has another result, {stored}: it was computed by other software or on another machine."
+
+
+def _parameters(result: SweepResult) -> str:
+    """Everything that the sweep sets, with units: a table for each section of its file."""
+    blocks = result.sweep["blocks"]
+    parts = ["<p>± is the standard deviation of a Gaussian, truncated to physical values.</p>"]
+    presets = [["preset", "", _in_blocks({block["name"]: _value(block, "", "preset") for block in blocks}), "", ""]]
+    for section, model in SECTIONS.items():
+        rows = presets if section == "parameters" else []
+        for name in model.model_fields:
+            column = field_column(name)
+            symbol = axis_symbol(name)
+            values = _in_blocks({block["name"]: _value(block, section, name) for block in blocks})
+            rows.append([name, "" if " " in symbol or symbol == name else symbol, values, _unit(name), column.meaning])
+        head = ["name", "symbol", "value", "unit", "meaning"]
+        parts += [f"<h3>{section}</h3>", _table(head, rows, numbers_from=len(head))]
+    return "\n".join(parts)
+
+
+def _value(block: Mapping[str, Any], section: str, name: str) -> str:
+    """What a block of a resolved sweep says about a field: a value, the values of an axis, or a distribution."""
+    if name in block["grid"]:
+        values = [_plain(value) for value in block["grid"][name]]
+        return ", ".join(values) if len(values) <= 12 else f"{values[0]} … {values[-1]} ({len(values)} values)"
+    fixed = block.get(name) if name == "preset" else block[section].get(name)
+    plain = "of the preset" if fixed is None else _plain(fixed)
+    distribution = block["distributions"].get(name, {})
+    if "gaussian" in distribution:
+        gaussian = distribution["gaussian"]
+        return f"{_plain(gaussian['mean']) if 'mean' in gaussian else plain} ± {_plain(gaussian['sigma'])}"
+    if "uniform" in distribution:
+        return "uniform, {} … {}".format(*map(_plain, distribution["uniform"]))
+    return plain
+
+
+def _in_blocks(values: Mapping[str, str]) -> str:
+    """The value that most blocks have, then the others with the names of their blocks."""
+    texts = list(values.values())
+    most = max(texts, key=texts.count)
+    return "; ".join([most, *(f"{name}: {text}" for name, text in values.items() if text != most)])
+
+
+def _provenance(result: SweepResult) -> str:
+    """What names the sweep and the software, and how to run it again."""
+    software = ", ".join(f"{name} {number}" for name, number in result.provenance["versions"].items())
+    rows = [
+        ["seed", f"{result.seed}"],
+        ["digest of the sweep (SHA-256)", f"{result.provenance['digest']}"],
+        ["version of the numerics", f"{result.provenance['numerics_version']}"],
+        ["software that began the sweep", software],
+        ["software that wrote this page", f"warpchain {version('warpchain')}"],
+    ]
+    again = "<p>With the text under Sweep in a file: <code>warpchain sweep FILE.yaml -o DIR</code></p>"
+    return _table(["", ""], rows, numbers_from=2) + again
+
+
+def _cell(block: BlockResult, place: tuple[int, ...]) -> str:
+    """What a cell is; empty if the block has but one."""
+    return cell_text({name: values[i] for (name, values), i in zip(block.axes.items(), place, strict=True)})
+
+
+def _axis_values(block: BlockResult, place: tuple[int, ...]) -> list[str]:
+    return [_plain(values[i].item()) for values, i in zip(block.axes.values(), place, strict=True)]
+
+
+def _heading(result: SweepResult, name: str) -> list[str]:
+    """A heading for a block, if there are several."""
+    return [f"<h3>{escape(name)}</h3>"] if len(result.blocks) > 1 else []
+
+
+def _plain(value: object) -> str:
+    """A value as in a sweep file."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return number_text(value) if isinstance(value, float) else str(value)
+
+
+def _unit(name: str) -> str:
+    """Unit of a field; empty for pure numbers."""
+    unit = field_column(name).unit
+    return "" if unit == DIMENSIONLESS else unit
+
+
+def _meters(length: float) -> str:
+    """A length [m] to tenths of a millimetre, a dash for none."""
+    return f"{length:.4f}" if math.isfinite(length) else "–"
+
+
+def _table(
+    head: Sequence[str], rows: Iterable[Sequence[str]], *, numbers_from: int, marked: Sequence[bool] = ()
+) -> str:
+    """A table of texts.
+
+    Args:
+        head: one text for each column; nothing is above columns without texts.
+        rows: the same number of texts each.
+        numbers_from: first of the columns that hold numbers.
+        marked: rows to draw attention to.
+    """
+    kinds = ["" if column < numbers_from else ' class="number"' for column in range(len(head))]
+    lines = [f"<th{kind}>{escape(text)}</th>" for text, kind in zip(head, kinds, strict=True)]
+    top = f"<thead><tr>{''.join(lines)}</tr></thead>" if any(head) else ""
+    body = []
+    for number, row in enumerate(rows):
+        cells = "".join(f"<td{kind}>{escape(text)}</td>" for text, kind in zip(row, kinds, strict=True))
+        body.append(f"<tr{' class=bad' if number < len(marked) and marked[number] else ''}>{cells}</tr>")
+    return f'<div class="wide"><table>{top}<tbody>\n' + "\n".join(body) + "\n</tbody></table></div>"
+
+
+_STYLE: Final = """
+:root { color-scheme: light; }
+body { margin: 0 auto; max-width: 62rem; padding: 1.5rem; color: #222; background: #fff;
+       font: 16px/1.5 system-ui, sans-serif; }
+h1 { margin: 0; font-size: 1.9rem; }
+h2 { margin: 2.5rem 0 .75rem; padding-bottom: .25rem; border-bottom: 1px solid #ccc; font-size: 1.35rem; }
+h3 { margin: 1.5rem 0 .5rem; font-size: 1.05rem; }
+p { max-width: 46rem; }
+a { color: #0072b2; margin-right: 1rem; }
+dl { display: flex; flex-wrap: wrap; gap: .75rem; margin: 1rem 0; }
+dl div { padding: .5rem 1rem; min-width: 6rem; background: #f3f4f5; border-left: 4px solid #0072b2; }
+dl .bad { border-color: #d55e00; }
+dt { font-size: .85rem; color: #555; }
+dd { margin: 0; font-size: 1.4rem; font-variant-numeric: tabular-nums; }
+figure { margin: 1.5rem 0 2.5rem; }
+figure img { max-width: 100%; display: block; }
+figcaption { max-width: 46rem; margin-top: .5rem; color: #555; font-size: .9rem; }
+.wide { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .9rem; }
+th, td { padding: .2rem .8rem .2rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid #e3e3e3; }
+th { border-bottom: 1px solid #777; }
+.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+tr.bad td, p.bad { color: #a84a00; }
+iframe { width: 100%; height: 27rem; border: 1px solid #ccc; }
+pre { max-height: 30rem; overflow: auto; padding: 1rem; background: #f3f4f5; font-size: .8rem; line-height: 1.35; }
+@page { margin: 15mm; }
+@media print {
+  body { max-width: none; padding: 0; font-size: 10pt; }
+  nav, iframe { display: none; }
+  table { font-size: 8.5pt; }
+  pre { max-height: none; white-space: pre-wrap; }
+  .wide { overflow: visible; }
+  h2, h3 { break-after: avoid; }
+  figure, tr { break-inside: avoid; }
+}
+"""
+
+# The policy makes the browser refuse whatever might be loaded, should a page ever ask for it.
+_PAGE: Final = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy"
+      content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'">
+<title>{title}</title>
+<style>{style}</style>
+</head>
+<body>
+<h1>{title}</h1>
+<dl>{numbers}</dl>
+<nav>{links}</nav>
+{sections}
+</body>
+</html>
+"""
