@@ -71,7 +71,7 @@ def distance(walk: PlannedWalk) -> float:
     )
 
 
-def make_rows(walk: PlannedWalk, outcome: "float | Status", rows: Rows) -> None:
+def fill_row(walk: PlannedWalk, outcome: "float | Status", rows: Rows) -> None:
     """Fill the row of a walk that came to rest at a distance [m], or failed."""
     failed = isinstance(outcome, Status)
     rows["status"] = outcome if failed else Status.AT_REST
@@ -84,17 +84,16 @@ def make_rows(walk: PlannedWalk, outcome: "float | Status", rows: Rows) -> None:
 
 
 def make_sweep(folder: Path, content: Mapping[str, object], outcome: Outcome = distance) -> SweepResult:
-    """A folder in which every walk has its outcome; shards of one walk each, so that any may be missing."""
+    """A folder in which every walk has its outcome; in shards of one walk each, if some are not to be there."""
     sweep = load_sweep(content)
-    size = sweep.walk_count if outcome is distance else 1
-    with Store.open(folder, sweep, shard_size=size) as store:
-        for walks in store.missing():
-            rows = empty_rows(sweep, walks)
-            for place, index in enumerate(walks):
-                walk = sweep.planned(index)
-                if (given := outcome(walk)) is None:
-                    break
-                make_rows(walk, given, rows[place : place + 1])
-            else:
-                store.write(walks, rows)
+    walks = [sweep.planned(index) for index in range(sweep.walk_count)]
+    outcomes = [outcome(walk) for walk in walks]
+    with Store.open(folder, sweep, shard_size=1 if None in outcomes else len(walks)) as store:
+        for shard in store.missing():
+            rows = empty_rows(sweep, shard)
+            for place, index in enumerate(shard):
+                if (given := outcomes[index]) is not None:
+                    fill_row(walks[index], given, rows[place : place + 1])
+            if outcomes[shard.start] is not None:
+                store.write(shard, rows)
     return load(folder)

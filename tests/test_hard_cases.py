@@ -22,6 +22,8 @@ ELASTIC = SOFT.with_values(
 """Nothing dissipates: neither joints nor collisions."""
 
 every_method = pytest.mark.parametrize("method", METHODS)
+every_method_walks = pytest.mark.parametrize("method", ["rkf78", "dp5", pytest.param("bs32", marks=pytest.mark.slow)])
+"""The same for walks, which need a kernel more: no other quick test uses that of bs32."""
 
 
 def set_down(position, gap=2e-4, parameters=SOFT):
@@ -250,7 +252,7 @@ def test_elastic_bouncing_shows_the_order(method, steps, slope):
     assert np.polyfit(np.log(steps), np.log(drifts), 1)[0] == pytest.approx(slope, abs=1)
 
 
-@every_method
+@every_method_walks
 def test_endless_bouncing_meets_the_time_limit(method):
     """A chain that nothing brings to rest ends with time_limit at that time, and has no Δx."""
     names = [name for name in type(ELASTIC).model_fields if getattr(ELASTIC, name) != getattr(SOFT, name)]
@@ -299,7 +301,7 @@ def test_walks_at_the_ends_of_the_collision_law(method, friction, restitution):
 # --- short, long, fast and slow ---
 
 
-@every_method
+@every_method_walks
 @pytest.mark.parametrize("links", [4, 6, 8])
 def test_short_chains(method, links):
     """The shortest chains drop, bounce and come to rest, flat on the floor."""
@@ -314,9 +316,8 @@ def test_short_chains(method, links):
     assert abs(walk.energy["residual"]) < 2e-4 * at_release
 
 
-@pytest.mark.parametrize(
-    "method", ["bs32", pytest.param("dp5", marks=pytest.mark.slow), pytest.param("rkf78", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@every_method
 def test_thousand_links(method):
     """1000 links hit the floor like any other number."""
     position, velocity = reference.circular_loop(1000, SOFT, -3.0)

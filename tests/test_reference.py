@@ -273,7 +273,7 @@ def test_flight_refuses_and_reports():
             reference.solve_flight(position, velocity, np.array(times), MILD)
     for speed, error in ((np.nan, ValueError), (1e308, RuntimeError)):
         velocity[0, 0] = speed
-        with pytest.raises(error, match="finite|failed between 0.0 s and 0.001 s"), np.errstate(all="ignore"):
+        with pytest.raises(error, match=r"finite|failed between 0\.0 s and 0\.001 s"), np.errstate(all="ignore"):
             reference.solve_flight(position, velocity, np.array([0.0, 1e-3]), MILD)
 
 

@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from warpchain.parameters import InputError, Parameters
     from warpchain.parameters import preset as preset
     from warpchain.results import Trajectory, WalkResult, load_walk
+    from warpchain.runner import sweep
     from warpchain.status import Status
+    from warpchain.sweep_result import SweepResult, load
     from warpchain.trajectory import simulate
     from warpchain.walker import walk
 
@@ -21,11 +23,14 @@ _HOMES = {
     "InputError": "parameters",
     "Parameters": "parameters",
     "Status": "status",
+    "SweepResult": "sweep_result",
     "Trajectory": "results",
     "WalkResult": "results",
+    "load": "sweep_result",
     "load_walk": "results",
     "preset": "parameters",
     "simulate": "trajectory",
+    "sweep": "runner",
     "walk": "walker",
 }
 
@@ -33,11 +38,14 @@ __all__ = [
     "InputError",
     "Parameters",
     "Status",
+    "SweepResult",
     "Trajectory",
     "WalkResult",
+    "load",
     "load_walk",
     "preset",
     "simulate",
+    "sweep",
     "walk",
 ]
 

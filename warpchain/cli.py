@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NoReturn
 
 import typer
 
+from warpchain.sweep_cli import add_commands
+
 if TYPE_CHECKING:
     from warpchain.options import Setup
 
@@ -242,6 +244,9 @@ def bench(
         print(json.dumps(costs_as_json(steps, lists), indent=2, allow_nan=False))
     else:
         print_costs(machine(), steps, lists)
+
+
+add_commands(app)
 
 
 def _given_values(named: Mapping[str, str], assignments: Sequence[str]) -> Sections:

@@ -202,7 +202,11 @@ def _player(walk: "WalkResult") -> str:
         except ValueError as error:
             return f'<p class="bad">No moving picture: {escape(str(error))}</p>'
         content = escape(page.read_text(encoding="utf-8"))
-    return f'<iframe title="the walk in motion" sandbox="allow-scripts" loading="lazy" srcdoc="{content}"></iframe>'
+    # As high as the drawing at the page's full width, with its controls [px].
+    wide, high = np.ptp(walk.frame_joints[..., 0]), walk.frame_joints[..., 1].max()
+    height = round(min(600.0, 170.0 + 960.0 * high / wide))
+    style = f'style="height:{height}px" sandbox="allow-scripts" loading="lazy"'
+    return f'<iframe title="the walk in motion" {style} srcdoc="{content}"></iframe>'
 
 
 def _compared(walk: "WalkResult", block: BlockResult, place: tuple[int, ...]) -> str:
@@ -346,7 +350,7 @@ th, td { padding: .2rem .8rem .2rem 0; text-align: left; vertical-align: top; bo
 th { border-bottom: 1px solid #777; }
 .number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 tr.bad td, p.bad { color: #a84a00; }
-iframe { width: 100%; height: 27rem; border: 1px solid #ccc; }
+iframe { width: 100%; border: 1px solid #ccc; }
 pre { max-height: 30rem; overflow: auto; padding: 1rem; background: #f3f4f5; font-size: .8rem; line-height: 1.35; }
 @page { margin: 15mm; }
 @media print {

@@ -159,7 +159,7 @@ class Options(BaseModel):
     step_limit: int = Field(
         default=2_000_000_000,
         ge=1,
-        le=2**62,
+        le=10**15,
         description="most steps tried in one walk, accepted and rejected",
         json_schema_extra={"unit": "1"},
     )
