@@ -15,8 +15,8 @@ import warp as wp
 from .block_memory import barrier
 from .broadphase import list_layout
 from .contact import resolve_joint_pair
-from .elementary import TWO, ZERO
-from .layout import BOARD_LOST_SELF, RIGHT_X, RIGHT_Y
+from .elementary import TWO
+from .layout import BOARD_LOST_SELF, BOARD_SELF_DEPTH, RIGHT_X, RIGHT_Y
 from .types import Chain
 
 wp.set_module_options({"enable_backward": False})
@@ -151,10 +151,9 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
 
     @wp.func
     def resolve(K: wp.array2d(dtype=wp.float64), T: wp.array(dtype=wp.int32), chain: Chain, lane: int, touching: int):
-        """All touching pairs; the board is filled. Returns this thread's impulses and greatest depth [m]."""
+        """All touching pairs; the board is filled. Returns this thread's impulses."""
         n = chain.link_count
         impulses = int(0)
-        deepest = ZERO
         owners = int(wp.static(touch.owners))
         others = int(wp.static(touch.owners + columns))
         finished = int(0)
@@ -175,7 +174,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
                         p = first_joint(key)
                         depth, lost, hits = resolve_joint_pair(K, chain, p, second_joint(key), K[BOARD_LOST_SELF, p])
                         K[BOARD_LOST_SELF, p] = lost
-                        deepest = wp.max(deepest, depth)
+                        K[BOARD_SELF_DEPTH, p] = wp.max(K[BOARD_SELF_DEPTH, p], depth)
                         impulses += int(hits)
                         T[wp.static(touch.keys) + k] = DONE
                         gone += 1
@@ -189,6 +188,6 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
             swapped = owners
             owners = others
             others = swapped
-        return impulses, deepest
+        return impulses
 
     return clear, find, resolve

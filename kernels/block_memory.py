@@ -27,25 +27,10 @@ def barrier():
     return x;
 #endif
 """)
-def warp_greatest_int(x: wp.int32) -> wp.int32:
-    """Greatest number of the threads of a hardware warp (compute capability 8.0 and above)."""
-    ...
+def warp_greatest(x: wp.int32) -> wp.int32:
+    """Greatest number of the threads of a hardware warp, in one instruction (compute capability 8.0 and above).
 
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-    const int high = static_cast<int>(x >> 32);
-    const int top = __reduce_max_sync(0xffffffffu, high);
-    const unsigned rest = high == top ? static_cast<unsigned>(x) : 0u;
-    return (static_cast<::wp::int64>(top) << 32) | __reduce_max_sync(0xffffffffu, rest);
-#else
-    return x;
-#endif
-""")
-def warp_greatest(x: wp.int64) -> wp.int64:
-    """The same for long integers, exact.
-
-    Two integer reductions of 32 bits cost a fraction of ``wp.tile_max``, which shuffles and needs four barriers.
+    ``wp.tile_max`` shuffles and needs four barriers.
     """
     ...
 
@@ -75,12 +60,12 @@ def tile_address(dtype: type, size: int):
     return address
 
 
-vec4l = wp.types.vector(length=4, dtype=wp.int64)
+vec4i = wp.types.vector(length=4, dtype=wp.int32)
 
 
 @functools.cache
 def block_maxima(block_dim: int):
-    """Warp functions (greatest of an integer, greatest of each of four long integers) over the threads of a block.
+    """Warp functions (greatest of an integer, greatest of each of four) over the threads of a block.
 
     Both take a shared tile, the thread's number and its value, and return the same result in all threads. A tile may
     be used again after any other barrier.
@@ -88,7 +73,7 @@ def block_maxima(block_dim: int):
 
     @wp.func
     def greatest(tile: wp.tile[wp.int32, block_dim], lane: int, value: wp.int32):
-        tile[lane // warp_width()] = warp_greatest_int(value)
+        tile[lane // warp_width()] = warp_greatest(value)
         top = tile[0]
         i = int(1)
         while i < wp.static(block_dim) // warp_width():
@@ -97,15 +82,15 @@ def block_maxima(block_dim: int):
         return top
 
     @wp.func
-    def greatest_of_four(tile: wp.tile[vec4l, block_dim], lane: int, value: vec4l):
-        tile[lane // warp_width()] = vec4l(
+    def greatest_of_four(tile: wp.tile[vec4i, block_dim], lane: int, value: vec4i):
+        tile[lane // warp_width()] = vec4i(
             warp_greatest(value[0]), warp_greatest(value[1]), warp_greatest(value[2]), warp_greatest(value[3])
         )
         top = tile[0]
         i = int(1)
         while i < wp.static(block_dim) // warp_width():
             other = tile[i]
-            top = vec4l(
+            top = vec4i(
                 wp.max(top[0], other[0]), wp.max(top[1], other[1]), wp.max(top[2], other[2]), wp.max(top[3], other[3])
             )
             i += 1

@@ -9,10 +9,22 @@ import functools
 
 import warp as wp
 
-from .controller import error_bits_single
+from .controller import error_scale
 from .elementary import LARGEST_TURN, ZERO
 from .geometry import end_positions, end_velocities, turned_direction
 from .joint import friction_torque, joint_force, link_acceleration
+from .layout import (
+    BOARD_NOTES,
+    INVERSE_INERTIA,
+    INVERSE_MASS,
+    NOTE_COULOMB,
+    NOTE_DAMPING,
+    NOTE_GRAVITY,
+    NOTE_INVERSE_SMOOTHING,
+    NOTE_STIFFNESS,
+    NOTE_VISCOUS,
+    THETA,
+)
 from .tableaus import TABLEAUS
 from .types import Chain
 
@@ -24,11 +36,13 @@ vec5d = wp.types.vector(length=5, dtype=wp.float64)
 
 @wp.struct
 class Link:
-    """What a thread knows of its link; threads beyond the last link hold one that nothing acts upon."""
+    """What a thread knows of its link, but for the angle, which no stage needs: that lies on the board.
+
+    Threads beyond the last link hold one that nothing acts upon.
+    """
 
     x: wp.float64  # [m]
     y: wp.float64  # [m]
-    theta: wp.float64  # [rad]
     u: wp.float64  # ẋ [m/s]
     v: wp.float64  # ẏ [m/s]
     omega: wp.float64  # θ̇ [rad/s]
@@ -38,13 +52,13 @@ class Link:
 
 @wp.struct
 class Place:
-    """Where a thread stands in its block, and the constants of its link."""
+    """Where a thread stands in its block."""
 
     lane: wp.int32  # its link
+    column: wp.int32  # the same, of the last link for threads beyond
     before: wp.int32  # the link to the left
     after: wp.int32  # the link to the right
-    inverse_mass: wp.float64
-    inverse_inertia: wp.float64
+    half_length: wp.float64  # [m]
 
 
 @wp.struct
@@ -71,7 +85,25 @@ class Trial:
     last: Rates
     friction: wp.float64
     damping: wp.float64
-    worst: wp.int32  # error ratio times tolerance, as ordered bits of a single-precision number
+    error: wp.float32  # greatest error times tolerance, a quotient not yet divided, and …
+    scale: wp.float32  # … its divisor
+    turns_far: bool  # beyond the range of the stages' polynomials
+
+
+@wp.func
+def greater(error_a: wp.float32, scale_a: wp.float32, error_b: wp.float32, scale_b: wp.float32):
+    """The greater of two quotients |error| / scale with positive scales, a NaN before any number."""
+    keeps_a = wp.abs(error_a) * scale_b >= wp.abs(error_b) * scale_a or error_a != error_a
+    return wp.where(keeps_a, error_a, error_b), wp.where(keeps_a, scale_a, scale_b)
+
+
+@wp.func
+def error_of(trial: Trial, tolerance: wp.float64):
+    """Error ratio of a link as ordered bits, a NaN above all numbers; turning too far counts as an error of 2."""
+    ratio = wp.abs(trial.error) / (trial.scale * wp.float32(tolerance))
+    if trial.turns_far and ratio < wp.float32(2.0):
+        ratio = wp.float32(2.0)
+    return wp.cast(ratio, wp.int32)
 
 
 @functools.cache
@@ -83,9 +115,9 @@ def block_method(name: str, block_dim: int):
         block_dim: Threads in a block.
 
     Returns:
-        ``hand_over(ends, place, chain, x, y, u, v, omega, cosine, sine)`` → left end of the next link;
-        ``stage(forces, place, chain, next_end, x, y, u, v, omega, cosine, sine)`` → Rates;
-        ``attempt(ends, forces, place, chain, link, first, h)`` → Trial.
+        ``hand_over(ends, place, x, y, u, v, omega, cosine, sine)`` → left end of the next link;
+        ``stage(forces, K, place, next_end, x, y, u, v, omega, cosine, sine)`` → Rates;
+        ``attempt(ends, forces, K, place, link, first, h)`` → Trial.
     """
     tableau = TABLEAUS[name]
     stages = tableau.stages
@@ -98,7 +130,6 @@ def block_method(name: str, block_dim: int):
     def hand_over(
         ends: wp.tile[vec5d, block_dim],
         place: Place,
-        chain: Chain,
         x: wp.float64,
         y: wp.float64,
         u: wp.float64,
@@ -107,6 +138,8 @@ def block_method(name: str, block_dim: int):
         cosine: wp.float64,
         sine: wp.float64,
     ):
+        chain = Chain()
+        chain.half_length = place.half_length
         left_x, left_y, _right_x, _right_y = end_positions(chain, x, y, cosine, sine)
         left_u, left_v, _right_u, _right_v = end_velocities(chain, u, v, omega, cosine, sine)
         ends[place.lane] = vec5d(left_x, left_y, left_u, left_v, omega)
@@ -115,8 +148,8 @@ def block_method(name: str, block_dim: int):
     @wp.func
     def stage(
         forces: wp.tile[vec3d, block_dim],
+        K: wp.array2d(dtype=wp.float64),
         place: Place,
-        chain: Chain,
         next_end: vec5d,
         x: wp.float64,
         y: wp.float64,
@@ -126,6 +159,14 @@ def block_method(name: str, block_dim: int):
         cosine: wp.float64,
         sine: wp.float64,
     ):
+        # constants are read from the board where they are needed: registers are dear, such reads are not
+        chain = Chain()
+        chain.half_length = place.half_length
+        chain.joint_stiffness = K[BOARD_NOTES, NOTE_STIFFNESS]
+        chain.joint_damping = K[BOARD_NOTES, NOTE_DAMPING]
+        chain.viscous_friction = K[BOARD_NOTES, NOTE_VISCOUS]
+        chain.coulomb_friction = K[BOARD_NOTES, NOTE_COULOMB]
+        chain.inverse_smoothing = K[BOARD_NOTES, NOTE_INVERSE_SMOOTHING]
         _left_x, _left_y, right_x, right_y = end_positions(chain, x, y, cosine, sine)
         _left_u, _left_v, right_u, right_v = end_velocities(chain, u, v, omega, cosine, sine)
         cu = next_end[2] - right_u
@@ -134,13 +175,16 @@ def block_method(name: str, block_dim: int):
         force_x = joint_force(chain, next_end[0] - right_x, cu)
         force_y = joint_force(chain, next_end[1] - right_y, cv)
         torque = friction_torque(chain, spin)
+        friction = torque * spin
+        damping = chain.joint_damping * (cu * cu + cv * cv)
         forces[place.lane] = vec3d(force_x, force_y, torque)
         left = forces[place.before]
+        chain.gravity = K[BOARD_NOTES, NOTE_GRAVITY]
         rates = Rates()
         ax, ay, at = link_acceleration(
             chain,
-            place.inverse_mass,
-            place.inverse_inertia,
+            K[INVERSE_MASS, place.column],
+            K[INVERSE_INERTIA, place.column],
             cosine,
             sine,
             left[0],
@@ -153,16 +197,16 @@ def block_method(name: str, block_dim: int):
         rates.x = ax
         rates.y = ay
         rates.theta = at
-        rates.friction = torque * spin
-        rates.damping = chain.joint_damping * (cu * cu + cv * cv)
+        rates.friction = friction
+        rates.damping = damping
         return rates
 
     @wp.func
     def attempt(
         ends: wp.tile[vec5d, block_dim],
         forces: wp.tile[vec3d, block_dim],
+        K: wp.array2d(dtype=wp.float64),
         place: Place,
-        chain: Chain,
         link: Link,
         first: Rates,
         h: wp.float64,
@@ -204,8 +248,8 @@ def block_method(name: str, block_dim: int):
             u = link.u + h * du
             v = link.v + h * dv
             omega = link.omega + h * dw
-            next_end = hand_over(ends, place, chain, x, y, u, v, omega, cosine, sine)
-            rates = stage(forces, place, chain, next_end, x, y, u, v, omega, cosine, sine)
+            next_end = hand_over(ends, place, x, y, u, v, omega, cosine, sine)
+            rates = stage(forces, K, place, next_end, x, y, u, v, omega, cosine, sine)
             ax[s] = rates.x
             ay[s] = rates.y
             at[s] = rates.theta
@@ -244,29 +288,32 @@ def block_method(name: str, block_dim: int):
                 et += wp.static(wp.float64(position_errors[j])) * at[j]
         trial.x = link.x + (h * link.u + hh * dx)
         trial.y = link.y + (h * link.v + hh * dy)
-        trial.theta = link.theta + (h * link.omega + hh * turn)
+        theta = K[THETA, place.column]
+        trial.theta = theta + (h * link.omega + hh * turn)
         trial.u = link.u + h * du
         trial.v = link.v + h * dv
         trial.omega = link.omega + h * dw
         trial.last = rates
         trial.friction = friction
         trial.damping = damping
-        worst = error_bits_single(hh * ex, link.x, link.u, h)
-        worst = wp.max(worst, error_bits_single(hh * ey, link.y, link.v, h))
-        worst = wp.max(worst, error_bits_single(hh * et, link.theta, link.omega, h))
-        worst = wp.max(worst, error_bits_single(h * eu, link.u, first.x, h))
-        worst = wp.max(worst, error_bits_single(h * ev, link.v, first.y, h))
-        worst = wp.max(worst, error_bits_single(h * ew, link.omega, first.theta, h))
-        trial.worst = worst
+        # the greatest of six quotients by cross-multiplication, so that only one needs a division
+        error_x, scale_x = greater(
+            wp.float32(hh * ex), error_scale(link.x, link.u, h), wp.float32(h * eu), error_scale(link.u, first.x, h)
+        )
+        error_y, scale_y = greater(
+            wp.float32(hh * ey), error_scale(link.y, link.v, h), wp.float32(h * ev), error_scale(link.v, first.y, h)
+        )
+        error_t, scale_t = greater(
+            wp.float32(hh * et),
+            error_scale(theta, link.omega, h),
+            wp.float32(h * ew),
+            error_scale(link.omega, first.theta, h),
+        )
+        error, scale = greater(error_x, scale_x, error_y, scale_y)
+        error, scale = greater(error, scale, error_t, scale_t)
+        trial.error = error
+        trial.scale = scale
+        trial.turns_far = wp.abs(trial.theta - theta) > LARGEST_TURN
         return trial
 
     return hand_over, stage, attempt
-
-
-@wp.func
-def error_of(trial: Trial, link: Link, tolerance: wp.float64):
-    """Error ratio of a link as ordered bits; a turn beyond the polynomials' range counts as an error of 2."""
-    error = wp.cast(wp.cast(trial.worst, wp.float32) / wp.float32(tolerance), wp.int32)
-    if wp.abs(trial.theta - link.theta) > LARGEST_TURN:
-        error = wp.max(error, wp.cast(wp.float32(2.0), wp.int32))
-    return error

@@ -11,7 +11,7 @@ import functools
 import warp as wp
 
 from .broadphase import list_layout
-from .elementary import HALF, ONE, TWO, ZERO, from_order_key, order_bits, order_key
+from .elementary import HALF, ONE, TWO, ZERO, from_order_key, order_bits, order_key, quotient
 from .impulse import collision_impulse, fixed_contact
 from .layout import (
     INVERSE_INERTIA,
@@ -192,8 +192,8 @@ def sprocket_circle(
     """
     # a circle exactly at the centre has no normal: zero instead makes it one that does not approach
     distance = wp.max(wp.sqrt(circle_x * circle_x + circle_y * circle_y), SMALLEST)
-    normal_x = circle_x / distance
-    normal_y = circle_y / distance
+    normal_x = quotient(circle_x, distance)
+    normal_y = quotient(circle_y, distance)
     r = chain.circle_radius
     point_x = circle_x - r * normal_x
     point_y = circle_y - r * normal_y
@@ -319,8 +319,8 @@ def resolve_link_pair(
     if square < reach * reach and square > ZERO:
         distance = wp.sqrt(square)
         depth = reach - distance
-        nx = dx / distance
-        ny = dy / distance
+        nx = quotient(dx, distance)
+        ny = quotient(dy, distance)
         px = HALF * (end_a_x + end_b_x)
         py = HALF * (end_a_y + end_b_y)
         ax = px - K[X, link_a]

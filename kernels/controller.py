@@ -20,10 +20,21 @@ def error_bits(error: wp.float64, value: wp.float64, rate: wp.float64, h: wp.flo
 
 
 @wp.func
-def error_bits_single(error: wp.float64, value: wp.float64, rate: wp.float64, h: wp.float64):
-    """The same to single precision, at a fraction of the cost where divisions are dear."""
-    ratio = wp.float32(error) / wp.float32(ONE + wp.abs(value) + h * wp.abs(rate))
-    return wp.cast(wp.abs(ratio), wp.int32)
+def error_scale(value: wp.float64, rate: wp.float64, h: wp.float64):
+    """Divisor 1 + |y| + h |ẏ| of that norm in single precision."""
+    return wp.float32(ONE + wp.abs(value) + h * wp.abs(rate))
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    return __powf(x, y);
+#else
+    return ::powf(x, y);
+#endif
+""")
+def quick_power(x: wp.float32, y: wp.float32) -> wp.float32:
+    """x to the power of y; to about 1e-6 on a GPU, where it takes a sixth of the time of ``wp.pow``."""
+    ...
 
 
 @functools.cache
@@ -41,22 +52,23 @@ def step_controller(order: int, error_order: int, real: type = wp.float64):
     """
     least_error = 5.0**-order
     least_shrinkage = float(LEAST_SHRINKAGE)
+    power = quick_power if real is wp.float32 else wp.pow
 
     @wp.func
     def growth(error: real, last_error: real, proportional: wp.int32):
         bounded = wp.max(error, wp.static(real(least_error)))
         if proportional != 0:
-            factor = wp.static(real(SAFETY)) * wp.pow(bounded, wp.static(real(-0.7 / (error_order + 1))))
-            factor = factor * wp.pow(last_error, wp.static(real(0.4 / (error_order + 1))))
+            factor = wp.static(real(SAFETY)) * power(bounded, wp.static(real(-0.7 / (error_order + 1))))
+            factor = factor * power(last_error, wp.static(real(0.4 / (error_order + 1))))
             return wp.clamp(factor, wp.static(real(least_shrinkage)), wp.static(real(GREATEST_GROWTH)))
         if error < wp.static(real(0.5)):
-            factor = wp.static(real(SAFETY)) * wp.pow(bounded, wp.static(real(-1.0 / order)))
+            factor = wp.static(real(SAFETY)) * power(bounded, wp.static(real(-1.0 / order)))
             return wp.min(factor, wp.static(real(GREATEST_GROWTH)))
         return wp.static(real(1.0))
 
     @wp.func
     def shrinkage(error: real):
-        factor = wp.static(real(SAFETY)) * wp.pow(error, wp.static(real(-1.0 / (error_order - 1))))
+        factor = wp.static(real(SAFETY)) * power(error, wp.static(real(-1.0 / (error_order - 1))))
         return wp.max(factor, wp.static(real(least_shrinkage)))
 
     return growth, shrinkage

@@ -160,10 +160,8 @@ def sprocket_turning(program: Program, world: int, time: wp.float64):
     ramp = program.spin_up_time[world]
     since = time - program.spin_up_start[world]
     s = ONE
-    if since <= ZERO and ramp > ZERO:
-        s = ZERO
-    elif since < ramp:
-        s = since / ramp
+    if ramp > ZERO and since < ramp:
+        s = wp.max(since, ZERO) / ramp
     return program.sprocket_speed[world] * s * s * (wp.float64(3.0) - TWO * s)
 
 
@@ -325,7 +323,7 @@ def make_advance(features: Features):
                 if impulses > wp.int64(0):
                     has_first_stage = int(0)
             if status == RUNNING:
-                total = state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
+                total = state.tries_before[world] + state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
                 if total >= control.step_limit:
                     status = int(STEP_LIMIT)
         if status != RUNNING and status != NOT_FINITE and state.last_look[world, TIME] != time:

@@ -65,6 +65,26 @@ LARGEST_TURN = wp.constant(wp.float64(0.05))
 """Largest turn of a link [rad] within one step for which :func:`small_turn` is exact to rounding."""
 
 
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    double y;
+    asm("rcp.approx.ftz.f64 %0, %1;" : "=d"(y) : "d"(b));
+    y = fma(y, fma(-b, y, 1.0), y);
+    y = fma(y, fma(-b, y, 1.0), y);
+    const double q = a * y;
+    return fma(fma(-b, q, a), y, q);
+#else
+    return a / b;
+#endif
+""")
+def quotient(a: wp.float64, b: wp.float64) -> wp.float64:
+    """a / b for divisors that are neither zero nor infinite nor subnormal, to one unit in the last place.
+
+    On a GPU the compiler's division takes 128 cycles and branches, so that several do not overlap; this takes 81.
+    """
+    ...
+
+
 @wp.func
 def cos_sin(angle: wp.float64):
     """Cosine and sine of an angle [rad], to about one unit in the last place for |angle| < 1e5."""
@@ -104,7 +124,7 @@ def tanh(x: wp.float64):
     series = ONE + r * (ONE + r * (T2 + r * (T3 + r * series)))
     exponent = wp.cast(shifted, wp.int64) - ROUNDER_BITS + EXPONENT_BIAS
     exponential = series * wp.cast(exponent << EXPONENT_SHIFT, wp.float64)
-    value = ONE - TWO / (exponential + ONE)
+    value = ONE - quotient(TWO, exponential + ONE)
     return wp.where(x < ZERO, -value, value)
 
 
@@ -122,6 +142,19 @@ def order_key(x: wp.float64):
     """A number of any sign as an integer that orders as the number does."""
     bits = wp.cast(x, wp.int64)
     return bits ^ ((bits >> SIGN_SHIFT) & MAGNITUDE_BITS)
+
+
+@wp.func
+def order_key_single(x: wp.float32):
+    """The same for single precision."""
+    bits = wp.cast(x, wp.int32)
+    return bits ^ ((bits >> 31) & 0x7FFFFFFF)
+
+
+@wp.func
+def from_order_key_single(key: wp.int32):
+    """Inverse of :func:`order_key_single`."""
+    return wp.cast(key ^ ((key >> 31) & 0x7FFFFFFF), wp.float32)
 
 
 @wp.func

@@ -10,7 +10,7 @@ Two misprints of the roller-chain paper are corrected here:
 
 import warp as wp
 
-from .elementary import HALF, ONE, ZERO
+from .elementary import HALF, ONE, ZERO, quotient
 from .types import Chain
 
 wp.set_module_options({"enable_backward": False})
@@ -34,15 +34,15 @@ def collision_impulse(
     |J_t| > μ J_n is the same as (1 + e_t)(|J₂ₜ| − μ(J₂ₙ − J₁ₙ)) > μ (1 + e) J₁ₙ.
     """
     determinant = w_nn * w_tt - w_nt * w_nt
-    first = normal_speed / w_nn
-    second_n = (w_tt * normal_speed - w_nt * tangential_speed) / determinant
-    second_t = (w_nn * tangential_speed - w_nt * normal_speed) / determinant
+    first = quotient(normal_speed, w_nn)
+    second_n = quotient(w_tt * normal_speed - w_nt * tangential_speed, determinant)
+    second_t = quotient(w_nn * tangential_speed - w_nt * normal_speed, determinant)
     bounce = (ONE + restitution) * first
     excess = second_n - first
     stick_n = bounce + (ONE + tangential_restitution) * excess
     stick_t = (ONE + tangential_restitution) * second_t
     sticks = wp.abs(stick_t) <= friction * stick_n
-    kappa = friction * bounce / (wp.abs(second_t) - friction * excess)
+    kappa = quotient(friction * bounce, wp.abs(second_t) - friction * excess)
     impulse_n = wp.where(sticks, stick_n, bounce + kappa * excess)
     impulse_t = wp.where(sticks, stick_t, kappa * second_t)
     return impulse_n, impulse_t

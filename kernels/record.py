@@ -12,11 +12,13 @@ from .layout import (
     CENTER_Y,
     COSINE,
     GRAVITATIONAL,
+    GREATEST_HEIGHT,
+    GREATEST_WIDTH,
     HEIGHT,
     INERTIA,
     KINETIC,
-    LAST_HEIGHT,
-    LAST_WIDTH,
+    LEAST_HEIGHT,
+    LEAST_WIDTH,
     LEFT_X,
     LEFT_Y,
     LOOP_SPEED,
@@ -29,7 +31,7 @@ from .layout import (
     RMS_SPEED,
     SINE,
     SPRING,
-    STEADY_TIME,
+    STEADY_SINCE,
     SUM_HEIGHT,
     SUM_SPEED,
     SUM_WIDTH,
@@ -145,9 +147,10 @@ def watch_rest(state: State, control: Control, world: int, time: wp.float64, sum
 def watch_steadiness(state: State, program: Program, world: int, time: wp.float64, summary: Summary):
     """Sets the moment of release once the loop runs steadily on its sprocket.
 
-    Means over windows of one loop period: the speed along the loop within 1 % (or 0.02 m/s) of the sprocket's, and
-    height and width of the loop each within 1 % of the window before. Release follows after the drawn fraction of a
-    loop period. Nothing is done once that moment is set.
+    Steady means: for ``steady_time`` the means over windows of one loop period have stayed together, height and width
+    of the loop to within ``steady_tolerance`` of themselves, and the speed along the loop to within 1 % (or 0.02 m/s)
+    of the sprocket's. Release follows after the drawn fraction of a loop period. Nothing is done once that moment is
+    set.
     """
     if state.stop_status[world] == FINISHED or time < program.hold_start[world]:
         return
@@ -165,19 +168,32 @@ def watch_steadiness(state: State, program: Program, world: int, time: wp.float6
     speed = state.watch[world, SUM_SPEED] / count
     target = program.loop_speed[world]
     fast_enough = wp.abs(speed - target) <= wp.max(ONE_PERCENT * target, SLOWEST_STEADY)
-    height_kept = wp.abs(height - state.watch[world, LAST_HEIGHT]) <= ONE_PERCENT * height
-    width_kept = wp.abs(width - state.watch[world, LAST_WIDTH]) <= ONE_PERCENT * width
-    if fast_enough and height_kept and width_kept:
-        state.watch[world, STEADY_TIME] = time
+    least_height = wp.min(state.watch[world, LEAST_HEIGHT], height)
+    greatest_height = wp.max(state.watch[world, GREATEST_HEIGHT], height)
+    least_width = wp.min(state.watch[world, LEAST_WIDTH], width)
+    greatest_width = wp.max(state.watch[world, GREATEST_WIDTH], width)
+    tolerance = program.steady_tolerance[world]
+    height_kept = greatest_height - least_height <= tolerance * height
+    width_kept = greatest_width - least_width <= tolerance * width
+    is_first = state.watch[world, STEADY_SINCE] < ZERO
+    if is_first or not (fast_enough and height_kept and width_kept):
+        state.watch[world, STEADY_SINCE] = time
+        least_height = height
+        greatest_height = height
+        least_width = width
+        greatest_width = width
+    elif time - state.watch[world, STEADY_SINCE] >= program.steady_time[world]:
         state.stop_time[world] = time + program.release_phase[world] * program.loop_period[world]
         state.stop_status[world] = FINISHED
+    state.watch[world, LEAST_HEIGHT] = least_height
+    state.watch[world, GREATEST_HEIGHT] = greatest_height
+    state.watch[world, LEAST_WIDTH] = least_width
+    state.watch[world, GREATEST_WIDTH] = greatest_width
     state.watch[world, WINDOW_START] = time
     state.watch[world, WINDOW_COUNT] = ZERO
     state.watch[world, SUM_HEIGHT] = ZERO
     state.watch[world, SUM_WIDTH] = ZERO
     state.watch[world, SUM_SPEED] = ZERO
-    state.watch[world, LAST_HEIGHT] = height
-    state.watch[world, LAST_WIDTH] = width
 
 
 @wp.func

@@ -45,6 +45,8 @@ class Program:
     hold_start: wp.array(dtype=wp.float64)  # [s]; the steady-state watch begins here
     loop_speed: wp.array(dtype=wp.float64)  # speed along the loop that counts as steady [m/s]
     loop_period: wp.array(dtype=wp.float64)  # length of a watch window [s]
+    steady_time: wp.array(dtype=wp.float64)  # how long the loop must have been steady [s]
+    steady_tolerance: wp.array(dtype=wp.float64)  # relative change of its height and width in that time
     release_phase: wp.array(dtype=wp.float64)  # release this fraction of a loop period after steadiness
 
 
@@ -69,6 +71,7 @@ class State:
     next_sample: wp.array(dtype=wp.int64)  # index of the next sample mark
     status: wp.array(dtype=wp.int32)
     watch: wp.array2d(dtype=wp.float64)  # (W, WATCH_ROWS): memory of the steadiness and rest watches
+    tries_before: wp.array(dtype=wp.int64)  # tries of the walk's earlier phases, for the limit
     first_look: wp.array2d(dtype=wp.float64)  # (W, SAMPLE_COLUMNS): the chain when its run began …
     last_look: wp.array2d(dtype=wp.float64)  # … and when it was last looked at, at the end of the run the last time
     counts: wp.array2d(dtype=wp.int64)  # (W, COUNT_ROWS)

@@ -157,7 +157,7 @@ def test_figure6_tells_blocks_of_one_start_apart(tmp_path: Path) -> None:
     assert len({handle.get_color() for handle in handles}) == len({handle.get_marker() for handle in handles}) == 3
 
 
-def test_figure6_needs_walks(tmp_path: Path, saltelli: SweepResult) -> None:
+def test_figure6_needs_walks(tmp_path: Path) -> None:
     """Without walks at rest, or without a fitting block, there is no figure; the reason is one line."""
     result = make_sweep(tmp_path, one_block(grid={"frequency": [10, 20]}), lambda walk: Status.NOT_STEADY)
     with pytest.raises(NothingToShow, match=r"^[^\n]+$"):
@@ -272,21 +272,24 @@ def test_tolerance_compares_only_what_can_be_compared(
 
 
 def test_sensitivity_is_scipys(saltelli: SweepResult) -> None:
-    """Indices are those of scipy.stats.sobol_indices, and lie inside their intervals."""
+    """Indices are those of scipy.stats.sobol_indices and lie inside their intervals, which are as wide as SciPy's."""
     stats = pytest.importorskip("scipy.stats")
     count = len(saltelli.drawn)
     for place, cell in enumerate(sensitivities(saltelli)):
         table = saltelli.dx[place].reshape(-1, count + 2).T
         func = {"f_A": table[:1], "f_B": table[1:2], "f_AB": table[2:, None]}
         expected = stats.sobol_indices(func=func, n=64)
+        spread = expected.bootstrap(n_resamples=500)
         order = [saltelli.drawn.index(name) for name in cell.names]
         np.testing.assert_allclose(cell.first_order, expected.first_order[order], atol=1e-12)
         np.testing.assert_allclose(cell.total_order, expected.total_order[order], atol=1e-12)
-        for values, ends in (
-            (cell.first_order, cell.first_order_interval),
-            (cell.total_order, cell.total_order_interval),
+        for values, ends, theirs in (
+            (cell.first_order, cell.first_order_interval, spread.first_order.confidence_interval),
+            (cell.total_order, cell.total_order_interval, spread.total_order.confidence_interval),
         ):
             assert ((ends[:, 0] < values) & (values < ends[:, 1])).all()
+            widths = np.ptp(ends, axis=1) / (theirs.high - theirs.low)[order]
+            assert np.median(widths) == pytest.approx(1.0, abs=0.15)
         assert list(cell.total_order) == sorted(cell.total_order, reverse=True)
         assert (cell.samples, cell.lost) == (64, 0)
 

@@ -95,6 +95,8 @@ class Course:
             hold_start=self._at_full_speed,
             loop_speed=speed,
             loop_period=scene.links * parameters.link_length / speed if speed > 0 else STILL_WINDOW,
+            steady_time=scene.steady_time,
+            steady_tolerance=scene.steady_tolerance,
             release_phase=scene.phase,
         )
         if not from_rest:
@@ -208,7 +210,14 @@ class Course:
         measured = self._hanging_lowest if scene.clearance_of == "hanging" else lowest
         self.raised = scene.clearance - measured
         position[:, 1] += self.raised
-        self._batch.load(self._world, position, velocity, stop_time=scene.walk_limit, stop_status=Status.TIME_LIMIT)
+        self._batch.load(
+            self._world,
+            position,
+            velocity,
+            stop_time=scene.walk_limit,
+            stop_status=Status.TIME_LIMIT,
+            tries_before=self.drive_counts["accepted"] + self.drive_counts["rejected"],
+        )
         self._released = True
 
 

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 PROGRAM = (
     *("sprocket_speed", "spin_up_start", "spin_up_time", "hold_start"),
-    *("loop_speed", "loop_period", "release_phase"),
+    *("loop_speed", "loop_period", "steady_time", "steady_tolerance", "release_phase"),
 )
 """Fields of :class:`warpchain.kernels.types.Program`."""
 FIRST_STEP = 1e-7  # s; the controller grows it fivefold per step
@@ -137,6 +137,7 @@ class Batch:
         for name in ("stop_status", "is_fresh", "has_first_stage"):
             setattr(self.state, name, self._array(np.zeros(worlds, dtype=np.int32)))
         self.state.status = self._array(np.full(worlds, int(Status.FINISHED), dtype=np.int32))
+        self.state.tries_before = self._array(np.zeros(worlds, dtype=np.int64))
         self.state.next_sample = self._array(np.zeros(worlds, dtype=np.int64))
         self.state.watch = self._array(np.zeros((worlds, layout.WATCH_ROWS)))
         for name in ("first_look", "last_look"):
@@ -189,7 +190,16 @@ class Batch:
         if sprocket_radius is not None:
             _view(self.model.sprocket_radius)[world] = sprocket_radius
 
-    def load(self, world: int, position: Array, velocity: Array, *, stop_time: float, stop_status: Status) -> None:
+    def load(
+        self,
+        world: int,
+        position: Array,
+        velocity: Array,
+        *,
+        stop_time: float,
+        stop_status: Status,
+        tries_before: int = 0,
+    ) -> None:
         """Set the state of a world's chain and start its clock at zero; its statistics and watches start anew.
 
         Args:
@@ -198,6 +208,7 @@ class Batch:
             velocity: (n, 3), their rates.
             stop_time: The run lands on this time [s] and ends.
             stop_status: Status it then has.
+            tries_before: Tries of earlier phases, which the limit of the options counts as well.
         """
         state = self.state
         n = self.links[world]
@@ -214,9 +225,10 @@ class Batch:
         ):
             _view(array)[world] = 0
         _view(state.watch)[world] = 0
-        _view(state.watch)[world, [layout.WINDOW_START, layout.REST_SINCE]] = -1.0
+        _view(state.watch)[world, [layout.WINDOW_START, layout.STEADY_SINCE, layout.REST_SINCE]] = -1.0
         _view(state.last_look)[world, layout.TIME] = -1.0
         _view(state.watch)[world, layout.LAST_FLOOR_IMPULSE] = -np.inf
+        _view(state.tries_before)[world] = tries_before
         _view(state.has_first_stage)[world] = 0
         _view(state.is_fresh)[world] = 1
         _view(state.step)[world] = FIRST_STEP

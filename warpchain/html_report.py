@@ -205,7 +205,8 @@ def _player(walk: "WalkResult") -> str:
     # As high as the drawing at the page's full width, with its controls [px].
     wide, high = np.ptp(walk.frame_joints[..., 0]), walk.frame_joints[..., 1].max()
     height = round(min(600.0, 170.0 + 960.0 * high / wide))
-    style = f'style="height:{height}px" sandbox="allow-scripts" loading="lazy"'
+    # Without a sandbox, which browsers put into another process: the player may then draw before it has a size.
+    style = f'style="height:{height}px" loading="lazy"'
     return f'<iframe title="the walk in motion" {style} srcdoc="{content}"></iframe>'
 
 

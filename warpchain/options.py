@@ -88,8 +88,21 @@ class Scene(BaseModel):
         description="time in which the sprocket reaches its frequency",
         json_schema_extra={"unit": "s"},
     )
+    steady_time: float = Field(
+        default=0.0,
+        ge=0,
+        description="the loop is steady once it has kept its shape and speed for this long, at least a loop period",
+        json_schema_extra={"unit": "s"},
+    )
+    steady_tolerance: float = Field(
+        default=0.01,
+        gt=0,
+        le=1,
+        description="relative change of the loop's height and width that still counts as kept",
+        json_schema_extra={"unit": "1"},
+    )
     hold_limit: float = Field(
-        default=5.0,
+        default=30.0,
         gt=0,
         description="longest time at full frequency to become steady; then the walk ends as not_steady",
         json_schema_extra={"unit": "s"},

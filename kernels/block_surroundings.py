@@ -1,0 +1,159 @@
+"""Floor and sprocket in the block form: how far they are, how long the next step may be, and what they do."""
+
+import functools
+
+import warp as wp
+
+from .block_board import ends_of
+from .block_memory import block_maxima, vec4i
+from .block_step import Link, Place, vec5d
+from .contact import meet_floor, meet_sprocket
+from .driver import Features, sprocket_turning
+from .elementary import TWO, ZERO, from_order_key_single, order_key_single
+from .layout import (
+    BOARD_LISTED_X,
+    BOARD_LISTED_Y,
+    BOARD_LOST_FIXED,
+    BOARD_NOTES,
+    INVERSE_INERTIA,
+    INVERSE_MASS,
+    NOTE_CIRCLE_RADIUS,
+    NOTE_SPROCKET_RADIUS,
+)
+from .types import Chain, Control, Program
+
+wp.set_module_options({"enable_backward": False})
+
+OPENING_MARGIN = wp.constant(wp.float64(1.0 + 1e-6))
+
+
+@wp.func
+def raised(opening: wp.float32):
+    """An opening that was compared in single precision, made a bound again."""
+    return wp.float64(opening) * OPENING_MARGIN
+
+
+@functools.cache
+def block_surroundings(features: Features, block_dim: int):
+    """Warp functions (measure, bound of the step, meet floor or sprocket) of a kernel with these features."""
+    has_floor = features.fixed_body == "floor"
+    has_sprocket = features.fixed_body == "sprocket"
+    has_fixed = has_floor or has_sprocket
+    has_self = features.self_contact
+    has_contacts = has_fixed or has_self
+    _greatest, greatest_of_four = block_maxima(block_dim)
+
+    @wp.func
+    def measure(
+        K: wp.array2d(dtype=wp.float64),
+        maxima: wp.tile[vec4i, block_dim],
+        n: int,
+        place: Place,
+        link: Link,
+        next_end: vec5d,
+    ):
+        """Greatest opening, least gap, greatest displacement since listing, greatest speed: [m], [m/s].
+
+        Computed in double, compared in single precision, which keeps signs.
+        """
+        left_x, left_y, right_x, right_y = ends_of(place, link)
+        values = vec4i(0, order_key_single(wp.float32(-wp.inf)), 0, 0)
+        if place.lane < n:
+            cx = next_end[0] - right_x
+            cy = next_end[1] - right_y
+            values[0] = wp.cast(wp.float32(cx * cx + cy * cy), wp.int32)
+            if wp.static(has_floor):
+                gap = wp.min(left_y, right_y) - K[BOARD_NOTES, NOTE_CIRCLE_RADIUS]
+                values[1] = order_key_single(wp.float32(-gap))
+            if wp.static(has_sprocket):
+                square = wp.min(left_x * left_x + left_y * left_y, right_x * right_x + right_y * right_y)
+                gap = wp.sqrt(square) - K[BOARD_NOTES, NOTE_SPROCKET_RADIUS] - K[BOARD_NOTES, NOTE_CIRCLE_RADIUS]
+                values[1] = order_key_single(wp.float32(-gap))
+            if wp.static(has_self):
+                dx = right_x - K[BOARD_LISTED_X, place.lane]
+                dy = right_y - K[BOARD_LISTED_Y, place.lane]
+                values[2] = wp.cast(wp.float32(dx * dx + dy * dy), wp.int32)
+            if wp.static(has_contacts):
+                turn = place.half_length * link.omega
+                speed = TWO * (link.u * link.u + link.v * link.v + turn * turn)
+                values[3] = wp.cast(wp.float32(speed), wp.int32)
+        values = greatest_of_four(maxima, place.lane, values)
+        return (
+            wp.sqrt(wp.cast(values[0], wp.float32)),
+            -from_order_key_single(values[1]),
+            wp.sqrt(wp.cast(values[2], wp.float32)),
+            wp.sqrt(wp.cast(values[3], wp.float32)),
+        )
+
+    @wp.func
+    def bound_of(control: Control, pairs: int, gap: wp.float32, slack: wp.float32, speed: wp.float32):
+        """Longest step [s]: bounded near contacts; far from them nothing may come through the skin unseen."""
+        near = pairs > 0
+        room = wp.float32(control.skin)
+        if wp.static(has_fixed):
+            near = near or gap < room
+            room = wp.float32(0.5) * gap
+        if wp.static(has_self):
+            room = wp.min(room, slack)
+        bound = control.contact_step
+        if not near:
+            bound = wp.max(bound, wp.float64(room / speed))
+        return bound
+
+    @wp.func
+    def meet_fixed_body(
+        K: wp.array2d(dtype=wp.float64),
+        place: Place,
+        chain: Chain,
+        program: Program,
+        world: int,
+        time: wp.float64,
+        link: Link,
+    ):
+        """This link after floor or sprocket, and the number of impulses."""
+        left_x, left_y, right_x, right_y = ends_of(place, link)
+        u = link.u
+        v = link.v
+        omega = link.omega
+        lost_left = ZERO
+        lost_right = ZERO
+        hits = wp.int64(0)
+        if wp.static(has_floor):
+            u, v, omega, lost_left, lost_right, hits = meet_floor(
+                chain,
+                left_x,
+                left_y,
+                right_x,
+                right_y,
+                link.x,
+                link.y,
+                K[INVERSE_MASS, place.column],
+                K[INVERSE_INERTIA, place.column],
+                link.u,
+                link.v,
+                link.omega,
+            )
+        if wp.static(has_sprocket):
+            u, v, omega, lost_left, lost_right, hits = meet_sprocket(
+                chain,
+                sprocket_turning(program, world, time),
+                left_x,
+                left_y,
+                right_x,
+                right_y,
+                link.x,
+                link.y,
+                K[INVERSE_MASS, place.column],
+                K[INVERSE_INERTIA, place.column],
+                link.u,
+                link.v,
+                link.omega,
+            )
+        after = link
+        after.u = u
+        after.v = v
+        after.omega = omega
+        K[BOARD_LOST_FIXED, place.lane] = K[BOARD_LOST_FIXED, place.lane] + lost_left + lost_right
+        return after, int(hits)
+
+    return measure, bound_of, meet_fixed_body
