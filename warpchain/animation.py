@@ -381,6 +381,7 @@ function tick(now) {
 play.onclick = () => toggle(!playing);
 slider.oninput = () => { toggle(false); show(Number(slider.value)); };
 window.onresize = draw;
+new ResizeObserver(draw).observe(canvas.parentElement); // a frame may get its size after the first drawing
 window.onkeydown = event => {
   const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
   if (event.target === speed || event.target === play) return;

@@ -175,7 +175,7 @@ def walk(
     ] = False,
 ) -> None:
     """Let one chain walk: hang it on its sprocket, spin it up, drop it and follow it until it rests."""
-    from warpchain.report import print_walk, progress_text, status_line, try_folder, write_files
+    from warpchain.terminal import print_walk, progress_text, status_line, try_folder, write_files
     from warpchain.walker import run_walk
 
     named = {
@@ -235,7 +235,7 @@ def bench(
 
     from warpchain.bench import as_json as costs_as_json
     from warpchain.bench import broad_phase_costs, machine, step_costs
-    from warpchain.report import print_costs, status_line
+    from warpchain.terminal import print_costs, status_line
 
     with status_line() as show:
         steps = step_costs(lengths, rounds=rounds, report=show)

@@ -144,8 +144,7 @@ def lay_chain(
     s = curve.period(size)[0] * (phase + np.arange(links) / links)
     if curve.period(size)[1] == 0.0:  # equal steps of the parameter are not equal chords: even them out first
         s = _spread_evenly(curve, size, s)
-    jacobian = np.zeros((links, links))
-    rows = np.arange(links)
+    worst = np.inf
     for _ in range(50):
         period, period_growth = curve.period(size)
         s[0] = phase * period
@@ -159,19 +158,14 @@ def lay_chain(
         # the first joint moves with the period, the last chord ends on it one period later
         to_size[0] += to_here[0] * phase * period_growth
         to_size[-1] += to_following[-1] * (1 + phase) * period_growth
-        # unknowns: s[1:], then the size
-        jacobian[:] = 0.0
-        jacobian[rows[1:], rows[1:] - 1] = to_here[1:]
-        jacobian[rows[:-1], rows[:-1]] += to_following[:-1]
-        jacobian[:, -1] = to_size
-        try:
-            change = np.linalg.solve(jacobian, -residual)
-        except np.linalg.LinAlgError:
-            raise ValueError(f"a closed chain of {links} links of {link_length} m does not fit this curve") from None
+        last, worst = worst, float(np.max(np.abs(residual)))
+        if last < 1e-9 * link_length**2 and worst > last / 2:  # rounding is reached
+            break
+        change = _solve_loop(to_here, to_following, to_size, -residual)
+        if not np.all(np.isfinite(change)):
+            break
         s[1:] += change[:-1]
         size = max(size + float(change[-1]), 0.0)
-        if np.max(np.abs(residual)) < 1e-14 * link_length**2 or np.max(np.abs(change)) < 1e-16 * period:
-            break
     joints = curve.points(s, size)
     closed = np.linalg.norm(joints.point - np.roll(joints.point, 1, axis=0), axis=1)
     if not np.allclose(closed, link_length, rtol=1e-9, atol=0.0):
@@ -180,11 +174,27 @@ def lay_chain(
     drive = np.zeros(links)
     drive[0] = -to_here[0]
     drive[-1] -= to_following[-1]
-    rates = np.linalg.solve(jacobian, drive)
+    rates = _solve_loop(to_here, to_following, to_size, drive)
     first_rate = 1.0 + phase * period_growth * rates[-1]
     joint_rate = np.append(first_rate, rates[:-1])[:, None] * joints.along + rates[-1] * joints.growth
     joint_rate *= speed / np.mean(np.linalg.norm(joint_rate, axis=1))
     return links_between(joints.point, joint_rate)
+
+
+def _solve_loop(to_here: Array, to_following: Array, to_size: Array, right: Array) -> Array:
+    """Solve the n equations of a loop's chords for the changes of s[1:] and of the size, all shapes (n,).
+
+    Chord i: to_here[i] δs[i] + to_following[i] δs[i + 1] + to_size[i] δsize = right[i], with δs[0] = δs[n] = 0. From the
+    first chord on, each gives the next δs as a + b δsize; the last one then gives δsize.
+    """
+    links = len(right)
+    constant, slope = np.zeros(links + 1), np.zeros(links + 1)
+    with np.errstate(all="ignore"):  # a singular loop gives infinities, which the caller looks for
+        for i in range(links - 1):
+            constant[i + 1] = (right[i] - to_here[i] * constant[i]) / to_following[i]
+            slope[i + 1] = -(to_size[i] + to_here[i] * slope[i]) / to_following[i]
+        size = (right[-1] - to_here[-1] * constant[-2]) / (to_size[-1] + to_here[-1] * slope[-2])
+        return np.append(constant[1:-1] + slope[1:-1] * size, size)
 
 
 def links_between(joints: Array, joint_rate: Array) -> tuple[Array, Array]:

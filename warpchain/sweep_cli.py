@@ -39,7 +39,7 @@ def sweep(
     as_json: AsJson = False,
 ) -> None:
     """Run a sweep, or what is left of it: many walks over a grid, with random samples in each cell."""
-    from warpchain.report import status_line
+    from warpchain.terminal import status_line
     from warpchain.runner import sweep as run
 
     with status_line() as show, _dask(scheduler) as cluster:
@@ -71,7 +71,7 @@ def plot(
     ] = None,
 ) -> None:
     """Draw every figure that the sweep has something for: Figure 6, maps, tolerance, sensitivity, statuses."""
-    from warpchain.report import PICTURE_DPI, try_folder
+    from warpchain.terminal import PICTURE_DPI, try_folder
     from warpchain.results import replacing
     from warpchain.sweep_plots import figures
     from warpchain.sweep_result import load
