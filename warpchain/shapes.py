@@ -184,8 +184,8 @@ def lay_chain(
 def _solve_loop(to_here: Array, to_following: Array, to_size: Array, right: Array) -> Array:
     """Solve the n equations of a loop's chords for the changes of s[1:] and of the size, all shapes (n,).
 
-    Chord i: to_here[i] δs[i] + to_following[i] δs[i + 1] + to_size[i] δsize = right[i], with δs[0] = δs[n] = 0. From the
-    first chord on, each gives the next δs as a + b δsize; the last one then gives δsize.
+    Chord i: to_here[i] δs[i] + to_following[i] δs[i + 1] + to_size[i] δsize = right[i], with δs[0] = δs[n] = 0.
+    From the first chord on, each gives the next δs as a + b δsize; the last one then gives δsize.
     """
     links = len(right)
     constant, slope = np.zeros(links + 1), np.zeros(links + 1)

@@ -39,8 +39,8 @@ def sweep(
     as_json: AsJson = False,
 ) -> None:
     """Run a sweep, or what is left of it: many walks over a grid, with random samples in each cell."""
-    from warpchain.terminal import status_line
     from warpchain.runner import sweep as run
+    from warpchain.terminal import status_line
 
     with status_line() as show, _dask(scheduler) as cluster:
         executor, threads = cluster
@@ -71,10 +71,10 @@ def plot(
     ] = None,
 ) -> None:
     """Draw every figure that the sweep has something for: Figure 6, maps, tolerance, sensitivity, statuses."""
-    from warpchain.terminal import PICTURE_DPI, try_folder
     from warpchain.results import replacing
     from warpchain.sweep_plots import figures
     from warpchain.sweep_result import load
+    from warpchain.terminal import PICTURE_DPI, try_folder
 
     result = load(directory)
     folder = output or directory
