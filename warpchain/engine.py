@@ -8,7 +8,8 @@ import platform
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpchain.kernels import layout
+from warpchain.kernels.block import make_advance_block
 from warpchain.kernels.broadphase import list_layout
 from warpchain.kernels.driver import Features, make_advance
 from warpchain.kernels.tableaus import TABLEAUS
@@ -85,10 +87,9 @@ def versions() -> dict[str, str]:
     return {name: importlib.metadata.version(name) for name in packages} | {"python": platform.python_version()}
 
 
-def _view(array: wp.array) -> NDArray[Any]:
-    """The elements of an array in the CPU's memory, to read and to write."""
-    values: NDArray[Any] = array.numpy()
-    return values
+def block_threads(links: int) -> int:
+    """Threads of a GPU's block that carries a chain: one per link, rounded up to whole warps of 32."""
+    return -(-links // 32) * 32
 
 
 class Batch:
@@ -118,8 +119,9 @@ class Batch:
         self.options = options
         self.device = start_device(options.device)
         self.links = [0] * worlds
+        self._mirrors: dict[int, tuple[wp.array, NDArray[Any]]] = {}
         self.columns = layout.padded_width(longest)
-        rows = layout.scratch_rows(TABLEAUS[options.method].stages)
+        rows = max(layout.scratch_rows(TABLEAUS[options.method].stages), layout.BLOCK_ROWS)
 
         self.model = Model()
         self.model.link_count = self._array(np.zeros(worlds, dtype=np.int32))
@@ -172,7 +174,20 @@ class Batch:
         self.lists = wp.zeros((worlds, list_layout(self.columns).size), dtype=wp.int32, device=self.device)
 
     def _array(self, values: NDArray[np.generic]) -> wp.array:
-        return wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device=self.device)
+        """An array on the device that the host will read or write."""
+        array = wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device=self.device)
+        if self.device.is_cuda and array.size > 0:
+            self._mirrors[array.ptr] = array, values.copy()
+        return array
+
+    def _view(self, array: wp.array) -> NDArray[Any]:
+        """The elements of an array, to read and to write between launches: on a GPU, those of its copy on the host."""
+        values: NDArray[Any]
+        if array.ptr in self._mirrors:
+            _, values = self._mirrors[array.ptr]
+        else:
+            values = array.numpy()
+        return values
 
     def set_chain(self, world: int, parameters: Parameters, links: int, sprocket_radius: float | None = None) -> None:
         """Say what a world's chain is made of.
@@ -184,11 +199,11 @@ class Batch:
             sprocket_radius: Radius [m] at which circles touch the sprocket; None: the parameter's.
         """
         self.links[world] = links
-        _view(self.model.link_count)[world] = links
+        self._view(self.model.link_count)[world] = links
         for name, value in parameters:
-            _view(getattr(self.model, name))[world] = value
+            self._view(getattr(self.model, name))[world] = value
         if sprocket_radius is not None:
-            _view(self.model.sprocket_radius)[world] = sprocket_radius
+            self._view(self.model.sprocket_radius)[world] = sprocket_radius
 
     def load(
         self,
@@ -212,8 +227,8 @@ class Batch:
         """
         state = self.state
         n = self.links[world]
-        _view(state.links)[world, :3, :n] = position.T
-        _view(state.links)[world, 3:, :n] = velocity.T
+        self._view(state.links)[world, :3, :n] = position.T
+        self._view(state.links)[world, 3:, :n] = velocity.T
         for array in (
             state.time,
             state.gap,
@@ -223,30 +238,30 @@ class Batch:
             state.losses,
             state.next_sample,
         ):
-            _view(array)[world] = 0
-        _view(state.watch)[world] = 0
-        _view(state.watch)[world, [layout.WINDOW_START, layout.STEADY_SINCE, layout.REST_SINCE]] = -1.0
-        _view(state.last_look)[world, layout.TIME] = -1.0
-        _view(state.watch)[world, layout.LAST_FLOOR_IMPULSE] = -np.inf
-        _view(state.tries_before)[world] = tries_before
-        _view(state.has_first_stage)[world] = 0
-        _view(state.is_fresh)[world] = 1
-        _view(state.step)[world] = FIRST_STEP
-        _view(state.last_error)[world] = 1.0
-        _view(self.record.sample_count)[world] = 0
-        _view(self.record.frame_count)[world] = 0
+            self._view(array)[world] = 0
+        self._view(state.watch)[world] = 0
+        self._view(state.watch)[world, [layout.WINDOW_START, layout.STEADY_SINCE, layout.REST_SINCE]] = -1.0
+        self._view(state.last_look)[world, layout.TIME] = -1.0
+        self._view(state.watch)[world, layout.LAST_FLOOR_IMPULSE] = -np.inf
+        self._view(state.tries_before)[world] = tries_before
+        self._view(state.has_first_stage)[world] = 0
+        self._view(state.is_fresh)[world] = 1
+        self._view(state.step)[world] = FIRST_STEP
+        self._view(state.last_error)[world] = 1.0
+        self._view(self.record.sample_count)[world] = 0
+        self._view(self.record.frame_count)[world] = 0
         self.resume(world, stop_time, stop_status)
 
     def resume(self, world: int, stop_time: float, stop_status: Status) -> None:
         """Let a world that has stopped run on to a later time, as if it had not stopped there."""
-        _view(self.state.stop_time)[world] = stop_time
-        _view(self.state.stop_status)[world] = int(stop_status)
-        _view(self.state.status)[world] = int(Status.RUNNING)
+        self._view(self.state.stop_time)[world] = stop_time
+        self._view(self.state.stop_status)[world] = int(stop_status)
+        self._view(self.state.status)[world] = int(Status.RUNNING)
 
     def set_program(self, world: int, **values: float) -> None:
         """Set fields of :class:`Program` of a world."""
         for name, value in values.items():
-            _view(getattr(self.program, name))[world] = value
+            self._view(getattr(self.program, name))[world] = value
 
     def features(self, *, fixed_body: str, watch: str, broad_phase: str = "grid") -> Features:
         """Kernel features for these worlds."""
@@ -268,8 +283,8 @@ class Batch:
             after_launch: Called after each launch; it drains the record. Results do not depend on how a run is cut
                 into launches.
         """
-        self.compile(features)
-        status = _view(self.state.status)
+        self.compile(features, [self.links[world] for world in worlds])
+        status = self._view(self.state.status)
         while True:
             active = [world for world in worlds if status[world] == Status.RUNNING]
             if not active:
@@ -282,43 +297,68 @@ class Batch:
             if after_launch is not None:
                 after_launch()
 
-    def compile(self, features: Features) -> None:
-        """Make sure that the kernel for these features is ready; takes seconds the first time on a machine."""
-        wp.load_module(make_advance(features).module, device=self.device)
+    def compile(self, features: Features, links: Iterable[int] = ()) -> None:
+        """Make sure that the kernels for these features are ready; takes seconds the first time on a machine.
+
+        Args:
+            features: What they are compiled for.
+            links: On a GPU, numbers of links, each of which may need a kernel of its own.
+        """
+        if not self.device.is_cuda:
+            wp.load_module(make_advance(features).module, device=self.device)
+            return
+        for threads in {block_threads(count) for count in links}:
+            wp.load_module(make_advance_block(features, threads).module, device=self.device, block_dim=threads)
 
     def launch(self, worlds: Sequence[int], features: Features, tries: int) -> float:
         """Carry worlds on by at most this many tries each; returns the wall time [s]."""
         self.control.tries = tries
-        indices = self._array(np.asarray(worlds, dtype=np.int32))
-        arrays = [indices, self.model, self.program, self.state, self.record, self.scratch, self.lists]
         before = time.perf_counter()
-        wp.launch(make_advance(features), dim=len(worlds), inputs=[*arrays, self.control], device=self.device)
-        wp.synchronize_device(self.device)
+        arrays = [self.model, self.program, self.state, self.record, self.scratch, self.lists, self.control]
+        if not self.device.is_cuda:
+            indices = wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device)
+            wp.launch(make_advance(features), dim=len(worlds), inputs=[indices, *arrays], device=self.device)
+            return time.perf_counter() - before
+        for array, values in self._mirrors.values():
+            array.assign(values)
+        groups: dict[int, list[int]] = defaultdict(list)
+        for world in worlds:
+            groups[block_threads(self.links[world])].append(world)
+        for threads, members in groups.items():
+            wp.launch_tiled(
+                make_advance_block(features, threads),
+                dim=[len(members)],
+                inputs=[wp.array(np.asarray(members, dtype=np.int32), dtype=wp.int32, device=self.device), *arrays],
+                block_dim=threads,
+                device=self.device,
+            )
+        for array, values in self._mirrors.values():
+            values[...] = array.numpy()
         return time.perf_counter() - before
 
     def listed_pairs(self, world: int) -> int:
         """Pairs of joints in a world's neighbour list."""
-        return int(_view(self.lists)[world, list_layout(self.columns).count])
+        return int(self._view(self.lists)[world, list_layout(self.columns).count])
 
     def position(self, world: int) -> Array:
         """(n, 3): x, y [m], θ [rad]."""
-        return _view(self.state.links)[world, :3, : self.links[world]].T.copy()
+        return self._view(self.state.links)[world, :3, : self.links[world]].T.copy()
 
     def velocity(self, world: int) -> Array:
         """(n, 3): their rates."""
-        return _view(self.state.links)[world, 3:, : self.links[world]].T.copy()
+        return self._view(self.state.links)[world, 3:, : self.links[world]].T.copy()
 
     def status(self, world: int) -> Status:
         """How the world stands."""
-        return Status(int(_view(self.state.status)[world]))
+        return Status(int(self._view(self.state.status)[world]))
 
     def time(self, world: int) -> float:
         """Time [s] since loading."""
-        return float(_view(self.state.time)[world])
+        return float(self._view(self.state.time)[world])
 
     def counts(self, world: int) -> dict[str, int]:
         """Counters since loading."""
-        row = _view(self.state.counts)[world]
+        row = self._view(self.state.counts)[world]
         return {name: int(value) for name, value in zip(COUNTS, row, strict=True)}
 
     def tries(self, world: int) -> int:
@@ -328,32 +368,32 @@ class Batch:
 
     def extremes(self, world: int) -> dict[str, float]:
         """Greatest joint opening and depths [m] since loading."""
-        row = _view(self.state.extremes)[world]
+        row = self._view(self.state.extremes)[world]
         return {name: float(value) for name, value in zip(EXTREMES, row, strict=True)}
 
     def losses(self, world: int) -> dict[str, float]:
         """Energy [J] lost since loading, by cause."""
-        row = _view(self.state.losses)[world]
+        row = self._view(self.state.losses)[world]
         return {name: float(value) for name, value in zip(LOSSES, row, strict=True)}
 
     def first_look(self, world: int) -> Array:
         """Sums over the chain when its run began: (SAMPLE_COLUMNS,), see :mod:`warpchain.kernels.layout`."""
-        return np.array(_view(self.state.first_look)[world])
+        return np.array(self._view(self.state.first_look)[world])
 
     def last_look(self, world: int) -> Array:
         """The same when the chain was last looked at; at the end of the run if that has ended."""
-        return np.array(_view(self.state.last_look)[world])
+        return np.array(self._view(self.state.last_look)[world])
 
     def drain_samples(self, world: int) -> Array:
         """Take the time series kept so far: (t, SAMPLE_COLUMNS), see :mod:`warpchain.kernels.layout`."""
-        count = int(_view(self.record.sample_count)[world])
-        _view(self.record.sample_count)[world] = 0
-        return _view(self.record.samples)[world, :count].copy()
+        count = int(self._view(self.record.sample_count)[world])
+        self._view(self.record.sample_count)[world] = 0
+        return self._view(self.record.samples)[world, :count].copy()
 
     def drain_frames(self, world: int) -> tuple[Array, Array]:
         """Take the frames kept so far: times (f,) [s], joint positions (f, n, 2) [m]."""
-        count = int(_view(self.record.frame_count)[world])
-        _view(self.record.frame_count)[world] = 0
+        count = int(self._view(self.record.frame_count)[world])
+        self._view(self.record.frame_count)[world] = 0
         n = self.links[world]
-        rows = _view(self.record.frames)[world, :count, : 2 * n].reshape(count, 2, n)
-        return _view(self.record.frame_times)[world, :count].copy(), rows.transpose(0, 2, 1).copy()
+        rows = self._view(self.record.frames)[world, :count, : 2 * n].reshape(count, 2, n)
+        return self._view(self.record.frame_times)[world, :count].copy(), rows.transpose(0, 2, 1).copy()
