@@ -525,7 +525,7 @@ def no_kernels(monkeypatch):
         ({"start": "spinning", "clearance_of": "hanging"}, "scene.clearance_of"),
         ({"method": "euler"}, "options.method"),
         ({"tolerance": 0.0}, "options.tolerance"),
-        ({"device": "cuda"}, "options.device"),
+        ({"device": "gpu"}, "options.device"),
         ({"smallest_step": 1e-4}, "options.smallest_step"),
         ({"seed": -1}, "seed"),
         ({"frame_interval": 0.0}, "frame_interval"),

@@ -249,7 +249,7 @@ def test_parameter_bounds(name: str, accepted: float, rejected: float) -> None:
             "options.self_contact: 'yes' is not a truth value; give true or false",
         ),
         ("options", {"self_contact": 1}, "options.self_contact: 1 is not a truth value; give true or false"),
-        ("options", {"device": "cuda"}, "options.device: 'cuda' is not supported; give cpu"),
+        ("options", {"device": "gpu"}, "options.device: 'gpu' is no device; give cpu, cuda or cuda:N"),
         ("options", {"device": 0}, "options.device: 0 is not text; give a name"),
         ("options", {"skin": 0.0}, "options.skin: 0.0 is not greater than 0 m; give a positive skin"),
         (

@@ -11,12 +11,14 @@ from warpchain.kernels.driver import Features
 from warpchain.options import Options, Setup
 from warpchain.status import Status
 
-TRIES = 20_000
-"""Tries of each chain per launch; what a walk gives does not depend on it."""
+TRIES = {"cpu": 20_000, "cuda": 5_000}
+"""Tries of each chain per launch, by kind of device; what a walk gives does not depend on it."""
+MOST_SLOTS = 4096
+"""Most chains in one launch on a GPU: enough to fill it."""
 
 
 def run_setups(
-    setups: Sequence[Setup], *, slots: int = 1, stop: threading.Event | None = None
+    setups: Sequence[Setup], *, slots: int | None = None, stop: threading.Event | None = None
 ) -> Iterator[tuple[int, Course]]:
     """Run walks and yield each when it is over, as (place in ``setups``, course).
 
@@ -25,8 +27,8 @@ def run_setups(
 
     Args:
         setups: The walks, samples drawn.
-        slots: Chains that are carried on together in one launch. On a CPU a launch is one core's work, so one chain
-            at a time, which stays in the cache, is best.
+        slots: Chains that are carried on together in one launch. Default: on a GPU as many as fill it, on a CPU, where
+            a launch is one core's work, one at a time, which stays in the cache.
         stop: When set, the walks are abandoned after the launch that is under way.
     """
     buckets: dict[tuple[Options, int], list[int]] = defaultdict(list)
@@ -34,26 +36,28 @@ def run_setups(
         buckets[setup.options, layout.padded_width(setup.scene.links)].append(place)
     for (options, _), places in buckets.items():
         longest = max(setups[place].scene.links for place in places)
-        yield from _run_bucket(setups, places, Batch(min(slots, len(places)), longest, options), stop)
+        worlds = slots or (MOST_SLOTS if options.device.startswith("cuda") else 1)
+        yield from _run_bucket(setups, places, Batch(min(worlds, len(places)), longest, options), stop)
 
 
 def compile_kernels(setups: Iterable[Setup]) -> None:
     """Make sure that every kernel these walks need is ready, before threads or processes ask for it at once."""
-    ready: set[Features] = set()
+    ready: set[tuple[Features, int]] = set()
     for setup in setups:
         batch = Batch(1, setup.scene.links, setup.options)
         bodies = [("floor", "rest")] + [("sprocket", "steady")] * (setup.scene.start != "ellipse")
         for fixed_body, watch in bodies:
             features = batch.features(fixed_body=fixed_body, watch=watch)
-            if features not in ready:
-                batch.compile(features)
-                ready.add(features)
+            if (features, setup.scene.links) not in ready:
+                batch.compile(features, [setup.scene.links])
+                ready.add((features, setup.scene.links))
 
 
 def _run_bucket(
     setups: Sequence[Setup], places: Sequence[int], batch: Batch, stop: threading.Event | None
 ) -> Iterator[tuple[int, Course]]:
     """Run walks that share options and the width of their arrays."""
+    tries = TRIES["cuda" if batch.device.is_cuda else "cpu"]
     waiting = iter(places)
     running: dict[int, tuple[int, Course]] = {}
     for world, place in zip(range(len(batch.links)), waiting, strict=False):
@@ -63,8 +67,7 @@ def _run_bucket(
         for world, (_, course) in running.items():
             together[course.features].append(world)
         for features, worlds in together.items():
-            batch.compile(features)
-            batch.launch(worlds, features, TRIES)
+            batch.launch(worlds, features, tries)
         for world, (place, course) in list(running.items()):
             if batch.status(world) == Status.RUNNING or course.next_phase():
                 continue

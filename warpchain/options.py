@@ -201,13 +201,13 @@ class Options(BaseModel):
         description="time between two recorded points of the centre of mass",
         json_schema_extra={"unit": "s"},
     )
-    device: str = Field(default="cpu", description="where walks run; only cpu is supported")
+    device: str = Field(default="cpu", description="where walks run: cpu, cuda (the first GPU) or cuda:N")
 
     @field_validator("device")
     @classmethod
     def _device_supported(cls, device: str) -> str:
-        if device != "cpu":
-            raise refusal("device", f"{shown(device)} is not supported; give cpu")
+        if not re.fullmatch(r"cpu|cuda(:\d{1,3})?", device):
+            raise refusal("device", f"{shown(device)} is no device; give cpu, cuda or cuda:N")
         return device
 
     @model_validator(mode="after")

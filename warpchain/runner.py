@@ -1,6 +1,6 @@
 """Runs a sweep: hands its shards to workers, follows their progress, and survives being killed.
 
-A worker runs the walks of one shard and writes them to an immutable file; what it returns is only the shard's key. So
+A worker runs the walks of a shard and writes them to an immutable file; what it returns is only the shard's key. So
 any executor in the style of ``concurrent.futures`` will do, on this machine or another that sees the same folder.
 """
 
@@ -9,7 +9,7 @@ import os
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -25,6 +25,8 @@ from warpchain.sweep_result import SweepResult, load
 
 SHARD_WALKS = 256
 """Most walks in a shard."""
+GPU_TASK_WALKS = 8192
+"""Walks that a worker with a GPU is given at a time."""
 SHARDS = 128
 """A sweep has at least about this many shards, as far as it has walks: the grain of progress and of a restart."""
 
@@ -114,29 +116,38 @@ def shard_size(walks: int) -> int:
     return max(1, min(SHARD_WALKS, walks // SHARDS))
 
 
-def run_shard(
-    sweep: Mapping[str, Any], directory: str, first: int, last: int, stop: threading.Event | None = None
-) -> str:
-    """Run the walks ``first`` … ``last − 1`` of a sweep and write their shard; what a worker does.
+def run_shards(
+    sweep: Mapping[str, Any],
+    directory: str,
+    shards: Sequence[tuple[int, int]],
+    stop: threading.Event | None = None,
+) -> list[str]:
+    """Run the walks of some shards and write each shard as soon as its walks are over; what a worker does.
 
     Args:
         sweep: Canonical form of the sweep.
         directory: The sweep's folder.
-        first: Index of the first walk.
-        last: Index after the last walk.
-        stop: When set, the work is abandoned: nothing is written.
+        shards: First walk, and the one after the last, of each shard.
+        stop: When set, the work is abandoned: unfinished shards are not written.
 
     Returns:
-        The shard's key; empty if abandoned.
+        Keys of the shards written.
     """
     planned = load_sweep(sweep)
-    walks = [planned.planned(index) for index in range(first, last)]
-    rows = empty_rows(planned, range(first, last))
+    digest = planned.digest()
+    walks = [planned.planned(index) for first, last in shards for index in range(first, last)]
+    shard_of = {index: shard for shard in shards for index in range(*shard)}
+    rows = {shard: empty_rows(planned, range(*shard)) for shard in shards}
+    left = {shard: shard[1] - shard[0] for shard in shards}
+    keys = []
     for place, course in run_setups([walk.setup for walk in walks], stop=stop):
-        _fill(rows[place], walks[place], course)
-    if stop is not None and stop.is_set():
-        return ""
-    return write_shard(directory, planned.digest(), range(first, last), rows)
+        walk = walks[place]
+        shard = shard_of[walk.index]
+        _fill(rows[shard][walk.index - shard[0]], walk, course)
+        left[shard] -= 1
+        if left[shard] == 0:
+            keys.append(write_shard(directory, digest, range(*shard), rows.pop(shard)))
+    return keys
 
 
 def _fill(row: Any, walk: PlannedWalk, course: Course) -> None:
@@ -199,18 +210,18 @@ def _run(
     progress: SweepProgress,
     on_progress: Callable[[SweepProgress], None] | None,
 ) -> None:
-    """Keep the workers busy with two shards each; memory does not grow with the sweep."""
+    """Keep the workers busy with two tasks each; memory does not grow with the sweep."""
     began = time.perf_counter()
-    canonical = planned.canonical()
-    waiting = iter(missing)
-    pending: dict[concurrent.futures.Future[str], range] = {}
+    canonical, digest = planned.canonical(), planned.digest()
+    waiting = _tasks(planned, missing)
+    pending: dict[concurrent.futures.Future[list[str]], list[range]] = {}
 
     def submit() -> bool:
-        shard = next(waiting, None)
-        if shard is None:
+        task = next(waiting, None)
+        if task is None:
             return False
-        arguments = (canonical, str(store.directory), shard.start, shard.stop, *more)
-        pending[executor.submit(run_shard, *arguments)] = shard
+        shards = [(shard.start, shard.stop) for shard in task]
+        pending[executor.submit(run_shards, canonical, str(store.directory), shards, *more)] = task
         return True
 
     while len(pending) < 2 * workers and submit():
@@ -219,18 +230,32 @@ def _run(
         while pending:
             finished, _ = concurrent.futures.wait(pending, return_when=concurrent.futures.FIRST_COMPLETED)
             for future in finished:
-                shard = pending.pop(future)
+                task = pending.pop(future)
                 future.result()
                 submit()
-                statuses = read_shard(store.directory, planned.digest(), shard)["status"]
-                progress.statuses.update(Status(int(code)).label for code in statuses)
-                progress.done += len(shard)
+                for shard in task:
+                    statuses = read_shard(store.directory, digest, shard)["status"]
+                    progress.statuses.update(Status(int(code)).label for code in statuses)
+                    progress.done += len(shard)
             progress.seconds = time.perf_counter() - began
             if on_progress is not None:
                 on_progress(progress)
     finally:
         for future in pending:
             future.cancel()
+
+
+def _tasks(planned: Sweep, missing: Sequence[range]) -> Iterator[list[range]]:
+    """What is handed to a worker at a time: a shard, or for a GPU enough shards to fill it."""
+    task: list[range] = []
+    for shard in missing:
+        task.append(shard)
+        on_gpu = planned.planned(shard.start).setup.options.device.startswith("cuda")
+        if not on_gpu or sum(map(len, task)) >= GPU_TASK_WALKS:
+            yield task
+            task = []
+    if task:
+        yield task
 
 
 def _counts(statuses: Counter[str]) -> str:

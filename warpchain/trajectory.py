@@ -47,7 +47,7 @@ def simulate(
         self_contact: Whether links touch one another.
         method: ``"rkf78"``, ``"dp5"`` or ``"bs32"``.
         tolerance: See :func:`walk`.
-        device: ``"cpu"``.
+        device: ``"cpu"``, ``"cuda"`` (the first GPU) or ``"cuda:N"``.
         settings: Any other field of :class:`Options` by its name.
 
     Returns:
