@@ -9,7 +9,7 @@ import sys
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -140,6 +140,7 @@ class Batch:
         self.device = start_device(options.device)
         self.links = [0] * worlds
         self._mirrors: dict[int, tuple[wp.array, NDArray[Any]]] = {}
+        self._streams: dict[tuple[Features, int], wp.Stream] = {}
         self.columns = layout.padded_width(longest)
         rows = max(layout.scratch_rows(TABLEAUS[options.method].stages), layout.BLOCK_ROWS)
 
@@ -332,29 +333,48 @@ class Batch:
 
     def launch(self, worlds: Sequence[int], features: Features, tries: int) -> float:
         """Carry worlds on by at most this many tries each; returns the wall time [s]."""
+        return self.launch_together({features: worlds}, tries)
+
+    def launch_together(self, groups: Mapping[Features, Sequence[int]], tries: int) -> float:
+        """Carry groups of worlds on, each with features of its own, at the same time if the device can."""
         self.control.tries = tries
         before = time.perf_counter()
         arrays = [self.model, self.program, self.state, self.record, self.scratch, self.lists, self.control]
         if not self.device.is_cuda:
-            indices = wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device)
-            wp.launch(make_advance(features), dim=len(worlds), inputs=[indices, *arrays], device=self.device)
+            for features, worlds in groups.items():
+                inputs = [self._indices(worlds), *arrays]
+                wp.launch(make_advance(features), dim=len(worlds), inputs=inputs, device=self.device)
             return time.perf_counter() - before
         for array, values in self._mirrors.values():
             array.assign(values)
-        groups: dict[int, list[int]] = defaultdict(list)
-        for world in worlds:
-            groups[block_threads(self.links[world])].append(world)
-        for threads, members in groups.items():
+        blocks: dict[tuple[Features, int], list[int]] = defaultdict(list)
+        for features, worlds in groups.items():
+            for world in worlds:
+                blocks[features, block_threads(self.links[world])].append(world)
+        members = {key: self._indices(worlds) for key, worlds in blocks.items()}
+        wp.synchronize_device(self.device)
+        for (features, threads), indices in members.items():
             wp.launch_tiled(
                 block_kernel(features, threads),
-                dim=[len(members)],
-                inputs=[wp.array(np.asarray(members, dtype=np.int32), dtype=wp.int32, device=self.device), *arrays],
+                dim=[len(indices)],
+                inputs=[indices, *arrays],
                 block_dim=threads,
                 device=self.device,
+                stream=self._stream(features, threads),
             )
+        wp.synchronize_device(self.device)
         for array, values in self._mirrors.values():
             values[...] = array.numpy()
         return time.perf_counter() - before
+
+    def _stream(self, features: Features, threads: int) -> wp.Stream:
+        """A stream for each kernel, so that groups of chains that do not fill the device run side by side."""
+        if (features, threads) not in self._streams:
+            self._streams[features, threads] = wp.Stream(self.device)
+        return self._streams[features, threads]
+
+    def _indices(self, worlds: Sequence[int]) -> wp.array:
+        return wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device)
 
     def listed_pairs(self, world: int) -> int:
         """Pairs of joints in a world's neighbour list."""

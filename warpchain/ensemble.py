@@ -11,7 +11,7 @@ from warpchain.kernels.driver import Features
 from warpchain.options import Options, Setup
 from warpchain.status import Status
 
-TRIES = {"cpu": 20_000, "cuda": 5_000}
+TRIES = {"cpu": 20_000, "cuda": 10_000}
 """Tries of each chain per launch, by kind of device; what a walk gives does not depend on it."""
 MOST_SLOTS = 4096
 """Most chains in one launch on a GPU: enough to fill it."""
@@ -66,8 +66,7 @@ def _run_bucket(
         together: dict[Features, list[int]] = defaultdict(list)
         for world, (_, course) in running.items():
             together[course.features].append(world)
-        for features, worlds in together.items():
-            batch.launch(worlds, features, tries)
+        batch.launch_together(together, tries)
         for world, (place, course) in list(running.items()):
             if batch.status(world) == Status.RUNNING or course.next_phase():
                 continue
