@@ -106,7 +106,7 @@ def test_a_single_walk_is_that_of_a_sweep(tmp_path):
 
 def test_threads_and_processes_write_the_same_bytes(tmp_path, uninterrupted):
     """However many workers share a sweep, and whether they are threads or processes, its shards are the same."""
-    sweep(TINY, tmp_path / "threads", workers=3)
+    sweep(TINY, tmp_path / "threads", workers=3, device="cpu")
     assert data_of(tmp_path / "threads") == uninterrupted
     context = multiprocessing.get_context("spawn")
     with concurrent.futures.ProcessPoolExecutor(2, mp_context=context) as processes:
@@ -222,4 +222,6 @@ def test_sweep_refuses_what_it_cannot_do(tmp_path):
             sweep(*arguments)
     with pytest.raises(warpchain.InputError, match="workers: 0 is not a number of workers"):
         sweep(TINY, tmp_path / "a", workers=0)
+    with pytest.raises(warpchain.InputError, match=r"options\.device: 'gpu' is no device"):
+        sweep(TINY, tmp_path / "a", device="gpu")
     assert not (tmp_path / "a").exists()

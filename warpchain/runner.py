@@ -72,6 +72,7 @@ def sweep(
     source: str | os.PathLike[str] | Mapping[str, Any] | Sweep,
     out: str | os.PathLike[str],
     *,
+    device: str | None = None,
     executor: Executor | None = None,
     workers: int | None = None,
     fresh: bool = False,
@@ -83,6 +84,7 @@ def sweep(
         source: A sweep file (YAML), its content, or a :class:`Sweep`.
         out: Folder of the results. A sweep that was killed goes on where it was; the data come out the same, to the
             byte.
+        device: ``"cpu"``, ``"cuda"`` or ``"cuda:N"`` instead of what the sweep says.
         executor: Where shards are run; it must see ``out``. Default: threads of this process.
         workers: Shards in work at the same time; default: processors of this machine. With an executor, at least the
             number of its workers.
@@ -94,6 +96,8 @@ def sweep(
         OSError: The folder cannot be read or written.
     """
     planned = load_sweep(source)
+    if device is not None:
+        planned = _on_device(planned, device)
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
         raise InputError(f"workers: {workers!r} is not a number of workers; give a whole number from 1")
     at_once = workers or len(os.sched_getaffinity(0))
@@ -109,6 +113,14 @@ def sweep(
                 _run(executor, (), planned, store, missing, at_once, progress, on_progress)
         store.log(f"complete after {progress.seconds:.1f} s: " + _counts(progress.statuses))
     return load(out)
+
+
+def _on_device(planned: Sweep, device: str) -> Sweep:
+    """The same sweep on another device."""
+    canonical = planned.canonical()
+    for block in canonical["blocks"]:
+        block["options"]["device"] = device
+    return load_sweep(canonical)
 
 
 def shard_size(walks: int) -> int:

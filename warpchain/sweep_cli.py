@@ -27,6 +27,10 @@ def sweep(
         Path,
         typer.Option("-o", "--output", metavar="DIR", help="Folder of the results; a killed sweep goes on in it."),
     ],
+    device: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="cpu, cuda (the first GPU) or cuda:N, instead of what the sweep says."),
+    ] = None,
     workers: Annotated[
         int | None,
         typer.Option(metavar="N", min=1, help="Shards in work at once. Default: processors, or Dask's threads."),
@@ -47,6 +51,7 @@ def sweep(
         result = run(
             source,
             output,
+            device=device,
             executor=executor,
             workers=workers or threads,
             fresh=fresh,
