@@ -225,7 +225,7 @@ def _run(
     """Keep the workers busy with two tasks each; memory does not grow with the sweep."""
     began = time.perf_counter()
     canonical, digest = planned.canonical(), planned.digest()
-    waiting = _tasks(planned, missing)
+    waiting = _tasks(planned, missing, workers)
     pending: dict[concurrent.futures.Future[list[str]], list[range]] = {}
 
     def submit() -> bool:
@@ -257,13 +257,14 @@ def _run(
             future.cancel()
 
 
-def _tasks(planned: Sweep, missing: Sequence[range]) -> Iterator[list[range]]:
-    """What is handed to a worker at a time: a shard, or for a GPU enough shards to fill it."""
+def _tasks(planned: Sweep, missing: Sequence[range], workers: int) -> Iterator[list[range]]:
+    """What is handed to a worker at a time: a shard, or for a GPU enough shards to fill it, if there are enough."""
+    fair_share = -(-sum(map(len, missing)) // workers)
     task: list[range] = []
     for shard in missing:
         task.append(shard)
         on_gpu = planned.planned(shard.start).setup.options.device.startswith("cuda")
-        if not on_gpu or sum(map(len, task)) >= GPU_TASK_WALKS:
+        if not on_gpu or sum(map(len, task)) >= min(GPU_TASK_WALKS, fair_share):
             yield task
             task = []
     if task:
