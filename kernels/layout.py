@@ -24,10 +24,9 @@ FORCE_X, FORCE_Y, TORQUE = 30, 31, 32
 LOST_FRICTION, LOST_DAMPING, LOST_FIXED = 33, 34, 35
 # Joint positions when the neighbour list was built.
 LISTED_X, LISTED_Y = 36, 37
-# Per stage: accelerations, and the power [W] lost in each joint to friction and damping.
+# Per stage, in this order: accelerations of x, y, θ, and the power [W] lost in each joint to friction and damping.
 STAGES = 38
 STAGE_ROWS = 5
-ACCELERATION_X, ACCELERATION_Y, ACCELERATION_SPIN, POWER_FRICTION, POWER_DAMPING = 0, 1, 2, 3, 4
 
 # The block form keeps most of a chain in registers. The first 18 rows above and the next eight lie on a board that all
 # threads of the block see; the scratch block keeps rows from BOARD_LOST_SELF on between launches.
