@@ -14,13 +14,14 @@ import numpy as np
 import pytest
 import xarray
 
+from warpchain.merged_file import merge
 from warpchain.parameters import InputError
 from warpchain.planning import load_sweep
 from warpchain.rows import COLUMNS
 from warpchain.shards import shard_name
 from warpchain.status import Status
 from warpchain.store import Store, empty_rows
-from warpchain.sweep_result import BlockResult, SweepResult, load, merge
+from warpchain.sweep_result import BlockResult, SweepResult, load
 
 from .synthetic_sweep import SWEEP, SyntheticBlock, SyntheticSweep, run, synthetic_rows
 

@@ -20,7 +20,7 @@ from warpchain.results import replacing
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-    from warpchain.results import WalkResult
+    from warpchain.plots import Walk
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ _GIF_PICTURES: Final = 1200
 _PLAYER_FRAMES: Final = 2000
 
 
-def animate(walk: "WalkResult", path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
+def animate(walk: "Walk", path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
     """Write a moving picture of a walk; the suffix of `path` says which kind: .gif, .mp4 or .html.
 
     Where frames were recorded less often than pictures are wanted, a frame is shown until the next one.
@@ -74,7 +74,7 @@ def animate(walk: "WalkResult", path: str | os.PathLike[str], *, fps: float = 30
     writers[suffix](walk, Path(path), fps, slow)
 
 
-def _chosen_frames(walk: "WalkResult", fps: float, slow: float) -> list[int]:
+def _chosen_frames(walk: "Walk", fps: float, slow: float) -> list[int]:
     """The frame for each picture, at a constant rate: the latest that is not later than the picture."""
     start, end = walk.frame_time[0], walk.frame_time[-1]
     marks = start + np.arange(math.floor((end - start) * fps * slow + 1e-6) + 1) / (fps * slow)
@@ -82,7 +82,7 @@ def _chosen_frames(walk: "WalkResult", fps: float, slow: float) -> list[int]:
     return chosen if chosen[-1] == len(walk.frame_time) - 1 else [*chosen, len(walk.frame_time) - 1]
 
 
-def _write_gif(walk: "WalkResult", path: Path, fps: float, slow: float) -> None:
+def _write_gif(walk: "Walk", path: Path, fps: float, slow: float) -> None:
     """One picture per different frame; times are hundredths of a second, rounded without drift."""
     from PIL import Image
 
@@ -104,7 +104,7 @@ def _write_gif(walk: "WalkResult", path: Path, fps: float, slow: float) -> None:
         first.save(part, format="GIF", save_all=True, append_images=reduced, duration=durations, loop=0)
 
 
-def _write_mp4(walk: "WalkResult", path: Path, fps: float, slow: float) -> None:
+def _write_mp4(walk: "Walk", path: Path, fps: float, slow: float) -> None:
     try:
         ffmpeg = importlib.import_module("imageio_ffmpeg")
     except ImportError:
@@ -132,7 +132,7 @@ class _View:
     marks: tuple[float, ...]
 
 
-def _view(walk: "WalkResult") -> _View:
+def _view(walk: "Walk") -> _View:
     """The whole walk, with a strip of floor for the marks."""
     x, y = walk.frame_joints[:, :, 0], walk.frame_joints[:, :, 1]
     margin = 3 * walk.setup.parameters.circle_radius
@@ -150,7 +150,7 @@ class _Stage:
         size: width and height of a picture in pixels, even as video wants them.
     """
 
-    def __init__(self, walk: "WalkResult") -> None:
+    def __init__(self, walk: "Walk") -> None:
         from PIL import ImageFont
 
         view = _view(walk)
@@ -213,7 +213,7 @@ class _Stage:
         return image
 
 
-def _write_html(walk: "WalkResult", path: Path, fps: float, slow: float) -> None:
+def _write_html(walk: "Walk", path: Path, fps: float, slow: float) -> None:
     """A page with the data in it, lengths in whole tenths of a millimetre, times in microseconds."""
     count = min(len(walk.frame_time), _PLAYER_FRAMES)
     frames = np.rint(np.linspace(0, len(walk.frame_time) - 1, count)).astype(int)

@@ -14,8 +14,11 @@ from numpy.typing import NDArray
 from warpchain.engine import COUNTS, EXTREMES, Batch
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features
+from warpchain.motion import Motion
 from warpchain.options import Setup, contact_radius, joint_radius
 from warpchain.parameters import InputError, Parameters
+from warpchain.recorder import Recorder
+from warpchain.recording import NOTHING, Keep
 from warpchain.shapes import ellipse, lay_chain, stadium
 from warpchain.status import Status
 
@@ -45,11 +48,13 @@ class Course:
         drive_time: Simulated time [s] before the release.
         drive_counts: Counters (:data:`warpchain.engine.COUNTS`) of the time before the release.
         drive_extremes: Greatest opening and depths [m] of the time before the release.
+        recorder: What is kept of the motion since the release.
     """
 
-    def __init__(self, batch: Batch, world: int, setup: Setup) -> None:
-        """Place the chain of a walk in a world; the batch has the walk's options."""
+    def __init__(self, batch: Batch, world: int, setup: Setup, keep: Keep = NOTHING) -> None:
+        """Place the chain of a walk in a world; the batch has the walk's options, and records what is to be kept."""
         self.setup = setup
+        self.recorder = Recorder(batch, world, keep)
         self.status = Status.RUNNING
         self.raised = math.nan
         self.drive_time = 0.0
@@ -182,6 +187,16 @@ class Course:
         at_end = ledger["kinetic_at_end"] + ledger["potential_at_end"]
         ledger["residual"] = at_release - at_end - sum(lost.values())
         return ledger if self._released else dict.fromkeys(ledger, math.nan)
+
+    @property
+    def motion(self) -> Motion:
+        """What is kept of the motion since the release."""
+        has_sprocket = self._released and self.setup.scene.start != "ellipse"
+        return self.recorder.motion(self.setup.scene.links, self.raised if has_sprocket else math.nan)
+
+    def drain(self) -> None:
+        """Take what a launch has recorded; to be called after each, before the next phase."""
+        self.recorder.drain(self._released)
 
     def next_phase(self) -> bool:
         """Take a world that has stopped into its next phase; False if the course is over."""

@@ -2,13 +2,14 @@
 
 import threading
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from warpchain.course import Course
 from warpchain.engine import Batch
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features
 from warpchain.options import Options, Setup
+from warpchain.recording import NOTHING, Keep
 from warpchain.status import Status
 
 TRIES = {"cpu": 20_000, "cuda": 10_000}
@@ -18,7 +19,11 @@ MOST_SLOTS = 4096
 
 
 def run_setups(
-    setups: Sequence[Setup], *, slots: int | None = None, stop: threading.Event | None = None
+    setups: Sequence[Setup],
+    *,
+    keeps: Sequence[Keep] | None = None,
+    slots: int | None = None,
+    stop: threading.Event | None = None,
 ) -> Iterator[tuple[int, Course]]:
     """Run walks and yield each when it is over, as (place in ``setups``, course).
 
@@ -27,6 +32,8 @@ def run_setups(
 
     Args:
         setups: The walks, samples drawn.
+        keeps: What is kept of the motion of each, for ``course.motion``; None: nothing. Walks of equal options keep
+            frames equally often.
         slots: Chains that are carried on together in one launch. Default: on a GPU as many as fill it, on a CPU, where
             a launch is one core's work, one at a time, which stays in the cache.
         stop: When set, the walks are abandoned after the launch that is under way.
@@ -37,7 +44,16 @@ def run_setups(
     for (options, _), places in buckets.items():
         longest = max(setups[place].scene.links for place in places)
         worlds = slots or (MOST_SLOTS if options.device.startswith("cuda") else 1)
-        yield from _run_bucket(setups, places, Batch(min(worlds, len(places)), longest, options), stop)
+        wanted = {place: keeps[place] if keeps is not None else NOTHING for place in places}
+        # One batch for all, although most may keep nothing: two batches would wait for two slowest walks.
+        batch = Batch(
+            min(worlds, len(places)),
+            longest,
+            options,
+            keeps_samples=any(keep.series_every for keep in wanted.values()),
+            frame_every=next((keep.frame_every for keep in wanted.values() if keep.frame_every), None),
+        )
+        yield from _run_bucket(setups, wanted, batch, stop)
 
 
 def compile_kernels(setups: Iterable[Setup]) -> None:
@@ -54,24 +70,25 @@ def compile_kernels(setups: Iterable[Setup]) -> None:
 
 
 def _run_bucket(
-    setups: Sequence[Setup], places: Sequence[int], batch: Batch, stop: threading.Event | None
+    setups: Sequence[Setup], wanted: Mapping[int, Keep], batch: Batch, stop: threading.Event | None
 ) -> Iterator[tuple[int, Course]]:
-    """Run walks that share options and the width of their arrays."""
+    """Run walks, by place, that share options and the width of their arrays."""
     tries = TRIES["cuda" if batch.device.is_cuda else "cpu"]
-    waiting = iter(places)
+    waiting = iter(wanted)
     running: dict[int, tuple[int, Course]] = {}
     for world, place in zip(range(len(batch.links)), waiting, strict=False):
-        running[world] = place, Course(batch, world, setups[place])
+        running[world] = place, Course(batch, world, setups[place], wanted[place])
     while running and not (stop is not None and stop.is_set()):
         together: dict[Features, list[int]] = defaultdict(list)
         for world, (_, course) in running.items():
             together[course.features].append(world)
         batch.launch_together(together, tries)
         for world, (place, course) in list(running.items()):
+            course.drain()
             if batch.status(world) == Status.RUNNING or course.next_phase():
                 continue
             yield place, course
             del running[world]
             following = next(waiting, None)
             if following is not None:
-                running[world] = following, Course(batch, world, setups[following])
+                running[world] = following, Course(batch, world, setups[following], wanted[following])

@@ -1,7 +1,7 @@
 """The report of a sweep: one page that holds everything and loads nothing.
 
 Figures and tables of what is there of the sweep, its parameters, its file, where it comes from, which walks failed
-and what to try; on demand one walk in motion, run again for the page. A folder gives the same page each time.
+and what to try; on demand one walk in motion. A folder gives the same page each time.
 """
 
 import base64
@@ -20,6 +20,7 @@ import yaml
 
 from warpchain.parameters import DIMENSIONLESS, InputError
 from warpchain.planning import load_sweep
+from warpchain.recording import Recording
 from warpchain.results import replacing
 from warpchain.rows import MISSING, field_column
 from warpchain.shards import Folder
@@ -31,7 +32,7 @@ from warpchain.sweep_statistics import axis_symbol, cell_text, number_text
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from warpchain.results import WalkResult
+    from warpchain.plots import Walk
 
 FRAME_INTERVAL: Final = 2e-3
 """Time between two pictures of the walk in motion [s]."""
@@ -47,7 +48,8 @@ def write_report(directory: Folder, path: str | os.PathLike[str], *, animation_o
     Args:
         directory: folder of the sweep, which may still be running.
         path: the file to write.
-        animation_of: number of a walk to run again and to show in motion; None for none.
+        animation_of: number of a walk to show in motion, with the frames that the sweep kept of it or else run again;
+            None for none.
 
     Raises:
         OSError: the folder cannot be read, or the file cannot be written.
@@ -165,7 +167,7 @@ def _rows_of(result: SweepResult, block: BlockResult, status: Status) -> Iterato
 
 
 def _walk(result: SweepResult, index: int) -> str:
-    """One walk, run again: what it is, a player, and its pictures."""
+    """One walk, as kept or else run again: what it is, a player, and its pictures."""
     from warpchain.walker import run_walk
 
     planned = load_sweep(result.sweep).planned(index)
@@ -173,11 +175,18 @@ def _walk(result: SweepResult, index: int) -> str:
     place = (*planned.cell, planned.sample)
     name = f"block {block.name}, " if len(result.blocks) > 1 else ""
     cell = _cell(block, planned.cell)
-    walk = run_walk(planned.setup, frame_interval=FRAME_INTERVAL)
-    distance = f"Δx = {walk.dx:.4f} m in {walk.walk_time:.2f} s with {walk.bounces} bounces"
+    walk: Walk
+    if _has_frames(result, block, place):
+        walk, again = block.kept_walk(place), ""
+        seconds, bounces = block.columns["walk_time"][place], block.columns["bounces"][place]
+    else:
+        walk = ran = run_walk(planned.setup, frame_interval=FRAME_INTERVAL)
+        again, seconds, bounces = ", run again for this page", ran.walk_time, ran.bounces
+    distance = f"Δx = {walk.dx:.4f} m in {seconds:.2f} s with {bounces} bounces"
     text = (
-        f"Walk {index} ({name}{cell + ', ' if cell else ''}sample {planned.sample}), run again for this page: "
-        f"{distance if math.isfinite(walk.dx) else walk.status.label}. {_compared(walk, block, place)}"
+        f"Walk {index} ({name}{cell + ', ' if cell else ''}sample {planned.sample}){again}: "
+        f"{distance if math.isfinite(walk.dx) else walk.status.label}. "
+        + (_compared(walk, block, place) if again else "Its frames were kept by the sweep.")
     )
     parts = [f"<p>{escape(text)}</p>", _player(walk)]
     if len(walk.frame_time) and np.isfinite(walk.frame_joints).all():
@@ -191,7 +200,13 @@ def _walk(result: SweepResult, index: int) -> str:
     return "\n".join(parts)
 
 
-def _player(walk: "WalkResult") -> str:
+def _has_frames(result: SweepResult, block: BlockResult, place: tuple[int, ...]) -> bool:
+    """Whether the sweep has kept frames of a walk, or would have, had it been released."""
+    frames = Recording.of(result.sweep.get("record", {})).frames
+    return frames is not None and frames.includes(place[-1]) and bool(block.kept[place])
+
+
+def _player(walk: "Walk") -> str:
     """The page with the moving picture, inside this one; why there is none if it can't be made."""
     from warpchain.animation import animate
 
@@ -210,7 +225,7 @@ def _player(walk: "WalkResult") -> str:
     return f'<iframe title="the walk in motion" {style} srcdoc="{content}"></iframe>'
 
 
-def _compared(walk: "WalkResult", block: BlockResult, place: tuple[int, ...]) -> str:
+def _compared(walk: "Walk", block: BlockResult, place: tuple[int, ...]) -> str:
     """What the sweep says about a walk that was run again."""
     status, dx = int(block.columns["status"][place]), float(block.columns["dx"][place])
     if status == MISSING:

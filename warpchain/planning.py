@@ -20,6 +20,7 @@ from typing import Any, Final
 from warpchain.design import design_points, saltelli_points, walks_per_sample
 from warpchain.options import Scene, Setup, check_scene, resolve
 from warpchain.parameters import PRESETS, InputError, validated
+from warpchain.recording import Keep, Recording
 from warpchain.sampling import DRAW_LIMIT, Distribution, Gaussian, draw, placed, random_generator
 from warpchain.sweep_file import SECTIONS, VERSION, BlockPlan, Value, read_sweep
 
@@ -135,12 +136,14 @@ class Sweep:
         seed: seed of all random numbers.
         same_samples_along: axes along which the same samples are used, sorted.
         blocks: its blocks.
+        recording: what is kept of the motion of its walks.
     """
 
     name: str
     seed: int
     same_samples_along: tuple[str, ...]
     blocks: tuple[Block, ...]
+    recording: Recording
 
     @property
     def walk_count(self) -> int:
@@ -182,15 +185,32 @@ class Sweep:
         points, setups = _first_possible(block, fixed, candidates)
         return PlannedWalk(index, number, cell, sample, setups[member], points[member])
 
+    def keep(self, walk: PlannedWalk) -> Keep:
+        """What is kept of the motion of a walk."""
+        every = {
+            name: choice.steps(walk.setup.options, f"sweep.record.{name}") if choice.includes(walk.sample) else None
+            for name, choice in self.recording.choices.items()
+        }
+        return Keep(series_every=every.get("series"), frame_every=every.get("frames"))
+
     def check(self) -> None:
         """Check every cell: its fixed values, its distributions, and that a random sample makes a possible walk.
 
         Raises:
             InputError: a cell is refused.
         """
+        most = max(block.samples for block in self.blocks)
+        for name, choice in self.recording.choices.items():
+            if choice.samples is not None and choice.samples[-1] >= most:
+                raise InputError(
+                    f"sweep.record.{name}.samples: {choice.samples[-1]} is no sample of any block; "
+                    f"give numbers from 0 to {most - 1}"
+                )
         for block in self.blocks:
             for cell in block.cells():
                 fixed = block.fixed(cell)
+                for name, choice in self.recording.choices.items():
+                    choice.steps(fixed.options, f"sweep.record.{name}")
                 distributions = block.placed(fixed)
                 for name, distribution in distributions.items():
                     if distribution.share() < LEAST_SHARE:
@@ -235,7 +255,7 @@ class Sweep:
             "name": self.name,
             "seed": self.seed,
             "same_samples_along": list(self.same_samples_along),
-            "record": {"series": False},
+            "record": self.recording.canonical(),
             "blocks": [_canonical(block) for block in self.blocks],
         }
 
@@ -287,7 +307,7 @@ def load_sweep(source: "str | os.PathLike[str] | Mapping[str, object] | Sweep") 
         first_stream += math.prod(
             len(values) for name, values in block.axes.items() if name not in plan.same_samples_along
         )
-    sweep = Sweep(plan.name, plan.seed, plan.same_samples_along, tuple(blocks))
+    sweep = Sweep(plan.name, plan.seed, plan.same_samples_along, tuple(blocks), plan.recording)
     sweep.check()
     return sweep
 

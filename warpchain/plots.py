@@ -5,7 +5,7 @@ Figures are made without pyplot: nothing is global, no display is needed, the ca
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
 import numpy as np
 from matplotlib import colormaps
@@ -21,7 +21,10 @@ from numpy.typing import NDArray
 from warpchain.status import Status
 
 if TYPE_CHECKING:
+    from warpchain.kept_walk import KeptWalk
     from warpchain.results import WalkResult
+
+    Walk: TypeAlias = WalkResult | KeptWalk
 
 Array = NDArray[np.float64]
 
@@ -40,9 +43,20 @@ _CLOSE_UP_LINKS: Final = 9
 _CLOSE_UP_ASPECT: Final = 1.5
 
 
-def figure5(
-    walks: "Sequence[WalkResult]", *, labels: Sequence[str] | None = None, figure: Figure | None = None
-) -> Figure:
+def draw(walk: "Walk", kind: Literal["figure5", "film_strip"], *, figure: Figure | None = None) -> Figure:
+    """Draw a walk, see `WalkResult.plot`.
+
+    Raises:
+        ValueError: the kind is unknown, or the walk does not have what it shows.
+    """
+    if kind == "figure5":
+        return figure5([walk], figure=figure)
+    if kind == "film_strip":
+        return film_strip(walk, figure=figure)
+    raise ValueError(f"kind: {kind!r} is unknown; give 'figure5' or 'film_strip'")
+
+
+def figure5(walks: "Sequence[Walk]", *, labels: Sequence[str] | None = None, figure: Figure | None = None) -> Figure:
     """Height and horizontal speed of the centre of mass against time since the release, as in Figure 5.
 
     Args:
@@ -86,7 +100,7 @@ def figure5(
     return figure
 
 
-def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure | None = None) -> Figure:
+def film_strip(walk: "Walk", *, count: int | None = None, figure: Figure | None = None) -> Figure:
     """The chain along its walk, drawn to scale, and close-ups of it at the moments that matter.
 
     The strip shows the chain at instants between which its centre of mass moves equally far. Colour is time;
@@ -189,7 +203,7 @@ class _CloseUp:
     spot: Array
 
 
-def _close_ups(walk: "WalkResult") -> list[_CloseUp]:
+def _close_ups(walk: "Walk") -> list[_CloseUp]:
     """At most four moments, in order of time and each frame once.
 
     First touch of the floor; first self-contact; collapse, when the top of the chain is for the last time
@@ -235,7 +249,7 @@ def _sharpest_bend(joints: Array) -> int:
     return int(np.argmax(np.abs(turn)))
 
 
-def _instants(walk: "WalkResult", count: int | None) -> list[int]:
+def _instants(walk: "Walk", count: int | None) -> list[int]:
     """Frames between which the centre of mass moves equally far, the first and the last among them."""
     columns = [np.interp(walk.frame_time, walk.time, walk.center[:, axis]) for axis in (0, 1)]
     path = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(columns, axis=1)))])
@@ -245,7 +259,7 @@ def _instants(walk: "WalkResult", count: int | None) -> list[int]:
     return sorted({0, *(int(np.argmin(np.abs(path - mark))) for mark in marks), len(path) - 1})
 
 
-def _extent(walk: "WalkResult", boxes: list[float], width: float) -> tuple[float, float, float]:
+def _extent(walk: "Walk", boxes: list[float], width: float) -> tuple[float, float, float]:
     """Left and right end and top of all that the strip shows, boxes with their left ends included [m]."""
     x, y = walk.frame_joints[:, :, 0], walk.frame_joints[:, :, 1]
     margin = 3 * walk.setup.parameters.circle_radius
@@ -263,7 +277,7 @@ def _draw_ground(axes: Axes, left: float, right: float, bottom: float) -> None:
     axes.plot([left, right], [0.0, 0.0], color=INK, linewidth=1.0, zorder=3)
 
 
-def _draw_chain(axes: Axes, walk: "WalkResult", frame: int, color_of: ScalarMappable, edge: float) -> None:
+def _draw_chain(axes: Axes, walk: "Walk", frame: int, color_of: ScalarMappable, edge: float) -> None:
     """One chain: a white halo that parts it from those behind it, inner links, outer links over them."""
     outlines = link_outlines(walk.frame_joints[frame], walk.setup.parameters.circle_radius)
     color = np.array(color_of.to_rgba(walk.frame_time[frame])[:3])
@@ -277,7 +291,7 @@ def _draw_chain(axes: Axes, walk: "WalkResult", frame: int, color_of: ScalarMapp
         )
 
 
-def _annotate_strip(axes: Axes, walk: "WalkResult", depth: float) -> None:
+def _annotate_strip(axes: Axes, walk: "Walk", depth: float) -> None:
     """The sprocket, the path of the centre of mass, and the distance walked, at height `depth` [m]."""
     if walk.sprocket_center is not None:
         x, y = walk.sprocket_center

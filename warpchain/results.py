@@ -184,13 +184,9 @@ class WalkResult:
         Raises:
             ValueError: the kind is unknown, or a film strip is asked of a walk without frames.
         """
-        from warpchain.plots import figure5, film_strip
+        from warpchain.plots import draw
 
-        if kind == "figure5":
-            return figure5([self], figure=figure)
-        if kind == "film_strip":
-            return film_strip(self, figure=figure)
-        raise ValueError(f"kind: {kind!r} is unknown; give 'figure5' or 'film_strip'")
+        return draw(self, kind, figure=figure)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the walk to an HDF5 file, whole or not at all; an older file of that name is replaced.

@@ -16,6 +16,7 @@ from typing import Any, Protocol
 
 from warpchain.course import Course
 from warpchain.ensemble import compile_kernels, run_setups
+from warpchain.motion import Motion
 from warpchain.options import Setup
 from warpchain.parameters import InputError
 from warpchain.planning import PlannedWalk, Sweep, load_sweep
@@ -151,14 +152,18 @@ def run_shards(
     shard_of = {index: shard for shard in shards for index in range(*shard)}
     rows = {shard: empty_rows(planned, range(*shard)) for shard in shards}
     left = {shard: shard[1] - shard[0] for shard in shards}
+    motions: dict[tuple[int, int], dict[int, Motion]] = {shard: {} for shard in shards}
+    keeps = [planned.keep(walk) for walk in walks]
     keys = []
-    for place, course in run_setups([walk.setup for walk in walks], stop=stop):
+    for place, course in run_setups([walk.setup for walk in walks], keeps=keeps, stop=stop):
         walk = walks[place]
         shard = shard_of[walk.index]
         _fill(rows[shard][walk.index - shard[0]], walk, course)
+        if keeps[place].series_every is not None:
+            motions[shard][walk.index] = course.motion
         left[shard] -= 1
         if left[shard] == 0:
-            keys.append(write_shard(directory, digest, range(*shard), rows.pop(shard)))
+            keys.append(write_shard(directory, digest, range(*shard), rows.pop(shard), motions.pop(shard)))
     return keys
 
 

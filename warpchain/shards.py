@@ -11,14 +11,17 @@ import importlib.metadata
 import io
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
+from warpchain.motion import Motion, read_motion, write_motions
 from warpchain.parameters import InputError
+from warpchain.recording import Recording
 from warpchain.results import replacing
 from warpchain.rows import Rows, missing_rows, row_type
 from warpchain.status import Status
@@ -116,6 +119,28 @@ class Manifest:
         starts = range(0, self.walk_count, self.shard_size)
         return [range(start, min(start + self.shard_size, self.walk_count)) for start in starts]
 
+    @property
+    def recording(self) -> Recording:
+        """What is kept of the motion of walks."""
+        return Recording.of(self.sweep.get("record", {}))
+
+    def kept(self, walks: range) -> list[int]:
+        """Those of some walks whose motion is kept."""
+        series = self.recording.series
+        if series is None:
+            return []
+        found = []
+        for block in self.blocks:
+            last = block.first + int(np.prod(block.shape))
+            part = range(max(walks.start, block.first), min(walks.stop, last))
+            found += [walk for walk in part if series.includes((walk - block.first) % block.samples)]
+        return found
+
+    def shard_of(self, walk: int) -> range:
+        """The walks of the shard that a walk is in."""
+        start = walk - walk % self.shard_size
+        return range(start, min(start + self.shard_size, self.walk_count))
+
     def text(self) -> str:
         """Content of sweep.json."""
         content = {"format": FORMAT, "format_version": FORMAT_VERSION, **asdict(self)}
@@ -174,7 +199,9 @@ def shard_key(digest: str, walks: range, numerics_version: int = NUMERICS_VERSIO
     return hashlib.sha256(f"{digest} {numerics_version} {walks.start} {walks.stop}".encode()).hexdigest()
 
 
-def write_shard(directory: Folder, digest: str, walks: range, rows: Rows) -> str:
+def write_shard(
+    directory: Folder, digest: str, walks: range, rows: Rows, motions: Mapping[int, Motion] | None = None
+) -> str:
     """Write the rows of a shard; needs no lock and no `Store`, so that the workers of a sweep can call it.
 
     Two workers may write the same shard at the same time: both have the same bytes, and one replaces the
@@ -185,6 +212,7 @@ def write_shard(directory: Folder, digest: str, walks: range, rows: Rows) -> str
         digest: digest of the sweep that the rows were computed for.
         walks: indices of the walks; one of `Store.missing`.
         rows: their rows, shape (len(walks),), in order, of the type that the manifest says.
+        motions: index → motion of those of the walks whose motion the sweep keeps; None: of none.
 
     Returns:
         The key of the shard.
@@ -192,7 +220,7 @@ def write_shard(directory: Folder, digest: str, walks: range, rows: Rows) -> str
     Raises:
         OSError: the file cannot be written; the folder is as it was.
         InputError: the folder is not that of the sweep, perhaps not any more.
-        ValueError: the rows are not those of the walks.
+        ValueError: the rows or the motions are not those of the walks.
     """
     manifest = read_manifest(directory)
     if (manifest.digest, manifest.numerics_version) != (digest, NUMERICS_VERSION):
@@ -203,6 +231,9 @@ def write_shard(directory: Folder, digest: str, walks: range, rows: Rows) -> str
         raise ValueError(f"the rows are not those of walks {walks.start} to {walks.stop - 1}, all in order")
     if not np.isin(rows["status"], [status for status in Status if status != Status.RUNNING]).all():
         raise ValueError(f"a walk of {walks.start} to {walks.stop - 1} has no status that ends a walk")
+    motions = motions or {}
+    if sorted(motions) != manifest.kept(walks):
+        raise ValueError(f"the motions are not those that are kept of walks {walks.start} to {walks.stop - 1}")
     rows = rows.copy()
     for name in rows.dtype.names or ():  # there are many NaNs, and which one may depend on the batch
         if rows[name].dtype.kind == "f":
@@ -216,6 +247,8 @@ def write_shard(directory: Folder, digest: str, walks: range, rows: Rows) -> str
         file.attrs["numerics_version"] = NUMERICS_VERSION
         dataset = file.create_dataset("rows", data=rows)
         dataset.attrs["sha256"] = _checksum(rows)
+        if motions:
+            write_motions(motions, file)
 
     put_file(Path(directory) / "shards" / shard_name(walks), hdf5_image(fill))
     return key
@@ -234,25 +267,52 @@ def read_shard(directory: Folder, digest: str, walks: range, *, numerics_version
         OSError: the file cannot be read.
         InputError: the file is damaged or belongs to another sweep.
     """
+    with _opened(directory, digest, walks, numerics_version) as file:
+        rows = np.asarray(file["rows"][()])
+        if _checksum(rows) != file["rows"].attrs["sha256"]:
+            raise ValueError("rows")
+    return rows
+
+
+def read_motions(directory: Folder, manifest: Manifest, walks: range) -> dict[int, Motion]:
+    """The motions of some walks of one shard, by index and in order, all checked; needs no lock.
+
+    Args:
+        directory: folder of the sweep.
+        manifest: its manifest.
+        walks: indices of walks of one shard; those whose motion is not kept are left out.
+
+    Raises:
+        OSError: the file cannot be read.
+        InputError: the file is damaged or belongs to another sweep.
+    """
+    shard = manifest.shard_of(walks.start)
+    with _opened(directory, manifest.digest, shard, manifest.numerics_version) as file:
+        return {walk: read_motion(file, walk) for walk in manifest.kept(walks)}
+
+
+@contextmanager
+def _opened(directory: Folder, digest: str, walks: range, numerics_version: int) -> "Iterator[h5py.File]":
+    """The file of a shard; whatever goes wrong while it is read means that it is damaged."""
     import h5py
 
     path = Path(directory) / "shards" / shard_name(walks)
     try:
-        content = path.read_bytes()
+        content = path.open("rb")
     except OSError as error:
         raise _unreadable(path, error) from error
-    try:
-        with h5py.File(io.BytesIO(content), "r") as file:
-            key, rows = str(file.attrs["key"]), np.asarray(file["rows"][()])
-            whole = bool(_checksum(rows) == file["rows"].attrs["sha256"])
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError):
-        whole = False
-    if not whole:
-        problem = "damaged or cut short; delete it and run the sweep again, which computes only its walks"
-        raise InputError(f"{path}: {problem}")
-    if key != shard_key(digest, walks, numerics_version):
+    is_foreign = False
+    with content:
+        try:
+            with h5py.File(content, "r") as file:
+                is_foreign = str(file.attrs["key"]) != shard_key(digest, walks, numerics_version)
+                if not is_foreign:
+                    yield file
+        except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError):
+            problem = "damaged or cut short; delete it and run the sweep again, which computes only its walks"
+            raise InputError(f"{path}: {problem}") from None
+    if is_foreign:
         raise InputError(f"{path}: a shard of another sweep; move it out of this folder")
-    return rows
 
 
 def _checksum(rows: Rows) -> str:
@@ -293,9 +353,26 @@ def hdf5_image(fill: "Callable[[h5py.File], None]") -> bytes:
     import h5py
 
     image = io.BytesIO()
-    with h5py.File(image, "w", libver=("v108", "v108"), track_order=True) as file:
+    with h5py.File(image, "w", **_FIXED) as file:
         fill(file)
     return image.getvalue()
+
+
+@contextmanager
+def open_new_hdf5(path: Path) -> "Iterator[h5py.File]":
+    """A new HDF5 file that is too large for `hdf5_image`, with the same bytes.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    import h5py
+
+    with path.open("w+b") as content, h5py.File(content, "w", **_FIXED) as file:
+        yield file
+
+
+_FIXED: Final[dict[str, Any]] = {"libver": ("v108", "v108"), "track_order": True}
+"""What equal bytes take."""
 
 
 _REMEDIES: Final = {

@@ -75,7 +75,7 @@ def plot(
         typer.Option("-o", "--output", metavar="DIR", help="Folder of the figures. Default: DIR."),
     ] = None,
 ) -> None:
-    """Draw every figure that the sweep has something for: Figure 6, maps, tolerance, sensitivity, statuses."""
+    """Draw every figure that the sweep has something for: Figures 6 and 5, maps, tolerance, sensitivity, statuses."""
     from warpchain.results import replacing
     from warpchain.sweep_plots import figures
     from warpchain.sweep_result import load
@@ -98,7 +98,12 @@ def report(
         Path | None, typer.Option("-o", "--output", metavar="FILE.html", help="The page. Default: DIR/report.html.")
     ] = None,
     walk: Annotated[
-        int | None, typer.Option(metavar="INDEX", min=0, help="Run this walk again and show it in motion.")
+        int | None,
+        typer.Option(
+            metavar="INDEX",
+            min=0,
+            help="Show this walk in motion: its frames if the sweep kept them, or else run again.",
+        ),
     ] = None,
 ) -> None:
     """Write one self-contained HTML page: figures, table, parameters, provenance, failed walks, a walk in motion."""
@@ -114,7 +119,7 @@ def merge(
     output: Annotated[Path, typer.Argument(metavar="FILE.h5", help="The file to write.", show_default=False)],
 ) -> None:
     """Put all results into one HDF5 file with named axes and units, which xarray opens."""
-    from warpchain.sweep_result import merge as merge_shards
+    from warpchain.merged_file import merge as merge_shards
 
     merge_shards(directory, output)
     print(output)

@@ -18,6 +18,7 @@ from pydantic import BaseModel, ValidationError
 from warpchain.design import SAMPLERS, check_design
 from warpchain.options import Options, Scene, read_yaml
 from warpchain.parameters import InputError, Parameters, preset, shown, suggestion, validated
+from warpchain.recording import FRAME_INTERVAL, SERIES_INTERVAL, Choice, Recording
 from warpchain.sampling import TABLE, Distribution, Gaussian, Uniform, physical_values
 
 Value = float | int | str
@@ -83,12 +84,14 @@ class SweepPlan:
         seed: seed of all random numbers.
         same_samples_along: axes along which the same samples are used, sorted.
         blocks: at least one.
+        recording: what is kept of the motion of walks.
     """
 
     name: str
     seed: int
     same_samples_along: tuple[str, ...]
     blocks: tuple[BlockPlan, ...]
+    recording: Recording
 
 
 def read_sweep(source: str | os.PathLike[str] | Mapping[str, object]) -> SweepPlan:
@@ -104,13 +107,41 @@ def read_sweep(source: str | os.PathLike[str] | Mapping[str, object]) -> SweepPl
     version = _needed(top, "version", "sweep", f"give {VERSION}")
     if version != VERSION or isinstance(version, bool):
         raise InputError(f"sweep.version: {shown(version)} is not supported; give {VERSION}")
-    record = _keys(top.get("record"), "sweep.record", ("series",))
-    if record.get("series", False) is not False:
-        raise InputError(f"sweep.record.series: {shown(record['series'])} is not supported; give false")
+    recording = _recording(top.get("record"))
     name = _text(_needed(top, "name", "sweep", "give the sweep a name"), "sweep.name")
     seed = _whole(_needed(top, "seed", "sweep", "give a whole number"), "sweep.seed", 0, 2**128 - 1)
     blocks = tuple(_blocks(top))
-    return SweepPlan(name, seed, _same_samples_along(top.get("same_samples_along"), blocks), blocks)
+    return SweepPlan(name, seed, _same_samples_along(top.get("same_samples_along"), blocks), blocks, recording)
+
+
+def _recording(content: object) -> Recording:
+    """What is kept of the motion of walks."""
+    given = _keys(content, "sweep.record", ("series", "frames"))
+    series = _choice(given.get("series", False), "sweep.record.series", SERIES_INTERVAL)
+    frames = _choice(given.get("frames", False), "sweep.record.frames", FRAME_INTERVAL)
+    if frames is not None and (series is None or not series.covers(frames)):
+        raise InputError(
+            "sweep.record.frames: kept of samples without series; give them in sweep.record.series as well"
+        )
+    return Recording(series, frames)
+
+
+def _choice(content: object, path: str, interval: float) -> Choice | None:
+    """Of which samples something is kept, and how often; None for none."""
+    if content is False:
+        return None
+    if not (content is True or isinstance(content, Mapping)):
+        raise InputError(f"{path}: {shown(content)}; give true, false or {{interval: {interval}, samples: [0, 1]}}")
+    keys = {} if content is True else _keys(content, path, ("interval", "samples"))
+    chosen = keys.get("samples", "all")
+    samples = None
+    if chosen != "all":
+        numbers = _sequence(chosen, f"{path}.samples", "give all, or a list such as [0, 1]")
+        samples = tuple(_whole(item, f"{path}.samples[{place}]", 0, 2**30) for place, item in enumerate(numbers))
+        if len(set(samples)) < len(samples):
+            raise InputError(f"{path}.samples: a number is given twice; leave one out")
+        samples = tuple(sorted(samples))
+    return Choice(float(_positive(keys.get("interval", interval), f"{path}.interval")), samples)
 
 
 @dataclass(frozen=True)

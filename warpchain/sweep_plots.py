@@ -1,4 +1,4 @@
-"""Figures of sweeps: the paper's Figure 6, maps over the grid, tolerances compared, sensitivity, how walks ended.
+"""Figures of sweeps: the paper's Figures 6 and 5, maps, tolerances compared, sensitivity, how walks ended.
 
 Means and spreads are of the walks that came to rest. Walks that failed, or have not been run yet, are counted on the
 figure.
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from warpchain.parameters import DIMENSIONLESS, Parameters
 from warpchain.plots import FAINT, GROUND, INK, LINE_COLORS, _tidy
 from warpchain.status import Status
+from warpchain.sweep_figure5 import sweep_figure5
 from warpchain.sweep_statistics import (
     CONFIDENCE,
     NothingToShow,
@@ -78,11 +79,14 @@ class Picture:
 
 
 def figures(result: "SweepResult") -> Iterator[Picture]:
-    """Every figure that a sweep has something for, the paper's Figure 6 first."""
+    """Every figure that a sweep has something for, the paper's Figures 6 and 5 first."""
     with suppress(NothingToShow):
         if any(len(item.cells) > 1 for item in _all_series(result)):
             text = "Distance walked against the frequency of the sprocket, as in the paper's Figure 6: mean, "
             yield Picture("figure6", text + "box of one and bar of two standard deviations.", figure6(result))
+    with suppress(NothingToShow):
+        figure, text = sweep_figure5(result)
+        yield Picture("figure5", text, figure)
     with suppress(NothingToShow):
         text = "Mean and standard deviation of the distance walked, over the walks at rest in each cell."
         yield Picture("heat_map", text, heat_map(result))

@@ -1,28 +1,26 @@
-"""Results of a sweep as arrays with named axes, and the one HDF5 file that keeps them.
+"""Results of a sweep as arrays with named axes.
 
 A folder is read at any moment, also while its sweep runs: what is not there yet is missing and counted.
 """
 
 import importlib
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.kept_walk import KeptMotions, KeptWalk, kept_motions
 from warpchain.parameters import InputError, Parameters, shown, suggestion
 from warpchain.rows import COLUMNS, MISSING, Column, Rows, field_column, missing_rows
-from warpchain.shards import FORMAT_VERSION, Folder, Manifest, hdf5_image, put_file, read_manifest
+from warpchain.shards import FORMAT_VERSION, Folder, Manifest, read_manifest
 from warpchain.status import Status
 from warpchain.store import read_rows
 
 if TYPE_CHECKING:
-    import h5py
     import pandas
     import xarray
 
@@ -76,12 +74,14 @@ class BlockResult:
         axes: name of each axis of the grid → its values, in order; the samples are one more axis.
         drawn: names of the quantities that samples draw.
         columns: name → values.
+        motions: where the motions of the walks are; None if none was kept.
     """
 
     name: str
     axes: dict[str, Array]
     drawn: tuple[str, ...]
     columns: dict[str, Array]
+    motions: KeptMotions | None = None
 
     @property
     def dims(self) -> tuple[str, ...]:
@@ -132,6 +132,55 @@ class BlockResult:
             raise KeyError(f"{shown(name)}: {suggestion(name, (*self.columns, *self.axes))}")
         return COLUMNS[name] if name in COLUMNS else field_column(name)
 
+    @property
+    def kept(self) -> NDArray[np.bool_]:
+        """Whether the motion of a walk was kept and is there, shape `shape`."""
+        recording = None if self.motions is None else self.motions.manifest.recording.series
+        numbers = range(self.shape[-1])
+        chosen = np.array([recording is not None and recording.includes(sample) for sample in numbers])
+        there: NDArray[np.bool_] = chosen & (self.columns["status"] != MISSING)
+        return there
+
+    def series(self, *, sample: int = 0, **at: float | str) -> KeptWalk:
+        """The motion of one walk: `series(links=60, frequency=15, sample=2).time`.
+
+        Args:
+            sample: number of the sample.
+            at: value of each axis; of an axis with just one value it may be left out.
+
+        Raises:
+            InputError: there is no such walk, or its motion was not kept or is not there yet.
+            OSError: its shard cannot be read.
+        """
+        if unknown := [name for name in at if name not in self.axes]:
+            known = f"{suggestion(unknown[0], tuple(self.axes))}" if self.axes else "there are no axes"
+            raise InputError(f"{unknown[0]}: no axis of block {self.name}; {known}")
+        place = []
+        for name, values in self.axes.items():
+            if name not in at and len(values) > 1:
+                raise InputError(f"{name}: missing; give one of {', '.join(map(str, values))}")
+            found = np.flatnonzero(values == at.get(name, values[0]))
+            if not len(found):
+                raise InputError(
+                    f"{name}: {shown(at[name])} is not on the axis; give one of {', '.join(map(str, values))}"
+                )
+            place.append(int(found[0]))
+        is_whole = isinstance(sample, (int, np.integer)) and not isinstance(sample, bool)
+        if not is_whole or not 0 <= sample < self.shape[-1]:
+            raise InputError(f"sample: there is no sample {shown(sample)}; give 0 to {self.shape[-1] - 1}")
+        return self.kept_walk((*place, sample))
+
+    def kept_walk(self, place: tuple[int, ...]) -> KeptWalk:
+        """The motion of the walk at a place along the axes and samples; errors as of `series`."""
+        if self.motions is None or not self.kept[place]:
+            kept = np.flatnonzero(self.kept.any(axis=tuple(range(len(self.axes)))))
+            there = (
+                f"kept are samples {', '.join(map(str, kept[:12]))}" if len(kept) else "record: {series: true} keeps it"
+            )
+            raise InputError(f"the motion of walk {self.columns['index'][place]} is not there; {there}")
+        row = {name: self.columns[name][place] for name in ("status", "dx")}
+        return self.motions.walk(int(self.columns["index"][place]), row)
+
     def summary(self) -> dict[str, int]:
         """Number of walks by status label; `at_rest` and `missing` always, others if there are any."""
         return _summary(self.columns["status"])
@@ -167,7 +216,7 @@ class BlockResult:
         Raises:
             ImportError: xarray is not installed.
         """
-        coordinates, variables = self._variables()
+        coordinates, variables = self.variables()
         dataset: xarray.Dataset = _package("xarray").Dataset(variables, coordinates, {"block": self.name})
         return dataset
 
@@ -182,13 +231,13 @@ class BlockResult:
         table = {name: values.ravel() for name, values in (places | self.columns).items()}
         return _package("pandas").DataFrame(table)
 
-    def _variables(self) -> tuple[_Variables, _Variables]:
+    def variables(self) -> tuple[_Variables, _Variables]:
         """Coordinates and variables."""
         places = {**self.axes, "sample": np.arange(self.shape[-1])}
-        coordinates: _Variables = {name: ((name,), values, self._notes(name)) for name, values in places.items()}
-        return coordinates, {name: (self.dims, values, self._notes(name)) for name, values in self.columns.items()}
+        coordinates: _Variables = {name: ((name,), values, self.notes(name)) for name, values in places.items()}
+        return coordinates, {name: (self.dims, values, self.notes(name)) for name, values in self.columns.items()}
 
-    def _notes(self, name: str) -> dict[str, Any]:
+    def notes(self, name: str) -> dict[str, Any]:
         """Attributes of a variable."""
         column = self._column(name)
         notes: dict[str, Any] = {"units": column.unit, "description": column.meaning}
@@ -268,11 +317,11 @@ class SweepResult:
         """
         package = _package("xarray")
         sets = {name: block.to_xarray() for name, block in self.blocks.items()}
-        notes = self._notes()
+        attributes = self.notes()
         if len(sets) == 1:
-            dataset: xarray.Dataset = next(iter(sets.values())).assign_attrs(notes)
+            dataset: xarray.Dataset = next(iter(sets.values())).assign_attrs(attributes)
             return dataset
-        tree: xarray.DataTree = package.DataTree.from_dict({"/": package.Dataset(attrs=notes), **sets})
+        tree: xarray.DataTree = package.DataTree.from_dict({"/": package.Dataset(attrs=attributes), **sets})
         return tree
 
     def to_pandas(self) -> "pandas.DataFrame":
@@ -286,7 +335,7 @@ class SweepResult:
             table.insert(0, "block", name)
         return _package("pandas").concat(list(tables.values()), ignore_index=True)
 
-    def _notes(self) -> dict[str, Any]:
+    def notes(self) -> dict[str, Any]:
         """Attributes of a file: what the result is and how to make it again."""
         return {
             "format": FORMAT,
@@ -318,57 +367,13 @@ def load(directory: Folder) -> SweepResult:
     return SweepResult(
         name=manifest.name,
         seed=manifest.seed,
-        blocks=_blocks(manifest, rows),
+        blocks=_blocks(manifest, rows, kept_motions(directory, manifest)),
         sweep=manifest.sweep,
         provenance=provenance,
     )
 
 
-def merge(directory: Folder, path: str | os.PathLike[str]) -> None:
-    """Write the results of a folder to one HDF5 file, whole or not at all; an older file is replaced.
-
-    Axes and samples are dimension scales; units and meanings are attributes of every dataset, and the resolved
-    sweep, versions and counts by status those of the file. A single block is in the root group, which
-    `xarray.open_dataset(path, engine="h5netcdf")` opens; several are in groups of their names (`group=`).
-
-    Raises:
-        OSError: the folder cannot be read, or the file cannot be written.
-        InputError: there is no sweep in the folder, or a shard is damaged or foreign.
-    """
-    result = load(directory)
-    target = Path(path)
-    if target.resolve().parent == (Path(directory) / "shards").resolve():
-        raise InputError(f"{target}: among the shards of the sweep; give another folder")
-
-    def fill(file: "h5py.File") -> None:
-        file.attrs.update(result._notes())
-        for name, block in result.blocks.items():
-            group = file if len(result.blocks) == 1 else file.create_group(name, track_order=True)
-            group.attrs["block"] = name
-            _write(block, group)
-
-    put_file(target, hdf5_image(fill))
-
-
-def _write(block: BlockResult, group: "h5py.Group") -> None:
-    """Fill the group of a block."""
-    coordinates, variables = block._variables()
-    for name, (dims, values, notes) in {**coordinates, **variables}.items():
-        if values.dtype.kind == "b":  # NetCDF has no truth values; xarray's way to write them
-            values, notes = values.astype(np.int8), {**notes, "dtype": "bool"}
-        if values.dtype.kind == "U":
-            values = values.astype(object)
-        filters = {} if name in coordinates else {"compression": "gzip", "shuffle": True}
-        dataset = group.create_dataset(name, data=values, **filters)
-        dataset.attrs.update(notes)
-        if name in coordinates:
-            dataset.make_scale(name)
-        else:
-            for place, dim in enumerate(dims):
-                dataset.dims[place].attach_scale(group[dim])
-
-
-def _blocks(manifest: Manifest, rows: Rows) -> dict[str, BlockResult]:
+def _blocks(manifest: Manifest, rows: Rows, motions: KeptMotions | None) -> dict[str, BlockResult]:
     """The blocks of a sweep, from the rows of all of its walks."""
     blocks = {}
     for layout in manifest.blocks:
@@ -380,6 +385,7 @@ def _blocks(manifest: Manifest, rows: Rows) -> dict[str, BlockResult]:
             axes={name: np.array(values) for name, values in layout.axes.items()},
             drawn=layout.drawn,
             columns={name: np.ascontiguousarray(part[name]) for name in names},
+            motions=motions,
         )
     return blocks
 

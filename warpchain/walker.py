@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
-from warpchain.course import Course, Phase
+from warpchain.course import Course
 from warpchain.engine import Batch, versions
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features
 from warpchain.options import Options, Scene, Setup, check_scene, contact_radius, resolve
 from warpchain.parameters import InputError, Parameters, shown, suggestion, validated
+from warpchain.recorder import EVERYTHING
 from warpchain.results import CONTACTS, WalkResult
 from warpchain.sampling import random_generator, sample_parameters, sample_scene
 
@@ -131,12 +132,11 @@ def run_walk(
     options = setup.options
     frame_every = None if frame_interval is None else _samples_per_frame(frame_interval, options)
     batch = Batch(1, setup.scene.links, options, keeps_samples=True, frame_every=frame_every)
-    course = Course(batch, 0, setup)
-    record = _Record(batch)
+    course = Course(batch, 0, setup, EVERYTHING)
     compiled: set[Features] = set()
 
     def after_launch() -> None:
-        record.drain()
+        course.drain()
         report(Progress(course.phase.value, course.walk_time or course.simulated_time, course.speed, course.tries))
 
     running = True
@@ -145,13 +145,9 @@ def run_walk(
         if features not in compiled:
             report(Progress("compile", course.simulated_time, 0.0, course.tries))
             compiled.add(features)
-        if course.phase == Phase.WALK:
-            record.clear()
         batch.run([0], features, after_launch)
         running = course.next_phase()
-    if course.phase != Phase.WALK:
-        record.clear()
-    return _result(course, record, seed, time.perf_counter() - started)
+    return _result(course, seed, time.perf_counter() - started)
 
 
 def _samples_per_frame(frame_interval: float, options: Options) -> int:
@@ -174,11 +170,11 @@ def _samples_per_frame(frame_interval: float, options: Options) -> int:
     return round(samples)
 
 
-def _result(course: Course, record: "_Record", seed: int | None, wall_time: float) -> WalkResult:
+def _result(course: Course, seed: int | None, wall_time: float) -> WalkResult:
     """Put the result together; the record is empty if the chain was never released."""
     setup, counts, extremes = course.setup, course.counts, course.extremes
     on_sprocket = setup.scene.start != "ellipse"
-    samples, frame_time, frames = record.arrays(setup.scene.links)
+    samples, (frame_time, frames) = course.recorder.samples(), course.recorder.frames(setup.scene.links)
     return WalkResult(
         status=course.status,
         dx=course.dx,
@@ -208,30 +204,3 @@ def _result(course: Course, record: "_Record", seed: int | None, wall_time: floa
         frame_time=frame_time,
         frame_joints=frames,
     )
-
-
-class _Record:
-    """Time series and frames of a batch of one, collected between launches."""
-
-    def __init__(self, batch: Batch) -> None:
-        self._batch = batch
-        self.clear()
-
-    def clear(self) -> None:
-        """Forget what has been collected."""
-        self._samples: list[Array] = []
-        self._frame_times: list[Array] = []
-        self._frames: list[Array] = []
-
-    def drain(self) -> None:
-        """Take what the last launch wrote."""
-        self._samples.append(self._batch.drain_samples(0))
-        times, frames = self._batch.drain_frames(0)
-        self._frame_times.append(times)
-        self._frames.append(frames)
-
-    def arrays(self, links: int) -> tuple[Array, Array, Array]:
-        """Samples (t, SAMPLE_COLUMNS), frame times (f,) [s], joint positions (f, n, 2) [m]."""
-        if not self._samples:
-            return np.empty((0, layout.SAMPLE_COLUMNS)), np.empty(0), np.empty((0, links, 2))
-        return np.concatenate(self._samples), np.concatenate(self._frame_times), np.concatenate(self._frames)
