@@ -21,7 +21,16 @@ from numpy.typing import NDArray
 from warpchain.motion import FRAMES, SERIES, Motion
 from warpchain.parameters import InputError
 from warpchain.results import replacing
-from warpchain.shards import Folder, hdf5_image, open_new_hdf5, put_file, read_motions, unwritable
+from warpchain.shards import (
+    Folder,
+    hdf5_image,
+    open_new_hdf5,
+    present_shards,
+    put_file,
+    read_manifest,
+    read_motions,
+    unwritable,
+)
 from warpchain.sweep_result import BlockResult, SweepResult, load
 
 if TYPE_CHECKING:
@@ -29,6 +38,8 @@ if TYPE_CHECKING:
 
 _DIMENSIONS: Final = {"series": "instant", "frame": "frame", "joint": "joint"}
 """What is counted of a walk → name of the axis that it is along."""
+_ROOM: Final = 2**20
+"""Bytes that a merged file takes at most beyond its shards: their frames, and the tables of axes."""
 _NO_VARIABLE: Final = "This is a netCDF dimension but not a netCDF variable."
 
 
@@ -46,9 +57,10 @@ def merge(directory: Folder, path: str | os.PathLike[str]) -> None:
     if not any(block.kept.any() for block in result.blocks.values()):
         put_file(target, hdf5_image(lambda file: _fill(file, result)))
         return
-    # Motions do not fit into memory: this file grows on the disk.
+    # Motions may not fit into memory: this file grows on the disk.
+    most = _ROOM + sum(path.stat().st_size for path in present_shards(directory, read_manifest(directory)).values())
     try:
-        with replacing(target) as part, open_new_hdf5(part) as file:
+        with replacing(target) as part, open_new_hdf5(part, most) as file:
             _fill(file, result)
     except OSError as error:
         raise unwritable(target, error) from error

@@ -1,4 +1,4 @@
-"""Shards: immutable HDF5 files that hold the rows of ended walks, and the manifest that says what they are.
+"""Shards: immutable HDF5 files that hold the rows and motions of ended walks, and the manifest that says what they are.
 
 A shard appears whole or not at all: its bytes go to a temporary name, to the disk, and then get their name.
 Only what the digest of the sweep and the numerics decide is in it, no time and no place, so that a sweep
@@ -135,6 +135,18 @@ class Manifest:
             part = range(max(walks.start, block.first), min(walks.stop, last))
             found += [walk for walk in part if series.includes((walk - block.first) % block.samples)]
         return found
+
+    @property
+    def kept_count(self) -> int:
+        """Number of walks whose motion is kept."""
+        series = self.recording.series
+        if series is None:
+            return 0
+        return sum(
+            int(np.prod(block.shape[:-1]))
+            * (block.samples if series.samples is None else sum(sample < block.samples for sample in series.samples))
+            for block in self.blocks
+        )
 
     def shard_of(self, walk: int) -> range:
         """The walks of the shard that a walk is in."""
@@ -359,15 +371,22 @@ def hdf5_image(fill: "Callable[[h5py.File], None]") -> bytes:
 
 
 @contextmanager
-def open_new_hdf5(path: Path) -> "Iterator[h5py.File]":
+def open_new_hdf5(path: Path, most: int) -> "Iterator[h5py.File]":
     """A new HDF5 file that is too large for `hdf5_image`, with the same bytes.
 
+    Its room is taken beforehand, for the reason given there; what is left over is given back.
+
+    Args:
+        path: the file, which may be there.
+        most: bytes that it takes at most.
+
     Raises:
-        OSError: it cannot be written.
+        OSError: there is not enough room, or the file cannot be written.
     """
     import h5py
 
     with path.open("w+b") as content, h5py.File(content, "w", **_FIXED) as file:
+        os.posix_fallocate(content.fileno(), 0, most)
         yield file
 
 

@@ -2,7 +2,7 @@
 
     DIR/sweep.json     what the folder belongs to, see `Manifest`; written first and never changed
     DIR/sweep.yaml     the resolved sweep, for people and to run again
-    DIR/shards/        000000000-000000063.h5 holds walks 0 … 63
+    DIR/shards/        000000000-000000063.h5 holds walks 0 … 63, and their series and frames if they are kept
     DIR/log.txt        what the runs of the sweep did, with times
     DIR/lock           locked by the process that runs the sweep; the system unlocks it when that ends
 
@@ -16,6 +16,7 @@ import re
 import secrets
 import shutil
 import socket
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Self
@@ -23,6 +24,7 @@ from typing import TYPE_CHECKING, Final, Self
 import numpy as np
 import yaml
 
+from warpchain.motion import SERIES, Motion
 from warpchain.parameters import InputError
 from warpchain.rows import Rows
 from warpchain.shards import (
@@ -47,6 +49,11 @@ __all__ = ["Store", "empty_rows", "read_rows", "read_shard", "write_shard"]
 
 SHARD_OVERHEAD: Final = 16 * 1024
 """Bytes that a shard takes at most beside its rows."""
+
+SHORT_WALK: Final = 0.5
+"""Time [s] that few walks are shorter than."""
+SAMPLE_BYTES: Final = 8 * len(SERIES)
+"""Bytes of a sample of a series."""
 
 _OWN: Final = ("sweep.json", "sweep.yaml", "shards", "log.txt")
 _PART: Final = re.compile(r"\.(?:sweep|\d{9,}-\d{9,})\.[0-9a-f]{8}\.part\.(?:json|yaml|h5)")
@@ -130,9 +137,9 @@ class Store:
         present = present_shards(self.directory, self.manifest)
         return [walks for walks in self.manifest.shards if walks not in present]
 
-    def write(self, walks: range, rows: Rows) -> str:
-        """Write the rows of a shard, see `write_shard`, and return its key."""
-        return write_shard(self.directory, self.manifest.digest, walks, rows)
+    def write(self, walks: range, rows: Rows, motions: Mapping[int, Motion] | None = None) -> str:
+        """Write a shard, see `write_shard`, and return its key."""
+        return write_shard(self.directory, self.manifest.digest, walks, rows, motions)
 
     def rows(self) -> Rows:
         """Rows of all walks that are there, in order.
@@ -156,6 +163,12 @@ class Store:
     ) -> None:
         """Close."""
         self.close()
+
+    @property
+    def _series_bytes(self) -> float:
+        """What the series of a short walk takes; frames are not in it."""
+        series = self.manifest.recording.series
+        return 0.0 if series is None else SHORT_WALK / series.interval * SAMPLE_BYTES
 
     def _check(self) -> None:
         """Refuse what would fail later: bad shards, a folder that cannot be written, a disk too full."""
@@ -181,6 +194,7 @@ class Store:
             raise unwritable(shards, error) from error
         row = self.manifest.row_type.itemsize
         need = sum(len(walks) * row + SHARD_OVERHEAD for walks in left)
+        need += round(sum(map(len, left)) / self.manifest.walk_count * self.manifest.kept_count * self._series_bytes)
         if need > free:
             raise OSError(
                 f"{self.directory}: the rest of the sweep takes {need / 1e6:.3g} MB, but {free / 1e6:.3g} MB are "

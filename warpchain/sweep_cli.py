@@ -39,6 +39,10 @@ def sweep(
         str | None,
         typer.Option(metavar="tcp://HOST:PORT", help="Run on the workers of this Dask scheduler; they must see DIR."),
     ] = None,
+    gpus: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, help="Run on the first N GPUs of this machine, a process for each."),
+    ] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Discard what another sweep left in the folder.")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -46,7 +50,9 @@ def sweep(
     from warpchain.runner import sweep as run
     from warpchain.terminal import status_line
 
-    with status_line() as show, _dask(scheduler) as cluster:
+    if gpus is not None:
+        device = _device_of_gpus(scheduler, workers, device)
+    with status_line() as show, _gpus(gpus) if gpus is not None else _dask(scheduler) as cluster:
         executor, threads = cluster
         result = run(
             source,
@@ -129,6 +135,31 @@ def add_commands(app: typer.Typer) -> None:
     """Register the commands."""
     for command in (sweep, info, plot, report, merge):
         app.command()(command)
+
+
+def _device_of_gpus(scheduler: str | None, workers: int | None, device: str | None) -> str:
+    """The device of a sweep on several GPUs.
+
+    Raises:
+        InputError: another option contradicts --gpus.
+    """
+    from warpchain.parameters import InputError
+
+    for name, value in (("--scheduler", scheduler), ("--workers", workers)):
+        if value is not None:
+            raise InputError(f"{name}: given together with --gpus; leave one out")
+    if device not in (None, "cuda"):
+        raise InputError(f"--device: {device} is given together with --gpus; give cuda, or leave one out")
+    return "cuda"
+
+
+@contextlib.contextmanager
+def _gpus(count: int) -> "Iterator[tuple[Executor | None, int | None]]":
+    """An executor with a process for each GPU, and their number."""
+    from warpchain.gpu_workers import gpu_workers
+
+    with gpu_workers(count) as executor:
+        yield executor, count
 
 
 @contextlib.contextmanager

@@ -174,10 +174,9 @@ class BlockResult:
         """The motion of the walk at a place along the axes and samples; errors as of `series`."""
         if self.motions is None or not self.kept[place]:
             kept = np.flatnonzero(self.kept.any(axis=tuple(range(len(self.axes)))))
-            there = (
-                f"kept are samples {', '.join(map(str, kept[:12]))}" if len(kept) else "record: {series: true} keeps it"
-            )
-            raise InputError(f"the motion of walk {self.columns['index'][place]} is not there; {there}")
+            samples = ", ".join(map(str, kept[:12]))
+            remedy = f"give one of the samples {samples}" if samples else "a sweep with record: {series: true} keeps it"
+            raise InputError(f"the motion of walk {self.columns['index'][place]} is not there; {remedy}")
         row = {name: self.columns[name][place] for name in ("status", "dx")}
         return self.motions.walk(int(self.columns["index"][place]), row)
 

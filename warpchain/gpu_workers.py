@@ -1,0 +1,48 @@
+"""Several GPUs of this host: one worker process for each, as an executor of a sweep."""
+
+import contextlib
+import multiprocessing
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing.queues import SimpleQueue
+
+from warpchain.parameters import InputError
+
+
+@contextlib.contextmanager
+def gpu_workers(count: int) -> Iterator[ProcessPoolExecutor]:
+    """As many worker processes, each of which sees one GPU only and runs a sweep with the device ``cuda``.
+
+    Args:
+        count: Number of GPUs; the first ones, in the order of CUDA_VISIBLE_DEVICES if that is set.
+
+    Raises:
+        InputError: CUDA_VISIBLE_DEVICES has fewer.
+    """
+    context = multiprocessing.get_context("spawn")  # CUDA does not survive a fork
+    free = context.SimpleQueue()
+    for gpu in visible_gpus(count):
+        free.put(gpu)
+    with ProcessPoolExecutor(count, mp_context=context, initializer=_take_gpu, initargs=(free,)) as executor:
+        yield executor
+
+
+def visible_gpus(count: int) -> Sequence[str]:
+    """What CUDA_VISIBLE_DEVICES must be for each of the first GPUs that this process may use.
+
+    Raises:
+        InputError: there are fewer.
+    """
+    listed = os.environ.get("CUDA_VISIBLE_DEVICES")
+    if listed is None:
+        return [str(number) for number in range(count)]
+    gpus = [gpu.strip() for gpu in listed.split(",") if gpu.strip()]
+    if len(gpus) < count:
+        raise InputError(f"--gpus: {count} wanted, but CUDA_VISIBLE_DEVICES is {listed!r}; give at most {len(gpus)}")
+    return gpus[:count]
+
+
+def _take_gpu(free: "SimpleQueue[str]") -> None:
+    """Let this process see just one GPU; at its start, for CUDA looks once, when a sweep's first walk starts Warp."""
+    os.environ["CUDA_VISIBLE_DEVICES"] = free.get()
