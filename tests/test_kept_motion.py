@@ -2,7 +2,6 @@
 
 import concurrent.futures
 import multiprocessing
-import os
 import pickle
 import signal
 import subprocess
@@ -20,7 +19,6 @@ import yaml
 import warpchain
 from warpchain.engine import CAPACITY_SAMPLES
 from warpchain.ensemble import run_setups
-from warpchain.gpu_workers import gpu_workers, visible_gpus
 from warpchain.html_report import write_report
 from warpchain.kept_walk import KeptWalk
 from warpchain.merged_file import merge
@@ -374,30 +372,3 @@ def test_results_with_motions_can_be_copied(kept: Path) -> None:
     """A pickled result still finds its series."""
     result: SweepResult = pickle.loads(pickle.dumps(load(kept)))
     assert len(result.series(links=30, frequency=5).time) > 90
-
-
-def _gpu_of_worker(seconds: float) -> str:
-    time.sleep(seconds)
-    return os.environ["CUDA_VISIBLE_DEVICES"]
-
-
-def test_each_worker_has_a_gpu_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Workers see one GPU each, those that this process may use, and too many are refused; a sweep runs on them."""
-    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "5, GPU-abc,2")
-    assert visible_gpus(2) == ["5", "GPU-abc"]
-    with pytest.raises(
-        InputError, match="--gpus: 4 wanted, but CUDA_VISIBLE_DEVICES is '5, GPU-abc,2'; give at most 3"
-    ):
-        visible_gpus(4)
-    with gpu_workers(2) as executor:
-        seen = list(executor.map(_gpu_of_worker, [0.5] * 4))
-    assert set(seen) == {"5", "GPU-abc"} and os.environ["CUDA_VISIBLE_DEVICES"] == "5, GPU-abc,2"
-    monkeypatch.delenv("CUDA_VISIBLE_DEVICES")
-    assert visible_gpus(3) == ["0", "1", "2"]
-
-
-def test_a_sweep_runs_on_gpu_workers(kept: Path, tmp_path: Path) -> None:
-    """What such workers write are the bytes of one thread; on the CPU here, whatever GPU they were given."""
-    with gpu_workers(2) as executor:
-        sweep(KEPT, tmp_path, executor=executor, workers=2)
-    assert data_of(tmp_path) == data_of(kept)

@@ -212,6 +212,45 @@ def test_a_dask_worker_may_be_killed(tmp_path, uninterrupted):
     np.testing.assert_array_equal(indices, np.arange(80))
 
 
+@pytest.mark.slow
+def test_a_dask_cluster_of_separate_processes(tmp_path, uninterrupted):
+    """`--scheduler` on a scheduler and two workers that were started by themselves: the bytes are the same."""
+    pytest.importorskip("distributed")
+    source, where = tmp_path / "tiny.yaml", tmp_path / "scheduler.json"
+    source.write_text(yaml.safe_dump(TINY, sort_keys=False))
+    dask = [sys.executable, "-m", "dask"]
+    commands = [["scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]]
+    commands += [["worker", "--no-nanny", "--nthreads", "1", "--no-dashboard", "--local-directory", str(tmp_path)]] * 2
+    processes = []
+    with (tmp_path / "dask.log").open("wb") as log:
+        try:
+            for command in commands:
+                command = [*dask, *command, "--scheduler-file", str(where)]
+                processes.append(subprocess.Popen(command, stdout=log, stderr=log))
+            address = wait_for_workers(where, 2)
+            command = [sys.executable, "-m", "warpchain", "sweep", str(source), "-o", str(tmp_path / "sweep")]
+            done = subprocess.run([*command, "--scheduler", address], capture_output=True, encoding="utf-8")
+        finally:
+            for process in reversed(processes):
+                process.kill()
+                process.wait()
+    assert "80 time_limit" in done.stdout, done.stderr
+    assert data_of(tmp_path / "sweep") == uninterrupted
+
+
+def wait_for_workers(where: Path, count: int) -> str:
+    """Address of the scheduler whose file is there, or soon will be, once it has so many workers."""
+    from distributed import Client
+
+    until = time.monotonic() + 60
+    while not (where.exists() and where.read_text()):
+        assert time.monotonic() < until, "no scheduler"
+        time.sleep(0.1)
+    with Client(scheduler_file=str(where)) as client:
+        client.wait_for_workers(count, timeout=60)
+        return str(client.scheduler.address)
+
+
 def test_sweep_refuses_what_it_cannot_do(tmp_path):
     """Bad arguments are refused in one line, and no folder is made."""
     for arguments, message in (
