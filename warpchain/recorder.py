@@ -30,6 +30,7 @@ class Recorder:
             keep: Which of the samples are kept, and whether frames are.
         """
         self._batch, self._world, self._keep = batch, world, keep
+        self._has_samples, self._has_frames = batch.record.samples.size > 0, batch.record.frames.size > 0
         self._interval = (keep.series_every or 1) * batch.options.record_interval
         self._place = -1.0
         self._last: Array = np.empty((0, layout.SAMPLE_COLUMNS))
@@ -39,16 +40,16 @@ class Recorder:
 
     def drain(self, released: bool) -> None:
         """Take what the last launch wrote; forget it if that was before the release."""
-        samples = self._batch.drain_samples(self._world)
-        times, frames = self._batch.drain_frames(self._world)
-        if not released:
-            return
-        if self._keep.series_every is not None and len(samples):
-            self._samples.append(self._thinned(samples))
-            self._last = samples[-1:]
-        if self._keep.frame_every is not None:
-            self._frame_times.append(times)
-            self._frames.append(frames)
+        if self._has_samples:
+            samples = self._batch.drain_samples(self._world)
+            if released and self._keep.series_every is not None and len(samples):
+                self._samples.append(self._thinned(samples))
+                self._last = samples[-1:]
+        if self._has_frames:
+            times, frames = self._batch.drain_frames(self._world)
+            if released and self._keep.frame_every is not None:
+                self._frame_times.append(times)
+                self._frames.append(frames)
 
     def _thinned(self, samples: Array) -> Array:
         """The first of the samples in each interval: steps may be longer than the time between two looks."""
