@@ -74,6 +74,7 @@ from .layout import (
     Y,
 )
 from .record import record_is_full, sampling, summarise, write_sample
+from .softening import change_joints, softened
 from .tableaus import TABLEAUS
 from .types import Control, Model, Program, Record, State, read_chain
 
@@ -125,7 +126,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     growth, shrinkage = step_controller(tableau.order, tableau.error_order, wp.float32)
     build_list = block_list(columns, block_dim, features.broad_phase)
     clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, block_dim, touch)
-    look = sampling(features.watch)
+    softens = features.softens
+    look = sampling(features.watch, softens)
 
     @wp.kernel(
         module="unique",
@@ -184,6 +186,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 K[row, lane] = wp.where(is_fresh, ZERO, kept[row, lane])
                 row += 1
         if lane == 0:
+            if wp.static(softens):
+                chain = softened(chain, control, state.softness[world])
             note_constants(K, chain)
             K[BOARD_NOTES, NOTE_OPENING] = state.extremes[world, OPENING]
             K[BOARD_NOTES, NOTE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
@@ -231,12 +235,17 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         barrier()
         while status == RUNNING and tries < tries_left and not is_full:
             if time >= K[BOARD_NOTES, NOTE_NEXT_LOOK]:
+                softness = state.softness[world]
                 publish(K, n, place, link)
                 barrier()
                 if lane == 0:
-                    T[wp.static(touch.mailbox)] = look(
-                        K, read_chain(model, world), program, state, record, control, world, time
-                    )
+                    seen = read_chain(model, world)
+                    if wp.static(softens):
+                        seen = softened(seen, control, softness)
+                    T[wp.static(touch.mailbox)] = look(K, seen, program, state, record, control, world, time)
+                    if wp.static(softens):
+                        if state.softness[world] != softness:
+                            note_constants(K, change_joints(seen, model, state, control, world))
                     K[BOARD_NOTES, NOTE_STOP_TIME] = state.stop_time[world]
                     K[BOARD_NOTES, NOTE_NEXT_LOOK] = wp.float64(state.next_sample[world]) * control.sample_interval
                 barrier()
@@ -245,6 +254,21 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 barrier()
                 if status != RUNNING:
                     break
+                if wp.static(softens):
+                    if state.softness[world] != softness:
+                        first = stage(
+                            forces,
+                            K,
+                            place,
+                            next_end,
+                            link.x,
+                            link.y,
+                            link.u,
+                            link.v,
+                            link.omega,
+                            link.cosine,
+                            link.sine,
+                        )
             stop_time = K[BOARD_NOTES, NOTE_STOP_TIME]
             if time >= stop_time:
                 status = state.stop_status[world]
@@ -389,7 +413,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         if lane == 0:
             if is_last:
                 # the series ends with the state in which the run ends
-                write_sample(state, record, world, time, summarise(K, read_chain(model, world)))
+                seen = read_chain(model, world)
+                if wp.static(softens):
+                    seen = softened(seen, control, state.softness[world])
+                write_sample(state, record, world, time, summarise(K, seen))
             friction = ZERO
             damping = ZERO
             fixed = ZERO

@@ -51,6 +51,7 @@ from .layout import (
     TIME,
 )
 from .record import record_is_full, sampling, summarise, write_sample
+from .softening import change_joints, softened
 from .tableaus import TABLEAUS
 from .types import Chain, Control, Model, Program, Record, State, read_chain
 
@@ -83,6 +84,7 @@ class Features:
         self_contact: Contacts between a chain's own links.
         broad_phase: ``"grid"`` or ``"all_pairs"``; the latter exists to measure the former against.
         watch: ``"rest"``, ``"steady"`` or ``"none"``: what ends the run before its stop time.
+        softens: The watch also changes the softness of the joints, see :mod:`softening`.
     """
 
     method: str
@@ -91,6 +93,7 @@ class Features:
     self_contact: bool
     broad_phase: str
     watch: str
+    softens: bool = False
 
 
 @wp.func
@@ -184,7 +187,8 @@ def make_advance(features: Features):
     has_self = features.self_contact
     fixed_loss = layout.LOSS_SPROCKET if has_sprocket else layout.LOSS_FLOOR
     reuses_last = tableau.first_same_as_last
-    look = sampling(features.watch)
+    softens = features.softens
+    look = sampling(features.watch, softens)
     first_stage, attempt, commit = explicit_method(features.method)
     growth, shrinkage = step_controller(tableau.order, tableau.error_order)
     build_by_grid, build_by_all_pairs = neighbour_list(columns)
@@ -206,6 +210,8 @@ def make_advance(features: Features):
         if state.status[world] != RUNNING:
             return
         chain = read_chain(model, world)
+        if wp.static(softens):
+            chain = softened(chain, control, state.softness[world])
         block = scratch[world]
         K = wp.array(ptr=block.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
         block_list = lists[world]
@@ -233,7 +239,12 @@ def make_advance(features: Features):
         tries = int(0)
         while status == RUNNING and tries < control.tries and not record_is_full(record, world):
             if time >= wp.float64(state.next_sample[world]) * control.sample_interval:
+                softness = state.softness[world]
                 status = look(K, chain, program, state, record, control, world, time)
+                if wp.static(softens):
+                    if state.softness[world] != softness:
+                        chain = change_joints(chain, model, state, control, world)
+                        has_first_stage = int(0)
                 if status != RUNNING:
                     break
             stop_time = state.stop_time[world]

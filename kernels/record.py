@@ -44,6 +44,7 @@ from .layout import (
     X,
     Y,
 )
+from .softening import watch_collapse, watch_stiffening
 from .types import Chain, Control, Program, Record, State
 
 wp.set_module_options({"enable_backward": False})
@@ -251,11 +252,12 @@ def record_is_full(record: Record, world: int):
 
 
 @functools.cache
-def sampling(watch: str):
+def sampling(watch: str, softens: bool = False):
     """Warp function ``look``, one sample of a placed chain: time series, frame and watch; returns the status.
 
     Args:
         watch: ``"rest"``, ``"steady"`` or ``"none"``.
+        softens: Whether the look may change the softness of the joints, see :mod:`softening`.
     """
     watches_rest = watch == "rest"
     watches_steadiness = watch == "steady"
@@ -272,12 +274,17 @@ def sampling(watch: str):
         time: wp.float64,
     ):
         mark = state.next_sample[world]
+        is_first = state.last_look[world, TIME] < ZERO
         summary = summarise(K, chain)
         write_sample(state, record, world, time, summary)
         if mark % control.frame_every == wp.int64(0):
             write_frame(record, K, chain, world, time)
         passed = wp.int64(wp.floor(time / control.sample_interval))
         state.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
+        if wp.static(softens and watches_rest):
+            watch_collapse(K, chain, state, control, world, time, is_first)
+        if wp.static(softens and watches_steadiness):
+            watch_stiffening(state, program, control, world, time)
         if wp.static(watches_rest):
             return watch_rest(state, control, world, time, summary)
         if wp.static(watches_steadiness):

@@ -70,7 +70,9 @@ class State:
     last_error: wp.array(dtype=wp.float64)  # error ratio of the last accepted step (PI controller)
     next_sample: wp.array(dtype=wp.int64)  # index of the next sample mark
     status: wp.array(dtype=wp.int32)
-    watch: wp.array2d(dtype=wp.float64)  # (W, WATCH_ROWS): memory of the steadiness and rest watches
+    watch: wp.array2d(dtype=wp.float64)  # (W, WATCH_ROWS): memory of the watches
+    softness: wp.array(dtype=wp.float64)  # of the joints, from 0, the model's own, to 1, soft; see softening
+    first_area: wp.array(dtype=wp.float64)  # enclosed by the loop when its run began [m²]
     tries_before: wp.array(dtype=wp.int64)  # tries of the walk's earlier phases, for the limit
     first_look: wp.array2d(dtype=wp.float64)  # (W, SAMPLE_COLUMNS): the chain when its run began …
     last_look: wp.array2d(dtype=wp.float64)  # … and when it was last looked at, at the end of the run the last time
@@ -105,6 +107,12 @@ class Control:
     frame_every: wp.int64  # samples per frame
     rest_speed: wp.float64  # [m/s]
     rest_time: wp.float64  # [s]
+    soft_stiffness: wp.float64  # k of soft joints [N/m]
+    soft_damping: wp.float64  # b [N s/m]
+    soft_smoothing: wp.float64  # ω_c [rad/s]
+    soften_area: wp.float64  # joints soften below this fraction of the first area
+    stiffening_time: wp.float64  # from soft joints on the sprocket to the model's own [s]
+    stiff_time: wp.float64  # how long they then have these before the release, at least [s]
 
 
 @wp.struct

@@ -86,10 +86,12 @@ def test_names_of_columns_mean_one_thing() -> None:
 def test_columns_of_a_row() -> None:
     """A row has the agreed columns, without padding, and the drawn quantities in the order of the table."""
     assert ROW.names == (
-        *("index", "status", "dx", "walk_time", "simulated_time", "bounces", "steps_accepted", "steps_rejected"),
+        *("index", "status", "dx", "walk_time", "simulated_time", "softened_at"),
+        *("bounces", "steps_accepted", "steps_rejected"),
         *("impulses_floor", "impulses_sprocket", "impulses_self", "greatest_opening"),
         *("penetration_floor", "penetration_sprocket", "penetration_self", "energy_at_release"),
-        *("loss_joint_friction", "loss_joint_damping", "loss_floor", "loss_self_contact", "energy_residual"),
+        *("loss_joint_friction", "loss_joint_damping", "loss_floor", "loss_self_contact", "loss_softening"),
+        "energy_residual",
     )
     assert ROW.itemsize == sum(ROW[name].itemsize for name in ROW.names)
     one, other = row_type(["clearance", "phase", "link_length"]), row_type(["link_length", "clearance", "phase"])

@@ -11,7 +11,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.engine import COUNTS, EXTREMES, Batch
+from warpchain.engine import COUNTS, EXTREMES, STIFF_TIME, STIFFENING_TIME, Batch
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features
 from warpchain.motion import Motion
@@ -19,6 +19,7 @@ from warpchain.options import Setup, contact_radius, joint_radius
 from warpchain.parameters import InputError, Parameters
 from warpchain.recorder import Recorder
 from warpchain.recording import NOTHING, Keep
+from warpchain.results import LOST
 from warpchain.shapes import ellipse, lay_chain, stadium
 from warpchain.status import Status
 
@@ -91,7 +92,17 @@ class Course:
             parameters.link_length,
             0.0 if from_rest else speed,
         )
-        batch.load(world, position, velocity, stop_time=self._settled, stop_status=Status.FINISHED)
+        period = scene.links * parameters.link_length / speed if speed > 0 else STILL_WINDOW
+        earliest_release = self._at_full_speed + period + max(period, scene.steady_time)
+        is_soft = setup.options.soften_drive and earliest_release >= STIFFENING_TIME + STIFF_TIME
+        batch.load(
+            world,
+            position,
+            velocity,
+            stop_time=self._settled,
+            stop_status=Status.FINISHED,
+            softness=float(is_soft),
+        )
         batch.set_program(
             world,
             sprocket_speed=-2 * math.pi * scene.frequency,  # clockwise, so that the walk goes towards +x
@@ -99,7 +110,7 @@ class Course:
             spin_up_time=spin_up,
             hold_start=self._at_full_speed,
             loop_speed=speed,
-            loop_period=scene.links * parameters.link_length / speed if speed > 0 else STILL_WINDOW,
+            loop_period=period,
             steady_time=scene.steady_time,
             steady_tolerance=scene.steady_tolerance,
             release_phase=scene.phase,
@@ -171,11 +182,16 @@ class Course:
             return math.nan
         return float(self._batch.last_look(self._world)[layout.CENTER_X])
 
+    @property
+    def softened_at(self) -> float:
+        """Time [s] since the release at which the joints were softened in the pile; NaN if they were not."""
+        return self._batch.softened_at(self._world)
+
     def energy(self) -> dict[str, float]:
         """Where the energy of the walk went [J]; NaN before the release. Keys: ``results.ENERGIES``."""
         first, last = self._batch.first_look(self._world), self._batch.last_look(self._world)
         losses = self._batch.losses(self._world)
-        lost = {name: losses[name] for name in ("joint_friction", "joint_damping", "floor", "self_contact")}
+        lost = {name: losses[name] for name in LOST}
         ledger = {
             "kinetic_at_release": float(first[layout.KINETIC]),
             "potential_at_release": float(first[layout.GRAVITATIONAL] + first[layout.SPRING]),

@@ -3,6 +3,7 @@
 import contextlib
 import functools
 import importlib.metadata
+import math
 import os
 import platform
 import sys
@@ -23,7 +24,7 @@ from warpchain.kernels.driver import Features, make_advance
 from warpchain.kernels.tableaus import TABLEAUS
 from warpchain.kernels.types import Control, Model, Program, Record, State
 from warpchain.options import Options
-from warpchain.parameters import InputError, Parameters
+from warpchain.parameters import InputError, Parameters, preset
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
@@ -37,12 +38,23 @@ FIRST_STEP = 1e-7  # s; the controller grows it fivefold per step
 LAUNCH_SECONDS = 0.1  # how long a launch should take: the grain of progress and of Ctrl-C
 CAPACITY_SAMPLES = 512
 CAPACITY_FRAMES = 64
+SOFT = preset("soft")
+"""Whose joints softened ones have."""
+STIFFENING_TIME = 0.05
+"""Time [s] in which joints that were soft on the sprocket get their own values back."""
+STIFF_TIME = 0.1
+"""Time [s] that they have these before the release, at least."""
+UNSET_WATCHES = (
+    *(layout.WINDOW_START, layout.STEADY_SINCE, layout.REST_SINCE),
+    *(layout.STIFFENING_SINCE, layout.SOFTENED_AT),
+)
+"""Moments of :attr:`State.watch` that are negative until they come."""
 
 COUNTS = ("accepted", "rejected", "floor", "sprocket", "self", "bounces", "list_builds")
 """Counters of a world, in the order of :mod:`warpchain.kernels.layout`."""
 EXTREMES = ("opening", "floor", "sprocket", "self")
 """Greatest joint opening and depths of a world, likewise."""
-LOSSES = ("joint_friction", "joint_damping", "floor", "sprocket", "self_contact")
+LOSSES = ("joint_friction", "joint_damping", "floor", "sprocket", "self_contact", "softening")
 """Losses of energy of a world, likewise."""
 
 
@@ -155,7 +167,7 @@ class Batch:
 
         self.state = State()
         self.state.links = self._array(np.zeros((worlds, 6, longest)))
-        for name in ("time", "stop_time", "gap", "slack", "step", "last_error"):
+        for name in ("time", "stop_time", "gap", "slack", "step", "last_error", "softness", "first_area"):
             setattr(self.state, name, self._array(np.zeros(worlds)))
         for name in ("stop_status", "is_fresh", "has_first_stage"):
             setattr(self.state, name, self._array(np.zeros(worlds, dtype=np.int32)))
@@ -189,6 +201,12 @@ class Batch:
         self.control.frame_every = frame_every or 1
         self.control.rest_speed = options.rest_speed
         self.control.rest_time = options.rest_time
+        self.control.soft_stiffness = SOFT.joint_stiffness
+        self.control.soft_damping = SOFT.joint_damping
+        self.control.soft_smoothing = SOFT.friction_smoothing
+        self.control.soften_area = options.soften_area
+        self.control.stiffening_time = STIFFENING_TIME
+        self.control.stiff_time = STIFF_TIME
 
         self._tries = 500
         self.scratch = wp.zeros((worlds, rows, self.columns), dtype=wp.float64, device=self.device)
@@ -235,6 +253,7 @@ class Batch:
         stop_time: float,
         stop_status: Status,
         tries_before: int = 0,
+        softness: float = 0.0,
     ) -> None:
         """Set the state of a world's chain and start its clock at zero; its statistics and watches start anew.
 
@@ -245,6 +264,7 @@ class Batch:
             stop_time: The run lands on this time [s] and ends.
             stop_status: Status it then has.
             tries_before: Tries of earlier phases, which the limit of the options counts as well.
+            softness: Of the joints, see :mod:`warpchain.kernels.softening`.
         """
         state = self.state
         n = self.links[world]
@@ -261,7 +281,8 @@ class Batch:
         ):
             self._view(array)[world] = 0
         self._view(state.watch)[world] = 0
-        self._view(state.watch)[world, [layout.WINDOW_START, layout.STEADY_SINCE, layout.REST_SINCE]] = -1.0
+        self._view(state.watch)[world, list(UNSET_WATCHES)] = -1.0
+        self._view(state.softness)[world] = softness
         self._view(state.last_look)[world, layout.TIME] = -1.0
         self._view(state.watch)[world, layout.LAST_FLOOR_IMPULSE] = -np.inf
         self._view(state.tries_before)[world] = tries_before
@@ -293,6 +314,7 @@ class Batch:
             self_contact=self.options.self_contact,
             broad_phase=broad_phase,
             watch=watch,
+            softens={"rest": self.options.soften_pile, "steady": self.options.soften_drive}.get(watch, False),
         )
 
     def run(self, worlds: Sequence[int], features: Features, after_launch: Callable[[], None] | None = None) -> None:
@@ -423,6 +445,11 @@ class Batch:
     def last_look(self, world: int) -> Array:
         """The same when the chain was last looked at; at the end of the run if that has ended."""
         return np.array(self._view(self.state.last_look)[world])
+
+    def softened_at(self, world: int) -> float:
+        """Time [s] since loading at which the joints of a collapsed loop were softened; NaN if they were not."""
+        moment = float(self._view(self.state.watch)[world, layout.SOFTENED_AT])
+        return moment if moment >= 0 else math.nan
 
     def drain_samples(self, world: int) -> Array:
         """Take the time series kept so far: (t, SAMPLE_COLUMNS), see :mod:`warpchain.kernels.layout`."""

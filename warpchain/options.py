@@ -22,6 +22,10 @@ from warpchain.parameters import preset as parameter_preset
 _STRICT: Final = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
+LONGEST_STIFFENING_INTERVAL: Final = 2e-3
+"""Greatest time [s] between two of the small steps in which soft joints on the sprocket become stiff."""
+
+
 class Scene(BaseModel):
     """What one walk does, from hanging on the sprocket to the end.
 
@@ -201,6 +205,21 @@ class Options(BaseModel):
         description="time between two recorded points of the centre of mass",
         json_schema_extra={"unit": "s"},
     )
+    soften_pile: bool = Field(
+        default=False,
+        description="whether the joints of a walking loop that has collapsed get the values of the preset soft",
+    )
+    soften_area: float = Field(
+        default=0.3,
+        gt=0,
+        lt=1,
+        description="a loop has collapsed when it encloses less than this fraction of its area at the release",
+        json_schema_extra={"unit": "1"},
+    )
+    soften_drive: bool = Field(
+        default=False,
+        description="whether joints have the values of the preset soft on the sprocket, until shortly before the release",
+    )
     device: str = Field(default="cpu", description="where walks run: cpu, cuda (the first GPU) or cuda:N")
 
     @field_validator("device")
@@ -216,6 +235,16 @@ class Options(BaseModel):
             raise refusal(
                 "smallest_step",
                 f"{self.smallest_step} is not smaller than contact_step {self.contact_step} s; give a smaller step",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _stiffens_in_small_steps(self) -> Self:
+        if self.soften_drive and self.record_interval > LONGEST_STIFFENING_INTERVAL:
+            raise refusal(
+                "soften_drive",
+                f"joints stiffen at each record_interval, and {self.record_interval} s is too long for that; "
+                f"give a record_interval of at most {LONGEST_STIFFENING_INTERVAL} s",
             )
         return self
 

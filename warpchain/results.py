@@ -50,9 +50,13 @@ ENERGIES: Final = {
     "joint_damping": "energy lost to the damping of the joint springs",
     "floor": "energy lost in impacts on the floor",
     "self_contact": "energy lost in impacts of links on one another",
+    "softening": "energy taken out of the joint springs by softening them in the pile",
     "residual": "energy at release, less that at the end and all losses: the error of the integration",
 }
 """Keys of `WalkResult.energy`. Losses count as positive."""
+
+LOST: Final = ("joint_friction", "joint_damping", "floor", "self_contact", "softening")
+"""Those of them that are losses of the walk."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +96,10 @@ class WalkResult:
     walk_time: Annotated[float, Stored("summary/walk_time", "s", "from the release to the end")]
     simulated_time: Annotated[
         float, Stored("summary/simulated_time", "s", "simulated, the phases before the release included")
+    ]
+    softened_at: Annotated[
+        float,
+        Stored("summary/softened_at", "s", "from the release to the softening of the joints; NaN if they were not"),
     ]
     wall_time: Annotated[float, Stored("summary/wall_time", "s", "that the computer took")]
     bounces: Annotated[int, Stored("summary/bounces", "1", "number of bounces off the floor")]

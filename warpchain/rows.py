@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from warpchain.options import Options, Scene
 from warpchain.parameters import Parameters
-from warpchain.results import CONTACTS, ENERGIES, STORED
+from warpchain.results import CONTACTS, ENERGIES, LOST, STORED
 
 Rows = NDArray[np.void]
 
@@ -47,6 +47,7 @@ COLUMNS: Final[dict[str, Column]] = {
     "dx": _of_walk("<f8", "dx"),
     "walk_time": _of_walk("<f8", "walk_time"),
     "simulated_time": _of_walk("<f8", "simulated_time"),
+    "softened_at": _of_walk("<f8", "softened_at"),
     "bounces": _of_walk("<i4", "bounces"),
     "steps_accepted": _of_walk("<i8", "steps_accepted"),
     "steps_rejected": _of_walk("<i8", "steps_rejected"),
@@ -54,10 +55,7 @@ COLUMNS: Final[dict[str, Column]] = {
     "greatest_opening": _of_walk("<f8", "greatest_opening"),
     **{f"penetration_{key}": _of_walk("<f8", "greatest_penetration", meaning) for key, meaning in CONTACTS.items()},
     "energy_at_release": Column("<f8", "J", "energy at release, kinetic and potential"),
-    **{
-        f"loss_{key}": Column("<f8", "J", ENERGIES[key])
-        for key in ("joint_friction", "joint_damping", "floor", "self_contact")
-    },
+    **{f"loss_{key}": Column("<f8", "J", ENERGIES[key]) for key in LOST},
     "energy_residual": Column("<f8", "J", ENERGIES["residual"]),
 }
 """Columns of every sweep; behind them comes one for each quantity that the sweep draws.

@@ -20,6 +20,7 @@ from warpchain.motion import Motion
 from warpchain.options import Setup
 from warpchain.parameters import InputError
 from warpchain.planning import PlannedWalk, Sweep, load_sweep
+from warpchain.results import LOST
 from warpchain.status import Status
 from warpchain.store import Store, empty_rows, read_shard, write_shard
 from warpchain.sweep_result import SweepResult, load
@@ -174,6 +175,7 @@ def _fill(row: Any, walk: PlannedWalk, course: Course) -> None:
     row["dx"] = course.dx
     row["walk_time"] = course.walk_time
     row["simulated_time"] = course.simulated_time
+    row["softened_at"] = course.softened_at
     row["bounces"] = counts["bounces"]
     row["steps_accepted"] = counts["accepted"]
     row["steps_rejected"] = counts["rejected"]
@@ -182,7 +184,7 @@ def _fill(row: Any, walk: PlannedWalk, course: Course) -> None:
         row[f"impulses_{kind}"] = counts[kind]
         row[f"penetration_{kind}"] = extremes[kind]
     row["energy_at_release"] = energy["kinetic_at_release"] + energy["potential_at_release"]
-    for loss in ("joint_friction", "joint_damping", "floor", "self_contact"):
+    for loss in LOST:
         row[f"loss_{loss}"] = energy[loss]
     row["energy_residual"] = energy["residual"]
     for name, value in walk.drawn.items():

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 
 from warpchain.parameters import InputError
-from warpchain.results import WalkResult, replacing
+from warpchain.results import LOST, WalkResult, replacing
 
 if TYPE_CHECKING:
     from warpchain.bench import BroadPhaseCost, StepCost
@@ -89,8 +89,9 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
     if math.isnan(released):
         return  # the chain never got so far
     yield "energy at release", f"{released:.5f} J, kinetic {energy['kinetic_at_release']:.5f} J"
-    for cause in ("joint_friction", "joint_damping", "floor", "self_contact"):
-        yield f"  lost to {cause.replace('_', ' ')}", f"{energy[cause]:.5f} J"
+    for cause in LOST:
+        if cause != "softening" or energy[cause]:
+            yield f"  lost to {cause.replace('_', ' ')}", f"{energy[cause]:.5f} J"
     left = energy["kinetic_at_end"] + energy["potential_at_end"]
     yield "energy at the end", f"{left:.5f} J, kinetic {energy['kinetic_at_end']:.5f} J"
     yield "unaccounted for", f"{energy['residual']:.1e} J"

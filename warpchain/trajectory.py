@@ -58,6 +58,9 @@ def simulate(
     """
     chosen = {"method": method, "tolerance": tolerance, "device": device, "self_contact": self_contact}
     options = validated(Options, settings | chosen, "options")
+    for name in ("soften_pile", "soften_drive"):
+        if getattr(options, name):
+            raise InputError(f"options.{name}: only a walk has phases in which joints soften; leave it out")
     for name, switch in (("floor", floor), ("gravity", gravity)):
         if not isinstance(switch, bool):
             raise InputError(f"{name}: {shown(switch)} is not a truth value; give True or False")

@@ -1,0 +1,410 @@
+"""Softer joints in the pile and on the sprocket: when, how much, and that nothing else changes."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import warp as wp
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.special import ellipe
+
+import warpchain
+from tests.blocks_under_test import FIXED_STEP, batch_of, fibers, heap, launch_blocks, launch_chains
+from warpchain import InputError, Status, ensemble, preset
+from warpchain.course import Course
+from warpchain.engine import SOFT, STIFF_TIME, STIFFENING_TIME, Batch, start_device
+from warpchain.kernels import block, driver, layout
+from warpchain.kernels.block import make_advance_block
+from warpchain.kernels.driver import load_state, make_advance
+from warpchain.kernels.explicit import place_ends
+from warpchain.kernels.softening import enclosed_area, softened
+from warpchain.kernels.types import Chain, Control, Model, State, read_chain
+from warpchain.shapes import ellipse, lay_chain, stadium
+from warpchain.walker import setup_walk
+
+PAPER = preset("paper")
+SERIES = ("time", "center", "center_velocity", "kinetic_energy", "spring_energy", "lowest", "rms_speed")
+
+
+# --- area and joints ---
+
+
+@wp.kernel(module="unique", enable_backward=False)
+def _area(model: Model, state: State, scratch: wp.array3d(dtype=wp.float64), areas: wp.array(dtype=wp.float64)):
+    world = wp.tid()
+    chain = read_chain(model, world)
+    load_state(scratch[world], state, chain, world)
+    place_ends(scratch[world], chain)
+    areas[world] = enclosed_area(scratch[world], chain)
+
+
+def area_of(position: np.ndarray) -> float:
+    """`enclosed_area` of a chain (n, 3)."""
+    batch = Batch(1, len(position), setup_walk("paper", {}, None).options)
+    batch.set_chain(0, PAPER, len(position))
+    batch.load(0, position, np.zeros_like(position), stop_time=1.0, stop_status=Status.FINISHED)
+    areas = wp.full(1, np.nan, dtype=wp.float64, device=start_device("cpu"))
+    wp.launch(_area, dim=1, inputs=[batch.model, batch.state, batch.scratch, areas], device="cpu")
+    return float(areas.numpy()[0])
+
+
+@pytest.mark.parametrize("links", [4, 30, 180])
+def test_area_of_a_ring(links: int) -> None:
+    """A ring is a regular polygon of area n ℓ² / (4 tan(π/n)), wherever it lies; run the other way it is negative."""
+    position, _ = lay_chain(ellipse(1.0), links, PAPER.link_length, 0.0)
+    expected = links * PAPER.link_length**2 / (4 * np.tan(np.pi / links))
+    sign = np.sign(area_of(position))
+    assert area_of(position) == pytest.approx(sign * expected, rel=1e-9)
+    assert area_of(position + [3.0, -1.0, 0.0]) == pytest.approx(sign * expected, rel=1e-9)
+    mirrored = position * [-1.0, 1.0, -1.0] + [0.0, 0.0, np.pi]
+    assert area_of(mirrored) == pytest.approx(-sign * expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("aspect", [0.5, 1.5, 4.0])
+def test_area_of_an_ellipse(aspect: float) -> None:
+    """A long chain laid along an ellipse encloses π a b, its length being the ellipse's by the elliptic integral."""
+    links = 600
+    position, _ = lay_chain(ellipse(aspect), links, PAPER.link_length, 0.0)
+    longer = max(aspect, 1 / aspect)
+    short = links * PAPER.link_length / (4 * longer * ellipe(1 - longer**-2))
+    assert abs(area_of(position)) == pytest.approx(np.pi * longer * short**2, rel=1e-3)
+
+
+@wp.kernel(module="unique", enable_backward=False)
+def _soften(chains: wp.array(dtype=Chain), control: Control, softness: wp.array(dtype=wp.float64)):
+    i = wp.tid()
+    chains[i] = softened(chains[i], control, softness[i])
+
+
+def joints_of(stiffness: float, damping: float, smoothing: float, softness: float) -> tuple[float, float, float]:
+    """k, b and 1/ω_c of a joint at a softness."""
+    chain = Chain()
+    chain.joint_stiffness, chain.joint_damping, chain.inverse_smoothing = stiffness, damping, 1 / smoothing
+    control = Control()
+    control.soft_stiffness, control.soft_damping, control.soft_smoothing = 1e7, 100.0, 0.1
+    chains = wp.array([chain], dtype=Chain, device="cpu")
+    inputs = [chains, control, wp.array([softness], dtype=wp.float64, device="cpu")]
+    wp.launch(_soften, dim=1, inputs=inputs, device="cpu")
+    after = chains.numpy()[0]
+    return tuple(float(after[name]) for name in ("joint_stiffness", "joint_damping", "inverse_smoothing"))
+
+
+def test_softness_goes_geometrically_from_own_to_soft() -> None:
+    """Exactly the own values at 0, exactly the soft ones at 1, their geometric mean at 1/2, within bounds beyond."""
+    for softness in (0.0, -0.1):
+        assert joints_of(1e9, 1e3, 1e-3, softness) == (1e9, 1e3, 1 / 1e-3)
+    for softness in (1.0, 1.1):
+        assert joints_of(1e9, 1e3, 1e-3, softness) == (1e7, 100.0, 1 / 0.1)
+    assert_allclose(joints_of(1e9, 1e3, 1e-3, 0.5), [1e8, np.sqrt(1e5), 100.0], rtol=1e-14)
+
+
+def test_no_joint_becomes_stiffer() -> None:
+    """What is softer than the soft preset stays, undamped joints included; the rest softens."""
+    for softness in (0.0, 0.3, 1.0):
+        assert joints_of(1e6, 0.0, 2.0, softness) == (1e6, 0.0, 0.5)
+    assert joints_of(1e6, 1e3, 2.0, 1.0) == (1e6, 100.0, 0.5)
+
+
+# --- the pile ---
+
+
+def short_walk(**settings):
+    """A walk of a loop of 20 links with the joints of Table 1."""
+    given = {"preset": "paper", "links": 20, "frequency": 8.0, "start": "ellipse", "frame_interval": 1e-3}
+    return warpchain.walk(**given | settings)
+
+
+@pytest.fixture(scope="module")
+def stiff_walk():
+    """The walk with its own joints throughout."""
+    return short_walk()
+
+
+@pytest.fixture(scope="module")
+def softened_walk():
+    """The same, softened in the pile."""
+    return short_walk(soften_pile=True)
+
+
+def shoelace(joints: np.ndarray) -> np.ndarray:
+    """Area (f,) inside polygons (f, n, 2)."""
+    x, y = joints[..., 0], joints[..., 1]
+    return 0.5 * np.sum(x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1), axis=1)
+
+
+def test_joints_soften_at_the_first_mark_of_a_small_area(softened_walk) -> None:
+    """The moment is that of the first sample whose loop encloses less than 0.3 of the area at the release."""
+    area = shoelace(softened_walk.frame_joints)
+    first = np.flatnonzero(area / area[0] < 0.3)[0]
+    assert 0 < first < len(area) - 20
+    assert softened_walk.softened_at == softened_walk.frame_time[first]
+
+
+def test_soften_area_sets_the_moment(softened_walk) -> None:
+    """A greater fraction is reached earlier, at the mark where the area says so."""
+    walk = short_walk(soften_pile=True, soften_area=0.6)
+    area = shoelace(walk.frame_joints)
+    assert walk.softened_at == walk.frame_time[np.flatnonzero(area / area[0] < 0.6)[0]]
+    assert walk.softened_at < softened_walk.softened_at
+
+
+def test_nothing_changes_before_the_joints_soften(stiff_walk, softened_walk) -> None:
+    """Up to the switch the series are those of the stiff walk to the bit, afterwards they are not."""
+    switch = int(np.flatnonzero(softened_walk.time == softened_walk.softened_at)[0])
+    for name in SERIES:
+        stiff, soft = getattr(stiff_walk, name), getattr(softened_walk, name)
+        assert_array_equal(stiff[: switch + 1], soft[: switch + 1], err_msg=name)
+        assert not np.array_equal(stiff[switch + 1], soft[switch + 1]), name
+    assert np.isnan(stiff_walk.softened_at)
+
+
+def test_softened_walk_ends_alike_with_fewer_steps(stiff_walk, softened_walk) -> None:
+    """The chain comes to rest at the same place to a millimetre, in far fewer steps."""
+    assert softened_walk.status == Status.AT_REST
+    assert softened_walk.dx == pytest.approx(stiff_walk.dx, abs=1e-3)
+    assert softened_walk.steps_accepted < 0.7 * stiff_walk.steps_accepted
+
+
+@pytest.mark.parametrize("method", ["rkf78", "dp5"])
+def test_ledger_of_a_softened_walk_closes(method: str, softened_walk) -> None:
+    """What softening frees is ½ (k − k') Σ C² at the switch; with it the ledger closes as before."""
+    walk = softened_walk if method == "rkf78" else short_walk(method=method, soften_pile=True)
+    energy = walk.energy
+    at_release = energy["kinetic_at_release"] + energy["potential_at_release"]
+    assert abs(energy["residual"]) < 1e-5 * at_release
+    (freed_from,) = walk.spring_energy[walk.time == walk.softened_at]
+    assert energy["softening"] == pytest.approx(0.99 * freed_from, rel=1e-12)
+
+
+def test_ledger_closes_when_much_is_freed() -> None:
+    """Springs pulled by a ring that turns fast give most of their energy when it counts as collapsed at once."""
+    setup = setup_walk("paper", {"links": 20, "frequency": 20.0, "start": "ellipse", "soften_pile": True}, None)
+    setup = dataclasses.replace(setup, parameters=setup.parameters.with_values({"joint_stiffness": 1e8}))
+    setup = dataclasses.replace(setup, scene=setup.scene.model_copy(update={"walk_limit": 4e-3}))
+    batch = Batch(1, 20, setup.options)
+    batch.control.soften_area = 2.0
+    course = Course(batch, 0, setup)
+    batch.run([0], course.features)
+    course.next_phase()
+    energy = course.energy()
+    assert course.softened_at == pytest.approx(1e-3, abs=2e-5)
+    assert energy["softening"] > 1e-5 * energy["kinetic_at_release"]
+    assert abs(energy["residual"]) < 1e-2 * energy["softening"]
+
+
+def test_soft_joints_are_left_alone() -> None:
+    """A walk of the preset soft has nothing to soften: it is the same to the bit and says that it did not."""
+    walks = [short_walk(preset="soft", soften_pile=on) for on in (False, True)]
+    for name in SERIES:
+        assert_array_equal(getattr(walks[0], name), getattr(walks[1], name), err_msg=name)
+    assert walks[0].energy == walks[1].energy
+    assert np.isnan(walks[1].softened_at)
+
+
+# --- the sprocket ---
+
+
+SPINNING = {"links": 30, "frequency": 15.0, "start": "spinning", "steady_time": 0.4}
+
+
+def drive(**settings):
+    """Time and spring energy of all looks at a chain on its sprocket, and its course, just released."""
+    setup = setup_walk("paper", SPINNING | settings, None)
+    batch = Batch(1, setup.scene.links, setup.options, keeps_samples=True)
+    course = Course(batch, 0, setup)
+    samples = []
+    batch.run([0], course.features, lambda: samples.append(batch.drain_samples(0)))
+    assert course.next_phase()
+    series = np.concatenate(samples)
+    return series[:, layout.TIME], series[:, layout.SPRING], batch.extremes(0), course
+
+
+def test_springs_are_soft_on_the_sprocket_and_stiff_at_the_release() -> None:
+    """Spring energy is n T²/2k' on soft joints, T = m̄ v²/ℓ, and n T²/2k before the release, without ringing."""
+    time, spring, _, course = drive(soften_drive=True)
+    scene, parameters = course.setup.scene, course.setup.parameters
+    speed = 2 * np.pi * scene.frequency * (parameters.sprocket_radius + parameters.circle_radius)
+    tension = (parameters.inner_mass + parameters.outer_mass) / 2 * speed**2 / parameters.link_length
+    still = time >= time[-1] - STIFF_TIME
+    soft = (time > 0.05) & (time < time[-1] - STIFF_TIME - STIFFENING_TIME - 0.1)
+    for part, stiffness in ((soft, SOFT.joint_stiffness), (still, parameters.joint_stiffness)):
+        level = scene.links * tension**2 / (2 * stiffness)
+        assert np.median(spring[part]) == pytest.approx(level, rel=0.1)
+    # as even as that of a chain that was never soft; medians, because blows of the sprocket stand out
+    time, stiff, _, _ = drive()
+    stiff = stiff[time >= time[-1] - STIFF_TIME]
+    after = spring[still]
+    assert np.median(after) == pytest.approx(np.median(stiff), rel=0.03)
+    evenness = [np.median(np.abs(part - np.median(part))) for part in (after, stiff)]
+    assert evenness[0] < 2 * evenness[1]
+
+
+def test_the_moment_of_the_release_stays() -> None:
+    """The release is neither put off nor hurried, and a phase of 1/2 puts it off by half a loop period as ever."""
+    stiff, soft, late = (
+        warpchain.walk(**SPINNING, preset="paper", walk_limit=1e-3, **settings)
+        for settings in ({}, {"soften_drive": True}, {"soften_drive": True, "phase": 0.5})
+    )
+    assert soft.steps_accepted < 0.7 * stiff.steps_accepted
+    assert soft.simulated_time == pytest.approx(stiff.simulated_time, abs=1e-4)
+    period = 30 * PAPER.link_length / (2 * np.pi * 15.0 * (PAPER.sprocket_radius + PAPER.circle_radius))
+    assert late.simulated_time - soft.simulated_time == pytest.approx(period / 2, rel=1e-9)
+
+
+def test_joints_that_could_not_stiffen_in_time_are_never_soft() -> None:
+    """A short loop may be released sooner than joints can stiffen: its walk is as if nothing had been asked for."""
+    walks = [
+        warpchain.walk(**SPINNING | {"steady_time": 0.0, "frequency": 40.0}, walk_limit=1e-3, soften_drive=on)
+        for on in (False, True)
+    ]
+    assert walks[0].simulated_time < STIFFENING_TIME + STIFF_TIME
+    for name in SERIES:
+        assert_array_equal(getattr(walks[0], name), getattr(walks[1], name), err_msg=name)
+    assert walks[0].steps_accepted == walks[1].steps_accepted
+
+
+def test_a_whole_walk_from_soft_joints() -> None:
+    """Softened on the sprocket and in the pile, a walk ends at rest where it should, and its ledger closes."""
+    walk = warpchain.walk(preset="paper", start="spinning", soften_drive=True, soften_pile=True, frame_interval=None)
+    assert walk.status == Status.AT_REST
+    assert 0.5 < walk.dx < 0.8
+    assert 0.3 < walk.softened_at < walk.walk_time
+    at_release = walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"]
+    assert abs(walk.energy["residual"]) < 1e-5 * at_release
+
+
+# --- launches and blocks ---
+
+
+def test_cuts_into_launches_do_not_change_a_softened_walk(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A walk softened on the sprocket and in the pile is the same to the bit in launches of 20000 and of 777 tries."""
+    setup = setup_walk("paper", SPINNING | {"method": "dp5", "soften_drive": True, "soften_pile": True}, None)
+    seen = []
+    for tries in (20_000, 777):
+        monkeypatch.setitem(ensemble.TRIES, "cpu", tries)
+        ((_, course),) = ensemble.run_setups([setup])
+        seen.append(
+            (course.dx, course.drive_time, course.walk_time, course.softened_at, course.counts, course.energy())
+        )
+    assert seen[0] == seen[1]
+    assert seen[0][3] > 0
+
+
+@pytest.fixture
+def exact_kernels(monkeypatch: pytest.MonkeyPatch):
+    """Kernels without fused operations, in which the block form and the CPU form do the same operations."""
+    for module in (driver, block):
+        monkeypatch.setattr(module, "COMPILER_FLAGS", "-ffp-contract=off")
+    for factory in (make_advance, make_advance_block):
+        factory.cache_clear()
+    yield
+    for factory in (make_advance, make_advance_block):
+        factory.cache_clear()
+
+
+LINKS = 12
+
+
+def heaps(area: float) -> Batch:
+    """Heaps on the floor that soften below a fraction of their first area, in fixed steps, looked at often."""
+    batch = batch_of([heap(LINKS, 5, tilt=2.0), heap(LINKS, 10, tilt=2.0)], method="dp5", keeps=True)
+    batch.control.sample_interval = 5 * FIXED_STEP
+    batch.control.soften_area = area
+    batch.control.soft_stiffness, batch.control.soft_damping, batch.control.soft_smoothing = 1e6, 10.0, 1.0
+    return batch
+
+
+def turning(softness: float) -> Batch:
+    """A soft chain that turns on its sprocket and is steady, as soon as it can be."""
+    chain = lay_chain(stadium(0.02), LINKS, SOFT.link_length, 2.0)
+    batch = batch_of([chain], method="dp5", keeps=True)
+    batch.set_chain(0, SOFT, LINKS, 0.02 - SOFT.circle_radius)
+    batch.control.sample_interval = 4 * FIXED_STEP
+    batch.control.stiffening_time, batch.control.stiff_time = 15 * FIXED_STEP, 8 * FIXED_STEP
+    batch.control.soft_stiffness, batch.control.soft_damping, batch.control.soft_smoothing = 1e6, 10.0, 1.0
+    batch.state.softness.numpy()[0] = softness
+    batch.resume(0, 1.0, Status.NOT_STEADY)
+    batch.set_program(
+        0,
+        sprocket_speed=-2.0 / 0.02,
+        loop_speed=1.92,
+        loop_period=8 * FIXED_STEP,
+        steady_time=40 * FIXED_STEP,
+        steady_tolerance=1.0,
+        release_phase=0.25,
+    )
+    return batch
+
+
+def assert_same_bits(ours: Batch, theirs: Batch) -> None:
+    """States, moments and samples agree to the bit, losses to the order of their sums."""
+    for name in ("links", "time", "status", "softness", "first_area", "watch", "stop_time"):
+        assert_array_equal(getattr(ours.state, name).numpy(), getattr(theirs.state, name).numpy(), err_msg=name)
+    assert_allclose(ours.state.losses.numpy(), theirs.state.losses.numpy(), rtol=1e-12)
+    for world in range(len(ours.links)):
+        assert_array_equal(ours.drain_samples(world), theirs.drain_samples(world))
+
+
+def softening_features(batch: Batch, fixed_body: str, watch: str):
+    """What the kernels are compiled for."""
+    return dataclasses.replace(batch.features(fixed_body=fixed_body, watch=watch), softens=True)
+
+
+@pytest.mark.parametrize("cut", [60, 7])
+def test_blocks_soften_a_pile_as_the_cpu_form_does(cut: int, exact_kernels: None) -> None:
+    """The block form softens at the same look, frees the same energy, and goes on to the same bits, however cut."""
+    area = 0.9975
+    ours, theirs = heaps(area), heaps(area)
+    features = softening_features(ours, "floor", "rest")
+    for _ in range(-(-60 // cut)):
+        launch_blocks(ours, features, min(cut, 60), block_dim=LINKS)
+    launch_chains(theirs, features, cut * -(-60 // cut))
+    first, second = (theirs.softened_at(world) for world in range(2))
+    assert 0 < first < second < theirs.time(0)
+    assert np.all(theirs.state.losses.numpy()[:, layout.LOSS_SOFTENING] > 0)
+    assert_same_bits(ours, theirs)
+
+
+@pytest.mark.parametrize("cut", [60, 7])
+def test_blocks_stiffen_as_the_cpu_form_does(cut: int, exact_kernels: None) -> None:
+    """The block form gives the joints their values back in the same steps, and stops at the same moment."""
+    ours, theirs = turning(1.0), turning(1.0)
+    features = softening_features(ours, "sprocket", "steady")
+    for _ in range(-(-80 // cut)):
+        launch_blocks(ours, features, cut, block_dim=LINKS)
+    launch_chains(theirs, features, 100)
+    assert theirs.status(0) == Status.FINISHED
+    assert theirs.state.softness.numpy()[0] == 0.0
+    assert theirs.state.losses.numpy()[0, layout.LOSS_SOFTENING] < 0
+    assert_same_bits(ours, theirs)
+
+
+# --- refusals ---
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"soften_area": 0.0}, r"options\.soften_area: 0.0 is not greater than 0; .*"),
+        ({"soften_area": 1.0}, r"options\.soften_area: 1.0 is not less than 1; .*"),
+        ({"soften_area": float("nan")}, r"options\.soften_area: nan is not finite; .*"),
+        ({"soften_pile": 1}, r"options\.soften_pile: 1 is not a truth value; .*"),
+        ({"soften_drive": "yes"}, r"options\.soften_drive: 'yes' is not a truth value; .*"),
+        (
+            {"soften_drive": True, "record_interval": 5e-3},
+            r"options\.soften_drive: joints stiffen at each record_interval, and 0\.005 s .* at most 0\.002 s",
+        ),
+    ],
+)
+def test_bad_values_are_refused(settings: dict, message: str) -> None:
+    """Options of softening that cannot be are refused in one line."""
+    with pytest.raises(InputError, match=f"^{message}$"):
+        setup_walk("paper", settings, None)
+
+
+@pytest.mark.parametrize("name", ["soften_pile", "soften_drive"])
+def test_simulate_does_not_soften(name: str) -> None:
+    """A given chain has neither release nor pile: asked to soften, `simulate` refuses."""
+    position, velocity = lay_chain(ellipse(1.0), 8, PAPER.link_length, 1.0)
+    with pytest.raises(InputError, match=rf"^options\.{name}: only a walk"):
+        warpchain.simulate("paper", position, velocity, 0.1, **{name: True})
