@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.special import ellipe
 
 import warpchain
-from tests.blocks_under_test import FIXED_STEP, batch_of, fibers, heap, launch_blocks, launch_chains
+from tests.blocks_under_test import FIXED_STEP, batch_of, heap, launch_blocks, launch_chains
 from warpchain import InputError, Status, ensemble, preset
 from warpchain.course import Course
 from warpchain.engine import SOFT, STIFF_TIME, STIFFENING_TIME, Batch, start_device
@@ -55,8 +55,9 @@ def test_area_of_a_ring(links: int) -> None:
     expected = links * PAPER.link_length**2 / (4 * np.tan(np.pi / links))
     sign = np.sign(area_of(position))
     assert area_of(position) == pytest.approx(sign * expected, rel=1e-9)
-    assert area_of(position + [3.0, -1.0, 0.0]) == pytest.approx(sign * expected, rel=1e-9)
-    mirrored = position * [-1.0, 1.0, -1.0] + [0.0, 0.0, np.pi]
+    moved = position + np.array([3.0, -1.0, 0.0])
+    assert area_of(moved) == pytest.approx(sign * expected, rel=1e-9)
+    mirrored = position * np.array([-1.0, 1.0, -1.0]) + np.array([0.0, 0.0, np.pi])
     assert area_of(mirrored) == pytest.approx(-sign * expected, rel=1e-9)
 
 
@@ -283,11 +284,10 @@ def test_cuts_into_launches_do_not_change_a_softened_walk(monkeypatch: pytest.Mo
     for tries in (20_000, 777):
         monkeypatch.setitem(ensemble.TRIES, "cpu", tries)
         ((_, course),) = ensemble.run_setups([setup])
-        seen.append(
-            (course.dx, course.drive_time, course.walk_time, course.softened_at, course.counts, course.energy())
-        )
+        times = course.drive_time, course.walk_time, course.softened_at
+        seen.append((course.dx, times, course.counts, course.energy()))
     assert seen[0] == seen[1]
-    assert seen[0][3] > 0
+    assert seen[0][1][2] > 0
 
 
 @pytest.fixture
