@@ -229,3 +229,11 @@ def test_every_kernel_compiles_for_gpus(
     fixed_body, watch = body_and_watch
     features = Features(method, layout.padded_width(60), fixed_body, self_contact, "grid", watch)
     compiles_for_gpus(tmp_path, features, 192)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("fixed_body", "watch"), [("floor", "rest"), ("sprocket", "steady")])
+def test_kernels_that_soften_compile_for_gpus(tmp_path: Path, fixed_body: str, watch: str) -> None:
+    """So do those that change the softness of joints."""
+    features = Features("rkf78", layout.padded_width(60), fixed_body, True, "grid", watch, softens=True)
+    compiles_for_gpus(tmp_path, features, 192)

@@ -364,7 +364,7 @@ def test_damage_is_seen(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["", "[]", "3", '{"format": "other"}', '{"format": "warpchain sweep", "format_version": 1}', "\xff", "{" * 2000],
+    ["", "[]", "3", '{"format": "other"}', '{"format": "warpchain sweep", "format_version": 2}', "\xff", "{" * 2000],
 )
 def test_a_damaged_manifest_is_refused(tmp_path: Path, text: str) -> None:
     """A manifest that is none is named, and nothing is begun over it."""
@@ -378,8 +378,8 @@ def test_a_later_format_is_refused(tmp_path: Path) -> None:
     """A folder of another version of the format says so."""
     run(tmp_path)
     path = tmp_path / "sweep.json"
-    path.write_text(path.read_text().replace('"format_version": 1', '"format_version": 2'))
-    with refused(InputError, tmp_path, "format version 2, not 1"):
+    path.write_text(path.read_text().replace('"format_version": 2', '"format_version": 3'))
+    with refused(InputError, tmp_path, "format version 3, not 2"):
         read_manifest(tmp_path)
 
 

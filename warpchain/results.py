@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 FORMAT: Final = "warpchain walk"
-FORMAT_VERSION: Final = 1
+FORMAT_VERSION: Final = 2
 
 CONTACTS: Final = {
     "floor": "between links and floor",

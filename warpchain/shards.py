@@ -37,7 +37,7 @@ NUMERICS_VERSION: Final = 1
 """Raised by every change that changes a number of any walk; shards of two versions never mix."""
 
 FORMAT: Final = "warpchain sweep"
-FORMAT_VERSION: Final = 1
+FORMAT_VERSION: Final = 2
 
 
 @dataclass(frozen=True)

@@ -80,6 +80,8 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
     yield "status", status.label if status.ok else f"{status.label}: {status.sentence}"
     yield "walk time", f"{result.walk_time:.3f} s"
     yield "bounces", f"{result.bounces}"
+    if math.isfinite(result.softened_at):
+        yield "joints softened", f"{result.softened_at:.3f} s after the release"
     yield "steps", f"{result.steps_accepted:,} accepted, {result.steps_rejected:,} rejected"
     yield "simulated", f"{result.simulated_time:.3f} s in {result.wall_time:.1f} s"
     yield "greatest joint opening", f"{1e3 * result.greatest_opening:.3g} mm"
