@@ -281,10 +281,9 @@ def sampling(watch: str, softens: bool = False):
             write_frame(record, K, chain, world, time)
         passed = wp.int64(wp.floor(time / control.sample_interval))
         state.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
-        if wp.static(softens and watches_rest):
+        if wp.static(softens):
+            watch_stiffening(state, control, world, time)
             watch_collapse(K, chain, state, control, world, time, is_first)
-        if wp.static(softens and watches_steadiness):
-            watch_stiffening(state, program, control, world, time)
         if wp.static(watches_rest):
             return watch_rest(state, control, world, time, summary)
         if wp.static(watches_steadiness):

@@ -1,4 +1,8 @@
-"""Softer joints where nothing fast is left to resolve: in a loop that has collapsed, and on the sprocket.
+"""Softer joints where nothing fast is left to resolve: in a loop that has collapsed, and just after the release.
+
+A chain that was driven on soft joints is released with them; they get their own values back before it lands. Earlier
+was tried and rejected: nobody knows beforehand when the loop will be steady, and putting the release off by 0.25 s
+shifts Δx by 4 %, for the loop's width swings slowly.
 
 Stiff joints are what makes steps short. Softness s goes from 0, the model's own k, b and 1/ω_c, to 1, those of soft
 joints; in between they are interpolated geometrically. No value ever becomes stiffer than the model's own. Softness
@@ -20,10 +24,8 @@ from .layout import (
     RIGHT_Y,
     SOFTENED_AT,
     SPRING,
-    STEADY_SINCE,
-    STIFFENING_SINCE,
 )
-from .types import Chain, Control, Model, Program, State, read_chain
+from .types import Chain, Control, Model, State, read_chain
 
 wp.set_module_options({"enable_backward": False})
 
@@ -83,39 +85,23 @@ def watch_collapse(
 
     Joints that are soft already stay as they are, and no moment of softening is noted.
     """
+    if is_first:
+        state.first_area[world] = enclosed_area(K, chain)
     soft = softened(chain, control, ONE)
     is_stiffer = (
         chain.joint_stiffness > soft.joint_stiffness
         or chain.joint_damping > soft.joint_damping
         or chain.inverse_smoothing > soft.inverse_smoothing
     )
-    if state.softness[world] > ZERO or not is_stiffer:
+    if is_first or state.softness[world] > ZERO or not is_stiffer:
         return
-    area = enclosed_area(K, chain)
-    if is_first:
-        state.first_area[world] = area
-    elif area / state.first_area[world] < control.soften_area:
+    if enclosed_area(K, chain) / state.first_area[world] < control.soften_area:
         state.softness[world] = ONE
         state.watch[world, SOFTENED_AT] = time
 
 
 @wp.func
-def watch_stiffening(state: State, program: Program, control: Control, world: int, time: wp.float64):
-    """Gives soft joints on the sprocket their own values back in time for the release.
-
-    They have them for at least ``stiff_time`` before the first moment at which the loop may turn out to be steady,
-    which the memory of the watch for steadiness tells. A loop that is not steady then keeps them. Putting the release
-    off instead was tried and rejected: the loop's width swings so slowly that 0.25 s shift Δx by 4 %.
-    """
-    if state.softness[world] <= ZERO:
-        return
-    period = program.loop_period[world]
-    wait = wp.max(period, program.steady_time[world])
-    release = program.hold_start[world] + period + wait
-    if state.watch[world, STEADY_SINCE] >= ZERO:
-        release = state.watch[world, STEADY_SINCE] + wait
-    if state.watch[world, STIFFENING_SINCE] < ZERO and release - time <= control.stiffening_time + control.stiff_time:
-        state.watch[world, STIFFENING_SINCE] = time
-    since = state.watch[world, STIFFENING_SINCE]
-    if since >= ZERO:
-        state.softness[world] = wp.max(ZERO, ONE - (time - since) / control.stiffening_time)
+def watch_stiffening(state: State, control: Control, world: int, time: wp.float64):
+    """Gives joints that were soft on the sprocket their own values back, in the first moments after the release."""
+    if state.softness[world] > ZERO and state.watch[world, SOFTENED_AT] < ZERO:
+        state.softness[world] = wp.max(ZERO, ONE - time / control.stiffening_time)

@@ -111,8 +111,7 @@ class Control:
     soft_damping: wp.float64  # b [N s/m]
     soft_smoothing: wp.float64  # ω_c [rad/s]
     soften_area: wp.float64  # joints soften below this fraction of the first area
-    stiffening_time: wp.float64  # from soft joints on the sprocket to the model's own [s]
-    stiff_time: wp.float64  # how long they then have these before the release, at least [s]
+    stiffening_time: wp.float64  # from soft joints at the release to the model's own [s]
 
 
 @wp.struct

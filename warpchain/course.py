@@ -11,7 +11,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.engine import COUNTS, EXTREMES, STIFF_TIME, STIFFENING_TIME, Batch
+from warpchain.engine import COUNTS, EXTREMES, SOFT, Batch
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features
 from warpchain.motion import Motion
@@ -82,7 +82,8 @@ class Course:
             self._settled = self._at_full_speed = 0.0
             self._release(position, velocity)
             return
-        batch.set_chain(world, parameters, scene.links, contact_radius(scene, parameters))
+        driven = soft_joints(parameters) if setup.options.soften_drive else parameters
+        batch.set_chain(world, driven, scene.links, contact_radius(scene, parameters))
         self._settled = scene.settle_time if from_rest else 0.0
         spin_up = scene.spin_up_time if from_rest and speed > 0 else 0.0
         self._at_full_speed = self._settled + spin_up
@@ -92,17 +93,7 @@ class Course:
             parameters.link_length,
             0.0 if from_rest else speed,
         )
-        period = scene.links * parameters.link_length / speed if speed > 0 else STILL_WINDOW
-        earliest_release = self._at_full_speed + period + max(period, scene.steady_time)
-        is_soft = setup.options.soften_drive and earliest_release >= STIFFENING_TIME + STIFF_TIME
-        batch.load(
-            world,
-            position,
-            velocity,
-            stop_time=self._settled,
-            stop_status=Status.FINISHED,
-            softness=float(is_soft),
-        )
+        batch.load(world, position, velocity, stop_time=self._settled, stop_status=Status.FINISHED)
         batch.set_program(
             world,
             sprocket_speed=-2 * math.pi * scene.frequency,  # clockwise, so that the walk goes towards +x
@@ -110,7 +101,7 @@ class Course:
             spin_up_time=spin_up,
             hold_start=self._at_full_speed,
             loop_speed=speed,
-            loop_period=period,
+            loop_period=scene.links * parameters.link_length / speed if speed > 0 else STILL_WINDOW,
             steady_time=scene.steady_time,
             steady_tolerance=scene.steady_tolerance,
             release_phase=scene.phase,
@@ -241,6 +232,8 @@ class Course:
         measured = self._hanging_lowest if scene.clearance_of == "hanging" else lowest
         self.raised = scene.clearance - measured
         position[:, 1] += self.raised
+        was_driven_soft = self.setup.options.soften_drive and scene.start != "ellipse"
+        self._batch.set_chain(self._world, self.setup.parameters, scene.links)
         self._batch.load(
             self._world,
             position,
@@ -248,8 +241,20 @@ class Course:
             stop_time=scene.walk_limit,
             stop_status=Status.TIME_LIMIT,
             tries_before=self.drive_counts["accepted"] + self.drive_counts["rejected"],
+            softness=float(was_driven_soft),
         )
         self._released = True
+
+
+def soft_joints(parameters: Parameters) -> Parameters:
+    """The parameters with joints as soft as those of the preset `soft`, or softer if they were."""
+    return parameters.with_values(
+        {
+            "joint_stiffness": min(parameters.joint_stiffness, SOFT.joint_stiffness),
+            "joint_damping": min(parameters.joint_damping, SOFT.joint_damping),
+            "friction_smoothing": max(parameters.friction_smoothing, SOFT.friction_smoothing),
+        }
+    )
 
 
 def lowest_point(position: Array, parameters: Parameters) -> float:

@@ -40,14 +40,9 @@ CAPACITY_SAMPLES = 512
 CAPACITY_FRAMES = 64
 SOFT = preset("soft")
 """Whose joints softened ones have."""
-STIFFENING_TIME = 0.05
-"""Time [s] in which joints that were soft on the sprocket get their own values back."""
-STIFF_TIME = 0.1
-"""Time [s] that they have these before the release, at least."""
-UNSET_WATCHES = (
-    *(layout.WINDOW_START, layout.STEADY_SINCE, layout.REST_SINCE),
-    *(layout.STIFFENING_SINCE, layout.SOFTENED_AT),
-)
+STIFFENING_TIME = 0.03
+"""Time [s] in which joints that were soft on the sprocket get their own values back after the release."""
+UNSET_WATCHES = (layout.WINDOW_START, layout.STEADY_SINCE, layout.REST_SINCE, layout.SOFTENED_AT)
 """Moments of :attr:`State.watch` that are negative until they come."""
 
 COUNTS = ("accepted", "rejected", "floor", "sprocket", "self", "bounces", "list_builds")
@@ -204,9 +199,8 @@ class Batch:
         self.control.soft_stiffness = SOFT.joint_stiffness
         self.control.soft_damping = SOFT.joint_damping
         self.control.soft_smoothing = SOFT.friction_smoothing
-        self.control.soften_area = options.soften_area
+        self.control.soften_area = options.soften_area if options.soften_pile else -math.inf
         self.control.stiffening_time = STIFFENING_TIME
-        self.control.stiff_time = STIFF_TIME
 
         self._tries = 500
         self.scratch = wp.zeros((worlds, rows, self.columns), dtype=wp.float64, device=self.device)
@@ -314,7 +308,7 @@ class Batch:
             self_contact=self.options.self_contact,
             broad_phase=broad_phase,
             watch=watch,
-            softens={"rest": self.options.soften_pile, "steady": self.options.soften_drive}.get(watch, False),
+            softens=watch == "rest" and (self.options.soften_pile or self.options.soften_drive),
         )
 
     def run(self, worlds: Sequence[int], features: Features, after_launch: Callable[[], None] | None = None) -> None:

@@ -218,7 +218,7 @@ class Options(BaseModel):
     )
     soften_drive: bool = Field(
         default=False,
-        description="whether joints have the values of the preset soft on the sprocket, until shortly before release",
+        description="whether joints have the values of the preset soft on the sprocket, their own from 0.03 s later",
     )
     device: str = Field(default="cpu", description="where walks run: cpu, cuda (the first GPU) or cuda:N")
 
