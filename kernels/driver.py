@@ -23,7 +23,7 @@ from .contact import (
 )
 from .controller import LEAST_SHRINKAGE, step_controller
 from .elementary import HALF, ONE, TWO, ZERO
-from .explicit import explicit_method, place_ends
+from .explicit import place_ends
 from .layout import (
     ACCEPTED,
     BOUNCES,
@@ -50,9 +50,9 @@ from .layout import (
     STAGES,
     TIME,
 )
+from .methods import METHODS
 from .record import record_is_full, sampling, summarise, write_sample
 from .softening import change_joints, softened
-from .tableaus import TABLEAUS
 from .types import Chain, Control, Model, Program, Record, State, read_chain
 
 wp.set_module_options({"enable_backward": False})
@@ -78,7 +78,7 @@ class Features:
     """What a kernel is compiled for; everything else is left out of it.
 
     Attributes:
-        method: Key of :data:`TABLEAUS`.
+        method: Key of :data:`METHODS`.
         columns: Width of the scratch blocks, see :func:`layout.padded_width`.
         fixed_body: ``"floor"``, ``"sprocket"`` or ``"none"``.
         self_contact: Contacts between a chain's own links.
@@ -176,9 +176,9 @@ def make_advance(features: Features):
     scratch: (W, rows, columns) float64, lists: (W, size) int32, see :mod:`layout` and :mod:`broadphase`; both belong
     to a world until its run ends.
     """
-    tableau = TABLEAUS[features.method]
-    rows = layout.scratch_rows(tableau.stages)
+    method = METHODS[features.method]
     columns = features.columns
+    rows = method.scratch_rows(columns)
     list_size = list_layout(columns).size
     list_count = list_layout(columns).count
     has_floor = features.fixed_body == "floor"
@@ -186,11 +186,11 @@ def make_advance(features: Features):
     has_fixed = has_floor or has_sprocket
     has_self = features.self_contact
     fixed_loss = layout.LOSS_SPROCKET if has_sprocket else layout.LOSS_FLOOR
-    reuses_last = tableau.first_same_as_last
+    reuses_last = method.reuses_last
     softens = features.softens
     look = sampling(features.watch, softens)
-    first_stage, attempt, commit = explicit_method(features.method)
-    growth, shrinkage = step_controller(tableau.order, tableau.error_order)
+    first_stage, attempt, commit = method.functions(columns)
+    growth, shrinkage = step_controller(method.order, method.error_order)
     build_by_grid, build_by_all_pairs = neighbour_list(columns)
     build_list = build_by_grid if features.broad_phase == "grid" else build_by_all_pairs
     resolve_self_contacts = self_contacts(columns)

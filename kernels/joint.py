@@ -5,7 +5,7 @@ Scalar functions, one joint or one link a call.
 
 import warp as wp
 
-from .elementary import tanh
+from .elementary import ONE, tanh
 from .types import Chain
 
 wp.set_module_options({"enable_backward": False})
@@ -24,6 +24,13 @@ def joint_force(chain: Chain, opening: wp.float64, opening_rate: wp.float64):
 def friction_torque(chain: Chain, spin: wp.float64):
     """f(w) = β w + τ_c tanh(w / ω_c) [N m] for a relative angular velocity w [rad/s]."""
     return chain.viscous_friction * spin + chain.coulomb_friction * tanh(spin * chain.inverse_smoothing)
+
+
+@wp.func
+def friction_slope(chain: Chain, spin: wp.float64):
+    """f'(w) = β + τ_c / ω_c (1 − tanh²(w / ω_c)) [N m s]."""
+    switch = tanh(spin * chain.inverse_smoothing)
+    return chain.viscous_friction + chain.coulomb_friction * chain.inverse_smoothing * (ONE - switch * switch)
 
 
 @wp.func

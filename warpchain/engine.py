@@ -21,6 +21,7 @@ from warpchain.kernels import layout
 from warpchain.kernels.block import make_advance_block
 from warpchain.kernels.broadphase import list_layout
 from warpchain.kernels.driver import Features, make_advance
+from warpchain.kernels.methods import METHODS
 from warpchain.kernels.tableaus import TABLEAUS
 from warpchain.kernels.types import Control, Model, Program, Record, State
 from warpchain.options import Options
@@ -149,7 +150,7 @@ class Batch:
         self._mirrors: dict[int, tuple[wp.array, NDArray[Any]]] = {}
         self._streams: dict[tuple[Features, int], wp.Stream] = {}
         self.columns = layout.padded_width(longest)
-        rows = max(layout.scratch_rows(TABLEAUS[options.method].stages), layout.BLOCK_ROWS)
+        rows = max(METHODS[options.method].scratch_rows(self.columns), layout.BLOCK_ROWS)
 
         self.model = Model()
         self.model.link_count = self._array(np.zeros(worlds, dtype=np.int32))

@@ -146,9 +146,9 @@ class Options(BaseModel):
 
     model_config = _STRICT
 
-    method: Literal["rkf78", "dp5", "bs32"] = Field(
+    method: Literal["rkf78", "dp5", "bs32", "rodas4p"] = Field(
         default="rkf78",
-        description="embedded Runge–Kutta pair: Fehlberg 7(8), Dormand–Prince 5(4) or Bogacki–Shampine 3(2)",
+        description="embedded pair: Fehlberg 7(8), Dormand–Prince 5(4), Bogacki–Shampine 3(2), or RODAS4P 4(3), implicit",
     )
     tolerance: float = Field(
         default=1e-6,
@@ -228,6 +228,12 @@ class Options(BaseModel):
         if not re.fullmatch(r"cpu|cuda(:\d{1,3})?", device):
             raise refusal("device", f"{shown(device)} is no device; give cpu, cuda or cuda:N")
         return device
+
+    @model_validator(mode="after")
+    def _method_on_device(self) -> Self:
+        if self.method == "rodas4p" and self.device != "cpu":
+            raise refusal("method", f"rodas4p runs on the CPU, not on {self.device}; give rkf78, dp5 or bs32")
+        return self
 
     @model_validator(mode="after")
     def _steps_ordered(self) -> Self:

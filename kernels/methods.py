@@ -1,0 +1,66 @@
+"""Every method of the step loop by the name that a user writes, and what the loop must know of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from . import layout
+from .explicit import explicit_method
+from .rosenbrock import rosenbrock_method, rosenbrock_rows
+from .rosenbrock_tables import ROSENBROCK_TABLES
+from .tableaus import TABLEAUS
+
+
+@dataclass(frozen=True)
+class Method:
+    """One method.
+
+    Attributes:
+        name: What a user writes for ``method``.
+        order: Order of the solution that is propagated.
+        error_order: Order of the embedded solution; both set the controller's exponents.
+        stages: Number of stages.
+        reuses_last: Whether a step leaves the first stage of the next.
+        scratch_rows: Rows of a chain's scratch block of so many columns.
+        functions: Warp functions (first stage, attempt, commit) for scratch blocks of so many columns.
+    """
+
+    name: str
+    order: int
+    error_order: int
+    stages: int
+    reuses_last: bool
+    scratch_rows: Callable[[int], int]
+    functions: Callable[[int], Any]
+
+
+def _explicit(name: str) -> Method:
+    tableau = TABLEAUS[name]
+    return Method(
+        name=name,
+        order=tableau.order,
+        error_order=tableau.error_order,
+        stages=tableau.stages,
+        reuses_last=tableau.first_same_as_last,
+        scratch_rows=lambda columns: layout.scratch_rows(tableau.stages),
+        functions=lambda columns: explicit_method(name),
+    )
+
+
+def _rosenbrock(name: str) -> Method:
+    table = ROSENBROCK_TABLES[name]
+    return Method(
+        name=name,
+        order=table.order,
+        error_order=table.error_order,
+        stages=table.stages,
+        reuses_last=False,
+        scratch_rows=lambda columns: rosenbrock_rows(name, columns),
+        functions=lambda columns: rosenbrock_method(name, columns),
+    )
+
+
+METHODS = {
+    **{name: _explicit(name) for name in TABLEAUS},
+    **{name: _rosenbrock(name) for name in ROSENBROCK_TABLES},
+}

@@ -1,0 +1,523 @@
+"""Rosenbrock methods on the chain's equations with their exact Jacobian: O(n) a step, no bound on h from the springs.
+
+With v = q̇ and M q̈ = Q(q, v), put g = hγ, K = −∂Q/∂q and D = −∂Q/∂v. A stage of :class:`RosenbrockTable`,
+(1 − g J) U = r with r_q = g v + γ Σ C U_q, r_v = g M⁻¹ Q + γ Σ C U_v at the stage's place, is freed of its velocities:
+
+    (M + g D + g² K) U_q = g M r_v + (M + g D) r_q,    U_v = (U_q − r_q) / g.
+
+The matrix couples neighbouring links only: 3 × 3 blocks along the loop, the same for all stages of a step.
+
+A joint between link l on its left and link r on its right opens by C = (X_r − a u_r) − (X_l + a u_l) and pulls with
+F = k C + b Ċ. With σ = g b + g² k its part of the matrix is g F ≙ σ δC + g² b a (ω_l u_l δθ_l + ω_r u_r δθ_r), where
+the last two terms come from the turning of t in Ċ; that of t in the torque a t·F adds g² a u·F to the diagonal. Both
+links' columns of the first part are c = −σ a t + g² b a ω u. So the diagonal blocks are diagonal:
+
+    D_i = diag(m + 2σ, m + 2σ, I + 2σ a² + g (φ_i + φ_i₋₁) + g² a u·(F_i + F_i₋₁)),
+    U_i = −(1; a t_iᵀ) (σ, c_i₊₁) − g φ_i,    L_i = (1; −a t_iᵀ) (−σ, c_i₋₁) − g φ_i₋₁,
+
+with φ = f'(w) of the joints' friction, in the corner of the angles.
+
+All is done in the order of :mod:`cyclic_solver`: eight segments of the loop side by side, so that the next link is the
+next vector of memory. A joint lies at the column of the link on its left, rows of joints one place further.
+"""
+
+import functools
+
+import warp as wp
+
+from .controller import error_bits
+from .cyclic_solver import SegmentLayout, cyclic_solver, place_column, row_at, segment_columns, segment_places
+from .elementary import ONE, TWO, ZERO, cos_sin, order_bits
+from .geometry import end_positions, end_velocities
+from .joint import friction_slope, friction_torque, joint_force
+from .layout import LOST_DAMPING, LOST_FRICTION, OMEGA, STAGE_ROWS, STAGES, THETA, U, V, X, Y
+from .rosenbrock_tables import ROSENBROCK_TABLES
+from .types import Chain
+
+wp.set_module_options({"enable_backward": False})
+
+# Rows in segment order. The state at the start of the step (6), its direction, the links' constants.
+BASE = 0
+BASE_COSINE, BASE_SINE, MASS, INERTIA, COUNTED = 6, 7, 8, 9, 10
+# Accelerations at the start of the step; of joints there: friction's slope and torque, force, spin, opening rate.
+BASE_RATE = 11
+SLOPE, BASE_TORQUE, BASE_FORCE_X, BASE_FORCE_Y, BASE_SPIN, BASE_RATE_X, BASE_RATE_Y = 14, 15, 16, 17, 18, 19, 20
+# A stage: direction, spin, link ends and their velocities, r_q, and the same ends' changes by r_q.
+COSINE, SINE, SPIN = 21, 22, 23
+LEFT, RIGHT = 24, 28
+SHIFT, SHIFT_LEFT, SHIFT_RIGHT = 32, 35, 37
+# γ Σ C U_v, joint forces and torques of the stage and of the change by r_q.
+DRIVE = 39
+FORCE_X, FORCE_Y, TORQUE, SHIFT_X, SHIFT_Y, SHIFT_TORQUE = 42, 43, 44, 45, 46, 47
+POWER_FRICTION, POWER_DAMPING = 48, 49
+# The candidate state.
+NEW = 50
+FIRST_STAGE_ROW = 56
+
+
+@functools.cache
+def segments_of(stages: int, links: int) -> SegmentLayout:
+    """Layout of the linear system behind the rows of a method with so many stages."""
+    matrix = FIRST_STAGE_ROW + 6 * stages
+    return SegmentLayout(size=3, columns=segment_columns(links), matrix=matrix, right=matrix + 54)
+
+
+def rosenbrock_rows(name: str, columns: int) -> int:
+    """Rows of a chain's scratch block of this width."""
+    segments = segments_of(ROSENBROCK_TABLES[name].stages, columns)
+    doubles = (segments.right + segments.right_rows) * segments.columns + segments.separator_rows * 16
+    return STAGES + STAGE_ROWS + -(-doubles // columns)
+
+
+@functools.cache
+def rosenbrock_method(name: str, columns: int):
+    """Warp functions of one table: (evaluate the first stage, try a step, commit it), as those of an explicit method.
+
+    Args:
+        name: Key of :data:`ROSENBROCK_TABLES`.
+        columns: Width of the scratch blocks.
+
+    Returns:
+        ``first_stage(K, chain)``, ``attempt(K, chain, h, tolerance)`` → bits of the greatest error ratio (see
+        :func:`order_bits`), ``commit(K, chain, h)``.
+    """
+    table = ROSENBROCK_TABLES[name]
+    stages, gamma = table.stages, table.gamma
+    matrix, couplings, quadrature = table.matrix, table.couplings, table.quadrature
+    segments = segments_of(stages, columns)
+    factor, solve = cyclic_solver(segments)
+    width, right = segments.columns, segments.right
+    rows = segments.right + segments.right_rows
+    separator_rows = segments.separator_rows
+    first_row = STAGES + STAGE_ROWS
+    offset = 8 * first_row * columns
+    separator_offset = offset + 8 * rows * width
+    lower, diagonal, upper = (segments.block(k) for k in range(3))
+
+    @wp.func
+    def segment_rows(K: wp.array2d(dtype=wp.float64)):
+        return wp.array(
+            ptr=K.ptr + wp.uint64(wp.static(offset)), shape=(wp.static(rows), wp.static(width)), dtype=wp.float64
+        )
+
+    @wp.func
+    def separator_rows_of(K: wp.array2d(dtype=wp.float64)):
+        return wp.array(
+            ptr=K.ptr + wp.uint64(wp.static(separator_offset)), shape=(wp.static(separator_rows), 16), dtype=wp.float64
+        )
+
+    @wp.func
+    def link_at(place: int, segment: int, places: int, full: int, link_count: int):
+        row = row_at(place, segment, places, full)
+        return wp.where(row >= link_count, row - link_count, row)
+
+    @wp.func
+    def pad_behind(S: wp.array2d(dtype=wp.float64), row: int, places: int, full: int):
+        """Behind each segment's last link, the first link of the next segment."""
+        s = int(0)
+        while s < 8:
+            after = (s + 1) % 8
+            S[row, 8 * places + 8 + s] = S[row, 8 + after + wp.where(after >= full, 8, 0)]
+            s += 1
+
+    @wp.func
+    def pad_before(S: wp.array2d(dtype=wp.float64), row: int, places: int):
+        """Before each segment's first place, the last of the segment before."""
+        s = int(0)
+        while s < 8:
+            S[row, s] = S[row, 8 * places + (s + 7) % 8]
+            s += 1
+
+    @wp.func
+    def pad_joints(S: wp.array2d(dtype=wp.float64), row: int, places: int):
+        """The same for joints, which lie one place further."""
+        s = int(0)
+        while s < 8:
+            S[row, 8 + s] = S[row, 8 * places + 8 + (s + 7) % 8]
+            s += 1
+
+    @wp.func
+    def first_stage(K: wp.array2d(dtype=wp.float64), chain: Chain):
+        S = segment_rows(K)
+        n = chain.link_count
+        places, full, total = segment_places(n)
+        end = place_column(places + 1)
+        p = int(0)
+        while p < places:
+            s = int(0)
+            while s < 8:
+                i = link_at(p, s, places, full, n)
+                c = 8 * p + 8 + s
+                S[BASE, c] = K[X, i]
+                S[wp.static(BASE + 1), c] = K[Y, i]
+                S[wp.static(BASE + 2), c] = K[THETA, i]
+                S[wp.static(BASE + 3), c] = K[U, i]
+                S[wp.static(BASE + 4), c] = K[V, i]
+                S[wp.static(BASE + 5), c] = K[OMEGA, i]
+                inner = i % 2 == 0
+                S[MASS, c] = wp.where(inner, chain.inner_mass, chain.outer_mass)
+                S[INERTIA, c] = wp.where(inner, chain.inner_inertia, chain.outer_inertia)
+                repeats = (p == 0 and s >= full) or row_at(p, s, places, full) >= n
+                S[COUNTED, c] = wp.where(repeats, ZERO, ONE)
+                s += 1
+            p += 1
+        c = int(8)
+        while c < end:
+            cosine, sine = cos_sin(S[wp.static(BASE + 2), c])
+            S[BASE_COSINE, c] = cosine
+            S[BASE_SINE, c] = sine
+            place_link(
+                S,
+                chain,
+                c,
+                S[BASE, c],
+                S[wp.static(BASE + 1), c],
+                S[wp.static(BASE + 3), c],
+                S[wp.static(BASE + 4), c],
+                S[wp.static(BASE + 5), c],
+                cosine,
+                sine,
+            )
+            c += 1
+        for k in range(4):
+            pad_behind(S, wp.static(LEFT + k), places, full)
+        pad_behind(S, SPIN, places, full)
+        for k in range(3):
+            pad_before(S, wp.static((BASE_COSINE, BASE_SINE, BASE + 5)[k]), places)
+            pad_behind(S, wp.static((BASE_COSINE, BASE_SINE, BASE + 5)[k]), places, full)
+        c = int(8)
+        while c < end:
+            cx = S[LEFT, c + 8] - S[RIGHT, c]
+            cy = S[wp.static(LEFT + 1), c + 8] - S[wp.static(RIGHT + 1), c]
+            cu = S[wp.static(LEFT + 2), c + 8] - S[wp.static(RIGHT + 2), c]
+            cv = S[wp.static(LEFT + 3), c + 8] - S[wp.static(RIGHT + 3), c]
+            spin = S[SPIN, c] - S[SPIN, c + 8]
+            S[BASE_FORCE_X, c + 8] = joint_force(chain, cx, cu)
+            S[BASE_FORCE_Y, c + 8] = joint_force(chain, cy, cv)
+            S[BASE_TORQUE, c + 8] = friction_torque(chain, spin)
+            S[SLOPE, c + 8] = friction_slope(chain, spin)
+            S[BASE_SPIN, c + 8] = spin
+            S[BASE_RATE_X, c + 8] = cu
+            S[BASE_RATE_Y, c + 8] = cv
+            c += 1
+        for k in range(4):
+            pad_joints(S, wp.static((BASE_FORCE_X, BASE_FORCE_Y, BASE_TORQUE, SLOPE)[k]), places)
+        c = int(8)
+        while c < end:
+            fx = S[BASE_FORCE_X, c + 8] - S[BASE_FORCE_X, c]
+            fy = S[BASE_FORCE_Y, c + 8] - S[BASE_FORCE_Y, c]
+            sum_x = S[BASE_FORCE_X, c + 8] + S[BASE_FORCE_X, c]
+            sum_y = S[BASE_FORCE_Y, c + 8] + S[BASE_FORCE_Y, c]
+            lever = chain.half_length * (S[BASE_COSINE, c] * sum_y - S[BASE_SINE, c] * sum_x)
+            S[BASE_RATE, c] = fx / S[MASS, c]
+            S[wp.static(BASE_RATE + 1), c] = fy / S[MASS, c] - chain.gravity
+            S[wp.static(BASE_RATE + 2), c] = (lever + S[BASE_TORQUE, c] - S[BASE_TORQUE, c + 8]) / S[INERTIA, c]
+            c += 1
+        # where the driver looks for rates that are not finite
+        p = int(0)
+        while p < places:
+            s = int(0)
+            while s < 8:
+                i = link_at(p, s, places, full, n)
+                for k in range(3):
+                    K[wp.static(STAGES + k), i] = S[wp.static(BASE_RATE + k), 8 * p + 8 + s]
+                s += 1
+            p += 1
+
+    @wp.func
+    def assemble(S: wp.array2d(dtype=wp.float64), chain: Chain, g: wp.float64, end: int, full: int):
+        """The matrix M + g D + g² K."""
+        a = chain.half_length
+        gg = g * g
+        sigma = g * chain.joint_damping + gg * chain.joint_stiffness
+        turning = gg * chain.joint_damping * a
+        c = int(8)
+        while c < end:
+            repeats = c < 16 and c >= 8 + full
+            tx = -S[BASE_SINE, c]
+            ty = S[BASE_COSINE, c]
+            before_x = sigma * a * S[BASE_SINE, c - 8] + turning * S[wp.static(BASE + 5), c - 8] * S[BASE_COSINE, c - 8]
+            before_y = turning * S[wp.static(BASE + 5), c - 8] * S[BASE_SINE, c - 8] - sigma * a * S[BASE_COSINE, c - 8]
+            after_x = sigma * a * S[BASE_SINE, c + 8] + turning * S[wp.static(BASE + 5), c + 8] * S[BASE_COSINE, c + 8]
+            after_y = turning * S[wp.static(BASE + 5), c + 8] * S[BASE_SINE, c + 8] - sigma * a * S[BASE_COSINE, c + 8]
+            force_x = S[BASE_FORCE_X, c] + S[BASE_FORCE_X, c + 8]
+            force_y = S[BASE_FORCE_Y, c] + S[BASE_FORCE_Y, c + 8]
+            own = TWO * sigma * a * a + g * (S[SLOPE, c] + S[SLOPE, c + 8])
+            own = S[INERTIA, c] + own + gg * a * (ty * force_x - tx * force_y)
+            level = S[MASS, c] + TWO * sigma
+            S[wp.static(diagonal), c] = wp.where(repeats, ONE, level)
+            S[wp.static(diagonal + 1), c] = ZERO
+            S[wp.static(diagonal + 2), c] = ZERO
+            S[wp.static(diagonal + 3), c] = ZERO
+            S[wp.static(diagonal + 4), c] = wp.where(repeats, ONE, level)
+            S[wp.static(diagonal + 5), c] = ZERO
+            S[wp.static(diagonal + 6), c] = ZERO
+            S[wp.static(diagonal + 7), c] = ZERO
+            S[wp.static(diagonal + 8), c] = wp.where(repeats, ONE, own)
+            S[wp.static(lower), c] = wp.where(repeats, -ONE, -sigma)
+            S[wp.static(lower + 1), c] = ZERO
+            S[wp.static(lower + 2), c] = wp.where(repeats, ZERO, before_x)
+            S[wp.static(lower + 3), c] = ZERO
+            S[wp.static(lower + 4), c] = wp.where(repeats, -ONE, -sigma)
+            S[wp.static(lower + 5), c] = wp.where(repeats, ZERO, before_y)
+            S[wp.static(lower + 6), c] = wp.where(repeats, ZERO, sigma * a * tx)
+            S[wp.static(lower + 7), c] = wp.where(repeats, ZERO, sigma * a * ty)
+            corner = -a * (tx * before_x + ty * before_y) - g * S[SLOPE, c]
+            S[wp.static(lower + 8), c] = wp.where(repeats, -ONE, corner)
+            S[wp.static(upper), c] = wp.where(repeats, ZERO, -sigma)
+            S[wp.static(upper + 1), c] = ZERO
+            S[wp.static(upper + 2), c] = wp.where(repeats, ZERO, -after_x)
+            S[wp.static(upper + 3), c] = ZERO
+            S[wp.static(upper + 4), c] = wp.where(repeats, ZERO, -sigma)
+            S[wp.static(upper + 5), c] = wp.where(repeats, ZERO, -after_y)
+            S[wp.static(upper + 6), c] = wp.where(repeats, ZERO, -sigma * a * tx)
+            S[wp.static(upper + 7), c] = wp.where(repeats, ZERO, -sigma * a * ty)
+            corner = -a * (tx * after_x + ty * after_y) - g * S[SLOPE, c + 8]
+            S[wp.static(upper + 8), c] = wp.where(repeats, ZERO, corner)
+            c += 1
+
+    @wp.func
+    def attempt(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64, tolerance: wp.float64):
+        S = segment_rows(K)
+        R = separator_rows_of(K)
+        places, full, total = segment_places(chain.link_count)
+        lanes = wp.min(total, 8)
+        end = place_column(places + 1)
+        a = chain.half_length
+        g = wp.static(wp.float64(gamma)) * h
+        assemble(S, chain, g, end, full)
+        factor(S, R, places, full, lanes)
+        for i in range(wp.static(stages)):
+            # the stage's place, r_q and γ Σ C U_v
+            c = int(8)
+            while c < end:
+                x = S[BASE, c]
+                y = S[wp.static(BASE + 1), c]
+                theta = S[wp.static(BASE + 2), c]
+                u = S[wp.static(BASE + 3), c]
+                v = S[wp.static(BASE + 4), c]
+                w = S[wp.static(BASE + 5), c]
+                rx = ZERO
+                ry = ZERO
+                rt = ZERO
+                ru = ZERO
+                rv = ZERO
+                rw = ZERO
+                for j in range(wp.static(i)):
+                    ux = S[wp.static(FIRST_STAGE_ROW + 6 * j), c]
+                    uy = S[wp.static(FIRST_STAGE_ROW + 6 * j + 1), c]
+                    ut = S[wp.static(FIRST_STAGE_ROW + 6 * j + 2), c]
+                    uu = S[wp.static(FIRST_STAGE_ROW + 6 * j + 3), c]
+                    uv = S[wp.static(FIRST_STAGE_ROW + 6 * j + 4), c]
+                    uw = S[wp.static(FIRST_STAGE_ROW + 6 * j + 5), c]
+                    x += wp.static(wp.float64(matrix[i][j])) * ux
+                    y += wp.static(wp.float64(matrix[i][j])) * uy
+                    theta += wp.static(wp.float64(matrix[i][j])) * ut
+                    u += wp.static(wp.float64(matrix[i][j])) * uu
+                    v += wp.static(wp.float64(matrix[i][j])) * uv
+                    w += wp.static(wp.float64(matrix[i][j])) * uw
+                    rx += wp.static(wp.float64(gamma * couplings[i][j])) * ux
+                    ry += wp.static(wp.float64(gamma * couplings[i][j])) * uy
+                    rt += wp.static(wp.float64(gamma * couplings[i][j])) * ut
+                    ru += wp.static(wp.float64(gamma * couplings[i][j])) * uu
+                    rv += wp.static(wp.float64(gamma * couplings[i][j])) * uv
+                    rw += wp.static(wp.float64(gamma * couplings[i][j])) * uw
+                rx += g * u
+                ry += g * v
+                rt += g * w
+                S[SHIFT, c] = rx
+                S[wp.static(SHIFT + 1), c] = ry
+                S[wp.static(SHIFT + 2), c] = rt
+                S[DRIVE, c] = ru
+                S[wp.static(DRIVE + 1), c] = rv
+                S[wp.static(DRIVE + 2), c] = rw
+                cosine, sine = cos_sin(theta)
+                place_link(S, chain, c, x, y, u, v, w, cosine, sine)
+                left_x, left_y, right_x, right_y = end_velocities(
+                    chain, rx, ry, rt, S[BASE_COSINE, c], S[BASE_SINE, c]
+                )
+                S[SHIFT_LEFT, c] = left_x
+                S[wp.static(SHIFT_LEFT + 1), c] = left_y
+                S[SHIFT_RIGHT, c] = right_x
+                S[wp.static(SHIFT_RIGHT + 1), c] = right_y
+                if wp.static(i == stages - 1):
+                    S[NEW, c] = x
+                    S[wp.static(NEW + 1), c] = y
+                    S[wp.static(NEW + 2), c] = theta
+                    S[wp.static(NEW + 3), c] = u
+                    S[wp.static(NEW + 4), c] = v
+                    S[wp.static(NEW + 5), c] = w
+                c += 1
+            for k in range(4):
+                pad_behind(S, wp.static(LEFT + k), places, full)
+            pad_behind(S, SPIN, places, full)
+            for k in range(2):
+                pad_behind(S, wp.static(SHIFT_LEFT + k), places, full)
+            pad_behind(S, wp.static(SHIFT + 2), places, full)
+            # joints
+            c = int(8)
+            while c < end:
+                cx = S[LEFT, c + 8] - S[RIGHT, c]
+                cy = S[wp.static(LEFT + 1), c + 8] - S[wp.static(RIGHT + 1), c]
+                cu = S[wp.static(LEFT + 2), c + 8] - S[wp.static(RIGHT + 2), c]
+                cv = S[wp.static(LEFT + 3), c + 8] - S[wp.static(RIGHT + 3), c]
+                spin = S[SPIN, c] - S[SPIN, c + 8]
+                torque = friction_torque(chain, spin)
+                S[FORCE_X, c + 8] = joint_force(chain, cx, cu)
+                S[FORCE_Y, c + 8] = joint_force(chain, cy, cv)
+                S[TORQUE, c + 8] = torque
+                sx = S[SHIFT_LEFT, c + 8] - S[SHIFT_RIGHT, c]
+                sy = S[wp.static(SHIFT_LEFT + 1), c + 8] - S[wp.static(SHIFT_RIGHT + 1), c]
+                S[SHIFT_X, c + 8] = chain.joint_damping * sx
+                S[SHIFT_Y, c + 8] = chain.joint_damping * sy
+                S[SHIFT_TORQUE, c + 8] = S[SLOPE, c + 8] * (S[wp.static(SHIFT + 2), c] - S[wp.static(SHIFT + 2), c + 8])
+                friction = wp.static(wp.float64(quadrature[i])) * (torque * spin)
+                damping = wp.static(wp.float64(quadrature[i])) * (chain.joint_damping * (cu * cu + cv * cv))
+                if wp.static(i == 0):
+                    S[POWER_FRICTION, c + 8] = friction
+                    S[POWER_DAMPING, c + 8] = damping
+                else:
+                    S[POWER_FRICTION, c + 8] = S[POWER_FRICTION, c + 8] + friction
+                    S[POWER_DAMPING, c + 8] = S[POWER_DAMPING, c + 8] + damping
+                c += 1
+            for k in range(6):
+                pad_joints(S, wp.static(FORCE_X + k), places)
+            # right-hand sides
+            c = int(8)
+            while c < end:
+                repeats = c < 16 and c >= 8 + full
+                fx = S[FORCE_X, c + 8] - S[FORCE_X, c]
+                fy = S[FORCE_Y, c + 8] - S[FORCE_Y, c]
+                sum_x = S[FORCE_X, c + 8] + S[FORCE_X, c]
+                sum_y = S[FORCE_Y, c + 8] + S[FORCE_Y, c]
+                turn = a * (S[COSINE, c] * sum_y - S[SINE, c] * sum_x) + S[TORQUE, c] - S[TORQUE, c + 8]
+                gx = S[SHIFT_X, c + 8] - S[SHIFT_X, c]
+                gy = S[SHIFT_Y, c + 8] - S[SHIFT_Y, c]
+                sum_gx = S[SHIFT_X, c + 8] + S[SHIFT_X, c]
+                sum_gy = S[SHIFT_Y, c + 8] + S[SHIFT_Y, c]
+                gt = S[SHIFT_TORQUE, c + 8] - S[SHIFT_TORQUE, c]
+                gt = gt - a * (S[BASE_COSINE, c] * sum_gy - S[BASE_SINE, c] * sum_gx)
+                m = S[MASS, c]
+                rx = g * (g * fx - gx) + m * (g * S[DRIVE, c] + S[SHIFT, c])
+                ry = g * (g * (fy - m * chain.gravity) - gy) + m * (
+                    g * S[wp.static(DRIVE + 1), c] + S[wp.static(SHIFT + 1), c]
+                )
+                rt = g * (g * turn + gt) + S[INERTIA, c] * (
+                    g * S[wp.static(DRIVE + 2), c] + S[wp.static(SHIFT + 2), c]
+                )
+                S[wp.static(right), c] = wp.where(repeats, ZERO, rx)
+                S[wp.static(right + 1), c] = wp.where(repeats, ZERO, ry)
+                S[wp.static(right + 2), c] = wp.where(repeats, ZERO, rt)
+                c += 1
+            solve(S, R, places, lanes)
+            inverse = ONE / g
+            c = int(8)
+            while c < end:
+                for k in range(3):
+                    change = S[wp.static(right + k), c]
+                    S[wp.static(FIRST_STAGE_ROW + 6 * i + k), c] = change
+                    S[wp.static(FIRST_STAGE_ROW + 6 * i + 3 + k), c] = (change - S[wp.static(SHIFT + k), c]) * inverse
+                c += 1
+        # new state and error ratio
+        worst = wp.int64(0)
+        c = int(8)
+        while c < end:
+            for k in range(3):
+                place_error = S[wp.static(FIRST_STAGE_ROW + 6 * (stages - 1) + k), c]
+                speed_error = S[wp.static(FIRST_STAGE_ROW + 6 * (stages - 1) + 3 + k), c]
+                S[wp.static(NEW + k), c] = S[wp.static(NEW + k), c] + place_error
+                S[wp.static(NEW + 3 + k), c] = S[wp.static(NEW + 3 + k), c] + speed_error
+                speed = S[wp.static(BASE + 3 + k), c]
+                worst = wp.max(worst, error_bits(place_error, S[wp.static(BASE + k), c], speed, h))
+                worst = wp.max(worst, error_bits(speed_error, speed, S[wp.static(BASE_RATE + k), c], h))
+            c += 1
+        return order_bits(wp.cast(worst, wp.float64) / tolerance)
+
+    @wp.func
+    def commit(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64):
+        S = segment_rows(K)
+        n = chain.link_count
+        places, full, total = segment_places(n)
+        end = place_column(places + 1)
+        a = chain.half_length
+        # Σ w U, and how the joints' spins and opening rates change by it
+        c = int(8)
+        while c < end:
+            dt = ZERO
+            du = ZERO
+            dv = ZERO
+            dw = ZERO
+            for j in range(wp.static(stages)):
+                dt += wp.static(wp.float64(quadrature[j])) * S[wp.static(FIRST_STAGE_ROW + 6 * j + 2), c]
+                du += wp.static(wp.float64(quadrature[j])) * S[wp.static(FIRST_STAGE_ROW + 6 * j + 3), c]
+                dv += wp.static(wp.float64(quadrature[j])) * S[wp.static(FIRST_STAGE_ROW + 6 * j + 4), c]
+                dw += wp.static(wp.float64(quadrature[j])) * S[wp.static(FIRST_STAGE_ROW + 6 * j + 5), c]
+            left_u, left_v, right_u, right_v = end_velocities(chain, du, dv, dw, S[BASE_COSINE, c], S[BASE_SINE, c])
+            turn_x = a * S[wp.static(BASE + 5), c] * S[BASE_COSINE, c] * dt
+            turn_y = a * S[wp.static(BASE + 5), c] * S[BASE_SINE, c] * dt
+            S[wp.static(LEFT + 2), c] = left_u + turn_x
+            S[wp.static(LEFT + 3), c] = left_v + turn_y
+            S[wp.static(RIGHT + 2), c] = right_u - turn_x
+            S[wp.static(RIGHT + 3), c] = right_v - turn_y
+            S[SPIN, c] = dw
+            c += 1
+        pad_behind(S, wp.static(LEFT + 2), places, full)
+        pad_behind(S, wp.static(LEFT + 3), places, full)
+        pad_behind(S, SPIN, places, full)
+        c = int(8)
+        while c < end:
+            cu = S[wp.static(LEFT + 2), c + 8] - S[wp.static(RIGHT + 2), c]
+            cv = S[wp.static(LEFT + 3), c + 8] - S[wp.static(RIGHT + 3), c]
+            spin = S[SPIN, c] - S[SPIN, c + 8]
+            friction = (S[SLOPE, c + 8] * S[BASE_SPIN, c + 8] + S[BASE_TORQUE, c + 8]) * spin
+            damping = TWO * chain.joint_damping * (S[BASE_RATE_X, c + 8] * cu + S[BASE_RATE_Y, c + 8] * cv)
+            S[POWER_FRICTION, c + 8] = h * S[COUNTED, c] * (S[POWER_FRICTION, c + 8] + friction)
+            S[POWER_DAMPING, c + 8] = h * S[COUNTED, c] * (S[POWER_DAMPING, c + 8] + damping)
+            c += 1
+        p = int(0)
+        while p < places:
+            s = int(0)
+            while s < 8:
+                i = link_at(p, s, places, full, n)
+                c = 8 * p + 8 + s
+                K[X, i] = S[NEW, c]
+                K[Y, i] = S[wp.static(NEW + 1), c]
+                K[THETA, i] = S[wp.static(NEW + 2), c]
+                K[U, i] = S[wp.static(NEW + 3), c]
+                K[V, i] = S[wp.static(NEW + 4), c]
+                K[OMEGA, i] = S[wp.static(NEW + 5), c]
+                K[LOST_FRICTION, i] = K[LOST_FRICTION, i] + S[POWER_FRICTION, c + 8]
+                K[LOST_DAMPING, i] = K[LOST_DAMPING, i] + S[POWER_DAMPING, c + 8]
+                s += 1
+            p += 1
+
+    return first_stage, attempt, commit
+
+
+@wp.func
+def place_link(
+    S: wp.array2d(dtype=wp.float64),
+    chain: Chain,
+    c: int,
+    x: wp.float64,
+    y: wp.float64,
+    u: wp.float64,
+    v: wp.float64,
+    w: wp.float64,
+    cosine: wp.float64,
+    sine: wp.float64,
+):
+    """Rows of a stage for one link: direction, spin, ends and their velocities."""
+    S[COSINE, c] = cosine
+    S[SINE, c] = sine
+    S[SPIN, c] = w
+    left_x, left_y, right_x, right_y = end_positions(chain, x, y, cosine, sine)
+    left_u, left_v, right_u, right_v = end_velocities(chain, u, v, w, cosine, sine)
+    S[LEFT, c] = left_x
+    S[LEFT + 1, c] = left_y
+    S[LEFT + 2, c] = left_u
+    S[LEFT + 3, c] = left_v
+    S[RIGHT, c] = right_x
+    S[RIGHT + 1, c] = right_y
+    S[RIGHT + 2, c] = right_u
+    S[RIGHT + 3, c] = right_v

@@ -1,0 +1,82 @@
+"""Coefficients of Rosenbrock methods, as data."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+
+@dataclass(frozen=True)
+class RosenbrockTable:
+    """One stiffly accurate embedded Rosenbrock method for y' = f(y), in the form without products by the Jacobian J.
+
+    Stage i is (1/(hγ) − J) U_i = f(y + Σ_j<i A_ij U_j) + Σ_j<i C_ij U_j / h. The last row of A leads to the embedded
+    solution ŷ, the new state is ŷ plus the last U, which therefore is the error estimate too.
+
+    Attributes:
+        name: What a user writes for ``method``.
+        order: Order of the solution that is propagated.
+        error_order: Order of the embedded solution.
+        gamma: γ.
+        matrix: A; row i has i entries.
+        couplings: C, likewise.
+        source: Where the coefficients were published.
+    """
+
+    name: str
+    order: int
+    error_order: int
+    gamma: float
+    matrix: tuple[tuple[float, ...], ...]
+    couplings: tuple[tuple[float, ...], ...]
+    source: str
+
+    @property
+    def stages(self) -> int:
+        """Number of stages."""
+        return len(self.matrix)
+
+    @property
+    def weights(self) -> tuple[float, ...]:
+        """m with y_new = y + Σ m_i U_i."""
+        return (*self.matrix[-1], 1.0)
+
+    @cached_property
+    def quadrature(self) -> tuple[float, ...]:
+        """Weights w with ∫ p dt = h Σ w_i (p(Y_i) + ∂p/∂y · U_i) over a step, for a p that does not act back on y.
+
+        That is the method on the system extended by e' = p(y): its stages are a triangular system for e alone,
+        E_i = hγ (p(Y_i) + ∂p/∂y · U_i) + γ Σ_j C_ij E_j, which is solved here once and for all.
+        """
+        weights = list(self.weights)
+        for i in reversed(range(self.stages)):
+            for j, coupling in enumerate(self.couplings[i]):
+                weights[j] += self.gamma * coupling * weights[i]
+        return tuple(self.gamma * weight for weight in weights)
+
+
+_FOURTH = (-7.170454962423024, -4.741636671481785, -16.31002631330971, -1.062004044111401)
+
+RODAS4P = RosenbrockTable(
+    name="rodas4p",
+    order=4,
+    error_order=3,
+    gamma=0.25,
+    matrix=(
+        (),
+        (3.0,),
+        (1.831036793486759, 0.4955183967433795),
+        (2.304376582692669, -0.05249275245743001, -1.176798761832782),
+        _FOURTH,
+        (*_FOURTH, 1.0),
+    ),
+    couplings=(
+        (),
+        (-12.0,),
+        (-8.791795173947035, -2.207865586973518),
+        (10.81793056857153, 6.780270611428266, 19.53485944642410),
+        (34.19095006749676, 15.49671153725963, 54.74760875964130, 14.16005392148534),
+        (34.62605830930532, 15.30084976114473, 56.99955578662667, 18.40807009793095, -5.714285714285717),
+    ),
+    source="G. Steinebach, preprint 1741, TH Darmstadt (1995); as RODASP in E. Hairer's code rodas.f",
+)
+
+ROSENBROCK_TABLES = {table.name: table for table in (RODAS4P,)}
