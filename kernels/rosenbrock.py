@@ -428,8 +428,10 @@ def rosenbrock_method(name: str, columns: int):
                 S[wp.static(NEW + k), c] = S[wp.static(NEW + k), c] + place_error
                 S[wp.static(NEW + 3 + k), c] = S[wp.static(NEW + 3 + k), c] + speed_error
                 speed = S[wp.static(BASE + 3 + k), c]
-                worst = wp.max(worst, error_bits(place_error, S[wp.static(BASE + k), c], speed, h))
-                worst = wp.max(worst, error_bits(speed_error, speed, S[wp.static(BASE_RATE + k), c], h))
+                # repeated places have no rate of their own
+                counted = S[COUNTED, c]
+                worst = wp.max(worst, error_bits(counted * place_error, S[wp.static(BASE + k), c], speed, h))
+                worst = wp.max(worst, error_bits(counted * speed_error, speed, S[wp.static(BASE_RATE + k), c], h))
             c += 1
         return order_bits(wp.cast(worst, wp.float64) / tolerance)
 

@@ -1,0 +1,246 @@
+"""The implicit method: its coefficients, its linear solver, its Jacobian, and what it is for, long steps."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import warpchain
+from tests.rosenbrock_under_test import one_step, solve_loop
+from warpchain import InputError, Status, preset, reference
+from warpchain.kernels.rosenbrock_tables import RODAS4P, ROSENBROCK_TABLES
+from warpchain.shapes import ellipse, lay_chain
+
+PAPER, SOFT = preset("paper"), preset("soft")
+
+tables = pytest.mark.parametrize("table", ROSENBROCK_TABLES.values(), ids=lambda table: table.name)
+
+
+def square(rows, stages):
+    """Lower-triangular rows as a square matrix."""
+    matrix = np.zeros((stages, stages))
+    for i, row in enumerate(rows):
+        matrix[i, : len(row)] = row
+    return matrix
+
+
+def classical(table):
+    """α, Γ, b and b̂ of the form k_i = h f(y + Σ α_ij k_j) + h J Σ Γ_ij k_j, y_new = y + Σ b_i k_i."""
+    s = table.stages
+    gammas = np.linalg.inv(np.eye(s) / table.gamma - square(table.couplings, s))
+    alphas = square(table.matrix, s) @ gammas
+    return alphas, gammas, np.array(table.weights) @ gammas, np.array([*table.matrix[-1], 0.0]) @ gammas
+
+
+# --- coefficients ---
+
+
+@tables
+def test_coefficients_fulfil_the_order_conditions(table):
+    """All conditions of order 4 hold for the solution and all of order 3 for the embedded one, to 1e-14 of the terms.
+
+    E. Hairer, G. Wanner, Solving ODEs II, table IV.7.1, with β = α + Γ.
+    """
+    alphas, gammas, b, embedded = classical(table)
+    betas = alphas + gammas
+    a, beta = alphas.sum(axis=1), betas.sum(axis=1)
+    third = [
+        (np.ones(table.stages), 1.0),
+        (beta, 1 / 2),
+        (a**2, 1 / 3),
+        (betas @ beta, 1 / 6),
+    ]
+    fourth = [
+        (a**3, 1 / 4),
+        (a * (alphas @ beta), 1 / 8),
+        (betas @ a**2, 1 / 12),
+        (betas @ betas @ beta, 1 / 24),
+    ]
+    assert (table.order, table.error_order) == (4, 3)
+    for weights, conditions in ((b, third + fourth), (embedded, third)):
+        for terms, value in conditions:
+            assert abs(weights @ terms - value) < 1e-14 * max(1.0, np.abs(weights * terms).max())
+    misses = [abs(embedded @ terms - value) for terms, value in fourth]
+    assert max(misses) > 1e-3
+
+
+@tables
+def test_method_is_stiffly_accurate(table):
+    """The last stage lies at the new state, so very stiff parts are damped at once: R(∞) = 0, of both solutions."""
+    alphas, gammas, b, embedded = classical(table)
+    assert_allclose((alphas + gammas)[-1], b, atol=1e-14)
+    assert_allclose(alphas[-1], embedded, atol=1e-14)
+    for weights in (b, embedded):
+        for z, bound in ((-1e8, 1e-6), (1e8j, 1e-6)):
+            inner = np.eye(table.stages) - z * (alphas + gammas)
+            assert abs(1 + z * weights @ np.linalg.solve(inner, np.ones(table.stages))) < bound
+
+
+@tables
+def test_quadrature_belongs_to_the_method(table):
+    """The weights of quadratures are b of the classical form: ∫ 1 dt = h, and each stage's weight Σ b Γ⁻¹ γ …"""
+    _, gammas, b, _ = classical(table)
+    # e' = p(y): its stages are k_e = h (p(Y) + p'·Σ Γ_ij k_j), and Σ Γ_ij k_j = U_i
+    assert_allclose(table.quadrature, b, atol=1e-14)
+    assert gammas.shape == (table.stages, table.stages)
+
+
+# --- the linear solver ---
+
+
+def dense(lower, diagonal, upper):
+    """The cyclic block-tridiagonal matrix in full."""
+    n, size, _ = diagonal.shape
+    matrix = np.zeros((n, size, n, size))
+    for i in range(n):
+        matrix[i, :, (i - 1) % n] += lower[i]
+        matrix[i, :, i] += diagonal[i]
+        matrix[i, :, (i + 1) % n] += upper[i]
+    return matrix.reshape(n * size, n * size)
+
+
+@pytest.mark.parametrize("size", [2, 3])
+def test_solver_agrees_with_dense_elimination(size):
+    """For every kind of number of rows, the shortest loops included, the solution is NumPy's to rounding."""
+    rng = np.random.default_rng(size)
+    for rows in (4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 60, 90, 150, 198, 1000 if size == 3 else 62):
+        lower, upper, diagonal = (rng.normal(size=(rows, size, size)) for _ in range(3))
+        diagonal += 3 * size * np.eye(size)
+        right = rng.normal(size=(rows, size))
+        exact = np.linalg.solve(dense(lower, diagonal, upper), right.ravel()).reshape(rows, size)
+        assert_allclose(solve_loop(lower, diagonal, upper, right), exact, rtol=0, atol=3e-15, err_msg=f"{rows} rows")
+
+
+def jacobians(position, velocity, parameters):
+    """∂q̈/∂q and ∂q̈/∂q̇ of the reference, (3n, 3n) each, by central differences.
+
+    Forces are linear in X, Ẋ and ω up to friction, so only angles and friction see the finite step.
+    """
+    n = len(position)
+    found = []
+    for which in (0, 1):
+        columns = np.empty((3 * n, 3 * n))
+        for k in range(3 * n):
+            states = []
+            step = 1e-6 if which == 0 else min(1e-6, 1e-4 * parameters.friction_smoothing)
+            if k % 3 != 2:
+                step = 1e-3
+            for sign in (1, -1):
+                moved = [position.copy(), velocity.copy()]
+                moved[which].ravel()[k] += sign * step
+                states.append(reference.acceleration(*moved, parameters).ravel())
+            columns[:, k] = (states[0] - states[1]) / (2 * step)
+        found.append(columns)
+    return found
+
+
+def flying(parameters, links, speed=2.0, disorder=1e-8):
+    """A circulating ellipse with a little disorder in places and speeds: no joint is at rest or closed."""
+    position, velocity = lay_chain(ellipse(1.5), links, parameters.link_length, speed, 0.1)
+    rng = np.random.default_rng(links)
+    return position + disorder * rng.normal(size=(links, 3)), velocity + rng.normal(size=(links, 3)) * [1e-3, 1e-3, 1e-1]
+
+
+@pytest.mark.parametrize("h", [1e-8, 1e-6, 1e-4])
+@pytest.mark.parametrize(
+    "values",
+    [{}, {"joint_stiffness": 1e11}, {"joint_stiffness": 1e5}, {"friction_smoothing": 1e-6}, {"joint_damping": 1e6}],
+    ids=str,
+)
+def test_solver_on_matrices_of_chains(values, h):
+    """On M + hγD + (hγ)²K of real chains the solution is NumPy's to 1e-13 of it, times the matrix's condition.
+
+    The condition stays below 1000 where steps are wanted, h = 1e-4 s at k = 1e9 N/m, or 1e-5 s at 1e11 N/m.
+    """
+    chain = PAPER.with_values(values)
+    links = 30
+    position, velocity = flying(chain, links)
+    by_place, by_speed = jacobians(position, velocity, chain)
+    mass = np.column_stack([*[reference.link_masses(links, chain)] * 2, reference.link_inertias(links, chain)])
+    g = h / 4
+    matrix = mass.ravel()[:, None] * (np.eye(3 * links) - g * by_speed - g * g * by_place)
+    blocks = matrix.reshape(links, 3, links, 3)
+    around = np.arange(links)
+    lower, diagonal, upper = (blocks[around, :, (around + shift) % links] for shift in (-1, 0, 1))
+    matrix = dense(lower, diagonal, upper)
+    right = mass * velocity * g
+    found = solve_loop(lower, diagonal, upper, right)
+    exact = np.linalg.solve(matrix, right.ravel()).reshape(links, 3)
+    # both solutions are off by rounding times the condition, that of rows and columns of one size
+    scale = 1 / np.sqrt(np.abs(np.diag(matrix)))
+    condition = np.linalg.cond(scale[:, None] * matrix * scale)
+    difference = np.abs((found - exact).ravel() / scale).max() / np.abs(exact.ravel() / scale).max()
+    assert difference < 1e-13 * condition
+    assert condition < 1e3 or h * np.sqrt(chain.joint_stiffness) > 10 or chain.joint_damping > 1e5
+
+
+# --- one step ---
+
+
+def dense_step(table, position, velocity, parameters, h):
+    """One step of the method in its textbook form, with the reference's equations and dense linear algebra."""
+    n = len(position)
+    start = np.concatenate([position.ravel(), velocity.ravel()])
+    by_place, by_speed = jacobians(position, velocity, parameters)
+    jacobian = np.block([[np.zeros((3 * n, 3 * n)), np.eye(3 * n)], [by_place, by_speed]])
+    matrix = np.eye(6 * n) - h * table.gamma * jacobian
+    changes = []
+    for row, coupling in zip(table.matrix, table.couplings, strict=True):
+        place = start + sum((a * change for a, change in zip(row, changes, strict=True)), np.zeros(6 * n))
+        q, v = place.reshape(2, n, 3)
+        rates = np.concatenate([v, reference.acceleration(q, v, parameters)]).ravel()
+        right = h * table.gamma * rates
+        right += table.gamma * sum((c * change for c, change in zip(coupling, changes, strict=True)), np.zeros(6 * n))
+        changes.append(np.linalg.solve(matrix, right))
+    end = start + sum(m * change for m, change in zip(table.weights, changes, strict=True))
+    return (*end.reshape(2, n, 3), changes[-1].reshape(2, n, 3))
+
+
+@pytest.mark.parametrize("links", [4, 6, 10, 16, 30])
+@pytest.mark.parametrize(
+    ("parameters", "h"),
+    [(PAPER, 1e-6), (PAPER, 3e-5), (SOFT, 3e-5), (SOFT.with_values({"friction_smoothing": 10.0}), 3e-4)],
+    ids=["paper-short", "paper-long", "soft", "smooth"],
+)
+def test_step_is_that_of_the_exact_jacobian(links, parameters, h):
+    """A step is the textbook's with the reference's Jacobian, geometric terms included, to the latter's accuracy."""
+    position, velocity = flying(parameters, links)
+    place, speed, error, _ = one_step("rodas4p", position, velocity, parameters, h)
+    expected_place, expected_speed, estimate = dense_step(RODAS4P, position, velocity, parameters, h)
+    moved = np.abs(expected_place - position).max(axis=0)
+    changed = np.abs(expected_speed - velocity).max(axis=0)
+    assert (np.abs(place - expected_place).max(axis=0) / moved).max() < 1e-6
+    assert (np.abs(speed - expected_speed).max(axis=0) / np.maximum(changed, 1e-6)).max() < 1e-5
+    rates = reference.acceleration(position, velocity, parameters)
+    scales = 1 + np.abs([position, velocity]) + h * np.abs([velocity, rates])
+    assert error == pytest.approx((np.abs(estimate) / scales).max(), rel=1e-4)
+
+
+def test_rejected_steps_leave_the_chain_alone():
+    """A step far beyond the tolerance reports an error ratio above one."""
+    position, velocity = flying(PAPER, 12, disorder=1e-6)
+    *_, error, _ = one_step("rodas4p", position, velocity, PAPER, 1e-4, tolerance=1e-9)
+    assert error > 1
+
+
+# --- what it is for ---
+
+
+def test_steps_are_longer_than_the_springs_allow():
+    """In calm flight a step is tens of times the explicit limit of 4 µs, and as accurate as the tolerance says."""
+    chain = PAPER.with_values({"friction_smoothing": 1.0})
+    start = lay_chain(ellipse(1.5), 60, chain.link_length, 2.0, 0.1)
+    duration = 0.05
+    run = {"times": [duration], "floor": False, "self_contact": False}
+    calm = warpchain.simulate(chain, *start, 5e-3, tolerance=1e-8, **(run | {"times": [5e-3]}))
+    state = calm.position[-1], calm.velocity[-1]
+    exact = warpchain.simulate(chain, *state, duration, tolerance=1e-9, **run)
+    flight = warpchain.simulate(chain, *state, duration, method="rodas4p", tolerance=1e-3, **run)
+    assert flight.status == Status.FINISHED
+    assert duration / flight.steps_accepted > 5e-5
+    assert np.abs(flight.position[-1] - exact.position[-1])[:, :2].max() < 1e-5
+
+
+def test_gpu_is_refused_at_the_door():
+    """The method has no GPU form yet, which one line says."""
+    with pytest.raises(InputError, match=r"options\.method: rodas4p runs on the CPU, not on cuda; give"):
+        warpchain.walk(method="rodas4p", device="cuda")
