@@ -36,6 +36,9 @@ from .types import Chain
 
 wp.set_module_options({"enable_backward": False})
 
+GREATEST_TURN = wp.constant(wp.float64(1.0))
+"""Greatest turn of a link [rad] in one step: beyond it the error estimate, which sees six places, means nothing."""
+
 # Rows in segment order. The state at the start of the step (6), its direction, the links' constants.
 BASE = 0
 BASE_COSINE, BASE_SINE, MASS, INERTIA, COUNTED = 6, 7, 8, 9, 10
@@ -420,6 +423,7 @@ def rosenbrock_method(name: str, columns: int):
                 c += 1
         # new state and error ratio
         worst = wp.int64(0)
+        turned = wp.int64(0)
         c = int(8)
         while c < end:
             for k in range(3):
@@ -432,8 +436,13 @@ def rosenbrock_method(name: str, columns: int):
                 counted = S[COUNTED, c]
                 worst = wp.max(worst, error_bits(counted * place_error, S[wp.static(BASE + k), c], speed, h))
                 worst = wp.max(worst, error_bits(counted * speed_error, speed, S[wp.static(BASE_RATE + k), c], h))
+            turned = wp.max(turned, order_bits(S[wp.static(NEW + 2), c] - S[wp.static(BASE + 2), c]))
             c += 1
-        return order_bits(wp.cast(worst, wp.float64) / tolerance)
+        greatest = order_bits(wp.cast(worst, wp.float64) / tolerance)
+        # a greater turn is refused as an error of 2: the step shrinks
+        if wp.cast(turned, wp.float64) > GREATEST_TURN:
+            greatest = wp.max(greatest, order_bits(TWO))
+        return greatest
 
     @wp.func
     def commit(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64):

@@ -53,7 +53,7 @@ def remarks_by_function(folder: Path, method: str, fixed_body: str) -> list[tupl
     not Path("/proc/cpuinfo").exists() or "avx2" not in Path("/proc/cpuinfo").read_text(),
     reason="widths are known for x86 processors with AVX2",
 )
-@pytest.mark.parametrize(("method", "fixed_body"), [("rkf78", "floor"), ("dp5", "sprocket"), ("bs32", "floor")])
+@pytest.mark.parametrize(("method", "fixed_body"), [("rkf78", "floor"), ("dp5", "sprocket"), ("bs32", "floor"), ("rodas4p", "floor")])
 def test_hot_loops_are_vectorised(tmp_path: Path, method: str, fixed_body: str) -> None:
     """Every loop over links that runs once per stage or step is vectorised, to at least four doubles."""
     found = remarks_by_function(tmp_path, method, fixed_body)
