@@ -25,8 +25,9 @@ LANES = 8
 ROUNDS = 3
 """Rounds of cyclic reduction, after which each separator's equation holds that separator alone: log₂ of the lanes."""
 
-GAP = 6
-"""Rows of 16 columns that keep loads away from stores."""
+GAP = 32
+"""Rows of 16 columns between a round and the next: clang fears that a shifted load waits for a store less than 4 KiB
+behind it, and makes shorter vectors."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,12 @@ class SegmentLayout:
     @property
     def separator_rows(self) -> int:
         """Rows of 16 columns for the system of the separators."""
-        return (6 * self.size**2 + self.size + 3 * GAP) * (ROUNDS + 1) + 2 * self.size + GAP
+        return self.round_rows * (ROUNDS + 1) + self.size**2 * (2 * ROUNDS + 1) + 3 * self.size
+
+    @property
+    def round_rows(self) -> int:
+        """Such rows from one round of cyclic reduction to the next."""
+        return 4 * self.size**2 + self.size + GAP
 
 
 def segment_columns(links: int) -> int:
@@ -194,14 +200,17 @@ def cyclic_solver(layout: SegmentLayout):
     load, store, load_vector, store_vector, scalar_block, inverse = block_algebra(size)
     lower, diagonal, upper, fill, head, first_sum = (layout.block(k) for k in range(6))
     right, partial, before_segment = (layout.right + size * k for k in range(3))
-    # rows of R; each round lies some rows behind what it is made of: closer, clang fears that a shifted load waits for
-    # a store and makes shorter vectors
-    per_round = 6 * square + size + 3 * GAP
-    below, centre, above, pivots = (tuple(per_round * r + square * k for r in range(ROUNDS + 1)) for k in range(4))
-    take_before, take_after = (tuple(per_round * r + square * k + GAP for r in range(ROUNDS)) for k in (4, 5))
-    values = tuple(per_round * r + 6 * square + 2 * GAP for r in range(ROUNDS + 1))
-    first_parts = per_round * (ROUNDS + 1)
-    separators = first_parts + size + GAP
+    # rows of R: a round after the other, what rows take from one another, and what leads there and back
+    per_round = layout.round_rows
+    below, centre, above, pivots, values = (
+        tuple(per_round * r + square * k for r in range(ROUNDS + 1)) for k in range(5)
+    )
+    taken = per_round * (ROUNDS + 1)
+    take_before, take_after = (tuple(taken + square * (2 * r + k) for r in range(ROUNDS)) for k in range(2))
+    coupling = taken + square * 2 * ROUNDS
+    first_parts = coupling + square
+    own_parts = first_parts + size
+    separators = own_parts + size
 
     @wp.func
     def copy_twice(
@@ -292,6 +301,7 @@ def cyclic_solver(layout: SegmentLayout):
             copy_twice(S, wp.static(fill) + k, last, R, wp.static(below[0]) + k, lanes)
             copy_twice(S, wp.static(first_sum) + k, last, R, wp.static(centre[0]) + k, lanes)
             copy_twice(S, wp.static(head) + k, last, R, wp.static(above[0]) + k, lanes)
+            copy_twice(S, wp.static(upper) + k, last, R, wp.static(coupling) + k, lanes)
             k += 1
         for r in range(wp.static(ROUNDS)):
             s = int(0)
@@ -327,7 +337,7 @@ def cyclic_solver(layout: SegmentLayout):
                 S[wp.static(partial + k), s] = ZERO
             s += 1
         p = int(1)
-        while p < places:
+        while p < places + 1:
             c = place_column(p)
             s = int(0)
             while s < lanes:
@@ -341,19 +351,14 @@ def cyclic_solver(layout: SegmentLayout):
             p += 1
         for k in range(wp.static(size)):
             copy_twice(S, wp.static(partial + k), place_column(places - 1), R, wp.static(first_parts + k), lanes)
-            s = int(0)
-            while s < lanes:
-                S[wp.static(partial + k), last + s] = R[wp.static(first_parts + k), s + 1]
-                s += 1
-        here = int(last)
-        while here < last + lanes:
-            value = load_vector(S, wp.static(right), here)
-            value -= load(S, wp.static(lower), here) * load_vector(S, wp.static(right), here - 8)
-            value -= load(S, wp.static(upper), here) * load_vector(S, wp.static(partial), here)
-            store_vector(S, wp.static(right), here, value)
-            here += 1
-        for k in range(wp.static(size)):
-            copy_twice(S, wp.static(right + k), last, R, wp.static(values[0] + k), lanes)
+            copy_twice(S, wp.static(right + k), last, R, wp.static(own_parts + k), lanes)
+        s = int(0)
+        while s < lanes:
+            value = load_vector(R, wp.static(own_parts), s)
+            value -= load(R, wp.static(coupling), s) * load_vector(R, wp.static(first_parts), s + 1)
+            store_vector(R, wp.static(values[0]), s, value)
+            store_vector(R, wp.static(values[0]), s + 8, value)
+            s += 1
         for r in range(wp.static(ROUNDS)):
             s = int(0)
             while s < lanes:
