@@ -73,6 +73,39 @@ def rosenbrock_rows(name: str, columns: int) -> int:
 
 
 @functools.cache
+def pad_behind(rows: tuple[int, ...]):
+    """Warp function that puts, in these rows, the next segment's first link behind each segment's last."""
+
+    @wp.func
+    def pad(S: wp.array2d(dtype=wp.float64), places: int, full: int):
+        s = int(0)
+        while s < 8:
+            after = (s + 1) % 8
+            source = 8 + after + wp.where(after >= full, 8, 0)
+            for k in range(wp.static(len(rows))):
+                S[wp.static(rows[k]), 8 * places + 8 + s] = S[wp.static(rows[k]), source]
+            s += 1
+
+    return pad
+
+
+@functools.cache
+def pad_before(rows: tuple[int, ...], place: int):
+    """Warp function that puts, before the place that rows begin at, what lies at the end of the segment before."""
+
+    @wp.func
+    def pad(S: wp.array2d(dtype=wp.float64), places: int):
+        s = int(0)
+        while s < 8:
+            for k in range(wp.static(len(rows))):
+                source = 8 * places + wp.static(8 * place) + (s + 7) % 8
+                S[wp.static(rows[k]), wp.static(8 * place) + s] = S[wp.static(rows[k]), source]
+            s += 1
+
+    return pad
+
+
+@functools.cache
 def rosenbrock_method(name: str, columns: int):
     """Warp functions of one table: (evaluate the first stage, try a step, commit it), as those of an explicit method.
 
@@ -114,30 +147,13 @@ def rosenbrock_method(name: str, columns: int):
         row = row_at(place, segment, places, full)
         return wp.where(row >= link_count, row - link_count, row)
 
-    @wp.func
-    def pad_behind(S: wp.array2d(dtype=wp.float64), row: int, places: int, full: int):
-        """Behind each segment's last link, the first link of the next segment."""
-        s = int(0)
-        while s < 8:
-            after = (s + 1) % 8
-            S[row, 8 * places + 8 + s] = S[row, 8 + after + wp.where(after >= full, 8, 0)]
-            s += 1
-
-    @wp.func
-    def pad_before(S: wp.array2d(dtype=wp.float64), row: int, places: int):
-        """Before each segment's first place, the last of the segment before."""
-        s = int(0)
-        while s < 8:
-            S[row, s] = S[row, 8 * places + (s + 7) % 8]
-            s += 1
-
-    @wp.func
-    def pad_joints(S: wp.array2d(dtype=wp.float64), row: int, places: int):
-        """The same for joints, which lie one place further."""
-        s = int(0)
-        while s < 8:
-            S[row, 8 + s] = S[row, 8 * places + 8 + (s + 7) % 8]
-            s += 1
+    first_rows = (LEFT, LEFT + 1, LEFT + 2, LEFT + 3, SPIN, BASE_COSINE, BASE_SINE, BASE + 5)
+    behind_start = pad_behind(first_rows)
+    behind_stage = pad_behind((*first_rows[:5], SHIFT_LEFT, SHIFT_LEFT + 1, SHIFT + 2))
+    behind_end = pad_behind((LEFT + 2, LEFT + 3, SPIN))
+    before_start = pad_before(first_rows[5:], 0)
+    joints_start = pad_before(tuple(range(SLOPE, SLOPE + 7)), 1)
+    joints_stage = pad_before(tuple(range(FORCE_X, FORCE_X + 6)), 1)
 
     @wp.func
     def first_stage(K: wp.array2d(dtype=wp.float64), chain: Chain):
@@ -182,12 +198,8 @@ def rosenbrock_method(name: str, columns: int):
                 sine,
             )
             c += 1
-        for k in range(4):
-            pad_behind(S, wp.static(LEFT + k), places, full)
-        pad_behind(S, SPIN, places, full)
-        for k in range(3):
-            pad_before(S, wp.static((BASE_COSINE, BASE_SINE, BASE + 5)[k]), places)
-            pad_behind(S, wp.static((BASE_COSINE, BASE_SINE, BASE + 5)[k]), places, full)
+        behind_start(S, places, full)
+        before_start(S, places)
         c = int(8)
         while c < end:
             cx = S[LEFT, c + 8] - S[RIGHT, c]
@@ -203,8 +215,7 @@ def rosenbrock_method(name: str, columns: int):
             S[BASE_RATE_X, c + 8] = cu
             S[BASE_RATE_Y, c + 8] = cv
             c += 1
-        for k in range(4):
-            pad_joints(S, wp.static((BASE_FORCE_X, BASE_FORCE_Y, BASE_TORQUE, SLOPE)[k]), places)
+        joints_start(S, places)
         c = int(8)
         while c < end:
             fx = S[BASE_FORCE_X, c + 8] - S[BASE_FORCE_X, c]
@@ -280,155 +291,219 @@ def rosenbrock_method(name: str, columns: int):
             c += 1
 
     @wp.func
-    def attempt(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64, tolerance: wp.float64):
-        S = segment_rows(K)
-        R = separator_rows_of(K)
-        places, full, total = segment_places(chain.link_count)
-        lanes = wp.min(total, 8)
-        end = place_column(places + 1)
+    def first_right_hand_side(
+        S: wp.array2d(dtype=wp.float64), chain: Chain, g: wp.float64, end: int, full: int
+    ):
+        """Of the stage at the start of the step, r_q = g v and r_v = g v̇; begins the sums of the powers lost."""
         a = chain.half_length
-        g = wp.static(wp.float64(gamma)) * h
-        assemble(S, chain, g, end, full)
-        factor(S, R, places, full, lanes)
-        for i in range(wp.static(stages)):
-            # the stage's place, r_q and γ Σ C U_v
-            c = int(8)
-            while c < end:
-                x = S[BASE, c]
-                y = S[wp.static(BASE + 1), c]
-                theta = S[wp.static(BASE + 2), c]
-                u = S[wp.static(BASE + 3), c]
-                v = S[wp.static(BASE + 4), c]
-                w = S[wp.static(BASE + 5), c]
-                rx = ZERO
-                ry = ZERO
-                rt = ZERO
-                ru = ZERO
-                rv = ZERO
-                rw = ZERO
-                for j in range(wp.static(i)):
-                    ux = S[wp.static(FIRST_STAGE_ROW + 6 * j), c]
-                    uy = S[wp.static(FIRST_STAGE_ROW + 6 * j + 1), c]
-                    ut = S[wp.static(FIRST_STAGE_ROW + 6 * j + 2), c]
-                    uu = S[wp.static(FIRST_STAGE_ROW + 6 * j + 3), c]
-                    uv = S[wp.static(FIRST_STAGE_ROW + 6 * j + 4), c]
-                    uw = S[wp.static(FIRST_STAGE_ROW + 6 * j + 5), c]
-                    x += wp.static(wp.float64(matrix[i][j])) * ux
-                    y += wp.static(wp.float64(matrix[i][j])) * uy
-                    theta += wp.static(wp.float64(matrix[i][j])) * ut
-                    u += wp.static(wp.float64(matrix[i][j])) * uu
-                    v += wp.static(wp.float64(matrix[i][j])) * uv
-                    w += wp.static(wp.float64(matrix[i][j])) * uw
-                    rx += wp.static(wp.float64(gamma * couplings[i][j])) * ux
-                    ry += wp.static(wp.float64(gamma * couplings[i][j])) * uy
-                    rt += wp.static(wp.float64(gamma * couplings[i][j])) * ut
-                    ru += wp.static(wp.float64(gamma * couplings[i][j])) * uu
-                    rv += wp.static(wp.float64(gamma * couplings[i][j])) * uv
-                    rw += wp.static(wp.float64(gamma * couplings[i][j])) * uw
-                rx += g * u
-                ry += g * v
-                rt += g * w
-                S[SHIFT, c] = rx
-                S[wp.static(SHIFT + 1), c] = ry
-                S[wp.static(SHIFT + 2), c] = rt
-                S[DRIVE, c] = ru
-                S[wp.static(DRIVE + 1), c] = rv
-                S[wp.static(DRIVE + 2), c] = rw
-                cosine, sine = cos_sin(theta)
-                place_link(S, chain, c, x, y, u, v, w, cosine, sine)
-                left_x, left_y, right_x, right_y = end_velocities(
-                    chain, rx, ry, rt, S[BASE_COSINE, c], S[BASE_SINE, c]
-                )
-                S[SHIFT_LEFT, c] = left_x
-                S[wp.static(SHIFT_LEFT + 1), c] = left_y
-                S[SHIFT_RIGHT, c] = right_x
-                S[wp.static(SHIFT_RIGHT + 1), c] = right_y
-                if wp.static(i == stages - 1):
+        b = chain.joint_damping
+        c = int(8)
+        while c < end:
+            repeats = c < 16 and c >= 8 + full
+            gx = b * (S[BASE_RATE_X, c + 8] - S[BASE_RATE_X, c])
+            gy = b * (S[BASE_RATE_Y, c + 8] - S[BASE_RATE_Y, c])
+            sum_gx = b * (S[BASE_RATE_X, c + 8] + S[BASE_RATE_X, c])
+            sum_gy = b * (S[BASE_RATE_Y, c + 8] + S[BASE_RATE_Y, c])
+            gt = S[SLOPE, c + 8] * S[BASE_SPIN, c + 8] - S[SLOPE, c] * S[BASE_SPIN, c]
+            gt = gt - a * (S[BASE_COSINE, c] * sum_gy - S[BASE_SINE, c] * sum_gx)
+            m = S[MASS, c]
+            sx = g * S[wp.static(BASE + 3), c]
+            sy = g * S[wp.static(BASE + 4), c]
+            st = g * S[wp.static(BASE + 5), c]
+            rx = m * (g * g * S[BASE_RATE, c] + sx) - g * g * gx
+            ry = m * (g * g * S[wp.static(BASE_RATE + 1), c] + sy) - g * g * gy
+            rt = S[INERTIA, c] * (g * g * S[wp.static(BASE_RATE + 2), c] + st) + g * g * gt
+            S[SHIFT, c] = sx
+            S[wp.static(SHIFT + 1), c] = sy
+            S[wp.static(SHIFT + 2), c] = st
+            S[wp.static(right), c] = wp.where(repeats, ZERO, rx)
+            S[wp.static(right + 1), c] = wp.where(repeats, ZERO, ry)
+            S[wp.static(right + 2), c] = wp.where(repeats, ZERO, rt)
+            rate_x = S[BASE_RATE_X, c + 8]
+            rate_y = S[BASE_RATE_Y, c + 8]
+            friction = S[BASE_TORQUE, c + 8] * S[BASE_SPIN, c + 8]
+            S[POWER_FRICTION, c + 8] = wp.static(wp.float64(quadrature[0])) * friction
+            S[POWER_DAMPING, c + 8] = wp.static(wp.float64(quadrature[0])) * (b * (rate_x * rate_x + rate_y * rate_y))
+            c += 1
+
+    @wp.func
+    def place_stage(S: wp.array2d(dtype=wp.float64), chain: Chain, stage: int, g: wp.float64, end: int):
+        """U of the stage before, this stage's place in the links' rows, r_q and γ Σ C U_v."""
+        inverse = ONE / g
+        for i in range(1, wp.static(stages)):
+            if stage == i:
+                c = int(8)
+                while c < end:
+                    for k in range(3):
+                        change = S[wp.static(right + k), c]
+                        speed_change = (change - S[wp.static(SHIFT + k), c]) * inverse
+                        S[wp.static(FIRST_STAGE_ROW + 6 * (i - 1) + k), c] = change
+                        S[wp.static(FIRST_STAGE_ROW + 6 * (i - 1) + 3 + k), c] = speed_change
+                    x = S[BASE, c]
+                    y = S[wp.static(BASE + 1), c]
+                    theta = S[wp.static(BASE + 2), c]
+                    u = S[wp.static(BASE + 3), c]
+                    v = S[wp.static(BASE + 4), c]
+                    w = S[wp.static(BASE + 5), c]
+                    rx = ZERO
+                    ry = ZERO
+                    rt = ZERO
+                    ru = ZERO
+                    rv = ZERO
+                    rw = ZERO
+                    for j in range(wp.static(i)):
+                        ux = S[wp.static(FIRST_STAGE_ROW + 6 * j), c]
+                        uy = S[wp.static(FIRST_STAGE_ROW + 6 * j + 1), c]
+                        ut = S[wp.static(FIRST_STAGE_ROW + 6 * j + 2), c]
+                        uu = S[wp.static(FIRST_STAGE_ROW + 6 * j + 3), c]
+                        uv = S[wp.static(FIRST_STAGE_ROW + 6 * j + 4), c]
+                        uw = S[wp.static(FIRST_STAGE_ROW + 6 * j + 5), c]
+                        x += wp.static(wp.float64(matrix[i][j])) * ux
+                        y += wp.static(wp.float64(matrix[i][j])) * uy
+                        theta += wp.static(wp.float64(matrix[i][j])) * ut
+                        u += wp.static(wp.float64(matrix[i][j])) * uu
+                        v += wp.static(wp.float64(matrix[i][j])) * uv
+                        w += wp.static(wp.float64(matrix[i][j])) * uw
+                        rx += wp.static(wp.float64(gamma * couplings[i][j])) * ux
+                        ry += wp.static(wp.float64(gamma * couplings[i][j])) * uy
+                        rt += wp.static(wp.float64(gamma * couplings[i][j])) * ut
+                        ru += wp.static(wp.float64(gamma * couplings[i][j])) * uu
+                        rv += wp.static(wp.float64(gamma * couplings[i][j])) * uv
+                        rw += wp.static(wp.float64(gamma * couplings[i][j])) * uw
+                    S[SHIFT, c] = rx + g * u
+                    S[wp.static(SHIFT + 1), c] = ry + g * v
+                    S[wp.static(SHIFT + 2), c] = rt + g * w
+                    S[DRIVE, c] = ru
+                    S[wp.static(DRIVE + 1), c] = rv
+                    S[wp.static(DRIVE + 2), c] = rw
                     S[NEW, c] = x
                     S[wp.static(NEW + 1), c] = y
                     S[wp.static(NEW + 2), c] = theta
                     S[wp.static(NEW + 3), c] = u
                     S[wp.static(NEW + 4), c] = v
                     S[wp.static(NEW + 5), c] = w
-                c += 1
-            for k in range(4):
-                pad_behind(S, wp.static(LEFT + k), places, full)
-            pad_behind(S, SPIN, places, full)
-            for k in range(2):
-                pad_behind(S, wp.static(SHIFT_LEFT + k), places, full)
-            pad_behind(S, wp.static(SHIFT + 2), places, full)
-            # joints
-            c = int(8)
-            while c < end:
-                cx = S[LEFT, c + 8] - S[RIGHT, c]
-                cy = S[wp.static(LEFT + 1), c + 8] - S[wp.static(RIGHT + 1), c]
-                cu = S[wp.static(LEFT + 2), c + 8] - S[wp.static(RIGHT + 2), c]
-                cv = S[wp.static(LEFT + 3), c + 8] - S[wp.static(RIGHT + 3), c]
-                spin = S[SPIN, c] - S[SPIN, c + 8]
-                torque = friction_torque(chain, spin)
-                S[FORCE_X, c + 8] = joint_force(chain, cx, cu)
-                S[FORCE_Y, c + 8] = joint_force(chain, cy, cv)
-                S[TORQUE, c + 8] = torque
-                sx = S[SHIFT_LEFT, c + 8] - S[SHIFT_RIGHT, c]
-                sy = S[wp.static(SHIFT_LEFT + 1), c + 8] - S[wp.static(SHIFT_RIGHT + 1), c]
-                S[SHIFT_X, c + 8] = chain.joint_damping * sx
-                S[SHIFT_Y, c + 8] = chain.joint_damping * sy
-                S[SHIFT_TORQUE, c + 8] = S[SLOPE, c + 8] * (S[wp.static(SHIFT + 2), c] - S[wp.static(SHIFT + 2), c + 8])
-                friction = wp.static(wp.float64(quadrature[i])) * (torque * spin)
-                damping = wp.static(wp.float64(quadrature[i])) * (chain.joint_damping * (cu * cu + cv * cv))
-                if wp.static(i == 0):
-                    S[POWER_FRICTION, c + 8] = friction
-                    S[POWER_DAMPING, c + 8] = damping
-                else:
-                    S[POWER_FRICTION, c + 8] = S[POWER_FRICTION, c + 8] + friction
-                    S[POWER_DAMPING, c + 8] = S[POWER_DAMPING, c + 8] + damping
-                c += 1
-            for k in range(6):
-                pad_joints(S, wp.static(FORCE_X + k), places)
-            # right-hand sides
-            c = int(8)
-            while c < end:
-                repeats = c < 16 and c >= 8 + full
-                fx = S[FORCE_X, c + 8] - S[FORCE_X, c]
-                fy = S[FORCE_Y, c + 8] - S[FORCE_Y, c]
-                sum_x = S[FORCE_X, c + 8] + S[FORCE_X, c]
-                sum_y = S[FORCE_Y, c + 8] + S[FORCE_Y, c]
-                turn = a * (S[COSINE, c] * sum_y - S[SINE, c] * sum_x) + S[TORQUE, c] - S[TORQUE, c + 8]
-                gx = S[SHIFT_X, c + 8] - S[SHIFT_X, c]
-                gy = S[SHIFT_Y, c + 8] - S[SHIFT_Y, c]
-                sum_gx = S[SHIFT_X, c + 8] + S[SHIFT_X, c]
-                sum_gy = S[SHIFT_Y, c + 8] + S[SHIFT_Y, c]
-                gt = S[SHIFT_TORQUE, c + 8] - S[SHIFT_TORQUE, c]
-                gt = gt - a * (S[BASE_COSINE, c] * sum_gy - S[BASE_SINE, c] * sum_gx)
-                m = S[MASS, c]
-                rx = g * (g * fx - gx) + m * (g * S[DRIVE, c] + S[SHIFT, c])
-                ry = g * (g * (fy - m * chain.gravity) - gy) + m * (
-                    g * S[wp.static(DRIVE + 1), c] + S[wp.static(SHIFT + 1), c]
-                )
-                rt = g * (g * turn + gt) + S[INERTIA, c] * (
-                    g * S[wp.static(DRIVE + 2), c] + S[wp.static(SHIFT + 2), c]
-                )
-                S[wp.static(right), c] = wp.where(repeats, ZERO, rx)
-                S[wp.static(right + 1), c] = wp.where(repeats, ZERO, ry)
-                S[wp.static(right + 2), c] = wp.where(repeats, ZERO, rt)
-                c += 1
+                    c += 1
+        c = int(8)
+        while c < end:
+            cosine, sine = cos_sin(S[wp.static(NEW + 2), c])
+            place_link(
+                S,
+                chain,
+                c,
+                S[NEW, c],
+                S[wp.static(NEW + 1), c],
+                S[wp.static(NEW + 3), c],
+                S[wp.static(NEW + 4), c],
+                S[wp.static(NEW + 5), c],
+                cosine,
+                sine,
+            )
+            left_x, left_y, right_x, right_y = end_velocities(
+                chain,
+                S[SHIFT, c],
+                S[wp.static(SHIFT + 1), c],
+                S[wp.static(SHIFT + 2), c],
+                S[BASE_COSINE, c],
+                S[BASE_SINE, c],
+            )
+            S[SHIFT_LEFT, c] = left_x
+            S[wp.static(SHIFT_LEFT + 1), c] = left_y
+            S[SHIFT_RIGHT, c] = right_x
+            S[wp.static(SHIFT_RIGHT + 1), c] = right_y
+            c += 1
+
+    @wp.func
+    def pull_joints(S: wp.array2d(dtype=wp.float64), chain: Chain, weight: wp.float64, end: int):
+        """Forces and torques of the joints at the stage's place, and g D r_q over g; sums up the powers lost."""
+        c = int(8)
+        while c < end:
+            cx = S[LEFT, c + 8] - S[RIGHT, c]
+            cy = S[wp.static(LEFT + 1), c + 8] - S[wp.static(RIGHT + 1), c]
+            cu = S[wp.static(LEFT + 2), c + 8] - S[wp.static(RIGHT + 2), c]
+            cv = S[wp.static(LEFT + 3), c + 8] - S[wp.static(RIGHT + 3), c]
+            spin = S[SPIN, c] - S[SPIN, c + 8]
+            torque = friction_torque(chain, spin)
+            S[FORCE_X, c + 8] = joint_force(chain, cx, cu)
+            S[FORCE_Y, c + 8] = joint_force(chain, cy, cv)
+            S[TORQUE, c + 8] = torque
+            sx = S[SHIFT_LEFT, c + 8] - S[SHIFT_RIGHT, c]
+            sy = S[wp.static(SHIFT_LEFT + 1), c + 8] - S[wp.static(SHIFT_RIGHT + 1), c]
+            S[SHIFT_X, c + 8] = chain.joint_damping * sx
+            S[SHIFT_Y, c + 8] = chain.joint_damping * sy
+            S[SHIFT_TORQUE, c + 8] = S[SLOPE, c + 8] * (S[wp.static(SHIFT + 2), c] - S[wp.static(SHIFT + 2), c + 8])
+            damping = chain.joint_damping * (cu * cu + cv * cv)
+            S[POWER_FRICTION, c + 8] = S[POWER_FRICTION, c + 8] + weight * (torque * spin)
+            S[POWER_DAMPING, c + 8] = S[POWER_DAMPING, c + 8] + weight * damping
+            c += 1
+
+    @wp.func
+    def right_hand_side(
+        S: wp.array2d(dtype=wp.float64), chain: Chain, g: wp.float64, end: int, full: int
+    ):
+        """g M r_v + (M + g D) r_q of the stage."""
+        a = chain.half_length
+        c = int(8)
+        while c < end:
+            repeats = c < 16 and c >= 8 + full
+            fx = S[FORCE_X, c + 8] - S[FORCE_X, c]
+            fy = S[FORCE_Y, c + 8] - S[FORCE_Y, c]
+            sum_x = S[FORCE_X, c + 8] + S[FORCE_X, c]
+            sum_y = S[FORCE_Y, c + 8] + S[FORCE_Y, c]
+            turn = a * (S[COSINE, c] * sum_y - S[SINE, c] * sum_x) + S[TORQUE, c] - S[TORQUE, c + 8]
+            gx = S[SHIFT_X, c + 8] - S[SHIFT_X, c]
+            gy = S[SHIFT_Y, c + 8] - S[SHIFT_Y, c]
+            sum_gx = S[SHIFT_X, c + 8] + S[SHIFT_X, c]
+            sum_gy = S[SHIFT_Y, c + 8] + S[SHIFT_Y, c]
+            gt = S[SHIFT_TORQUE, c + 8] - S[SHIFT_TORQUE, c]
+            gt = gt - a * (S[BASE_COSINE, c] * sum_gy - S[BASE_SINE, c] * sum_gx)
+            m = S[MASS, c]
+            rx = g * (g * fx - gx) + m * (g * S[DRIVE, c] + S[SHIFT, c])
+            ry = g * (g * (fy - m * chain.gravity) - gy)
+            ry = ry + m * (g * S[wp.static(DRIVE + 1), c] + S[wp.static(SHIFT + 1), c])
+            rt = g * (g * turn + gt)
+            rt = rt + S[INERTIA, c] * (g * S[wp.static(DRIVE + 2), c] + S[wp.static(SHIFT + 2), c])
+            S[wp.static(right), c] = wp.where(repeats, ZERO, rx)
+            S[wp.static(right + 1), c] = wp.where(repeats, ZERO, ry)
+            S[wp.static(right + 2), c] = wp.where(repeats, ZERO, rt)
+            c += 1
+
+    @wp.func
+    def attempt(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64, tolerance: wp.float64):
+        S = segment_rows(K)
+        R = separator_rows_of(K)
+        places, full, total = segment_places(chain.link_count)
+        lanes = wp.min(total, 8)
+        end = place_column(places + 1)
+        g = wp.static(wp.float64(gamma)) * h
+        assemble(S, chain, g, end, full)
+        factor(S, R, places, full, lanes)
+        # stages are a loop at run time: unrolled, the code of a step would not fit into the cache for instructions
+        stage = int(0)
+        while stage < wp.static(stages):
+            if stage == 0:
+                first_right_hand_side(S, chain, g, end, full)
+            else:
+                weight = ZERO
+                for i in range(1, wp.static(stages)):
+                    weight = wp.where(stage == i, wp.static(wp.float64(quadrature[i])), weight)
+                place_stage(S, chain, stage, g, end)
+                behind_stage(S, places, full)
+                pull_joints(S, chain, weight, end)
+                joints_stage(S, places)
+                right_hand_side(S, chain, g, end, full)
             solve(S, R, places, lanes)
-            inverse = ONE / g
-            c = int(8)
-            while c < end:
-                for k in range(3):
-                    change = S[wp.static(right + k), c]
-                    S[wp.static(FIRST_STAGE_ROW + 6 * i + k), c] = change
-                    S[wp.static(FIRST_STAGE_ROW + 6 * i + 3 + k), c] = (change - S[wp.static(SHIFT + k), c]) * inverse
-                c += 1
+            stage += 1
         # new state and error ratio
         worst = wp.int64(0)
         turned = wp.int64(0)
+        inverse = ONE / g
         c = int(8)
         while c < end:
             for k in range(3):
-                place_error = S[wp.static(FIRST_STAGE_ROW + 6 * (stages - 1) + k), c]
-                speed_error = S[wp.static(FIRST_STAGE_ROW + 6 * (stages - 1) + 3 + k), c]
+                place_error = S[wp.static(right + k), c]
+                speed_error = (place_error - S[wp.static(SHIFT + k), c]) * inverse
+                S[wp.static(FIRST_STAGE_ROW + 6 * (stages - 1) + k), c] = place_error
+                S[wp.static(FIRST_STAGE_ROW + 6 * (stages - 1) + 3 + k), c] = speed_error
                 S[wp.static(NEW + k), c] = S[wp.static(NEW + k), c] + place_error
                 S[wp.static(NEW + 3 + k), c] = S[wp.static(NEW + 3 + k), c] + speed_error
                 speed = S[wp.static(BASE + 3 + k), c]
@@ -472,9 +547,7 @@ def rosenbrock_method(name: str, columns: int):
             S[wp.static(RIGHT + 3), c] = right_v - turn_y
             S[SPIN, c] = dw
             c += 1
-        pad_behind(S, wp.static(LEFT + 2), places, full)
-        pad_behind(S, wp.static(LEFT + 3), places, full)
-        pad_behind(S, SPIN, places, full)
+        behind_end(S, places, full)
         c = int(8)
         while c < end:
             cu = S[wp.static(LEFT + 2), c + 8] - S[wp.static(RIGHT + 2), c]
