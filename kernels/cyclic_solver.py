@@ -269,9 +269,7 @@ def cyclic_solver(layout: SegmentLayout):
             p += 1
 
     @wp.func
-    def factor(
-        S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), places: int, full: int, lanes: int
-    ):
+    def factor(S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), places: int, full: int, lanes: int):
         eliminate_segments(S, places, full, lanes)
         # what the first unknown of the next segment depends on, beside its separator
         last = place_column(places)
@@ -363,8 +361,12 @@ def cyclic_solver(layout: SegmentLayout):
             s = int(0)
             while s < lanes:
                 value = load_vector(R, wp.static(values[r]), s)
-                value -= load(R, wp.static(take_before[r]), s) * load_vector(R, wp.static(values[r]), s + wp.static(8 - 2**r))
-                value -= load(R, wp.static(take_after[r]), s) * load_vector(R, wp.static(values[r]), s + wp.static(2**r))
+                value -= load(R, wp.static(take_before[r]), s) * load_vector(
+                    R, wp.static(values[r]), s + wp.static(8 - 2**r)
+                )
+                value -= load(R, wp.static(take_after[r]), s) * load_vector(
+                    R, wp.static(values[r]), s + wp.static(2**r)
+                )
                 store_vector(R, wp.static(values[r + 1]), s, value)
                 store_vector(R, wp.static(values[r + 1]), s + 8, value)
                 s += 1

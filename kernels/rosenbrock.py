@@ -291,9 +291,7 @@ def rosenbrock_method(name: str, columns: int):
             c += 1
 
     @wp.func
-    def first_right_hand_side(
-        S: wp.array2d(dtype=wp.float64), chain: Chain, g: wp.float64, end: int, full: int
-    ):
+    def first_right_hand_side(S: wp.array2d(dtype=wp.float64), chain: Chain, g: wp.float64, end: int, full: int):
         """Of the stage at the start of the step, r_q = g v and r_v = g v̇; begins the sums of the powers lost."""
         a = chain.half_length
         b = chain.joint_damping
@@ -437,9 +435,7 @@ def rosenbrock_method(name: str, columns: int):
             c += 1
 
     @wp.func
-    def right_hand_side(
-        S: wp.array2d(dtype=wp.float64), chain: Chain, g: wp.float64, end: int, full: int
-    ):
+    def right_hand_side(S: wp.array2d(dtype=wp.float64), chain: Chain, g: wp.float64, end: int, full: int):
         """g M r_v + (M + g D) r_q of the stage."""
         a = chain.half_length
         c = int(8)

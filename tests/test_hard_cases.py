@@ -22,7 +22,9 @@ ELASTIC = SOFT.with_values(
 """Nothing dissipates: neither joints nor collisions."""
 
 every_method = pytest.mark.parametrize("method", METHODS)
-every_method_walks = pytest.mark.parametrize("method", ["rkf78", "dp5", "rodas4p", pytest.param("bs32", marks=pytest.mark.slow)])
+every_method_walks = pytest.mark.parametrize(
+    "method", ["rkf78", "dp5", "rodas4p", pytest.param("bs32", marks=pytest.mark.slow)]
+)
 """The same for walks, which need a kernel more: no other quick test uses that of bs32."""
 
 
@@ -204,7 +206,8 @@ def test_extreme_values(method, values):
 
 
 @pytest.mark.parametrize(
-    ("method", "tolerance", "bound"), [("rkf78", 1e-8, 1e-5), ("dp5", 1e-8, 5e-5), ("bs32", 1e-7, 3e-3), ("rodas4p", 1e-8, 1e-4)]
+    ("method", "tolerance", "bound"),
+    [("rkf78", 1e-8, 1e-5), ("dp5", 1e-8, 5e-5), ("bs32", 1e-7, 3e-3), ("rodas4p", 1e-8, 1e-4)],
 )
 def test_elastic_bouncing_keeps_the_energy_for_a_second(method, tolerance, bound):
     """Without any dissipation a bouncing chain keeps its energy and its momentum along the floor over 1 s.

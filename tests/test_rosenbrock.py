@@ -137,7 +137,11 @@ def flying(parameters, links, speed=2.0, disorder=1e-8):
     """A circulating ellipse with a little disorder in places and speeds: no joint is at rest or closed."""
     position, velocity = lay_chain(ellipse(1.5), links, parameters.link_length, speed, 0.1)
     rng = np.random.default_rng(links)
-    return position + disorder * rng.normal(size=(links, 3)), velocity + rng.normal(size=(links, 3)) * [1e-3, 1e-3, 1e-1]
+    return position + disorder * rng.normal(size=(links, 3)), velocity + rng.normal(size=(links, 3)) * [
+        1e-3,
+        1e-3,
+        1e-1,
+    ]
 
 
 @pytest.mark.parametrize("h", [1e-8, 1e-6, 1e-4])

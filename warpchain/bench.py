@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from warpchain import reference
 from warpchain.engine import Batch, versions
-from warpchain.kernels.tableaus import TABLEAUS
+from warpchain.kernels.methods import METHODS
 from warpchain.options import Options
 from warpchain.parameters import Parameters, preset
 from warpchain.shapes import ellipse, lay_chain
@@ -122,7 +122,7 @@ def step_costs(
         starts = {"flight": flying(n, parameters), "pile": dropped(n)}
         scipy_starts[n] = starts["flight"]
         for scene, (position, velocity) in starts.items():
-            for method in TABLEAUS:
+            for method in METHODS:
                 stepper = _Stepper(parameters, Options.model_validate({"method": method}), position, velocity)
                 stepper.run(tries)  # past the first, small steps
                 runs[scene, method, n] = stepper
@@ -248,7 +248,7 @@ class _Stepper:
 
     def cost(self, scene: str, method: str, links: int, seconds: float) -> StepCost:
         counts, simulated, tries = self.batch.counts(0), self.batch.time(0), self.batch.tries(0)
-        stages = TABLEAUS[method].stages
+        stages = METHODS[method].stages
         return StepCost(
             scene=scene,
             method=method,

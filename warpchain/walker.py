@@ -64,7 +64,7 @@ def walk(
         links: Number of links n, even.
         frequency: Turns of the sprocket per second [Hz].
         preset: ``"paper"`` (Table 1) or ``"soft"`` (softer joints, 10 to 15 times fewer steps).
-        method: ``"rkf78"``, ``"dp5"`` or ``"bs32"``.
+        method: ``"rkf78"``, ``"dp5"``, ``"bs32"`` or ``"rodas4p"``.
         tolerance: Error allowed in a step, absolute (SI units) and relative alike.
         start: ``"rest"``, ``"spinning"`` or ``"ellipse"``.
         seed: Draw parameters, phase and clearance from their distributions; None: Table 1's means, phase 0.
