@@ -7,16 +7,6 @@ With v = q̇ and M q̈ = Q(q, v), put g = hγ, K = −∂Q/∂q and D = −∂Q/
 
 The matrix couples neighbouring links only: 3 × 3 blocks along the loop, the same for all stages of a step.
 
-A joint between link l on its left and link r on its right opens by C = (X_r − a u_r) − (X_l + a u_l) and pulls with
-F = k C + b Ċ. With σ = g b + g² k its part of the matrix is g F ≙ σ δC + g² b a (ω_l u_l δθ_l + ω_r u_r δθ_r), where
-the last two terms come from the turning of t in Ċ; that of t in the torque a t·F adds g² a u·F to the diagonal. Both
-links' columns of the first part are c = −σ a t + g² b a ω u. So the diagonal blocks are diagonal:
-
-    D_i = diag(m + 2σ, m + 2σ, I + 2σ a² + g (φ_i + φ_i₋₁) + g² a u·(F_i + F_i₋₁)),
-    U_i = −(1; a t_iᵀ) (σ, c_i₊₁) − g φ_i,    L_i = (1; −a t_iᵀ) (−σ, c_i₋₁) − g φ_i₋₁,
-
-with φ = f'(w) of the joints' friction, in the corner of the angles.
-
 All is done in the order of :mod:`cyclic_solver`: eight segments of the loop side by side, so that the next link is the
 next vector of memory. A joint lies at the column of the link on its left, rows of joints one place further.
 """
@@ -26,11 +16,44 @@ import functools
 import warp as wp
 
 from .controller import error_bits
-from .cyclic_solver import SegmentLayout, cyclic_solver, place_column, row_at, segment_columns, segment_places
+from .cyclic_solver import cyclic_solver, place_column, row_at, segment_places
 from .elementary import ONE, TWO, ZERO, cos_sin, order_bits
-from .geometry import end_positions, end_velocities
+from .geometry import end_velocities
 from .joint import friction_slope, friction_torque, joint_force
 from .layout import LOST_DAMPING, LOST_FRICTION, OMEGA, STAGE_ROWS, STAGES, THETA, U, V, X, Y
+from .rosenbrock_layout import (
+    BASE,
+    BASE_COSINE,
+    BASE_FORCE_X,
+    BASE_FORCE_Y,
+    BASE_RATE,
+    BASE_RATE_X,
+    BASE_RATE_Y,
+    BASE_SINE,
+    BASE_SPIN,
+    BASE_TORQUE,
+    COUNTED,
+    DRIVE,
+    FIRST_STAGE_ROW,
+    FORCE_X,
+    INERTIA,
+    LEFT,
+    MASS,
+    NEW,
+    POWER_DAMPING,
+    POWER_FRICTION,
+    RIGHT,
+    RIGHT_SIDE,
+    SHIFT,
+    SHIFT_LEFT,
+    SHIFT_RIGHT,
+    SLOPE,
+    SPIN,
+    pad_before,
+    pad_behind,
+    segments_of,
+)
+from .rosenbrock_system import assemble, first_right_hand_side, place_link, pull_joints, right_hand_side
 from .rosenbrock_tables import ROSENBROCK_TABLES
 from .types import Chain
 
@@ -39,70 +62,13 @@ wp.set_module_options({"enable_backward": False})
 GREATEST_TURN = wp.constant(wp.float64(1.0))
 """Greatest turn of a link [rad] in one step: beyond it the error estimate, which sees six places, means nothing."""
 
-# Rows in segment order. The state at the start of the step (6), its direction, the links' constants.
-BASE = 0
-BASE_COSINE, BASE_SINE, MASS, INERTIA, COUNTED = 6, 7, 8, 9, 10
-# Accelerations at the start of the step; of joints there: friction's slope and torque, force, spin, opening rate.
-BASE_RATE = 11
-SLOPE, BASE_TORQUE, BASE_FORCE_X, BASE_FORCE_Y, BASE_SPIN, BASE_RATE_X, BASE_RATE_Y = 14, 15, 16, 17, 18, 19, 20
-# A stage: direction, spin, link ends and their velocities, r_q, and the same ends' changes by r_q.
-COSINE, SINE, SPIN = 21, 22, 23
-LEFT, RIGHT = 24, 28
-SHIFT, SHIFT_LEFT, SHIFT_RIGHT = 32, 35, 37
-# γ Σ C U_v, joint forces and torques of the stage and of the change by r_q.
-DRIVE = 39
-FORCE_X, FORCE_Y, TORQUE, SHIFT_X, SHIFT_Y, SHIFT_TORQUE = 42, 43, 44, 45, 46, 47
-POWER_FRICTION, POWER_DAMPING = 48, 49
-# The candidate state.
-NEW = 50
-FIRST_STAGE_ROW = 56
-
-
-@functools.cache
-def segments_of(stages: int, links: int) -> SegmentLayout:
-    """Layout of the linear system behind the rows of a method with so many stages."""
-    matrix = FIRST_STAGE_ROW + 6 * stages
-    return SegmentLayout(size=3, columns=segment_columns(links), matrix=matrix, right=matrix + 54)
-
 
 def rosenbrock_rows(name: str, columns: int) -> int:
     """Rows of a chain's scratch block of this width."""
-    segments = segments_of(ROSENBROCK_TABLES[name].stages, columns)
-    doubles = (segments.right + segments.right_rows) * segments.columns + segments.separator_rows * 16
+    segments = segments_of(columns)
+    rows = FIRST_STAGE_ROW + 6 * ROSENBROCK_TABLES[name].stages
+    doubles = rows * segments.columns + segments.separator_rows * 16
     return STAGES + STAGE_ROWS + -(-doubles // columns)
-
-
-@functools.cache
-def pad_behind(rows: tuple[int, ...]):
-    """Warp function that puts, in these rows, the next segment's first link behind each segment's last."""
-
-    @wp.func
-    def pad(S: wp.array2d(dtype=wp.float64), places: int, full: int):
-        s = int(0)
-        while s < 8:
-            after = (s + 1) % 8
-            source = 8 + after + wp.where(after >= full, 8, 0)
-            for k in range(wp.static(len(rows))):
-                S[wp.static(rows[k]), 8 * places + 8 + s] = S[wp.static(rows[k]), source]
-            s += 1
-
-    return pad
-
-
-@functools.cache
-def pad_before(rows: tuple[int, ...], place: int):
-    """Warp function that puts, before the place that rows begin at, what lies at the end of the segment before."""
-
-    @wp.func
-    def pad(S: wp.array2d(dtype=wp.float64), places: int):
-        s = int(0)
-        while s < 8:
-            for k in range(wp.static(len(rows))):
-                source = 8 * places + wp.static(8 * place) + (s + 7) % 8
-                S[wp.static(rows[k]), wp.static(8 * place) + s] = S[wp.static(rows[k]), source]
-            s += 1
-
-    return pad
 
 
 @functools.cache
@@ -120,15 +86,14 @@ def rosenbrock_method(name: str, columns: int):
     table = ROSENBROCK_TABLES[name]
     stages, gamma = table.stages, table.gamma
     matrix, couplings, quadrature = table.matrix, table.couplings, table.quadrature
-    segments = segments_of(stages, columns)
+    segments = segments_of(columns)
     factor, solve = cyclic_solver(segments)
-    width, right = segments.columns, segments.right
-    rows = segments.right + segments.right_rows
+    width = segments.columns
+    rows = FIRST_STAGE_ROW + 6 * stages
     separator_rows = segments.separator_rows
     first_row = STAGES + STAGE_ROWS
     offset = 8 * first_row * columns
     separator_offset = offset + 8 * rows * width
-    lower, diagonal, upper = (segments.block(k) for k in range(3))
 
     @wp.func
     def segment_rows(K: wp.array2d(dtype=wp.float64)):
@@ -159,7 +124,7 @@ def rosenbrock_method(name: str, columns: int):
     def first_stage(K: wp.array2d(dtype=wp.float64), chain: Chain):
         S = segment_rows(K)
         n = chain.link_count
-        places, full, total = segment_places(n)
+        places, full, _ = segment_places(n)
         end = place_column(places + 1)
         p = int(0)
         while p < places:
@@ -239,92 +204,6 @@ def rosenbrock_method(name: str, columns: int):
             p += 1
 
     @wp.func
-    def assemble(S: wp.array2d(dtype=wp.float64), chain: Chain, g: wp.float64, end: int, full: int):
-        """The matrix M + g D + g² K."""
-        a = chain.half_length
-        gg = g * g
-        sigma = g * chain.joint_damping + gg * chain.joint_stiffness
-        turning = gg * chain.joint_damping * a
-        c = int(8)
-        while c < end:
-            repeats = c < 16 and c >= 8 + full
-            tx = -S[BASE_SINE, c]
-            ty = S[BASE_COSINE, c]
-            before_x = sigma * a * S[BASE_SINE, c - 8] + turning * S[wp.static(BASE + 5), c - 8] * S[BASE_COSINE, c - 8]
-            before_y = turning * S[wp.static(BASE + 5), c - 8] * S[BASE_SINE, c - 8] - sigma * a * S[BASE_COSINE, c - 8]
-            after_x = sigma * a * S[BASE_SINE, c + 8] + turning * S[wp.static(BASE + 5), c + 8] * S[BASE_COSINE, c + 8]
-            after_y = turning * S[wp.static(BASE + 5), c + 8] * S[BASE_SINE, c + 8] - sigma * a * S[BASE_COSINE, c + 8]
-            force_x = S[BASE_FORCE_X, c] + S[BASE_FORCE_X, c + 8]
-            force_y = S[BASE_FORCE_Y, c] + S[BASE_FORCE_Y, c + 8]
-            own = TWO * sigma * a * a + g * (S[SLOPE, c] + S[SLOPE, c + 8])
-            own = S[INERTIA, c] + own + gg * a * (ty * force_x - tx * force_y)
-            level = S[MASS, c] + TWO * sigma
-            S[wp.static(diagonal), c] = wp.where(repeats, ONE, level)
-            S[wp.static(diagonal + 1), c] = ZERO
-            S[wp.static(diagonal + 2), c] = ZERO
-            S[wp.static(diagonal + 3), c] = ZERO
-            S[wp.static(diagonal + 4), c] = wp.where(repeats, ONE, level)
-            S[wp.static(diagonal + 5), c] = ZERO
-            S[wp.static(diagonal + 6), c] = ZERO
-            S[wp.static(diagonal + 7), c] = ZERO
-            S[wp.static(diagonal + 8), c] = wp.where(repeats, ONE, own)
-            S[wp.static(lower), c] = wp.where(repeats, -ONE, -sigma)
-            S[wp.static(lower + 1), c] = ZERO
-            S[wp.static(lower + 2), c] = wp.where(repeats, ZERO, before_x)
-            S[wp.static(lower + 3), c] = ZERO
-            S[wp.static(lower + 4), c] = wp.where(repeats, -ONE, -sigma)
-            S[wp.static(lower + 5), c] = wp.where(repeats, ZERO, before_y)
-            S[wp.static(lower + 6), c] = wp.where(repeats, ZERO, sigma * a * tx)
-            S[wp.static(lower + 7), c] = wp.where(repeats, ZERO, sigma * a * ty)
-            corner = -a * (tx * before_x + ty * before_y) - g * S[SLOPE, c]
-            S[wp.static(lower + 8), c] = wp.where(repeats, -ONE, corner)
-            S[wp.static(upper), c] = wp.where(repeats, ZERO, -sigma)
-            S[wp.static(upper + 1), c] = ZERO
-            S[wp.static(upper + 2), c] = wp.where(repeats, ZERO, -after_x)
-            S[wp.static(upper + 3), c] = ZERO
-            S[wp.static(upper + 4), c] = wp.where(repeats, ZERO, -sigma)
-            S[wp.static(upper + 5), c] = wp.where(repeats, ZERO, -after_y)
-            S[wp.static(upper + 6), c] = wp.where(repeats, ZERO, -sigma * a * tx)
-            S[wp.static(upper + 7), c] = wp.where(repeats, ZERO, -sigma * a * ty)
-            corner = -a * (tx * after_x + ty * after_y) - g * S[SLOPE, c + 8]
-            S[wp.static(upper + 8), c] = wp.where(repeats, ZERO, corner)
-            c += 1
-
-    @wp.func
-    def first_right_hand_side(S: wp.array2d(dtype=wp.float64), chain: Chain, g: wp.float64, end: int, full: int):
-        """Of the stage at the start of the step, r_q = g v and r_v = g v̇; begins the sums of the powers lost."""
-        a = chain.half_length
-        b = chain.joint_damping
-        c = int(8)
-        while c < end:
-            repeats = c < 16 and c >= 8 + full
-            gx = b * (S[BASE_RATE_X, c + 8] - S[BASE_RATE_X, c])
-            gy = b * (S[BASE_RATE_Y, c + 8] - S[BASE_RATE_Y, c])
-            sum_gx = b * (S[BASE_RATE_X, c + 8] + S[BASE_RATE_X, c])
-            sum_gy = b * (S[BASE_RATE_Y, c + 8] + S[BASE_RATE_Y, c])
-            gt = S[SLOPE, c + 8] * S[BASE_SPIN, c + 8] - S[SLOPE, c] * S[BASE_SPIN, c]
-            gt = gt - a * (S[BASE_COSINE, c] * sum_gy - S[BASE_SINE, c] * sum_gx)
-            m = S[MASS, c]
-            sx = g * S[wp.static(BASE + 3), c]
-            sy = g * S[wp.static(BASE + 4), c]
-            st = g * S[wp.static(BASE + 5), c]
-            rx = m * (g * g * S[BASE_RATE, c] + sx) - g * g * gx
-            ry = m * (g * g * S[wp.static(BASE_RATE + 1), c] + sy) - g * g * gy
-            rt = S[INERTIA, c] * (g * g * S[wp.static(BASE_RATE + 2), c] + st) + g * g * gt
-            S[SHIFT, c] = sx
-            S[wp.static(SHIFT + 1), c] = sy
-            S[wp.static(SHIFT + 2), c] = st
-            S[wp.static(right), c] = wp.where(repeats, ZERO, rx)
-            S[wp.static(right + 1), c] = wp.where(repeats, ZERO, ry)
-            S[wp.static(right + 2), c] = wp.where(repeats, ZERO, rt)
-            rate_x = S[BASE_RATE_X, c + 8]
-            rate_y = S[BASE_RATE_Y, c + 8]
-            friction = S[BASE_TORQUE, c + 8] * S[BASE_SPIN, c + 8]
-            S[POWER_FRICTION, c + 8] = wp.static(wp.float64(quadrature[0])) * friction
-            S[POWER_DAMPING, c + 8] = wp.static(wp.float64(quadrature[0])) * (b * (rate_x * rate_x + rate_y * rate_y))
-            c += 1
-
-    @wp.func
     def place_stage(S: wp.array2d(dtype=wp.float64), chain: Chain, stage: int, g: wp.float64, end: int):
         """U of the stage before, this stage's place in the links' rows, r_q and γ Σ C U_v."""
         inverse = ONE / g
@@ -333,7 +212,7 @@ def rosenbrock_method(name: str, columns: int):
                 c = int(8)
                 while c < end:
                     for k in range(3):
-                        change = S[wp.static(right + k), c]
+                        change = S[wp.static(RIGHT_SIDE + k), c]
                         speed_change = (change - S[wp.static(SHIFT + k), c]) * inverse
                         S[wp.static(FIRST_STAGE_ROW + 6 * (i - 1) + k), c] = change
                         S[wp.static(FIRST_STAGE_ROW + 6 * (i - 1) + 3 + k), c] = speed_change
@@ -411,59 +290,6 @@ def rosenbrock_method(name: str, columns: int):
             c += 1
 
     @wp.func
-    def pull_joints(S: wp.array2d(dtype=wp.float64), chain: Chain, weight: wp.float64, end: int):
-        """Forces and torques of the joints at the stage's place, and g D r_q over g; sums up the powers lost."""
-        c = int(8)
-        while c < end:
-            cx = S[LEFT, c + 8] - S[RIGHT, c]
-            cy = S[wp.static(LEFT + 1), c + 8] - S[wp.static(RIGHT + 1), c]
-            cu = S[wp.static(LEFT + 2), c + 8] - S[wp.static(RIGHT + 2), c]
-            cv = S[wp.static(LEFT + 3), c + 8] - S[wp.static(RIGHT + 3), c]
-            spin = S[SPIN, c] - S[SPIN, c + 8]
-            torque = friction_torque(chain, spin)
-            S[FORCE_X, c + 8] = joint_force(chain, cx, cu)
-            S[FORCE_Y, c + 8] = joint_force(chain, cy, cv)
-            S[TORQUE, c + 8] = torque
-            sx = S[SHIFT_LEFT, c + 8] - S[SHIFT_RIGHT, c]
-            sy = S[wp.static(SHIFT_LEFT + 1), c + 8] - S[wp.static(SHIFT_RIGHT + 1), c]
-            S[SHIFT_X, c + 8] = chain.joint_damping * sx
-            S[SHIFT_Y, c + 8] = chain.joint_damping * sy
-            S[SHIFT_TORQUE, c + 8] = S[SLOPE, c + 8] * (S[wp.static(SHIFT + 2), c] - S[wp.static(SHIFT + 2), c + 8])
-            damping = chain.joint_damping * (cu * cu + cv * cv)
-            S[POWER_FRICTION, c + 8] = S[POWER_FRICTION, c + 8] + weight * (torque * spin)
-            S[POWER_DAMPING, c + 8] = S[POWER_DAMPING, c + 8] + weight * damping
-            c += 1
-
-    @wp.func
-    def right_hand_side(S: wp.array2d(dtype=wp.float64), chain: Chain, g: wp.float64, end: int, full: int):
-        """g M r_v + (M + g D) r_q of the stage."""
-        a = chain.half_length
-        c = int(8)
-        while c < end:
-            repeats = c < 16 and c >= 8 + full
-            fx = S[FORCE_X, c + 8] - S[FORCE_X, c]
-            fy = S[FORCE_Y, c + 8] - S[FORCE_Y, c]
-            sum_x = S[FORCE_X, c + 8] + S[FORCE_X, c]
-            sum_y = S[FORCE_Y, c + 8] + S[FORCE_Y, c]
-            turn = a * (S[COSINE, c] * sum_y - S[SINE, c] * sum_x) + S[TORQUE, c] - S[TORQUE, c + 8]
-            gx = S[SHIFT_X, c + 8] - S[SHIFT_X, c]
-            gy = S[SHIFT_Y, c + 8] - S[SHIFT_Y, c]
-            sum_gx = S[SHIFT_X, c + 8] + S[SHIFT_X, c]
-            sum_gy = S[SHIFT_Y, c + 8] + S[SHIFT_Y, c]
-            gt = S[SHIFT_TORQUE, c + 8] - S[SHIFT_TORQUE, c]
-            gt = gt - a * (S[BASE_COSINE, c] * sum_gy - S[BASE_SINE, c] * sum_gx)
-            m = S[MASS, c]
-            rx = g * (g * fx - gx) + m * (g * S[DRIVE, c] + S[SHIFT, c])
-            ry = g * (g * (fy - m * chain.gravity) - gy)
-            ry = ry + m * (g * S[wp.static(DRIVE + 1), c] + S[wp.static(SHIFT + 1), c])
-            rt = g * (g * turn + gt)
-            rt = rt + S[INERTIA, c] * (g * S[wp.static(DRIVE + 2), c] + S[wp.static(SHIFT + 2), c])
-            S[wp.static(right), c] = wp.where(repeats, ZERO, rx)
-            S[wp.static(right + 1), c] = wp.where(repeats, ZERO, ry)
-            S[wp.static(right + 2), c] = wp.where(repeats, ZERO, rt)
-            c += 1
-
-    @wp.func
     def attempt(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64, tolerance: wp.float64):
         S = segment_rows(K)
         R = separator_rows_of(K)
@@ -477,7 +303,7 @@ def rosenbrock_method(name: str, columns: int):
         stage = int(0)
         while stage < wp.static(stages):
             if stage == 0:
-                first_right_hand_side(S, chain, g, end, full)
+                first_right_hand_side(S, chain, g, wp.static(wp.float64(quadrature[0])), end, full)
             else:
                 weight = ZERO
                 for i in range(1, wp.static(stages)):
@@ -496,7 +322,7 @@ def rosenbrock_method(name: str, columns: int):
         c = int(8)
         while c < end:
             for k in range(3):
-                place_error = S[wp.static(right + k), c]
+                place_error = S[wp.static(RIGHT_SIDE + k), c]
                 speed_error = (place_error - S[wp.static(SHIFT + k), c]) * inverse
                 S[wp.static(FIRST_STAGE_ROW + 6 * (stages - 1) + k), c] = place_error
                 S[wp.static(FIRST_STAGE_ROW + 6 * (stages - 1) + 3 + k), c] = speed_error
@@ -519,7 +345,7 @@ def rosenbrock_method(name: str, columns: int):
     def commit(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64):
         S = segment_rows(K)
         n = chain.link_count
-        places, full, total = segment_places(n)
+        places, full, _ = segment_places(n)
         end = place_column(places + 1)
         a = chain.half_length
         # Σ w U, and how the joints' spins and opening rates change by it
@@ -572,32 +398,3 @@ def rosenbrock_method(name: str, columns: int):
             p += 1
 
     return first_stage, attempt, commit
-
-
-@wp.func
-def place_link(
-    S: wp.array2d(dtype=wp.float64),
-    chain: Chain,
-    c: int,
-    x: wp.float64,
-    y: wp.float64,
-    u: wp.float64,
-    v: wp.float64,
-    w: wp.float64,
-    cosine: wp.float64,
-    sine: wp.float64,
-):
-    """Rows of a stage for one link: direction, spin, ends and their velocities."""
-    S[COSINE, c] = cosine
-    S[SINE, c] = sine
-    S[SPIN, c] = w
-    left_x, left_y, right_x, right_y = end_positions(chain, x, y, cosine, sine)
-    left_u, left_v, right_u, right_v = end_velocities(chain, u, v, w, cosine, sine)
-    S[LEFT, c] = left_x
-    S[LEFT + 1, c] = left_y
-    S[LEFT + 2, c] = left_u
-    S[LEFT + 3, c] = left_v
-    S[RIGHT, c] = right_x
-    S[RIGHT + 1, c] = right_y
-    S[RIGHT + 2, c] = right_u
-    S[RIGHT + 3, c] = right_v

@@ -44,12 +44,12 @@ def _solver(size: int, columns: int) -> tuple[wp.Kernel, SegmentLayout]:
 
     @_compiled
     def solver(block: wp.array2d(dtype=wp.float64), separators: wp.array2d(dtype=wp.float64), links: int):
-        S = wp.array(ptr=block.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
-        R = wp.array(ptr=separators.ptr, shape=(wp.static(separator_rows), 16), dtype=wp.float64)
+        rows_of_loop = wp.array(ptr=block.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
+        rows_of_separators = wp.array(ptr=separators.ptr, shape=(wp.static(separator_rows), 16), dtype=wp.float64)
         places, full, total = segment_places(links)
         lanes = wp.min(total, 8)
-        factor(S, R, places, full, lanes)
-        solve(S, R, places, lanes)
+        factor(rows_of_loop, rows_of_separators, places, full, lanes)
+        solve(rows_of_loop, rows_of_separators, places, lanes)
 
     return solver, segments
 
@@ -99,13 +99,13 @@ def _step(method: str, columns: int) -> wp.Kernel:
         world = wp.tid()
         chain = read_chain(model, world)
         block = scratch[world]
-        K = wp.array(ptr=block.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
-        load_state(K, state, chain, world)
-        place_ends(K, chain)
-        first_stage(K, chain)
-        bits = attempt(K, chain, h, tolerance)
+        rows_of_chain = wp.array(ptr=block.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
+        load_state(rows_of_chain, state, chain, world)
+        place_ends(rows_of_chain, chain)
+        first_stage(rows_of_chain, chain)
+        bits = attempt(rows_of_chain, chain, h, tolerance)
         error[world] = wp.cast(bits, wp.float64)
-        commit(K, chain, h)
+        commit(rows_of_chain, chain, h)
 
     return step
 

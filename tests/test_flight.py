@@ -181,7 +181,7 @@ def test_centre_of_mass_falls_freely():
 @pytest.mark.parametrize("parameters", [PAPER, SOFT], ids=["paper", "soft"])
 @pytest.mark.parametrize("method", METHODS)
 def test_energy_is_kept_without_dissipation(parameters, method):
-    """With β = τ_c = b = 0 the energy stays: to 1e-13 at tolerance 1e-12, by rodas4p to 1e-12, by bs32 at 1e-10 to 1e-9."""
+    """With β = τ_c = b = 0 the energy stays: to 1e-13 at tolerance 1e-12, rodas4p to 1e-12, bs32 at 1e-10 to 1e-9."""
     tolerance, bound = {"bs32": (1e-10, 1e-9), "rodas4p": (1e-12, 1e-12)}.get(method, (1e-12, 1e-13))
     chain = parameters.with_values(FRICTIONLESS)
     flight = flight_without_gravity(chain, method=method, tolerance=tolerance)

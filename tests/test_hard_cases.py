@@ -145,7 +145,7 @@ def test_any_damping(method, damping, duration):
 
 @pytest.mark.parametrize("method", ["rkf78", "dp5", "bs32"])
 def test_hopeless_damping_is_a_status(method):
-    """Damping that asks explicit methods for steps of 1e-12 s ends in a limit that says so, with the state reached until then."""
+    """Damping that asks explicit methods for steps of 1e-12 s ends in a limit that says so, where it stood then."""
     chain = SOFT.with_values({"joint_damping": 1e9})
     state = dropped()
     flight = simulate(chain, state, 1e-2, method=method, step_limit=20_000)

@@ -77,11 +77,10 @@ def test_method_is_stiffly_accurate(table):
 
 @tables
 def test_quadrature_belongs_to_the_method(table):
-    """The weights of quadratures are b of the classical form: ∫ 1 dt = h, and each stage's weight Σ b Γ⁻¹ γ …"""
-    _, gammas, b, _ = classical(table)
-    # e' = p(y): its stages are k_e = h (p(Y) + p'·Σ Γ_ij k_j), and Σ Γ_ij k_j = U_i
+    """The weights of quadratures are b of the textbook form, whose stages for e' = p(y) are h (p(Y_i) + p'·U_i)."""
+    _, _, b, _ = classical(table)
     assert_allclose(table.quadrature, b, atol=1e-14)
-    assert gammas.shape == (table.stages, table.stages)
+    assert sum(table.quadrature) == pytest.approx(1.0, abs=1e-14)
 
 
 # --- the linear solver ---

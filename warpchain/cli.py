@@ -113,7 +113,7 @@ def walk(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Integrator: rkf78 (the paper's), dp5, bs32 or rodas4p (implicit); the digits are orders. Default: rkf78.",
+            help="Integrator: rkf78 (the paper's), dp5, bs32 or rodas4p (implicit); digits are orders. Default: rkf78.",
         ),
     ] = None,
     tolerance: Annotated[

@@ -148,7 +148,7 @@ class Options(BaseModel):
 
     method: Literal["rkf78", "dp5", "bs32", "rodas4p"] = Field(
         default="rkf78",
-        description="embedded pair: Fehlberg 7(8), Dormand–Prince 5(4), Bogacki–Shampine 3(2), or RODAS4P 4(3), implicit",
+        description="embedded pair: Fehlberg 7(8), Dormand–Prince 5(4), Bogacki–Shampine 3(2) or RODAS4P 4(3)",
     )
     tolerance: float = Field(
         default=1e-6,

@@ -1,0 +1,74 @@
+"""Where the implicit step keeps a chain: rows of memory in the order of :mod:`cyclic_solver`, and their neighbours.
+
+The next link is the next place, eight columns on. A joint lies at the column of the link on its left in what the loops
+read, but its rows begin one place further, so that a link finds the joint on its left in its own column.
+"""
+
+import functools
+
+import warp as wp
+
+from .cyclic_solver import SegmentLayout, segment_columns
+
+wp.set_module_options({"enable_backward": False})
+
+# Rows in segment order. The state at the start of the step (6), its direction, the links' constants.
+BASE = 0
+BASE_COSINE, BASE_SINE, MASS, INERTIA, COUNTED = 6, 7, 8, 9, 10
+# Accelerations at the start of the step; of joints there: friction's slope and torque, force, spin, opening rate.
+BASE_RATE = 11
+SLOPE, BASE_TORQUE, BASE_FORCE_X, BASE_FORCE_Y, BASE_SPIN, BASE_RATE_X, BASE_RATE_Y = 14, 15, 16, 17, 18, 19, 20
+# A stage: direction, spin, link ends and their velocities, r_q, and the same ends' changes by r_q.
+COSINE, SINE, SPIN = 21, 22, 23
+LEFT, RIGHT = 24, 28
+SHIFT, SHIFT_LEFT, SHIFT_RIGHT = 32, 35, 37
+# γ Σ C U_v, joint forces and torques of the stage and of the change by r_q.
+DRIVE = 39
+FORCE_X, FORCE_Y, TORQUE, SHIFT_X, SHIFT_Y, SHIFT_TORQUE = 42, 43, 44, 45, 46, 47
+POWER_FRICTION, POWER_DAMPING = 48, 49
+# The candidate state.
+NEW = 50
+# The linear system of :mod:`cyclic_solver`, then six rows a stage: U_q, U_v.
+SYSTEM = 56
+LOWER, DIAGONAL, UPPER = SYSTEM, SYSTEM + 9, SYSTEM + 18
+RIGHT_SIDE = SYSTEM + 54
+FIRST_STAGE_ROW = RIGHT_SIDE + 9
+
+
+@functools.cache
+def segments_of(columns: int) -> SegmentLayout:
+    """Layout of the linear system for chains whose scratch blocks have so many columns."""
+    return SegmentLayout(size=3, columns=segment_columns(columns), matrix=SYSTEM, right=RIGHT_SIDE)
+
+
+@functools.cache
+def pad_behind(rows: tuple[int, ...]):
+    """Warp function that puts, in these rows, the next segment's first link behind each segment's last."""
+
+    @wp.func
+    def pad(S: wp.array2d(dtype=wp.float64), places: int, full: int):
+        s = int(0)
+        while s < 8:
+            after = (s + 1) % 8
+            source = 8 + after + wp.where(after >= full, 8, 0)
+            for k in range(wp.static(len(rows))):
+                S[wp.static(rows[k]), 8 * places + 8 + s] = S[wp.static(rows[k]), source]
+            s += 1
+
+    return pad
+
+
+@functools.cache
+def pad_before(rows: tuple[int, ...], place: int):
+    """Warp function that puts, before the place that rows begin at, what lies at the end of the segment before."""
+
+    @wp.func
+    def pad(S: wp.array2d(dtype=wp.float64), places: int):
+        s = int(0)
+        while s < 8:
+            for k in range(wp.static(len(rows))):
+                source = 8 * places + wp.static(8 * place) + (s + 7) % 8
+                S[wp.static(rows[k]), wp.static(8 * place) + s] = S[wp.static(rows[k]), source]
+            s += 1
+
+    return pad
