@@ -4,12 +4,10 @@ Figures and tables of what is there of the sweep, its parameters, its file, wher
 and what to try; on demand one walk in motion. A folder gives the same page each time.
 """
 
-import base64
-import io
 import math
 import os
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from html import escape
 from importlib.metadata import version
 from pathlib import Path
@@ -18,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import yaml
 
+from warpchain.html_page import page, picture, table
 from warpchain.parameters import DIMENSIONLESS, InputError
 from warpchain.planning import load_sweep
 from warpchain.recording import Recording
@@ -30,14 +29,11 @@ from warpchain.sweep_result import BlockResult, SweepResult, load
 from warpchain.sweep_statistics import axis_symbol, cell_text, number_text
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from warpchain.plots import Walk
 
 FRAME_INTERVAL: Final = 2e-3
 """Time between two pictures of the walk in motion [s]."""
 
-_DPI: Final = 160
 _MOST_FAILED: Final = 100
 """Most walks of each status that are listed one by one."""
 
@@ -85,35 +81,13 @@ def _page(result: SweepResult, sections: Mapping[str, str]) -> str:
     tiles = {"walks": (result.walk_count, ""), "at rest": (rested, ""), "failed": (failed, "bad" if failed else "")}
     if missing:
         tiles["not run yet"] = (missing, "")
-    numbers = [
-        f'<div class="{kind}"><dt>{label}</dt><dd>{count:,}</dd></div>' for label, (count, kind) in tiles.items()
-    ]
-    anchors = {title: title.lower().replace(" ", "-") for title in sections}
-    return _PAGE.format(
-        title=escape(result.name),
-        style=_STYLE,
-        numbers="".join(numbers),
-        links="".join(f'<a href="#{anchor}">{title}</a> ' for title, anchor in anchors.items()),
-        sections="\n".join(
-            f'<section id="{anchors[title]}"><h2>{title}</h2>\n{text}\n</section>' for title, text in sections.items()
-        ),
-    )
+    return page(result.name, tiles, sections)
 
 
 def _figures(result: SweepResult) -> str:
     from warpchain.sweep_plots import figures
 
-    return "\n".join(_picture(picture.figure, picture.caption) for picture in figures(result))
-
-
-def _picture(figure: "Figure", caption: str) -> str:
-    """A figure in the page itself."""
-    content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=_DPI, metadata={"Software": None})
-    data = base64.b64encode(content.getvalue()).decode()
-    width = round(96 * figure.get_figwidth())
-    image = f'<img src="data:image/png;base64,{data}" alt="{escape(caption)}" style="width:{width}px">'
-    return f"<figure>{image}<figcaption>{escape(caption)}</figcaption></figure>"
+    return "\n".join(picture(drawn.figure, drawn.caption) for drawn in figures(result))
 
 
 def _cells(result: SweepResult) -> str:
@@ -137,7 +111,7 @@ def _cells(result: SweepResult) -> str:
         if not found.missing.any():
             head, rows = head[:-1], [row[:-1] for row in rows]
         marked = [bool(count) for count in found.failed.ravel()]
-        parts += [*_heading(result, block.name), _table(head, rows, numbers_from=0, marked=marked)]
+        parts += [*_heading(result, block.name), table(head, rows, numbers_from=0, marked=marked)]
     return "\n".join(parts)
 
 
@@ -152,7 +126,7 @@ def _failed(result: SweepResult) -> str:
             continue
         parts.append(f"<h3>{status.label}: {len(rows):,}</h3><p>{escape(status.sentence)}</p>")
         head = ["walk", *(["block"] if len(result.blocks) > 1 else []), "cell", "sample"]
-        parts.append(_table(head, rows[:_MOST_FAILED], numbers_from=len(head)))
+        parts.append(table(head, rows[:_MOST_FAILED], numbers_from=len(head)))
         if len(rows) > _MOST_FAILED:
             parts.append(f"<p>… and {len(rows) - _MOST_FAILED:,} more.</p>")
     return "\n".join(parts) or "<p>None.</p>"
@@ -190,13 +164,13 @@ def _walk(result: SweepResult, index: int) -> str:
     )
     parts = [f"<p>{escape(text)}</p>", _player(walk)]
     if len(walk.frame_time) and np.isfinite(walk.frame_joints).all():
-        parts.append(_picture(walk.plot("film_strip"), "The walk, drawn to scale."))
+        parts.append(picture(walk.plot("film_strip"), "The walk, drawn to scale."))
         parts.append(
-            _picture(walk.plot("figure5"), "Height and speed of the centre of mass, as in the paper's Figure 5.")
+            picture(walk.plot("figure5"), "Height and speed of the centre of mass, as in the paper's Figure 5.")
         )
     if planned.drawn:
         rows = [[name, number_text(value), _unit(name)] for name, value in planned.drawn.items()]
-        parts.append("<h3>Drawn for this walk</h3>" + _table(["name", "value", "unit"], rows, numbers_from=3))
+        parts.append("<h3>Drawn for this walk</h3>" + table(["name", "value", "unit"], rows, numbers_from=3))
     return "\n".join(parts)
 
 
@@ -211,12 +185,12 @@ def _player(walk: "Walk") -> str:
     from warpchain.animation import animate
 
     with tempfile.TemporaryDirectory() as folder:
-        page = Path(folder) / "walk.html"
+        player = Path(folder) / "walk.html"
         try:
-            animate(walk, page)
+            animate(walk, player)
         except ValueError as error:
             return f'<p class="bad">No moving picture: {escape(str(error))}</p>'
-        content = escape(page.read_text(encoding="utf-8"))
+        content = escape(player.read_text(encoding="utf-8"))
     # As high as the drawing at the page's full width, with its controls [px].
     wide, high = np.ptp(walk.frame_joints[..., 0]), walk.frame_joints[..., 1].max()
     height = round(min(600.0, 170.0 + 960.0 * high / wide))
@@ -249,7 +223,7 @@ def _parameters(result: SweepResult) -> str:
             values = _in_blocks({block["name"]: _value(block, section, name) for block in blocks})
             rows.append([name, "" if " " in symbol or symbol == name else symbol, values, _unit(name), column.meaning])
         head = ["name", "symbol", "value", "unit", "meaning"]
-        parts += [f"<h3>{section}</h3>", _table(head, rows, numbers_from=len(head))]
+        parts += [f"<h3>{section}</h3>", table(head, rows, numbers_from=len(head))]
     return "\n".join(parts)
 
 
@@ -287,7 +261,7 @@ def _provenance(result: SweepResult) -> str:
         ["software that wrote this page", f"warpchain {version('warpchain')}"],
     ]
     again = "<p>With the text under Sweep in a file: <code>warpchain sweep FILE.yaml -o DIR</code></p>"
-    return _table(["", ""], rows, numbers_from=2) + again
+    return table(["", ""], rows, numbers_from=2) + again
 
 
 def _cell(block: BlockResult, place: tuple[int, ...]) -> str:
@@ -320,82 +294,3 @@ def _unit(name: str) -> str:
 def _meters(length: float) -> str:
     """A length [m] to tenths of a millimetre, a dash for none."""
     return f"{length:.4f}" if math.isfinite(length) else "–"
-
-
-def _table(
-    head: Sequence[str], rows: Iterable[Sequence[str]], *, numbers_from: int, marked: Sequence[bool] = ()
-) -> str:
-    """A table of texts.
-
-    Args:
-        head: one text for each column; nothing is above columns without texts.
-        rows: the same number of texts each.
-        numbers_from: first of the columns that hold numbers.
-        marked: rows to draw attention to.
-    """
-    kinds = ["" if column < numbers_from else ' class="number"' for column in range(len(head))]
-    lines = [f"<th{kind}>{escape(text)}</th>" for text, kind in zip(head, kinds, strict=True)]
-    top = f"<thead><tr>{''.join(lines)}</tr></thead>" if any(head) else ""
-    body = []
-    for number, row in enumerate(rows):
-        cells = "".join(f"<td{kind}>{escape(text)}</td>" for text, kind in zip(row, kinds, strict=True))
-        body.append(f"<tr{' class=bad' if number < len(marked) and marked[number] else ''}>{cells}</tr>")
-    return f'<div class="wide"><table>{top}<tbody>\n' + "\n".join(body) + "\n</tbody></table></div>"
-
-
-_STYLE: Final = """
-:root { color-scheme: light; }
-body { margin: 0 auto; max-width: 62rem; padding: 1.5rem; color: #222; background: #fff;
-       font: 16px/1.5 system-ui, sans-serif; }
-h1 { margin: 0; font-size: 1.9rem; }
-h2 { margin: 2.5rem 0 .75rem; padding-bottom: .25rem; border-bottom: 1px solid #ccc; font-size: 1.35rem; }
-h3 { margin: 1.5rem 0 .5rem; font-size: 1.05rem; }
-p { max-width: 46rem; }
-a { color: #0072b2; margin-right: 1rem; }
-dl { display: flex; flex-wrap: wrap; gap: .75rem; margin: 1rem 0; }
-dl div { padding: .5rem 1rem; min-width: 6rem; background: #f3f4f5; border-left: 4px solid #0072b2; }
-dl .bad { border-color: #d55e00; }
-dt { font-size: .85rem; color: #555; }
-dd { margin: 0; font-size: 1.4rem; font-variant-numeric: tabular-nums; }
-figure { margin: 1.5rem 0 2.5rem; }
-figure img { max-width: 100%; display: block; }
-figcaption { max-width: 46rem; margin-top: .5rem; color: #555; font-size: .9rem; }
-.wide { overflow-x: auto; }
-table { border-collapse: collapse; font-size: .9rem; }
-th, td { padding: .2rem .8rem .2rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid #e3e3e3; }
-th { border-bottom: 1px solid #777; }
-.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-tr.bad td, p.bad { color: #a84a00; }
-iframe { width: 100%; border: 1px solid #ccc; }
-pre { max-height: 30rem; overflow: auto; padding: 1rem; background: #f3f4f5; font-size: .8rem; line-height: 1.35; }
-@page { margin: 15mm; }
-@media print {
-  body { max-width: none; padding: 0; font-size: 10pt; }
-  nav, iframe { display: none; }
-  table { font-size: 8.5pt; }
-  pre { max-height: none; white-space: pre-wrap; }
-  .wide { overflow: visible; }
-  h2, h3 { break-after: avoid; }
-  figure, tr { break-inside: avoid; }
-}
-"""
-
-# The policy makes the browser refuse whatever might be loaded, should a page ever ask for it.
-_PAGE: Final = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy"
-      content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'">
-<title>{title}</title>
-<style>{style}</style>
-</head>
-<body>
-<h1>{title}</h1>
-<dl>{numbers}</dl>
-<nav>{links}</nav>
-{sections}
-</body>
-</html>
-"""

@@ -1,0 +1,123 @@
+"""Building blocks of the HTML pages: one page that holds everything and loads nothing."""
+
+import base64
+import io
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_DPI: Final = 160
+
+
+def page(title: str, tiles: Mapping[str, tuple[int, str]], sections: Mapping[str, str]) -> str:
+    """A whole page.
+
+    Args:
+        title: heading of the page.
+        tiles: what the numbers at the top count → the number, and ``"bad"`` if it needs attention.
+        sections: heading → content in HTML.
+    """
+    numbers = [
+        f'<div class="{kind}"><dt>{label}</dt><dd>{count:,}</dd></div>' for label, (count, kind) in tiles.items()
+    ]
+    anchors = {heading: heading.lower().replace(" ", "-") for heading in sections}
+    return _PAGE.format(
+        title=escape(title),
+        style=_STYLE,
+        numbers="".join(numbers),
+        links="".join(f'<a href="#{anchor}">{heading}</a> ' for heading, anchor in anchors.items()),
+        sections="\n".join(
+            f'<section id="{anchors[heading]}"><h2>{heading}</h2>\n{text}\n</section>'
+            for heading, text in sections.items()
+        ),
+    )
+
+
+def picture(figure: "Figure", caption: str) -> str:
+    """A figure in the page itself."""
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=_DPI, metadata={"Software": None})
+    data = base64.b64encode(content.getvalue()).decode()
+    width = round(96 * figure.get_figwidth())
+    image = f'<img src="data:image/png;base64,{data}" alt="{escape(caption)}" style="width:{width}px">'
+    return f"<figure>{image}<figcaption>{escape(caption)}</figcaption></figure>"
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], *, numbers_from: int, marked: Sequence[bool] = ()) -> str:
+    """A table of texts.
+
+    Args:
+        head: one text for each column; nothing is above columns without texts.
+        rows: the same number of texts each.
+        numbers_from: first of the columns that hold numbers.
+        marked: rows to draw attention to.
+    """
+    kinds = ["" if column < numbers_from else ' class="number"' for column in range(len(head))]
+    lines = [f"<th{kind}>{escape(text)}</th>" for text, kind in zip(head, kinds, strict=True)]
+    top = f"<thead><tr>{''.join(lines)}</tr></thead>" if any(head) else ""
+    body = []
+    for number, row in enumerate(rows):
+        cells = "".join(f"<td{kind}>{escape(text)}</td>" for text, kind in zip(row, kinds, strict=True))
+        body.append(f"<tr{' class=bad' if number < len(marked) and marked[number] else ''}>{cells}</tr>")
+    return f'<div class="wide"><table>{top}<tbody>\n' + "\n".join(body) + "\n</tbody></table></div>"
+
+
+_STYLE: Final = """
+:root { color-scheme: light; }
+body { margin: 0 auto; max-width: 62rem; padding: 1.5rem; color: #222; background: #fff;
+       font: 16px/1.5 system-ui, sans-serif; }
+h1 { margin: 0; font-size: 1.9rem; }
+h2 { margin: 2.5rem 0 .75rem; padding-bottom: .25rem; border-bottom: 1px solid #ccc; font-size: 1.35rem; }
+h3 { margin: 1.5rem 0 .5rem; font-size: 1.05rem; }
+p { max-width: 46rem; }
+a { color: #0072b2; margin-right: 1rem; }
+dl { display: flex; flex-wrap: wrap; gap: .75rem; margin: 1rem 0; }
+dl div { padding: .5rem 1rem; min-width: 6rem; background: #f3f4f5; border-left: 4px solid #0072b2; }
+dl .bad { border-color: #d55e00; }
+dt { font-size: .85rem; color: #555; }
+dd { margin: 0; font-size: 1.4rem; font-variant-numeric: tabular-nums; }
+figure { margin: 1.5rem 0 2.5rem; }
+figure img { max-width: 100%; display: block; }
+figcaption { max-width: 46rem; margin-top: .5rem; color: #555; font-size: .9rem; }
+.wide { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .9rem; }
+th, td { padding: .2rem .8rem .2rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid #e3e3e3; }
+th { border-bottom: 1px solid #777; }
+.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+tr.bad td, p.bad { color: #a84a00; }
+iframe { width: 100%; border: 1px solid #ccc; }
+pre { max-height: 30rem; overflow: auto; padding: 1rem; background: #f3f4f5; font-size: .8rem; line-height: 1.35; }
+@page { margin: 15mm; }
+@media print {
+  body { max-width: none; padding: 0; font-size: 10pt; }
+  nav, iframe { display: none; }
+  table { font-size: 8.5pt; }
+  pre { max-height: none; white-space: pre-wrap; }
+  .wide { overflow: visible; }
+  h2, h3 { break-after: avoid; }
+  figure, tr { break-inside: avoid; }
+}
+"""
+
+# The policy makes the browser refuse whatever might be loaded, should a page ever ask for it.
+_PAGE: Final = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy"
+      content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'">
+<title>{title}</title>
+<style>{style}</style>
+</head>
+<body>
+<h1>{title}</h1>
+<dl>{numbers}</dl>
+<nav>{links}</nav>
+{sections}
+</body>
+</html>
+"""
