@@ -6,46 +6,29 @@ import warp as wp
 from numpy.testing import assert_allclose, assert_array_equal
 
 import warpchain
-from warpchain import InputError, Status, preset, reference
-from warpchain.shapes import ellipse, lay_chain, links_between
+from warpchain import InputError, Status, reference
+from warpchain.hard_starts import (
+    ELASTIC,
+    PAPER,
+    SOFT,
+    UNDISSIPATIVE,
+    dropped,
+    dropped_circle,
+    energy_error,
+    energy_scale,
+    folded,
+    overlapping,
+    pulled_apart,
+    set_down,
+    turning_joints,
+)
 
 METHODS = ("rkf78", "dp5", "bs32", "rodas4p")
-PAPER, SOFT = preset("paper"), preset("soft")
-ELASTIC = SOFT.with_values(
-    {
-        "joint_stiffness": 1e5,
-        **dict.fromkeys(["joint_damping", "viscous_friction", "coulomb_friction"], 0.0),
-        **dict.fromkeys(["floor_restitution", "chain_restitution"], 1.0),
-        **dict.fromkeys(["floor_friction", "chain_friction"], 0.0),
-    }
-)
-"""Nothing dissipates: neither joints nor collisions."""
-
 every_method = pytest.mark.parametrize("method", METHODS)
 every_method_walks = pytest.mark.parametrize(
     "method", ["rkf78", "dp5", "rodas4p", pytest.param("bs32", marks=pytest.mark.slow)]
 )
 """The same for walks, which need a kernel more: no other quick test uses that of bs32."""
-
-
-def set_down(position, gap=2e-4, parameters=SOFT):
-    """The chain raised or lowered so that its lowest circle is this far above the floor [m]."""
-    ends = np.concatenate(reference.link_ends(position, parameters))
-    return position - [0.0, ends[:, 1].min() - parameters.circle_radius - gap, 0.0]
-
-
-def dropped(links=8, speed=2.0, fall=1.0, gap=2e-4, aspect=1.2):
-    """A circulating ellipse just above the floor, falling: it hits within the first millisecond."""
-    position, velocity = lay_chain(ellipse(aspect), links, SOFT.link_length, speed, 0.1)
-    return set_down(position, gap), velocity - [0.0, fall, 0.0]
-
-
-def folded(links, height=0.02):
-    """A chain laid out on a line and folded back by 180° at both ends, its strands exactly on each other."""
-    place = np.arange(links)
-    along = np.minimum(place, links - place) * SOFT.link_length
-    joints = np.column_stack([along, np.full(links, height)])
-    return links_between(joints, np.zeros_like(joints))
 
 
 def simulate(parameters, state, duration, **settings):
@@ -58,12 +41,8 @@ def assert_sound(flight, parameters, state, within=1e-5):
     assert flight.status == Status.FINISHED, flight.status.sentence
     position, velocity = flight.position[-1], flight.velocity[-1]
     assert np.all(np.isfinite(position)) and np.all(np.isfinite(velocity))
-    at_start = reference.total_energy(*state, parameters)
-    at_end = reference.total_energy(position, velocity, parameters)
-    moving = reference.kinetic_energy(state[1], parameters) + reference.spring_energy(state[0], parameters)
-    fallen = parameters.gravity * reference.link_masses(len(position), parameters).sum() * 0.01
-    assert abs(at_start - at_end - sum(flight.losses.values())) < within * (moving + fallen)
-    assert all(loss > -within * (moving + fallen) for loss in flight.losses.values())
+    assert energy_error(flight, parameters, state) < within
+    assert all(loss > -within * energy_scale(parameters, state) for loss in flight.losses.values())
 
 
 # --- the whole pile ---
@@ -160,10 +139,7 @@ def test_hopeless_damping_is_a_status(method):
 def test_any_smoothing_of_friction(method, smoothing):
     """However sharp friction's change of sign, joints that stop turning stay so, to some tens of tolerances of ω."""
     chain = PAPER.with_values({"friction_smoothing": smoothing, "gravity": 0.0})
-    position, velocity = reference.circular_loop(8, chain, 1.0)
-    position[:, 1] += 0.1
-    # friction stops a relative 0.02 rad/s within 10 µs
-    velocity[:, 2] += 0.01 * np.array([1, -1] * 4)
+    position, velocity = turning_joints()  # friction stops their relative 0.02 rad/s within 10 µs
     instants = np.linspace(0.0, 1e-4, 11)
     flight = warpchain.simulate(chain, position, velocity, 1e-4, times=instants, method=method, step_limit=100_000)
     assert_sound(flight, chain, (position, velocity))
@@ -259,7 +235,6 @@ def test_elastic_bouncing_shows_the_order(method, steps, slope):
 @every_method_walks
 def test_endless_bouncing_meets_the_time_limit(method):
     """A chain that nothing brings to rest ends with time_limit at that time, and has no Δx."""
-    names = [name for name in type(ELASTIC).model_fields if getattr(ELASTIC, name) != getattr(SOFT, name)]
     walk = warpchain.walk(
         preset="soft",
         method=method,
@@ -267,7 +242,7 @@ def test_endless_bouncing_meets_the_time_limit(method):
         frequency=2.0,
         start="ellipse",
         walk_limit=0.3,
-        **{name: getattr(ELASTIC, name) for name in names},
+        **UNDISSIPATIVE,
     )
     assert walk.status == Status.TIME_LIMIT
     assert walk.walk_time == 0.3
@@ -324,8 +299,7 @@ def test_short_chains(method, links):
 @every_method
 def test_thousand_links(method):
     """1000 links hit the floor like any other number."""
-    position, velocity = reference.circular_loop(1000, SOFT, -3.0)
-    state = set_down(position), velocity - [0.0, 1.0, 0.0]
+    state = dropped_circle(1000)
     flight = simulate(SOFT, state, 5e-3, method=method)
     assert_sound(flight, SOFT, state)
     assert flight.impulses["floor"] > 100
@@ -365,10 +339,8 @@ def test_standing_sprocket(start):
 @pytest.mark.parametrize("parameters", [PAPER, SOFT], ids=["paper", "soft"])
 def test_joints_pulled_apart(method, parameters):
     """Joints opened by 0.1 mm, 40 J at k = 1e9, pull themselves together; the ledger tells where the energy went."""
-    position, velocity = dropped(gap=1e-3)
-    shift = np.random.default_rng(1).normal(size=(8, 2))
-    position[:, :2] += 0.7e-4 * shift / np.linalg.norm(shift, axis=1)[:, None]
-    state = position, velocity
+    state = pulled_apart()
+    position = state[0]
     opening = np.linalg.norm(reference.joint_opening(position, parameters), axis=1)
     assert 1e-4 < opening.max() < 1.5e-4
     flight = simulate(parameters, state, 2e-3, method=method)
@@ -415,16 +387,8 @@ def test_folded_back_on_itself(method, links, parameters):
 @every_method
 def test_overlapping_links(method):
     """Links that start inside each other and move together collide at once, gain no energy and stay finite."""
-    # a zigzag: joints alternate between two places, so every second joint lies on every other
-    links = 8
-    joints = np.column_stack([np.arange(links) % 2 * SOFT.link_length, 0.02 + 1e-4 * np.arange(links)])
-    joints[:, 0] += np.sqrt(SOFT.link_length**2 - 1e-8) - SOFT.link_length
-    joints[::2, 0] = 0.0
-    joints[-1, 1] = joints[0, 1] + 1e-4
-    position, velocity = links_between(joints, np.zeros_like(joints))
-    velocity[:, 1] += np.random.default_rng(2).normal(size=links) * 0.1
-    state = position, velocity
-    assert len(reference.touching_pairs(position, SOFT)) >= 10
+    state = overlapping()
+    assert len(reference.touching_pairs(state[0], SOFT)) >= 10
     flight = simulate(SOFT, state, 5e-3, method=method)
     assert_sound(flight, SOFT, state, within=1e-4)
     assert flight.impulses["self"] > 10
