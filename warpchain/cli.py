@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NoReturn
 
 import typer
 
+from warpchain.bench_cli import bench_app
 from warpchain.sweep_cli import add_commands
 
 if TYPE_CHECKING:
@@ -212,8 +213,9 @@ def walk(
         raise typer.Exit(FAILED)
 
 
-@app.command()
+@bench_app.callback(invoke_without_command=True)
 def bench(
+    context: typer.Context,
     links: Annotated[
         list[int] | None,
         typer.Option(metavar="N", help="Number of links; may be repeated. Default: 60 and 150."),
@@ -224,6 +226,8 @@ def bench(
     ] = False,
 ) -> None:
     """Measure what integration costs on one core (µs a step), beside SciPy's DOP853 on a NumPy model."""
+    if context.invoked_subcommand is not None:
+        return
     from importlib.util import find_spec
 
     from warpchain.options import Scene
@@ -247,6 +251,7 @@ def bench(
 
 
 add_commands(app)
+app.add_typer(bench_app, name="bench")
 
 
 def _given_values(named: Mapping[str, str], assignments: Sequence[str]) -> Sections:

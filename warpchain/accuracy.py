@@ -1,0 +1,298 @@
+"""``warpchain bench accuracy``: error against cost of every method, its ensembles of walks, and the hard cases.
+
+Three parts, each of which can be run by itself: what the others have left in the folder stays. Numbers are kept in one
+JSON file with the machine they were measured on, figures and a page are drawn from it.
+"""
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Final
+
+from warpchain.accuracy_columns import COLUMNS
+from warpchain.accuracy_ensembles import Contestant, Ensemble, default_samples, run_ensemble, summary
+from warpchain.bench import machine
+from warpchain.engine import start_device
+from warpchain.hard_cases import HARD_CASES
+from warpchain.options import Options, Scene, check_scene
+from warpchain.parameters import InputError, preset, shown, suggestion, validated
+from warpchain.planning import load_sweep
+from warpchain.results import replacing
+from warpchain.work_precision import TOLERANCES, TRIALS, Errors, make_reference, make_trial, methods, points
+
+PARTS: Final = ("work-precision", "ensembles", "hard-cases")
+FILE: Final = "accuracy.json"
+FORMAT: Final = "warpchain accuracy"
+VERSION: Final = 1
+TOLERANCE: Final = 1e-6
+"""Of a method in the ensembles unless one says otherwise."""
+SCIPY_TOLERANCES: Final = (1e-3, 1e-6, 1e-9)
+"""Those of the tolerances that SciPy's solvers, which take a minute each, are run at."""
+
+Report = Callable[[str], None]
+Document = dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """What is to be run, checked; see `make_plan`."""
+
+    parts: tuple[str, ...]
+    contestants: tuple[Contestant, ...]
+    tolerances: tuple[float, ...]
+    links: tuple[int, ...]
+    trials: tuple[str, ...]
+    ensembles: tuple[Ensemble, ...]
+    cases: tuple[str, ...]
+    rounds: int
+    scipy: bool
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Names of the methods, each once."""
+        return tuple(dict.fromkeys(method for method, _ in self.contestants))
+
+
+def make_plan(
+    *,
+    parts: Sequence[str] = PARTS,
+    contestants: Sequence[str] | None = None,
+    tolerances: Sequence[float] = TOLERANCES,
+    links: Sequence[int] = (60, 150),
+    trials: Sequence[str] = TRIALS,
+    presets: Sequence[str] = ("soft", "paper"),
+    start: str = "spinning",
+    samples: int | None = None,
+    device: str = "cpu",
+    cases: Sequence[str] | None = None,
+    rounds: int = 5,
+    scipy: bool = True,
+) -> Plan:
+    """Check what is asked for, before anything is run.
+
+    Args:
+        parts: Some of `PARTS`.
+        contestants: Methods, each a name or ``NAME@TOLERANCE``, which sets the tolerance of its ensembles; None: all.
+        tolerances: Of the work–precision diagrams.
+        links: Numbers of links in the diagrams and the ensembles.
+        trials: Some of `TRIALS`.
+        presets: Of the ensembles.
+        start: Of the ensembles.
+        samples: Walks of each ensemble; None: 200, and 60 from 100 links on.
+        device: Where the ensembles run; the other parts are measured on one CPU core.
+        cases: Names of hard cases; None: all.
+        rounds: Measurements of each run in the diagrams.
+        scipy: Run SciPy's solvers as well.
+
+    Raises:
+        InputError: Something is unknown or impossible.
+    """
+    names = [case.name for case in HARD_CASES]
+    for option, given, known in (
+        ("--parts", parts, PARTS),
+        ("--trials", trials, TRIALS),
+        ("--cases", cases or (), names),
+    ):
+        for name in given:
+            if name not in known:
+                raise InputError(f"{option}: {shown(name)} is unknown; {suggestion(name, known)}")
+    for tolerance in tolerances:
+        validated(Options, {"tolerance": tolerance}, "--tolerances")
+    for name in presets:
+        preset(name)
+    plan = Plan(
+        parts=tuple(parts),
+        contestants=tuple(map(_contestant, methods() if contestants is None else contestants)),
+        tolerances=tuple(tolerances),
+        links=tuple(validated(Scene, {"links": count}, "--links").links for count in links),
+        trials=tuple(trials),
+        ensembles=tuple(
+            Ensemble(count, name, start, default_samples(count) if samples is None else samples, device)
+            for count in links
+            for name in presets
+        ),
+        cases=tuple(names if cases is None else cases),
+        rounds=rounds,
+        scipy=scipy,
+    )
+    if "work-precision" in parts and "sprocket" in trials:
+        for count in plan.links:
+            check_scene(Scene(links=count), preset("paper"))
+    if "ensembles" in parts:
+        start_device(validated(Options, {"device": device}, "options").device)
+        for ensemble in plan.ensembles:
+            load_sweep(ensemble.content(plan.contestants[0]))
+    return plan
+
+
+def run_accuracy(folder: Path, plan: Plan, report: Report) -> Document:
+    """Run a plan; the document in the folder grows with each trial, ensemble and case.
+
+    Args:
+        folder: Of the results; results of other parts, methods and cases in it are kept.
+        plan: What is run.
+        report: Called with a line of progress.
+
+    Returns:
+        The document as it is in the file: None for what is no finite number.
+
+    Raises:
+        InputError: The folder holds another kind of file under the name of the document.
+        OSError: The folder cannot be read or written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    document = load_document(folder) if (folder / FILE).exists() else _empty()
+    here = machine()
+    if find_spec("scipy") is not None:
+        here["scipy"] = version("scipy")
+    if "work-precision" in plan.parts:
+        document["notes"]["scipy"] = _scipy_note(plan)
+        for links in plan.links:
+            for name in plan.trials:
+                _add_trial(document, plan, name, links, _number(document, here), report)
+                _save(folder, document)
+    if "hard-cases" in plan.parts:
+        for case in HARD_CASES:
+            for method in plan.methods if case.name in plan.cases else ():
+                report(f"{case.what}, {method}")
+                outcome = asdict(_outcome(case, method))
+                row = {"group": case.group, "case": case.name, "what": case.what, "method": method, **outcome}
+                _put(document["hard_cases"], row | {"machine": _number(document, here)}, ("case", "method"))
+                _save(folder, document)
+    if "ensembles" in plan.parts:
+        for ensemble in plan.ensembles:
+            run_ensemble(folder / "ensembles", ensemble, plan.contestants, report)
+            on = here if ensemble.device == "cpu" else here | {"device": start_device(ensemble.device).name}
+            row = {"name": ensemble.name, "title": ensemble.title, **asdict(ensemble), "frequency": ensemble.frequency}
+            row |= {"machine": _number(document, on), "methods": summary(folder / "ensembles", ensemble)}
+            _put(document["ensembles"], row, ("name",))
+            _save(folder, document)
+    plain: Document = _plain(document)
+    return plain
+
+
+def load_document(folder: Path) -> Document:
+    """Read what earlier runs have left in a folder.
+
+    Raises:
+        InputError: The file is not what its name says, or of another version.
+        OSError: It cannot be read.
+    """
+    path = folder / FILE
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError:
+        raise InputError(f"{path}: not a JSON file; give another folder") from None
+    if not isinstance(document, dict) or document.get("format") != FORMAT or document.get("version") != VERSION:
+        raise InputError(f"{path}: not written by this version of bench accuracy; give another folder")
+    return document
+
+
+def _empty() -> Document:
+    columns = {
+        part: {name: {"unit": unit, "meaning": meaning} for name, (unit, meaning) in table.items()}
+        for part, table in COLUMNS.items()
+    }
+    tables: Document = {"references": [], "points": [], "ensembles": [], "hard_cases": []}
+    return {"format": FORMAT, "version": VERSION, "machines": [], "notes": {}, "columns": columns, **tables}
+
+
+def _add_trial(document: Document, plan: Plan, name: str, links: int, on: int, report: Report) -> None:
+    """Run a trial with all methods and put its points into the document."""
+    report(f"{name}, {links} links: reference")
+    trial = make_trial(name, links)
+    true = make_reference(trial)
+    found = points(trial, true, plan.methods, plan.tolerances, plan.rounds, report)
+    if plan.scipy and find_spec("scipy") is not None:
+        from warpchain.scipy_trials import scipy_points
+
+        found += scipy_points(trial, true, [x for x in plan.tolerances if x in SCIPY_TOLERANCES], report)
+    row = {"trial": name, "links": links, "duration": trial.duration, "starts": len(trial.starts)}
+    _put(document["references"], row | _error_columns(true.trust) | {"machine": on}, ("trial", "links"))
+    for point in found:
+        _put(document["points"], asdict(point) | {"machine": on}, ("trial", "links", "method", "tolerance"))
+
+
+def _error_columns(errors: Errors) -> dict[str, float]:
+    """Errors under the names that `Point` has for them."""
+    return {
+        "position_error": errors.position,
+        "velocity_error": errors.velocity,
+        "momentum_error": errors.momentum,
+        "momentum_bias": errors.bias,
+    }
+
+
+def _outcome(case: Any, method: str) -> Any:
+    """What a method makes of a hard case; one that refuses it says so in its own words."""
+    from warpchain.hard_cases import Outcome
+
+    try:
+        return case.subject.run(method)
+    except InputError as error:
+        return Outcome("refused", str(error), 0.0, 0.0, 0, math.nan, False)
+
+
+def _contestant(text: str) -> Contestant:
+    """Method and tolerance of ``NAME`` or ``NAME@TOLERANCE``.
+
+    Raises:
+        InputError: The method is unknown, or the tolerance is no tolerance.
+    """
+    name, at, tolerance = text.partition("@")
+    if name not in methods():
+        raise InputError(f"--methods: {shown(name)} is unknown; {suggestion(name, methods())}")
+    try:
+        value = float(tolerance) if at else TOLERANCE
+    except ValueError:
+        raise InputError(f"--methods: {shown(text)} has no number after the @; write it as {name}@1e-6") from None
+    return name, validated(Options, {"tolerance": value}, "--methods").tolerance
+
+
+def _scipy_note(plan: Plan) -> str:
+    """What is there of SciPy and what is not."""
+    if not plan.scipy:
+        return "SciPy's solvers were left out on demand."
+    if find_spec("scipy") is None:
+        return "SciPy is not installed, so its solvers are missing: pip install 'warpchain[scipy]'."
+    from warpchain.scipy_trials import PATIENCE
+
+    return (
+        f"SciPy's solvers run on the NumPy model, once each, {PATIENCE:g} s at most: what took longer is missing. "
+        "DOP853 does the flight and the impacts, Radau (with the pattern of its Jacobian) the flight; a turn of the "
+        "sprocket has 100,000 contacts, too many for Python."
+    )
+
+
+def _number(document: Document, on: dict[str, str]) -> int:
+    """Place of a machine in the document's list of them."""
+    if on not in document["machines"]:
+        document["machines"].append(on)
+    return int(document["machines"].index(on))
+
+
+def _put(rows: list[dict[str, Any]], row: dict[str, Any], keys: Sequence[str]) -> None:
+    """Add a row in the place of one with the same keys."""
+    for place, other in enumerate(rows):
+        if all(other[key] == row[key] for key in keys):
+            rows[place] = row
+            return
+    rows.append(row)
+
+
+def _save(folder: Path, document: Document) -> None:
+    with replacing(folder / FILE) as part:
+        part.write_text(json.dumps(_plain(document), indent=1, allow_nan=False, ensure_ascii=False), encoding="utf-8")
+
+
+def _plain(value: Any) -> Any:
+    """As JSON has it: null for what is no finite number."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,165 @@
+"""The page of ``warpchain bench accuracy``: figures, tables and machines in one HTML file that loads nothing."""
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+from typing import Any, Final
+
+from warpchain.accuracy_plots import figures
+from warpchain.html_page import page, picture, table
+from warpchain.results import replacing
+from warpchain.sweep_plots import Picture
+from warpchain.terminal import PICTURE_DPI
+
+PAGE: Final = "accuracy.html"
+
+Row = dict[str, Any]
+
+
+def write_pictures_and_page(folder: Path, document: dict[str, Any]) -> list[Path]:
+    """Write every figure and the page; older files of these names are replaced.
+
+    Returns:
+        Paths of the files, the page last.
+
+    Raises:
+        OSError: A file cannot be written.
+    """
+    pictures = list(figures(document))
+    paths = []
+    for drawn in pictures:
+        paths.append(folder / f"{drawn.name}.png")
+        with replacing(paths[-1]) as part:
+            drawn.figure.savefig(part, dpi=PICTURE_DPI)
+    paths.append(folder / PAGE)
+    with replacing(paths[-1]) as part:
+        part.write_text(_page(document, pictures), encoding="utf-8")
+    return paths
+
+
+def _page(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
+    """The whole page."""
+    methods = {row["method"] for row in (*document["points"], *document["hard_cases"])}
+    ensembles = document["ensembles"]
+    methods |= {one["method"] for row in ensembles for one in row["methods"]}
+    bad = sum(not row["sound"] for row in document["hard_cases"])
+    tiles = {
+        "methods": (len({name for name in methods if "SciPy" not in name}), ""),
+        "measured points": (len(document["points"]), ""),
+        "walks": (sum(one["at_rest"] for row in ensembles for one in row["methods"]), ""),
+        "hard cases": (len(document["hard_cases"]), ""),
+        "not sound": (bad, "bad" if bad else ""),
+    }
+    sections = {
+        "Work and precision": _work_precision(document, pictures),
+        "Ensembles": _ensembles(document, pictures),
+        "Hard cases": _hard_cases(document, pictures),
+        "Machines": _machines(document["machines"]),
+    }
+    return page("Speed against error", tiles, {title: text for title, text in sections.items() if text})
+
+
+def _work_precision(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
+    if not document["points"]:
+        return ""
+    parts = [f"<p>{escape(note)}</p>" for note in document["notes"].values()]
+    parts += [picture(drawn.figure, drawn.caption) for drawn in pictures if drawn.name.startswith("work_precision")]
+    head = ["trial", "n", "method", "tolerance", "positions / m", "velocities / (m/s)", "momentum", "bias"]
+    head += ["s per simulated s", "evaluations per s", "rejected", "status"]
+    rows = [
+        [
+            *(row["trial"], f"{row['links']}", row["method"], f"{row['tolerance']:g}"),
+            *(_number(row[name], ".1e") for name in ("position_error", "velocity_error", "momentum_error")),
+            _number(row["momentum_bias"], "+.1e"),
+            _number(row["seconds"] / row["simulated"], ".3g"),
+            _number(None if row["evaluations"] is None else row["evaluations"] / row["simulated"], ".2e"),
+            f"{row['rejected'] / max(1, row['accepted'] + row['rejected']):.0%}",
+            row["status"],
+        ]
+        for row in document["points"]
+    ]
+    marked = [row["status"] != "finished" for row in document["points"]]
+    text = (
+        "<h3>All points</h3><p>Errors as in the figures; momentum: relative error of the floor's impulse (rms) or of "
+    )
+    text += "the angular momentum about the sprocket, bias: its mean with sign.</p>"
+    return "\n".join([*parts, text, table(head, rows, numbers_from=3, marked=marked)])
+
+
+def _ensembles(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
+    if not document["ensembles"]:
+        return ""
+    parts = [
+        "<p>All methods walk from the same drawn samples; the tests treat their ensembles as independent. Intervals "
+        "are 95 % bootstrap intervals, p is the exact two-sample Kolmogorov–Smirnov probability, Δ the difference of "
+        "the means relative to the reference, in brackets in units of its standard error. A method passes when its "
+        "mean is within 1 % of that of rkf78 at 1e-6 or in its interval, and no more walks failed. Cost is processor "
+        "time of one core, the time on the sprocket included; on a GPU walks per second.</p>"
+    ]
+    by_name = {drawn.name: drawn for drawn in pictures}
+    head = ["method", "tolerance", "at rest", "failed", "mean Δx / m", "s.d. / m"]
+    head += ["Δ to 1e-6", "p to 1e-6", "Δ to 1e-9", "p to 1e-9", "cost", "passes"]
+    for row in document["ensembles"]:
+        drawn = by_name[f"ensemble_{row['name']}"]
+        parts += [f"<h3>{escape(row['title'])}, {escape(row['device'])}</h3>", picture(drawn.figure, drawn.caption)]
+        rows = [
+            [
+                *(one["method"], f"{one['tolerance']:g}", f"{one['at_rest']}", _failures(one)),
+                *(_with_interval(one[name], one[f"{name}_interval"]) for name in ("mean", "sd")),
+                *(text for suffix in ("loose", "tight") for text in _agreement(one, suffix)),
+                f"{one['seconds_per_walk']:.3g} s"
+                if one["seconds_per_walk"] is not None
+                else f"{_number(one['walks_per_second'], '.3g')} 1/s",
+                "yes" if one["passes"] else "no",
+            ]
+            for one in row["methods"]
+        ]
+        marked = [not one["passes"] for one in row["methods"]]
+        parts.append(table(head, rows, numbers_from=1, marked=marked))
+    return "\n".join(parts)
+
+
+def _hard_cases(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
+    rows = document["hard_cases"]
+    if not rows:
+        return ""
+    parts = [picture(drawn.figure, drawn.caption) for drawn in pictures if drawn.name == "hard_cases"]
+    head = ["kind", "case", "method", "status", "result", "s", "simulated s", "tries", "energy error", "sound"]
+    lines = [
+        [
+            *(row["group"], row["what"], row["method"], row["status"], row["result"]),
+            *(f"{row['seconds']:.3g}", f"{row['simulated']:.3g}", f"{row['tries']:,}"),
+            *(_number(row["energy_error"], ".1e"), "yes" if row["sound"] else "no"),
+        ]
+        for row in rows
+    ]
+    return "\n".join([*parts, table(head, lines, numbers_from=5, marked=[not row["sound"] for row in rows])])
+
+
+def _machines(machines: Sequence[dict[str, str]]) -> str:
+    names = list(dict.fromkeys(name for machine in machines for name in machine))
+    rows = [[name, *(machine.get(name, "–") for machine in machines)] for name in names]
+    return table(["", *(f"machine {number}" for number in range(len(machines)))], rows, numbers_from=len(machines) + 1)
+
+
+def _failures(row: Row) -> str:
+    return ", ".join(f"{count} {label}" for label, count in row["failed"].items()) or "0"
+
+
+def _with_interval(value: float | None, interval: Sequence[float | None]) -> str:
+    lower, upper = interval
+    if value is None or lower is None or upper is None:
+        return _number(value, ".4f")
+    return f"{value:.4f} ({lower:.4f} … {upper:.4f})"
+
+
+def _agreement(row: Row, suffix: str) -> tuple[str, str]:
+    """Difference of the means with its standard errors, and the probability of the test."""
+    difference, errors = row[f"difference_{suffix}"], row[f"errors_{suffix}"]
+    text = "–" if difference is None else f"{difference:+.2%}" + ("" if errors is None else f" ({errors:+.1f})")
+    return text, _number(row[f"p_{suffix}"], ".2g")
+
+
+def _number(value: float | None, form: str) -> str:
+    """A number in a form, a dash for none."""
+    return "–" if value is None else f"{value:{form}}"
