@@ -10,7 +10,7 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from warpchain.plots import FAINT, GROUND, INK, LINE_COLORS, _tidy
 from warpchain.sweep_plots import Picture
@@ -105,7 +105,7 @@ def work_precision(true: Row, rows: Sequence[Row]) -> Figure:
             _tidy(axes)
         grid[line, 0].set_ylabel(label)
     grid[1, 0].set_xlabel("seconds of one core per simulated second")
-    grid[1, 1].set_xlabel("evaluations of the equations per simulated second")
+    grid[1, 1].set_xlabel("evaluations per simulated second")
     handles = [
         Line2D([], [], color=colors[method], marker=_marker(method, chosen), markersize=4.5, label=method)
         for method in chosen
@@ -192,7 +192,16 @@ def _thin_out(axis: Axis) -> None:
     lower, upper = axis.get_view_interval()
     decades = math.log10(upper / lower)
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 2 else (1.0,), numticks=8))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: _decimal(value)))
     axis.set_minor_formatter(NullFormatter())
+
+
+def _decimal(value: float) -> str:
+    """A number with one digit that matters, such as 0.05 or 5·10⁻⁶."""
+    if 0.01 <= value < 1e4:
+        return f"{value:g}"
+    digit, exponent = f"{value:.0e}".split("e")
+    return f"$10^{{{int(exponent)}}}$" if digit == "1" else f"${digit}\\cdot 10^{{{int(exponent)}}}$"
 
 
 def _draw_line(axes: Axes, drawn: Any, color: str, marker: str) -> None:

@@ -62,11 +62,15 @@ def accuracy(
     from warpchain.accuracy_report import write_pictures_and_page
     from warpchain.terminal import status_line, try_folder
 
-    lists = {"parts": parts, "trials": trials, "presets": presets}
-    lists |= {name: text for name, text in (("contestants", chosen), ("cases", cases)) if text is not None}
+    lists = {"parts": _words("--parts", parts), "trials": _words("--trials", trials)}
+    lists["presets"] = _words("--presets", presets)
+    if chosen is not None:
+        lists["contestants"] = _words("--methods", chosen)
+    if cases is not None:
+        lists["cases"] = _words("--cases", cases)
     numbers = {"tolerances": _numbers("--tolerances", tolerances)} if tolerances is not None else {}
     plan = make_plan(
-        **{name: _words(text) for name, text in lists.items()},  # type: ignore[arg-type]
+        **lists,  # type: ignore[arg-type]
         **numbers,  # type: ignore[arg-type]
         links=[int(number) for number in _numbers("--links", links, whole=True)],
         start=start,
@@ -87,9 +91,18 @@ def accuracy(
         print(path)
 
 
-def _words(text: str) -> list[str]:
-    """The words of a list with commas."""
-    return [word.strip() for word in text.split(",") if word.strip()]
+def _words(option: str, text: str) -> list[str]:
+    """The words of a list with commas.
+
+    Raises:
+        InputError: there are none.
+    """
+    from warpchain.parameters import InputError
+
+    words = [word.strip() for word in text.split(",") if word.strip()]
+    if not words:
+        raise InputError(f"{option}: nothing in it; give names with commas between them, or leave it out")
+    return words
 
 
 def _numbers(option: str, text: str, *, whole: bool = False) -> list[float]:
@@ -101,7 +114,7 @@ def _numbers(option: str, text: str, *, whole: bool = False) -> list[float]:
     from warpchain.parameters import InputError, shown
 
     numbers = []
-    for word in _words(text):
+    for word in _words(option, text):
         try:
             numbers.append(int(word) if whole else float(word))
         except ValueError:
