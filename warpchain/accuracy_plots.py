@@ -53,7 +53,7 @@ def figures(document: dict[str, Any]) -> Iterator[Picture]:
         note = _NOTES[true["trial"]].format(starts=true["starts"], milliseconds=1e3 * true["duration"])
         caption = (
             f"{_TITLES[true['trial']]}, {true['links']} links, {1e3 * true['duration']:.3g} ms at Table 1's values: "
-            "greatest error over the links against rkf78 at 1e-12, by wall time on one core and by evaluations of the "
+            "greatest error over the links against rkf78 at 1e-12, by processor time and by evaluations of the "
             "chain's equations. Small numbers are decimal exponents of the tolerance. The dashed line is how "
             f"far dp5 at 1e-11 is from that reference: nothing below it is certain.{note}"
         )
@@ -67,7 +67,7 @@ def figures(document: dict[str, Any]) -> Iterator[Picture]:
         yield Picture(f"ensemble_{row['name']}", caption, ensemble(row))
     if document["hard_cases"]:
         caption = (
-            "Hard cases by method: seconds on one core, and what the energy ledger leaves open as a fraction of the "
+            "Hard cases by method: seconds of one core, and what the energy ledger leaves open as a fraction of the "
             "energy. Blue: status, result and energy are such as the case may have."
         )
         yield Picture("hard_cases", caption, hard_cases(document["hard_cases"]))

@@ -64,8 +64,8 @@ def _work_precision(document: dict[str, Any], pictures: Sequence[Picture]) -> st
         return ""
     parts = [f"<p>{escape(note)}</p>" for note in document["notes"].values()]
     parts += [picture(drawn.figure, drawn.caption) for drawn in pictures if drawn.name.startswith("work_precision")]
-    head = ["trial", "n", "method", "tolerance", "positions / m", "velocities / (m/s)", "momentum", "bias"]
-    head += ["s per simulated s", "evaluations per s", "rejected", "status"]
+    head = ["trial", "n", "method", "tolerance", "position / m", "velocity / (m/s)", "momentum", "bias"]
+    head += ["s / s", "evaluations / s", "rejected", "status"]
     rows = [
         [
             *(row["trial"], f"{row['links']}", row["method"], f"{row['tolerance']:g}"),
@@ -82,7 +82,8 @@ def _work_precision(document: dict[str, Any], pictures: Sequence[Picture]) -> st
     text = (
         "<h3>All points</h3><p>Errors as in the figures; momentum: relative error of the floor's impulse (rms) or of "
     )
-    text += "the angular momentum about the sprocket, bias: its mean with sign.</p>"
+    text += "the angular momentum about the sprocket, bias: its mean with sign. Processor time and evaluations are per "
+    text += "simulated second.</p>"
     return "\n".join([*parts, text, table(head, rows, numbers_from=3, marked=marked)])
 
 

@@ -40,7 +40,7 @@ from warpchain.walker import run_walk, setup_walk
 
 Array = NDArray[np.float64]
 
-STEP_LIMIT: Final = 100_000_000
+STEP_LIMIT: Final = 20_000_000
 """Tries after which a case counts as hanging."""
 
 IMPOSSIBLE: Final[tuple[tuple[str, Mapping[str, object]], ...]] = (
@@ -60,7 +60,7 @@ class Outcome:
     Attributes:
         status: Label of the status; ``"refused"`` if nothing was run.
         result: What came out, for people.
-        seconds: Wall time on one core [s], compilation apart.
+        seconds: Processor time [s], compilation apart.
         simulated: Simulated time [s].
         tries: Steps tried.
         energy_error: What the energy ledger leaves open, as a fraction of the energy; NaN if there is no ledger.
@@ -92,9 +92,9 @@ class Flight:
         start = self.start()
         settings: dict[str, Any] = {"method": method, "step_limit": STEP_LIMIT, **self.settings}
         simulate(self.parameters, *start, 0.0, times=[0.0], **settings)  # compiles
-        began = time.perf_counter()
+        began = time.process_time()
         flight = simulate(self.parameters, *start, self.duration, times=[self.duration], **settings)
-        seconds = time.perf_counter() - began
+        seconds = time.process_time() - began
         with np.errstate(all="ignore"):
             error = energy_error(flight, self.parameters, start)
         finite = bool(np.all(np.isfinite(flight.position)) and np.all(np.isfinite(flight.velocity)))
@@ -123,13 +123,15 @@ class Walk:
         """Walk; Δx must lie within the distances [m], the energy error below the bound."""
         setup = setup_walk(self.preset, {"method": method, "step_limit": STEP_LIMIT, **self.settings}, None)
         compile_kernels([setup])
+        began = time.process_time()
         walk = run_walk(setup, frame_interval=None)
+        seconds = time.process_time() - began
         error = _ledger_error(walk)
         within = self.expected != Status.AT_REST or self.distance[0] < walk.dx < self.distance[1]
         return Outcome(
             status=walk.status.label,
             result=f"Δx = {walk.dx:.3f} m" if math.isfinite(walk.dx) else f"moving after {walk.walk_time:.3g} s",
-            seconds=walk.wall_time,
+            seconds=seconds,
             simulated=walk.simulated_time,
             tries=walk.steps_accepted + walk.steps_rejected,
             energy_error=error,
@@ -151,10 +153,10 @@ class Order:
         drifts, statuses, tries, seconds = [], [], 0, 0.0
         simulate(ELASTIC, *start, 0.0, times=[0.0], **settings)
         for step in self.steps:
-            began = time.perf_counter()
+            began = time.process_time()
             # a skin beyond the height of the fall makes contact_step, not the loose tolerance, set the step
             flight = simulate(ELASTIC, *start, 0.3, times=[0.3], contact_step=step, **settings)
-            seconds += time.perf_counter() - began
+            seconds += time.process_time() - began
             tries += flight.steps_accepted + flight.steps_rejected
             statuses.append(flight.status)
             end = reference.total_energy(flight.position[-1], flight.velocity[-1], ELASTIC)
@@ -182,7 +184,7 @@ class Refusals:
     def run(self, method: str) -> Outcome:
         """Ask for each."""
         named = 0
-        began = time.perf_counter()
+        began = time.process_time()
         for path, values in IMPOSSIBLE:
             try:
                 setup_walk("soft", {"method": method, **values}, None)
@@ -191,7 +193,7 @@ class Refusals:
         return Outcome(
             status="refused",
             result=f"{named} of {len(IMPOSSIBLE)} refused, naming the field",
-            seconds=time.perf_counter() - began,
+            seconds=time.process_time() - began,
             simulated=0.0,
             tries=0,
             energy_error=math.nan,
@@ -236,9 +238,9 @@ class OneBroken:
             batch.load(world, position, velocity, stop_time=self.duration, stop_status=Status.FINISHED)
         features = batch.features(fixed_body="floor", watch="none")
         batch.compile(features, [8])
-        began = time.perf_counter()
+        began = time.process_time()
         batch.run(range(self.worlds), features)
-        seconds = time.perf_counter() - began
+        seconds = time.process_time() - began
         tries = sum(batch.tries(world) for world in range(self.worlds))
         ends = [np.concatenate([batch.position(world), batch.velocity(world)]) for world in range(self.worlds)]
         return ends, [batch.status(world) for world in range(self.worlds)], (seconds, tries)
