@@ -242,7 +242,7 @@ def test_json_has_a_unit_for_every_number(results: tuple[Answer, Path]) -> None:
     points = {(row["method"], row["tolerance"]): row for row in document["points"]}
     assert set(points) == {(method, tolerance) for method in ("rkf78", "dp5") for tolerance in (1e-3, 1e-6)}
     for method in ("rkf78", "dp5"):
-        assert points[method, 1e-6]["position_error"] < 0.1 * points[method, 1e-3]["position_error"]
+        assert points[method, 1e-6]["position_error"] < 0.5 * points[method, 1e-3]["position_error"]
         assert points[method, 1e-3]["momentum_error"] is None
     assert [row["case"] for row in document["hard_cases"]] == ["hopeless-damping"] * 2 + ["links-4"] * 2 + [
         "refused"

@@ -33,7 +33,6 @@ from warpchain.hard_starts import (
 )
 from warpchain.options import Options
 from warpchain.parameters import InputError, Parameters, validated
-from warpchain.results import WalkResult
 from warpchain.status import Status
 from warpchain.trajectory import simulate
 from warpchain.walker import run_walk, setup_walk
@@ -126,7 +125,8 @@ class Walk:
         began = time.process_time()
         walk = run_walk(setup, frame_interval=None)
         seconds = time.process_time() - began
-        error = _ledger_error(walk)
+        released = walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"]
+        error = abs(walk.energy["residual"]) / released  # NaN if it was not released
         within = self.expected != Status.AT_REST or self.distance[0] < walk.dx < self.distance[1]
         return Outcome(
             status=walk.status.label,
@@ -395,9 +395,3 @@ def _slope(points: Array) -> float:
     """Slope of the straight line that fits points (p, 2) best."""
     x, y = (points - points.mean(axis=0)).T
     return float(x @ y / (x @ x))
-
-
-def _ledger_error(walk: WalkResult) -> float:
-    """What the ledger of a walk leaves open, relative to the energy at the release; NaN if it was not released."""
-    at_release = walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"]
-    return abs(walk.energy["residual"]) / at_release
