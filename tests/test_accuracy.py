@@ -13,7 +13,7 @@ import pytest
 from warpchain import InputError, reference
 from warpchain.accuracy import FILE, load_document, make_plan, run_accuracy
 from warpchain.accuracy_columns import COLUMNS
-from warpchain.accuracy_ensembles import Ensemble, run_ensemble, summary
+from warpchain.accuracy_ensembles import REFERENCES, Ensemble, run_ensemble, summary
 from warpchain.accuracy_plots import figures
 from warpchain.hard_cases import HARD_CASES, Flight, Outcome, Walk
 from warpchain.hard_starts import SOFT, dropped
@@ -143,11 +143,13 @@ def test_impacts_and_sprocket_converge_to_what_they_say() -> None:
 def test_an_ensemble_goes_on_and_is_summed_up(tmp_path: Path) -> None:
     """Methods added later join those that are there, whose walks and costs stay; statistics are those of the walks."""
     ensemble = Ensemble(links=8, preset="soft", start="ellipse", samples=3)
-    run_ensemble(tmp_path, ensemble, [], silent)
+    for contestant in REFERENCES:
+        run_ensemble(tmp_path, ensemble, contestant, silent)
     before = summary(tmp_path, ensemble)
     shards = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.h5")}
     assert shards
-    run_ensemble(tmp_path, ensemble, [("dp5", 1e-4), ("rkf78", 1e-6)], silent)
+    for contestant in (("dp5", 1e-4), *REFERENCES):
+        run_ensemble(tmp_path, ensemble, contestant, silent)
     after = summary(tmp_path, ensemble)
     assert [(row["method"], row["tolerance"]) for row in after] == [("rkf78", 1e-6), ("rkf78", 1e-9), ("dp5", 1e-4)]
     assert repr(after[:2]) == repr(before)

@@ -6,7 +6,7 @@ JSON file with the machine they were measured on, figures and a page are drawn f
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from importlib.util import find_spec
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from warpchain.accuracy_columns import COLUMNS
-from warpchain.accuracy_ensembles import Contestant, Ensemble, default_samples, run_ensemble, summary
+from warpchain.accuracy_ensembles import REFERENCES, Contestant, Ensemble, default_samples, run_ensemble, summary
 from warpchain.bench import machine
 from warpchain.engine import start_device
 from warpchain.hard_cases import HARD_CASES
@@ -33,6 +33,15 @@ TOLERANCE: Final = 1e-6
 SCIPY_TOLERANCES: Final = (1e-3, 1e-6, 1e-9)
 """Those of the tolerances that SciPy's solvers, which take a minute each, are run at."""
 
+KEYS: Final = {
+    "references": ("trial", "links"),
+    "points": ("trial", "links", "method", "tolerance"),
+    "ensembles": ("name",),
+    "hard_cases": ("case", "method"),
+}
+"""Tables of the document and the columns that tell their rows apart."""
+
+Row = dict[str, Any]
 Report = Callable[[str], None]
 Document = dict[str, Any]
 
@@ -145,34 +154,35 @@ def run_accuracy(folder: Path, plan: Plan, report: Report) -> Document:
         OSError: The folder cannot be read or written.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    document = load_document(folder) if (folder / FILE).exists() else _empty()
     here = machine()
     if find_spec("scipy") is not None:
         here["scipy"] = version("scipy")
+    _record(folder, here, {})
     if "work-precision" in plan.parts:
-        document["notes"]["scipy"] = _scipy_note(plan)
         for links in plan.links:
             for name in plan.trials:
-                _add_trial(document, plan, name, links, _number(document, here), report)
-                _save(folder, document)
+                _record(folder, here, _trial_rows(plan, name, links, report), _scipy_note(plan))
     if "hard-cases" in plan.parts:
         for case in HARD_CASES:
             for method in plan.methods if case.name in plan.cases else ():
                 report(f"{case.what}, {method}")
                 outcome = asdict(_outcome(case, method))
                 row = {"group": case.group, "case": case.name, "what": case.what, "method": method, **outcome}
-                _put(document["hard_cases"], row | {"machine": _number(document, here)}, ("case", "method"))
-                _save(folder, document)
+                _record(folder, here, {"hard_cases": [row]})
     if "ensembles" in plan.parts:
         for ensemble in plan.ensembles:
-            run_ensemble(folder / "ensembles", ensemble, plan.contestants, report)
             on = here if ensemble.device == "cpu" else here | {"device": start_device(ensemble.device).name}
-            row = {"name": ensemble.name, "title": ensemble.title, **asdict(ensemble), "frequency": ensemble.frequency}
-            row |= {"machine": _number(document, on), "methods": summary(folder / "ensembles", ensemble)}
-            _put(document["ensembles"], row, ("name",))
-            _save(folder, document)
-    plain: Document = _plain(document)
-    return plain
+            about = {
+                "name": ensemble.name,
+                "title": ensemble.title,
+                "frequency": ensemble.frequency,
+                **asdict(ensemble),
+            }
+            for contestant in dict.fromkeys((*REFERENCES, *plan.contestants)):
+                run_ensemble(folder / "ensembles", ensemble, contestant, report)
+                row = about | {"methods": summary(folder / "ensembles", ensemble)}
+                _record(folder, on, {"ensembles": [row]})
+    return load_document(folder)
 
 
 def load_document(folder: Path) -> Document:
@@ -197,12 +207,33 @@ def _empty() -> Document:
         part: {name: {"unit": unit, "meaning": meaning} for name, (unit, meaning) in table.items()}
         for part, table in COLUMNS.items()
     }
-    tables: Document = {"references": [], "points": [], "ensembles": [], "hard_cases": []}
+    tables: Document = {table: [] for table in KEYS}
     return {"format": FORMAT, "version": VERSION, "machines": [], "notes": {}, "columns": columns, **tables}
 
 
-def _add_trial(document: Document, plan: Plan, name: str, links: int, on: int, report: Report) -> None:
-    """Run a trial with all methods and put its points into the document."""
+def _record(folder: Path, on: dict[str, str], tables: Mapping[str, Sequence[Row]], scipy_note: str = "") -> None:
+    """Put rows, measured on a machine, into the document of a folder; those with the same keys are replaced.
+
+    The file is read again each time, so that another process that measures another part loses nothing.
+    """
+    document = load_document(folder) if (folder / FILE).exists() else _empty()
+    if on not in document["machines"]:
+        document["machines"].append(on)
+    place = document["machines"].index(on)
+    for table, rows in tables.items():
+        for row in rows:
+            keys = [[other[key] for key in KEYS[table]] for other in document[table]]
+            own = [row[key] for key in KEYS[table]]
+            at = keys.index(own) if own in keys else len(keys)
+            document[table][at : at + 1] = [row | {"machine": place}]
+    if not any("SciPy" in row["method"] for row in document["points"]) or scipy_note.startswith("SciPy's solvers run"):
+        document["notes"] |= {"scipy": scipy_note} if scipy_note else {}
+    with replacing(folder / FILE) as part:
+        part.write_text(json.dumps(_plain(document), indent=1, allow_nan=False, ensure_ascii=False), encoding="utf-8")
+
+
+def _trial_rows(plan: Plan, name: str, links: int, report: Report) -> dict[str, list[Row]]:
+    """Run a trial with all methods: the row of its reference and those of its points."""
     report(f"{name}, {links} links: reference")
     trial = make_trial(name, links)
     true = make_reference(trial)
@@ -212,9 +243,7 @@ def _add_trial(document: Document, plan: Plan, name: str, links: int, on: int, r
 
         found += scipy_points(trial, true, [x for x in plan.tolerances if x in SCIPY_TOLERANCES], report)
     row = {"trial": name, "links": links, "duration": trial.duration, "starts": len(trial.starts)}
-    _put(document["references"], row | _error_columns(true.trust) | {"machine": on}, ("trial", "links"))
-    for point in found:
-        _put(document["points"], asdict(point) | {"machine": on}, ("trial", "links", "method", "tolerance"))
+    return {"references": [row | _error_columns(true.trust)], "points": [asdict(point) for point in found]}
 
 
 def _error_columns(errors: Errors) -> dict[str, float]:
@@ -266,27 +295,6 @@ def _scipy_note(plan: Plan) -> str:
         "DOP853 does the flight and the impacts, Radau (with the pattern of its Jacobian) the flight; a turn of the "
         "sprocket has 100,000 contacts, too many for Python."
     )
-
-
-def _number(document: Document, on: dict[str, str]) -> int:
-    """Place of a machine in the document's list of them."""
-    if on not in document["machines"]:
-        document["machines"].append(on)
-    return int(document["machines"].index(on))
-
-
-def _put(rows: list[dict[str, Any]], row: dict[str, Any], keys: Sequence[str]) -> None:
-    """Add a row in the place of one with the same keys."""
-    for place, other in enumerate(rows):
-        if all(other[key] == row[key] for key in keys):
-            rows[place] = row
-            return
-    rows.append(row)
-
-
-def _save(folder: Path, document: Document) -> None:
-    with replacing(folder / FILE) as part:
-        part.write_text(json.dumps(_plain(document), indent=1, allow_nan=False, ensure_ascii=False), encoding="utf-8")
 
 
 def _plain(value: Any) -> Any:

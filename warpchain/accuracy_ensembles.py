@@ -7,7 +7,7 @@ for walks that forget their beginnings and makes differences look less certain t
 
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -88,49 +88,40 @@ def default_samples(links: int) -> int:
     return 60 if links >= LONG else 200
 
 
-def run_ensemble(
-    folder: Path, ensemble: Ensemble, contestants: Sequence[Contestant], report: Callable[[str], None]
-) -> None:
-    """Make the walks of each method, or what is left of them.
+def run_ensemble(folder: Path, ensemble: Ensemble, contestant: Contestant, report: Callable[[str], None]) -> None:
+    """Make the walks of a method, or what is left of them, and note what they cost beside them.
 
     Args:
         folder: Of all ensembles.
         ensemble: What the walks are.
-        contestants: Methods with tolerances; those of `REFERENCES` are made in any case.
+        contestant: Method and tolerance.
         report: Called with a line of progress.
 
     Raises:
-        InputError: A folder holds something else, or the device is not there.
+        InputError: The folder holds something else, or the device is not there.
     """
-    for contestant in dict.fromkeys((*REFERENCES, *contestants)):
-        method, tolerance = contestant
-        planned = load_sweep(ensemble.content(contestant))
-        place = _place(folder, ensemble, contestant)
-        place.parent.mkdir(parents=True, exist_ok=True)
-        who = f"{ensemble.title}, {method} at {tolerance:g}"
-        report(f"{who}: compiling")
-        compile_kernels([planned.planned(0).setup])
-        cost_file = _cost_file(place)
-        earlier = json.loads(cost_file.read_text(encoding="utf-8")) if place.exists() and cost_file.exists() else {}
-        began = time.process_time()
+    method, tolerance = contestant
+    planned = load_sweep(ensemble.content(contestant))
+    place = _place(folder, ensemble, contestant)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    who = f"{ensemble.title}, {method} at {tolerance:g}"
+    report(f"{who}: compiling")
+    compile_kernels([planned.planned(0).setup])
+    cost_file = _cost_file(place)
+    earlier = json.loads(cost_file.read_text(encoding="utf-8")) if place.exists() and cost_file.exists() else {}
+    began = time.process_time()
 
-        def after_shard(
-            progress: SweepProgress,
-            earlier: dict[str, float] = earlier,
-            cost_file: Path = cost_file,
-            began: float = began,
-            who: str = who,
-        ) -> None:
-            cost = {
-                "walks": earlier.get("walks", 0) + progress.done - progress.before,
-                "core_seconds": earlier.get("core_seconds", 0.0) + time.process_time() - began,
-                "wall_seconds": earlier.get("wall_seconds", 0.0) + progress.seconds,
-            }
-            with replacing(cost_file) as part:
-                part.write_text(json.dumps(cost), encoding="utf-8")
-            report(f"{who}: {progress.done} of {progress.walks} walks, {progress.rate:.2f} a second")
+    def after_shard(progress: SweepProgress) -> None:
+        cost = {
+            "walks": earlier.get("walks", 0) + progress.done - progress.before,
+            "core_seconds": earlier.get("core_seconds", 0.0) + time.process_time() - began,
+            "wall_seconds": earlier.get("wall_seconds", 0.0) + progress.seconds,
+        }
+        with replacing(cost_file) as part:
+            part.write_text(json.dumps(cost), encoding="utf-8")
+        report(f"{who}: {progress.done} of {progress.walks} walks, {progress.rate:.2f} a second")
 
-        sweep(planned, place, on_progress=after_shard)
+    sweep(planned, place, on_progress=after_shard)
 
 
 def summary(folder: Path, ensemble: Ensemble) -> list[dict[str, Any]]:

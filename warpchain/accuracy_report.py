@@ -64,6 +64,7 @@ def _work_precision(document: dict[str, Any], pictures: Sequence[Picture]) -> st
         return ""
     parts = [f"<p>{escape(note)}</p>" for note in document["notes"].values()]
     parts += [picture(drawn.figure, drawn.caption) for drawn in pictures if drawn.name.startswith("work_precision")]
+    points = _together(document["points"], "trial", "links", "method")
     head = ["trial", "n", "method", "tolerance", "position / m", "velocity / (m/s)", "momentum", "bias"]
     head += ["s / s", "evaluations / s", "rejected", "status"]
     rows = [
@@ -76,9 +77,9 @@ def _work_precision(document: dict[str, Any], pictures: Sequence[Picture]) -> st
             f"{row['rejected'] / max(1, row['accepted'] + row['rejected']):.0%}",
             row["status"],
         ]
-        for row in document["points"]
+        for row in points
     ]
-    marked = [row["status"] != "finished" for row in document["points"]]
+    marked = [row["status"] != "finished" for row in points]
     text = (
         "<h3>All points</h3><p>Errors as in the figures; momentum: relative error of the floor's impulse (rms) or of "
     )
@@ -121,7 +122,7 @@ def _ensembles(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
 
 
 def _hard_cases(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
-    rows = document["hard_cases"]
+    rows = _together(document["hard_cases"], "case")
     if not rows:
         return ""
     parts = [picture(drawn.figure, drawn.caption) for drawn in pictures if drawn.name == "hard_cases"]
@@ -141,6 +142,12 @@ def _machines(machines: Sequence[dict[str, str]]) -> str:
     names = list(dict.fromkeys(name for machine in machines for name in machine))
     rows = [[name, *(machine.get(name, "–") for machine in machines)] for name in names]
     return table(["", *(f"machine {number}" for number in range(len(machines)))], rows, numbers_from=len(machines) + 1)
+
+
+def _together(rows: Sequence[Row], *keys: str) -> list[Row]:
+    """Rows with those that agree in some columns side by side, in the order in which each value first came."""
+    first = {key: list(dict.fromkeys(row[key] for row in rows)) for key in keys}
+    return sorted(rows, key=lambda row: [first[key].index(row[key]) for key in keys])
 
 
 def _failures(row: Row) -> str:
