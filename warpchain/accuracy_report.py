@@ -97,7 +97,7 @@ def _ensembles(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
         "are 95 % bootstrap intervals, p is the exact two-sample Kolmogorov–Smirnov probability, Δ the difference of "
         "the means relative to the reference, in brackets in units of its standard error. A method passes when its "
         "mean is within 1 % of that of rkf78 at 1e-6 or in its interval, and no more walks failed. Cost is processor "
-        "time of one core, the time on the sprocket included; on a GPU walks per second. Speed is how many times cheaper "
+        "time of one core, time on the sprocket included; on a GPU walks per second. Speed is how many times cheaper "
         "than rkf78 at 1e-6 that is.</p>"
     ]
     by_name = {drawn.name: drawn for drawn in pictures}
