@@ -13,7 +13,7 @@ import pytest
 from warpchain import InputError, reference
 from warpchain.accuracy import FILE, load_document, make_plan, run_accuracy
 from warpchain.accuracy_columns import COLUMNS
-from warpchain.accuracy_ensembles import REFERENCES, Ensemble, run_ensemble, summary
+from warpchain.accuracy_ensembles import REFERENCES, Contestant, Ensemble, run_ensemble, summary
 from warpchain.accuracy_plots import figures
 from warpchain.hard_cases import HARD_CASES, Flight, Outcome, Walk
 from warpchain.hard_starts import SOFT, dropped
@@ -148,7 +148,7 @@ def test_an_ensemble_goes_on_and_is_summed_up(tmp_path: Path) -> None:
     before = summary(tmp_path, ensemble)
     shards = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.h5")}
     assert shards
-    for contestant in (("dp5", 1e-4), *REFERENCES):
+    for contestant in (Contestant("dp5", 1e-4), *REFERENCES):
         run_ensemble(tmp_path, ensemble, contestant, silent)
     after = summary(tmp_path, ensemble)
     assert [(row["method"], row["tolerance"]) for row in after] == [("rkf78", 1e-6), ("rkf78", 1e-9), ("dp5", 1e-4)]
@@ -163,6 +163,19 @@ def test_an_ensemble_goes_on_and_is_summed_up(tmp_path: Path) -> None:
         assert row["difference_loose"] == pytest.approx(row["mean"] / after[0]["mean"] - 1)
         assert 0 < row["p_loose"] <= 1
     assert after[0]["difference_loose"] == after[0]["ks_loose"] == 0 and after[0]["passes"]
+
+
+def test_contestants_are_read_as_they_are_named() -> None:
+    """A name with tolerance and switches is read back from itself, which a folder's name needs."""
+    for one in (
+        Contestant("dp5"),
+        Contestant("bs32", 1e-9),
+        Contestant("rkf78", 2e-3, ("soften_pile", "soften_drive")),
+    ):
+        assert Contestant.parse(one.name) == one
+    assert Contestant.parse("dp5") == Contestant("dp5", 1e-6)
+    content = Ensemble(8, "soft").content(Contestant.parse("dp5@1e-3+soften_pile"))
+    assert content["options"] == {"method": "dp5", "tolerance": 1e-3, "device": "cpu", "soften_pile": True}
 
 
 # --- hard cases ---
@@ -260,7 +273,11 @@ def test_page_says_the_same_and_stands_alone(results: tuple[Answer, Path]) -> No
     assert list(page.texts) == ["", "work-and-precision", "ensembles", "hard-cases", "machines"]
     assert len(page.images) == 3 and all(image.startswith("data:image/png;base64,") for image in page.images)
     assert len(page.rows["work-and-precision"]) == 1 + 4
-    assert [row[:2] for row in page.rows["ensembles"][1:]] == [["rkf78", "1e-06"], ["rkf78", "1e-09"], ["dp5", "1e-06"]]
+    assert [row[:2] for row in page.rows["ensembles"][1:]] == [
+        ["rkf78 at 1e-06", "3"],
+        ["rkf78 at 1e-09", "3"],
+        ["dp5 at 1e-06", "3"],
+    ]
     assert len(page.rows["hard-cases"]) == 1 + 6
     assert "warp-lang" in page.texts["machines"]
     assert not re.findall(r"https?:|@import|url\(|<link|<script", text)
@@ -291,6 +308,7 @@ REFUSED = {
     "--links 20": "scene.links: 20 links of",
     "--methods rk4": "--methods: 'rk4' is unknown",
     "--methods dp5@soon": "--methods: 'dp5@soon' has no number after the @",
+    "--methods dp5+soft": "--methods: 'soft' is unknown",
     "--methods dp5@1": "--methods.tolerance: 1.0 is greater than 0.1",
     "--tolerances 0": "--tolerances.tolerance: 0.0 is less than 1e-13",
     "--tolerances tight": "--tolerances: 'tight' is no number",

@@ -28,8 +28,6 @@ PARTS: Final = ("work-precision", "ensembles", "hard-cases")
 FILE: Final = "accuracy.json"
 FORMAT: Final = "warpchain accuracy"
 VERSION: Final = 1
-TOLERANCE: Final = 1e-6
-"""Of a method in the ensembles unless one says otherwise."""
 SCIPY_TOLERANCES: Final = (1e-3, 1e-6, 1e-9)
 """Those of the tolerances that SciPy's solvers, which take a minute each, are run at."""
 
@@ -63,7 +61,7 @@ class Plan:
     @property
     def methods(self) -> tuple[str, ...]:
         """Names of the methods, each once."""
-        return tuple(dict.fromkeys(method for method, _ in self.contestants))
+        return tuple(dict.fromkeys(one.method for one in self.contestants))
 
 
 def make_plan(
@@ -85,7 +83,8 @@ def make_plan(
 
     Args:
         parts: Some of `PARTS`.
-        contestants: Methods, each a name or ``NAME@TOLERANCE``, which sets the tolerance of its ensembles; None: all.
+        contestants: Methods, each as `Contestant.parse` reads it; None: all, at 1e-6. Tolerances and switches are for
+            the ensembles.
         tolerances: Of the work–precision diagrams.
         links: Numbers of links in the diagrams and the ensembles.
         trials: Some of `TRIALS`.
@@ -115,7 +114,7 @@ def make_plan(
         preset(name)
     plan = Plan(
         parts=tuple(parts),
-        contestants=tuple(map(_contestant, methods() if contestants is None else contestants)),
+        contestants=tuple(map(Contestant.parse, methods() if contestants is None else contestants)),
         tolerances=tuple(tolerances),
         links=tuple(validated(Scene, {"links": count}, "--links").links for count in links),
         trials=tuple(trials),
@@ -134,7 +133,8 @@ def make_plan(
     if "ensembles" in parts:
         start_device(validated(Options, {"device": device}, "options").device)
         for ensemble in plan.ensembles:
-            load_sweep(ensemble.content(plan.contestants[0]))
+            for contestant in plan.contestants:
+                load_sweep(ensemble.content(contestant))
     return plan
 
 
@@ -264,22 +264,6 @@ def _outcome(case: Any, method: str) -> Any:
         return case.subject.run(method)
     except InputError as error:
         return Outcome("refused", str(error), 0.0, 0.0, 0, math.nan, False)
-
-
-def _contestant(text: str) -> Contestant:
-    """Method and tolerance of ``NAME`` or ``NAME@TOLERANCE``.
-
-    Raises:
-        InputError: The method is unknown, or the tolerance is no tolerance.
-    """
-    name, at, tolerance = text.partition("@")
-    if name not in methods():
-        raise InputError(f"--methods: {shown(name)} is unknown; {suggestion(name, methods())}")
-    try:
-        value = float(tolerance) if at else TOLERANCE
-    except ValueError:
-        raise InputError(f"--methods: {shown(text)} has no number after the @; write it as {name}@1e-6") from None
-    return name, validated(Options, {"tolerance": value}, "--methods").tolerance
 
 
 def _scipy_note(plan: Plan) -> str:

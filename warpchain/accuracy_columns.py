@@ -50,6 +50,8 @@ COLUMNS: Final[dict[str, dict[str, tuple[str, str]]]] = {
         "samples": ("1", "walks of each method, the same samples for all"),
         "device": ("1", "where they ran"),
         "tolerance": ("1", "tolerance of a method"),
+        "switches": ("1", "options that were switched on"),
+        "title": ("1", "method, tolerance and switches, for people"),
         "at_rest": ("1", "walks that came to rest: those that the statistics are of"),
         "missing": ("1", "walks not run yet"),
         "failed": ("1", "walks that ended otherwise, by status"),

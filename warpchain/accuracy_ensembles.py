@@ -10,12 +10,14 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.ensemble import compile_kernels
+from warpchain.options import Options
+from warpchain.parameters import InputError, shown, suggestion, validated
 from warpchain.planning import load_sweep
 from warpchain.results import replacing
 from warpchain.runner import SweepProgress, sweep
@@ -25,14 +27,62 @@ from warpchain.two_samples import bootstrap_interval, kolmogorov_smirnov, means,
 from warpchain.work_precision import methods
 
 Array = NDArray[np.float64]
-Contestant = tuple[str, float]
-"""Method and tolerance."""
-
-REFERENCES: Final[tuple[Contestant, Contestant]] = (("rkf78", 1e-6), ("rkf78", 1e-9))
-"""What the others are tested against."""
+TOLERANCE: Final = 1e-6
+"""Of a method unless one says otherwise."""
+SWITCHES: Final = tuple(
+    name for name, field in Options.model_fields.items() if field.annotation is bool and field.default is False
+)
+"""Options that can be switched on beside a method."""
 SEED: Final = 20180602
 LONG: Final = 100
 """From this number of links on, walks are released at 20 Hz instead of 15 and there are 60 instead of 200 of them."""
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """How the walks of an ensemble are computed.
+
+    Attributes:
+        method: Name of the method.
+        tolerance: Its tolerance.
+        switches: Some of `SWITCHES`.
+    """
+
+    method: str
+    tolerance: float = TOLERANCE
+    switches: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """As `parse` reads it, and good for a folder: ``dp5@1e-06+soften_pile``."""
+        return "+".join([f"{self.method}@{self.tolerance:g}", *self.switches])
+
+    @property
+    def title(self) -> str:
+        """For people."""
+        return ", ".join([f"{self.method} at {self.tolerance:g}", *(name.replace("_", " ") for name in self.switches)])
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Read ``METHOD[@TOLERANCE][+SWITCH…]``.
+
+        Raises:
+            InputError: the method or a switch is unknown, or the tolerance is no tolerance.
+        """
+        start, *switches = text.split("+")
+        method, at, tolerance = start.partition("@")
+        for name, known in ((method, methods()), *((switch, SWITCHES) for switch in switches)):
+            if name not in known:
+                raise InputError(f"--methods: {shown(name)} is unknown; {suggestion(name, known)}")
+        try:
+            value = float(tolerance) if at else TOLERANCE
+        except ValueError:
+            raise InputError(f"--methods: {shown(text)} has no number after the @; write {method}@1e-6") from None
+        return cls(method, validated(Options, {"tolerance": value}, "--methods").tolerance, tuple(switches))
+
+
+REFERENCES: Final = (Contestant("rkf78", 1e-6), Contestant("rkf78", 1e-9))
+"""What the others are tested against."""
 
 
 @dataclass(frozen=True)
@@ -71,15 +121,20 @@ class Ensemble:
 
     def content(self, contestant: Contestant) -> dict[str, Any]:
         """The sweep of a method."""
-        method, tolerance = contestant
+        switches = dict.fromkeys(contestant.switches, True)
         return {
             "version": 1,
-            "name": f"{self.title}, {method} at {tolerance:g}",
+            "name": f"{self.title}, {contestant.title}",
             "seed": SEED,
             "preset": self.preset,
             "samples": self.samples,
             "scene": {"links": self.links, "frequency": self.frequency, "start": self.start},
-            "options": {"method": method, "tolerance": tolerance, "device": self.device},
+            "options": {
+                "method": contestant.method,
+                "tolerance": contestant.tolerance,
+                "device": self.device,
+                **switches,
+            },
         }
 
 
@@ -94,17 +149,16 @@ def run_ensemble(folder: Path, ensemble: Ensemble, contestant: Contestant, repor
     Args:
         folder: Of all ensembles.
         ensemble: What the walks are.
-        contestant: Method and tolerance.
+        contestant: How they are computed.
         report: Called with a line of progress.
 
     Raises:
         InputError: The folder holds something else, or the device is not there.
     """
-    method, tolerance = contestant
     planned = load_sweep(ensemble.content(contestant))
     place = _place(folder, ensemble, contestant)
     place.parent.mkdir(parents=True, exist_ok=True)
-    who = f"{ensemble.title}, {method} at {tolerance:g}"
+    who = f"{ensemble.title}, {contestant.title}"
     report(f"{who}: compiling")
     compile_kernels([planned.planned(0).setup])
     cost_file = _cost_file(place)
@@ -133,18 +187,21 @@ def summary(folder: Path, ensemble: Ensemble) -> list[dict[str, Any]]:
     found: dict[Contestant, SweepResult] = {}
     for place in sorted((folder / ensemble.name).glob("*@*")):
         if place.is_dir():
-            method, _, tolerance = place.name.partition("@")
-            found[method, float(tolerance)] = load(place)
+            found[Contestant.parse(place.name)] = load(place)
     known = methods()
-    ordered = sorted(found, key=lambda one: (one not in REFERENCES, known.index(one[0]), -one[1]))
+    ordered = sorted(
+        found, key=lambda one: (one not in REFERENCES, known.index(one.method), -one.tolerance, one.switches)
+    )
     distances = {one: _distances(result) for one, result in found.items()}
     rows = []
     for one in ordered:
         at_rest = distances[one]
         counts = found[one].summary()
         row: dict[str, Any] = {
-            "method": one[0],
-            "tolerance": one[1],
+            "method": one.method,
+            "tolerance": one.tolerance,
+            "switches": list(one.switches),
+            "title": one.title,
             "at_rest": len(at_rest),
             "missing": counts["missing"],
             "failed": {k: n for k, n in counts.items() if n and k not in (Status.AT_REST.label, "missing")},
@@ -201,8 +258,7 @@ def _cost(place: Path, device: str) -> dict[str, float]:
 
 
 def _place(folder: Path, ensemble: Ensemble, contestant: Contestant) -> Path:
-    method, tolerance = contestant
-    return folder / ensemble.name / f"{method}@{tolerance:g}"
+    return folder / ensemble.name / contestant.name
 
 
 def _cost_file(place: Path) -> Path:

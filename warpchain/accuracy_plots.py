@@ -232,4 +232,4 @@ def _marker(method: str, chosen: Sequence[str]) -> str:
 def _contestant_text(row: Row) -> str:
     lost = sum(row["failed"].values())
     notes = [f"{lost} failed"] * (lost > 0) + [f"{row['missing']} missing"] * (row["missing"] > 0)
-    return "\n".join([f"{row['method']} at {row['tolerance']:g}", *notes])
+    return "\n".join([row["title"], *notes])

@@ -101,14 +101,14 @@ def _ensembles(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
         "than rkf78 at 1e-6 that is.</p>"
     ]
     by_name = {drawn.name: drawn for drawn in pictures}
-    head = ["method", "tolerance", "at rest", "failed", "mean Δx / m", "s.d. / m"]
+    head = ["method", "at rest", "failed", "mean Δx / m", "s.d. / m"]
     head += ["Δ to 1e-6", "p to 1e-6", "Δ to 1e-9", "p to 1e-9", "cost", "speed", "passes"]
     for row in document["ensembles"]:
         drawn = by_name[f"ensemble_{row['name']}"]
         parts += [f"<h3>{escape(row['title'])}, {escape(row['device'])}</h3>", picture(drawn.figure, drawn.caption)]
         rows = [
             [
-                *(one["method"], f"{one['tolerance']:g}", f"{one['at_rest']}", _failures(one)),
+                *(one["title"], f"{one['at_rest']}", _failures(one)),
                 *(_with_interval(one[name], one[f"{name}_interval"]) for name in ("mean", "sd")),
                 *(text for suffix in ("loose", "tight") for text in _agreement(one, suffix)),
                 f"{one['seconds_per_walk']:.3g} s"

@@ -19,8 +19,9 @@ def accuracy(
         str | None,
         typer.Option(
             "--methods",
-            metavar="NAME[@TOL],…",
-            help="Methods; @TOL sets the tolerance of the ensembles, by default 1e-6. The ensembles of rkf78 at 1e-6 "
+            metavar="NAME[@TOL][+SWITCH],…",
+            help="Methods. For the ensembles @TOL sets the tolerance, by default 1e-6, and +SWITCH an option that is "
+            "off by default, as in rkf78+soften_pile. The ensembles of rkf78 at 1e-6 "
             "and 1e-9 are made in any case. Default: all methods.",
         ),
     ] = None,
