@@ -38,7 +38,7 @@ COLUMNS: Final[dict[str, dict[str, tuple[str, str]]]] = {
         "seconds": ("s", "processor time of that, median of the rounds: wall time of a core that does nothing else"),
         "evaluations": ("1", "evaluations of the chain's equations in it; null if the method does not count them"),
         "accepted": ("1", "accepted steps in it"),
-        "rejected": ("1", "rejected steps in it"),
+        "rejected": ("1", "rejected steps in it; null if the solver does not tell"),
         **_MACHINE,
     },
     "ensembles": {

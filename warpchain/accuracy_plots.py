@@ -35,6 +35,11 @@ _ERRORS: Final = {
     "sprocket": {"position_error": "error of positions / m", "momentum_error": "rel. error of angular momentum"},
 }
 """Errors that are drawn; single links' velocities after contacts depend on the steps and do not converge."""
+_ON_FIGURE: Final = {
+    "flight": "",
+    "impact": "velocities of single links after impacts depend on the steps and are not drawn: the impulse converges",
+    "sprocket": "velocities of single links depend on the steps and are not drawn: the angular momentum converges",
+}
 _NOTES: Final = {
     "flight": "",
     "impact": " Over {starts} impacts of {milliseconds:g} ms that differ in where the links are: greatest error of a "
@@ -114,6 +119,8 @@ def work_precision(true: Row, rows: Sequence[Row]) -> Figure:
         Line2D([], [], color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)), label="references\ndiffer by this")
     )
     figure.legend(handles=handles, loc="outside right center", frameon=False)
+    if _ON_FIGURE[true["trial"]]:
+        figure.supxlabel(_ON_FIGURE[true["trial"]], fontsize="small", color=FAINT)
     figure.suptitle(f"{_TITLES[true['trial']]}, $n$ = {true['links']}", fontsize="medium", x=0.01, ha="left")
     return figure
 

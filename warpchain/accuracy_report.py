@@ -75,7 +75,7 @@ def _work_precision(document: dict[str, Any], pictures: Sequence[Picture]) -> st
             _number(row["seconds"] / row["simulated"], ".3g"),
             _number(_speed(row, points), ".3g"),
             _number(None if row["evaluations"] is None else row["evaluations"] / row["simulated"], ".2e"),
-            f"{row['rejected'] / max(1, row['accepted'] + row['rejected']):.0%}",
+            "–" if row["rejected"] is None else f"{row['rejected'] / (row['accepted'] + row['rejected']):.0%}",
             row["status"],
         ]
         for row in points

@@ -63,7 +63,7 @@ def scipy_points(
                     seconds=time.process_time() - began,
                     evaluations=counts["evaluations"],
                     accepted=counts["steps"],
-                    rejected=0,
+                    rejected=None,
                 )
             )
     return found

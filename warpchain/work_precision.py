@@ -143,7 +143,7 @@ class Point:
             else.
         evaluations: Evaluations of the chain's equations in it; None if the method does not count them.
         accepted: Accepted steps in it.
-        rejected: Rejected steps in it.
+        rejected: Rejected steps in it; None if the solver does not tell.
     """
 
     trial: str
@@ -159,7 +159,7 @@ class Point:
     seconds: float
     evaluations: int | None
     accepted: int
-    rejected: int
+    rejected: int | None
 
 
 def methods() -> tuple[str, ...]:
