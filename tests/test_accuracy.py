@@ -15,7 +15,7 @@ from warpchain.accuracy import FILE, load_document, make_plan, run_accuracy
 from warpchain.accuracy_columns import COLUMNS
 from warpchain.accuracy_ensembles import REFERENCES, Contestant, Ensemble, run_ensemble, summary
 from warpchain.accuracy_plots import figures
-from warpchain.hard_cases import HARD_CASES, Flight, Outcome, Walk
+from warpchain.hard_cases import HARD_CASES, Flight, Order, Outcome, Walk
 from warpchain.hard_starts import SOFT, dropped
 from warpchain.kernels.tableaus import TABLEAUS
 from warpchain.scipy_trials import GAVE_UP, scipy_points
@@ -197,6 +197,15 @@ def test_all_cases_are_sound(method: str) -> None:
     outcomes = {case.name: case.subject.run(method) for case in HARD_CASES}
     assert SLOW_CASES < set(outcomes)
     assert not {name: outcome for name, outcome in outcomes.items() if not outcome.sound}
+
+
+@pytest.mark.parametrize("method", ["rkf78", "dp5"])
+def test_the_table_shows_the_order(method: str) -> None:
+    """The energy of undamped springs drifts as h^p for an odd order p, as h^(p + 1) for an even one."""
+    order = TABLEAUS[method].order
+    drift = re.fullmatch(r"drift of the energy ∝ h\^([\d.]+)", Order().run(method).result)
+    assert drift is not None
+    assert float(drift[1]) == pytest.approx(order + (order + 1) % 2, abs=0.5)
 
 
 def test_what_is_not_sound_is_found() -> None:
