@@ -177,7 +177,8 @@ def hard_cases(rows: Sequence[Row]) -> Figure:
         axes.add_patch(Rectangle((x - 0.48, y - 0.45), 0.96, 0.9, facecolor=(color, 0.25), edgecolor=color))
         numbers = [f"{row['seconds']:.2g} s"] * (row["tries"] > 0)
         numbers += [] if row["energy_error"] is None else [f"{row['energy_error']:.0e}"]
-        text = "   ".join(numbers) if row["sound"] and numbers else row["status"].replace("_", " ")
+        status = [] if row["sound"] and numbers else [row["status"].replace("_", " ")]
+        text = "   ".join([*status, *numbers])
         axes.text(x, y, text, ha="center", va="center", color=INK, fontsize="small")
     axes.set_xlim(-0.55, len(chosen) - 0.45)
     axes.set_ylim(len(cases) - 0.4, -0.6)
@@ -188,7 +189,7 @@ def hard_cases(rows: Sequence[Row]) -> Figure:
     axes.spines[:].set_visible(False)
     handles = [
         Patch(facecolor=(color, 0.25), edgecolor=color, label=label)
-        for color, label in zip(LINE_COLORS[:2], ("sound", "not sound: status"), strict=True)
+        for color, label in zip(LINE_COLORS[:2], ("sound", "not sound, with its status"), strict=True)
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
     return figure
