@@ -35,7 +35,7 @@ COLUMNS: Final[dict[str, dict[str, tuple[str, str]]]] = {
         "status": ("1", "how it ended"),
         **_ERRORS,
         "simulated": ("s", "simulated time of all starts together"),
-        "seconds": ("s", "processor time of that, median of the rounds: wall time of a core that does nothing else"),
+        "seconds": ("s", "processor time of that, median of the rounds; of a run that failed, up to then"),
         "evaluations": ("1", "evaluations of the chain's equations in it; null if the method does not count them"),
         "accepted": ("1", "accepted steps in it"),
         "rejected": ("1", "rejected steps in it; null if the solver does not tell"),

@@ -72,9 +72,9 @@ def _work_precision(document: dict[str, Any], pictures: Sequence[Picture]) -> st
             *(row["trial"], f"{row['links']}", row["method"], f"{row['tolerance']:g}"),
             *(_number(row[name], ".1e") for name in ("position_error", "velocity_error", "momentum_error")),
             _number(row["momentum_bias"], "+.1e"),
-            _number(row["seconds"] / row["simulated"], ".3g"),
+            _number(_per_second(row, "seconds"), ".3g"),
             _number(_speed(row, points), ".3g"),
-            _number(None if row["evaluations"] is None else row["evaluations"] / row["simulated"], ".2e"),
+            _number(_per_second(row, "evaluations"), ".2e"),
             "–" if row["rejected"] is None else f"{row['rejected'] / (row['accepted'] + row['rejected']):.0%}",
             row["status"],
         ]
@@ -153,12 +153,18 @@ def _together(rows: Sequence[Row], *keys: str) -> list[Row]:
     return sorted(rows, key=lambda row: [first[key].index(row[key]) for key in keys])
 
 
+def _per_second(row: Row, cost: str) -> float | None:
+    """Cost of a point per simulated second; None if it has not come to its end, or does not count this."""
+    return row[cost] / row["simulated"] if row["status"] == "finished" and row[cost] is not None else None
+
+
 def _speed(row: Row, points: Sequence[Row]) -> float | None:
     """How many times faster a point is than rkf78 at 1e-6 in the same trial; None if that was not measured."""
     for true in points:
         if true["method"] == "rkf78" and true["tolerance"] == 1e-6:
-            if all(true[key] == row[key] for key in ("trial", "links")) and row["seconds"]:
-                return float(true["seconds"] / row["seconds"] * row["simulated"] / true["simulated"])
+            seconds, own = _per_second(true, "seconds"), _per_second(row, "seconds")
+            if all(true[key] == row[key] for key in ("trial", "links")) and seconds and own:
+                return seconds / own
     return None
 
 
