@@ -17,7 +17,7 @@ from warpchain.accuracy_ensembles import REFERENCES, Contestant, Ensemble, run_e
 from warpchain.accuracy_plots import figures
 from warpchain.hard_cases import HARD_CASES, Flight, Order, Outcome, Walk
 from warpchain.hard_starts import SOFT, dropped
-from warpchain.kernels.tableaus import TABLEAUS
+from warpchain.kernels.methods import METHODS
 from warpchain.scipy_trials import GAVE_UP, scipy_points
 from warpchain.status import Status
 from warpchain.work_precision import Trial, errors, evaluations, make_reference, make_trial, methods, points
@@ -120,8 +120,9 @@ def test_evaluations_are_counted_by_stages() -> None:
     assert evaluations("dp5", 10, 3, 0) == 6 * 13 + 1
     assert evaluations("dp5", 10, 3, 4) == 6 * 13 + 1 + 4
     assert evaluations("bs32", 10, 3, 99) == 3 * 13 + 1 + 10
+    assert evaluations("rodas4p", 10, 3, 5) == 6 * 10 + 5 * 3
     for method in methods():
-        assert (evaluations(method, 10, 3, 0) is None) == (method not in TABLEAUS)
+        assert (evaluations(method, 10, 3, 0) is None) == (method not in METHODS)
 
 
 @pytest.mark.slow
@@ -202,7 +203,7 @@ def test_all_cases_are_sound(method: str) -> None:
 @pytest.mark.parametrize("method", ["rkf78", "dp5"])
 def test_the_table_shows_the_order(method: str) -> None:
     """The energy of undamped springs drifts as h^p for an odd order p, as h^(p + 1) for an even one."""
-    order = TABLEAUS[method].order
+    order = METHODS[method].order
     drift = re.fullmatch(r"drift of the energy ∝ h\^([\d.]+)", Order().run(method).result)
     assert drift is not None
     assert float(drift[1]) == pytest.approx(order + (order + 1) % 2, abs=0.5)

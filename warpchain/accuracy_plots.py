@@ -59,7 +59,8 @@ def figures(document: dict[str, Any]) -> Iterator[Picture]:
         caption = (
             f"{_TITLES[true['trial']]}, {true['links']} links, {1e3 * true['duration']:.3g} ms at Table 1's values: "
             "greatest error over the links against rkf78 at 1e-12, by processor time and by evaluations of the "
-            "chain's equations. Small numbers are decimal exponents of the tolerance. The dashed line is how "
+            "chain's equations (without an implicit method's Jacobians and linear systems). "
+            "Small numbers are decimal exponents of the tolerance. The dashed line is how "
             f"far dp5 at 1e-11 is from that reference: nothing below it is certain.{note}"
         )
         yield Picture(f"work_precision_{true['trial']}_{true['links']}", caption, work_precision(true, rows))

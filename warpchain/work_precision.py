@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from warpchain import reference
 from warpchain.engine import Batch
-from warpchain.kernels.tableaus import TABLEAUS
+from warpchain.kernels.methods import METHODS
 from warpchain.options import Options, Scene, check_scene, joint_radius
 from warpchain.parameters import Parameters, preset, validated
 from warpchain.shapes import ellipse, lay_chain, stadium
@@ -257,18 +257,19 @@ def points(
 
 
 def evaluations(method: str, accepted: int, rejected: int, impulses: int) -> int | None:
-    """Evaluations of the chain's equations; None for methods that are no embedded Runge–Kutta pair.
+    """Evaluations of the chain's equations; None for methods that are no one-step pair of a fixed number of stages.
+
+    Jacobians and solutions of linear systems are not counted.
 
     A rejected step leaves its first stage to the next try. So does an accepted one to the next step if the method
     is so made, unless an impulse came between: then at most one more for each impulse.
     """
-    if method not in TABLEAUS:
+    if method not in METHODS:
         return None
-    tableau = TABLEAUS[method]
-    tries = accepted + rejected
-    if tableau.first_same_as_last:
-        return tries * (tableau.stages - 1) + 1 + min(impulses, accepted)
-    return tries * (tableau.stages - 1) + accepted
+    stages, tries = METHODS[method].stages, accepted + rejected
+    if METHODS[method].reuses_last:
+        return tries * (stages - 1) + 1 + min(impulses, accepted)
+    return tries * (stages - 1) + accepted
 
 
 def _point(
