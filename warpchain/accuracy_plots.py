@@ -17,7 +17,7 @@ from warpchain.sweep_plots import Picture
 
 Row = dict[str, Any]
 
-_MARKERS: Final = "osD^vP*X"
+_MARKERS: Final = "osDvP*Xp"
 _GRID: Final = {"color": "#E6E6E6", "linewidth": 0.6}
 _SCIPY: Final = {"DOP853 (SciPy)": "s", "Radau (SciPy)": "^"}
 """Solvers of SciPy, all in black, and their markers."""
