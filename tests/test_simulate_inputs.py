@@ -69,7 +69,10 @@ def test_good_input_is_computed():
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"method": "rk4"}, r"options\.method: 'rk4' is unknown; give one of rkf78, dp5, bs32, rodas4p"),
+        (
+            {"method": "rk4"},
+            r"options\.method: 'rk4' is unknown; give one of standard, reference, rkf78, dp5, bs32, rodas4p",
+        ),
         ({"method": None}, r"options\.method: None is unknown; .*"),
         ({"tolerance": 0.0}, r"options\.tolerance: 0.0 is less than 1e-13; .*"),
         ({"tolerance": 1.0}, r"options\.tolerance: 1.0 is greater than 0.1; .*"),

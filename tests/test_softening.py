@@ -111,7 +111,7 @@ def test_no_joint_becomes_stiffer() -> None:
 
 def short_walk(**settings):
     """A walk of a loop of 20 links with the joints of Table 1."""
-    given = {"preset": "paper", "links": 20, "frequency": 8.0, "start": "ellipse", "frame_interval": 1e-3}
+    given = {"links": 20, "frequency": 8.0, "start": "ellipse", "method": "reference", "frame_interval": 1e-3}
     return warpchain.walk(**given | settings)
 
 
@@ -179,7 +179,9 @@ def test_ledger_of_a_softened_walk_closes(method: str, softened_walk) -> None:
 
 def test_ledger_closes_when_much_is_freed() -> None:
     """Springs pulled by a ring that turns fast give most of their energy when it counts as collapsed at once."""
-    setup = setup_walk("paper", {"links": 20, "frequency": 20.0, "start": "ellipse", "soften_pile": True}, None)
+    setup = setup_walk(
+        "paper", {"links": 20, "frequency": 20.0, "start": "ellipse", "method": "reference", "soften_pile": True}, None
+    )
     setup = dataclasses.replace(setup, parameters=setup.parameters.with_values({"joint_stiffness": 1e8}))
     setup = dataclasses.replace(setup, scene=setup.scene.model_copy(update={"walk_limit": 4e-3}))
     batch = Batch(1, 20, setup.options)
@@ -205,7 +207,7 @@ def test_soft_joints_are_left_alone() -> None:
 # --- the sprocket ---
 
 
-SPINNING = {"links": 30, "frequency": 15.0, "start": "spinning", "steady_time": 0.4}
+SPINNING = {"links": 30, "frequency": 15.0, "start": "spinning", "steady_time": 0.4, "method": "reference"}
 
 
 def test_joints_are_soft_on_the_sprocket_and_stiff_soon_after_the_release() -> None:
@@ -242,7 +244,9 @@ def test_a_soft_drive_alone_never_softens_the_pile() -> None:
 
 def test_a_whole_walk_from_soft_joints() -> None:
     """Softened on the sprocket and in the pile, a walk ends at rest where it should, and its ledger closes."""
-    walk = warpchain.walk(preset="paper", start="spinning", soften_drive=True, soften_pile=True, frame_interval=None)
+    walk = warpchain.walk(
+        method="reference", start="spinning", soften_drive=True, soften_pile=True, soften_area=0.7, frame_interval=None
+    )
     assert walk.status == Status.AT_REST
     assert 0.5 < walk.dx < 0.8
     assert 0.3 < walk.softened_at < walk.walk_time
@@ -356,7 +360,7 @@ def test_blocks_stiffen_as_the_cpu_form_does(cut: int, exact_kernels: None) -> N
         ({"soften_drive": "yes"}, r"options\.soften_drive: 'yes' is not a truth value; .*"),
         (
             {"soften_drive": True, "record_interval": 5e-3},
-            r"options\.soften_drive: joints stiffen at each record_interval, and 0\.005 s .* at most 0\.002 s",
+            r"options\.soften_drive: joints stiffen at each record_interval, and 0\.005 s .* at most 0\.002 s, or .*",
         ),
     ],
 )

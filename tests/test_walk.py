@@ -46,7 +46,7 @@ def assert_same_walk(first, second):
 @pytest.fixture(scope="module")
 def walk_from_rest():
     """The walk that a newcomer starts: 60 links, 15 Hz, hung up at rest, by the method of the paper."""
-    return warpchain.walk(links=60, frequency=15.0, preset="soft")
+    return warpchain.walk(links=60, frequency=15.0, preset="soft", method="reference")
 
 
 def test_walk_from_rest_ends_where_it_should(walk_from_rest):

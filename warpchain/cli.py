@@ -114,7 +114,8 @@ def walk(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Integrator: rkf78 (the paper's), dp5, bs32 or rodas4p (implicit); digits are orders. Default: rkf78.",
+            help="standard: dp5 at 1e-4, joints softened on the sprocket and in the pile; reference: rkf78 at 1e-6, "
+            "as in the paper; or an integrator: rkf78, dp5, bs32, rodas4p (implicit). Default: standard.",
         ),
     ] = None,
     tolerance: Annotated[
@@ -123,7 +124,7 @@ def walk(
             "--tol",
             metavar="NUMBER",
             help="Error allowed in a step: absolute, in SI units (m, rad, m/s, rad/s), and relative alike. "
-            "Default: 1e-6.",
+            "Default: that of the method, 1e-6 for an integrator.",
         ),
     ] = None,
     assignments: Annotated[

@@ -11,7 +11,8 @@ import re
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal, Self
+from types import MappingProxyType
+from typing import Any, Final, Literal, Self, get_args
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
@@ -136,8 +137,26 @@ class Scene(BaseModel):
         return self
 
 
+METHODS_BY_NEED: Final[Mapping[str, Mapping[str, object]]] = MappingProxyType(
+    {
+        "standard": MappingProxyType(
+            {"method": "dp5", "tolerance": 1e-4, "soften_pile": True, "soften_area": 0.9, "soften_drive": True}
+        ),
+        "reference": MappingProxyType({"method": "rkf78", "tolerance": 1e-6}),
+    }
+)
+"""One word for a method and its settings, see `Options.method`.
+
+`standard` is the cheapest of the explicit ones whose ensembles could not be told from those of `reference`, which is
+the paper's.
+"""
+
+
 class Options(BaseModel):
     """How a walk is computed.
+
+    `method` also takes a word of `METHODS_BY_NEED`: then the word's settings are what the fields default to. A method
+    that is named itself has the defaults below.
 
     Raises:
         pydantic.ValidationError: a value is unknown or out of bounds, the smallest step is not below the
@@ -222,6 +241,19 @@ class Options(BaseModel):
     )
     device: str = Field(default="cpu", description="where walks run: cpu, cuda (the first GPU) or cuda:N")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _method_by_need(cls, values: object) -> object:
+        if not isinstance(values, Mapping):
+            return values
+        word = values.get("method", "standard")
+        known = (*METHODS_BY_NEED, *get_args(cls.model_fields["method"].annotation))
+        if isinstance(word, str) and word not in known:
+            raise refusal("method", f"{shown(word)} is unknown; {suggestion(word, known)}")
+        if not isinstance(word, str) or word not in METHODS_BY_NEED:
+            return values
+        return {**METHODS_BY_NEED[word], **{name: value for name, value in values.items() if name != "method"}}
+
     @field_validator("device")
     @classmethod
     def _device_supported(cls, device: str) -> str:
@@ -250,7 +282,7 @@ class Options(BaseModel):
             raise refusal(
                 "soften_drive",
                 f"joints stiffen at each record_interval, and {self.record_interval} s is too long for that; "
-                f"give a record_interval of at most {LONGEST_STIFFENING_INTERVAL} s",
+                f"give a record_interval of at most {LONGEST_STIFFENING_INTERVAL} s, or soften_drive: false",
             )
         return self
 

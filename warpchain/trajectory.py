@@ -17,6 +17,10 @@ LONGEST = 1e9
 """Durations [s] from here on are refused."""
 
 
+_UNSOFTENED = {"soften_pile": False, "soften_drive": False}
+"""A given chain has no phases in which joints soften."""
+
+
 def simulate(
     parameters: Parameters | str,
     position: Array,
@@ -57,8 +61,8 @@ def simulate(
         InputError: A value is refused; nothing has been computed. It is a ``ValueError``.
     """
     chosen = {"method": method, "tolerance": tolerance, "device": device, "self_contact": self_contact}
-    options = validated(Options, settings | chosen, "options")
-    for name in ("soften_pile", "soften_drive"):
+    options = validated(Options, _UNSOFTENED | settings | chosen, "options")
+    for name in _UNSOFTENED:
         if getattr(options, name):
             raise InputError(f"options.{name}: only a walk has phases in which joints soften; leave it out")
     for name, switch in (("floor", floor), ("gravity", gravity)):

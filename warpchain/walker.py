@@ -50,8 +50,8 @@ def walk(
     links: int = 60,
     frequency: float = 15.0,
     preset: str = "paper",
-    method: str = "rkf78",
-    tolerance: float = 1e-6,
+    method: str = "standard",
+    tolerance: float | None = None,
     start: str = "rest",
     seed: int | None = None,
     frame_interval: float | None = 2e-3,
@@ -64,8 +64,11 @@ def walk(
         links: Number of links n, even.
         frequency: Turns of the sprocket per second [Hz].
         preset: ``"paper"`` (Table 1) or ``"soft"`` (softer joints, 10 to 15 times fewer steps).
-        method: ``"rkf78"``, ``"dp5"``, ``"bs32"`` or ``"rodas4p"``.
-        tolerance: Error allowed in a step, absolute (SI units) and relative alike.
+        method: ``"standard"`` (``"dp5"`` at 1e-4, with joints softened on the sprocket and in the pile),
+            ``"reference"`` (``"rkf78"`` at 1e-6, as in the paper), or an integrator: ``"rkf78"``, ``"dp5"``, ``"bs32"``
+            or ``"rodas4p"``.
+        tolerance: Error allowed in a step, absolute (SI units) and relative alike; None: the method's, 1e-6 for an
+            integrator.
         start: ``"rest"``, ``"spinning"`` or ``"ellipse"``.
         seed: Draw parameters, phase and clearance from their distributions; None: Table 1's means, phase 0.
         frame_interval: Time between kept frames of all joints [s], to whole samples; None keeps none. Neither frames
@@ -79,8 +82,9 @@ def walk(
     Raises:
         InputError: A value is refused; nothing has been computed. It is a ``ValueError``.
     """
-    named = {"links": links, "frequency": frequency, "method": method, "tolerance": tolerance, "start": start}
-    setup = setup_walk(preset, named | settings, seed)
+    named = {"links": links, "frequency": frequency, "method": method, "start": start}
+    chosen = {} if tolerance is None else {"tolerance": tolerance}
+    setup = setup_walk(preset, named | chosen | settings, seed)
     return run_walk(setup, seed=seed, frame_interval=frame_interval, on_progress=on_progress)
 
 
