@@ -99,20 +99,20 @@ def versions() -> dict[str, str]:
     return {name: importlib.metadata.version(name) for name in packages} | {"python": platform.python_version()}
 
 
-MANY_CHAINS_REGISTERS = {
-    **{("rkf78", 64): 128, ("dp5", 64): 168, ("bs32", 64): 168},
-    **{(method, 160): 136 for method in TABLEAUS},
-    **{(method, 192): 168 for method in TABLEAUS},
-}
-"""Registers a thread may take, by method and threads of a block: what was fastest with 1000 chains and more on an H200.
+REGISTERS = {160: 128, 224: 128, 256: 128}
+"""Registers a thread may take, by threads of a block, where that lets another block onto a multiprocessor; else 168.
 
-Few chains run up to 10 % faster without a bound; one table for all keeps a walk's bits independent of its batch.
+A multiprocessor has four schedulers with 16384 registers each, so that a block's number of warps of 32 threads and
+the registers decide how many blocks it holds. Measured on an H200, 4000 chains in flight with rkf78, dp5 and bs32, ns
+per try and chain, with 128 and 168: 60 links 12.2, 6.4, 3.9 and 9.9, 5.5, 3.3; 90 links 15.9, 8.9, 5.7 and 16.5, 9.0,
+5.5; 150 links 28.7, 16.4, 10.1 and 32.9, 18.0, 10.7. Without a bound, few chains run up to 15 % faster and many slower;
+one number for all keeps a walk's bits independent of its batch.
 """
 
 
 def block_kernel(features: Features, threads: int) -> wp.Kernel:
     """The kernel of the block form for blocks of this many threads."""
-    return make_advance_block(features, threads, MANY_CHAINS_REGISTERS.get((features.method, threads)))
+    return make_advance_block(features, threads, REGISTERS.get(threads, 168))
 
 
 def block_threads(links: int) -> int:
