@@ -191,7 +191,7 @@ def _check(code: int) -> None:
 
 def _kernel_needs(kernel: wp.Kernel, threads: int, device: wp.Device) -> tuple[int, int, int]:
     """Registers and local memory [B] of a thread, blocks that a multiprocessor holds at a time."""
-    hooks = kernel.module.get_kernel_hooks(kernel, device)
+    hooks = kernel.module.load(device, threads).get_kernel_hooks(kernel)
     function, shared = ctypes.c_void_p(hooks.forward), ctypes.c_size_t(hooks.forward_smem_bytes)
     registers, local, blocks = ctypes.c_int(), ctypes.c_int(), ctypes.c_int()
     driver = _driver()

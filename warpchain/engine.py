@@ -3,6 +3,7 @@
 import contextlib
 import functools
 import importlib.metadata
+import itertools
 import math
 import os
 import platform
@@ -36,6 +37,8 @@ PROGRAM = (
 )
 """Fields of :class:`warpchain.kernels.types.Program`."""
 FIRST_STEP = 1e-7  # s; the controller grows it fivefold per step
+LANES = 3  # streams of a batch for kernels side by side: chains of one length do not fill the device
+CONNECTIONS = "32"  # queues between host and GPU; with fewer than streams, streams wait for one another
 BLOCKS_OF_MULTIPROCESSOR = 32  # most that an NVIDIA multiprocessor holds
 LAUNCH_SECONDS = 0.1  # how long a launch should take: the grain of progress and of Ctrl-C
 CAPACITY_SAMPLES = 512
@@ -63,6 +66,7 @@ def start_device(device: str) -> wp.Device:
         InputError: This machine has no such device.
     """
     wp.config.log_level = wp.LOG_ERROR
+    os.environ.setdefault("CUDA_DEVICE_MAX_CONNECTIONS", CONNECTIONS)  # CUDA reads it when it starts
     with _without_driver_warning():
         wp.init()
     name = "cuda:0" if device == "cuda" else device
@@ -161,10 +165,10 @@ class Batch:
         self.device = start_device(options.device)
         self.links = [0] * worlds
         self._mirrors: dict[int, Mirror] = {}
-        self._streams: dict[tuple[Features, int], wp.Stream] = {}
         self._stream = wp.Stream(self.device) if self.device.is_cuda else None
         self._done: wp.Event | None = None
         self._launched: list[wp.array] = []
+        self._lanes = [wp.Stream(self.device) for _ in range(LANES)] if self.device.is_cuda else []
         self.columns = layout.padded_width(longest)
         rows = scratch_rows(options, self.columns, self.device)
 
@@ -177,6 +181,7 @@ class Batch:
         for name in PROGRAM:
             setattr(self.program, name, self._array(np.zeros(worlds)))
 
+        self._constant = set(self._mirrors)
         self.state = State()
         self.state.links = self._array(np.zeros((worlds, 6, longest)))
         for name in ("time", "stop_time", "gap", "slack", "step", "last_error", "softness", "first_area"):
@@ -388,21 +393,24 @@ class Batch:
         for mirror in self._mirrors.values():
             mirror.upload()
         ready = self._stream.record_event()
+        lanes = itertools.cycle(self._lanes)
+        for lane in self._lanes:
+            lane.wait_event(ready)
         for (features, threads), indices in members.items():
-            stream = self._stream_of(features, threads)
-            stream.wait_event(ready)
             wp.launch_tiled(
                 block_kernel(features, threads),
                 dim=[len(indices)],
                 inputs=[indices, *arrays],
                 block_dim=threads,
                 device=self.device,
-                stream=stream,
+                stream=next(lanes),
             )
-            self._stream.wait_event(stream.record_event())
+        for lane in self._lanes:
+            self._stream.wait_event(lane.record_event())
         for mirror in self._mirrors.values():
-            mirror.forget()
-        self._launched = list(members.values())  # they must live as long as the launch
+            if mirror.array.ptr not in self._constant:
+                mirror.download()
+        self._launched += members.values()  # they must live as long as the launch
         self._done = self._stream.record_event()
 
     def is_done(self) -> bool:
@@ -414,12 +422,7 @@ class Batch:
         if self._done is not None:
             wp.synchronize_event(self._done)
             self._done = None
-
-    def _stream_of(self, features: Features, threads: int) -> wp.Stream:
-        """A stream for each kernel, so that groups of chains that do not fill the device run side by side."""
-        if (features, threads) not in self._streams:
-            self._streams[features, threads] = wp.Stream(self.device)
-        return self._streams[features, threads]
+            self._launched.clear()
 
     def _indices(self, worlds: Sequence[int]) -> wp.array:
         return wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device)

@@ -1,7 +1,7 @@
-"""An array on a device and its copy on the host, of which each is brought up to date only when it is needed.
+"""An array on a device and its copy on the host, brought up to date by the launches themselves.
 
-A launch waits for nothing but what the host has changed, and the host fetches nothing but what it looks at: of the
-arrays of thousands of chains, a few numbers each unless a chain ends.
+A launch takes along what the host has changed and brings back what it may have changed itself, in the order of its
+stream, so that the host waits for one thing only: the end of the launch.
 """
 
 from typing import Any
@@ -25,29 +25,23 @@ class Mirror:
         self._host = wp.array(values, dtype=dtype, device="cpu", pinned=device.is_cuda)
         self._values: NDArray[Any] = self._host.numpy()
         self._stream = stream
-        self._is_edited = self._is_stale = False
+        self._is_edited = False
 
     def view(self) -> NDArray[Any]:
-        """The elements, to be read."""
-        if self._is_stale:
-            wp.copy(self._host, self.array, stream=self._stream)
-            if self._stream is not None:
-                wp.synchronize_stream(self._stream)
-            self._is_stale = False
+        """The elements, to be read between launches."""
         return self._values
 
     def edit(self) -> NDArray[Any]:
-        """The elements, to be changed before the next launch."""
-        values = self.view()
+        """The elements, to be changed between launches."""
         self._is_edited = True
-        return values
+        return self._values
 
     def upload(self) -> None:
-        """Bring the device up to date, in the order of the stream."""
+        """Begin to bring the device up to date."""
         if self._is_edited:
             wp.copy(self.array, self._host, stream=self._stream)
             self._is_edited = False
 
-    def forget(self) -> None:
-        """A launch may change the array: the copy on the host is out of date."""
-        self._is_stale = True
+    def download(self) -> None:
+        """Begin to bring the host up to date."""
+        wp.copy(self._host, self.array, stream=self._stream)
