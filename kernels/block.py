@@ -2,8 +2,8 @@
 
 The same run as in :mod:`driver`, on the same structs and with the same functions of physics, for devices where a block
 of threads is cheap. Stages live in registers, the state on a board in the memory that a block shares, where neighbours
-and contacts meet. Everything that decides (error, gap, status …) is known to all threads alike, so that all take the same
-branches. What a run gives depends neither on how it is cut into launches nor on the other chains.
+and contacts meet. Everything that decides (error, gap, status …) is known to all threads alike, so that all take the
+same branches. What a run gives depends neither on how it is cut into launches nor on the other chains.
 
 A try costs two barriers a stage and one for the error; an accepted one two more unless its last stage is the first of
 the next step. Contacts cost nothing more while the
