@@ -167,7 +167,6 @@ class Batch:
         self._mirrors: dict[int, Mirror] = {}
         self._stream = wp.Stream(self.device) if self.device.is_cuda else None
         self._done: wp.Event | None = None
-        self._launched: list[wp.array] = []
         self._lanes = [wp.Stream(self.device) for _ in range(LANES)] if self.device.is_cuda else []
         self.columns = layout.padded_width(longest)
         rows = scratch_rows(options, self.columns, self.device)
@@ -182,6 +181,7 @@ class Batch:
             setattr(self.program, name, self._array(np.zeros(worlds)))
 
         self._constant = set(self._mirrors)
+        self._order = Mirror(np.zeros(worlds, dtype=np.int32), self.device, self._stream)
         self.state = State()
         self.state.links = self._array(np.zeros((worlds, 6, longest)))
         for name in ("time", "stop_time", "gap", "slack", "step", "last_error", "softness", "first_area"):
@@ -380,37 +380,38 @@ class Batch:
         arrays = [self.model, self.program, self.state, self.record, self.scratch, self.lists, self.control]
         if self._stream is None:
             for features, worlds in groups.items():
-                inputs = [self._indices(worlds), *arrays]
+                inputs = [wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device), *arrays]
                 wp.launch(make_advance(features), dim=len(worlds), inputs=inputs, device=self.device)
             return
         blocks: dict[tuple[Features, int], list[int]] = defaultdict(list)
         for features, worlds in groups.items():
             for world in worlds:
                 blocks[features, block_threads(self.links[world])].append(world)
-        self._stream.wait_stream(self.device.stream)  # where new arrays are set to zero
-        with wp.ScopedStream(self._stream):
-            members = {key: self._indices(worlds) for key, worlds in blocks.items()}
-        for mirror in self._mirrors.values():
+        order = np.array([world for worlds in blocks.values() for world in worlds], dtype=np.int32)
+        if not np.array_equal(self._order.view()[: len(order)], order):
+            self._order.edit()[: len(order)] = order
+        self._stream.wait_stream(self.device.stream)  # where new arrays are filled
+        for mirror in (self._order, *self._mirrors.values()):
             mirror.upload()
         ready = self._stream.record_event()
-        lanes = itertools.cycle(self._lanes)
         for lane in self._lanes:
             lane.wait_event(ready)
-        for (features, threads), indices in members.items():
+        first = 0
+        for ((features, threads), worlds), lane in zip(blocks.items(), itertools.cycle(self._lanes), strict=False):
             wp.launch_tiled(
                 block_kernel(features, threads),
-                dim=[len(indices)],
-                inputs=[indices, *arrays],
+                dim=[len(worlds)],
+                inputs=[self._order.array[first : first + len(worlds)], *arrays],
                 block_dim=threads,
                 device=self.device,
-                stream=next(lanes),
+                stream=lane,
             )
+            first += len(worlds)
         for lane in self._lanes:
             self._stream.wait_event(lane.record_event())
         for mirror in self._mirrors.values():
             if mirror.array.ptr not in self._constant:
                 mirror.download()
-        self._launched += members.values()  # they must live as long as the launch
         self._done = self._stream.record_event()
 
     def is_done(self) -> bool:
@@ -422,10 +423,6 @@ class Batch:
         if self._done is not None:
             wp.synchronize_event(self._done)
             self._done = None
-            self._launched.clear()
-
-    def _indices(self, worlds: Sequence[int]) -> wp.array:
-        return wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device)
 
     def listed_pairs(self, world: int) -> int:
         """Pairs of joints in a world's neighbour list."""
