@@ -19,7 +19,7 @@ from .block_memory import barrier
 from .broadphase import list_layout
 from .elementary import TWO, ZERO
 from .layout import BOARD_LOST_SELF, RIGHT_X, RIGHT_Y
-from .self_contact import Touch, collide, touching_circles
+from .self_contact import collide, links_of, touching_circles
 from .types import Chain
 
 wp.set_module_options({"enable_backward": False})
@@ -120,11 +120,9 @@ def second_joint(pair: int):
 
 
 @wp.func
-def links_of(key: int, half: int, n: int):
-    """The two links of a contact of this half, see :func:`self_contact.touching_circles`."""
-    second = key & 1
-    link_b = second_joint(key >> 1) + (second ^ half)
-    return first_joint(key >> 1) + second, wp.where(link_b == n, 0, link_b)
+def links_at(key: int, half: int, n: int):
+    """The two links of a contact of this half."""
+    return links_of(first_joint(key >> 1), second_joint(key >> 1), half, key & 1, n)
 
 
 @wp.func
@@ -138,44 +136,6 @@ def claim(T: wp.array(dtype=wp.int32), owners: int, link_a: int, link_b: int, ke
 def is_first(T: wp.array(dtype=wp.int32), owners: int, link_a: int, link_b: int, key: int):
     """True if no smaller key lies on the links of a contact."""
     return T[owners + link_a] == key and T[owners + link_b] == key
-
-
-@wp.func
-def collide_and_note(K: wp.array2d(dtype=wp.float64), chain: Chain, touch: Touch):
-    """A contact's turn; returns the number of impulses."""
-    lost, hits = collide(K, chain, touch)
-    K[BOARD_LOST_SELF, touch.link_a] = K[BOARD_LOST_SELF, touch.link_a] + lost
-    return int(hits)
-
-
-@wp.func
-def stow(E: wp.array2d(dtype=wp.float64), F: wp.array2d(dtype=wp.float64), column: int, touch: Touch):
-    """Lays a contact's geometry down, five numbers and three: in registers it would crowd out the stages."""
-    E[0, column] = touch.normal_x
-    E[1, column] = touch.normal_y
-    E[2, column] = touch.a_n
-    E[3, column] = touch.a_t
-    E[4, column] = touch.b_n
-    F[0, column] = touch.b_t
-    F[1, column] = touch.inverse_nn
-    F[2, column] = touch.inverse_determinant
-
-
-@wp.func
-def fetch(E: wp.array2d(dtype=wp.float64), F: wp.array2d(dtype=wp.float64), column: int, own: Touch) -> Touch:
-    """What :func:`stow` laid down of this contact, of which a thread remembers the links."""
-    touch = Touch()
-    touch.link_a = own.link_a
-    touch.link_b = own.link_b
-    touch.normal_x = E[0, column]
-    touch.normal_y = E[1, column]
-    touch.a_n = E[2, column]
-    touch.a_t = E[3, column]
-    touch.b_n = E[4, column]
-    touch.b_t = F[0, column]
-    touch.inverse_nn = F[1, column]
-    touch.inverse_determinant = F[2, column]
-    return touch
 
 
 @functools.cache
@@ -232,8 +192,86 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         return T[wp.static(touch.touching)]
 
     @wp.func
-    def note_depth(T: wp.array(dtype=wp.int32), here: Touch):
-        wp.atomic_max(T, wp.static(touch.deepest), wp.cast(wp.float32(here.depth), wp.int32))
+    def note_depth(T: wp.array(dtype=wp.int32), depth: wp.float64):
+        wp.atomic_max(T, wp.static(touch.deepest), wp.cast(wp.float32(depth), wp.int32))
+
+    @wp.func
+    def prepare(
+        K: wp.array2d(dtype=wp.float64),
+        T: wp.array(dtype=wp.int32),
+        E: wp.array2d(dtype=wp.float64),
+        F: wp.array2d(dtype=wp.float64),
+        chain: Chain,
+        pair: int,
+        half: int,
+        lane: int,
+    ):
+        """Lays down the geometry of a thread's first contact; returns its key, or DONE for circles that do not meet."""
+        depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = touching_circles(
+            K, chain, first_joint(pair), second_joint(pair), half, lane % 2
+        )
+        key = int(DONE)
+        if depth > ZERO:
+            key = 2 * pair + lane % 2
+            E[0, lane] = nx
+            E[1, lane] = ny
+            E[2, lane] = a_n
+            E[3, lane] = a_t
+            E[4, lane] = b_n
+            F[0, lane] = b_t
+            F[1, lane] = inverse_nn
+            F[2, lane] = inverse_determinant
+            note_depth(T, depth)
+        return key
+
+    @wp.func
+    def go_prepared(
+        K: wp.array2d(dtype=wp.float64),
+        E: wp.array2d(dtype=wp.float64),
+        F: wp.array2d(dtype=wp.float64),
+        chain: Chain,
+        link_a: int,
+        link_b: int,
+        lane: int,
+    ):
+        """The turn of a thread's first contact; returns the number of impulses."""
+        lost, hits = collide(
+            K,
+            chain,
+            link_a,
+            link_b,
+            E[0, lane],
+            E[1, lane],
+            E[2, lane],
+            E[3, lane],
+            E[4, lane],
+            F[0, lane],
+            F[1, lane],
+            F[2, lane],
+        )
+        K[BOARD_LOST_SELF, link_a] = K[BOARD_LOST_SELF, link_a] + lost
+        return int(hits)
+
+    @wp.func
+    def measure(
+        K: wp.array2d(dtype=wp.float64), T: wp.array(dtype=wp.int32), chain: Chain, pair: int, half: int, second: int
+    ):
+        """1 if the circles of a further contact meet, else 0."""
+        depth, _nx, _ny, _a_n, _a_t, _b_n, _b_t, _inverse_nn, _inverse_determinant = touching_circles(
+            K, chain, first_joint(pair), second_joint(pair), half, second
+        )
+        note_depth(T, depth)
+        return wp.where(depth > ZERO, 1, 0)
+
+    @wp.func
+    def go(K: wp.array2d(dtype=wp.float64), chain: Chain, key: int, half: int, link_a: int, link_b: int):
+        """The turn of a further contact; returns the number of impulses."""
+        _depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = touching_circles(
+            K, chain, first_joint(key >> 1), second_joint(key >> 1), half, key & 1
+        )
+        lost, hits = collide(K, chain, link_a, link_b, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant)
+        K[BOARD_LOST_SELF, link_a] = K[BOARD_LOST_SELF, link_a] + lost
+        return int(hits)
 
     @wp.func
     def resolve(
@@ -259,51 +297,40 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         half = int(0)
         while half < 2:
             gone = int(0)
-            own = Touch()
             own_key = int(DONE)
             if lane < contacts:
-                pair = pair_at(L, T, lane // 2)
-                own = touching_circles(K, chain, first_joint(pair), second_joint(pair), half, lane % 2)
-                if own.depth > ZERO:
-                    own_key = 2 * pair + lane % 2
-                    stow(E, F, lane, own)
-                    note_depth(T, own)
-                else:
-                    # joints that are near, but not these circles
-                    gone = 1
+                own_key = prepare(K, T, E, F, chain, pair_at(L, T, lane // 2), half, lane)
+                gone = wp.where(own_key == DONE, 1, 0)
+            own_a, own_b = links_at(wp.max(own_key, 0), half, chain.link_count)
             k = lane + wp.static(block_dim)
             while k < contacts:
-                pair = pair_at(L, T, k // 2)
-                here = touching_circles(K, chain, first_joint(pair), second_joint(pair), half, k % 2)
-                note_depth(T, here)
-                L[wp.static(lists.pending) + k] = wp.where(here.depth > ZERO, 1, 0)
-                gone += wp.where(here.depth > ZERO, 0, 1)
+                touches = measure(K, T, chain, pair_at(L, T, k // 2), half, k % 2)
+                L[wp.static(lists.pending) + k] = touches
+                gone += 1 - touches
                 k += wp.static(block_dim)
             while finished < contacts * (half + 1):
                 if own_key != DONE:
-                    claim(T, owners, own.link_a, own.link_b, own_key)
+                    claim(T, owners, own_a, own_b, own_key)
                 k = lane + wp.static(block_dim)
                 while k < contacts:
                     if L[wp.static(lists.pending) + k] != 0:
                         key = 2 * pair_at(L, T, k // 2) + k % 2
-                        link_a, link_b = links_of(key, half, chain.link_count)
+                        link_a, link_b = links_at(key, half, chain.link_count)
                         claim(T, owners, link_a, link_b, key)
                     k += wp.static(block_dim)
                 barrier()
                 if own_key != DONE:
-                    if is_first(T, owners, own.link_a, own.link_b, own_key):
-                        impulses += collide_and_note(K, chain, fetch(E, F, lane, own))
+                    if is_first(T, owners, own_a, own_b, own_key):
+                        impulses += go_prepared(K, E, F, chain, own_a, own_b, lane)
                         gone += 1
                         own_key = DONE
                 k = lane + wp.static(block_dim)
                 while k < contacts:
                     if L[wp.static(lists.pending) + k] != 0:
-                        pair = pair_at(L, T, k // 2)
-                        key = 2 * pair + k % 2
-                        link_a, link_b = links_of(key, half, chain.link_count)
+                        key = 2 * pair_at(L, T, k // 2) + k % 2
+                        link_a, link_b = links_at(key, half, chain.link_count)
                         if is_first(T, owners, link_a, link_b, key):
-                            here = touching_circles(K, chain, first_joint(pair), second_joint(pair), half, k % 2)
-                            impulses += collide_and_note(K, chain, here)
+                            impulses += go(K, chain, key, half, link_a, link_b)
                             gone += 1
                             L[wp.static(lists.pending) + k] = 0
                     k += wp.static(block_dim)

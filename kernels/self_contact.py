@@ -35,23 +35,6 @@ from .types import Chain
 wp.set_module_options({"enable_backward": False})
 
 
-@wp.struct
-class Touch:
-    """A circle of link A and one of link B that overlap: everything about their contact but the velocities."""
-
-    link_a: wp.int32
-    link_b: wp.int32
-    depth: wp.float64  # of the overlap [m]; 0: these links do not touch
-    normal_x: wp.float64  # from A to B
-    normal_y: wp.float64
-    a_n: wp.float64  # lever of A crossed with normal and tangent [m]
-    a_t: wp.float64
-    b_n: wp.float64  # likewise of B
-    b_t: wp.float64
-    inverse_nn: wp.float64  # 1/W_nn [kg]
-    inverse_determinant: wp.float64  # 1/det W [kg²]
-
-
 @wp.func
 def are_neighbours(link_a: int, link_b: int, link_count: int):
     """True for the same link or links that share a joint."""
@@ -60,15 +43,23 @@ def are_neighbours(link_a: int, link_b: int, link_count: int):
 
 
 @wp.func
-def effective_masses(K: wp.array2d(dtype=wp.float64), touch: Touch):
-    """W_nn, W_nt, W_tt [1/kg] of a contact."""
-    mass = K[INVERSE_MASS, touch.link_a] + K[INVERSE_MASS, touch.link_b]
-    inertia_a = K[INVERSE_INERTIA, touch.link_a]
-    inertia_b = K[INVERSE_INERTIA, touch.link_b]
+def effective_masses(
+    K: wp.array2d(dtype=wp.float64),
+    link_a: int,
+    link_b: int,
+    a_n: wp.float64,
+    a_t: wp.float64,
+    b_n: wp.float64,
+    b_t: wp.float64,
+):
+    """W_nn, W_nt, W_tt [1/kg] of a contact, see :func:`circles_of_links`."""
+    mass = K[INVERSE_MASS, link_a] + K[INVERSE_MASS, link_b]
+    inertia_a = K[INVERSE_INERTIA, link_a]
+    inertia_b = K[INVERSE_INERTIA, link_b]
     return (
-        mass + touch.a_n * touch.a_n * inertia_a + touch.b_n * touch.b_n * inertia_b,
-        touch.a_n * touch.a_t * inertia_a + touch.b_n * touch.b_t * inertia_b,
-        mass + touch.a_t * touch.a_t * inertia_a + touch.b_t * touch.b_t * inertia_b,
+        mass + a_n * a_n * inertia_a + b_n * b_n * inertia_b,
+        a_n * a_t * inertia_a + b_n * b_t * inertia_b,
+        mass + a_t * a_t * inertia_a + b_t * b_t * inertia_b,
     )
 
 
@@ -82,17 +73,31 @@ def circles_of_links(
     link_b: int,
     end_b_x: wp.float64,
     end_b_y: wp.float64,
-) -> Touch:
-    """One circle of link A and one of link B, centres given [m]. Exactly concentric ones have no normal: no touch."""
-    touch = Touch()
-    touch.link_a = link_a
-    touch.link_b = link_b
+):
+    """Geometry of the contact of a circle of link A and one of link B, centres given [m].
+
+    Numbers, not a struct: clang would carry that through memory, which makes a pile on the CPU twice as slow.
+
+    Returns:
+        Depth of the overlap [m], 0 if there is none (exactly concentric circles have no normal: no contact); normal
+        from A to B; levers of A crossed with normal and tangent [m], likewise of B; 1/W_nn [kg] and 1/det W [kg²].
+    """
+    depth = ZERO
+    nx = ZERO
+    ny = ZERO
+    a_n = ZERO
+    a_t = ZERO
+    b_n = ZERO
+    b_t = ZERO
+    inverse_nn = ZERO
+    inverse_determinant = ZERO
     dx = end_b_x - end_a_x
     dy = end_b_y - end_a_y
     reach = TWO * chain.circle_radius
     square = dx * dx + dy * dy
     if square < reach * reach and square > ZERO:
         distance = wp.sqrt(square)
+        depth = reach - distance
         nx = quotient(dx, distance)
         ny = quotient(dy, distance)
         px = HALF * (end_a_x + end_b_x)
@@ -101,77 +106,86 @@ def circles_of_links(
         ay = py - K[Y, link_a]
         bx = px - K[X, link_b]
         by = py - K[Y, link_b]
-        touch.depth = reach - distance
-        touch.normal_x = nx
-        touch.normal_y = ny
-        touch.a_n = ax * ny - ay * nx
-        touch.a_t = ax * nx + ay * ny
-        touch.b_n = bx * ny - by * nx
-        touch.b_t = bx * nx + by * ny
-        w_nn, w_nt, w_tt = effective_masses(K, touch)
+        a_n = ax * ny - ay * nx
+        a_t = ax * nx + ay * ny
+        b_n = bx * ny - by * nx
+        b_t = bx * nx + by * ny
+        w_nn, w_nt, w_tt = effective_masses(K, link_a, link_b, a_n, a_t, b_n, b_t)
         inverse_nn, inverse_determinant = inverse_masses(w_nn, w_nt, w_tt)
-        touch.inverse_nn = inverse_nn
-        touch.inverse_determinant = inverse_determinant
-    return touch
+    return depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant
 
 
 @wp.func
-def touching_circles(K: wp.array2d(dtype=wp.float64), chain: Chain, p: int, q: int, half: int, second: int) -> Touch:
-    """The contact of joints p < q in this half of the sequence, the first (0) or second (1) of the two.
+def links_of(p: int, q: int, half: int, second: int, n: int):
+    """Links A and B of the contact of joints p < q in this half of the sequence, the first (0) or second (1) of two."""
+    link_b = q + (second ^ half)
+    return p + second, wp.where(link_b == n, 0, link_b)
+
+
+@wp.func
+def touching_circles(K: wp.array2d(dtype=wp.float64), chain: Chain, p: int, q: int, half: int, second: int):
+    """The same for that contact, see :func:`links_of`; links that share a joint have none.
 
     Joint j's left-hand circle belongs to link j's right end, its right-hand circle to the left end of the link after.
     """
-    after_p = second
     after_q = second ^ half
-    link_a = p + after_p
-    link_b = q + after_q
-    ax = wp.where(after_p == 0, K[RIGHT_X, p], K[LEFT_X, p + 1])
-    ay = wp.where(after_p == 0, K[RIGHT_Y, p], K[LEFT_Y, p + 1])
+    link_a, link_b = links_of(p, q, half, second, chain.link_count)
+    ax = wp.where(second == 0, K[RIGHT_X, p], K[LEFT_X, p + 1])
+    ay = wp.where(second == 0, K[RIGHT_Y, p], K[LEFT_Y, p + 1])
     bx = wp.where(after_q == 0, K[RIGHT_X, q], K[LEFT_X, q + 1])
     by = wp.where(after_q == 0, K[RIGHT_Y, q], K[LEFT_Y, q + 1])
-    if link_b == chain.link_count:
-        link_b = 0
-    touch = Touch()
-    if not are_neighbours(link_a, link_b, chain.link_count):
-        touch = circles_of_links(K, chain, link_a, ax, ay, link_b, bx, by)
-    return touch
+    if are_neighbours(link_a, link_b, chain.link_count):
+        bx = ax
+        by = ay
+    return circles_of_links(K, chain, link_a, ax, ay, link_b, bx, by)
 
 
 @wp.func
-def collide(K: wp.array2d(dtype=wp.float64), chain: Chain, touch: Touch):
+def collide(
+    K: wp.array2d(dtype=wp.float64),
+    chain: Chain,
+    link_a: int,
+    link_b: int,
+    nx: wp.float64,
+    ny: wp.float64,
+    a_n: wp.float64,
+    a_t: wp.float64,
+    b_n: wp.float64,
+    b_t: wp.float64,
+    inverse_nn: wp.float64,
+    inverse_determinant: wp.float64,
+):
     """Impulse between two touching links, if they approach; returns the energy lost [J] and the number of impulses."""
-    link_a = touch.link_a
-    link_b = touch.link_b
     u = K[U, link_a] - K[U, link_b]
     v = K[V, link_a] - K[V, link_b]
-    normal_speed = u * touch.normal_x + v * touch.normal_y
-    normal_speed += K[OMEGA, link_a] * touch.a_n - K[OMEGA, link_b] * touch.b_n
+    normal_speed = u * nx + v * ny
+    normal_speed += K[OMEGA, link_a] * a_n - K[OMEGA, link_b] * b_n
     lost = ZERO
     hits = wp.int64(0)
     if normal_speed > ZERO:
-        tangential_speed = v * touch.normal_x - u * touch.normal_y
-        tangential_speed += K[OMEGA, link_a] * touch.a_t - K[OMEGA, link_b] * touch.b_t
-        w_nn, w_nt, w_tt = effective_masses(K, touch)
+        tangential_speed = v * nx - u * ny
+        tangential_speed += K[OMEGA, link_a] * a_t - K[OMEGA, link_b] * b_t
+        w_nn, w_nt, w_tt = effective_masses(K, link_a, link_b, a_n, a_t, b_n, b_t)
         jn, jt = collision_impulse(
             normal_speed,
             tangential_speed,
             w_nn,
             w_nt,
             w_tt,
-            touch.inverse_nn,
-            touch.inverse_determinant,
+            inverse_nn,
+            inverse_determinant,
             chain.chain_restitution,
             chain.chain_friction,
             chain.tangential_restitution,
         )
-        jx = jn * touch.normal_x - jt * touch.normal_y
-        jy = jn * touch.normal_y + jt * touch.normal_x
+        jx = jn * nx - jt * ny
+        jy = jn * ny + jt * nx
         K[U, link_a] = K[U, link_a] - jx * K[INVERSE_MASS, link_a]
         K[V, link_a] = K[V, link_a] - jy * K[INVERSE_MASS, link_a]
-        K[OMEGA, link_a] = K[OMEGA, link_a] - (touch.a_n * jn + touch.a_t * jt) * K[INVERSE_INERTIA, link_a]
+        K[OMEGA, link_a] = K[OMEGA, link_a] - (a_n * jn + a_t * jt) * K[INVERSE_INERTIA, link_a]
         K[U, link_b] = K[U, link_b] + jx * K[INVERSE_MASS, link_b]
         K[V, link_b] = K[V, link_b] + jy * K[INVERSE_MASS, link_b]
-        K[OMEGA, link_b] = K[OMEGA, link_b] + (touch.b_n * jn + touch.b_t * jt) * K[INVERSE_INERTIA, link_b]
+        K[OMEGA, link_b] = K[OMEGA, link_b] + (b_n * jn + b_t * jt) * K[INVERSE_INERTIA, link_b]
         changed_n = w_nn * jn + w_nt * jt
         changed_t = w_nt * jn + w_tt * jt
         lost = jn * (normal_speed - HALF * changed_n) + jt * (tangential_speed - HALF * changed_t)
@@ -212,10 +226,15 @@ def self_contacts(columns: int):
                 pair = L[wp.static(lists.touching) + k // 2]
                 p = L[wp.static(lists.first) + pair]
                 q = L[wp.static(lists.second) + pair]
-                touch = touching_circles(K, chain, p, q, half, k % 2)
-                if touch.depth > ZERO:
-                    deepest = wp.max(deepest, touch.depth)
-                    energy, hits = collide(K, chain, touch)
+                link_a, link_b = links_of(p, q, half, k % 2, chain.link_count)
+                depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = touching_circles(
+                    K, chain, p, q, half, k % 2
+                )
+                if depth > ZERO:
+                    deepest = wp.max(deepest, depth)
+                    energy, hits = collide(
+                        K, chain, link_a, link_b, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant
+                    )
                     lost += energy
                     impulses += hits
                 k += 1

@@ -117,12 +117,14 @@ def _link_pair(
     chain.chain_restitution = cases[i, 1]
     chain.chain_friction = cases[i, 2]
     chain.tangential_restitution = cases[i, 3]
-    touch = circles_of_links(scratch[i], chain, 0, cases[i, 4], cases[i, 5], 1, cases[i, 6], cases[i, 7])
+    depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = circles_of_links(
+        scratch[i], chain, 0, cases[i, 4], cases[i, 5], 1, cases[i, 6], cases[i, 7]
+    )
     lost = wp.float64(0.0)
     hits = wp.int64(0)
-    if touch.depth > wp.float64(0.0):
-        lost, hits = collide(scratch[i], chain, touch)
-    results[i, 0] = touch.depth
+    if depth > wp.float64(0.0):
+        lost, hits = collide(scratch[i], chain, 0, 1, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant)
+    results[i, 0] = depth
     results[i, 1] = lost
     results[i, 2] = wp.float64(hits)
 
