@@ -1,11 +1,12 @@
 """The loop over steps in the block form: one block of threads carries one chain, one thread per link.
 
 The same run as in :mod:`driver`, on the same structs and with the same functions of physics, for devices where a block
-of threads is cheap. State and stages live in registers; neighbours and contacts meet on a board in the memory that a
-block shares. Everything that decides (error, gap, status …) is known to all threads alike, so that all take the same
-branches. What a run gives depends neither on how it is cut into launches nor on the other chains.
+of threads is cheap. Stages live in registers, the state on a board in the memory that a block shares, where neighbours
+and contacts meet. Everything that decides (error, gap, status …) is known to all threads alike, so that all take the
+same branches. What a run gives depends neither on how it is cut into launches nor on the other chains.
 
-A try costs two barriers a stage and one for the error; an accepted one two more. Contacts cost nothing more while the
+A try costs two barriers a stage and one for the error; an accepted one two more unless its last stage is the first of
+the next step. Contacts cost nothing more while the
 floor or sprocket is out of reach and the neighbour list is empty.
 """
 
@@ -14,11 +15,11 @@ import functools
 import warp as wp
 
 from . import layout
-from .block_board import contact_constants, link_is_finite, load_link, note_constants, publish, take_place
+from .block_board import contact_constants, link_is_finite, load_link, note_constants, point, publish, take_place
 from .block_contact import block_self_contacts, touch_layout
 from .block_list import block_list
-from .block_memory import barrier, block_maxima, tile_address, vec4i
-from .block_step import Rates, block_method, error_of, vec3d, vec5d
+from .block_memory import barrier, block_maxima, tile_address, vec5i
+from .block_step import Link, block_method, error_of, link_on, note_first, vec3d, vec5d
 from .block_surroundings import block_surroundings, raised
 from .broadphase import list_layout
 from .controller import LEAST_SHRINKAGE, step_controller
@@ -32,7 +33,7 @@ from .driver import (
     STEP_TOO_SMALL,
     Features,
 )
-from .elementary import ONE, ZERO, cos_sin
+from .elementary import ONE, ZERO
 from .layout import (
     ACCEPTED,
     BOARD_LOST_DAMPING,
@@ -40,14 +41,12 @@ from .layout import (
     BOARD_LOST_FRICTION,
     BOARD_LOST_SELF,
     BOARD_NOTES,
-    BOARD_SELF_DEPTH,
     BOUNCES,
     FLOOR_DEPTH,
     FLOOR_IMPULSES,
     INERTIA,
     INVERSE_INERTIA,
     INVERSE_MASS,
-    KEPT_STAGE,
     LAST_FLOOR_IMPULSE,
     LIST_BUILDS,
     LOSS_DAMPING,
@@ -116,12 +115,14 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     is_shared = block_dim <= LARGEST_SHARED_BLOCK
     width = block_dim + 1 if is_shared else columns
     board_size = layout.BOARD_NOTES * width + max(width, layout.NOTES) if is_shared else 1
-    touch = touch_layout(columns, in_lists=not is_shared)
+    touch = touch_layout(columns, block_dim, in_lists=not is_shared)
     touch_size = touch.size if is_shared else 1
     board_address = tile_address(wp.float64, board_size)
     touch_address = tile_address(wp.int32, touch_size)
+    ends_address = tile_address(vec5d, block_dim)
+    forces_address = tile_address(vec3d, block_dim)
     hand_over, stage, attempt = block_method(features.method, block_dim)
-    greatest, _greatest_of_four = block_maxima(block_dim)
+    greatest, _greatest_of_five = block_maxima(block_dim)
     measure, bound_of, meet_fixed_body = block_surroundings(features, block_dim)
     growth, shrinkage = step_controller(tableau.order, tableau.error_order, wp.float32)
     build_list = block_list(columns, block_dim, features.broad_phase)
@@ -152,28 +153,31 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         forces = wp.tile_empty(shape=(wp.static(block_dim),), dtype=vec3d, storage="shared")
         errors = wp.tile_empty(shape=(wp.static(block_dim),), dtype=wp.int32, storage="shared")
         votes = wp.tile_empty(shape=(wp.static(block_dim),), dtype=wp.int32, storage="shared")
-        maxima = wp.tile_empty(shape=(wp.static(block_dim),), dtype=vec4i, storage="shared")
+        maxima = wp.tile_empty(shape=(wp.static(block_dim),), dtype=vec5i, storage="shared")
         board = wp.tile_empty(shape=(wp.static(board_size),), dtype=wp.float64, storage="shared")
         touches = wp.tile_empty(shape=(wp.static(touch_size),), dtype=wp.int32, storage="shared")
         if state.status[world] != RUNNING:
             return
-        kept_block = scratch[world]
-        kept = wp.array(ptr=kept_block.ptr, shape=(wp.static(layout.BLOCK_ROWS), wp.static(columns)), dtype=wp.float64)
+        kept = wp.array(
+            ptr=scratch[world].ptr, shape=(wp.static(layout.BLOCK_ROWS), wp.static(columns)), dtype=wp.float64
+        )
         list_row = lists_of_worlds[world]
         L = wp.array(ptr=list_row.ptr, shape=(wp.static(lists.size),), dtype=wp.int32)
         board_start = board_address(board)
         touch_start = touch_address(touches)
         if wp.static(not is_shared):
-            board_start = kept_block.ptr
+            board_start = scratch[world].ptr
             touch_start = list_row.ptr
         K = wp.array(ptr=board_start, shape=(wp.static(layout.BOARD_ROWS), wp.static(width)), dtype=wp.float64)
         T = wp.array(ptr=touch_start, shape=(wp.static(touch.size),), dtype=wp.int32)
+        # what stages hand over is not needed while contacts are resolved
+        E = wp.array(ptr=ends_address(ends), shape=(5, wp.static(block_dim)), dtype=wp.float64)
+        F = wp.array(ptr=forces_address(forces), shape=(3, wp.static(block_dim)), dtype=wp.float64)
 
         chain = read_chain(model, world)
         n = chain.link_count
         place = take_place(chain, lane)
-        link = load_link(K, state, world, lane, n)
-        first = Rates()
+        load_link(K, state, world, lane, n)
         is_fresh = state.is_fresh[world] != 0
         if lane < n:
             inner = lane % 2 == 0
@@ -196,10 +200,12 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             K[BOARD_NOTES, NOTE_NEXT_LOOK] = wp.float64(state.next_sample[world]) * control.sample_interval
             T[wp.static(touch.fixed_hits)] = 0
             T[wp.static(touch.self_hits)] = 0
-        publish(K, n, place, link)
+            T[wp.static(touch.deepest)] = 0
+        publish(K, n, place)
         barrier()
-        next_end = hand_over(ends, place, link.x, link.y, link.u, link.v, link.omega, link.cosine, link.sine)
-        opening, gap, displacement, speed = measure(K, maxima, n, place, link, next_end)
+        link = link_on(K, lane)
+        next_end = hand_over(ends, K, place, link.x, link.y, link.u, link.v, link.omega, link.cosine, link.sine)
+        _error, opening, gap, displacement, speed = measure(K, maxima, n, place, link, next_end, 0)
         status = int(RUNNING)
         pairs = int(0)
         slack = wp.float32(0.5) * wp.float32(control.skin) - opening - displacement
@@ -216,27 +222,22 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             first = stage(
                 forces, K, place, next_end, link.x, link.y, link.u, link.v, link.omega, link.cosine, link.sine
             )
-        elif lane < n:
-            first.x = kept[KEPT_STAGE, lane]
-            first.y = kept[KEPT_STAGE + 1, lane]
-            first.theta = kept[KEPT_STAGE + 2, lane]
-            if wp.static(needs_first_power):
-                first.friction = kept[KEPT_STAGE + 3, lane]
-                first.damping = kept[KEPT_STAGE + 4, lane]
+            note_first(K, lane, first, wp.static(needs_first_power))
         time = state.time[world]
         step = state.step[world]
         last_error = wp.float32(state.last_error[world])
         tries_before = state.tries_before[world] + state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
         tries_left = int(wp.min(wp.int64(control.tries), control.step_limit - tries_before))
+        if record_is_full(record, world):
+            tries_left = 0
         bound = bound_of(control, pairs, gap, slack, speed)
-        is_full = record_is_full(record, world)
         tries = int(0)
         accepted = int(0)
         barrier()
-        while status == RUNNING and tries < tries_left and not is_full:
+        while status == RUNNING and tries < tries_left:
             if time >= K[BOARD_NOTES, NOTE_NEXT_LOOK]:
                 softness = state.softness[world]
-                publish(K, n, place, link)
+                publish(K, n, place)
                 barrier()
                 if lane == 0:
                     seen = read_chain(model, world)
@@ -252,10 +253,12 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 status = T[wp.static(touch.mailbox)]
                 is_full = record_is_full(record, world)
                 barrier()
-                if status != RUNNING:
-                    break
                 if wp.static(softens):
                     if state.softness[world] != softness:
+                        link = link_on(K, lane)
+                        next_end = hand_over(
+                            ends, K, place, link.x, link.y, link.u, link.v, link.omega, link.cosine, link.sine
+                        )
                         first = stage(
                             forces,
                             K,
@@ -269,6 +272,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                             link.cosine,
                             link.sine,
                         )
+                        note_first(K, lane, first, wp.static(needs_first_power))
+                if is_full or status != RUNNING:
+                    break
             stop_time = K[BOARD_NOTES, NOTE_STOP_TIME]
             if time >= stop_time:
                 status = state.stop_status[world]
@@ -281,18 +287,33 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if lands:
                 h = stop_time - time
 
-            trial = attempt(ends, forces, K, place, link, first, h)
+            trial = attempt(ends, forces, K, place, h)
             own_error = int(0)
             if lane < n:
                 own_error = error_of(trial, control.tolerance)
-            error = wp.cast(greatest(errors, lane, own_error), wp.float32)
+            error = wp.float32(0.0)
+            if wp.static(reuses_last):
+                # the last stage is at the new state: what else is to be known of it comes with the error
+                candidate = Link()
+                candidate.x = trial.x
+                candidate.y = trial.y
+                candidate.u = trial.u
+                candidate.v = trial.v
+                candidate.omega = trial.omega
+                candidate.cosine = trial.cosine
+                candidate.sine = trial.sine
+                error, new_opening, new_gap, new_displacement, new_speed = measure(
+                    K, maxima, n, place, candidate, trial.next_end, own_error
+                )
+            else:
+                error = wp.cast(greatest(errors, lane, own_error), wp.float32)
             tries += 1
             if not (error <= wp.float32(1.0)):
                 if wp.isfinite(error):
                     step = h * wp.float64(shrinkage(error))
                 else:
                     step = h * LEAST_SHRINKAGE
-                    broken = wp.where(lane >= n or link_is_finite(link, K[THETA, place.column], first), 0, 1)
+                    broken = wp.where(lane >= n or link_is_finite(K, lane), 0, 1)
                     if greatest(votes, lane, broken) > 0:
                         status = int(NOT_FINITE)
                 if status == RUNNING and step < control.smallest_step:
@@ -302,22 +323,31 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 if lane < n:
                     K[BOARD_LOST_FRICTION, lane] = K[BOARD_LOST_FRICTION, lane] + h * trial.friction
                     K[BOARD_LOST_DAMPING, lane] = K[BOARD_LOST_DAMPING, lane] + h * trial.damping
-                    link.x = trial.x
-                    link.y = trial.y
+                    K[X, lane] = trial.x
+                    K[Y, lane] = trial.y
                     K[THETA, lane] = trial.theta
-                    link.u = trial.u
-                    link.v = trial.v
-                    link.omega = trial.omega
-                    cosine, sine = cos_sin(trial.theta)
-                    link.cosine = cosine
-                    link.sine = sine
+                    K[U, lane] = trial.u
+                    K[V, lane] = trial.v
+                    K[OMEGA, lane] = trial.omega
+                    point(K, lane)
+                    if wp.static(reuses_last):
+                        note_first(K, lane, trial.last, wp.static(needs_first_power))
                 time = wp.where(lands, stop_time, time + h)
                 proposal = h * wp.float64(growth(error, last_error, control.proportional))
                 # a step that was cut short says nothing against the proposal that it was cut from
                 step = wp.where(h < step, wp.max(step, proposal), proposal)
                 last_error = wp.max(error, wp.float32(1e-4))
-                next_end = hand_over(ends, place, link.x, link.y, link.u, link.v, link.omega, link.cosine, link.sine)
-                opening, gap, displacement, speed = measure(K, maxima, n, place, link, next_end)
+                if wp.static(reuses_last):
+                    opening = new_opening
+                    gap = new_gap
+                    displacement = new_displacement
+                    speed = new_speed
+                else:
+                    link = link_on(K, lane)
+                    next_end = hand_over(
+                        ends, K, place, link.x, link.y, link.u, link.v, link.omega, link.cosine, link.sine
+                    )
+                    _error, opening, gap, displacement, speed = measure(K, maxima, n, place, link, next_end, 0)
                 if lane == 0:
                     K[BOARD_NOTES, NOTE_OPENING] = wp.max(K[BOARD_NOTES, NOTE_OPENING], wp.float64(opening))
                 is_hit = bool(False)
@@ -325,7 +355,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if gap < wp.float32(0.0):
                         hits = int(0)
                         if lane < n:
-                            link, hits = meet_fixed_body(K, place, contact_constants(K, n), program, world, time, link)
+                            hits = meet_fixed_body(K, place, contact_constants(K, n), program, world, time)
                         if hits > 0:
                             wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
                         if greatest(votes, lane, hits) > 0:
@@ -343,7 +373,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     slack = wp.float32(0.5) * wp.float32(control.skin) - opening - displacement
                     is_stale = not slack > wp.float32(0.0)
                     if is_stale or pairs > 0:
-                        publish(K, n, place, link)
+                        publish(K, n, place)
                         if is_stale:
                             if lane == 0:
                                 state.counts[world, LIST_BUILDS] = state.counts[world, LIST_BUILDS] + wp.int64(1)
@@ -358,23 +388,18 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                         touched = contact_constants(K, n)
                         touching = find_contacts(K, L, T, touched, lane, pairs, raised(opening))
                         if touching > 0:
-                            hits = resolve_contacts(K, T, touched, lane, touching)
+                            hits = resolve_contacts(K, L, T, E, F, touched, lane, touching)
                             if hits > 0:
                                 wp.atomic_add(T, wp.static(touch.self_hits), hits)
                             if greatest(votes, lane, hits) > 0:
                                 is_hit = bool(True)
-                                if lane < n:
-                                    link.u = K[U, lane]
-                                    link.v = K[V, lane]
-                                    link.omega = K[OMEGA, lane]
                 bound = bound_of(control, pairs, gap, slack, speed)
-                if wp.static(reuses_last):
-                    first = trial.last
-                if is_hit:
-                    next_end = hand_over(
-                        ends, place, link.x, link.y, link.u, link.v, link.omega, link.cosine, link.sine
-                    )
                 if is_hit or wp.static(not reuses_last):
+                    link = link_on(K, lane)
+                    if is_hit:
+                        next_end = hand_over(
+                            ends, K, place, link.x, link.y, link.u, link.v, link.omega, link.cosine, link.sine
+                        )
                     first = stage(
                         forces,
                         K,
@@ -388,28 +413,27 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                         link.cosine,
                         link.sine,
                     )
+                    note_first(K, lane, first, wp.static(needs_first_power))
+        tries_before = state.tries_before[world] + state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
         if status == RUNNING and tries_before + wp.int64(tries) >= control.step_limit:
             status = int(STEP_LIMIT)
         is_last = status != RUNNING and status != NOT_FINITE and state.last_look[world, TIME] != time
-        publish(K, n, place, link)
+        publish(K, n, place)
         barrier()
         if lane < n:
-            state.links[world, X, lane] = link.x
-            state.links[world, Y, lane] = link.y
+            state.links[world, X, lane] = K[X, lane]
+            state.links[world, Y, lane] = K[Y, lane]
             state.links[world, THETA, lane] = K[THETA, lane]
-            state.links[world, U, lane] = link.u
-            state.links[world, V, lane] = link.v
-            state.links[world, OMEGA, lane] = link.omega
+            state.links[world, U, lane] = K[U, lane]
+            state.links[world, V, lane] = K[V, lane]
+            state.links[world, OMEGA, lane] = K[OMEGA, lane]
+            left = wp.array(
+                ptr=scratch[world].ptr, shape=(wp.static(layout.BLOCK_ROWS), wp.static(columns)), dtype=wp.float64
+            )
             row = int(BOARD_LOST_SELF)
             while row < wp.static(layout.BOARD_NOTES):
-                kept[row, lane] = K[row, lane]
+                left[row, lane] = K[row, lane]
                 row += 1
-            kept[KEPT_STAGE, lane] = first.x
-            kept[KEPT_STAGE + 1, lane] = first.y
-            kept[KEPT_STAGE + 2, lane] = first.theta
-            if wp.static(needs_first_power):
-                kept[KEPT_STAGE + 3, lane] = first.friction
-                kept[KEPT_STAGE + 4, lane] = first.damping
         if lane == 0:
             if is_last:
                 # the series ends with the state in which the run ends
@@ -421,14 +445,12 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             damping = ZERO
             fixed = ZERO
             between = ZERO
-            deepest = ZERO
             i = int(0)
             while i < n:
                 friction += K[BOARD_LOST_FRICTION, i]
                 damping += K[BOARD_LOST_DAMPING, i]
                 fixed += K[BOARD_LOST_FIXED, i]
                 between += K[BOARD_LOST_SELF, i]
-                deepest = wp.max(deepest, K[BOARD_SELF_DEPTH, i])
                 i += 1
             state.losses[world, LOSS_FRICTION] = friction
             state.losses[world, LOSS_DAMPING] = damping
@@ -440,13 +462,13 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             counts[fixed_count] = counts[fixed_count] + wp.int64(T[wp.static(touch.fixed_hits)])
             counts[SELF_IMPULSES] = counts[SELF_IMPULSES] + wp.int64(T[wp.static(touch.self_hits)])
             state.extremes[world, OPENING] = K[BOARD_NOTES, NOTE_OPENING]
-            state.extremes[world, SELF_DEPTH] = deepest
+            state.extremes[world, SELF_DEPTH] = wp.max(
+                state.extremes[world, SELF_DEPTH], wp.float64(wp.cast(T[wp.static(touch.deepest)], wp.float32))
+            )
             state.extremes[world, fixed_depth] = K[BOARD_NOTES, NOTE_FIXED_DEPTH]
             state.watch[world, LAST_FLOOR_IMPULSE] = K[BOARD_NOTES, NOTE_LAST_IMPULSE]
             state.is_fresh[world] = 0
             state.has_first_stage[world] = 1
-            state.gap[world] = wp.float64(gap)
-            state.slack[world] = wp.float64(slack)
             state.time[world] = time
             state.step[world] = step
             state.last_error[world] = wp.float64(last_error)

@@ -2,14 +2,16 @@
 
 import warp as wp
 
-from .block_step import Link, Place, Rates
-from .elementary import ONE, cos_sin
+from .block_step import Link, Place, link_on
+from .elementary import ZERO, cos_sin
 from .geometry import end_positions
 from .layout import (
+    BOARD_FIRST,
     BOARD_NOTES,
     COSINE,
     LEFT_X,
     LEFT_Y,
+    MASS,
     NOTE_CHAIN_FRICTION,
     NOTE_CHAIN_RESTITUTION,
     NOTE_CIRCLE_RADIUS,
@@ -18,6 +20,7 @@ from .layout import (
     NOTE_FLOOR_FRICTION,
     NOTE_FLOOR_RESTITUTION,
     NOTE_GRAVITY,
+    NOTE_HALF_LENGTH,
     NOTE_INVERSE_SMOOTHING,
     NOTE_SPROCKET_FRICTION,
     NOTE_SPROCKET_RADIUS,
@@ -52,13 +55,13 @@ def take_place(chain: Chain, lane: int) -> Place:
     if lane < n:
         place.before = wp.where(lane == 0, n - 1, lane - 1)
         place.after = wp.where(lane == n - 1, 0, lane + 1)
-    place.half_length = chain.half_length
     return place
 
 
 @wp.func
 def note_constants(K: wp.array2d(dtype=wp.float64), chain: Chain):
     """What stages and contacts need of a chain, onto the board."""
+    K[BOARD_NOTES, NOTE_HALF_LENGTH] = chain.half_length
     K[BOARD_NOTES, NOTE_STIFFNESS] = chain.joint_stiffness
     K[BOARD_NOTES, NOTE_DAMPING] = chain.joint_damping
     K[BOARD_NOTES, NOTE_VISCOUS] = chain.viscous_friction
@@ -94,45 +97,44 @@ def contact_constants(K: wp.array2d(dtype=wp.float64), n: int) -> Chain:
 
 
 @wp.func
-def load_link(K: wp.array2d(dtype=wp.float64), state: State, world: int, lane: int, n: int) -> Link:
-    """State of a thread's link, its angle on the board; threads beyond the last hold one at the origin."""
-    link = Link()
-    link.cosine = ONE
+def load_link(K: wp.array2d(dtype=wp.float64), state: State, world: int, lane: int, n: int):
+    """Puts a thread's link on the board; threads beyond the last get one at the origin that nothing acts upon."""
+    row = int(0)
+    while row < SINE:
+        K[row, lane] = ZERO
+        row += 1
     if lane < n:
-        theta = state.links[world, THETA, lane]
-        K[THETA, lane] = theta
-        link.x = state.links[world, X, lane]
-        link.y = state.links[world, Y, lane]
-        link.u = state.links[world, U, lane]
-        link.v = state.links[world, V, lane]
-        link.omega = state.links[world, OMEGA, lane]
-        cosine, sine = cos_sin(theta)
-        link.cosine = cosine
-        link.sine = sine
-    return link
+        K[X, lane] = state.links[world, X, lane]
+        K[Y, lane] = state.links[world, Y, lane]
+        K[THETA, lane] = state.links[world, THETA, lane]
+        K[U, lane] = state.links[world, U, lane]
+        K[V, lane] = state.links[world, V, lane]
+        K[OMEGA, lane] = state.links[world, OMEGA, lane]
+    point(K, lane)
 
 
 @wp.func
-def ends_of(place: Place, link: Link):
+def point(K: wp.array2d(dtype=wp.float64), lane: int):
+    """Direction of a link, exactly, from its angle on the board."""
+    cosine, sine = cos_sin(K[THETA, lane])
+    K[COSINE, lane] = cosine
+    K[SINE, lane] = sine
+
+
+@wp.func
+def ends_of(K: wp.array2d(dtype=wp.float64), link: Link):
     """Left and right end of a link [m]."""
     chain = Chain()
-    chain.half_length = place.half_length
+    chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
     return end_positions(chain, link.x, link.y, link.cosine, link.sine)
 
 
 @wp.func
-def publish(K: wp.array2d(dtype=wp.float64), n: int, place: Place, link: Link):
-    """Fills the board's rows of state, directions and ends, with no barrier."""
+def publish(K: wp.array2d(dtype=wp.float64), n: int, place: Place):
+    """Fills the board's rows of ends from those of the state, with no barrier."""
     lane = place.lane
     if lane < n:
-        K[X, lane] = link.x
-        K[Y, lane] = link.y
-        K[U, lane] = link.u
-        K[V, lane] = link.v
-        K[OMEGA, lane] = link.omega
-        K[COSINE, lane] = link.cosine
-        K[SINE, lane] = link.sine
-        left_x, left_y, right_x, right_y = ends_of(place, link)
+        left_x, left_y, right_x, right_y = ends_of(K, link_on(K, lane))
         K[LEFT_X, lane] = left_x
         K[LEFT_Y, lane] = left_y
         K[RIGHT_X, lane] = right_x
@@ -143,8 +145,15 @@ def publish(K: wp.array2d(dtype=wp.float64), n: int, place: Place, link: Link):
 
 
 @wp.func
-def link_is_finite(link: Link, theta: wp.float64, first: Rates):
+def link_is_finite(K: wp.array2d(dtype=wp.float64), lane: int):
     """False if the state or its first derivative holds an infinity or a NaN."""
-    finite = wp.isfinite(link.x) and wp.isfinite(link.y) and wp.isfinite(theta)
-    finite = finite and wp.isfinite(link.u) and wp.isfinite(link.v) and wp.isfinite(link.omega)
-    return finite and wp.isfinite(first.x) and wp.isfinite(first.y) and wp.isfinite(first.theta)
+    finite = bool(True)
+    row = int(0)
+    while row < MASS:
+        finite = finite and wp.isfinite(K[row, lane])
+        row += 1
+    row = int(BOARD_FIRST)
+    while row < BOARD_FIRST + 3:
+        finite = finite and wp.isfinite(K[row, lane])
+        row += 1
+    return finite

@@ -1,10 +1,13 @@
 """Self-contacts in the block form: found in parallel, resolved in parallel rounds.
 
-A pair of joints (p, q) that may touch gets a key that orders as the fixed sequence of :func:`contact.self_contacts`
-does: (p mod 2, q mod 2, p, q). In each round every pair that is not done lays its key upon its four links, where the
-smallest stays, and a pair that finds its own key on all four goes: no pair before it in the sequence that shares a
-link is left. Pairs that go together share no link, so the outcome equals that of the sequence to the bit. The smallest
-key of all always goes, so there are at most as many rounds as pairs; a pile needs a handful.
+Either half of the fixed sequence of :mod:`self_contact` is taken by itself. A contact of it, a circle of one link and
+one of another, has a key that orders as the sequence does, and a thread that works out its geometry once. In each
+round every contact that is not done lays its key upon its two links, where the smallest stays, and a contact that
+finds its own key on both goes: none before it in the sequence that shares a link is left. Contacts that go together
+share no link, so the outcome equals that of the sequence to the bit. The smallest key of all always goes, so there are
+at most as many rounds as contacts; a pile of 60 links needs four in all, one of 150 about sixteen.
+
+What counts in a round is how many instructions one thread has to get through, at four to six cycles each.
 """
 
 import functools
@@ -14,9 +17,9 @@ import warp as wp
 
 from .block_memory import barrier
 from .broadphase import list_layout
-from .contact import resolve_joint_pair
-from .elementary import TWO
-from .layout import BOARD_LOST_SELF, BOARD_SELF_DEPTH, RIGHT_X, RIGHT_Y
+from .elementary import TWO, ZERO
+from .layout import BOARD_LOST_SELF, RIGHT_X, RIGHT_Y
+from .self_contact import collide, links_of, touching_circles
 from .types import Chain
 
 wp.set_module_options({"enable_backward": False})
@@ -33,63 +36,106 @@ class TouchLayout:
     """Where the integers of the contact pass lie: offsets into one row of int32.
 
     Attributes:
-        owners: Two sets of ``columns`` keys, one per link; rounds use them in turn.
-        keys: Keys of the touching pairs, DONE after their turn.
-        touching: Number of keys.
-        finished: Number of pairs that have gone.
+        width: Columns of the owners, at least the number of links.
+        owners: Two sets of ``width`` keys, one per link; rounds use them in turn.
+        pairs: The first ``shared_pairs`` pairs of joints that touch; further ones lie in the list's row.
+        shared_pairs: See ``pairs``.
+        touching: Number of such pairs.
+        finished: Number of contacts that have gone.
         fixed_hits: Impulses with floor or sprocket in this launch.
         self_hits: Impulses between links in this launch.
         mailbox: A status from one thread to all.
+        deepest: Greatest depth of a contact in this launch [m], bits of a single-precision number.
     """
 
+    width: int
     owners: int
-    keys: int
-    touching: int
-    finished: int
-    fixed_hits: int
-    self_hits: int
-    mailbox: int
-    size: int
+    shared_pairs: int
+
+    @property
+    def pairs(self) -> int:
+        """Offset."""
+        return self.owners + 2 * self.width
+
+    @property
+    def touching(self) -> int:
+        """Offset."""
+        return self.pairs + self.shared_pairs
+
+    @property
+    def finished(self) -> int:
+        """Offset."""
+        return self.touching + 1
+
+    @property
+    def fixed_hits(self) -> int:
+        """Offset."""
+        return self.touching + 2
+
+    @property
+    def self_hits(self) -> int:
+        """Offset."""
+        return self.touching + 3
+
+    @property
+    def mailbox(self) -> int:
+        """Offset."""
+        return self.touching + 4
+
+    @property
+    def deepest(self) -> int:
+        """Offset."""
+        return self.touching + 5
+
+    @property
+    def size(self) -> int:
+        """Integers from the row's start to the end of the last."""
+        return self.touching + 6
 
 
 @functools.cache
-def touch_layout(columns: int, in_lists: bool) -> TouchLayout:
-    """Layout for memory of its own, or inside the scratch parts of the neighbour list's row."""
-    lists = list_layout(columns)
-    owners, keys, end = 0, 2 * columns, 2 * columns + lists.capacity
-    size = end + 5
+def touch_layout(columns: int, block_dim: int, in_lists: bool) -> TouchLayout:
+    """Layout for shared memory of its own, a pair per thread, or inside the scratch parts of the list's row."""
     if in_lists:
-        owners, keys, end = lists.bucket, lists.touching, lists.found_first
-        size = lists.size
-    return TouchLayout(
-        owners=owners,
-        keys=keys,
-        touching=end,
-        finished=end + 1,
-        fixed_hits=end + 2,
-        self_hits=end + 3,
-        mailbox=end + 4,
-        size=size,
-    )
+        return TouchLayout(width=columns, owners=list_layout(columns).owners, shared_pairs=0)
+    return TouchLayout(width=block_dim, owners=0, shared_pairs=block_dim)
 
 
 @wp.func
 def pair_key(p: int, q: int):
     """Orders pairs of joints as (p mod 2, q mod 2, p, q)."""
-    parity = (p & 1) * 2 + (q & 1)
-    return (((parity << wp.static(JOINT_BITS)) | p) << wp.static(JOINT_BITS)) | q
+    return ((((p & 1) * 2 + (q & 1)) << wp.static(JOINT_BITS) | p) << wp.static(JOINT_BITS)) | q
 
 
 @wp.func
-def first_joint(key: int):
-    """p of a key."""
-    return (key >> wp.static(JOINT_BITS)) & wp.static(2**JOINT_BITS - 1)
+def first_joint(pair: int):
+    """p of a pair's key."""
+    return (pair >> wp.static(JOINT_BITS)) & wp.static(2**JOINT_BITS - 1)
 
 
 @wp.func
-def second_joint(key: int):
-    """q of a key."""
-    return key & wp.static(2**JOINT_BITS - 1)
+def second_joint(pair: int):
+    """q of a pair's key."""
+    return pair & wp.static(2**JOINT_BITS - 1)
+
+
+@wp.func
+def links_at(key: int, half: int, n: int):
+    """The two links of a contact of this half."""
+    return links_of(first_joint(key >> 1), second_joint(key >> 1), half, key & 1, n)
+
+
+@wp.func
+def claim(T: wp.array(dtype=wp.int32), owners: int, link_a: int, link_b: int, key: int):
+    """Lays a key upon the links of a contact."""
+    wp.atomic_min(T, owners + link_a, key)
+    wp.atomic_min(T, owners + link_b, key)
+
+
+@wp.func
+def is_first(T: wp.array(dtype=wp.int32), owners: int, link_a: int, link_b: int, key: int):
+    """True if no smaller key lies on the links of a contact."""
+    return T[owners + link_a] == key and T[owners + link_b] == key
 
 
 @functools.cache
@@ -102,10 +148,19 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         """Before a barrier that precedes ``find``."""
         if lane < n:
             T[wp.static(touch.owners) + lane] = FREE
-            T[wp.static(touch.owners + columns) + lane] = FREE
+            T[wp.static(touch.owners + touch.width) + lane] = FREE
         if lane == 0:
             T[wp.static(touch.touching)] = 0
             T[wp.static(touch.finished)] = 0
+
+    @wp.func
+    def pair_at(L: wp.array(dtype=wp.int32), T: wp.array(dtype=wp.int32), k: int):
+        pair = int(0)
+        if k < wp.static(touch.shared_pairs):
+            pair = T[wp.static(touch.pairs) + k]
+        else:
+            pair = L[wp.static(lists.touching) + k]
+        return pair
 
     @wp.func
     def find(
@@ -117,7 +172,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         pairs: int,
         opening: wp.float64,
     ):
-        """Number of listed pairs that may touch now; the board's rows RIGHT_X and RIGHT_Y are filled."""
+        """Number of pairs of joints that may touch now; the board is filled. ``opening``: greatest |C| [m]."""
         reach = TWO * chain.circle_radius + TWO * opening
         square = reach * reach
         k = lane
@@ -128,66 +183,168 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
             dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
             if dx * dx + dy * dy < square:
                 slot = wp.atomic_add(T, wp.static(touch.touching), 1)
-                T[wp.static(touch.keys) + slot] = pair_key(p, q)
+                if slot < wp.static(touch.shared_pairs):
+                    T[wp.static(touch.pairs) + slot] = pair_key(p, q)
+                else:
+                    L[wp.static(lists.touching) + slot] = pair_key(p, q)
             k += wp.static(block_dim)
         barrier()
         return T[wp.static(touch.touching)]
 
     @wp.func
-    def claim(T: wp.array(dtype=wp.int32), owners: int, n: int, key: int):
-        p = first_joint(key)
-        q = second_joint(key)
-        wp.atomic_min(T, owners + p, key)
-        wp.atomic_min(T, owners + p + 1, key)
-        wp.atomic_min(T, owners + q, key)
-        wp.atomic_min(T, owners + wp.where(q + 1 == n, 0, q + 1), key)
+    def note_depth(T: wp.array(dtype=wp.int32), depth: wp.float64):
+        wp.atomic_max(T, wp.static(touch.deepest), wp.cast(wp.float32(depth), wp.int32))
 
     @wp.func
-    def is_first(T: wp.array(dtype=wp.int32), owners: int, n: int, key: int):
-        p = first_joint(key)
-        q = second_joint(key)
-        here = T[owners + p] == key and T[owners + p + 1] == key
-        return here and T[owners + q] == key and T[owners + wp.where(q + 1 == n, 0, q + 1)] == key
+    def prepare(
+        K: wp.array2d(dtype=wp.float64),
+        T: wp.array(dtype=wp.int32),
+        E: wp.array2d(dtype=wp.float64),
+        F: wp.array2d(dtype=wp.float64),
+        chain: Chain,
+        pair: int,
+        half: int,
+        lane: int,
+    ):
+        """Lays down the geometry of a thread's first contact; returns its key, or DONE for circles that do not meet."""
+        depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = touching_circles(
+            K, chain, first_joint(pair), second_joint(pair), half, lane % 2
+        )
+        key = int(DONE)
+        if depth > ZERO:
+            key = 2 * pair + lane % 2
+            E[0, lane] = nx
+            E[1, lane] = ny
+            E[2, lane] = a_n
+            E[3, lane] = a_t
+            E[4, lane] = b_n
+            F[0, lane] = b_t
+            F[1, lane] = inverse_nn
+            F[2, lane] = inverse_determinant
+            note_depth(T, depth)
+        return key
 
     @wp.func
-    def resolve(K: wp.array2d(dtype=wp.float64), T: wp.array(dtype=wp.int32), chain: Chain, lane: int, touching: int):
-        """All touching pairs; the board is filled. Returns this thread's impulses."""
-        n = chain.link_count
+    def go_prepared(
+        K: wp.array2d(dtype=wp.float64),
+        E: wp.array2d(dtype=wp.float64),
+        F: wp.array2d(dtype=wp.float64),
+        chain: Chain,
+        link_a: int,
+        link_b: int,
+        lane: int,
+    ):
+        """The turn of a thread's first contact; returns the number of impulses."""
+        lost, hits = collide(
+            K,
+            chain,
+            link_a,
+            link_b,
+            E[0, lane],
+            E[1, lane],
+            E[2, lane],
+            E[3, lane],
+            E[4, lane],
+            F[0, lane],
+            F[1, lane],
+            F[2, lane],
+        )
+        K[BOARD_LOST_SELF, link_a] = K[BOARD_LOST_SELF, link_a] + lost
+        return int(hits)
+
+    @wp.func
+    def measure(
+        K: wp.array2d(dtype=wp.float64), T: wp.array(dtype=wp.int32), chain: Chain, pair: int, half: int, second: int
+    ):
+        """1 if the circles of a further contact meet, else 0."""
+        depth, _nx, _ny, _a_n, _a_t, _b_n, _b_t, _inverse_nn, _inverse_determinant = touching_circles(
+            K, chain, first_joint(pair), second_joint(pair), half, second
+        )
+        note_depth(T, depth)
+        return wp.where(depth > ZERO, 1, 0)
+
+    @wp.func
+    def go(K: wp.array2d(dtype=wp.float64), chain: Chain, key: int, half: int, link_a: int, link_b: int):
+        """The turn of a further contact; returns the number of impulses."""
+        _depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = touching_circles(
+            K, chain, first_joint(key >> 1), second_joint(key >> 1), half, key & 1
+        )
+        lost, hits = collide(K, chain, link_a, link_b, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant)
+        K[BOARD_LOST_SELF, link_a] = K[BOARD_LOST_SELF, link_a] + lost
+        return int(hits)
+
+    @wp.func
+    def resolve(
+        K: wp.array2d(dtype=wp.float64),
+        L: wp.array(dtype=wp.int32),
+        T: wp.array(dtype=wp.int32),
+        E: wp.array2d(dtype=wp.float64),
+        F: wp.array2d(dtype=wp.float64),
+        chain: Chain,
+        lane: int,
+        touching: int,
+    ):
+        """All contacts; the board is filled. Returns this thread's impulses.
+
+        A thread keeps the geometry of its first contact in its columns of E and F; should there be more contacts than
+        threads, it works that of the others out again in their turn.
+        """
         impulses = int(0)
         owners = int(wp.static(touch.owners))
-        others = int(wp.static(touch.owners + columns))
+        others = int(wp.static(touch.owners + touch.width))
+        contacts = 2 * touching
         finished = int(0)
-        while finished < touching:
-            k = lane
-            while k < touching:
-                key = T[wp.static(touch.keys) + k]
-                if key != DONE:
-                    claim(T, owners, n, key)
-                k += wp.static(block_dim)
-            barrier()
+        half = int(0)
+        while half < 2:
             gone = int(0)
-            k = lane
-            while k < touching:
-                key = T[wp.static(touch.keys) + k]
-                if key != DONE:
-                    if is_first(T, owners, n, key):
-                        p = first_joint(key)
-                        depth, lost, hits = resolve_joint_pair(K, chain, p, second_joint(key), K[BOARD_LOST_SELF, p])
-                        K[BOARD_LOST_SELF, p] = lost
-                        K[BOARD_SELF_DEPTH, p] = wp.max(K[BOARD_SELF_DEPTH, p], depth)
-                        impulses += int(hits)
-                        T[wp.static(touch.keys) + k] = DONE
-                        gone += 1
+            own_key = int(DONE)
+            if lane < contacts:
+                own_key = prepare(K, T, E, F, chain, pair_at(L, T, lane // 2), half, lane)
+                gone = wp.where(own_key == DONE, 1, 0)
+            own_a, own_b = links_at(wp.max(own_key, 0), half, chain.link_count)
+            k = lane + wp.static(block_dim)
+            while k < contacts:
+                touches = measure(K, T, chain, pair_at(L, T, k // 2), half, k % 2)
+                L[wp.static(lists.pending) + k] = touches
+                gone += 1 - touches
                 k += wp.static(block_dim)
-            if lane < n:
-                T[others + lane] = FREE
-            if gone > 0:
-                wp.atomic_add(T, wp.static(touch.finished), gone)
-            barrier()
-            finished = T[wp.static(touch.finished)]
-            swapped = owners
-            owners = others
-            others = swapped
+            while finished < contacts * (half + 1):
+                if own_key != DONE:
+                    claim(T, owners, own_a, own_b, own_key)
+                k = lane + wp.static(block_dim)
+                while k < contacts:
+                    if L[wp.static(lists.pending) + k] != 0:
+                        key = 2 * pair_at(L, T, k // 2) + k % 2
+                        link_a, link_b = links_at(key, half, chain.link_count)
+                        claim(T, owners, link_a, link_b, key)
+                    k += wp.static(block_dim)
+                barrier()
+                if own_key != DONE:
+                    if is_first(T, owners, own_a, own_b, own_key):
+                        impulses += go_prepared(K, E, F, chain, own_a, own_b, lane)
+                        gone += 1
+                        own_key = DONE
+                k = lane + wp.static(block_dim)
+                while k < contacts:
+                    if L[wp.static(lists.pending) + k] != 0:
+                        key = 2 * pair_at(L, T, k // 2) + k % 2
+                        link_a, link_b = links_at(key, half, chain.link_count)
+                        if is_first(T, owners, link_a, link_b, key):
+                            impulses += go(K, chain, key, half, link_a, link_b)
+                            gone += 1
+                            L[wp.static(lists.pending) + k] = 0
+                    k += wp.static(block_dim)
+                if lane < chain.link_count:
+                    T[others + lane] = FREE
+                if gone > 0:
+                    wp.atomic_add(T, wp.static(touch.finished), gone)
+                    gone = 0
+                barrier()
+                finished = T[wp.static(touch.finished)]
+                swapped = owners
+                owners = others
+                others = swapped
+            half += 1
         return impulses
 
     return clear, find, resolve

@@ -60,12 +60,12 @@ def tile_address(dtype: type, size: int):
     return address
 
 
-vec4i = wp.types.vector(length=4, dtype=wp.int32)
+vec5i = wp.types.vector(length=5, dtype=wp.int32)
 
 
 @functools.cache
 def block_maxima(block_dim: int):
-    """Warp functions (greatest of an integer, greatest of each of four) over the threads of a block.
+    """Warp functions (greatest of an integer, greatest of each of five) over the threads of a block.
 
     Both take a shared tile, the thread's number and its value, and return the same result in all threads. A tile may
     be used again after any other barrier.
@@ -82,18 +82,26 @@ def block_maxima(block_dim: int):
         return top
 
     @wp.func
-    def greatest_of_four(tile: wp.tile[vec4i, block_dim], lane: int, value: vec4i):
-        tile[lane // warp_width()] = vec4i(
-            warp_greatest(value[0]), warp_greatest(value[1]), warp_greatest(value[2]), warp_greatest(value[3])
+    def greatest_of_five(tile: wp.tile[vec5i, block_dim], lane: int, value: vec5i):
+        tile[lane // warp_width()] = vec5i(
+            warp_greatest(value[0]),
+            warp_greatest(value[1]),
+            warp_greatest(value[2]),
+            warp_greatest(value[3]),
+            warp_greatest(value[4]),
         )
         top = tile[0]
         i = int(1)
         while i < wp.static(block_dim) // warp_width():
             other = tile[i]
-            top = vec4i(
-                wp.max(top[0], other[0]), wp.max(top[1], other[1]), wp.max(top[2], other[2]), wp.max(top[3], other[3])
+            top = vec5i(
+                wp.max(top[0], other[0]),
+                wp.max(top[1], other[1]),
+                wp.max(top[2], other[2]),
+                wp.max(top[3], other[3]),
+                wp.max(top[4], other[4]),
             )
             i += 1
         return top
 
-    return greatest, greatest_of_four
+    return greatest, greatest_of_five

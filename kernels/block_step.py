@@ -1,8 +1,11 @@
-"""Embedded explicit Runge–Kutta methods in the block form: one thread per link, everything in registers.
+"""Embedded explicit Runge–Kutta methods in the block form: one thread per link, stages in registers.
 
-The same stages as in :mod:`explicit`, for the same tableaus. A thread holds its link's state and stage accelerations
-and works out the joint at its link's right end. In each stage it hands its left end to the link before and its joint's
-force to the link after; two barriers a stage cost less than working out every joint twice.
+The same stages as in :mod:`explicit`, for the same tableaus. A thread holds its link's stage accelerations and works
+out the joint at its link's right end. In each stage it hands its left end to the link before and its joint's force to
+the link after; two barriers a stage cost less than working out every joint twice.
+
+Registers are dear: what does not fit goes to local memory, for which shared memory leaves hardly any cache. So the
+state of the link and the constants of the chain lie on the board and are read where they are needed.
 """
 
 import functools
@@ -14,16 +17,25 @@ from .elementary import LARGEST_TURN, ZERO
 from .geometry import end_positions, end_velocities, turned_direction
 from .joint import friction_torque, joint_force, link_acceleration
 from .layout import (
+    BOARD_FIRST,
     BOARD_NOTES,
+    COSINE,
     INVERSE_INERTIA,
     INVERSE_MASS,
     NOTE_COULOMB,
     NOTE_DAMPING,
     NOTE_GRAVITY,
+    NOTE_HALF_LENGTH,
     NOTE_INVERSE_SMOOTHING,
     NOTE_STIFFNESS,
     NOTE_VISCOUS,
+    OMEGA,
+    SINE,
     THETA,
+    U,
+    V,
+    X,
+    Y,
 )
 from .tableaus import TABLEAUS
 from .types import Chain
@@ -36,10 +48,7 @@ vec5d = wp.types.vector(length=5, dtype=wp.float64)
 
 @wp.struct
 class Link:
-    """What a thread knows of its link, but for the angle, which no stage needs: that lies on the board.
-
-    Threads beyond the last link hold one that nothing acts upon.
-    """
+    """State of a link but for its angle, which no stage needs."""
 
     x: wp.float64  # [m]
     y: wp.float64  # [m]
@@ -58,7 +67,6 @@ class Place:
     column: wp.int32  # the same, of the last link for threads beyond
     before: wp.int32  # the link to the left
     after: wp.int32  # the link to the right
-    half_length: wp.float64  # [m]
 
 
 @wp.struct
@@ -83,11 +91,39 @@ class Trial:
     v: wp.float64
     omega: wp.float64
     last: Rates
+    next_end: vec5d  # left end of the next link in the last stage, and this link's direction there
+    cosine: wp.float64
+    sine: wp.float64
     friction: wp.float64
     damping: wp.float64
     error: wp.float32  # greatest error times tolerance, a quotient not yet divided, and …
     scale: wp.float32  # … its divisor
     turns_far: bool  # beyond the range of the stages' polynomials
+
+
+@wp.func
+def link_on(K: wp.array2d(dtype=wp.float64), column: int) -> Link:
+    """A link as it stands on the board."""
+    link = Link()
+    link.x = K[X, column]
+    link.y = K[Y, column]
+    link.u = K[U, column]
+    link.v = K[V, column]
+    link.omega = K[OMEGA, column]
+    link.cosine = K[COSINE, column]
+    link.sine = K[SINE, column]
+    return link
+
+
+@wp.func
+def note_first(K: wp.array2d(dtype=wp.float64), column: int, first: Rates, with_powers: bool):
+    """Puts a link's first stage of the next step on the board."""
+    K[BOARD_FIRST, column] = first.x
+    K[BOARD_FIRST + 1, column] = first.y
+    K[BOARD_FIRST + 2, column] = first.theta
+    if with_powers:
+        K[BOARD_FIRST + 3, column] = first.friction
+        K[BOARD_FIRST + 4, column] = first.damping
 
 
 @wp.func
@@ -115,9 +151,9 @@ def block_method(name: str, block_dim: int):
         block_dim: Threads in a block.
 
     Returns:
-        ``hand_over(ends, place, x, y, u, v, omega, cosine, sine)`` → left end of the next link;
+        ``hand_over(ends, K, place, x, y, u, v, omega, cosine, sine)`` → left end of the next link;
         ``stage(forces, K, place, next_end, x, y, u, v, omega, cosine, sine)`` → Rates;
-        ``attempt(ends, forces, K, place, link, first, h)`` → Trial.
+        ``attempt(ends, forces, K, place, h)`` → Trial, from the state and first stage on the board.
     """
     tableau = TABLEAUS[name]
     stages = tableau.stages
@@ -129,6 +165,7 @@ def block_method(name: str, block_dim: int):
     @wp.func
     def hand_over(
         ends: wp.tile[vec5d, block_dim],
+        K: wp.array2d(dtype=wp.float64),
         place: Place,
         x: wp.float64,
         y: wp.float64,
@@ -139,7 +176,7 @@ def block_method(name: str, block_dim: int):
         sine: wp.float64,
     ):
         chain = Chain()
-        chain.half_length = place.half_length
+        chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
         left_x, left_y, _right_x, _right_y = end_positions(chain, x, y, cosine, sine)
         left_u, left_v, _right_u, _right_v = end_velocities(chain, u, v, omega, cosine, sine)
         ends[place.lane] = vec5d(left_x, left_y, left_u, left_v, omega)
@@ -161,7 +198,7 @@ def block_method(name: str, block_dim: int):
     ):
         # constants are read from the board where they are needed: registers are dear, such reads are not
         chain = Chain()
-        chain.half_length = place.half_length
+        chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
         chain.joint_stiffness = K[BOARD_NOTES, NOTE_STIFFNESS]
         chain.joint_damping = K[BOARD_NOTES, NOTE_DAMPING]
         chain.viscous_friction = K[BOARD_NOTES, NOTE_VISCOUS]
@@ -207,24 +244,23 @@ def block_method(name: str, block_dim: int):
         forces: wp.tile[vec3d, block_dim],
         K: wp.array2d(dtype=wp.float64),
         place: Place,
-        link: Link,
-        first: Rates,
         h: wp.float64,
     ):
         hh = h * h
+        lane = place.lane
         ax = Stages()
         ay = Stages()
         at = Stages()
-        ax[0] = first.x
-        ay[0] = first.y
-        at[0] = first.theta
+        ax[0] = K[BOARD_FIRST, lane]
+        ay[0] = K[BOARD_FIRST + 1, lane]
+        at[0] = K[BOARD_FIRST + 2, lane]
         trial = Trial()
-        rates = first
+        rates = Rates()
         friction = ZERO
         damping = ZERO
         if wp.static(velocity_weights[0] != 0.0):
-            friction = wp.static(wp.float64(velocity_weights[0])) * first.friction
-            damping = wp.static(wp.float64(velocity_weights[0])) * first.damping
+            friction = wp.static(wp.float64(velocity_weights[0])) * K[BOARD_FIRST + 3, lane]
+            damping = wp.static(wp.float64(velocity_weights[0])) * K[BOARD_FIRST + 4, lane]
         for s in range(1, wp.static(stages)):
             du = ZERO
             dv = ZERO
@@ -242,14 +278,18 @@ def block_method(name: str, block_dim: int):
                     dy += wp.static(wp.float64(position[s][j])) * ay[j]
                     turn += wp.static(wp.float64(position[s][j])) * at[j]
             ch = wp.static(wp.float64(nodes[s])) * h
+            link = link_on(K, lane)
             cosine, sine = turned_direction(link.cosine, link.sine, ch * link.omega + hh * turn)
             x = link.x + (ch * link.u + hh * dx)
             y = link.y + (ch * link.v + hh * dy)
             u = link.u + h * du
             v = link.v + h * dv
             omega = link.omega + h * dw
-            next_end = hand_over(ends, place, x, y, u, v, omega, cosine, sine)
+            next_end = hand_over(ends, K, place, x, y, u, v, omega, cosine, sine)
             rates = stage(forces, K, place, next_end, x, y, u, v, omega, cosine, sine)
+            trial.next_end = next_end
+            trial.cosine = cosine
+            trial.sine = sine
             ax[s] = rates.x
             ay[s] = rates.y
             at[s] = rates.theta
@@ -286,9 +326,10 @@ def block_method(name: str, block_dim: int):
                 ex += wp.static(wp.float64(position_errors[j])) * ax[j]
                 ey += wp.static(wp.float64(position_errors[j])) * ay[j]
                 et += wp.static(wp.float64(position_errors[j])) * at[j]
+        link = link_on(K, lane)
         trial.x = link.x + (h * link.u + hh * dx)
         trial.y = link.y + (h * link.v + hh * dy)
-        theta = K[THETA, place.column]
+        theta = K[THETA, lane]
         trial.theta = theta + (h * link.omega + hh * turn)
         trial.u = link.u + h * du
         trial.v = link.v + h * dv
@@ -298,16 +339,22 @@ def block_method(name: str, block_dim: int):
         trial.damping = damping
         # the greatest of six quotients by cross-multiplication, so that only one needs a division
         error_x, scale_x = greater(
-            wp.float32(hh * ex), error_scale(link.x, link.u, h), wp.float32(h * eu), error_scale(link.u, first.x, h)
+            wp.float32(hh * ex),
+            error_scale(link.x, link.u, h),
+            wp.float32(h * eu),
+            error_scale(link.u, K[BOARD_FIRST, lane], h),
         )
         error_y, scale_y = greater(
-            wp.float32(hh * ey), error_scale(link.y, link.v, h), wp.float32(h * ev), error_scale(link.v, first.y, h)
+            wp.float32(hh * ey),
+            error_scale(link.y, link.v, h),
+            wp.float32(h * ev),
+            error_scale(link.v, K[BOARD_FIRST + 1, lane], h),
         )
         error_t, scale_t = greater(
             wp.float32(hh * et),
             error_scale(theta, link.omega, h),
             wp.float32(h * ew),
-            error_scale(link.omega, first.theta, h),
+            error_scale(link.omega, K[BOARD_FIRST + 2, lane], h),
         )
         error, scale = greater(error_x, scale_x, error_y, scale_y)
         error, scale = greater(error, scale, error_t, scale_t)

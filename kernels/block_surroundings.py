@@ -5,8 +5,8 @@ import functools
 import warp as wp
 
 from .block_board import ends_of
-from .block_memory import block_maxima, vec4i
-from .block_step import Link, Place, vec5d
+from .block_memory import block_maxima, vec5i
+from .block_step import Link, Place, link_on, vec5d
 from .contact import meet_floor, meet_sprocket
 from .driver import Features, sprocket_turning
 from .elementary import TWO, ZERO, from_order_key_single, order_key_single
@@ -18,7 +18,11 @@ from .layout import (
     INVERSE_INERTIA,
     INVERSE_MASS,
     NOTE_CIRCLE_RADIUS,
+    NOTE_HALF_LENGTH,
     NOTE_SPROCKET_RADIUS,
+    OMEGA,
+    U,
+    V,
 )
 from .types import Chain, Control, Program
 
@@ -41,23 +45,25 @@ def block_surroundings(features: Features, block_dim: int):
     has_fixed = has_floor or has_sprocket
     has_self = features.self_contact
     has_contacts = has_fixed or has_self
-    _greatest, greatest_of_four = block_maxima(block_dim)
+    _greatest, greatest_of_five = block_maxima(block_dim)
 
     @wp.func
     def measure(
         K: wp.array2d(dtype=wp.float64),
-        maxima: wp.tile[vec4i, block_dim],
+        maxima: wp.tile[vec5i, block_dim],
         n: int,
         place: Place,
         link: Link,
         next_end: vec5d,
+        error: int,
     ):
         """Greatest opening, least gap, greatest displacement since listing, greatest speed: [m], [m/s].
 
-        Computed in double, compared in single precision, which keeps signs.
+        Computed in double, compared in single precision, which keeps signs. ``error``: bits of a link's error ratio,
+        of which the greatest comes first.
         """
-        left_x, left_y, right_x, right_y = ends_of(place, link)
-        values = vec4i(0, order_key_single(wp.float32(-wp.inf)), 0, 0)
+        left_x, left_y, right_x, right_y = ends_of(K, link)
+        values = vec5i(0, order_key_single(wp.float32(-wp.inf)), 0, 0, error)
         if place.lane < n:
             cx = next_end[0] - right_x
             cy = next_end[1] - right_y
@@ -74,11 +80,12 @@ def block_surroundings(features: Features, block_dim: int):
                 dy = right_y - K[BOARD_LISTED_Y, place.lane]
                 values[2] = wp.cast(wp.float32(dx * dx + dy * dy), wp.int32)
             if wp.static(has_contacts):
-                turn = place.half_length * link.omega
+                turn = K[BOARD_NOTES, NOTE_HALF_LENGTH] * link.omega
                 speed = TWO * (link.u * link.u + link.v * link.v + turn * turn)
                 values[3] = wp.cast(wp.float32(speed), wp.int32)
-        values = greatest_of_four(maxima, place.lane, values)
+        values = greatest_of_five(maxima, place.lane, values)
         return (
+            wp.cast(values[4], wp.float32),
             wp.sqrt(wp.cast(values[0], wp.float32)),
             -from_order_key_single(values[1]),
             wp.sqrt(wp.cast(values[2], wp.float32)),
@@ -108,10 +115,10 @@ def block_surroundings(features: Features, block_dim: int):
         program: Program,
         world: int,
         time: wp.float64,
-        link: Link,
     ):
-        """This link after floor or sprocket, and the number of impulses."""
-        left_x, left_y, right_x, right_y = ends_of(place, link)
+        """This link, on the board, after floor or sprocket; returns the number of impulses."""
+        link = link_on(K, place.lane)
+        left_x, left_y, right_x, right_y = ends_of(K, link)
         u = link.u
         v = link.v
         omega = link.omega
@@ -149,11 +156,10 @@ def block_surroundings(features: Features, block_dim: int):
                 link.v,
                 link.omega,
             )
-        after = link
-        after.u = u
-        after.v = v
-        after.omega = omega
+        K[U, place.lane] = u
+        K[V, place.lane] = v
+        K[OMEGA, place.lane] = omega
         K[BOARD_LOST_FIXED, place.lane] = K[BOARD_LOST_FIXED, place.lane] + lost_left + lost_right
-        return after, int(hits)
+        return int(hits)
 
     return measure, bound_of, meet_fixed_body

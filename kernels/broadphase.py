@@ -88,9 +88,19 @@ class ListLayout:
         return self.cell_x + self.columns
 
     @property
+    def pending(self) -> int:
+        """Scratch of the block form, over parts that serve at other times: which contacts have not gone yet."""
+        return self.found_first
+
+    @property
+    def owners(self) -> int:
+        """Scratch of the block form for chains too long for shared memory, see :mod:`block_contact`."""
+        return max(self.cell_y + self.columns, self.pending + 2 * self.capacity)
+
+    @property
     def size(self) -> int:
         """Integers in all."""
-        return self.cell_y + self.columns
+        return self.owners + 2 * self.columns + 8
 
 
 @functools.cache

@@ -1,18 +1,15 @@
-"""Contacts of a chain after an accepted step: floor, then sprocket, then its own links.
+"""Contacts of a chain with floor and sprocket after an accepted step, and how near they are.
 
 Overlapping and approaching circles get one impulse each; overlapping ones that separate are left alone, and
 positions are never corrected. A floor or sprocket contact touches one link only, so those are done link by link,
 each link's left circle before its right one: the result is that of any sequence over the links. Contacts between
-links follow one fixed order, see :func:`resolve_self_contacts`.
+links follow one fixed order, see :mod:`self_contact`.
 """
-
-import functools
 
 import warp as wp
 
-from .broadphase import list_layout
-from .elementary import HALF, ONE, TWO, ZERO, from_order_key, order_bits, order_key, quotient
-from .impulse import collision_impulse, fixed_contact
+from .elementary import ONE, TWO, ZERO, from_order_key, order_bits, order_key, quotient
+from .impulse import fixed_contact
 from .layout import (
     INVERSE_INERTIA,
     INVERSE_MASS,
@@ -290,165 +287,3 @@ def resolve_sprocket(K: wp.array2d(dtype=wp.float64), chain: Chain, surface_spee
         impulses += hits
         i += 1
     return impulses
-
-
-@wp.func
-def resolve_link_pair(
-    K: wp.array2d(dtype=wp.float64),
-    chain: Chain,
-    link_a: int,
-    end_a_x: wp.float64,
-    end_a_y: wp.float64,
-    link_b: int,
-    end_b_x: wp.float64,
-    end_b_y: wp.float64,
-):
-    """One circle of link A against one of link B, centres given [m].
-
-    Returns:
-        Depth of the overlap [m] (0 if none), energy lost [J], and 1 if there was an impulse, else 0. Exactly
-        concentric circles have no normal and are left alone.
-    """
-    dx = end_b_x - end_a_x
-    dy = end_b_y - end_a_y
-    reach = TWO * chain.circle_radius
-    square = dx * dx + dy * dy
-    depth = ZERO
-    lost = ZERO
-    hits = wp.int64(0)
-    if square < reach * reach and square > ZERO:
-        distance = wp.sqrt(square)
-        depth = reach - distance
-        nx = quotient(dx, distance)
-        ny = quotient(dy, distance)
-        px = HALF * (end_a_x + end_b_x)
-        py = HALF * (end_a_y + end_b_y)
-        ax = px - K[X, link_a]
-        ay = py - K[Y, link_a]
-        bx = px - K[X, link_b]
-        by = py - K[Y, link_b]
-        vx = (K[U, link_a] - K[OMEGA, link_a] * ay) - (K[U, link_b] - K[OMEGA, link_b] * by)
-        vy = (K[V, link_a] + K[OMEGA, link_a] * ax) - (K[V, link_b] + K[OMEGA, link_b] * bx)
-        normal_speed = vx * nx + vy * ny
-        if normal_speed > ZERO:
-            tangential_speed = vy * nx - vx * ny
-            a_n = ax * ny - ay * nx
-            a_t = ax * nx + ay * ny
-            b_n = bx * ny - by * nx
-            b_t = bx * nx + by * ny
-            mass_a = K[INVERSE_MASS, link_a]
-            mass_b = K[INVERSE_MASS, link_b]
-            inertia_a = K[INVERSE_INERTIA, link_a]
-            inertia_b = K[INVERSE_INERTIA, link_b]
-            w_nn = mass_a + mass_b + a_n * a_n * inertia_a + b_n * b_n * inertia_b
-            w_nt = a_n * a_t * inertia_a + b_n * b_t * inertia_b
-            w_tt = mass_a + mass_b + a_t * a_t * inertia_a + b_t * b_t * inertia_b
-            jn, jt = collision_impulse(
-                normal_speed,
-                tangential_speed,
-                w_nn,
-                w_nt,
-                w_tt,
-                chain.chain_restitution,
-                chain.chain_friction,
-                chain.tangential_restitution,
-            )
-            jx = jn * nx - jt * ny
-            jy = jn * ny + jt * nx
-            K[U, link_a] = K[U, link_a] - jx * mass_a
-            K[V, link_a] = K[V, link_a] - jy * mass_a
-            K[OMEGA, link_a] = K[OMEGA, link_a] - (a_n * jn + a_t * jt) * inertia_a
-            K[U, link_b] = K[U, link_b] + jx * mass_b
-            K[V, link_b] = K[V, link_b] + jy * mass_b
-            K[OMEGA, link_b] = K[OMEGA, link_b] + (b_n * jn + b_t * jt) * inertia_b
-            changed_n = w_nn * jn + w_nt * jt
-            changed_t = w_nt * jn + w_tt * jt
-            lost = jn * (normal_speed - HALF * changed_n) + jt * (tangential_speed - HALF * changed_t)
-            hits = wp.int64(1)
-    return depth, lost, hits
-
-
-@wp.func
-def are_neighbours(link_a: int, link_b: int, link_count: int):
-    """True for the same link or links that share a joint."""
-    apart = wp.abs(link_a - link_b)
-    return apart < 2 or apart > link_count - 2
-
-
-@wp.func
-def resolve_joint_pair(K: wp.array2d(dtype=wp.float64), chain: Chain, p: int, q: int, lost: wp.float64):
-    """The four link pairs of two joints p < q, one after the other.
-
-    Returns:
-        Greatest depth [m], ``lost`` plus the energy lost [J], number of impulses.
-    """
-    n = chain.link_count
-    impulses = wp.int64(0)
-    deepest = ZERO
-    c = int(0)
-    while c < 4:
-        # c = 0 … 3: links (p, q), (p, q + 1), (p + 1, q), (p + 1, q + 1); joint j's left-hand circle
-        # belongs to link j's right end, its right-hand circle to the left end of the link after it
-        after_p = c // 2
-        after_q = c % 2
-        link_a = p + after_p
-        link_b = q + after_q
-        ax = wp.where(after_p == 0, K[RIGHT_X, p], K[LEFT_X, p + 1])
-        ay = wp.where(after_p == 0, K[RIGHT_Y, p], K[LEFT_Y, p + 1])
-        bx = wp.where(after_q == 0, K[RIGHT_X, q], K[LEFT_X, q + 1])
-        by = wp.where(after_q == 0, K[RIGHT_Y, q], K[LEFT_Y, q + 1])
-        if link_b == n:
-            link_b = 0
-        if not are_neighbours(link_a, link_b, n):
-            depth, energy, hits = resolve_link_pair(K, chain, link_a, ax, ay, link_b, bx, by)
-            deepest = wp.max(deepest, depth)
-            lost += energy
-            impulses += hits
-        c += 1
-    return deepest, lost, impulses
-
-
-@functools.cache
-def self_contacts(columns: int):
-    """Warp function that resolves a chain's contacts with itself, for scratch blocks of this width.
-
-    Order. A joint p carries a circle of link p (its right end) and one of link p + 1 (its left end). Pairs of joints
-    (p, q), p < q, go in the order of (p mod 2, q mod 2, p, q); within a pair, the links (p, q), (p, q + 1),
-    (p + 1, q), (p + 1, q + 1), each seeing the velocities left by those before. Joint pairs of one parity class
-    seldom share a link, so a block of threads can do the same sequence in a few parallel rounds.
-    """
-    lists = list_layout(columns)
-
-    @wp.func
-    def resolve_self_contacts(
-        K: wp.array2d(dtype=wp.float64), L: wp.array(dtype=wp.int32), chain: Chain, opening: wp.float64
-    ):
-        """Returns impulses, energy lost [J], and the greatest depth [m]; ``opening``: greatest |C| [m]."""
-        reach = TWO * chain.circle_radius + TWO * opening
-        square = reach * reach
-        total = L[wp.static(lists.count)]
-        touching = int(0)
-        k = int(0)
-        while k < total:
-            p = L[wp.static(lists.first) + k]
-            q = L[wp.static(lists.second) + k]
-            dx = K[RIGHT_X, q] - K[RIGHT_X, p]
-            dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
-            L[wp.static(lists.touching) + touching] = k
-            touching += wp.where(dx * dx + dy * dy < square, 1, 0)
-            k += 1
-        impulses = wp.int64(0)
-        lost = ZERO
-        deepest = ZERO
-        k = int(0)
-        while k < touching:
-            pair = L[wp.static(lists.touching) + k]
-            p = L[wp.static(lists.first) + pair]
-            q = L[wp.static(lists.second) + pair]
-            depth, lost, hits = resolve_joint_pair(K, chain, p, q, lost)
-            deepest = wp.max(deepest, depth)
-            impulses += hits
-            k += 1
-        return impulses, lost, deepest
-
-    return resolve_self_contacts

@@ -18,7 +18,6 @@ from .contact import (
     greatest_speed,
     resolve_floor,
     resolve_sprocket,
-    self_contacts,
     sprocket_gap,
 )
 from .controller import LEAST_SHRINKAGE, step_controller
@@ -52,6 +51,7 @@ from .layout import (
 )
 from .methods import METHODS
 from .record import record_is_full, sampling, summarise, write_sample
+from .self_contact import self_contacts
 from .softening import change_joints, softened
 from .types import Chain, Control, Model, Program, Record, State, read_chain
 

@@ -17,26 +17,34 @@ wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
+def inverse_masses(w_nn: wp.float64, w_nt: wp.float64, w_tt: wp.float64):
+    """1/W_nn [kg] and 1/det W [kg²]: what the law divides by that does not depend on velocities."""
+    return quotient(ONE, w_nn), quotient(ONE, w_nn * w_tt - w_nt * w_nt)
+
+
+@wp.func
 def collision_impulse(
     normal_speed: wp.float64,
     tangential_speed: wp.float64,
     w_nn: wp.float64,
     w_nt: wp.float64,
     w_tt: wp.float64,
+    inverse_nn: wp.float64,
+    inverse_determinant: wp.float64,
     restitution: wp.float64,
     friction: wp.float64,
     tangential_restitution: wp.float64,
 ):
     """Impulse (J_n, J_t) [N s] on body B for the relative velocity v = v_A − v_B [m/s] in the basis (n̂, t̂).
 
-    ``w_nn``, ``w_nt``, ``w_tt`` [1/kg]: the inverse effective mass W with W J = v − v'. The caller makes sure that
-    the bodies approach (v·n̂ > 0). In the sliding case the denominator of κ is positive, because
-    |J_t| > μ J_n is the same as (1 + e_t)(|J₂ₜ| − μ(J₂ₙ − J₁ₙ)) > μ (1 + e) J₁ₙ.
+    ``w_nn``, ``w_nt``, ``w_tt`` [1/kg]: the inverse effective mass W with W J = v − v'; of it the caller has
+    :func:`inverse_masses` ready. The caller makes sure that the bodies approach (v·n̂ > 0). In the sliding case the
+    denominator of κ is positive, because |J_t| > μ J_n is the same as
+    (1 + e_t)(|J₂ₜ| − μ(J₂ₙ − J₁ₙ)) > μ (1 + e) J₁ₙ.
     """
-    determinant = w_nn * w_tt - w_nt * w_nt
-    first = quotient(normal_speed, w_nn)
-    second_n = quotient(w_tt * normal_speed - w_nt * tangential_speed, determinant)
-    second_t = quotient(w_nn * tangential_speed - w_nt * normal_speed, determinant)
+    first = normal_speed * inverse_nn
+    second_n = (w_tt * normal_speed - w_nt * tangential_speed) * inverse_determinant
+    second_t = (w_nn * tangential_speed - w_nt * normal_speed) * inverse_determinant
     bounce = (ONE + restitution) * first
     excess = second_n - first
     stick_n = bounce + (ONE + tangential_restitution) * excess
@@ -85,8 +93,18 @@ def fixed_contact(
     w_nn = inverse_mass + cross_n * cross_n * inverse_inertia
     w_nt = cross_n * cross_t * inverse_inertia
     w_tt = inverse_mass + cross_t * cross_t * inverse_inertia
+    inverse_nn, inverse_determinant = inverse_masses(w_nn, w_nt, w_tt)
     impulse_n, impulse_t = collision_impulse(
-        normal_speed, tangential_speed, w_nn, w_nt, w_tt, restitution, friction, chain.tangential_restitution
+        normal_speed,
+        tangential_speed,
+        w_nn,
+        w_nt,
+        w_tt,
+        inverse_nn,
+        inverse_determinant,
+        restitution,
+        friction,
+        chain.tangential_restitution,
     )
     hit = (gap < ZERO) and (normal_speed > ZERO)
     impulse_n = wp.where(hit, impulse_n, ZERO)

@@ -28,22 +28,22 @@ LISTED_X, LISTED_Y = 36, 37
 STAGES = 38
 STAGE_ROWS = 5
 
-# The block form keeps most of a chain in registers. The first 18 rows above and the next eight lie on a board that all
-# threads of the block see; the scratch block keeps rows from BOARD_LOST_SELF on between launches.
+# The block form keeps the first 18 rows above and the following ones on a board that all threads of the block see; the
+# scratch block keeps rows from BOARD_LOST_SELF up to BOARD_NOTES between launches.
 BOARD_LOST_SELF, BOARD_LOST_FRICTION, BOARD_LOST_DAMPING, BOARD_LOST_FIXED = 18, 19, 20, 21
-BOARD_LISTED_X, BOARD_LISTED_Y, BOARD_SELF_DEPTH = 22, 23, 24
+BOARD_LISTED_X, BOARD_LISTED_Y = 22, 23
+# First stage of the next step: accelerations, then the two powers (see STAGES).
+BOARD_FIRST = 24
 # Numbers of the chain rather than of its links, in the first columns of one more row.
-BOARD_NOTES = 25
+BOARD_NOTES = 29
 NOTE_OPENING, NOTE_FIXED_DEPTH, NOTE_LAST_IMPULSE, NOTE_STOP_TIME, NOTE_NEXT_LOOK = 0, 1, 2, 3, 4
 NOTE_STIFFNESS, NOTE_DAMPING, NOTE_VISCOUS, NOTE_COULOMB, NOTE_INVERSE_SMOOTHING = 5, 6, 7, 8, 9
 NOTE_GRAVITY, NOTE_CIRCLE_RADIUS, NOTE_SPROCKET_RADIUS, NOTE_TANGENTIAL = 10, 11, 12, 13
 NOTE_FLOOR_RESTITUTION, NOTE_FLOOR_FRICTION, NOTE_SPROCKET_RESTITUTION, NOTE_SPROCKET_FRICTION = 14, 15, 16, 17
-NOTE_CHAIN_RESTITUTION, NOTE_CHAIN_FRICTION = 18, 19
-NOTES = 20
-BOARD_ROWS = 26
-# First stage of the next step, in the order of ACCELERATION_X … POWER_DAMPING.
-KEPT_STAGE = 26
-BLOCK_ROWS = 31
+NOTE_CHAIN_RESTITUTION, NOTE_CHAIN_FRICTION, NOTE_HALF_LENGTH = 18, 19, 20
+NOTES = 21
+BOARD_ROWS = 30
+BLOCK_ROWS = 29
 
 # State.watch
 WINDOW_START, WINDOW_COUNT, SUM_HEIGHT, SUM_WIDTH, SUM_SPEED = 0, 1, 2, 3, 4

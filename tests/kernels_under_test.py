@@ -19,14 +19,13 @@ from warpchain.kernels.contact import (
     floor_gap,
     greatest_opening,
     resolve_floor,
-    resolve_link_pair,
     resolve_sprocket,
-    self_contacts,
     sprocket_gap,
 )
 from warpchain.kernels.driver import COMPILER_FLAGS, load_state
 from warpchain.kernels.explicit import place_ends
-from warpchain.kernels.impulse import collision_impulse, fixed_contact
+from warpchain.kernels.impulse import collision_impulse, fixed_contact, inverse_masses
+from warpchain.kernels.self_contact import circles_of_links, collide, self_contacts
 from warpchain.kernels.types import Chain, Model, State, read_chain
 from warpchain.parameters import Parameters
 
@@ -50,15 +49,25 @@ def _poisoned(*shape: int) -> wp.array:
 @_compiled
 def _law(cases: wp.array2d(dtype=wp.float64), impulses: wp.array2d(dtype=wp.float64)):
     i = wp.tid()
+    inverse_nn, inverse_determinant = inverse_masses(cases[i, 2], cases[i, 3], cases[i, 4])
     impulse_n, impulse_t = collision_impulse(
-        cases[i, 0], cases[i, 1], cases[i, 2], cases[i, 3], cases[i, 4], cases[i, 5], cases[i, 6], cases[i, 7]
+        cases[i, 0],
+        cases[i, 1],
+        cases[i, 2],
+        cases[i, 3],
+        cases[i, 4],
+        inverse_nn,
+        inverse_determinant,
+        cases[i, 5],
+        cases[i, 6],
+        cases[i, 7],
     )
     impulses[i, 0] = impulse_n
     impulses[i, 1] = impulse_t
 
 
 def impulses_of_law(cases: Array) -> Array:
-    """`collision_impulse` of many collisions: arguments (N, 8) in its order → J_n, J_t (N, 2)."""
+    """`collision_impulse` of many collisions: speeds, W, coefficients (N, 8) in its order → J_n, J_t (N, 2)."""
     return _map_rows(_law, cases, 2)
 
 
@@ -108,14 +117,20 @@ def _link_pair(
     chain.chain_restitution = cases[i, 1]
     chain.chain_friction = cases[i, 2]
     chain.tangential_restitution = cases[i, 3]
-    depth, lost, hits = resolve_link_pair(scratch[i], chain, 0, cases[i, 4], cases[i, 5], 1, cases[i, 6], cases[i, 7])
+    depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = circles_of_links(
+        scratch[i], chain, 0, cases[i, 4], cases[i, 5], 1, cases[i, 6], cases[i, 7]
+    )
+    lost = wp.float64(0.0)
+    hits = wp.int64(0)
+    if depth > wp.float64(0.0):
+        lost, hits = collide(scratch[i], chain, 0, 1, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant)
     results[i, 0] = depth
     results[i, 1] = lost
     results[i, 2] = wp.float64(hits)
 
 
 def link_pairs(position: Array, velocity: Array, inverses: Array, cases: Array) -> tuple[Array, Array]:
-    """`resolve_link_pair` of many pairs A, B.
+    """`circles_of_links`, then `collide`, of many pairs A, B.
 
     Args:
         position: (N, 2, 2), x, y of the centres of mass.

@@ -342,10 +342,17 @@ def test_a_defect_is_not_disguised_as_bad_input(monkeypatch: pytest.MonkeyPatch)
 
 @pytest.mark.parametrize(
     ("arguments", "problem"),
-    [("--links 61", "bench.links: 61 is odd"), ("--links 60 --links 2", "bench.links: 2 is less than 4")],
+    [
+        ("--links 61", "bench.links: 61 is odd"),
+        ("--links 60 --links 2", "bench.links: 2 is less than 4"),
+        ("--chains 4", "--chains: only measurements on a GPU can be restricted so; add --device cuda"),
+        ("--device gpu", "bench.device: 'gpu' is no device"),
+        ("--device cuda:99", "options.device: there is no cuda:99 on this machine"),
+        ("--device cuda:99 --method euler", "bench.method: 'euler' is unknown"),
+    ],
 )
 def test_bad_input_of_bench_is_refused_in_one_line(command: Command, arguments: str, problem: str) -> None:
-    """Lengths of chains go through the door of the scene."""
+    """Lengths of chains go through the door of the scene, devices through that of the options."""
     answer = command("bench", *arguments.split())
     assert (answer.status, answer.out) == (2, "")
     assert answer.err.startswith(f"error: {problem}") and answer.err.count("\n") == 1

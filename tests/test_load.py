@@ -18,7 +18,7 @@ from warpchain.merged_file import merge
 from warpchain.parameters import InputError
 from warpchain.planning import load_sweep
 from warpchain.rows import COLUMNS
-from warpchain.shards import shard_name
+from warpchain.shards import NUMERICS_VERSION, shard_name
 from warpchain.status import Status
 from warpchain.store import Store, empty_rows
 from warpchain.sweep_result import BlockResult, SweepResult, load
@@ -306,7 +306,7 @@ def test_merged_file_is_plain_hdf5(folder: Path, tmp_path: Path) -> None:
         }
         assert json.loads(file.attrs["sweep"]) == SWEEP.canonical()
         assert json.loads(file.attrs["versions"]).keys() == {"warpchain", "warp-lang", "numpy"}
-        assert file.attrs["numerics_version"] == 1 and file.attrs["digest"] == SWEEP.digest()
+        assert file.attrs["numerics_version"] == NUMERICS_VERSION and file.attrs["digest"] == SWEEP.digest()
 
 
 def test_merged_files_are_equal(folder: Path, tmp_path: Path) -> None:

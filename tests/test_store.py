@@ -24,7 +24,7 @@ from warpchain.options import Options, Scene
 from warpchain.parameters import InputError, Parameters
 from warpchain.results import STORED
 from warpchain.rows import COLUMNS, MISSING, ROW, field_column, missing_rows, row_type
-from warpchain.shards import read_manifest, shard_name
+from warpchain.shards import NUMERICS_VERSION, read_manifest, shard_name
 from warpchain.status import Status
 from warpchain.store import Store, empty_rows, read_rows, read_shard, write_shard
 from warpchain.sweep_result import BlockResult, SweepResult
@@ -285,7 +285,7 @@ def test_other_numerics_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     run(tmp_path)
     for module in (shards, store):
         monkeypatch.setattr(module, "NUMERICS_VERSION", 99)
-    with refused(InputError, tmp_path, "numerics 1, but this warpchain has 99", "--fresh"):
+    with refused(InputError, tmp_path, f"numerics {NUMERICS_VERSION}, but this warpchain has 99", "--fresh"):
         open_store(tmp_path)
     with refused(InputError, tmp_path, "belongs to another sweep now"):
         write_shard(tmp_path, SWEEP.digest(), FIRST, synthetic_rows(SWEEP, FIRST))

@@ -91,13 +91,13 @@ def flying(links: int, parameters: Parameters) -> tuple[Array, Array]:
     return position, velocity
 
 
-def dropped(links: int) -> tuple[Array, Array]:
+def dropped(links: int, device: str = "cpu") -> tuple[Array, Array]:
     """A slowly circulating ellipse of soft joints, dropped and come down: position (n, 3), velocity (n, 3)."""
     parameters = preset("soft")
     position, velocity = lay_chain(ellipse(1.5), links, parameters.link_length, speed=0.3)
     position[:, 1] += 0.02 - position[:, 1].min()
     fall = math.sqrt(2 * np.ptp(position[:, 1]) / parameters.gravity)
-    end = simulate(parameters, position, velocity, 2 * fall, times=[2 * fall], method="dp5")
+    end = simulate(parameters, position, velocity, 2 * fall, times=[2 * fall], method="dp5", device=device)
     if end.status != Status.FINISHED:
         raise RuntimeError(f"the chain of {links} links did not come down: {end.status.sentence}")
     return end.position[-1], end.velocity[-1]

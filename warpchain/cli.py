@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NoReturn
 import typer
 
 from warpchain.bench_cli import bench_app
+from warpchain.speed_cli import bench
 from warpchain.sweep_cli import add_commands
 
 if TYPE_CHECKING:
@@ -214,44 +215,8 @@ def walk(
         raise typer.Exit(FAILED)
 
 
-@bench_app.callback(invoke_without_command=True)
-def bench(
-    context: typer.Context,
-    links: Annotated[
-        list[int] | None,
-        typer.Option(metavar="N", help="Number of links; may be repeated. Default: 60 and 150."),
-    ] = None,
-    rounds: Annotated[int, typer.Option(metavar="N", min=1, help="Measurements of each; medians are printed.")] = 7,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object, units in its keys or in s, instead of tables.")
-    ] = False,
-) -> None:
-    """Measure what integration costs on one core (µs a step), beside SciPy's DOP853 on a NumPy model."""
-    if context.invoked_subcommand is not None:
-        return
-    from importlib.util import find_spec
-
-    from warpchain.options import Scene
-    from warpchain.parameters import InputError, validated
-
-    lengths = [validated(Scene, {"links": count}, "bench").links for count in links or (60, 150)]
-    if find_spec("scipy") is None:
-        raise InputError("bench: SciPy is not installed; pip install 'warpchain[scipy]'")
-
-    from warpchain.bench import as_json as costs_as_json
-    from warpchain.bench import broad_phase_costs, machine, step_costs
-    from warpchain.terminal import print_costs, status_line
-
-    with status_line() as show:
-        steps = step_costs(lengths, rounds=rounds, report=show)
-        lists = broad_phase_costs(rounds=rounds, report=show)
-    if as_json:
-        print(json.dumps(costs_as_json(steps, lists), indent=2, allow_nan=False))
-    else:
-        print_costs(machine(), steps, lists)
-
-
 add_commands(app)
+bench_app.callback(invoke_without_command=True)(bench)
 app.add_typer(bench_app, name="bench")
 
 

@@ -3,6 +3,7 @@
 import contextlib
 import functools
 import importlib.metadata
+import itertools
 import math
 import os
 import platform
@@ -17,13 +18,13 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpchain.kernel_choice import block_kernel, block_threads, features_of, kernels_of
 from warpchain.kernels import layout
-from warpchain.kernels.block import make_advance_block
 from warpchain.kernels.broadphase import list_layout
 from warpchain.kernels.driver import Features, make_advance
 from warpchain.kernels.methods import METHODS
-from warpchain.kernels.tableaus import TABLEAUS
 from warpchain.kernels.types import Control, Model, Program, Record, State
+from warpchain.mirror import Mirror
 from warpchain.options import Options
 from warpchain.parameters import InputError, Parameters, preset
 from warpchain.status import Status
@@ -36,6 +37,9 @@ PROGRAM = (
 )
 """Fields of :class:`warpchain.kernels.types.Program`."""
 FIRST_STEP = 1e-7  # s; the controller grows it fivefold per step
+LANES = 3  # streams of a batch for kernels side by side: chains of one length do not fill the device
+CONNECTIONS = "32"  # queues between host and GPU; with fewer than streams, streams wait for one another
+BLOCKS_OF_MULTIPROCESSOR = 32  # most that an NVIDIA multiprocessor holds
 LAUNCH_SECONDS = 0.1  # how long a launch should take: the grain of progress and of Ctrl-C
 CAPACITY_SAMPLES = 512
 CAPACITY_FRAMES = 64
@@ -62,6 +66,7 @@ def start_device(device: str) -> wp.Device:
         InputError: This machine has no such device.
     """
     wp.config.log_level = wp.LOG_ERROR
+    os.environ.setdefault("CUDA_DEVICE_MAX_CONNECTIONS", CONNECTIONS)  # CUDA reads it when it starts
     with _without_driver_warning():
         wp.init()
     name = "cuda:0" if device == "cuda" else device
@@ -99,25 +104,37 @@ def versions() -> dict[str, str]:
     return {name: importlib.metadata.version(name) for name in packages} | {"python": platform.python_version()}
 
 
-MANY_CHAINS_REGISTERS = {
-    **{("rkf78", 64): 128, ("dp5", 64): 168, ("bs32", 64): 168},
-    **{(method, 160): 136 for method in TABLEAUS},
-    **{(method, 192): 168 for method in TABLEAUS},
-}
-"""Registers a thread may take, by method and threads of a block: what was fastest with 1000 chains and more on an H200.
-
-Few chains run up to 10 % faster without a bound; one table for all keeps a walk's bits independent of its batch.
-"""
+def scratch_rows(options: Options, columns: int, device: wp.Device) -> int:
+    """Rows of a chain's scratch block of so many columns on a device."""
+    return layout.BLOCK_ROWS if device.is_cuda else METHODS[options.method].scratch_rows(columns)
 
 
-def block_kernel(features: Features, threads: int) -> wp.Kernel:
-    """The kernel of the block form for blocks of this many threads."""
-    return make_advance_block(features, threads, MANY_CHAINS_REGISTERS.get((features.method, threads)))
+def world_bytes(longest: int, options: Options, samples: int, frames: int, device: wp.Device) -> int:
+    """Memory [B] that a batch takes on a device for each of its worlds.
+
+    Args:
+        longest: Greatest number of links.
+        options: Of the batch.
+        samples: Capacity of the time series.
+        frames: Capacity of the frames.
+        device: Where.
+    """
+    columns = layout.padded_width(longest)
+    few = len(Parameters.model_fields) + len(PROGRAM) + 80  # numbers of a world in model, program and state
+    numbers = columns * scratch_rows(options, columns, device) + 6 * longest + few
+    numbers += samples * layout.SAMPLE_COLUMNS + frames * (2 * longest + 1)
+    return 8 * numbers + 4 * list_layout(columns).size
 
 
-def block_threads(links: int) -> int:
-    """Threads of a GPU's block that carries a chain: one per link, rounded up to whole warps of 32."""
-    return -(-links // 32) * 32
+def most_worlds(longest: int, options: Options, *, keeps_samples: bool, keeps_frames: bool) -> int:
+    """Chains that a GPU should carry on together: what could ever reside on it, as far as they fit into free memory.
+
+    Half of what is free is left to others, such as batches of other threads.
+    """
+    device = start_device(options.device)
+    samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * keeps_frames
+    fitting = int(device.free_memory) // 2 // world_bytes(longest, options, samples, frames, device)
+    return max(1, min(BLOCKS_OF_MULTIPROCESSOR * int(device.sm_count), fitting))
 
 
 class Batch:
@@ -147,10 +164,12 @@ class Batch:
         self.options = options
         self.device = start_device(options.device)
         self.links = [0] * worlds
-        self._mirrors: dict[int, tuple[wp.array, NDArray[Any]]] = {}
-        self._streams: dict[tuple[Features, int], wp.Stream] = {}
+        self._mirrors: dict[int, Mirror] = {}
+        self._stream = wp.Stream(self.device) if self.device.is_cuda else None
+        self._done: wp.Event | None = None
+        self._lanes = [wp.Stream(self.device) for _ in range(LANES)] if self.device.is_cuda else []
         self.columns = layout.padded_width(longest)
-        rows = max(METHODS[options.method].scratch_rows(self.columns), layout.BLOCK_ROWS)
+        rows = scratch_rows(options, self.columns, self.device)
 
         self.model = Model()
         self.model.link_count = self._array(np.zeros(worlds, dtype=np.int32))
@@ -161,6 +180,8 @@ class Batch:
         for name in PROGRAM:
             setattr(self.program, name, self._array(np.zeros(worlds)))
 
+        self._constant = set(self._mirrors)
+        self._order = Mirror(np.zeros(worlds, dtype=np.int32), self.device, self._stream)
         self.state = State()
         self.state.links = self._array(np.zeros((worlds, 6, longest)))
         for name in ("time", "stop_time", "gap", "slack", "step", "last_error", "softness", "first_area"):
@@ -209,18 +230,20 @@ class Batch:
 
     def _array(self, values: NDArray[np.generic]) -> wp.array:
         """An array on the device that the host will read or write."""
-        array = wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device=self.device)
-        if self.device.is_cuda and array.size > 0:
-            self._mirrors[array.ptr] = array, values.copy()
-        return array
+        if not self.device.is_cuda or values.size == 0:
+            return wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device=self.device)
+        mirror = Mirror(values, self.device, self._stream)
+        self._mirrors[mirror.array.ptr] = mirror
+        return mirror.array
 
     def _view(self, array: wp.array) -> NDArray[Any]:
-        """The elements of an array, to read and to write between launches: on a GPU, those of its copy on the host."""
-        values: NDArray[Any]
-        if array.ptr in self._mirrors:
-            _, values = self._mirrors[array.ptr]
-        else:
-            values = array.numpy()
+        """The elements of an array, to be read between launches."""
+        values: NDArray[Any] = self._mirrors[array.ptr].view() if array.ptr in self._mirrors else array.numpy()
+        return values
+
+    def _edit(self, array: wp.array) -> NDArray[Any]:
+        """The elements of an array, to be changed between launches."""
+        values: NDArray[Any] = self._mirrors[array.ptr].edit() if array.ptr in self._mirrors else array.numpy()
         return values
 
     def set_chain(self, world: int, parameters: Parameters, links: int, sprocket_radius: float | None = None) -> None:
@@ -233,11 +256,11 @@ class Batch:
             sprocket_radius: Radius [m] at which circles touch the sprocket; None: the parameter's.
         """
         self.links[world] = links
-        self._view(self.model.link_count)[world] = links
+        self._edit(self.model.link_count)[world] = links
         for name, value in parameters:
-            self._view(getattr(self.model, name))[world] = value
+            self._edit(getattr(self.model, name))[world] = value
         if sprocket_radius is not None:
-            self._view(self.model.sprocket_radius)[world] = sprocket_radius
+            self._edit(self.model.sprocket_radius)[world] = sprocket_radius
 
     def load(
         self,
@@ -263,8 +286,8 @@ class Batch:
         """
         state = self.state
         n = self.links[world]
-        self._view(state.links)[world, :3, :n] = position.T
-        self._view(state.links)[world, 3:, :n] = velocity.T
+        self._edit(state.links)[world, :3, :n] = position.T
+        self._edit(state.links)[world, 3:, :n] = velocity.T
         for array in (
             state.time,
             state.gap,
@@ -274,43 +297,35 @@ class Batch:
             state.losses,
             state.next_sample,
         ):
-            self._view(array)[world] = 0
-        self._view(state.watch)[world] = 0
-        self._view(state.watch)[world, list(UNSET_WATCHES)] = -1.0
-        self._view(state.softness)[world] = softness
-        self._view(state.last_look)[world, layout.TIME] = -1.0
-        self._view(state.watch)[world, layout.LAST_FLOOR_IMPULSE] = -np.inf
-        self._view(state.tries_before)[world] = tries_before
-        self._view(state.has_first_stage)[world] = 0
-        self._view(state.is_fresh)[world] = 1
-        self._view(state.step)[world] = FIRST_STEP
-        self._view(state.last_error)[world] = 1.0
-        self._view(self.record.sample_count)[world] = 0
-        self._view(self.record.frame_count)[world] = 0
+            self._edit(array)[world] = 0
+        self._edit(state.watch)[world] = 0
+        self._edit(state.watch)[world, list(UNSET_WATCHES)] = -1.0
+        self._edit(state.softness)[world] = softness
+        self._edit(state.last_look)[world, layout.TIME] = -1.0
+        self._edit(state.watch)[world, layout.LAST_FLOOR_IMPULSE] = -np.inf
+        self._edit(state.tries_before)[world] = tries_before
+        self._edit(state.has_first_stage)[world] = 0
+        self._edit(state.is_fresh)[world] = 1
+        self._edit(state.step)[world] = FIRST_STEP
+        self._edit(state.last_error)[world] = 1.0
+        self._edit(self.record.sample_count)[world] = 0
+        self._edit(self.record.frame_count)[world] = 0
         self.resume(world, stop_time, stop_status)
 
     def resume(self, world: int, stop_time: float, stop_status: Status) -> None:
         """Let a world that has stopped run on to a later time, as if it had not stopped there."""
-        self._view(self.state.stop_time)[world] = stop_time
-        self._view(self.state.stop_status)[world] = int(stop_status)
-        self._view(self.state.status)[world] = int(Status.RUNNING)
+        self._edit(self.state.stop_time)[world] = stop_time
+        self._edit(self.state.stop_status)[world] = int(stop_status)
+        self._edit(self.state.status)[world] = int(Status.RUNNING)
 
     def set_program(self, world: int, **values: float) -> None:
         """Set fields of :class:`Program` of a world."""
         for name, value in values.items():
-            self._view(getattr(self.program, name))[world] = value
+            self._edit(getattr(self.program, name))[world] = value
 
     def features(self, *, fixed_body: str, watch: str, broad_phase: str = "grid") -> Features:
         """Kernel features for these worlds."""
-        return Features(
-            method=self.options.method,
-            columns=self.columns,
-            fixed_body=fixed_body,
-            self_contact=self.options.self_contact,
-            broad_phase=broad_phase,
-            watch=watch,
-            softens=watch == "rest" and (self.options.soften_pile or self.options.soften_drive),
-        )
+        return features_of(self.options, self.columns, fixed_body=fixed_body, watch=watch, broad_phase=broad_phase)
 
     def run(self, worlds: Sequence[int], features: Features, after_launch: Callable[[], None] | None = None) -> None:
         """Carry worlds on until none of them is running.
@@ -322,8 +337,8 @@ class Batch:
                 into launches.
         """
         self.compile(features, [self.links[world] for world in worlds])
-        status = self._view(self.state.status)
         while True:
+            status = self.statuses()
             active = [world for world in worlds if status[world] == Status.RUNNING]
             if not active:
                 return
@@ -342,11 +357,8 @@ class Batch:
             features: What they are compiled for.
             links: On a GPU, numbers of links, each of which may need a kernel of its own.
         """
-        if not self.device.is_cuda:
-            wp.load_module(make_advance(features).module, device=self.device)
-            return
-        for threads in {block_threads(count) for count in links}:
-            wp.load_module(block_kernel(features, threads).module, device=self.device, block_dim=threads)
+        for kernel, threads in kernels_of(self.device, features, links):
+            wp.load_module(kernel.module, device=self.device, block_dim=threads)
 
     def launch(self, worlds: Sequence[int], features: Features, tries: int) -> float:
         """Carry worlds on by at most this many tries each; returns the wall time [s]."""
@@ -354,44 +366,63 @@ class Batch:
 
     def launch_together(self, groups: Mapping[Features, Sequence[int]], tries: int) -> float:
         """Carry groups of worlds on, each with features of its own, at the same time if the device can."""
-        self.control.tries = tries
         before = time.perf_counter()
+        self.start(groups, tries)
+        self.finish()
+        return time.perf_counter() - before
+
+    def start(self, groups: Mapping[Features, Sequence[int]], tries: int) -> None:
+        """Begin a launch as of :meth:`launch_together`; until :meth:`finish` the host may not look at the worlds.
+
+        On a GPU this returns at once, and launches of other batches go on at the same time.
+        """
+        self.control.tries = tries
         arrays = [self.model, self.program, self.state, self.record, self.scratch, self.lists, self.control]
-        if not self.device.is_cuda:
+        if self._stream is None:
             for features, worlds in groups.items():
-                inputs = [self._indices(worlds), *arrays]
+                inputs = [wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device), *arrays]
                 wp.launch(make_advance(features), dim=len(worlds), inputs=inputs, device=self.device)
-            return time.perf_counter() - before
-        for array, values in self._mirrors.values():
-            array.assign(values)
+            return
         blocks: dict[tuple[Features, int], list[int]] = defaultdict(list)
         for features, worlds in groups.items():
             for world in worlds:
                 blocks[features, block_threads(self.links[world])].append(world)
-        members = {key: self._indices(worlds) for key, worlds in blocks.items()}
-        wp.synchronize_device(self.device)
-        for (features, threads), indices in members.items():
+        order = np.array([world for worlds in blocks.values() for world in worlds], dtype=np.int32)
+        if not np.array_equal(self._order.view()[: len(order)], order):
+            self._order.edit()[: len(order)] = order
+        self._stream.wait_stream(self.device.stream)  # where new arrays are filled
+        for mirror in (self._order, *self._mirrors.values()):
+            mirror.upload()
+        ready = self._stream.record_event()
+        for lane in self._lanes:
+            lane.wait_event(ready)
+        first = 0
+        for ((features, threads), worlds), lane in zip(blocks.items(), itertools.cycle(self._lanes), strict=False):
             wp.launch_tiled(
                 block_kernel(features, threads),
-                dim=[len(indices)],
-                inputs=[indices, *arrays],
+                dim=[len(worlds)],
+                inputs=[self._order.array[first : first + len(worlds)], *arrays],
                 block_dim=threads,
                 device=self.device,
-                stream=self._stream(features, threads),
+                stream=lane,
             )
-        wp.synchronize_device(self.device)
-        for array, values in self._mirrors.values():
-            values[...] = array.numpy()
-        return time.perf_counter() - before
+            first += len(worlds)
+        for lane in self._lanes:
+            self._stream.wait_event(lane.record_event())
+        for mirror in self._mirrors.values():
+            if mirror.array.ptr not in self._constant:
+                mirror.download()
+        self._done = self._stream.record_event()
 
-    def _stream(self, features: Features, threads: int) -> wp.Stream:
-        """A stream for each kernel, so that groups of chains that do not fill the device run side by side."""
-        if (features, threads) not in self._streams:
-            self._streams[features, threads] = wp.Stream(self.device)
-        return self._streams[features, threads]
+    def is_done(self) -> bool:
+        """Whether :meth:`finish` would return at once."""
+        return self._done is None or bool(self._done.is_complete)
 
-    def _indices(self, worlds: Sequence[int]) -> wp.array:
-        return wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device)
+    def finish(self) -> None:
+        """Wait for the launch that was begun, if there is one."""
+        if self._done is not None:
+            wp.synchronize_event(self._done)
+            self._done = None
 
     def listed_pairs(self, world: int) -> int:
         """Pairs of joints in a world's neighbour list."""
@@ -408,6 +439,10 @@ class Batch:
     def status(self, world: int) -> Status:
         """How the world stands."""
         return Status(int(self._view(self.state.status)[world]))
+
+    def statuses(self) -> NDArray[np.int32]:
+        """Of all worlds, as numbers; not to be changed."""
+        return self._view(self.state.status)
 
     def time(self, world: int) -> float:
         """Time [s] since loading."""
@@ -449,13 +484,13 @@ class Batch:
     def drain_samples(self, world: int) -> Array:
         """Take the time series kept so far: (t, SAMPLE_COLUMNS), see :mod:`warpchain.kernels.layout`."""
         count = int(self._view(self.record.sample_count)[world])
-        self._view(self.record.sample_count)[world] = 0
+        self._edit(self.record.sample_count)[world] = 0
         return self._view(self.record.samples)[world, :count].copy()
 
     def drain_frames(self, world: int) -> tuple[Array, Array]:
         """Take the frames kept so far: times (f,) [s], joint positions (f, n, 2) [m]."""
         count = int(self._view(self.record.frame_count)[world])
-        self._view(self.record.frame_count)[world] = 0
+        self._edit(self.record.frame_count)[world] = 0
         n = self.links[world]
         rows = self._view(self.record.frames)[world, :count, : 2 * n].reshape(count, 2, n)
         return self._view(self.record.frame_times)[world, :count].copy(), rows.transpose(0, 2, 1).copy()

@@ -1,11 +1,13 @@
 """Many walks on the worlds of a batch: finished ones make room for waiting ones."""
 
 import threading
+import time
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from warpchain.course import Course
-from warpchain.engine import Batch
+from warpchain.engine import Batch, most_worlds, start_device
+from warpchain.kernel_choice import block_threads, features_of, load_kernels
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features
 from warpchain.options import Options, Setup
@@ -14,8 +16,10 @@ from warpchain.status import Status
 
 TRIES = {"cpu": 20_000, "cuda": 10_000}
 """Tries of each chain per launch, by kind of device; what a walk gives does not depend on it."""
-MOST_SLOTS = 4096
-"""Most chains in one launch on a GPU: enough to fill it."""
+CREWS = 4
+"""Batches that share a GPU: while the host looks after one of them, the others go on and fill the device."""
+NAP = 5e-4
+"""Pause [s] before looking again whether a batch is done."""
 
 
 def run_setups(
@@ -42,53 +46,102 @@ def run_setups(
     for place, setup in enumerate(setups):
         buckets[setup.options, layout.padded_width(setup.scene.links)].append(place)
     for (options, _), places in buckets.items():
-        longest = max(setups[place].scene.links for place in places)
-        worlds = slots or (MOST_SLOTS if options.device.startswith("cuda") else 1)
         wanted = {place: keeps[place] if keeps is not None else NOTHING for place in places}
-        # One batch for all, although most may keep nothing: two batches would wait for two slowest walks.
-        batch = Batch(
-            min(worlds, len(places)),
-            longest,
-            options,
-            keeps_samples=any(keep.series_every for keep in wanted.values()),
-            frame_every=next((keep.frame_every for keep in wanted.values() if keep.frame_every), None),
+        batches = _batches(options, [setups[place].scene.links for place in places], list(wanted.values()), slots)
+        yield from _run_bucket(setups, wanted, batches, stop)
+
+
+def _batches(options: Options, links: Sequence[int], keeps: Sequence[Keep], slots: int | None) -> list[Batch]:
+    """Room for walks: on a CPU one batch, on a GPU several, with as many worlds in all as are of use and fit."""
+    longest = max(links)
+    # Every batch keeps what any walk wants, although most may want nothing: others would wait for two slowest walks.
+    keeps_samples = any(keep.series_every for keep in keeps)
+    frame_every = next((keep.frame_every for keep in keeps if keep.frame_every), None)
+    on_gpu = options.device.startswith("cuda")
+    if slots is None:
+        fitting = (
+            most_worlds(longest, options, keeps_samples=keeps_samples, keeps_frames=frame_every is not None)
+            if on_gpu
+            else 1
         )
-        yield from _run_bucket(setups, wanted, batch, stop)
+        slots = min(fitting, len(links))
+    worlds = -(-slots // CREWS) if on_gpu else slots
+    return [
+        Batch(min(worlds, slots - first), longest, options, keeps_samples=keeps_samples, frame_every=frame_every)
+        for first in range(0, slots, worlds)
+    ]
 
 
 def compile_kernels(setups: Iterable[Setup]) -> None:
     """Make sure that every kernel these walks need is ready, before threads or processes ask for it at once."""
-    ready: set[tuple[Features, int]] = set()
+    wanted: set[tuple[str, Features, int]] = set()
     for setup in setups:
-        batch = Batch(1, setup.scene.links, setup.options)
+        columns = layout.padded_width(setup.scene.links)
         bodies = [("floor", "rest")] + [("sprocket", "steady")] * (setup.scene.start != "ellipse")
         for fixed_body, watch in bodies:
-            features = batch.features(fixed_body=fixed_body, watch=watch)
-            if (features, setup.scene.links) not in ready:
-                batch.compile(features, [setup.scene.links])
-                ready.add((features, setup.scene.links))
+            features = features_of(setup.options, columns, fixed_body=fixed_body, watch=watch)
+            threads = block_threads(setup.scene.links) if setup.options.device.startswith("cuda") else 1
+            wanted.add((setup.options.device, features, threads))
+    load_kernels((start_device(device), features, [threads]) for device, features, threads in wanted)
+
+
+class _Crew:
+    """A batch and the walks on its worlds."""
+
+    def __init__(self, batch: Batch, setups: Sequence[Setup], wanted: Mapping[int, Keep]) -> None:
+        self.batch = batch
+        self._setups, self._wanted = setups, wanted
+        self._free = list(reversed(range(len(batch.links))))
+        self._running: dict[int, tuple[int, Course]] = {}
+        self._features: dict[int, Features] = {}
+
+    def begin(self, waiting: Iterator[int]) -> bool:
+        """Give waiting walks the free worlds and begin a launch; False if there is nothing to carry on."""
+        while self._free and (place := next(waiting, None)) is not None:
+            world = self._free.pop()
+            course = Course(self.batch, world, self._setups[place], self._wanted[place])
+            self._running[world] = place, course
+            self._features[world] = course.features
+        together: dict[Features, list[int]] = defaultdict(list)
+        for world, features in self._features.items():
+            together[features].append(world)
+        self.batch.start(together, TRIES["cuda" if self.batch.device.is_cuda else "cpu"])
+        return bool(together)
+
+    def end(self) -> Iterator[tuple[int, Course]]:
+        """Wait for the launch, and yield every walk that is over as its world becomes free."""
+        self.batch.finish()
+        running = self.batch.statuses() == Status.RUNNING
+        for world, (place, course) in list(self._running.items()):
+            course.drain()
+            if running[world]:
+                continue
+            if course.next_phase():
+                self._features[world] = course.features
+                continue
+            yield place, course
+            del self._running[world], self._features[world]
+            self._free.append(world)
 
 
 def _run_bucket(
-    setups: Sequence[Setup], wanted: Mapping[int, Keep], batch: Batch, stop: threading.Event | None
+    setups: Sequence[Setup], wanted: Mapping[int, Keep], batches: Sequence[Batch], stop: threading.Event | None
 ) -> Iterator[tuple[int, Course]]:
     """Run walks, by place, that share options and the width of their arrays."""
-    tries = TRIES["cuda" if batch.device.is_cuda else "cpu"]
-    waiting = iter(wanted)
-    running: dict[int, tuple[int, Course]] = {}
-    for world, place in zip(range(len(batch.links)), waiting, strict=False):
-        running[world] = place, Course(batch, world, setups[place], wanted[place])
-    while running and not (stop is not None and stop.is_set()):
-        together: dict[Features, list[int]] = defaultdict(list)
-        for world, (_, course) in running.items():
-            together[course.features].append(world)
-        batch.launch_together(together, tries)
-        for world, (place, course) in list(running.items()):
-            course.drain()
-            if batch.status(world) == Status.RUNNING or course.next_phase():
+    # long chains take longest: begun first, they are not what is waited for in the end
+    waiting = iter(sorted(wanted, key=lambda place: -setups[place].scene.links))
+    crews = [_Crew(batch, setups, wanted) for batch in batches]
+    try:
+        under_way = [crew for crew in crews if crew.begin(waiting)]
+        while under_way and not (stop is not None and stop.is_set()):
+            ready = next((crew for crew in under_way if crew.batch.is_done()), None)
+            if ready is None:
+                time.sleep(NAP)
                 continue
-            yield place, course
-            del running[world]
-            following = next(waiting, None)
-            if following is not None:
-                running[world] = following, Course(batch, world, setups[following], wanted[following])
+            yield from ready.end()
+            under_way.remove(ready)
+            if ready.begin(waiting):
+                under_way.append(ready)
+    finally:
+        for crew in crews:
+            crew.batch.finish()

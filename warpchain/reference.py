@@ -14,7 +14,7 @@ collision law based on impulse space considerations", Journal of Applied Mechani
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -292,9 +292,9 @@ def resolve_contacts(
     gets the impulse of `collision_impulse` if it approaches, else nothing. Positions never change. Two circles, or
     a circle and the sprocket, with exactly the same centre have no normal and are left alone.
 
-    Order: floor, links 0 … n−1, left circle before right; sprocket likewise; then self-contacts by joint pair in
-    the order of `self_contact_order`, and within a joint pair (p, q) the link pairs (p, q), (p, q+1), (p+1, q),
-    (p+1, q+1), links mod n, where links that are the same or neighbours are passed over.
+    Order: floor, links 0 … n−1, left circle before right; sprocket likewise; then self-contacts in two halves, each by
+    joint pair in the order of `self_contact_order`: of a joint pair (p, q), the first half has the link pairs (p, q)
+    and (p+1, q+1), the second (p, q+1) and (p+1, q), links mod n. Equal and neighbouring links are passed over.
 
     The point P and the normal: floor (A; y = 0): the circle's lowest point, +y. Sprocket (A): the circle's point
     nearest the sprocket's centre, radially outwards; the surface moves with Ω ẑ × (P − centre). Two links: midway
@@ -364,8 +364,9 @@ def resolve_contacts(
                     counts["sprocket"] += collide(None, link, point, outwards, law, surface)
     if self_contact:
         law = (parameters.chain_restitution, parameters.chain_friction)
-        for pair in sorted(touching_pairs(position, parameters), key=self_contact_order):
-            for a, b, centre_a, centre_b in _circle_pairs(pair, ends):
+        in_order = sorted(touching_pairs(position, parameters), key=self_contact_order)
+        for half, pair in product((0, 1), in_order):
+            for a, b, centre_a, centre_b in _circle_pairs(pair, ends, half):
                 distance = np.hypot(*(centre_b - centre_a))
                 if 0 < distance < 2 * radius:
                     normal = (centre_b - centre_a) / distance
@@ -392,19 +393,21 @@ def touching_pairs(position: Array, parameters: Parameters) -> list[tuple[int, i
         for q in range(p + 1, n)
         if any(
             np.hypot(*(centre_b - centre_a)) < 2 * parameters.circle_radius
-            for _, _, centre_a, centre_b in _circle_pairs((p, q), ends)
+            for half in (0, 1)
+            for _, _, centre_a, centre_b in _circle_pairs((p, q), ends, half)
         )
     ]
 
 
-def _circle_pairs(pair: tuple[int, int], ends: Array) -> Iterator[tuple[int, int, Array, Array]]:
+def _circle_pairs(pair: tuple[int, int], ends: Array, half: int) -> Iterator[tuple[int, int, Array, Array]]:
     """Link a at joint p, link b at joint q and the centres of their circles there, for links that can touch."""
     n = len(ends)
     p, q = pair
-    for a, centre_a in ((p, ends[p, 1]), ((p + 1) % n, ends[(p + 1) % n, 0])):
-        for b, centre_b in ((q, ends[q, 1]), ((q + 1) % n, ends[(q + 1) % n, 0])):
-            if 2 <= (b - a) % n <= n - 2:
-                yield a, b, centre_a, centre_b
+    for after_p in (0, 1):
+        after_q = after_p ^ half
+        a, b = (p + after_p) % n, (q + after_q) % n
+        if 2 <= (b - a) % n <= n - 2:
+            yield a, b, ends[a, 1 - after_p], ends[b, 1 - after_q]
 
 
 def circular_loop(n: int, parameters: Parameters, speed: float, *, stretched: bool = False) -> tuple[Array, Array]:

@@ -29,6 +29,8 @@ SHARD_WALKS = 256
 """Most walks in a shard."""
 GPU_TASK_WALKS = 8192
 """Walks that a worker with a GPU is given at a time."""
+GPU_WORKERS = 2
+"""Tasks at a time on a GPU: while the last walks of one come to rest, the other fills the device."""
 SHARDS = 128
 """A sweep has at least about this many shards, as far as it has walks: the grain of progress and of a restart."""
 
@@ -51,6 +53,7 @@ class SweepProgress:
         before: Walks that were on disk when this run began.
         seconds: Wall time [s] of this run so far.
         statuses: Number of walks of this run by status label.
+        compiling: Kernels are being compiled, which takes seconds to minutes the first time on a machine.
     """
 
     walks: int
@@ -58,6 +61,7 @@ class SweepProgress:
     before: int
     seconds: float = 0.0
     statuses: Counter[str] = field(default_factory=Counter)
+    compiling: bool = False
 
     @property
     def rate(self) -> float:
@@ -88,10 +92,10 @@ def sweep(
             byte.
         device: ``"cpu"``, ``"cuda"`` or ``"cuda:N"`` instead of what the sweep says.
         executor: Where shards are run; it must see ``out``. Default: threads of this process.
-        workers: Shards in work at the same time; default: processors of this machine. With an executor, at least the
-            number of its workers.
+        workers: Tasks in work at the same time; default: processors of this machine, and on a GPU two, each of which
+            keeps thousands of walks going. With an executor, at least the number of its workers.
         fresh: Discard what another sweep left in the folder.
-        on_progress: Called after each shard.
+        on_progress: Called before kernels are compiled and after each shard.
 
     Raises:
         InputError: The sweep or the folder is refused; one line with the remedy. It is a ``ValueError``.
@@ -102,7 +106,7 @@ def sweep(
         planned = _on_device(planned, device)
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
         raise InputError(f"workers: {workers!r} is not a number of workers; give a whole number from 1")
-    at_once = workers or len(os.sched_getaffinity(0))
+    at_once = workers or (GPU_WORKERS if _is_on_gpu(planned) else len(os.sched_getaffinity(0)))
     with Store.open(Path(out), planned, fresh=fresh, shard_size=shard_size(planned.walk_count)) as store:
         missing = store.missing()
         before = planned.walk_count - sum(len(shard) for shard in missing)
@@ -123,6 +127,11 @@ def _on_device(planned: Sweep, device: str) -> Sweep:
     for block in canonical["blocks"]:
         block["options"]["device"] = device
     return load_sweep(canonical)
+
+
+def _is_on_gpu(planned: Sweep) -> bool:
+    """Whether all walks go to a GPU."""
+    return all(str(block.plan.sections["options"].get("device", "cpu")).startswith("cuda") for block in planned.blocks)
 
 
 def shard_size(walks: int) -> int:
@@ -200,7 +209,11 @@ def _run_in_threads(
     on_progress: Callable[[SweepProgress], None] | None,
 ) -> None:
     """Run shards in threads of this process; launches run outside of Python's lock."""
+    progress.compiling = True
+    if on_progress is not None:
+        on_progress(progress)
     compile_kernels(_one_of_each_cell(planned))
+    progress.compiling = False
     stop = threading.Event()
     with concurrent.futures.ThreadPoolExecutor(workers) as threads:
         try:

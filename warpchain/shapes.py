@@ -148,8 +148,7 @@ def lay_chain(
     for _ in range(50):
         period, period_growth = curve.period(size)
         s[0] = phase * period
-        here = curve.points(s, size)
-        following = curve.points(np.append(s[1:], s[0] + period), size)
+        here, following = _chord_ends(curve.points(np.append(s, s[0] + period), size))
         chord = following.point - here.point
         residual = np.sum(chord**2, axis=1) - link_length**2
         to_here = -2 * np.sum(chord * here.along, axis=1)
@@ -187,14 +186,27 @@ def _solve_loop(to_here: Array, to_following: Array, to_size: Array, right: Arra
     Chord i: to_here[i] δs[i] + to_following[i] δs[i + 1] + to_size[i] δsize = right[i], with δs[0] = δs[n] = 0.
     From the first chord on, each gives the next δs as a + b δsize; the last one then gives δsize.
     """
-    links = len(right)
-    constant, slope = np.zeros(links + 1), np.zeros(links + 1)
-    with np.errstate(all="ignore"):  # a singular loop gives infinities, which the caller looks for
-        for i in range(links - 1):
-            constant[i + 1] = (right[i] - to_here[i] * constant[i]) / to_following[i]
-            slope[i + 1] = -(to_size[i] + to_here[i] * slope[i]) / to_following[i]
-        size = (right[-1] - to_here[-1] * constant[-2]) / (to_size[-1] + to_here[-1] * slope[-2])
-        return np.append(constant[1:-1] + slope[1:-1] * size, size)
+    # plain floats: a loop over elements of arrays takes ten times as long
+    rows = list(zip(to_here.tolist(), to_following.tolist(), to_size.tolist(), right.tolist(), strict=True))
+    constant, slope = [0.0], [0.0]
+    try:
+        for here, following, growth, value in rows[:-1]:
+            constant.append((value - here * constant[-1]) / following)
+            slope.append(-(growth + here * slope[-1]) / following)
+        here, _, growth, value = rows[-1]
+        size = (value - here * constant[-1]) / (growth + here * slope[-1])
+    except ZeroDivisionError:  # a singular loop
+        return np.full(len(rows), np.nan)
+    return np.append(np.array(constant[1:]) + np.array(slope[1:]) * size, size)
+
+
+def _chord_ends(points: CurvePoints) -> tuple[CurvePoints, CurvePoints]:
+    """First and second ends of the chords between points that follow one another."""
+    first, second = (
+        CurvePoints(points.point[part], points.along[part], points.growth[part])
+        for part in (slice(None, -1), slice(1, None))
+    )
+    return first, second
 
 
 def links_between(joints: Array, joint_rate: Array) -> tuple[Array, Array]:
@@ -218,7 +230,7 @@ def links_between(joints: Array, joint_rate: Array) -> tuple[Array, Array]:
 
 def _spread_evenly(curve: Curve, size: float, s: Array) -> Array:
     """Parameters at equal arc lengths, starting at s[0]."""
-    fine = s[0] + np.linspace(0.0, curve.period(size)[0], 8192)
+    fine = s[0] + np.linspace(0.0, curve.period(size)[0], 1024)
     speed = np.linalg.norm(curve.points(fine, size).along, axis=1)
     arc = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(fine))])
     spread: Array = np.interp(arc[-1] * np.arange(len(s)) / len(s), arc, fine)

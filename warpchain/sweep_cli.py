@@ -188,6 +188,8 @@ def _dask(address: str | None) -> "Iterator[tuple[Executor | None, int | None]]"
 
 def _progress_text(progress: "SweepProgress") -> str:
     """How far a sweep is, in columns."""
+    if progress.compiling:
+        return "compiling kernels; later runs find them ready"
     left = progress.time_left
     counts = ", ".join(f"{count} {label}" for label, count in sorted(progress.statuses.items()))
     remaining = "" if left is None else f"   {_duration(left)} left"

@@ -14,9 +14,12 @@ from warpchain.results import LOST, WalkResult, replacing
 
 if TYPE_CHECKING:
     from warpchain.bench import BroadPhaseCost, StepCost
+    from warpchain.bench_gpu import GpuCost
     from warpchain.walker import Progress
 
 PICTURE_DPI: Final = 200
+WIDE: Final = 110
+"""Columns of a wide table where there is no terminal to ask."""
 
 
 def try_folder(folder: Path) -> None:
@@ -125,6 +128,26 @@ def print_costs(
     for list_cost in broad_phase:
         builds = f"{list_cost.grid_microseconds:.1f}", f"{list_cost.all_pairs_microseconds:.1f}"
         table.add_row(str(list_cost.links), str(list_cost.pairs), *builds)
+    console.print(table)
+
+
+def print_gpu_costs(machine: Mapping[str, str], costs: "Sequence[GpuCost]") -> None:
+    """Print on standard output what a bench of a GPU measured; /s is per second of wall time."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else WIDE)
+    console.print(", ".join(f"{name} {value}" for name, value in machine.items()), "\n")
+    table = Table(box=None, pad_edge=False)
+    for heading in ("scene", "links", "method"):
+        table.add_column(heading)
+    for heading in ("chains", "µs/try", "link stages/s", "chain·s/s", "rejected", "registers", "blocks", "of peak"):
+        table.add_column(heading, justify="right")
+    for cost in costs:
+        rates = f"{cost.microseconds:.2f}", f"{cost.link_stages:.2e}", f"{cost.chain_seconds:.3g}"
+        needs = f"{cost.rejected:.1%}", str(cost.registers), f"{cost.blocks} ({cost.occupancy:.0%})"
+        peak = "" if math.isnan(cost.peak) else f"{cost.peak:.0%}"
+        table.add_row(cost.scene, str(cost.links), cost.method, str(cost.chains), *rates, *needs, peak)
     console.print(table)
 
 

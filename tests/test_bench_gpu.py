@@ -1,0 +1,74 @@
+"""The bench of a GPU: what of it needs none."""
+
+import math
+
+import pytest
+
+from warpchain import bench_gpu
+from warpchain.bench_gpu import STAGE_FLOPS, GpuCost, as_json, evaluations, flops_per_try, gpu_costs
+from warpchain.parameters import InputError
+from warpchain.terminal import print_gpu_costs
+
+COST = GpuCost(
+    scene="flight",
+    method="dp5",
+    links=60,
+    chains=1000,
+    microseconds=6.5,
+    link_stages=5.5e10,
+    chain_seconds=210.0,
+    rejected=0.25,
+    registers=168,
+    spilled=160,
+    blocks=6,
+    occupancy=0.1875,
+    peak=math.nan,
+)
+
+
+def test_stages_that_a_try_evaluates() -> None:
+    """A step of dp5 and bs32 begins with the last stage of the step before, one of rkf78 does not."""
+    assert {name: evaluations(name) for name in bench_gpu.METHODS} == {"rkf78": 13, "dp5": 6, "bs32": 3}
+
+
+def test_arithmetic_of_a_try_counts_the_coefficients_that_are_not_zero() -> None:
+    """Bogacki and Shampine's pair, by hand."""
+    stages = 1 + 1 + 3  # rows of A
+    products = 0 + 1 + 2  # rows of A·A: (3/8), (1/6, 1/3)
+    weights = 3 + 2  # b and b·A
+    errors = 4 + 3  # b − b̂ and its product with A
+    coefficients = stages + products + weights + errors
+    assert flops_per_try("bs32") == 3 * sum(STAGE_FLOPS.values()) + 6 * coefficients + bench_gpu.END_FLOPS
+    assert flops_per_try("bs32") < flops_per_try("dp5") < flops_per_try("rkf78")
+
+
+def test_json_holds_everything_and_no_nan() -> None:
+    """What is not known is null."""
+    content = as_json({"gpu": "some GPU"}, [COST])
+    assert content["machine"] == {"gpu": "some GPU"}
+    assert content["tries"][0]["peak"] is None
+    assert content["tries"][0]["microseconds"] == 6.5
+    assert set(content["flops_per_try"]) == set(bench_gpu.METHODS)
+
+
+def test_table_shows_a_row_for_each_measurement(capsys: pytest.CaptureFixture[str]) -> None:
+    """The machine, headings, then numbers."""
+    print_gpu_costs({"gpu": "some GPU"}, [COST, COST])
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("gpu some GPU")
+    rows = [line.split() for line in lines if line.startswith("flight")]
+    assert rows == [["flight", "60", "dp5", "1000", "6.50", "5.50e+10", "210", "25.0%", "168", "6", "(19%)"]] * 2
+
+
+@pytest.mark.parametrize(
+    ("what", "problem"),
+    [
+        ({"scenes": ["fall"]}, "bench.scene: 'fall' is unknown; give one of flight, pile"),
+        ({"methods": ["euler"]}, "bench.method: 'euler' is unknown"),
+        ({"links": [60]}, "bench.device: cpu is not a GPU"),
+    ],
+)
+def test_what_cannot_be_measured_is_refused(what: dict[str, list[object]], problem: str) -> None:
+    """One line with the name of the option."""
+    with pytest.raises(InputError, match=problem):
+        gpu_costs("cpu", report=lambda line: None, **what)
