@@ -187,7 +187,10 @@ def test_from_a_file(tmp_path: Path) -> None:
         (content(scene=[5]), "sweep.scene: [5] is not a mapping; give keys with values"),
         (content(scene={"clearance": "1 cm"}), "sweep.scene.clearance: '1 cm' has a unit written with it"),
         (content(scene={"clearance": None}), "sweep.scene.clearance: empty; give a plain number in m"),
-        (content(options={"method": "rk4"}), "sweep.options.method: 'rk4' is unknown; give one of standard, reference,"),
+        (
+            content(options={"method": "rk4"}),
+            "sweep.options.method: 'rk4' is unknown; give one of standard, reference,",
+        ),
         (content(parameters={"outer_mass": 0}), "sweep.parameters.outer_mass: 0 is not greater than 0 kg"),
         (content(record={"serie": True}), "sweep.record.serie: unknown key; did you mean series"),
         (content(record=[1]), "sweep.record: [1] is not a mapping"),
