@@ -779,7 +779,7 @@ def digest(given: Mapping[str, Any]) -> str:
         {"grid": {"links": {"from": 60, "to": 90, "step": 30}, "frequency": [5.0, 10.0]}},
         {"scene": {"start": "rest", "phase": None}},
         {"scene": {"start": "rest"}, "options": {}, "distributions": {"all": "table"}},
-        {"options": {"tolerance": 1e-4, "method": "standard"}},
+        {"options": {"method": "standard"}},
         {"parameters": {"gravity": 9.809}},
         {"sampler": "random", "record": {"series": False}, "same_samples_along": []},
         {"distributions": {"floor_friction": {"gaussian": {"sigma": 0.02}}, "phase": {"uniform": [0, 1]}}},
