@@ -87,7 +87,7 @@ class Trial:
     damping: wp.float64
     error: wp.float32  # greatest error times tolerance, a quotient not yet divided, and …
     scale: wp.float32  # … its divisor
-    turns_far: bool  # beyond the range of the stages' polynomials
+    turns_far: bool  # further than the method allows in one step
 
 
 @wp.func
@@ -106,25 +106,61 @@ def error_of(trial: Trial, tolerance: wp.float64):
     return wp.cast(ratio, wp.int32)
 
 
+@wp.func
+def joint_constants(K: wp.array2d(dtype=wp.float64), place: Place) -> Chain:
+    """What joints need of a chain, from the board: registers are dear, such reads are not."""
+    chain = Chain()
+    chain.half_length = place.half_length
+    chain.joint_stiffness = K[BOARD_NOTES, NOTE_STIFFNESS]
+    chain.joint_damping = K[BOARD_NOTES, NOTE_DAMPING]
+    chain.viscous_friction = K[BOARD_NOTES, NOTE_VISCOUS]
+    chain.coulomb_friction = K[BOARD_NOTES, NOTE_COULOMB]
+    chain.inverse_smoothing = K[BOARD_NOTES, NOTE_INVERSE_SMOOTHING]
+    chain.gravity = K[BOARD_NOTES, NOTE_GRAVITY]
+    return chain
+
+
+@wp.func
+def greatest_error(
+    link: Link,
+    theta: wp.float64,
+    first: Rates,
+    h: wp.float64,
+    ex: wp.float64,
+    ey: wp.float64,
+    et: wp.float64,
+    eu: wp.float64,
+    ev: wp.float64,
+    ew: wp.float64,
+):
+    """The greatest of six errors over their scales, as a quotient not yet divided.
+
+    Found by cross-multiplication, so that only one needs a division.
+    """
+    error_x, scale_x = greater(
+        wp.float32(ex), error_scale(link.x, link.u, h), wp.float32(eu), error_scale(link.u, first.x, h)
+    )
+    error_y, scale_y = greater(
+        wp.float32(ey), error_scale(link.y, link.v, h), wp.float32(ev), error_scale(link.v, first.y, h)
+    )
+    error_t, scale_t = greater(
+        wp.float32(et), error_scale(theta, link.omega, h), wp.float32(ew), error_scale(link.omega, first.theta, h)
+    )
+    error, scale = greater(error_x, scale_x, error_y, scale_y)
+    return greater(error, scale, error_t, scale_t)
+
+
 @functools.cache
-def block_method(name: str, block_dim: int):
-    """Warp functions of one tableau for blocks of this size: (hand over ends, evaluate a stage, try a step).
+def block_stage(block_dim: int):
+    """Warp functions for blocks of this size: (hand over ends, evaluate a stage).
 
     Args:
-        name: Key of :data:`TABLEAUS`.
         block_dim: Threads in a block.
 
     Returns:
         ``hand_over(ends, place, x, y, u, v, omega, cosine, sine)`` → left end of the next link;
-        ``stage(forces, K, place, next_end, x, y, u, v, omega, cosine, sine)`` → Rates;
-        ``attempt(ends, forces, K, place, link, first, h)`` → Trial.
+        ``stage(forces, K, place, next_end, x, y, u, v, omega, cosine, sine)`` → Rates.
     """
-    tableau = TABLEAUS[name]
-    stages = tableau.stages
-    velocity, position, nodes = tableau.velocity, tableau.position, tableau.nodes
-    velocity_weights, position_weights = tableau.velocity_weights, tableau.position_weights
-    velocity_errors, position_errors = tableau.velocity_errors, tableau.position_errors
-    Stages = wp.types.vector(length=stages, dtype=wp.float64)
 
     @wp.func
     def hand_over(
@@ -159,14 +195,7 @@ def block_method(name: str, block_dim: int):
         cosine: wp.float64,
         sine: wp.float64,
     ):
-        # constants are read from the board where they are needed: registers are dear, such reads are not
-        chain = Chain()
-        chain.half_length = place.half_length
-        chain.joint_stiffness = K[BOARD_NOTES, NOTE_STIFFNESS]
-        chain.joint_damping = K[BOARD_NOTES, NOTE_DAMPING]
-        chain.viscous_friction = K[BOARD_NOTES, NOTE_VISCOUS]
-        chain.coulomb_friction = K[BOARD_NOTES, NOTE_COULOMB]
-        chain.inverse_smoothing = K[BOARD_NOTES, NOTE_INVERSE_SMOOTHING]
+        chain = joint_constants(K, place)
         _left_x, _left_y, right_x, right_y = end_positions(chain, x, y, cosine, sine)
         _left_u, _left_v, right_u, right_v = end_velocities(chain, u, v, omega, cosine, sine)
         cu = next_end[2] - right_u
@@ -179,7 +208,6 @@ def block_method(name: str, block_dim: int):
         damping = chain.joint_damping * (cu * cu + cv * cv)
         forces[place.lane] = vec3d(force_x, force_y, torque)
         left = forces[place.before]
-        chain.gravity = K[BOARD_NOTES, NOTE_GRAVITY]
         rates = Rates()
         ax, ay, at = link_acceleration(
             chain,
@@ -201,12 +229,36 @@ def block_method(name: str, block_dim: int):
         rates.damping = damping
         return rates
 
+    return hand_over, stage
+
+
+@functools.cache
+def explicit_attempt(name: str, block_dim: int):
+    """Warp function that tries a step with a tableau in blocks of this size.
+
+    Args:
+        name: Key of :data:`TABLEAUS`.
+        block_dim: Threads in a block.
+
+    Returns:
+        ``attempt(ends, forces, S, K, place, n, link, first, h)`` → Trial; it needs no memory S.
+    """
+    tableau = TABLEAUS[name]
+    stages = tableau.stages
+    velocity, position, nodes = tableau.velocity, tableau.position, tableau.nodes
+    velocity_weights, position_weights = tableau.velocity_weights, tableau.position_weights
+    velocity_errors, position_errors = tableau.velocity_errors, tableau.position_errors
+    hand_over, stage = block_stage(block_dim)
+    Stages = wp.types.vector(length=stages, dtype=wp.float64)
+
     @wp.func
     def attempt(
         ends: wp.tile[vec5d, block_dim],
         forces: wp.tile[vec3d, block_dim],
+        S: wp.array(dtype=wp.float64),
         K: wp.array2d(dtype=wp.float64),
         place: Place,
+        n: int,
         link: Link,
         first: Rates,
         h: wp.float64,
@@ -296,24 +348,10 @@ def block_method(name: str, block_dim: int):
         trial.last = rates
         trial.friction = friction
         trial.damping = damping
-        # the greatest of six quotients by cross-multiplication, so that only one needs a division
-        error_x, scale_x = greater(
-            wp.float32(hh * ex), error_scale(link.x, link.u, h), wp.float32(h * eu), error_scale(link.u, first.x, h)
-        )
-        error_y, scale_y = greater(
-            wp.float32(hh * ey), error_scale(link.y, link.v, h), wp.float32(h * ev), error_scale(link.v, first.y, h)
-        )
-        error_t, scale_t = greater(
-            wp.float32(hh * et),
-            error_scale(theta, link.omega, h),
-            wp.float32(h * ew),
-            error_scale(link.omega, first.theta, h),
-        )
-        error, scale = greater(error_x, scale_x, error_y, scale_y)
-        error, scale = greater(error, scale, error_t, scale_t)
+        error, scale = greatest_error(link, theta, first, h, hh * ex, hh * ey, hh * et, h * eu, h * ev, h * ew)
         trial.error = error
         trial.scale = scale
         trial.turns_far = wp.abs(trial.theta - theta) > LARGEST_TURN
         return trial
 
-    return hand_over, stage, attempt
+    return attempt

@@ -18,7 +18,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpchain.kernels import layout
-from warpchain.kernels.block import make_advance_block
+from warpchain.kernels.block import block_rows, make_advance_block
 from warpchain.kernels.broadphase import list_layout
 from warpchain.kernels.driver import Features, make_advance
 from warpchain.kernels.methods import METHODS
@@ -150,7 +150,9 @@ class Batch:
         self._mirrors: dict[int, tuple[wp.array, NDArray[Any]]] = {}
         self._streams: dict[tuple[Features, int], wp.Stream] = {}
         self.columns = layout.padded_width(longest)
-        rows = max(METHODS[options.method].scratch_rows(self.columns), layout.BLOCK_ROWS)
+        rows = METHODS[options.method].scratch_rows(self.columns)
+        if self.device.is_cuda:
+            rows = block_rows(options.method, block_threads(longest), self.columns)
 
         self.model = Model()
         self.model.link_count = self._array(np.zeros(worlds, dtype=np.int32))
