@@ -21,12 +21,13 @@ from dataclasses import dataclass
 import warp as wp
 
 from .block_memory import barrier
+from .cyclic_solver import block_algebra, block_type
 from .elementary import ONE, quotient
 
 wp.set_module_options({"enable_backward": False})
 
 vec3d = wp.types.vector(length=3, dtype=wp.float64)
-mat33d = wp.types.matrix(shape=(3, 3), dtype=wp.float64)
+mat33d = block_type(3)
 
 LAST_ROWS = 24
 """Rows of the last level: no more than a hardware warp has threads; fewer take less memory."""
@@ -149,26 +150,6 @@ def store_vector(S: wp.array(dtype=wp.float64), start: int, width: int, column: 
 
 
 @wp.func
-def inverse_block(m: mat33d):
-    """Inverse by cofactors."""
-    a = m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1]
-    b = m[1, 2] * m[2, 0] - m[1, 0] * m[2, 2]
-    c = m[1, 0] * m[2, 1] - m[1, 1] * m[2, 0]
-    scale = quotient(ONE, m[0, 0] * a + m[0, 1] * b + m[0, 2] * c)
-    return mat33d(
-        a * scale,
-        (m[0, 2] * m[2, 1] - m[0, 1] * m[2, 2]) * scale,
-        (m[0, 1] * m[1, 2] - m[0, 2] * m[1, 1]) * scale,
-        b * scale,
-        (m[0, 0] * m[2, 2] - m[0, 2] * m[2, 0]) * scale,
-        (m[0, 2] * m[1, 0] - m[0, 0] * m[1, 2]) * scale,
-        c * scale,
-        (m[0, 1] * m[2, 0] - m[0, 0] * m[2, 1]) * scale,
-        (m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]) * scale,
-    )
-
-
-@wp.func
 def columns_scaled(m: mat33d, scale: vec3d):
     """m diag(scale)."""
     block = mat33d()
@@ -200,6 +181,7 @@ def block_solver(memory: FactorLayout, couplings_of):
     forward = [memory.forward(level) for level in range(reductions + 1)]
     backward = [memory.backward(level) for level in range(reductions + 1)]
     widths = [memory.width(level) for level in range(reductions + 1)]
+    *_, inverse_block = block_algebra(3)
 
     @wp.func
     def rows_at(n: int, level: int):
