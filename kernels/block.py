@@ -185,7 +185,6 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         memory_start = memory_address(memory)
         if wp.static(not holds_memory):
             memory_start = kept_block.ptr + wp.uint64(wp.static(8 * layout.BLOCK_ROWS * columns))
-        S = wp.array(ptr=memory_start, shape=(wp.static(memory_needed),), dtype=wp.float64)
 
         chain = read_chain(model, world)
         n = chain.link_count
@@ -299,7 +298,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if lands:
                 h = stop_time - time
 
-            trial = attempt(ends, forces, S, K, place, n, link, first, h)
+            trial = attempt(ends, forces, memory_start, K, place, n, link, first, h)
             own_error = int(0)
             if lane < n:
                 own_error = error_of(trial, control.tolerance)

@@ -19,7 +19,7 @@ import functools
 
 import warp as wp
 
-from .block_memory import barrier
+from .block_memory import barrier, read, write
 from .block_solver import FactorLayout, block_solver, mat33d, reductions_for
 from .block_step import Link, Place, Rates, Trial, block_stage, greatest_error, joint_constants, vec3d, vec5d
 from .elementary import ONE, TWO, ZERO, cos_sin
@@ -94,6 +94,18 @@ def coefficients(name: str):
 
 
 @wp.func
+def hand(K: wp.array2d(dtype=wp.float64), row: int, lane: int, value: wp.float64):
+    """Puts a number on the board."""
+    write(K.ptr, row * K.shape[1] + lane, value)
+
+
+@wp.func
+def handed(K: wp.array2d(dtype=wp.float64), row: int, lane: int):
+    """A number on the board."""
+    return read(K.ptr, row * K.shape[1] + lane)
+
+
+@wp.func
 def coupling(
     side: wp.float64,
     sigma: wp.float64,
@@ -148,28 +160,28 @@ def rosenbrock_attempt(name: str, block_dim: int):
     Stages = wp.types.vector(length=stages - 1, dtype=wp.float64)
 
     @wp.func
-    def couplings_of(S: wp.array(dtype=wp.float64), n: int, link: int, sigma: wp.float64):
+    def couplings_of(S: wp.uint64, n: int, link: int, sigma: wp.float64):
         before = wp.where(link == 0, n - 1, link - 1)
         after = wp.where(link == n - 1, 0, link + 1)
-        normal_x = S[wp.static(NORMAL_X * block_dim) + link]
-        normal_y = S[wp.static(NORMAL_Y * block_dim) + link]
+        normal_x = read(S, wp.static(NORMAL_X * block_dim) + link)
+        normal_y = read(S, wp.static(NORMAL_Y * block_dim) + link)
         lower = coupling(
             -ONE,
             sigma,
             normal_x,
             normal_y,
-            S[wp.static(COLUMN_X * block_dim) + before],
-            S[wp.static(COLUMN_Y * block_dim) + before],
-            S[wp.static(SLOPE * block_dim) + before],
+            read(S, wp.static(COLUMN_X * block_dim) + before),
+            read(S, wp.static(COLUMN_Y * block_dim) + before),
+            read(S, wp.static(SLOPE * block_dim) + before),
         )
         upper = coupling(
             ONE,
             sigma,
             normal_x,
             normal_y,
-            S[wp.static(COLUMN_X * block_dim) + after],
-            S[wp.static(COLUMN_Y * block_dim) + after],
-            S[wp.static(SLOPE * block_dim) + link],
+            read(S, wp.static(COLUMN_X * block_dim) + after),
+            read(S, wp.static(COLUMN_Y * block_dim) + after),
+            read(S, wp.static(SLOPE * block_dim) + link),
         )
         return lower, upper
 
@@ -179,7 +191,7 @@ def rosenbrock_attempt(name: str, block_dim: int):
     def attempt(
         ends: wp.tile[vec5d, block_dim],
         forces: wp.tile[vec3d, block_dim],
-        S: wp.array(dtype=wp.float64),
+        S: wp.uint64,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
         n: int,
@@ -212,22 +224,22 @@ def rosenbrock_attempt(name: str, block_dim: int):
         damper_x = chain.joint_damping * base_cu
         damper_y = chain.joint_damping * base_cv
         if lane < n:
-            K[END_X, lane] = force_x
-            K[END_Y, lane] = force_y
-            K[FORCE_X, lane] = own_slope
-            K[TORQUE, lane] = torque
-            K[DAMPER_X, lane] = damper_x
-            K[DAMPER_Y, lane] = damper_y
+            hand(K, END_X, lane, force_x)
+            hand(K, END_Y, lane, force_y)
+            hand(K, FORCE_X, lane, own_slope)
+            hand(K, TORQUE, lane, torque)
+            hand(K, DAMPER_X, lane, damper_x)
+            hand(K, DAMPER_Y, lane, damper_y)
         barrier()
         before = place.before
-        tension = link.cosine * (force_x + K[END_X, before]) + link.sine * (force_y + K[END_Y, before])
+        tension = link.cosine * (force_x + handed(K, END_X, before)) + link.sine * (force_y + handed(K, END_Y, before))
         own_angle = K[INERTIA, column] * inverse_length * inverse_length + TWO * sigma
-        own_angle += own_slope + K[FORCE_X, before] + g * g * inverse_length * tension
-        S[wp.static(NORMAL_X * block_dim) + lane] = -link.sine
-        S[wp.static(NORMAL_Y * block_dim) + lane] = link.cosine
-        S[wp.static(COLUMN_X * block_dim) + lane] = -sigma * link.sine - turning * link.cosine
-        S[wp.static(COLUMN_Y * block_dim) + lane] = sigma * link.cosine - turning * link.sine
-        S[wp.static(SLOPE * block_dim) + lane] = own_slope
+        own_angle += own_slope + handed(K, FORCE_X, before) + g * g * inverse_length * tension
+        write(S, wp.static(NORMAL_X * block_dim) + lane, -link.sine)
+        write(S, wp.static(NORMAL_Y * block_dim) + lane, link.cosine)
+        write(S, wp.static(COLUMN_X * block_dim) + lane, -sigma * link.sine - turning * link.cosine)
+        write(S, wp.static(COLUMN_Y * block_dim) + lane, sigma * link.cosine - turning * link.sine)
+        write(S, wp.static(SLOPE * block_dim) + lane, own_slope)
         own_place = K[MASS, column] + TWO * sigma
         # accelerations less what the dampers do with r_q, which are the velocities in the first stage
         chain.gravity = ZERO
@@ -237,11 +249,11 @@ def rosenbrock_attempt(name: str, block_dim: int):
             K[INVERSE_INERTIA, column],
             link.cosine,
             link.sine,
-            K[DAMPER_X, before],
-            K[DAMPER_Y, before],
+            handed(K, DAMPER_X, before),
+            handed(K, DAMPER_Y, before),
             damper_x,
             damper_y,
-            K[TORQUE, before],
+            handed(K, TORQUE, before),
             torque,
         )
         ax = first.x - ax
@@ -310,33 +322,33 @@ def rosenbrock_attempt(name: str, block_dim: int):
                     constants, rx, ry, rt, link.cosine, link.sine
                 )
                 if lane < n:
-                    K[END_X, lane] = left_x
-                    K[END_Y, lane] = left_y
-                    K[END_U, lane] = left_u
-                    K[END_V, lane] = left_v
-                    K[END_SPIN, lane] = omega
-                    K[SHIFT_U, lane] = shift_left_u
-                    K[SHIFT_V, lane] = shift_left_v
-                    K[SHIFT_SPIN, lane] = rt
+                    hand(K, END_X, lane, left_x)
+                    hand(K, END_Y, lane, left_y)
+                    hand(K, END_U, lane, left_u)
+                    hand(K, END_V, lane, left_v)
+                    hand(K, END_SPIN, lane, omega)
+                    hand(K, SHIFT_U, lane, shift_left_u)
+                    hand(K, SHIFT_V, lane, shift_left_v)
+                    hand(K, SHIFT_SPIN, lane, rt)
                 barrier()
                 after = place.after
-                cu = K[END_U, after] - right_u
-                cv = K[END_V, after] - right_v
-                spin = omega - K[END_SPIN, after]
-                force_x = joint_force(constants, K[END_X, after] - right_x, cu)
-                force_y = joint_force(constants, K[END_Y, after] - right_y, cv)
+                cu = handed(K, END_U, after) - right_u
+                cv = handed(K, END_V, after) - right_v
+                spin = omega - handed(K, END_SPIN, after)
+                force_x = joint_force(constants, handed(K, END_X, after) - right_x, cu)
+                force_y = joint_force(constants, handed(K, END_Y, after) - right_y, cv)
                 torque = friction_torque(constants, spin)
                 friction += weight * (torque * spin)
                 damping += weight * (constants.joint_damping * (cu * cu + cv * cv))
-                torque -= slope * (rt - K[SHIFT_SPIN, after])
-                damper_x = constants.joint_damping * (K[SHIFT_U, after] - shift_u)
-                damper_y = constants.joint_damping * (K[SHIFT_V, after] - shift_v)
+                torque -= slope * (rt - handed(K, SHIFT_SPIN, after))
+                damper_x = constants.joint_damping * (handed(K, SHIFT_U, after) - shift_u)
+                damper_y = constants.joint_damping * (handed(K, SHIFT_V, after) - shift_v)
                 if lane < n:
-                    K[FORCE_X, lane] = force_x
-                    K[FORCE_Y, lane] = force_y
-                    K[TORQUE, lane] = torque
-                    K[DAMPER_X, lane] = damper_x
-                    K[DAMPER_Y, lane] = damper_y
+                    hand(K, FORCE_X, lane, force_x)
+                    hand(K, FORCE_Y, lane, force_y)
+                    hand(K, TORQUE, lane, torque)
+                    hand(K, DAMPER_X, lane, damper_x)
+                    hand(K, DAMPER_Y, lane, damper_y)
                 barrier()
                 inverse_mass = K[INVERSE_MASS, column]
                 inverse_inertia = K[INVERSE_INERTIA, column]
@@ -346,11 +358,11 @@ def rosenbrock_attempt(name: str, block_dim: int):
                     inverse_inertia,
                     cosine,
                     sine,
-                    K[FORCE_X, before],
-                    K[FORCE_Y, before],
+                    handed(K, FORCE_X, before),
+                    handed(K, FORCE_Y, before),
                     force_x,
                     force_y,
-                    K[TORQUE, before],
+                    handed(K, TORQUE, before),
                     torque,
                 )
                 constants.gravity = ZERO
@@ -360,8 +372,8 @@ def rosenbrock_attempt(name: str, block_dim: int):
                     inverse_inertia,
                     link.cosine,
                     link.sine,
-                    K[DAMPER_X, before],
-                    K[DAMPER_Y, before],
+                    handed(K, DAMPER_X, before),
+                    handed(K, DAMPER_Y, before),
                     damper_x,
                     damper_y,
                     ZERO,
@@ -409,13 +421,13 @@ def rosenbrock_attempt(name: str, block_dim: int):
         left_u, left_v, right_u, right_v = end_velocities(chain, lost_u, lost_v, lost_omega, link.cosine, link.sine)
         swing = a * link.omega * g * lost_turn
         if lane < n:
-            K[END_U, lane] = left_u + swing * link.cosine
-            K[END_V, lane] = left_v + swing * link.sine
-            K[END_SPIN, lane] = lost_omega
+            hand(K, END_U, lane, left_u + swing * link.cosine)
+            hand(K, END_V, lane, left_v + swing * link.sine)
+            hand(K, END_SPIN, lane, lost_omega)
         barrier()
-        cu = K[END_U, place.after] - (right_u - swing * link.cosine)
-        cv = K[END_V, place.after] - (right_v - swing * link.sine)
-        trial.friction = friction + power_slope * (lost_omega - K[END_SPIN, place.after])
+        cu = handed(K, END_U, place.after) - (right_u - swing * link.cosine)
+        cv = handed(K, END_V, place.after) - (right_v - swing * link.sine)
+        trial.friction = friction + power_slope * (lost_omega - handed(K, END_SPIN, place.after))
         trial.damping = damping + TWO * chain.joint_damping * (base_cu * cu + base_cv * cv)
         return trial
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from .block_memory import barrier
+from .block_memory import barrier, read, write
 from .cyclic_solver import block_algebra, block_type
 from .elementary import ONE, quotient
 
@@ -44,6 +44,18 @@ LEAST_REDUCTIONS = 2
 """)
 def warp_barrier():
     """Wait until all threads of a hardware warp are here; on fibers all of the block."""
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    return lane < 32;
+#else
+    return true;
+#endif
+""")
+def is_in_first_warp(lane: int) -> bool:
+    """Whether a thread belongs to the hardware warp that carries the last level; fibers all wait with it."""
     ...
 
 
@@ -118,35 +130,35 @@ def reductions_for(block_dim: int) -> int:
 
 
 @wp.func
-def load_block(S: wp.array(dtype=wp.float64), start: int, width: int, column: int):
+def load_block(S: wp.uint64, start: int, width: int, column: int):
     """A block from memory: entry by entry, ``width`` apart."""
     block = mat33d()
     for i in range(3):
         for j in range(3):
-            block[i, j] = S[start + (3 * i + j) * width + column]
+            block[i, j] = read(S, start + (3 * i + j) * width + column)
     return block
 
 
 @wp.func
-def store_block(S: wp.array(dtype=wp.float64), start: int, width: int, column: int, block: mat33d):
+def store_block(S: wp.uint64, start: int, width: int, column: int, block: mat33d):
     """Inverse of :func:`load_block`."""
     for i in range(3):
         for j in range(3):
-            S[start + (3 * i + j) * width + column] = block[i, j]
+            write(S, start + (3 * i + j) * width + column, block[i, j])
 
 
 @wp.func
-def load_vector(S: wp.array(dtype=wp.float64), start: int, width: int, column: int):
+def load_vector(S: wp.uint64, start: int, width: int, column: int):
     """A vector from memory."""
-    return vec3d(S[start + column], S[start + width + column], S[start + 2 * width + column])
+    return vec3d(read(S, start + column), read(S, start + width + column), read(S, start + 2 * width + column))
 
 
 @wp.func
-def store_vector(S: wp.array(dtype=wp.float64), start: int, width: int, column: int, vector: vec3d):
+def store_vector(S: wp.uint64, start: int, width: int, column: int, vector: vec3d):
     """Inverse of :func:`load_vector`."""
-    S[start + column] = vector[0]
-    S[start + width + column] = vector[1]
-    S[start + 2 * width + column] = vector[2]
+    write(S, start + column, vector[0])
+    write(S, start + width + column, vector[1])
+    write(S, start + 2 * width + column, vector[2])
 
 
 @wp.func
@@ -188,7 +200,7 @@ def block_solver(memory: FactorLayout, couplings_of):
         return (n + (1 << level) - 1) >> level
 
     @wp.func
-    def reduce_links(S: wp.array(dtype=wp.float64), n: int, row: int, constant: wp.float64):
+    def reduce_links(S: wp.uint64, n: int, row: int, constant: wp.float64):
         """(D, L, U) of a row of level 1: an odd link, the links beside it eliminated."""
         link = 2 * row + 1
         up = wp.where(link == n - 1, 0, link + 1)
@@ -202,15 +214,13 @@ def block_solver(memory: FactorLayout, couplings_of):
         return middle, -(take_low * low_lower), -(take_up * up_upper)
 
     @wp.func
-    def publish_row(
-        S: wp.array(dtype=wp.float64), start: int, width: int, row: int, middle: mat33d, lower: mat33d, upper: mat33d
-    ):
+    def publish_row(S: wp.uint64, start: int, width: int, row: int, middle: mat33d, lower: mat33d, upper: mat33d):
         store_block(S, start, width, row, middle)
         store_block(S, start + 9 * width, width, row, lower)
         store_block(S, start + 18 * width, width, row, upper)
 
     @wp.func
-    def couple(S: wp.array(dtype=wp.float64), block: mat33d, start: int, width: int, other: int, is_there: bool):
+    def couple(S: wp.uint64, block: mat33d, start: int, width: int, other: int, is_there: bool):
         """What a row with this coupling takes of another one, and that times the other's two couplings.
 
         Rows are published from ``start`` on, ``width`` side by side; an eliminated one has its inverse pivot there.
@@ -239,45 +249,11 @@ def block_solver(memory: FactorLayout, couplings_of):
         return here, wp.where(has_low, low, here), wp.where(has_up, up, here), has_low, has_up
 
     @wp.func
-    def factor(S: wp.array(dtype=wp.float64), n: int, lane: int, own: vec3d, constant: wp.float64):
-        pivot = vec3d(quotient(ONE, own[0]), quotient(ONE, own[1]), quotient(ONE, own[2]))
-        if lane < n:
-            store_vector(S, wp.static(vectors), wp.static(threads), lane, wp.where(lane % 2 == 0, pivot, own))
-        barrier()
-        middle = mat33d()
-        lower = mat33d()
-        upper = mat33d()
-        if lane < n // 2:
-            middle, lower, upper = reduce_links(S, n, lane, constant)
-        for level in range(1, wp.static(reductions)):
-            rows = rows_at(n, level)
-            if lane < rows:
-                if lane % 2 == 0 and lane < rows - 1:
-                    middle = inverse_block(middle)
-                    start = wp.static(backward[level])
-                    width = wp.static(widths[level + 1])
-                    publish_row(S, start, width, lane // 2, middle, middle * lower, middle * upper)
-                publish_row(S, wp.static(rounds), wp.static(first_width), lane, middle, lower, upper)
-            barrier()
-            if lane < rows_at(n, level + 1):
-                here, low, up, has_low, has_up = neighbours(rows, lane)
-                middle = load_block(S, wp.static(rounds), wp.static(first_width), here)
-                lower = load_block(S, wp.static(rounds + 9 * first_width), wp.static(first_width), here)
-                upper = load_block(S, wp.static(rounds + 18 * first_width), wp.static(first_width), here)
-                take_low, low_lower, low_upper = couple(
-                    S, lower, wp.static(rounds), wp.static(first_width), low, has_low
-                )
-                take_up, up_lower, up_upper = couple(S, upper, wp.static(rounds), wp.static(first_width), up, has_up)
-                start = wp.static(forward[level + 1])
-                width = wp.static(widths[level + 1])
-                store_block(S, start, width, lane, take_low)
-                store_block(S, start + 9 * width, width, lane, take_up)
-                middle = middle - low_upper - up_lower
-                if has_low:
-                    lower = -low_lower
-                if has_up:
-                    upper = -up_upper
-            barrier()
+    def factor_last_level(S: wp.uint64, n: int, lane: int, own: mat33d, below: mat33d, above: mat33d):
+        """Parallel cyclic reduction in one warp, then the border."""
+        middle = own
+        lower = below
+        upper = above
         last = rows_at(n, wp.static(reductions)) - 1
         stride = int(1)
         start = int(wp.static(rounds))
@@ -325,120 +301,159 @@ def block_solver(memory: FactorLayout, couplings_of):
             store_block(S, wp.static(border), 1, 0, middle)
             store_block(S, wp.static(border + 9), 1, 0, middle * lower)
             store_block(S, wp.static(border + 18), 1, 0, middle * upper)
+
+    @wp.func
+    def factor(S: wp.uint64, n: int, lane: int, own: vec3d, constant: wp.float64):
+        pivot = vec3d(quotient(ONE, own[0]), quotient(ONE, own[1]), quotient(ONE, own[2]))
+        if lane < n:
+            store_vector(S, wp.static(vectors), wp.static(threads), lane, wp.where(lane % 2 == 0, pivot, own))
+        barrier()
+        middle = mat33d()
+        lower = mat33d()
+        upper = mat33d()
+        if lane < n // 2:
+            middle, lower, upper = reduce_links(S, n, lane, constant)
+        for level in range(1, wp.static(reductions)):
+            rows = rows_at(n, level)
+            if lane < rows:
+                if lane % 2 == 0 and lane < rows - 1:
+                    middle = inverse_block(middle)
+                    start = wp.static(backward[level])
+                    width = wp.static(widths[level + 1])
+                    publish_row(S, start, width, lane // 2, middle, middle * lower, middle * upper)
+                publish_row(S, wp.static(rounds), wp.static(first_width), lane, middle, lower, upper)
+            barrier()
+            if lane < rows_at(n, level + 1):
+                here, low, up, has_low, has_up = neighbours(rows, lane)
+                middle = load_block(S, wp.static(rounds), wp.static(first_width), here)
+                lower = load_block(S, wp.static(rounds + 9 * first_width), wp.static(first_width), here)
+                upper = load_block(S, wp.static(rounds + 18 * first_width), wp.static(first_width), here)
+                take_low, low_lower, low_upper = couple(
+                    S, lower, wp.static(rounds), wp.static(first_width), low, has_low
+                )
+                take_up, up_lower, up_upper = couple(S, upper, wp.static(rounds), wp.static(first_width), up, has_up)
+                start = wp.static(forward[level + 1])
+                width = wp.static(widths[level + 1])
+                store_block(S, start, width, lane, take_low)
+                store_block(S, start + 9 * width, width, lane, take_up)
+                middle = middle - low_upper - up_lower
+                if has_low:
+                    lower = -low_lower
+                if has_up:
+                    upper = -up_upper
+            barrier()
+        if is_in_first_warp(lane):
+            factor_last_level(S, n, lane, middle, lower, upper)
         return pivot
 
     @wp.func
-    def link_at(n: int, rows: int, row: int, level: int):
-        return wp.where(row == rows - 1, n - 1, ((row + 1) << level) - 1)
+    def at_link(S: wp.uint64, link: int):
+        return load_vector(S, wp.static(vectors), wp.static(threads), link)
 
     @wp.func
-    def solve(S: wp.array(dtype=wp.float64), n: int, lane: int, constant: wp.float64, pivot: vec3d, right: vec3d):
+    def to_link(S: wp.uint64, link: int, value: vec3d):
+        store_vector(S, wp.static(vectors), wp.static(threads), link, value)
+
+    @wp.func
+    def solve_last_level(S: wp.uint64, n: int, lane: int, given: vec3d):
+        """Parallel cyclic reduction in one warp; leaves the solutions of the last level's rows with their links."""
+        value = given
+        last = rows_at(n, wp.static(reductions)) - 1
+        row = wp.min(lane, wp.static(last_width - 1))
+        stride = int(1)
+        start = int(wp.static(rounds))
+        hand = int(wp.static(hands))
+        while stride < last:
+            if lane < last:
+                store_vector(S, hand, wp.static(last_width), lane, value)
+            take_low = load_block(S, start, wp.static(last_width), row)
+            take_up = load_block(S, start + wp.static(9 * last_width), wp.static(last_width), row)
+            warp_barrier()
+            # where there is no such row, nothing is taken of another one
+            low = wp.clamp(row - stride, 0, last - 1)
+            up = wp.min(row + stride, last - 1)
+            value = value - take_low * load_vector(S, hand, wp.static(last_width), low)
+            value = value - take_up * load_vector(S, hand, wp.static(last_width), up)
+            start += wp.static(18 * last_width)
+            hand = wp.static(2 * hands + 3 * last_width) - hand
+            stride = 2 * stride
+        if lane < last:
+            value = load_block(S, wp.static(inverse), wp.static(last_width), row) * value
+            store_vector(S, hand, wp.static(last_width), lane, value)
+        if lane == last:
+            store_vector(S, hand, wp.static(last_width), lane, given)
+        warp_barrier()
+        cut = load_block(S, wp.static(border), 1, 0) * load_vector(S, hand, wp.static(last_width), last)
+        before = wp.max(last - 1, 0)
+        cut = cut - load_block(S, wp.static(border + 9), 1, 0) * load_vector(S, hand, wp.static(last_width), before)
+        cut = cut - load_block(S, wp.static(border + 18), 1, 0) * load_vector(S, hand, wp.static(last_width), 0)
+        if lane < last:
+            value = value - load_block(S, wp.static(inverse + 9 * last_width), wp.static(last_width), row) * cut
+            to_link(S, ((lane + 1) << wp.static(reductions)) - 1, value)
+        if lane == last:
+            to_link(S, n - 1, cut)
+
+    @wp.func
+    def solve(S: wp.uint64, n: int, lane: int, constant: wp.float64, pivot: vec3d, right: vec3d):
         own = right
         if lane % 2 == 0:
             own = wp.cw_mul(pivot, right)
         if lane < n:
-            store_vector(S, wp.static(vectors), wp.static(threads), lane, own)
+            to_link(S, lane, own)
         value = vec3d()
-        last = rows_at(n, wp.static(reductions)) - 1
         lower, upper = couplings_of(S, n, wp.min(2 * lane + 1, n - 1), constant)
         barrier()
         if lane < n // 2:
             link = 2 * lane + 1
             up = wp.where(link == n - 1, 0, link + 1)
-            value = load_vector(S, wp.static(vectors), wp.static(threads), link)
-            value -= lower * load_vector(S, wp.static(vectors), wp.static(threads), link - 1)
-            value -= upper * load_vector(S, wp.static(vectors), wp.static(threads), up)
-            if wp.static(reductions > 1):
-                store_vector(S, wp.static(vectors), wp.static(threads), link, value)
+            value = at_link(S, link) - lower * at_link(S, link - 1) - upper * at_link(S, up)
+            to_link(S, link, value)
         for level in range(2, wp.static(reductions + 1)):
-            take_low = mat33d()
-            take_up = mat33d()
-            if lane < rows_at(n, level):
-                # factors are fetched while others are still to come
-                width = wp.static(widths[level])
-                take_low = load_block(S, wp.static(forward[level]), width, lane)
-                take_up = load_block(S, wp.static(forward[level]) + 9 * width, width, lane)
+            # factors are fetched while others are still to come
+            width = wp.static(widths[level])
+            row = wp.min(lane, width - 1)
+            take_low = load_block(S, wp.static(forward[level]), width, row)
+            take_up = load_block(S, wp.static(forward[level]) + 9 * width, width, row)
             barrier()
             if lane < rows_at(n, level):
-                rows = rows_at(n, level - 1)
-                here, low, up, _has_low, _has_up = neighbours(rows, lane)
-                link = link_at(n, rows, here, level - 1)
-                value = load_vector(S, wp.static(vectors), wp.static(threads), link)
-                value -= take_low * load_vector(
-                    S, wp.static(vectors), wp.static(threads), link_at(n, rows, low, level - 1)
-                )
-                value -= take_up * load_vector(
-                    S, wp.static(vectors), wp.static(threads), link_at(n, rows, up, level - 1)
-                )
+                # where nothing was eliminated on a side, nothing is taken of another row
+                half = wp.static(2 ** (level - 1))
+                is_border = lane == rows_at(n, level) - 1
+                link = wp.where(is_border, n - 1, ((lane + 1) << level) - 1)
+                below = wp.max((rows_at(n, level - 1) - 1) * half - 1, 0)
+                low = wp.where(is_border, below, link - half)
+                up = wp.where(is_border, wp.min(half, n) - 1, wp.min(link + half, n - 1))
+                value = at_link(S, link) - take_low * at_link(S, low) - take_up * at_link(S, up)
                 if wp.static(level < reductions):
-                    store_vector(S, wp.static(vectors), wp.static(threads), link, value)
-        stride = int(1)
-        start = int(wp.static(rounds))
-        hand = int(wp.static(hands))
-        while stride < last:
-            take_low = mat33d()
-            take_up = mat33d()
-            if lane < last:
-                store_vector(S, hand, wp.static(last_width), lane, value)
-                take_low = load_block(S, start, wp.static(last_width), lane)
-                take_up = load_block(S, start + wp.static(9 * last_width), wp.static(last_width), lane)
-            warp_barrier()
-            if lane < last:
-                low = wp.where(lane >= stride, lane - stride, lane)
-                up = wp.where(lane + stride < last, lane + stride, lane)
-                value -= take_low * load_vector(S, hand, wp.static(last_width), low)
-                value -= take_up * load_vector(S, hand, wp.static(last_width), up)
-            start += wp.static(18 * last_width)
-            hand = wp.static(2 * hands + 3 * last_width) - hand
-            stride = 2 * stride
-        if lane < last:
-            value = load_block(S, wp.static(inverse), wp.static(last_width), lane) * value
-        if lane <= last:
-            store_vector(S, hand, wp.static(last_width), lane, value)
-        warp_barrier()
-        if lane <= last:
-            cut = load_block(S, wp.static(border), 1, 0) * load_vector(S, hand, wp.static(last_width), last)
-            before = wp.max(last - 1, 0)
-            cut -= load_block(S, wp.static(border + 9), 1, 0) * load_vector(S, hand, wp.static(last_width), before)
-            cut -= load_block(S, wp.static(border + 18), 1, 0) * load_vector(S, hand, wp.static(last_width), 0)
-            if lane < last:
-                value -= load_block(S, wp.static(inverse + 9 * last_width), wp.static(last_width), lane) * cut
-            else:
-                value = cut
-            link = link_at(n, last + 1, lane, wp.static(reductions))
-            store_vector(S, wp.static(vectors), wp.static(threads), link, value)
+                    to_link(S, link, value)
+        if is_in_first_warp(lane):
+            solve_last_level(S, n, lane, value)
         for step in range(1, wp.static(reductions)):
             level = wp.static(reductions - step)
-            rows = rows_at(n, level)
-            is_own = 2 * lane < rows - 1
-            link = int(0)
-            take_low = mat33d()
-            take_up = mat33d()
-            if is_own:
-                width = wp.static(widths[reductions - step + 1])
-                start = wp.static(backward[reductions - step])
-                link = link_at(n, rows, 2 * lane, level)
-                value = load_block(S, start, width, lane) * load_vector(S, wp.static(vectors), wp.static(threads), link)
-                take_low = load_block(S, start + 9 * width, width, lane)
-                take_up = load_block(S, start + 18 * width, width, lane)
+            half = wp.static(2 ** (reductions - step))
+            width = wp.static(widths[reductions - step + 1])
+            start = wp.static(backward[reductions - step])
+            row = wp.min(lane, width - 1)
+            link = wp.min((2 * lane + 1) * half, n) - 1
+            inverse_pivot = load_block(S, start, width, row)
+            take_low = load_block(S, start + 9 * width, width, row)
+            take_up = load_block(S, start + 18 * width, width, row)
+            eliminated = inverse_pivot * at_link(S, link)
             barrier()
-            if is_own:
-                low = wp.where(lane == 0, n - 1, link - (1 << level))
-                up = link_at(n, rows, 2 * lane + 1, level)
-                value -= take_low * load_vector(S, wp.static(vectors), wp.static(threads), low)
-                value -= take_up * load_vector(S, wp.static(vectors), wp.static(threads), up)
-                store_vector(S, wp.static(vectors), wp.static(threads), link, value)
+            if 2 * lane < rows_at(n, level) - 1:
+                low = wp.where(lane == 0, n - 1, link - half)
+                up = wp.where(2 * lane + 2 == rows_at(n, level), n - 1, link + half)
+                to_link(S, link, eliminated - take_low * at_link(S, low) - take_up * at_link(S, up))
         lower, upper = couplings_of(S, n, wp.min(lane, n - 1), constant)
         solution = vec3d()
         barrier()
         if lane < n:
             if lane % 2 == 0:
                 low = wp.where(lane == 0, n - 1, lane - 1)
-                remainder = lower * load_vector(S, wp.static(vectors), wp.static(threads), low)
-                remainder += upper * load_vector(S, wp.static(vectors), wp.static(threads), lane + 1)
+                remainder = lower * at_link(S, low) + upper * at_link(S, lane + 1)
                 solution = own - wp.cw_mul(pivot, remainder)
             else:
-                solution = load_vector(S, wp.static(vectors), wp.static(threads), lane)
+                solution = at_link(S, lane)
         return solution
 
     return factor, solve

@@ -255,7 +255,7 @@ def explicit_attempt(name: str, block_dim: int):
     def attempt(
         ends: wp.tile[vec5d, block_dim],
         forces: wp.tile[vec3d, block_dim],
-        S: wp.array(dtype=wp.float64),
+        S: wp.uint64,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
         n: int,

@@ -28,7 +28,7 @@ class Method:
         needs_first_power: Whether a try in the block form asks what the joints lose at its start.
         block_memory: Doubles that a block of so many threads keeps for the method.
         block_attempt: Warp function ``attempt(ends, forces, S, K, place, n, link, first, h)`` → Trial for blocks of so
-            many threads, S that memory.
+            many threads, S the address of that memory.
     """
 
     name: str

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tests.blocks_under_test import fibers
 from warpchain.engine import start_device
-from warpchain.kernels.block_memory import barrier, tile_address
+from warpchain.kernels.block_memory import barrier, tile_address, write
 from warpchain.kernels.block_solver import FactorLayout, block_solver, load_block, reductions_for, vec3d
 from warpchain.kernels.elementary import ONE, ZERO
 
@@ -26,7 +26,7 @@ def _solver(block_dim: int, reductions: int) -> wp.Kernel:
     address = tile_address(wp.float64, size)
 
     @wp.func
-    def couplings_of(memory: wp.array(dtype=wp.float64), n: int, link: int, constant: wp.float64):
+    def couplings_of(memory: wp.uint64, n: int, link: int, constant: wp.float64):
         lower = load_block(memory, 0, wp.static(block_dim), link)
         return lower, load_block(memory, wp.static(9 * block_dim), wp.static(block_dim), link)
 
@@ -42,17 +42,17 @@ def _solver(block_dim: int, reductions: int) -> wp.Kernel:
     ):
         _block, lane = wp.tid()
         tile = wp.tile_empty(shape=(wp.static(size),), dtype=wp.float64, storage="shared")
-        shared = wp.array(ptr=address(tile), shape=(wp.static(size),), dtype=wp.float64)
+        shared = address(tile)
         k = int(lane)
         while k < wp.static(size):
-            shared[k] = wp.float64(wp.nan)
+            write(shared, k, wp.float64(wp.nan))
             k += wp.static(block_dim)
         barrier()
         own = vec3d(ONE, ONE, ONE)
         if lane < n:
             own = diagonal[lane]
             for entry in range(18):
-                shared[entry * wp.static(block_dim) + lane] = couplings[entry, lane]
+                write(shared, entry * wp.static(block_dim) + lane, couplings[entry, lane])
         pivot = factor(shared, n, lane, own, ZERO)
         barrier()
         for k in range(wp.static(RIGHT_SIDES)):
