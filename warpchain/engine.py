@@ -106,7 +106,8 @@ MANY_CHAINS_REGISTERS = {
 }
 """Registers a thread may take, by method and threads of a block: what was fastest with 1000 chains and more on an H200.
 
-rodas4p is fastest without a bound. Few chains run up to 10 % faster so with the others, too; one table for all keeps a walk's bits independent of its batch.
+rodas4p with 64 threads is fastest without a bound. Few chains run up to 10 % faster so with the others, too; one table
+for all keeps a walk's bits independent of its batch.
 """
 
 
