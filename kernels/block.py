@@ -19,7 +19,7 @@ from .block_board import contact_constants, link_is_finite, load_link, note_cons
 from .block_contact import block_self_contacts, touch_layout
 from .block_list import block_list
 from .block_memory import barrier, block_maxima, tile_address, vec5i
-from .block_step import Link, block_method, error_of, link_on, note_first, vec3d, vec5d
+from .block_step import Link, block_stage, error_of, link_on, note_first, vec3d, vec5d
 from .block_surroundings import block_surroundings, raised
 from .broadphase import list_layout
 from .controller import LEAST_SHRINKAGE, step_controller
@@ -72,9 +72,9 @@ from .layout import (
     X,
     Y,
 )
+from .methods import METHODS
 from .record import record_is_full, sampling, summarise, write_sample
 from .softening import change_joints, softened
-from .tableaus import TABLEAUS
 from .types import Control, Model, Program, Record, State, read_chain
 
 wp.set_module_options({"enable_backward": False})
@@ -82,6 +82,16 @@ wp.set_module_options({"enable_backward": False})
 REGISTERS_OF_MULTIPROCESSOR = 65536
 LARGEST_SHARED_BLOCK = 512
 """Longer chains keep their board in the scratch block: it would not fit into the memory that a block shares."""
+LARGEST_SHARED_MEMORY = 192
+"""The same for what a method keeps, if anything."""
+
+
+def block_rows(method: str, block_dim: int, columns: int) -> int:
+    """Rows of a chain's scratch block of this width that the block form needs: for the board and the method."""
+    held = layout.board_size(block_dim)
+    if block_dim > LARGEST_SHARED_MEMORY:
+        held += METHODS[method].block_memory(block_dim)
+    return -(-held // columns)
 
 
 @functools.cache
@@ -94,12 +104,13 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         registers: Greatest number of registers a thread may take on a GPU; None: as many as a block of this size can
             have.
 
-    scratch: (W, ≥ layout.BLOCK_ROWS, columns) float64; lists as for the CPU form.
+    scratch: (W, ≥ block_rows(features.method, block_dim, columns), columns) float64; lists as for the CPU form.
     """
     available = REGISTERS_OF_MULTIPROCESSOR // block_dim // 8 * 8
     if available < 255:
         registers = min(registers or available, available)
-    tableau = TABLEAUS[features.method]
+    method = METHODS[features.method]
+    memory_needed = max(method.block_memory(block_dim), 1)
     columns = features.columns
     lists = list_layout(columns)
     has_floor = features.fixed_body == "floor"
@@ -110,21 +121,24 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     fixed_loss = layout.LOSS_SPROCKET if has_sprocket else layout.LOSS_FLOOR
     fixed_depth = SPROCKET_DEPTH if has_sprocket else FLOOR_DEPTH
     fixed_count = SPROCKET_IMPULSES if has_sprocket else FLOOR_IMPULSES
-    reuses_last = tableau.first_same_as_last
-    needs_first_power = tableau.velocity_weights[0] != 0.0
+    reuses_last, needs_first_power = method.reuses_last, method.needs_first_power
+    attempt = method.block_attempt(block_dim)
     is_shared = block_dim <= LARGEST_SHARED_BLOCK
-    width = block_dim + 1 if is_shared else columns
-    board_size = layout.BOARD_NOTES * width + max(width, layout.NOTES) if is_shared else 1
+    width = block_dim + 1
+    board_size = layout.board_size(block_dim) if is_shared else 1
     touch = touch_layout(columns, block_dim, in_lists=not is_shared)
     touch_size = touch.size if is_shared else 1
+    holds_memory = block_dim <= LARGEST_SHARED_MEMORY
+    memory_size = memory_needed if holds_memory else 1
     board_address = tile_address(wp.float64, board_size)
     touch_address = tile_address(wp.int32, touch_size)
+    memory_address = tile_address(wp.float64, memory_size)
     ends_address = tile_address(vec5d, block_dim)
     forces_address = tile_address(vec3d, block_dim)
-    hand_over, stage, attempt = block_method(features.method, block_dim)
+    hand_over, stage = block_stage(block_dim)
     greatest, _greatest_of_five = block_maxima(block_dim)
     measure, bound_of, meet_fixed_body = block_surroundings(features, block_dim)
-    growth, shrinkage = step_controller(tableau.order, tableau.error_order, wp.float32)
+    growth, shrinkage = step_controller(method.order, method.error_order, wp.float32)
     build_list = block_list(columns, block_dim, features.broad_phase)
     clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, block_dim, touch)
     softens = features.softens
@@ -156,10 +170,11 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         maxima = wp.tile_empty(shape=(wp.static(block_dim),), dtype=vec5i, storage="shared")
         board = wp.tile_empty(shape=(wp.static(board_size),), dtype=wp.float64, storage="shared")
         touches = wp.tile_empty(shape=(wp.static(touch_size),), dtype=wp.int32, storage="shared")
+        memory = wp.tile_empty(shape=(wp.static(memory_size),), dtype=wp.float64, storage="shared")
         if state.status[world] != RUNNING:
             return
         kept = wp.array(
-            ptr=scratch[world].ptr, shape=(wp.static(layout.BLOCK_ROWS), wp.static(columns)), dtype=wp.float64
+            ptr=scratch[world].ptr, shape=(wp.static(layout.BOARD_NOTES), wp.static(width)), dtype=wp.float64
         )
         list_row = lists_of_worlds[world]
         L = wp.array(ptr=list_row.ptr, shape=(wp.static(lists.size),), dtype=wp.int32)
@@ -170,6 +185,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             touch_start = list_row.ptr
         K = wp.array(ptr=board_start, shape=(wp.static(layout.BOARD_ROWS), wp.static(width)), dtype=wp.float64)
         T = wp.array(ptr=touch_start, shape=(wp.static(touch.size),), dtype=wp.int32)
+        memory_start = memory_address(memory)
+        if wp.static(not holds_memory):
+            memory_start = scratch[world].ptr + wp.uint64(wp.static(8 * layout.board_size(block_dim)))
         # what stages hand over is not needed while contacts are resolved
         E = wp.array(ptr=ends_address(ends), shape=(5, wp.static(block_dim)), dtype=wp.float64)
         F = wp.array(ptr=forces_address(forces), shape=(3, wp.static(block_dim)), dtype=wp.float64)
@@ -287,7 +305,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if lands:
                 h = stop_time - time
 
-            trial = attempt(ends, forces, K, place, h)
+            trial = attempt(ends, forces, memory_start, K, place, n, h)
             own_error = int(0)
             if lane < n:
                 own_error = error_of(trial, control.tolerance)
@@ -428,7 +446,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             state.links[world, V, lane] = K[V, lane]
             state.links[world, OMEGA, lane] = K[OMEGA, lane]
             left = wp.array(
-                ptr=scratch[world].ptr, shape=(wp.static(layout.BLOCK_ROWS), wp.static(columns)), dtype=wp.float64
+                ptr=scratch[world].ptr, shape=(wp.static(layout.BOARD_NOTES), wp.static(width)), dtype=wp.float64
             )
             row = int(BOARD_LOST_SELF)
             while row < wp.static(layout.BOARD_NOTES):

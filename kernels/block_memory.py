@@ -60,6 +60,21 @@ def tile_address(dtype: type, size: int):
     return address
 
 
+@wp.func_native("return reinterpret_cast<const double*>(memory)[index];")
+def read(memory: wp.uint64, index: int) -> wp.float64:
+    """A double from the memory at this address.
+
+    An element of an array costs five integer instructions more: negative indices count from an array's end.
+    """
+    ...
+
+
+@wp.func_native("reinterpret_cast<double*>(memory)[index] = value;")
+def write(memory: wp.uint64, index: int, value: wp.float64):
+    """A double into the memory at this address, see :func:`read`."""
+    ...
+
+
 vec5i = wp.types.vector(length=5, dtype=wp.int32)
 
 

@@ -98,7 +98,7 @@ class Trial:
     damping: wp.float64
     error: wp.float32  # greatest error times tolerance, a quotient not yet divided, and …
     scale: wp.float32  # … its divisor
-    turns_far: bool  # beyond the range of the stages' polynomials
+    turns_far: bool  # further than the method allows in one step
 
 
 @wp.func
@@ -127,6 +127,18 @@ def note_first(K: wp.array2d(dtype=wp.float64), column: int, first: Rates, with_
 
 
 @wp.func
+def first_on(K: wp.array2d(dtype=wp.float64), column: int) -> Rates:
+    """A link's first stage as it stands on the board, with powers if they were noted."""
+    first = Rates()
+    first.x = K[BOARD_FIRST, column]
+    first.y = K[BOARD_FIRST + 1, column]
+    first.theta = K[BOARD_FIRST + 2, column]
+    first.friction = K[BOARD_FIRST + 3, column]
+    first.damping = K[BOARD_FIRST + 4, column]
+    return first
+
+
+@wp.func
 def greater(error_a: wp.float32, scale_a: wp.float32, error_b: wp.float32, scale_b: wp.float32):
     """The greater of two quotients |error| / scale with positive scales, a NaN before any number."""
     keeps_a = wp.abs(error_a) * scale_b >= wp.abs(error_b) * scale_a or error_a != error_a
@@ -142,25 +154,60 @@ def error_of(trial: Trial, tolerance: wp.float64):
     return wp.cast(ratio, wp.int32)
 
 
+@wp.func
+def joint_constants(K: wp.array2d(dtype=wp.float64)) -> Chain:
+    """What joints need of a chain, from the board: registers are dear, such reads are not."""
+    chain = Chain()
+    chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
+    chain.joint_stiffness = K[BOARD_NOTES, NOTE_STIFFNESS]
+    chain.joint_damping = K[BOARD_NOTES, NOTE_DAMPING]
+    chain.viscous_friction = K[BOARD_NOTES, NOTE_VISCOUS]
+    chain.coulomb_friction = K[BOARD_NOTES, NOTE_COULOMB]
+    chain.inverse_smoothing = K[BOARD_NOTES, NOTE_INVERSE_SMOOTHING]
+    return chain
+
+
+@wp.func
+def greatest_error(
+    link: Link,
+    theta: wp.float64,
+    first: Rates,
+    h: wp.float64,
+    ex: wp.float64,
+    ey: wp.float64,
+    et: wp.float64,
+    eu: wp.float64,
+    ev: wp.float64,
+    ew: wp.float64,
+):
+    """The greatest of six errors over their scales, as a quotient not yet divided.
+
+    Found by cross-multiplication, so that only one needs a division.
+    """
+    error_x, scale_x = greater(
+        wp.float32(ex), error_scale(link.x, link.u, h), wp.float32(eu), error_scale(link.u, first.x, h)
+    )
+    error_y, scale_y = greater(
+        wp.float32(ey), error_scale(link.y, link.v, h), wp.float32(ev), error_scale(link.v, first.y, h)
+    )
+    error_t, scale_t = greater(
+        wp.float32(et), error_scale(theta, link.omega, h), wp.float32(ew), error_scale(link.omega, first.theta, h)
+    )
+    error, scale = greater(error_x, scale_x, error_y, scale_y)
+    return greater(error, scale, error_t, scale_t)
+
+
 @functools.cache
-def block_method(name: str, block_dim: int):
-    """Warp functions of one tableau for blocks of this size: (hand over ends, evaluate a stage, try a step).
+def block_stage(block_dim: int):
+    """Warp functions for blocks of this size: (hand over ends, evaluate a stage).
 
     Args:
-        name: Key of :data:`TABLEAUS`.
         block_dim: Threads in a block.
 
     Returns:
         ``hand_over(ends, K, place, x, y, u, v, omega, cosine, sine)`` → left end of the next link;
-        ``stage(forces, K, place, next_end, x, y, u, v, omega, cosine, sine)`` → Rates;
-        ``attempt(ends, forces, K, place, h)`` → Trial, from the state and first stage on the board.
+        ``stage(forces, K, place, next_end, x, y, u, v, omega, cosine, sine)`` → Rates.
     """
-    tableau = TABLEAUS[name]
-    stages = tableau.stages
-    velocity, position, nodes = tableau.velocity, tableau.position, tableau.nodes
-    velocity_weights, position_weights = tableau.velocity_weights, tableau.position_weights
-    velocity_errors, position_errors = tableau.velocity_errors, tableau.position_errors
-    Stages = wp.types.vector(length=stages, dtype=wp.float64)
 
     @wp.func
     def hand_over(
@@ -196,14 +243,7 @@ def block_method(name: str, block_dim: int):
         cosine: wp.float64,
         sine: wp.float64,
     ):
-        # constants are read from the board where they are needed: registers are dear, such reads are not
-        chain = Chain()
-        chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
-        chain.joint_stiffness = K[BOARD_NOTES, NOTE_STIFFNESS]
-        chain.joint_damping = K[BOARD_NOTES, NOTE_DAMPING]
-        chain.viscous_friction = K[BOARD_NOTES, NOTE_VISCOUS]
-        chain.coulomb_friction = K[BOARD_NOTES, NOTE_COULOMB]
-        chain.inverse_smoothing = K[BOARD_NOTES, NOTE_INVERSE_SMOOTHING]
+        chain = joint_constants(K)
         _left_x, _left_y, right_x, right_y = end_positions(chain, x, y, cosine, sine)
         _left_u, _left_v, right_u, right_v = end_velocities(chain, u, v, omega, cosine, sine)
         cu = next_end[2] - right_u
@@ -238,12 +278,37 @@ def block_method(name: str, block_dim: int):
         rates.damping = damping
         return rates
 
+    return hand_over, stage
+
+
+@functools.cache
+def explicit_attempt(name: str, block_dim: int):
+    """Warp function that tries a step with a tableau in blocks of this size.
+
+    Args:
+        name: Key of :data:`TABLEAUS`.
+        block_dim: Threads in a block.
+
+    Returns:
+        ``attempt(ends, forces, S, K, place, n, h)`` → Trial, from the state and first stage on the board; it needs no
+        memory S.
+    """
+    tableau = TABLEAUS[name]
+    stages = tableau.stages
+    velocity, position, nodes = tableau.velocity, tableau.position, tableau.nodes
+    velocity_weights, position_weights = tableau.velocity_weights, tableau.position_weights
+    velocity_errors, position_errors = tableau.velocity_errors, tableau.position_errors
+    hand_over, stage = block_stage(block_dim)
+    Stages = wp.types.vector(length=stages, dtype=wp.float64)
+
     @wp.func
     def attempt(
         ends: wp.tile[vec5d, block_dim],
         forces: wp.tile[vec3d, block_dim],
+        S: wp.uint64,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
+        n: int,
         h: wp.float64,
     ):
         hh = h * h
@@ -251,16 +316,17 @@ def block_method(name: str, block_dim: int):
         ax = Stages()
         ay = Stages()
         at = Stages()
-        ax[0] = K[BOARD_FIRST, lane]
-        ay[0] = K[BOARD_FIRST + 1, lane]
-        at[0] = K[BOARD_FIRST + 2, lane]
+        first = first_on(K, lane)
+        ax[0] = first.x
+        ay[0] = first.y
+        at[0] = first.theta
         trial = Trial()
         rates = Rates()
         friction = ZERO
         damping = ZERO
         if wp.static(velocity_weights[0] != 0.0):
-            friction = wp.static(wp.float64(velocity_weights[0])) * K[BOARD_FIRST + 3, lane]
-            damping = wp.static(wp.float64(velocity_weights[0])) * K[BOARD_FIRST + 4, lane]
+            friction = wp.static(wp.float64(velocity_weights[0])) * first.friction
+            damping = wp.static(wp.float64(velocity_weights[0])) * first.damping
         for s in range(1, wp.static(stages)):
             du = ZERO
             dv = ZERO
@@ -337,30 +403,12 @@ def block_method(name: str, block_dim: int):
         trial.last = rates
         trial.friction = friction
         trial.damping = damping
-        # the greatest of six quotients by cross-multiplication, so that only one needs a division
-        error_x, scale_x = greater(
-            wp.float32(hh * ex),
-            error_scale(link.x, link.u, h),
-            wp.float32(h * eu),
-            error_scale(link.u, K[BOARD_FIRST, lane], h),
+        error, scale = greatest_error(
+            link, theta, first_on(K, lane), h, hh * ex, hh * ey, hh * et, h * eu, h * ev, h * ew
         )
-        error_y, scale_y = greater(
-            wp.float32(hh * ey),
-            error_scale(link.y, link.v, h),
-            wp.float32(h * ev),
-            error_scale(link.v, K[BOARD_FIRST + 1, lane], h),
-        )
-        error_t, scale_t = greater(
-            wp.float32(hh * et),
-            error_scale(theta, link.omega, h),
-            wp.float32(h * ew),
-            error_scale(link.omega, K[BOARD_FIRST + 2, lane], h),
-        )
-        error, scale = greater(error_x, scale_x, error_y, scale_y)
-        error, scale = greater(error, scale, error_t, scale_t)
         trial.error = error
         trial.scale = scale
         trial.turns_far = wp.abs(trial.theta - theta) > LARGEST_TURN
         return trial
 
-    return hand_over, stage, attempt
+    return attempt

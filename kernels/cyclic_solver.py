@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from .elementary import ONE, ZERO
+from .elementary import ONE, ZERO, quotient
 
 wp.set_module_options({"enable_backward": False})
 
@@ -160,7 +160,7 @@ def block_algebra(size: int):
 
         @wp.func
         def inverse(m: Block):
-            scale = ONE / (m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0])
+            scale = quotient(ONE, m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0])
             return Block(m[1, 1] * scale, -m[0, 1] * scale, -m[1, 0] * scale, m[0, 0] * scale)
 
     else:
@@ -170,7 +170,7 @@ def block_algebra(size: int):
             a = m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1]
             b = m[1, 2] * m[2, 0] - m[1, 0] * m[2, 2]
             c = m[1, 0] * m[2, 1] - m[1, 1] * m[2, 0]
-            scale = ONE / (m[0, 0] * a + m[0, 1] * b + m[0, 2] * c)
+            scale = quotient(ONE, m[0, 0] * a + m[0, 1] * b + m[0, 2] * c)
             return Block(
                 a * scale,
                 (m[0, 2] * m[2, 1] - m[0, 1] * m[2, 2]) * scale,

@@ -43,7 +43,6 @@ NOTE_FLOOR_RESTITUTION, NOTE_FLOOR_FRICTION, NOTE_SPROCKET_RESTITUTION, NOTE_SPR
 NOTE_CHAIN_RESTITUTION, NOTE_CHAIN_FRICTION, NOTE_HALF_LENGTH = 18, 19, 20
 NOTES = 21
 BOARD_ROWS = 30
-BLOCK_ROWS = 29
 
 # State.watch
 WINDOW_START, WINDOW_COUNT, SUM_HEIGHT, SUM_WIDTH, SUM_SPEED = 0, 1, 2, 3, 4
@@ -85,6 +84,11 @@ PAIRS_PER_LINK = 8
 def scratch_rows(stages: int) -> int:
     """Rows of a chain's scratch block for a method with this many stages."""
     return STAGES + STAGE_ROWS * stages
+
+
+def board_size(threads: int) -> int:
+    """Doubles of the board of a block of so many threads: a column for each, one more, and the last row's numbers."""
+    return BOARD_NOTES * (threads + 1) + max(threads + 1, NOTES)
 
 
 def padded_width(link_count: int) -> int:

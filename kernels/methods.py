@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from . import layout
+from .block_rosenbrock import factor_layout, rosenbrock_attempt
+from .block_step import explicit_attempt
 from .explicit import explicit_method
 from .rosenbrock import rosenbrock_method, rosenbrock_rows
 from .rosenbrock_tables import ROSENBROCK_TABLES
@@ -23,6 +25,10 @@ class Method:
         reuses_last: Whether a step leaves the first stage of the next.
         scratch_rows: Rows of a chain's scratch block of so many columns.
         functions: Warp functions (first stage, attempt, commit) for scratch blocks of so many columns.
+        needs_first_power: Whether a try in the block form asks what the joints lose at its start.
+        block_memory: Doubles that a block of so many threads keeps for the method.
+        block_attempt: Warp function ``attempt(ends, forces, S, K, place, n, h)`` → Trial for blocks of so many threads,
+            from the state and first stage on the board, S the address of that memory.
     """
 
     name: str
@@ -32,6 +38,9 @@ class Method:
     reuses_last: bool
     scratch_rows: Callable[[int], int]
     functions: Callable[[int], Any]
+    needs_first_power: bool
+    block_memory: Callable[[int], int]
+    block_attempt: Callable[[int], Any]
 
 
 def _explicit(name: str) -> Method:
@@ -44,6 +53,9 @@ def _explicit(name: str) -> Method:
         reuses_last=tableau.first_same_as_last,
         scratch_rows=lambda columns: layout.scratch_rows(tableau.stages),
         functions=lambda columns: explicit_method(name),
+        needs_first_power=tableau.velocity_weights[0] != 0.0,
+        block_memory=lambda threads: 0,
+        block_attempt=lambda threads: explicit_attempt(name, threads),
     )
 
 
@@ -57,6 +69,9 @@ def _rosenbrock(name: str) -> Method:
         reuses_last=False,
         scratch_rows=lambda columns: rosenbrock_rows(name, columns),
         functions=lambda columns: rosenbrock_method(name, columns),
+        needs_first_power=True,
+        block_memory=lambda threads: factor_layout(threads).size,
+        block_attempt=lambda threads: rosenbrock_attempt(name, threads),
     )
 
 

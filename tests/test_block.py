@@ -6,6 +6,7 @@ that were resolved in parallel rounds included.
 """
 
 import itertools
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -204,12 +205,18 @@ ALL_BODIES = (("none", "none"), ("floor", "none"), ("floor", "rest"), ("sprocket
 """Fixed bodies and watches that the package asks for."""
 
 
+SHARED_MEMORY = 163 * 1024
+"""Bytes that a block can have on a GPU of the older generation."""
+
+
 def compiles_for_gpus(folder: Path, features: Features, block_dim: int) -> None:
     """Compile a kernel to machine code of two GPU generations, which needs no GPU."""
     module = make_advance_block(features, block_dim).module
     module.options["block_dim"] = block_dim
     wp.compile_aot_module(module, arch=[80, 90], module_dir=str(folder), use_ptx=False)
     assert len(list(folder.glob("*.cubin"))) == 2
+    shared = [size for path in folder.glob("*.meta") for size in json.loads(path.read_text(encoding="utf-8")).values()]
+    assert 0 < max(shared) <= SHARED_MEMORY
 
 
 def test_a_kernel_compiles_for_gpus(tmp_path: Path) -> None:
@@ -220,7 +227,8 @@ def test_a_kernel_compiles_for_gpus(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("method", "body_and_watch", "self_contact"), list(itertools.product(ALL_METHODS, ALL_BODIES, (True, False)))
+    ("method", "body_and_watch", "self_contact"),
+    [*itertools.product(ALL_METHODS, ALL_BODIES, (True, False)), *itertools.product(["rodas4p"], ALL_BODIES, [True])],
 )
 def test_every_kernel_compiles_for_gpus(
     tmp_path: Path, method: str, body_and_watch: tuple[str, str], self_contact: bool

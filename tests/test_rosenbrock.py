@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 import warpchain
 from tests.rosenbrock_under_test import one_step, solve_loop
-from warpchain import InputError, Status, preset, reference
+from warpchain import Status, preset, reference
 from warpchain.kernels.rosenbrock_tables import RODAS4P, ROSENBROCK_TABLES
 from warpchain.shapes import ellipse, lay_chain
 
@@ -301,9 +301,3 @@ def test_floor_impact_is_that_of_an_explicit_method(tolerance):
     at_start = np.linalg.norm(momenta[0][0])
     assert np.linalg.norm(momenta[0][-1] - momenta[0][0]) > 0.1 * at_start
     assert np.linalg.norm(momenta[1] - momenta[0], axis=1).max() < 0.03 * at_start
-
-
-def test_gpu_is_refused_at_the_door():
-    """The method has no GPU form yet, which one line says."""
-    with pytest.raises(InputError, match=r"options\.method: rodas4p runs on the CPU, not on cuda; give"):
-        warpchain.walk(method="rodas4p", device="cuda")

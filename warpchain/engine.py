@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from warpchain.kernel_choice import block_kernel, block_threads, features_of, kernels_of
 from warpchain.kernels import layout
+from warpchain.kernels.block import block_rows
 from warpchain.kernels.broadphase import list_layout
 from warpchain.kernels.driver import Features, make_advance
 from warpchain.kernels.methods import METHODS
@@ -104,9 +105,12 @@ def versions() -> dict[str, str]:
     return {name: importlib.metadata.version(name) for name in packages} | {"python": platform.python_version()}
 
 
-def scratch_rows(options: Options, columns: int, device: wp.Device) -> int:
-    """Rows of a chain's scratch block of so many columns on a device."""
-    return layout.BLOCK_ROWS if device.is_cuda else METHODS[options.method].scratch_rows(columns)
+def scratch_rows(options: Options, longest: int, device: wp.Device) -> int:
+    """Rows of a chain's scratch block on a device, for chains of up to this many links."""
+    columns = layout.padded_width(longest)
+    if device.is_cuda:
+        return block_rows(options.method, block_threads(longest), columns)
+    return METHODS[options.method].scratch_rows(columns)
 
 
 def world_bytes(longest: int, options: Options, samples: int, frames: int, device: wp.Device) -> int:
@@ -121,7 +125,7 @@ def world_bytes(longest: int, options: Options, samples: int, frames: int, devic
     """
     columns = layout.padded_width(longest)
     few = len(Parameters.model_fields) + len(PROGRAM) + 80  # numbers of a world in model, program and state
-    numbers = columns * scratch_rows(options, columns, device) + 6 * longest + few
+    numbers = columns * scratch_rows(options, longest, device) + 6 * longest + few
     numbers += samples * layout.SAMPLE_COLUMNS + frames * (2 * longest + 1)
     return 8 * numbers + 4 * list_layout(columns).size
 
@@ -169,7 +173,7 @@ class Batch:
         self._done: wp.Event | None = None
         self._lanes = [wp.Stream(self.device) for _ in range(LANES)] if self.device.is_cuda else []
         self.columns = layout.padded_width(longest)
-        rows = scratch_rows(options, self.columns, self.device)
+        rows = scratch_rows(options, longest, self.device)
 
         self.model = Model()
         self.model.link_count = self._array(np.zeros(worlds, dtype=np.int32))

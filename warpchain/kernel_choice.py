@@ -8,6 +8,7 @@ import warp as wp
 
 from warpchain.kernels.block import make_advance_block
 from warpchain.kernels.driver import Features, make_advance
+from warpchain.kernels.tableaus import TABLEAUS
 from warpchain.options import Options
 
 REGISTERS = {160: 128, 224: 128, 256: 128}
@@ -17,13 +18,14 @@ A multiprocessor has four schedulers with 16384 registers each, so that a block'
 the registers decide how many blocks it holds. Measured on an H200, 4000 chains in flight with rkf78, dp5 and bs32, ns
 per try and chain, with 128 and 168: 60 links 12.2, 6.4, 3.9 and 9.9, 5.5, 3.3; 90 links 15.9, 8.9, 5.7 and 16.5, 9.0,
 5.5; 150 links 28.7, 16.4, 10.1 and 32.9, 18.0, 10.7. Without a bound, few chains run up to 15 % faster and many slower;
-one number for all keeps a walk's bits independent of its batch.
+one number for all keeps a walk's bits independent of its batch. rodas4p is fastest without one.
 """
 
 
 def block_kernel(features: Features, threads: int) -> wp.Kernel:
     """The kernel of the block form for blocks of this many threads."""
-    return make_advance_block(features, threads, REGISTERS.get(threads, 168))
+    registers = REGISTERS.get(threads, 168) if features.method in TABLEAUS else None
+    return make_advance_block(features, threads, registers)
 
 
 def block_threads(links: int) -> int:

@@ -262,12 +262,6 @@ class Options(BaseModel):
         return device
 
     @model_validator(mode="after")
-    def _method_on_device(self) -> Self:
-        if self.method == "rodas4p" and self.device != "cpu":
-            raise refusal("method", f"rodas4p runs on the CPU, not on {self.device}; give rkf78, dp5 or bs32")
-        return self
-
-    @model_validator(mode="after")
     def _steps_ordered(self) -> Self:
         if self.smallest_step >= self.contact_step:
             raise refusal(
