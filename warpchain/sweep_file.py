@@ -16,7 +16,7 @@ from typing import Any, Final
 from pydantic import BaseModel, ValidationError
 
 from warpchain.design import SAMPLERS, check_design
-from warpchain.options import Options, Scene, read_yaml
+from warpchain.options import METHODS_BY_NEED, Options, Scene, read_yaml
 from warpchain.parameters import InputError, Parameters, preset, shown, suggestion, validated
 from warpchain.recording import FRAME_INTERVAL, SERIES_INTERVAL, Choice, Recording
 from warpchain.sampling import TABLE, Distribution, Gaussian, Uniform, physical_values
@@ -245,7 +245,7 @@ def _checked(name: str, value: object, path: str) -> Value:
         values = {**(preset("paper").model_dump() if model is Parameters else {}), name: value}
         try:
             result: Value = getattr(model.model_validate(values), name)
-            return result
+            return str(value) if name == "method" and value in METHODS_BY_NEED else result
         except ValidationError as error:
             if any(problem["loc"] for problem in error.errors()):
                 validated(model, values, "")
