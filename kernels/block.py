@@ -88,10 +88,17 @@ LARGEST_SHARED_MEMORY = 192
 
 def block_rows(method: str, block_dim: int, columns: int) -> int:
     """Rows of a chain's scratch block of this width that the block form needs: for the board and the method."""
-    held = layout.board_size(block_dim)
+    rows = _board_rows(block_dim, columns)
     if block_dim > LARGEST_SHARED_MEMORY:
-        held += METHODS[method].block_memory(block_dim)
-    return -(-held // columns)
+        rows += -(-METHODS[method].block_memory(block_dim) // columns)
+    return rows
+
+
+def _board_rows(block_dim: int, columns: int) -> int:
+    """Rows of this width for what a chain keeps of its board between launches, or for all of a board not shared."""
+    if block_dim <= LARGEST_SHARED_BLOCK:
+        return layout.BOARD_NOTES
+    return -(-layout.board_size(block_dim) // columns)
 
 
 @functools.cache
@@ -125,6 +132,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     attempt = method.block_attempt(block_dim)
     is_shared = block_dim <= LARGEST_SHARED_BLOCK
     width = block_dim + 1
+    kept_width = columns if is_shared else width
     board_size = layout.board_size(block_dim) if is_shared else 1
     touch = touch_layout(columns, block_dim, in_lists=not is_shared)
     touch_size = touch.size if is_shared else 1
@@ -174,7 +182,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         if state.status[world] != RUNNING:
             return
         kept = wp.array(
-            ptr=scratch[world].ptr, shape=(wp.static(layout.BOARD_NOTES), wp.static(width)), dtype=wp.float64
+            ptr=scratch[world].ptr, shape=(wp.static(layout.BOARD_NOTES), wp.static(kept_width)), dtype=wp.float64
         )
         list_row = lists_of_worlds[world]
         L = wp.array(ptr=list_row.ptr, shape=(wp.static(lists.size),), dtype=wp.int32)
@@ -187,7 +195,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         T = wp.array(ptr=touch_start, shape=(wp.static(touch.size),), dtype=wp.int32)
         memory_start = memory_address(memory)
         if wp.static(not holds_memory):
-            memory_start = scratch[world].ptr + wp.uint64(wp.static(8 * layout.board_size(block_dim)))
+            memory_start = scratch[world].ptr + wp.uint64(wp.static(8 * _board_rows(block_dim, columns) * columns))
         # what stages hand over is not needed while contacts are resolved
         E = wp.array(ptr=ends_address(ends), shape=(5, wp.static(block_dim)), dtype=wp.float64)
         F = wp.array(ptr=forces_address(forces), shape=(3, wp.static(block_dim)), dtype=wp.float64)
@@ -446,7 +454,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             state.links[world, V, lane] = K[V, lane]
             state.links[world, OMEGA, lane] = K[OMEGA, lane]
             left = wp.array(
-                ptr=scratch[world].ptr, shape=(wp.static(layout.BOARD_NOTES), wp.static(width)), dtype=wp.float64
+                ptr=scratch[world].ptr, shape=(wp.static(layout.BOARD_NOTES), wp.static(kept_width)), dtype=wp.float64
             )
             row = int(BOARD_LOST_SELF)
             while row < wp.static(layout.BOARD_NOTES):

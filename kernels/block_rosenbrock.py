@@ -27,7 +27,6 @@ from .block_step import (
     block_stage,
     first_on,
     greatest_error,
-    joint_constants,
     link_on,
     vec3d,
     vec5d,
@@ -45,12 +44,19 @@ from .layout import (
     LEFT_X,
     LEFT_Y,
     MASS,
+    NOTE_COULOMB,
+    NOTE_DAMPING,
     NOTE_GRAVITY,
+    NOTE_HALF_LENGTH,
+    NOTE_INVERSE_SMOOTHING,
+    NOTE_STIFFNESS,
+    NOTE_VISCOUS,
     RIGHT_X,
     THETA,
 )
 from .rosenbrock import GREATEST_TURN
 from .rosenbrock_tables import ROSENBROCK_TABLES
+from .types import Chain
 
 wp.set_module_options({"enable_backward": False})
 
@@ -108,6 +114,19 @@ def hand(K: wp.array2d(dtype=wp.float64), row: int, lane: int, value: wp.float64
 def handed(K: wp.array2d(dtype=wp.float64), row: int, lane: int):
     """A number on the board."""
     return read(K.ptr, row * K.shape[1] + lane)
+
+
+@wp.func
+def joint_constants(K: wp.array2d(dtype=wp.float64)) -> Chain:
+    """What joints need of a chain, but for gravity, from the board."""
+    chain = Chain()
+    chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
+    chain.joint_stiffness = K[BOARD_NOTES, NOTE_STIFFNESS]
+    chain.joint_damping = K[BOARD_NOTES, NOTE_DAMPING]
+    chain.viscous_friction = K[BOARD_NOTES, NOTE_VISCOUS]
+    chain.coulomb_friction = K[BOARD_NOTES, NOTE_COULOMB]
+    chain.inverse_smoothing = K[BOARD_NOTES, NOTE_INVERSE_SMOOTHING]
+    return chain
 
 
 @wp.func
@@ -284,7 +303,6 @@ def rosenbrock_attempt(name: str, block_dim: int):
             dx = ZERO
             dy = ZERO
             turn = ZERO
-            link = link_on(K, lane)
             u = link.u
             v = link.v
             omega = link.omega
@@ -411,13 +429,10 @@ def rosenbrock_attempt(name: str, block_dim: int):
                 trial.v = v + dv
                 trial.omega = omega + dw
                 trial.turns_far = wp.abs(trial.theta - theta) > GREATEST_TURN
-                error, scale = greatest_error(
-                    link, theta, first_on(K, lane), h, g * z[0], g * z[1], g * z[2], du, dv, dw
-                )
+                error, scale = greatest_error(link, theta, first, h, g * z[0], g * z[1], g * z[2], du, dv, dw)
                 trial.error = error
                 trial.scale = scale
         # lost power: how the joint's spin and opening rate change by Σ w U
-        chain = joint_constants(K)
         left_u, left_v, right_u, right_v = end_velocities(chain, lost_u, lost_v, lost_omega, link.cosine, link.sine)
         swing = chain.half_length * link.omega * g * lost_turn
         ends[lane] = vec5d(ZERO, ZERO, left_u + swing * link.cosine, left_v + swing * link.sine, lost_omega)

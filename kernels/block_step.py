@@ -155,19 +155,6 @@ def error_of(trial: Trial, tolerance: wp.float64):
 
 
 @wp.func
-def joint_constants(K: wp.array2d(dtype=wp.float64)) -> Chain:
-    """What joints need of a chain, from the board: registers are dear, such reads are not."""
-    chain = Chain()
-    chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
-    chain.joint_stiffness = K[BOARD_NOTES, NOTE_STIFFNESS]
-    chain.joint_damping = K[BOARD_NOTES, NOTE_DAMPING]
-    chain.viscous_friction = K[BOARD_NOTES, NOTE_VISCOUS]
-    chain.coulomb_friction = K[BOARD_NOTES, NOTE_COULOMB]
-    chain.inverse_smoothing = K[BOARD_NOTES, NOTE_INVERSE_SMOOTHING]
-    return chain
-
-
-@wp.func
 def greatest_error(
     link: Link,
     theta: wp.float64,
@@ -243,7 +230,15 @@ def block_stage(block_dim: int):
         cosine: wp.float64,
         sine: wp.float64,
     ):
-        chain = joint_constants(K)
+        # constants are read from the board where they are needed: registers are dear, such reads are not; a function
+        # that returned them would cost a double or two of local memory
+        chain = Chain()
+        chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
+        chain.joint_stiffness = K[BOARD_NOTES, NOTE_STIFFNESS]
+        chain.joint_damping = K[BOARD_NOTES, NOTE_DAMPING]
+        chain.viscous_friction = K[BOARD_NOTES, NOTE_VISCOUS]
+        chain.coulomb_friction = K[BOARD_NOTES, NOTE_COULOMB]
+        chain.inverse_smoothing = K[BOARD_NOTES, NOTE_INVERSE_SMOOTHING]
         _left_x, _left_y, right_x, right_y = end_positions(chain, x, y, cosine, sine)
         _left_u, _left_v, right_u, right_v = end_velocities(chain, u, v, omega, cosine, sine)
         cu = next_end[2] - right_u

@@ -77,13 +77,14 @@ def test_fixed_steps_equal_the_cpu_form(method: str, fixed_body: str, self_conta
     assert_same(ours, theirs)
 
 
-def test_chains_too_long_for_shared_memory_equal_the_cpu_form(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Long chains keep their board in the scratch block, with the same result."""
+@pytest.mark.parametrize("block_dim", [LINKS, 224])
+def test_chains_too_long_for_shared_memory_equal_the_cpu_form(block_dim: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Long chains keep their board in the scratch block, with the same result, even with more threads than columns."""
     monkeypatch.setattr(block, "LARGEST_SHARED_BLOCK", LINKS - 1)
     make_advance_block.cache_clear()
     ours, theirs = (batch_of([heap(LINKS)], method="bs32") for _ in range(2))
     features = features_of(ours, fixed_body="floor")
-    launch_blocks(ours, features, 20, block_dim=LINKS)
+    launch_blocks(ours, features, 20, block_dim=block_dim)
     make_advance_block.cache_clear()
     launch_chains(theirs, features, 20)
     assert theirs.counts(0)["self"] > 10
