@@ -1,14 +1,17 @@
 """Every method of the step loop by the name that a user writes, and what the loop must know of it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from . import layout
 from .explicit import explicit_method
+from .hand_over import hand_over
+from .rigid_step import flight_method, flight_rows
 from .rosenbrock import rosenbrock_method, rosenbrock_rows
 from .rosenbrock_tables import ROSENBROCK_TABLES
 from .tableaus import TABLEAUS
+from .w_tables import ROS34PW2
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,7 @@ class Method:
         reuses_last: Whether a step leaves the first stage of the next.
         scratch_rows: Rows of a chain's scratch block of so many columns.
         functions: Warp functions (first stage, attempt, commit) for scratch blocks of so many columns.
+        flight: Another method, for flight on rigid joints, if this one has one; see :class:`Flight`.
     """
 
     name: str
@@ -31,6 +35,22 @@ class Method:
     stages: int
     reuses_last: bool
     scratch_rows: Callable[[int], int]
+    functions: Callable[[int], Any]
+    flight: "Flight | None" = None
+
+
+@dataclass(frozen=True)
+class Flight:
+    """How a method carries a chain from one impulse to the next on rigid joints.
+
+    Attributes:
+        order: As that of a method.
+        error_order: As that of a method.
+        functions: Warp functions (attempt, commit, close joints, open joints) for scratch blocks of so many columns.
+    """
+
+    order: int
+    error_order: int
     functions: Callable[[int], Any]
 
 
@@ -60,7 +80,19 @@ def _rosenbrock(name: str) -> Method:
     )
 
 
+def _hybrid(name: str, burst: str) -> Method:
+    method = _explicit(burst)
+    first_row = method.scratch_rows(0)
+    flight = Flight(
+        order=ROS34PW2.order,
+        error_order=ROS34PW2.error_order,
+        functions=lambda columns: (*flight_method(columns, first_row), *hand_over(columns, first_row)),
+    )
+    return replace(method, name=name, scratch_rows=lambda columns: first_row + flight_rows(columns), flight=flight)
+
+
 METHODS = {
     **{name: _explicit(name) for name in TABLEAUS},
     **{name: _rosenbrock(name) for name in ROSENBROCK_TABLES},
+    "hybrid": _hybrid("hybrid", "bs32"),
 }

@@ -165,15 +165,23 @@ class Options(BaseModel):
 
     model_config = _STRICT
 
-    method: Literal["rkf78", "dp5", "bs32", "rodas4p"] = Field(
+    method: Literal["rkf78", "dp5", "bs32", "rodas4p", "hybrid"] = Field(
         default="rkf78",
-        description="embedded pair: Fehlberg 7(8), Dormand–Prince 5(4), Bogacki–Shampine 3(2) or RODAS4P 4(3)",
+        description="embedded pair: Fehlberg 7(8), Dormand–Prince 5(4), Bogacki–Shampine 3(2) or RODAS4P 4(3); "
+        "hybrid: rigid joints between impulses, bs32 around them",
     )
     tolerance: float = Field(
         default=1e-6,
         ge=1e-13,
         le=1e-1,
         description="error allowed in a step, absolute (SI units) and relative alike",
+        json_schema_extra={"unit": "1"},
+    )
+    flight_tolerance: float = Field(
+        default=1e-3,
+        ge=1e-13,
+        le=1e-1,
+        description="of method hybrid: error allowed in a step between impulses, where joints are taken for rigid",
         json_schema_extra={"unit": "1"},
     )
     controller: Literal["standard", "pi"] = Field(
@@ -263,8 +271,8 @@ class Options(BaseModel):
 
     @model_validator(mode="after")
     def _method_on_device(self) -> Self:
-        if self.method == "rodas4p" and self.device != "cpu":
-            raise refusal("method", f"rodas4p runs on the CPU, not on {self.device}; give rkf78, dp5 or bs32")
+        if self.method in ("rodas4p", "hybrid") and self.device != "cpu":
+            raise refusal("method", f"{self.method} runs on the CPU, not on {self.device}; give rkf78, dp5 or bs32")
         return self
 
     @model_validator(mode="after")
