@@ -16,7 +16,8 @@ import warp as wp
 from .cyclic_solver import place_column, segment_places
 from .elementary import ONE, TWO, ZERO
 from .layout import THETA, X, Y
-from .rigid import BASE, FORCE, GREATEST_STRETCHING, force_layout, link_at, rigid_joints
+from .rigid import GREATEST_STRETCHING, rigid_joints
+from .rigid_layout import BASE, FORCE, force_layout, link_at
 from .rigid_step import flight_memory
 from .types import Chain
 

@@ -20,10 +20,31 @@ from typing import Any
 
 import warp as wp
 
-from .cyclic_solver import SegmentLayout, cyclic_solver, place_column, row_at, segment_columns, segment_places
+from .cyclic_solver import cyclic_solver, place_column, row_at, segment_places
 from .elementary import HALF, ONE, ZERO, cos_sin, order_bits
 from .joint import smoothed_torque
 from .layout import OMEGA, STAGES, THETA, U, V, X, Y
+from .rigid_layout import (
+    BASE,
+    BASE_RATE,
+    COSINE,
+    COUNTED,
+    FORCE,
+    FREE,
+    INERTIA,
+    INVERSE_INERTIA,
+    INVERSE_MASS,
+    INVERSE_SMOOTHING,
+    MASS,
+    RATE,
+    ROWS_OF_RIGID,
+    SINE,
+    SPIN,
+    TORQUE,
+    force_layout,
+    link_at,
+    pad_joints,
+)
 from .rosenbrock_layout import pad_behind
 from .types import Chain
 
@@ -38,51 +59,6 @@ GREATEST_STRETCHING = wp.constant(wp.float64(3e-4))
 In a loop turning at a speed v that part is m v²/(k ℓ²), the relative stretch: 7e-5 for k = 1e7 N/m at 5 m/s. Where the
 links of a loop lie on one line, S is singular and forces without bound would go over to the springs.
 """
-
-# Rows in segment order. The state; constants of the links.
-BASE = 0
-INVERSE_MASS, INVERSE_INERTIA, MASS, INERTIA, COUNTED = 6, 7, 8, 9, 10
-# A stage: rates, directions; joints' inverse smoothing and torques, α; accelerations.
-STAGE_U, STAGE_V, SPIN = 11, 12, 13
-COSINE, SINE = 14, 15
-INVERSE_SMOOTHING, TORQUE, FREE = 16, 17, 18
-RATE = 19
-# Joint forces of the state and the accelerations that belong to it.
-FORCE = 22
-BASE_RATE = 24
-# The system S F = r.
-SYSTEM = 27
-ROWS_OF_RIGID = SYSTEM + 30
-
-
-@functools.cache
-def force_layout(columns: int) -> SegmentLayout:
-    """Where S, r and F lie, for scratch blocks of this width."""
-    return SegmentLayout(size=2, columns=segment_columns(columns), matrix=SYSTEM, right=SYSTEM + 24)
-
-
-@wp.func
-def link_at(place: int, segment: int, places: int, full: int, link_count: int):
-    """Link that lies at this place."""
-    row = row_at(place, segment, places, full)
-    return wp.where(row >= link_count, row - link_count, row)
-
-
-@functools.cache
-def pad_joints(rows: tuple[int, ...]):
-    """Warp function that puts, in these rows, before each segment's first place the joint before it."""
-
-    @wp.func
-    def pad(S: wp.array2d(dtype=wp.float64), places: int, full: int):
-        s = int(0)
-        while s < 8:
-            # a short segment begins with the last joint of the segment before, so its predecessor is wanted
-            source = 8 * places + (s + 7) % 8 - wp.where(s >= full, 8, 0)
-            for k in range(wp.static(len(rows))):
-                S[wp.static(rows[k]), s] = S[wp.static(rows[k]), source]
-            s += 1
-
-    return pad
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,8 @@ from .controller import error_bits
 from .cyclic_solver import SegmentLayout, cyclic_solver, place_column, segment_places
 from .elementary import ONE, TWO, ZERO, cos_sin, order_bits
 from .layout import LOST_FRICTION
-from .rigid import (
+from .rigid import rigid_joints
+from .rigid_layout import (
     BASE,
     BASE_RATE,
     COSINE,
@@ -45,7 +46,6 @@ from .rigid import (
     force_layout,
     link_at,
     pad_joints,
-    rigid_joints,
 )
 from .rosenbrock import GREATEST_TURN
 from .rosenbrock_layout import pad_behind

@@ -1,4 +1,4 @@
-"""Rigid joints from NumPy: the kernels' functions one by one on scratch memory poisoned with NaN, and the dense truth."""
+"""Rigid joints from NumPy: the kernels' functions on scratch memory poisoned with NaN, and the dense truth."""
 
 import functools
 from dataclasses import dataclass
@@ -135,18 +135,16 @@ def _visit(columns: int) -> wp.Kernel:
     ):
         chain = read_chain(model, 0)
         block = scratch[0]
-        K = wp.array(ptr=block.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
-        load_state(K, state, chain, 0)
-        closed, lost = close_joints(K, chain)
+        rows_of_chain = wp.array(ptr=block.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
+        load_state(rows_of_chain, state, chain, 0)
+        closed, lost = close_joints(rows_of_chain, chain)
         results[0] = wp.where(closed, wp.float64(1.0), wp.float64(0.0))
         results[1] = lost
-        step = int(0)
-        while step < steps:
-            attempt(K, chain, h, wp.float64(1.0))
-            commit(K, chain, h)
-            step += 1
+        for _ in range(steps):
+            attempt(rows_of_chain, chain, h, wp.float64(1.0))
+            commit(rows_of_chain, chain, h)
         if opens != 0:
-            results[2] = open_joints(K, chain)
+            results[2] = open_joints(rows_of_chain, chain)
 
     return visit
 

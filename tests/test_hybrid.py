@@ -104,7 +104,7 @@ def test_closing_is_the_projection_in_the_metric_of_the_masses(links):
 
 @pytest.mark.parametrize(("size", "parameters"), [(1e-6, PAPER), (1e-7, PAPER.with_values({"joint_stiffness": 1e4}))])
 def test_springs_that_ring_or_stretch_stay_springs(size, parameters):
-    """A chain that swings on its springs, or whose springs are too soft for its tension, is left as it is to the bit."""
+    """A chain that swings on its springs, or whose springs are too soft, is left as it is to the bit."""
     position, velocity = shaken(12, size, parameters)
     outcome = visit(position, velocity, parameters)
     assert not outcome.closed
@@ -162,7 +162,7 @@ def test_error_of_a_flight_falls_with_order_three(links):
 
 
 def test_flight_keeps_momentum_energy_and_joints():
-    """Without friction and gravity: momentum to rounding, angular momentum and energy to h³, joints closed all the time."""
+    """Without friction and gravity: momentum to rounding, angular momentum and energy to h³, joints closed."""
     chain = PAPER.with_values({"viscous_friction": 0.0, "coulomb_friction": 0.0, "gravity": 0.0})
     position, velocity = loop(20, chain)
     end = visit(position, velocity, chain, h=1e-4, steps=100)
@@ -178,7 +178,7 @@ def test_flight_keeps_momentum_energy_and_joints():
 
 @pytest.mark.parametrize(("name", "duration", "within"), [("paper", 3e-4, 2e-6), ("soft", 2e-3, 5e-5)])
 def test_flight_agrees_with_springs(name, duration, within):
-    """A flight at a tight tolerance differs from that of the springs, by DOP853, by their stretch, 1e-6 and 1e-5 of it."""
+    """A flight at a tight tolerance differs from that of springs, by DOP853, by their stretch: 1e-6 and 1e-5."""
     parameters = preset(name)
     start = loop(12, parameters)
     position, velocity, _ = reference.solve_flight(*start, [0.0, duration], parameters)
@@ -216,7 +216,7 @@ def falling(links, parameters, phase, speed=2.0, fall=2.0):
 
 @pytest.mark.parametrize(("parameters", "duration"), [(PAPER, 3e-3), (SOFT, 3e-3)], ids=["paper", "soft"])
 def test_impacts_push_as_with_springs(parameters, duration):
-    """The impulse of the first milliseconds on the floor, the mean of 8 starts, is that of rkf78 to 2 %; the ledger closes."""
+    """The floor's impulse in the first milliseconds, the mean of 8 starts, is rkf78's to 2 %; the ledger closes."""
     pushes = {"hybrid": [], "rkf78": []}
     for phase in (np.arange(8) + 0.5) / 8:
         start = falling(20, parameters, phase)
