@@ -7,7 +7,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 import warpchain
 from tests.rigid_under_test import exact_flight, projected, rigid_motion, visit
 from warpchain import InputError, Status, preset, reference
+from warpchain.engine import Batch
 from warpchain.kernels.w_tables import ROS34PW2
+from warpchain.options import Options
 from warpchain.shapes import ellipse, lay_chain
 
 PAPER, SOFT = preset("paper"), preset("soft")
@@ -231,6 +233,25 @@ def test_impacts_push_as_with_springs(parameters, duration):
             assert abs(run.losses["hand_over"]) < 1e-3 * at_start
             assert (run.losses["hand_over"] != 0) == (method == "hybrid")
     assert np.mean(pushes["hybrid"]) == pytest.approx(np.mean(pushes["rkf78"]), rel=0.02)
+
+
+def test_launch_size_changes_no_bit_of_flights_and_bursts():
+    """A chain of the paper that falls, bounces and flies again ends the same to the bit in any launches."""
+    ends = []
+    for tries in (1, 13, 1000):
+        batch = Batch(1, 20, Options(method="hybrid", tolerance=1e-5))
+        batch.set_chain(0, PAPER, 20)
+        batch.load(0, *falling(20, PAPER, 0.3), stop_time=6e-3, stop_status=Status.FINISHED)
+        modes = set()
+        while batch.status(0) == Status.RUNNING:
+            batch.launch([0], batch.features(fixed_body="floor", watch="none"), tries)
+            modes.add(int(batch.state.flies.numpy()[0]))
+        assert tries > 13 or modes == {0, 1}
+        state = np.hstack([batch.position(0), batch.velocity(0)])
+        ends.append((state, *batch.counts(0).values(), *batch.losses(0).values(), *batch.extremes(0).values()))
+    for end in ends[1:]:
+        for first, other in zip(ends[0], end, strict=True):
+            assert_array_equal(first, other)
 
 
 def test_hybrid_is_refused_on_a_gpu():
