@@ -168,7 +168,7 @@ class Options(BaseModel):
     method: Literal["rkf78", "dp5", "bs32", "rodas4p", "hybrid"] = Field(
         default="rkf78",
         description="embedded pair: Fehlberg 7(8), Dormand–Prince 5(4), Bogacki–Shampine 3(2) or RODAS4P 4(3); "
-        "hybrid: rigid joints between impulses, bs32 around them",
+        "hybrid: rigid joints between impulses, dp5 around them",
     )
     tolerance: float = Field(
         default=1e-6,
