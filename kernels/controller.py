@@ -72,3 +72,28 @@ def step_controller(order: int, error_order: int, real: type = wp.float64):
         return wp.max(factor, wp.static(real(least_shrinkage)))
 
     return growth, shrinkage
+
+
+@functools.cache
+def classical_controller(error_order: int):
+    """The same two functions for an error that goes as h^(error_order + 1): the step where it would be the safe one.
+
+    E. Hairer, S. P. Nørsett, G. Wanner, Solving ODEs I, section II.4. odeint's rule shrinks by a power of the error
+    that with an embedded solution of order 2 throws far too much away; the flights of :mod:`rigid_step`, whose tries
+    are dear and whose error comes in jumps, take twice as many steps with it.
+    """
+
+    @wp.func
+    def factor(error: wp.float64):
+        bounded = wp.max(error, wp.static(wp.float64(1e-4)))
+        return wp.static(wp.float64(SAFETY)) * wp.pow(bounded, wp.static(wp.float64(-1.0 / (error_order + 1))))
+
+    @wp.func
+    def growth(error: wp.float64, last_error: wp.float64, proportional: wp.int32):
+        return wp.clamp(factor(error), LEAST_SHRINKAGE, wp.static(wp.float64(GREATEST_GROWTH)))
+
+    @wp.func
+    def shrinkage(error: wp.float64):
+        return wp.max(factor(error), LEAST_SHRINKAGE)
+
+    return growth, shrinkage

