@@ -234,14 +234,16 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         _error, opening, gap, displacement, speed = measure(K, maxima, n, place, link, next_end, 0)
         status = int(RUNNING)
         pairs = int(0)
-        slack = wp.float32(0.5) * wp.float32(control.skin) - opening - displacement
+        slack = wp.float32(0.5) * wp.float32(control.skin) - opening
         if is_fresh:
-            slack = wp.float32(0.5) * wp.float32(control.skin) - opening
             if wp.static(has_self):
                 pairs = build_list(K, L, chain, lane, control.skin, raised(opening))
                 if pairs > wp.static(lists.capacity):
                     status = int(LIST_OVERFLOW)
         else:
+            # as the last step left them: worked out anew they could round differently
+            gap = wp.float32(state.gap[world])
+            slack = wp.float32(state.slack[world])
             if wp.static(has_self):
                 pairs = L[wp.static(lists.count)]
         if is_fresh or state.has_first_stage[world] == 0:
@@ -495,6 +497,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             state.watch[world, LAST_FLOOR_IMPULSE] = K[BOARD_NOTES, NOTE_LAST_IMPULSE]
             state.is_fresh[world] = 0
             state.has_first_stage[world] = 1
+            state.gap[world] = wp.float64(gap)
+            state.slack[world] = wp.float64(slack)
             state.time[world] = time
             state.step[world] = step
             state.last_error[world] = wp.float64(last_error)

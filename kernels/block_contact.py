@@ -163,6 +163,34 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         return pair
 
     @wp.func
+    def order(L: wp.array(dtype=wp.int32), T: wp.array(dtype=wp.int32), lane: int, touching: int):
+        """Puts the pairs in the order of their keys.
+
+        Not every contact then has a thread of its own, and the code that prepares one rounds differently from that
+        which does not: which way a contact goes must not depend on the order in which threads found the pairs.
+        """
+        k = lane
+        while k < touching:
+            pair = pair_at(L, T, k)
+            rank = int(0)
+            other = int(0)
+            while other < touching:
+                rank += wp.where(pair_at(L, T, other) < pair, 1, 0)
+                other += 1
+            L[wp.static(lists.pending) + rank] = pair
+            k += wp.static(block_dim)
+        barrier()
+        k = lane
+        while k < touching:
+            pair = L[wp.static(lists.pending) + k]
+            if k < wp.static(touch.shared_pairs):
+                T[wp.static(touch.pairs) + k] = pair
+            else:
+                L[wp.static(lists.touching) + k] = pair
+            k += wp.static(block_dim)
+        barrier()
+
+    @wp.func
     def find(
         K: wp.array2d(dtype=wp.float64),
         L: wp.array(dtype=wp.int32),
@@ -189,7 +217,10 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
                     L[wp.static(lists.touching) + slot] = pair_key(p, q)
             k += wp.static(block_dim)
         barrier()
-        return T[wp.static(touch.touching)]
+        touching = T[wp.static(touch.touching)]
+        if 2 * touching > wp.static(block_dim):
+            order(L, T, lane, touching)
+        return touching
 
     @wp.func
     def note_depth(T: wp.array(dtype=wp.int32), depth: wp.float64):
