@@ -111,7 +111,8 @@ def test_no_joint_becomes_stiffer() -> None:
 
 def short_walk(**settings):
     """A walk of a loop of 20 links with the joints of Table 1."""
-    given = {"links": 20, "frequency": 8.0, "start": "ellipse", "method": "reference", "frame_interval": 1e-3}
+    given = {"links": 20, "frequency": 8.0, "start": "ellipse", "method": "reference"}
+    given |= {"soften_area": 0.3, "frame_interval": 1e-3}
     return warpchain.walk(**given | settings)
 
 
@@ -259,7 +260,9 @@ def test_a_whole_walk_from_soft_joints() -> None:
 
 def test_cuts_into_launches_do_not_change_a_softened_walk(monkeypatch: pytest.MonkeyPatch) -> None:
     """A walk softened on the sprocket and in the pile is the same to the bit in launches of 20000 and of 777 tries."""
-    setup = setup_walk("paper", SPINNING | {"method": "dp5", "soften_drive": True, "soften_pile": True}, None)
+    setup = setup_walk(
+        "paper", SPINNING | {"method": "dp5", "soften_drive": True, "soften_pile": True, "soften_area": 0.3}, None
+    )
     seen = []
     for tries in (20_000, 777):
         monkeypatch.setitem(ensemble.TRIES, "cpu", tries)

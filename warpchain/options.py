@@ -137,7 +137,7 @@ class Scene(BaseModel):
         return self
 
 
-_SOFTENED: Final = {"soften_pile": True, "soften_area": 0.9, "soften_drive": True}
+_SOFTENED: Final = {"soften_pile": True, "soften_drive": True}
 METHODS_BY_NEED: Final[Mapping[str, Mapping[str, object]]] = MappingProxyType(
     {
         "standard": MappingProxyType({"method": "dp5", "tolerance": 1e-4, **_SOFTENED}),
@@ -237,7 +237,7 @@ class Options(BaseModel):
         description="whether the joints of a walking loop that has collapsed get the values of the preset soft",
     )
     soften_area: float = Field(
-        default=0.3,
+        default=0.9,
         gt=0,
         lt=1,
         description="a loop has collapsed when it encloses less than this fraction of its area at the release",
