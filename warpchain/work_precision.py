@@ -264,7 +264,7 @@ def evaluations(method: str, accepted: int, rejected: int, impulses: int) -> int
     A rejected step leaves its first stage to the next try. So does an accepted one to the next step if the method
     is so made, unless an impulse came between: then at most one more for each impulse.
     """
-    if method not in METHODS:
+    if method not in METHODS or METHODS[method].flight is not None:
         return None
     stages, tries = METHODS[method].stages, accepted + rejected
     if METHODS[method].reuses_last:
@@ -301,7 +301,7 @@ def _point(
 
 def _run(trial: Trial, start: State, method: str, tolerance: float, **settings: float) -> tuple[State, dict[str, Any]]:
     """Carry one start of a trial to its end: the state there, and status, seconds and counts."""
-    given = {"method": method, "tolerance": tolerance, "self_contact": False, **settings}
+    given = {"method": method, "tolerance": tolerance, "flight_tolerance": tolerance, "self_contact": False, **settings}
     batch = Batch(1, trial.links, validated(Options, given, "options"))
     batch.set_chain(0, trial.parameters, trial.links)
     batch.load(0, *start, stop_time=trial.duration, stop_status=Status.FINISHED)
