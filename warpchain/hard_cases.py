@@ -41,6 +41,8 @@ Array = NDArray[np.float64]
 
 STEP_LIMIT: Final = 20_000_000
 """Tries after which a case counts as hanging."""
+LIMITS: Final = {"step_limit": STEP_LIMIT, "flight_tolerance": 1e-4}
+"""Of every case; the energy error of `hybrid` follows the tolerance of its flights."""
 
 IMPOSSIBLE: Final[tuple[tuple[str, Mapping[str, object]], ...]] = (
     ("scene.links", {"links": 61}),
@@ -89,7 +91,7 @@ class Flight:
     def run(self, method: str) -> Outcome:
         """Simulate; the energy error must be below the bound."""
         start = self.start()
-        settings: dict[str, Any] = {"method": method, "step_limit": STEP_LIMIT, **self.settings}
+        settings: dict[str, Any] = {"method": method, **LIMITS, **self.settings}
         simulate(self.parameters, *start, 0.0, times=[0.0], **settings)  # compiles
         began = time.process_time()
         flight = simulate(self.parameters, *start, self.duration, times=[self.duration], **settings)
@@ -120,7 +122,7 @@ class Walk:
 
     def run(self, method: str) -> Outcome:
         """Walk; Δx must lie within the distances [m], the energy error below the bound."""
-        setup = setup_walk(self.preset, {"method": method, "step_limit": STEP_LIMIT, **self.settings}, None)
+        setup = setup_walk(self.preset, {"method": method, **LIMITS, **self.settings}, None)
         compile_kernels([setup])
         began = time.process_time()
         walk = run_walk(setup, frame_interval=None)
