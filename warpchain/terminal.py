@@ -95,7 +95,7 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
         return  # the chain never got so far
     yield "energy at release", f"{released:.5f} J, kinetic {energy['kinetic_at_release']:.5f} J"
     for cause in LOST:
-        if cause != "softening" or energy[cause]:
+        if energy[cause] or cause not in ("softening", "hand_over"):
             yield f"  lost to {cause.replace('_', ' ')}", f"{energy[cause]:.5f} J"
     left = energy["kinetic_at_end"] + energy["potential_at_end"]
     yield "energy at the end", f"{left:.5f} J, kinetic {energy['kinetic_at_end']:.5f} J"
