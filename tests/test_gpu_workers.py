@@ -1,7 +1,6 @@
 """A worker process for each GPU: what each sees, what is refused; no GPU is needed for that."""
 
 import os
-import time
 from pathlib import Path
 
 import pytest
@@ -15,10 +14,8 @@ from warpchain.runner import sweep
 from .test_runner import TINY, data_of
 
 
-def _gpu_of_worker(seconds: float) -> str:
-    """Take a while, so that other workers have to take the next ones."""
-    time.sleep(seconds)
-    return os.environ["CUDA_VISIBLE_DEVICES"]
+GPU_OF_WORKER = "__import__('time').sleep(0.5) or __import__('os').environ['CUDA_VISIBLE_DEVICES']"
+"""Takes a while, so that other workers have to take the next ones; text, for workers cannot import tests."""
 
 
 def test_each_worker_has_a_gpu_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -30,7 +27,7 @@ def test_each_worker_has_a_gpu_of_its_own(monkeypatch: pytest.MonkeyPatch) -> No
     ):
         visible_gpus(4)
     with gpu_workers(2) as executor:
-        seen = list(executor.map(_gpu_of_worker, [0.5] * 4))
+        seen = list(executor.map(eval, [GPU_OF_WORKER] * 4))
     assert set(seen) == {"5", "GPU-abc"} and os.environ["CUDA_VISIBLE_DEVICES"] == "5, GPU-abc,2"
     monkeypatch.delenv("CUDA_VISIBLE_DEVICES")
     assert visible_gpus(3) == ["0", "1", "2"]
