@@ -13,7 +13,6 @@ from warpchain.runner import sweep
 
 from .test_runner import TINY, data_of
 
-
 GPU_OF_WORKER = "__import__('time').sleep(0.5) or __import__('os').environ['CUDA_VISIBLE_DEVICES']"
 """Takes a while, so that other workers have to take the next ones; text, for workers cannot import tests."""
 
