@@ -79,8 +79,7 @@ def classical_controller(error_order: int):
     """The same two functions for an error that goes as h^(error_order + 1): the step where it would be the safe one.
 
     E. Hairer, S. P. Nørsett, G. Wanner, Solving ODEs I, section II.4. odeint's rule shrinks by a power of the error
-    that with an embedded solution of order 2 throws far too much away; the flights of :mod:`rigid_step`, whose tries
-    are dear and whose error comes in jumps, take twice as many steps with it.
+    that with an embedded solution of order 2 is 1; the tries of flights, see :mod:`rigid_step`, are dear.
     """
 
     @wp.func

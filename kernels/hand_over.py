@@ -27,7 +27,7 @@ QUIET_TIME = wp.constant(wp.float64(5e-5))
 """A chain may close its joints after no impulse for this long [s].
 
 That is 30 decay times of the paper's springs for neighbours; long waves round the loop take longer, and what is left
-of them is what the projection takes: 2e-4 of a walk's energy in all, booked.
+of them is what the projection takes, and that is booked.
 """
 GREATEST_RINGING = wp.constant(wp.float64(1e-6))
 """Part of the kinetic energy that the projection may take; more means that springs still oscillate."""

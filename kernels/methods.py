@@ -96,7 +96,7 @@ def _rosenbrock(name: str) -> Method:
 
 
 def _hybrid(name: str, burst: str) -> Method:
-    """Springs by the explicit method ``burst``; with dp5 walks take half the time that bs32 needs."""
+    """Springs by the explicit method ``burst``."""
     method = _explicit(burst)
     first_row = method.scratch_rows(0)
     flight = Flight(

@@ -13,8 +13,7 @@ Coulomb friction switches its sign in a millionth of the time of such a step whe
 some thousand times a second in a loop. Seen sharp, each switch makes steps of a few µs. So within one step friction
 is smoothed over a part of the way that the joint's spin w goes in it: tanh(w / max(ω_c, c h |ẇ|)). A passing through
 zero then gives off the same impulse, the two sides being alike; a joint that sticks has no ẇ and keeps ω_c; and with h
-the smoothing goes to nothing. c = 0.2 lets steps be 5 to 10 times longer at the same error; 0.05 is no gain, 1 errs
-more than it saves.
+the smoothing goes to nothing. c = 0.2 was best in a prototype: 0.05 was no gain, 1 erred more than it saved.
 """
 
 import functools
