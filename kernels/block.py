@@ -18,7 +18,7 @@ from . import layout
 from .block_board import contact_constants, link_is_finite, load_link, note_constants, point, publish, take_place
 from .block_contact import block_self_contacts, touch_layout
 from .block_list import block_list
-from .block_memory import barrier, block_maxima, tile_address, vec5i
+from .block_memory import barrier, block_maxima, clock, tile_address, vec5i
 from .block_step import Link, block_stage, error_of, link_on, note_first, vec3d, vec5d
 from .block_surroundings import block_surroundings, raised
 from .broadphase import list_layout
@@ -53,6 +53,7 @@ from .layout import (
     LOSS_FRICTION,
     LOSS_SELF,
     MASS,
+    NOTE_DEADLINE,
     NOTE_FIXED_DEPTH,
     NOTE_LAST_IMPULSE,
     NOTE_NEXT_LOOK,
@@ -227,6 +228,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             T[wp.static(touch.fixed_hits)] = 0
             T[wp.static(touch.self_hits)] = 0
             T[wp.static(touch.deepest)] = 0
+            T[wp.static(touch.is_late)] = 0
+            K[BOARD_NOTES, NOTE_DEADLINE] = clock() + control.launch_time
+        barrier()  # the chain's constants are on the board
         publish(K, n, place)
         barrier()
         link = link_on(K, lane)
@@ -277,9 +281,11 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                             note_constants(K, change_joints(seen, model, state, control, world))
                     K[BOARD_NOTES, NOTE_STOP_TIME] = state.stop_time[world]
                     K[BOARD_NOTES, NOTE_NEXT_LOOK] = wp.float64(state.next_sample[world]) * control.sample_interval
+                    if clock() > K[BOARD_NOTES, NOTE_DEADLINE]:
+                        T[wp.static(touch.is_late)] = 1
                 barrier()
                 status = T[wp.static(touch.mailbox)]
-                is_full = record_is_full(record, world)
+                pauses = record_is_full(record, world) or T[wp.static(touch.is_late)] != 0
                 barrier()
                 if wp.static(softens):
                     if state.softness[world] != softness:
@@ -301,7 +307,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                             link.sine,
                         )
                         note_first(K, lane, first, wp.static(needs_first_power))
-                if is_full or status != RUNNING:
+                if pauses or status != RUNNING:
                     break
             stop_time = K[BOARD_NOTES, NOTE_STOP_TIME]
             if time >= stop_time:

@@ -45,6 +45,7 @@ class TouchLayout:
         fixed_hits: Impulses with floor or sprocket in this launch.
         self_hits: Impulses between links in this launch.
         mailbox: A status from one thread to all.
+        is_late: Whether the launch has taken its time.
         deepest: Greatest depth of a contact in this launch [m], bits of a single-precision number.
     """
 
@@ -88,9 +89,14 @@ class TouchLayout:
         return self.touching + 5
 
     @property
+    def is_late(self) -> int:
+        """Offset."""
+        return self.touching + 6
+
+    @property
     def size(self) -> int:
         """Integers from the row's start to the end of the last."""
-        return self.touching + 6
+        return self.touching + 7
 
 
 @functools.cache

@@ -47,6 +47,20 @@ def warp_width() -> int:
     ...
 
 
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    unsigned long long now;
+    asm volatile("mov.u64 %0, %globaltimer;" : "=l"(now));
+    return 1e-9 * now;
+#else
+    return 1e-9 * __builtin_readcyclecounter();
+#endif
+""")
+def clock() -> wp.float64:
+    """Time [s] to a fraction of a microsecond; without a GPU, in 10⁹ cycles of the processor."""
+    ...
+
+
 @functools.cache
 def tile_address(dtype: type, size: int):
     """Warp function ``address(tile)`` of the shared memory behind a tile (size,) of this type.

@@ -107,6 +107,7 @@ class Control:
     smallest_step: wp.float64  # [s]
     step_limit: wp.int64  # tries in all
     tries: wp.int32  # tries in this launch
+    launch_time: wp.float64  # after which a block stops at its next look [s]
     sample_interval: wp.float64  # [s]
     frame_every: wp.int64  # samples per frame
     rest_speed: wp.float64  # [m/s]

@@ -121,12 +121,21 @@ def bounded_heaps(count: int) -> Batch:
 def test_cuts_and_neighbours_do_not_change_a_bit() -> None:
     """A chain gives the same bits however its run is cut into launches, in whatever batch, among whatever threads."""
     runs = []
-    for worlds, tries, block_dim in ((2, 60, LINKS), (2, 7, LINKS), (3, 60, LINKS), (2, 60, LINKS + 3)):
+    for worlds, tries, block_dim, seconds, expected in (
+        (2, 60, LINKS, 1e9, 1),
+        (2, 7, LINKS, 1e9, 6),
+        (3, 60, LINKS, 1e9, 1),
+        (2, 60, LINKS + 3, 1e9, 1),
+        (2, 60, LINKS, 0.0, 10),
+    ):
         batch = bounded_heaps(worlds)
+        batch.control.launch_time = seconds
         features = features_of(batch, fixed_body="floor", watch="rest")
-        for _ in range(-(-60 // tries)):
+        launches = 0
+        while batch.status(1) == Status.RUNNING:
             launch_blocks(batch, features, tries, block_dim=block_dim)
-        assert batch.status(1) == Status.FINISHED
+            launches += 1
+        assert launches == expected
         runs.append(batch)
     assert runs[0].counts(1)["self"] > 10
     for run in runs[1:]:

@@ -222,6 +222,7 @@ class Batch:
         self.control.smallest_step = options.smallest_step
         self.control.step_limit = options.step_limit
         self.control.tries = 0
+        self.control.launch_time = LAUNCH_SECONDS
         self.control.sample_interval = options.record_interval
         self.control.frame_every = frame_every or 1
         self.control.rest_speed = options.rest_speed

@@ -14,8 +14,12 @@ from warpchain.options import Options, Setup
 from warpchain.recording import NOTHING, Keep
 from warpchain.status import Status
 
-TRIES = {"cpu": 20_000, "cuda": 10_000}
-"""Tries of each chain per launch, by kind of device; what a walk gives does not depend on it."""
+TRIES = {"cpu": 20_000, "cuda": 200_000}
+"""Most tries of each chain per launch, by kind of device; what a walk gives does not depend on it.
+
+On a GPU a launch is cut by its time: tries in a pile take three times as long as in flight, and with equal numbers of
+tries every chain would wait for the slowest of its batch.
+"""
 CREWS = 4
 """Batches that share a GPU: while the host looks after one of them, the others go on and fill the device."""
 NAP = 5e-4
