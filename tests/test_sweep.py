@@ -861,7 +861,7 @@ def test_canonical_form(given: dict[str, Any]) -> None:
         ("quickstart", {"main": (2, 3, 4)}),
         ("figure6", {"rest": (5, 6, 12), "ellipse": (2, 6, 12)}),
         ("tolerance", {"main": (2, 2, 2, 12)}),
-        ("montecarlo", {"main": (5, 4, 5000)}),
+        ("montecarlo", {"main": (7, 8, 1800)}),
         ("steadiness", {"default": (2, 2, 16), "held": (2, 2, 16)}),
         (
             "sensitivity",
