@@ -19,7 +19,7 @@ from .block_board import contact_constants, link_is_finite, load_link, note_cons
 from .block_contact import block_self_contacts, touch_layout
 from .block_list import block_list
 from .block_memory import barrier, block_maxima, clock, tile_address, vec5i
-from .block_step import Link, block_stage, error_of, link_on, note_first, vec3d, vec5d
+from .block_step import Link, Place, block_stage, error_of, link_on, note_first, vec3d, vec5d
 from .block_surroundings import block_surroundings, raised
 from .broadphase import list_layout
 from .controller import LEAST_SHRINKAGE, step_controller
@@ -153,6 +153,12 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     softens = features.softens
     look = sampling(features.watch, softens)
 
+    @wp.func
+    def begin_step(forces: wp.tile[vec3d, block_dim], K: wp.array2d(dtype=wp.float64), place: Place, next_end: vec5d):
+        """Works out the first stage of the next step; ``next_end``: left end of the next link."""
+        first = stage(forces, K, place, next_end, link_on(K, place.lane))
+        note_first(K, place.lane, first, wp.static(needs_first_power))
+
     @wp.kernel(
         module="unique",
         enable_backward=False,
@@ -234,7 +240,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         publish(K, n, place)
         barrier()
         link = link_on(K, lane)
-        next_end = hand_over(ends, K, place, link.x, link.y, link.u, link.v, link.omega, link.cosine, link.sine)
+        next_end = hand_over(ends, K, place, link)
         _error, opening, gap, displacement, speed = measure(K, maxima, n, place, link, next_end, 0)
         status = int(RUNNING)
         pairs = int(0)
@@ -251,10 +257,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if wp.static(has_self):
                 pairs = L[wp.static(lists.count)]
         if is_fresh or state.has_first_stage[world] == 0:
-            first = stage(
-                forces, K, place, next_end, link.x, link.y, link.u, link.v, link.omega, link.cosine, link.sine
-            )
-            note_first(K, lane, first, wp.static(needs_first_power))
+            begin_step(forces, K, place, next_end)
         time = state.time[world]
         step = state.step[world]
         last_error = wp.float32(state.last_error[world])
@@ -289,24 +292,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 barrier()
                 if wp.static(softens):
                     if state.softness[world] != softness:
-                        link = link_on(K, lane)
-                        next_end = hand_over(
-                            ends, K, place, link.x, link.y, link.u, link.v, link.omega, link.cosine, link.sine
-                        )
-                        first = stage(
-                            forces,
-                            K,
-                            place,
-                            next_end,
-                            link.x,
-                            link.y,
-                            link.u,
-                            link.v,
-                            link.omega,
-                            link.cosine,
-                            link.sine,
-                        )
-                        note_first(K, lane, first, wp.static(needs_first_power))
+                        next_end = hand_over(ends, K, place, link_on(K, lane))
+                        begin_step(forces, K, place, next_end)
                 if pauses or status != RUNNING:
                     break
             stop_time = K[BOARD_NOTES, NOTE_STOP_TIME]
@@ -378,9 +365,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     speed = new_speed
                 else:
                     link = link_on(K, lane)
-                    next_end = hand_over(
-                        ends, K, place, link.x, link.y, link.u, link.v, link.omega, link.cosine, link.sine
-                    )
+                    next_end = hand_over(ends, K, place, link)
                     _error, opening, gap, displacement, speed = measure(K, maxima, n, place, link, next_end, 0)
                 if lane == 0:
                     K[BOARD_NOTES, NOTE_OPENING] = wp.max(K[BOARD_NOTES, NOTE_OPENING], wp.float64(opening))
@@ -429,25 +414,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                                 is_hit = bool(True)
                 bound = bound_of(control, pairs, gap, slack, speed)
                 if is_hit or wp.static(not reuses_last):
-                    link = link_on(K, lane)
                     if is_hit:
-                        next_end = hand_over(
-                            ends, K, place, link.x, link.y, link.u, link.v, link.omega, link.cosine, link.sine
-                        )
-                    first = stage(
-                        forces,
-                        K,
-                        place,
-                        next_end,
-                        link.x,
-                        link.y,
-                        link.u,
-                        link.v,
-                        link.omega,
-                        link.cosine,
-                        link.sine,
-                    )
-                    note_first(K, lane, first, wp.static(needs_first_power))
+                        next_end = hand_over(ends, K, place, link_on(K, lane))
+                    begin_step(forces, K, place, next_end)
         tries_before = state.tries_before[world] + state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
         if status == RUNNING and tries_before + wp.int64(tries) >= control.step_limit:
             status = int(STEP_LIMIT)

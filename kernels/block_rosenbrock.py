@@ -22,11 +22,13 @@ import warp as wp
 from .block_memory import barrier, read, write
 from .block_solver import FactorLayout, block_solver, mat33d, reductions_for
 from .block_step import (
+    Link,
     Place,
     Trial,
     block_stage,
     first_on,
     greatest_error,
+    joint_constants,
     link_on,
     vec3d,
     vec5d,
@@ -44,19 +46,12 @@ from .layout import (
     LEFT_X,
     LEFT_Y,
     MASS,
-    NOTE_COULOMB,
-    NOTE_DAMPING,
     NOTE_GRAVITY,
-    NOTE_HALF_LENGTH,
-    NOTE_INVERSE_SMOOTHING,
-    NOTE_STIFFNESS,
-    NOTE_VISCOUS,
     RIGHT_X,
     THETA,
 )
 from .rosenbrock import GREATEST_TURN
 from .rosenbrock_tables import ROSENBROCK_TABLES
-from .types import Chain
 
 wp.set_module_options({"enable_backward": False})
 
@@ -114,19 +109,6 @@ def hand(K: wp.array2d(dtype=wp.float64), row: int, lane: int, value: wp.float64
 def handed(K: wp.array2d(dtype=wp.float64), row: int, lane: int):
     """A number on the board."""
     return read(K.ptr, row * K.shape[1] + lane)
-
-
-@wp.func
-def joint_constants(K: wp.array2d(dtype=wp.float64)) -> Chain:
-    """What joints need of a chain, but for gravity, from the board."""
-    chain = Chain()
-    chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
-    chain.joint_stiffness = K[BOARD_NOTES, NOTE_STIFFNESS]
-    chain.joint_damping = K[BOARD_NOTES, NOTE_DAMPING]
-    chain.viscous_friction = K[BOARD_NOTES, NOTE_VISCOUS]
-    chain.coulomb_friction = K[BOARD_NOTES, NOTE_COULOMB]
-    chain.inverse_smoothing = K[BOARD_NOTES, NOTE_INVERSE_SMOOTHING]
-    return chain
 
 
 @wp.func
@@ -230,7 +212,7 @@ def rosenbrock_attempt(name: str, block_dim: int):
         theta = K[THETA, lane]
         link = link_on(K, lane)
         first = first_on(K, lane)
-        next_end = hand_over(ends, K, place, link.x, link.y, link.u, link.v, link.omega, link.cosine, link.sine)
+        next_end = hand_over(ends, K, place, link)
         _left_x, _left_y, right_x, right_y = end_positions(chain, link.x, link.y, link.cosine, link.sine)
         _left_u, _left_v, right_u, right_v = end_velocities(chain, link.u, link.v, link.omega, link.cosine, link.sine)
         base_cu = next_end[2] - right_u
@@ -347,7 +329,15 @@ def rosenbrock_attempt(name: str, block_dim: int):
                     hand(K, SHIFT_V, lane, shift_left_v)
                     hand(K, SHIFT_SPIN, lane, rt)
                 after = place.after
-                next_end = hand_over(ends, K, place, x, y, u, v, omega, cosine, sine)
+                there = Link()
+                there.x = x
+                there.y = y
+                there.u = u
+                there.v = v
+                there.omega = omega
+                there.cosine = cosine
+                there.sine = sine
+                next_end = hand_over(ends, K, place, there)
                 cu = next_end[2] - right_u
                 cv = next_end[3] - right_v
                 spin = omega - next_end[4]

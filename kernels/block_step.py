@@ -139,6 +139,19 @@ def first_on(K: wp.array2d(dtype=wp.float64), column: int) -> Rates:
 
 
 @wp.func
+def joint_constants(K: wp.array2d(dtype=wp.float64)) -> Chain:
+    """What joints need of a chain, but for gravity, from the board."""
+    chain = Chain()
+    chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
+    chain.joint_stiffness = K[BOARD_NOTES, NOTE_STIFFNESS]
+    chain.joint_damping = K[BOARD_NOTES, NOTE_DAMPING]
+    chain.viscous_friction = K[BOARD_NOTES, NOTE_VISCOUS]
+    chain.coulomb_friction = K[BOARD_NOTES, NOTE_COULOMB]
+    chain.inverse_smoothing = K[BOARD_NOTES, NOTE_INVERSE_SMOOTHING]
+    return chain
+
+
+@wp.func
 def greater(error_a: wp.float32, scale_a: wp.float32, error_b: wp.float32, scale_b: wp.float32):
     """The greater of two quotients |error| / scale with positive scales, a NaN before any number."""
     keeps_a = wp.abs(error_a) * scale_b >= wp.abs(error_b) * scale_a or error_a != error_a
@@ -192,8 +205,8 @@ def block_stage(block_dim: int):
         block_dim: Threads in a block.
 
     Returns:
-        ``hand_over(ends, K, place, x, y, u, v, omega, cosine, sine)`` → left end of the next link;
-        ``stage(forces, K, place, next_end, x, y, u, v, omega, cosine, sine)`` → Rates.
+        ``hand_over(ends, K, place, link)`` → left end of the next link;
+        ``stage(forces, K, place, next_end, link)`` → Rates.
     """
 
     @wp.func
@@ -201,19 +214,13 @@ def block_stage(block_dim: int):
         ends: wp.tile[vec5d, block_dim],
         K: wp.array2d(dtype=wp.float64),
         place: Place,
-        x: wp.float64,
-        y: wp.float64,
-        u: wp.float64,
-        v: wp.float64,
-        omega: wp.float64,
-        cosine: wp.float64,
-        sine: wp.float64,
+        link: Link,
     ):
         chain = Chain()
         chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
-        left_x, left_y, _right_x, _right_y = end_positions(chain, x, y, cosine, sine)
-        left_u, left_v, _right_u, _right_v = end_velocities(chain, u, v, omega, cosine, sine)
-        ends[place.lane] = vec5d(left_x, left_y, left_u, left_v, omega)
+        left_x, left_y, _right_x, _right_y = end_positions(chain, link.x, link.y, link.cosine, link.sine)
+        left_u, left_v, _right_u, _right_v = end_velocities(chain, link.u, link.v, link.omega, link.cosine, link.sine)
+        ends[place.lane] = vec5d(left_x, left_y, left_u, left_v, link.omega)
         return ends[place.after]
 
     @wp.func
@@ -222,28 +229,15 @@ def block_stage(block_dim: int):
         K: wp.array2d(dtype=wp.float64),
         place: Place,
         next_end: vec5d,
-        x: wp.float64,
-        y: wp.float64,
-        u: wp.float64,
-        v: wp.float64,
-        omega: wp.float64,
-        cosine: wp.float64,
-        sine: wp.float64,
+        link: Link,
     ):
-        # constants are read from the board where they are needed: registers are dear, such reads are not; a function
-        # that returned them would cost a double or two of local memory
-        chain = Chain()
-        chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
-        chain.joint_stiffness = K[BOARD_NOTES, NOTE_STIFFNESS]
-        chain.joint_damping = K[BOARD_NOTES, NOTE_DAMPING]
-        chain.viscous_friction = K[BOARD_NOTES, NOTE_VISCOUS]
-        chain.coulomb_friction = K[BOARD_NOTES, NOTE_COULOMB]
-        chain.inverse_smoothing = K[BOARD_NOTES, NOTE_INVERSE_SMOOTHING]
-        _left_x, _left_y, right_x, right_y = end_positions(chain, x, y, cosine, sine)
-        _left_u, _left_v, right_u, right_v = end_velocities(chain, u, v, omega, cosine, sine)
+        # constants are read from the board where they are needed: registers are dear, such reads are not
+        chain = joint_constants(K)
+        _left_x, _left_y, right_x, right_y = end_positions(chain, link.x, link.y, link.cosine, link.sine)
+        _left_u, _left_v, right_u, right_v = end_velocities(chain, link.u, link.v, link.omega, link.cosine, link.sine)
         cu = next_end[2] - right_u
         cv = next_end[3] - right_v
-        spin = omega - next_end[4]
+        spin = link.omega - next_end[4]
         force_x = joint_force(chain, next_end[0] - right_x, cu)
         force_y = joint_force(chain, next_end[1] - right_y, cv)
         torque = friction_torque(chain, spin)
@@ -257,8 +251,8 @@ def block_stage(block_dim: int):
             chain,
             K[INVERSE_MASS, place.column],
             K[INVERSE_INERTIA, place.column],
-            cosine,
-            sine,
+            link.cosine,
+            link.sine,
             left[0],
             left[1],
             force_x,
@@ -340,17 +334,20 @@ def explicit_attempt(name: str, block_dim: int):
                     turn += wp.static(wp.float64(position[s][j])) * at[j]
             ch = wp.static(wp.float64(nodes[s])) * h
             link = link_on(K, lane)
+            there = Link()
+            there.x = link.x + (ch * link.u + hh * dx)
+            there.y = link.y + (ch * link.v + hh * dy)
+            there.u = link.u + h * du
+            there.v = link.v + h * dv
+            there.omega = link.omega + h * dw
             cosine, sine = turned_direction(link.cosine, link.sine, ch * link.omega + hh * turn)
-            x = link.x + (ch * link.u + hh * dx)
-            y = link.y + (ch * link.v + hh * dy)
-            u = link.u + h * du
-            v = link.v + h * dv
-            omega = link.omega + h * dw
-            next_end = hand_over(ends, K, place, x, y, u, v, omega, cosine, sine)
-            rates = stage(forces, K, place, next_end, x, y, u, v, omega, cosine, sine)
+            there.cosine = cosine
+            there.sine = sine
+            next_end = hand_over(ends, K, place, there)
+            rates = stage(forces, K, place, next_end, there)
             trial.next_end = next_end
-            trial.cosine = cosine
-            trial.sine = sine
+            trial.cosine = there.cosine
+            trial.sine = there.sine
             ax[s] = rates.x
             ay[s] = rates.y
             at[s] = rates.theta
