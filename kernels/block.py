@@ -15,7 +15,17 @@ import functools
 import warp as wp
 
 from . import layout
-from .block_board import contact_constants, link_is_finite, load_link, note_constants, point, publish, take_place
+from .block_board import (
+    contact_constants,
+    link_is_finite,
+    load_link,
+    note_constants,
+    point,
+    publish,
+    store_link,
+    store_losses,
+    take_place,
+)
 from .block_contact import block_self_contacts, touch_layout
 from .block_list import block_list
 from .block_memory import barrier, block_maxima, clock, tile_address, vec5i
@@ -37,7 +47,6 @@ from .elementary import ONE, ZERO
 from .layout import (
     ACCEPTED,
     BOARD_LOST_DAMPING,
-    BOARD_LOST_FIXED,
     BOARD_LOST_FRICTION,
     BOARD_LOST_SELF,
     BOARD_NOTES,
@@ -49,9 +58,6 @@ from .layout import (
     INVERSE_MASS,
     LAST_FLOOR_IMPULSE,
     LIST_BUILDS,
-    LOSS_DAMPING,
-    LOSS_FRICTION,
-    LOSS_SELF,
     MASS,
     NOTE_DEADLINE,
     NOTE_FIXED_DEPTH,
@@ -424,12 +430,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         publish(K, n, place)
         barrier()
         if lane < n:
-            state.links[world, X, lane] = K[X, lane]
-            state.links[world, Y, lane] = K[Y, lane]
-            state.links[world, THETA, lane] = K[THETA, lane]
-            state.links[world, U, lane] = K[U, lane]
-            state.links[world, V, lane] = K[V, lane]
-            state.links[world, OMEGA, lane] = K[OMEGA, lane]
+            store_link(K, state, world, lane)
             left = wp.array(
                 ptr=scratch[world].ptr, shape=(wp.static(layout.BOARD_NOTES), wp.static(kept_width)), dtype=wp.float64
             )
@@ -444,21 +445,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 if wp.static(softens):
                     seen = softened(seen, control, state.softness[world])
                 write_sample(state, record, world, time, summarise(K, seen))
-            friction = ZERO
-            damping = ZERO
-            fixed = ZERO
-            between = ZERO
-            i = int(0)
-            while i < n:
-                friction += K[BOARD_LOST_FRICTION, i]
-                damping += K[BOARD_LOST_DAMPING, i]
-                fixed += K[BOARD_LOST_FIXED, i]
-                between += K[BOARD_LOST_SELF, i]
-                i += 1
-            state.losses[world, LOSS_FRICTION] = friction
-            state.losses[world, LOSS_DAMPING] = damping
-            state.losses[world, wp.static(fixed_loss)] = fixed
-            state.losses[world, LOSS_SELF] = between
+            store_losses(K, state, world, n, wp.static(fixed_loss))
             counts = state.counts[world]
             counts[ACCEPTED] = counts[ACCEPTED] + wp.int64(accepted)
             counts[REJECTED] = counts[REJECTED] + wp.int64(tries - accepted)

@@ -7,10 +7,17 @@ from .elementary import ZERO, cos_sin
 from .geometry import end_positions
 from .layout import (
     BOARD_FIRST,
+    BOARD_LOST_DAMPING,
+    BOARD_LOST_FIXED,
+    BOARD_LOST_FRICTION,
+    BOARD_LOST_SELF,
     BOARD_NOTES,
     COSINE,
     LEFT_X,
     LEFT_Y,
+    LOSS_DAMPING,
+    LOSS_FRICTION,
+    LOSS_SELF,
     MASS,
     NOTE_CHAIN_FRICTION,
     NOTE_CHAIN_RESTITUTION,
@@ -111,6 +118,37 @@ def load_link(K: wp.array2d(dtype=wp.float64), state: State, world: int, lane: i
         K[V, lane] = state.links[world, V, lane]
         K[OMEGA, lane] = state.links[world, OMEGA, lane]
     point(K, lane)
+
+
+@wp.func
+def store_link(K: wp.array2d(dtype=wp.float64), state: State, world: int, lane: int):
+    """Writes the state of a thread's link."""
+    state.links[world, X, lane] = K[X, lane]
+    state.links[world, Y, lane] = K[Y, lane]
+    state.links[world, THETA, lane] = K[THETA, lane]
+    state.links[world, U, lane] = K[U, lane]
+    state.links[world, V, lane] = K[V, lane]
+    state.links[world, OMEGA, lane] = K[OMEGA, lane]
+
+
+@wp.func
+def store_losses(K: wp.array2d(dtype=wp.float64), state: State, world: int, n: int, fixed_loss: int):
+    """Writes the losses since loading, summed over the links in their order; for one thread."""
+    friction = ZERO
+    damping = ZERO
+    fixed = ZERO
+    between = ZERO
+    i = int(0)
+    while i < n:
+        friction += K[BOARD_LOST_FRICTION, i]
+        damping += K[BOARD_LOST_DAMPING, i]
+        fixed += K[BOARD_LOST_FIXED, i]
+        between += K[BOARD_LOST_SELF, i]
+        i += 1
+    state.losses[world, LOSS_FRICTION] = friction
+    state.losses[world, LOSS_DAMPING] = damping
+    state.losses[world, fixed_loss] = fixed
+    state.losses[world, LOSS_SELF] = between
 
 
 @wp.func

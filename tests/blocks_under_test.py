@@ -72,6 +72,7 @@ def batch_of(
     longest = max(len(position) for position, _ in chains)
     options = Options(method=method, tolerance=0.1 if fixed_step else tolerance, self_contact=self_contact)
     batch = Batch(len(chains), longest, options, keeps_samples=keeps, frame_every=2 if keeps else None)
+    batch.control.launch_time = 1e9  # tries alone end a launch, however busy the machine is
     if fixed_step:
         batch.control.skin = 1e-9
         batch.control.contact_step = FIXED_STEP
