@@ -10,8 +10,21 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from warpchain.parameters import preset
+
 Array = NDArray[np.float64]
 Vector = tuple[float, float]
+
+UNIT = preset("paper").with_values(
+    {
+        "link_length": 2.0,
+        "circle_radius": 0.5,
+        **dict.fromkeys(["inner_mass", "outer_mass", "inner_inertia", "outer_inertia"], 1.0),
+        **dict.fromkeys(["floor_restitution", "sprocket_restitution", "chain_restitution"], 0.0),
+        **dict.fromkeys(["floor_friction", "sprocket_friction", "chain_friction"], 1.0),
+    }
+)
+"""Links of 2 m, 1 kg and 1 kg m², circles of 0.5 m, e = 0 and μ = 1: for contacts worked by hand."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from warpchain.status import Status
 from warpchain.sweep_result import load
 
 from .made_sweeps import FIGURE_6, distance, make_sweep
-from .test_results import make_unreleased, make_walk
+from .made_walks import make_unreleased, make_walk
 
 CONTENT: dict[str, Any] = FIGURE_6 | {
     "samples": 3,
