@@ -16,8 +16,6 @@ from matplotlib.patches import Rectangle
 from warpchain.planning import PlannedWalk
 from warpchain.status import Status
 from warpchain.sweep_plots import (
-    GREEN,
-    RED,
     figure6,
     figures,
     heat_map,
@@ -27,6 +25,7 @@ from warpchain.sweep_plots import (
     tolerance,
 )
 from warpchain.sweep_result import SweepResult
+from warpchain.sweep_series import GREEN, RED
 from warpchain.sweep_statistics import (
     NothingToShow,
     cell_text,

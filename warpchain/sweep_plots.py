@@ -21,6 +21,7 @@ from warpchain.parameters import DIMENSIONLESS, Parameters
 from warpchain.plots import FAINT, GROUND, INK, LINE_COLORS, _tidy
 from warpchain.status import Status
 from warpchain.sweep_figure5 import sweep_figure5
+from warpchain.sweep_series import BLUE, RED, Cell, Series, all_series, lost_note
 from warpchain.sweep_statistics import (
     CONFIDENCE,
     NothingToShow,
@@ -35,20 +36,6 @@ if TYPE_CHECKING:
     from warpchain.sweep_result import SweepResult
 
 Array = NDArray[np.float64]
-
-BLUE, RED, GREEN = LINE_COLORS[:3]
-"""A red and a green that people with any kind of colour vision can tell apart; markers differ as well."""
-
-_STARTS: Final = {
-    "rest": ("started at rest", RED, "o"),
-    "ellipse": ("started as an ellipse", GREEN, "D"),
-    "spinning": ("started spinning", BLUE, "s"),
-}
-"""How the chain started → legend, colour, marker."""
-
-_OTHER_COLORS: Final = (BLUE, *LINE_COLORS[3:6], INK)
-_OTHER_MARKERS: Final = "s^vP*X"
-"""For further blocks of the same start."""
 
 _GRID: Final = {"color": "#E6E6E6", "linewidth": 0.6}
 _FREQUENCY: Final = "frequency of the sprocket $ν$ / Hz"
@@ -81,7 +68,7 @@ class Picture:
 def figures(result: "SweepResult") -> Iterator[Picture]:
     """Every figure that a sweep has something for, the paper's Figures 6 and 5 first."""
     with suppress(NothingToShow):
-        if any(len(item.cells) > 1 for item in _all_series(result)):
+        if any(len(item.cells) > 1 for item in all_series(result)):
             text = "Distance walked against the frequency of the sprocket, as in the paper's Figure 6: mean, "
             yield Picture("figure6", text + "box of one and bar of two standard deviations.", figure6(result))
     with suppress(NothingToShow):
@@ -114,7 +101,7 @@ def figure6(result: "SweepResult") -> Figure:
     Raises:
         NothingToShow: no walk of such a block has come to rest.
     """
-    series = _all_series(result)
+    series = all_series(result)
     drawn = [cell for item in series for cell in item.cells.values() if cell.count]
     if not drawn:
         raise NothingToShow("Figure 6 takes walks at rest in a block with nothing but links and frequency as axes")
@@ -132,7 +119,7 @@ def figure6(result: "SweepResult") -> Figure:
             shift = gap * (place - (len(here) - 1) / 2) * 0.7 / len(here)
             _draw_boxes(axes, item, links, shift, gap * min(0.36, 0.6 / len(here)))
         axes.set_title(f"$n$ = {links}", fontsize="medium", loc="left")
-        note = _lost_note([cell for item in here for key, cell in item.cells.items() if key[0] == links])
+        note = lost_note([cell for item in here for key, cell in item.cells.items() if key[0] == links])
         axes.set_xlabel(note, color=RED, fontsize="small")
         axes.grid(axis="y", **_GRID)
         _tidy(axes)
@@ -163,7 +150,7 @@ def heat_map(result: "SweepResult", quantity: str = "dx") -> Figure:
         KeyError: there is no such column.
         NothingToShow: no walk has come to rest in a block that has several links and frequencies, and no other axes.
     """
-    series = [item for item in _all_series(result, quantity) if item.is_map]
+    series = [item for item in all_series(result, quantity) if item.is_map]
     if not any(cell.count for item in series for cell in item.cells.values()):
         raise NothingToShow(
             "a map takes walks at rest in a block with several links and frequencies, and no other axes"
@@ -325,8 +312,8 @@ def responses(result: "SweepResult") -> Figure:
             axes.set_xticks(places, texts)
         axes.margins(x=0.15)
         unit = "" if block.unit(name) == DIMENSIONLESS else f" / {block.unit(name)}"
-        counts = _Cell(np.nan, np.nan, *(int(table.sum()) for table in (found.count, found.failed, found.missing)))
-        note = _lost_note([counts])
+        counts = Cell(np.nan, np.nan, *(int(table.sum()) for table in (found.count, found.failed, found.missing)))
+        note = lost_note([counts])
         axes.set_xlabel(_quantity_text(name) + unit + (f"\n{note}" if note else ""), fontsize="small")
         axes.tick_params(axis="x", labelsize="small")
         axes.grid(axis="y", **_GRID)
@@ -369,70 +356,7 @@ def status_counts(result: "SweepResult") -> Figure:
     return figure
 
 
-@dataclass(frozen=True)
-class _Cell:
-    """Statistics of one cell, see `warpchain.sweep_result.CellStatistics`."""
-
-    mean: float
-    sd: float
-    count: int
-    failed: int
-    missing: int
-
-
-@dataclass(frozen=True)
-class _Series:
-    """Cells that belong together in a figure: those of one block and start, by links and frequency [Hz]."""
-
-    label: str
-    color: str
-    marker: str
-    unit: str
-    cells: dict[tuple[int, float], _Cell]
-
-    @property
-    def is_map(self) -> bool:
-        """Whether it has several numbers of links and several frequencies."""
-        return all(len(set(values)) > 1 for values in zip(*self.cells, strict=True))
-
-    def table(self, name: str, links: Sequence[int], frequencies: Sequence[float]) -> Array:
-        """A statistic, NaN where there is no cell, shape (links, frequencies)."""
-        empty = _Cell(np.nan, np.nan, 0, 0, 0)
-        cells = [[self.cells.get((number, frequency), empty) for frequency in frequencies] for number in links]
-        return np.array([[getattr(cell, name) for cell in row] for row in cells])
-
-
-def _all_series(result: "SweepResult", quantity: str = "dx") -> list[_Series]:
-    """Every block that has nothing but links, frequency and start as axes of several values, by its starts."""
-    series: list[_Series] = []
-    for block, given in zip(result.blocks.values(), result.sweep["blocks"], strict=True):
-        several = {name for name, values in block.axes.items() if len(values) > 1}
-        if not several <= {"links", "frequency", "start"} or "frequency" in block.drawn:
-            continue
-        found = block.statistics(quantity)
-        by_start: dict[str, dict[tuple[int, float], _Cell]] = {}
-        for place in np.ndindex(*block.shape[:-1]):
-            at = given["scene"] | {name: block.axes[name][i] for name, i in zip(block.axes, place, strict=True)}
-            cells = by_start.setdefault(str(at["start"]), {})
-            cells[int(at["links"]), float(at["frequency"])] = _Cell(
-                mean=float(found.mean[place]),
-                sd=float(found.sd[place]),
-                count=int(found.count[place]),
-                failed=int(found.failed[place]),
-                missing=int(found.missing[place]),
-            )
-        for start, cells in by_start.items():
-            label, color, marker = _STARTS[start]
-            if any(item.color == color for item in series):
-                # A start that has been drawn already: the name of the block, and a look that is still free.
-                label, number = f"{block.name}, {label}", len(series)
-                marker = _OTHER_MARKERS[number % len(_OTHER_MARKERS)]
-                color = next((other for other in _OTHER_COLORS if all(other != item.color for item in series)), INK)
-            series.append(_Series(label, color, marker, found.unit, cells))
-    return series
-
-
-def _draw_boxes(axes: Axes, series: _Series, links: int, shift: float, width: float) -> None:
+def _draw_boxes(axes: Axes, series: Series, links: int, shift: float, width: float) -> None:
     """Mean, box and bar at each frequency of one number of links."""
     for (number, frequency), cell in series.cells.items():
         if number != links or not cell.count:
@@ -446,7 +370,7 @@ def _draw_boxes(axes: Axes, series: _Series, links: int, shift: float, width: fl
         axes.plot([x], [cell.mean], series.marker, color=color, markersize=4.5, zorder=3)
 
 
-def _draw_legend(figure: Figure, empty: Axes | None, series: Sequence[_Series]) -> None:
+def _draw_legend(figure: Figure, empty: Axes | None, series: Sequence[Series]) -> None:
     """What colours and signs mean, in the place of axes that stay empty, or else above."""
     handles: list[Any] = [
         Line2D([], [], color=item.color, marker=item.marker, linestyle="", label=item.label) for item in series
@@ -462,17 +386,8 @@ def _draw_legend(figure: Figure, empty: Axes | None, series: Sequence[_Series]) 
     empty.legend(handles=handles, loc="center", frameon=False)
 
 
-def _lost_note(cells: Sequence[_Cell]) -> str:
-    """How many walks are not in the means; empty if all are."""
-    walks = sum(cell.count + cell.failed + cell.missing for cell in cells)
-    failed, missing = sum(cell.failed for cell in cells), sum(cell.missing for cell in cells)
-    parts = [f"{failed} of {walks} walks failed"] * (failed > 0)
-    parts += [f"{missing} of {walks} not run yet"] * (missing > 0)
-    return ", ".join(parts)
-
-
 def _write_numbers(
-    axes: Axes, series: _Series, table: Array, links: Sequence[int], frequencies: Sequence[float], image: Any
+    axes: Axes, series: Series, table: Array, links: Sequence[int], frequencies: Sequence[float], image: Any
 ) -> None:
     """The value in each cell of a map, and how many of its walks are not in it."""
     for (row, column), value in np.ndenumerate(table):
