@@ -20,6 +20,7 @@ import h5py  # noqa: F401 - before the forks below, or each would read it anew
 import numpy as np
 
 from warpchain.rows import Rows
+from warpchain.shards import BlockLayout
 from warpchain.status import Status
 from warpchain.store import Store, empty_rows
 from warpchain.sweep_result import load
@@ -28,37 +29,21 @@ SHARD_SIZE = 20
 
 
 @dataclass(frozen=True)
-class SyntheticBlock:
-    """What a store reads of a block."""
-
-    name: str
-    axes: dict[str, tuple[Any, ...]]
-    samples: int
-    first: int
-    drawn: tuple[str, ...]
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Axes, then samples."""
-        return (*(len(values) for values in self.axes.values()), self.samples)
-
-
-@dataclass(frozen=True)
 class SyntheticSweep:
     """What a store reads of a sweep; two blocks of 3 × 2 × 20 and 5 × 8 walks."""
 
     name: str = "synthetic"
     seed: int = 2**100 + 1
-    blocks: tuple[SyntheticBlock, ...] = field(
+    blocks: tuple[BlockLayout, ...] = field(
         default=(
-            SyntheticBlock(
+            BlockLayout(
                 "rest",
                 {"links": (60, 90, 120), "frequency": (5.0, 12.5)},
                 20,
                 0,
                 ("phase", "floor_friction", "clearance"),
             ),
-            SyntheticBlock("ellipse", {"gravity": (1.6, 3.7, 9.8, 12.0, 24.8)}, 8, 120, ("phase", "link_length")),
+            BlockLayout("ellipse", {"gravity": (1.6, 3.7, 9.8, 12.0, 24.8)}, 8, 120, ("phase", "link_length")),
         )
     )
 
@@ -79,7 +64,7 @@ class SyntheticSweep:
 
 
 SWEEP: Any = SyntheticSweep()
-LONG_SWEEP: Any = SyntheticSweep(blocks=(SyntheticBlock("main", {"links": (60, 90)}, 350, 0, ("phase",)),))
+LONG_SWEEP: Any = SyntheticSweep(blocks=(BlockLayout("main", {"links": (60, 90)}, 350, 0, ("phase",)),))
 
 
 def synthetic_rows(sweep: Any, walks: range) -> Rows:

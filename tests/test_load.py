@@ -18,16 +18,16 @@ from warpchain.merged_file import merge
 from warpchain.parameters import InputError
 from warpchain.planning import load_sweep
 from warpchain.rows import COLUMNS
-from warpchain.shards import NUMERICS_VERSION, shard_name
+from warpchain.shards import NUMERICS_VERSION, BlockLayout, shard_name
 from warpchain.status import Status
 from warpchain.store import Store, empty_rows
 from warpchain.sweep_result import BlockResult, SweepResult, load
 
-from .synthetic_sweep import SWEEP, SyntheticBlock, SyntheticSweep, run, synthetic_rows
+from .synthetic_sweep import SWEEP, SyntheticSweep, run, synthetic_rows
 
 SINGLE: Any = SyntheticSweep(
     blocks=(
-        SyntheticBlock(
+        BlockLayout(
             "main",
             {"links": (60, 90), "start": ("rest", "ellipse"), "self_contact": (False, True), "frequency": (5.0, 7.5)},
             6,
@@ -170,7 +170,7 @@ def test_a_sweep_just_begun_is_all_missing(tmp_path: Path) -> None:
 
 def test_statistics_are_over_walks_at_rest(tmp_path: Path) -> None:
     """Mean and deviation of known numbers; failed and missing walks are in neither, but counted."""
-    sweep: Any = SyntheticSweep(blocks=(SyntheticBlock("main", {"links": (10, 20, 30, 40, 50)}, 4, 0, ()),))
+    sweep: Any = SyntheticSweep(blocks=(BlockLayout("main", {"links": (10, 20, 30, 40, 50)}, 4, 0, ()),))
     status = [[1, 1, 1, 1], [1, 3, 6, 1], [1, 3, 3, 3], [3, 3, 3, 3]]
     with Store.open(tmp_path, sweep, shard_size=4) as store:
         for cell, walks in enumerate(store.missing()[:4]):
