@@ -191,24 +191,27 @@ def collide(
     inverse_determinant: wp.float64,
 ):
     """Impulse between two touching links, if they approach; returns the energy lost [J] and the number of impulses."""
-    u = K[U, link_a] - K[U, link_b]
-    v = K[V, link_a] - K[V, link_b]
+    # all is read before anything is written: otherwise the compiler would read again, not knowing that A is not B
+    u_a = K[U, link_a]
+    v_a = K[V, link_a]
+    omega_a = K[OMEGA, link_a]
+    u_b = K[U, link_b]
+    v_b = K[V, link_b]
+    omega_b = K[OMEGA, link_b]
+    u = u_a - u_b
+    v = v_a - v_b
     normal_speed = u * nx + v * ny
-    normal_speed += K[OMEGA, link_a] * a_n - K[OMEGA, link_b] * b_n
+    normal_speed += omega_a * a_n - omega_b * b_n
     lost = ZERO
     hits = wp.int64(0)
     if normal_speed > ZERO:
         tangential_speed = v * nx - u * ny
-        tangential_speed += K[OMEGA, link_a] * a_t - K[OMEGA, link_b] * b_t
-        w_nn, w_nt, w_tt = effective_masses(
-            K[INVERSE_MASS, link_a] + K[INVERSE_MASS, link_b],
-            K[INVERSE_INERTIA, link_a],
-            K[INVERSE_INERTIA, link_b],
-            a_n,
-            a_t,
-            b_n,
-            b_t,
-        )
+        tangential_speed += omega_a * a_t - omega_b * b_t
+        mass_a = K[INVERSE_MASS, link_a]
+        mass_b = K[INVERSE_MASS, link_b]
+        inertia_a = K[INVERSE_INERTIA, link_a]
+        inertia_b = K[INVERSE_INERTIA, link_b]
+        w_nn, w_nt, w_tt = effective_masses(mass_a + mass_b, inertia_a, inertia_b, a_n, a_t, b_n, b_t)
         jn, jt = collision_impulse(
             normal_speed,
             tangential_speed,
@@ -223,12 +226,12 @@ def collide(
         )
         jx = jn * nx - jt * ny
         jy = jn * ny + jt * nx
-        K[U, link_a] = K[U, link_a] - jx * K[INVERSE_MASS, link_a]
-        K[V, link_a] = K[V, link_a] - jy * K[INVERSE_MASS, link_a]
-        K[OMEGA, link_a] = K[OMEGA, link_a] - (a_n * jn + a_t * jt) * K[INVERSE_INERTIA, link_a]
-        K[U, link_b] = K[U, link_b] + jx * K[INVERSE_MASS, link_b]
-        K[V, link_b] = K[V, link_b] + jy * K[INVERSE_MASS, link_b]
-        K[OMEGA, link_b] = K[OMEGA, link_b] + (b_n * jn + b_t * jt) * K[INVERSE_INERTIA, link_b]
+        K[U, link_a] = u_a - jx * mass_a
+        K[V, link_a] = v_a - jy * mass_a
+        K[OMEGA, link_a] = omega_a - (a_n * jn + a_t * jt) * inertia_a
+        K[U, link_b] = u_b + jx * mass_b
+        K[V, link_b] = v_b + jy * mass_b
+        K[OMEGA, link_b] = omega_b + (b_n * jn + b_t * jt) * inertia_b
         changed_n = w_nn * jn + w_nt * jt
         changed_t = w_nt * jn + w_tt * jt
         lost = jn * (normal_speed - HALF * changed_n) + jt * (tangential_speed - HALF * changed_t)
