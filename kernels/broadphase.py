@@ -115,7 +115,7 @@ class ListLayout:
     @property
     def geometry(self) -> int:
         """That scratch: doubles, on whole cache lines."""
-        return -(-(self.owners + 2 * self.columns + 8) // 16) * 16
+        return -(-(self.owners + 3 * self.columns + 8) // 16) * 16
 
 
 @functools.cache
