@@ -28,7 +28,7 @@ from .block_board import (
 )
 from .block_contact import block_self_contacts, touch_layout
 from .block_list import block_list
-from .block_memory import barrier, block_maxima, clock, tile_address, vec5i
+from .block_memory import barrier, barrier_if_any, block_maxima, clock, tile_address, vec5i
 from .block_step import Link, Place, block_stage, error_of, link_on, note_first, vec3d, vec5d
 from .block_surroundings import block_surroundings, raised
 from .broadphase import list_layout
@@ -241,6 +241,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             T[wp.static(touch.self_hits)] = 0
             T[wp.static(touch.deepest)] = 0
             T[wp.static(touch.is_late)] = 0
+            T[wp.static(touch.votes)] = 0
             K[BOARD_NOTES, NOTE_DEADLINE] = clock() + control.launch_time
         barrier()  # the chain's constants are on the board
         publish(K, n, place)
@@ -376,48 +377,51 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 if lane == 0:
                     K[BOARD_NOTES, NOTE_OPENING] = wp.max(K[BOARD_NOTES, NOTE_OPENING], wp.float64(opening))
                 is_hit = bool(False)
+                is_near = bool(False)
+                is_stale = bool(False)
+                hits = int(0)
                 if wp.static(has_fixed):
                     if gap < wp.float32(0.0):
-                        hits = int(0)
+                        is_near = bool(True)
                         if lane < n:
                             hits = meet_fixed_body(K, place, contact_constants(K, n), program, world, time)
                         if hits > 0:
                             wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
-                        if greatest(votes, lane, hits) > 0:
-                            is_hit = bool(True)
-                        if lane == 0:
-                            K[BOARD_NOTES, NOTE_FIXED_DEPTH] = wp.max(
-                                K[BOARD_NOTES, NOTE_FIXED_DEPTH], wp.float64(-gap)
-                            )
-                            if wp.static(has_floor):
-                                if is_hit:
-                                    if time - K[BOARD_NOTES, NOTE_LAST_IMPULSE] > BOUNCE_PAUSE:
-                                        state.counts[world, BOUNCES] = state.counts[world, BOUNCES] + wp.int64(1)
-                                    K[BOARD_NOTES, NOTE_LAST_IMPULSE] = time
                 if wp.static(has_self):
                     slack = wp.float32(0.5) * wp.float32(control.skin) - opening - displacement
                     is_stale = not slack > wp.float32(0.0)
                     if is_stale or pairs > 0:
+                        is_near = bool(True)
                         publish(K, n, place)
-                        if is_stale:
-                            if lane == 0:
-                                state.counts[world, LIST_BUILDS] = state.counts[world, LIST_BUILDS] + wp.int64(1)
-                            barrier()
-                            pairs = build_list(K, L, contact_constants(K, n), lane, control.skin, raised(opening))
-                            if pairs > wp.static(lists.capacity):
-                                status = int(LIST_OVERFLOW)
-                                pairs = int(wp.static(lists.capacity))
-                            slack = wp.float32(0.5) * wp.float32(control.skin) - opening
                         clear_contacts(T, lane, n)
-                        barrier()
+                if is_near:
+                    is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
+                if wp.static(has_fixed):
+                    if gap < wp.float32(0.0) and lane == 0:
+                        K[BOARD_NOTES, NOTE_FIXED_DEPTH] = wp.max(K[BOARD_NOTES, NOTE_FIXED_DEPTH], wp.float64(-gap))
+                        if wp.static(has_floor):
+                            if is_hit:
+                                if time - K[BOARD_NOTES, NOTE_LAST_IMPULSE] > BOUNCE_PAUSE:
+                                    state.counts[world, BOUNCES] = state.counts[world, BOUNCES] + wp.int64(1)
+                                K[BOARD_NOTES, NOTE_LAST_IMPULSE] = time
+                if wp.static(has_self):
+                    if is_stale:
+                        if lane == 0:
+                            state.counts[world, LIST_BUILDS] = state.counts[world, LIST_BUILDS] + wp.int64(1)
+                        pairs = build_list(K, L, contact_constants(K, n), lane, control.skin, raised(opening))
+                        if pairs > wp.static(lists.capacity):
+                            status = int(LIST_OVERFLOW)
+                            pairs = int(wp.static(lists.capacity))
+                        slack = wp.float32(0.5) * wp.float32(control.skin) - opening
+                    if pairs > 0:
                         touched = contact_constants(K, n)
                         touching = find_contacts(K, L, T, touched, lane, pairs, raised(opening))
                         if touching > 0:
                             hits = resolve_contacts(K, L, T, E, F, touched, lane, touching)
                             if hits > 0:
                                 wp.atomic_add(T, wp.static(touch.self_hits), hits)
-                            if greatest(votes, lane, hits) > 0:
-                                is_hit = bool(True)
+                            if not is_hit:
+                                is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
                 bound = bound_of(control, pairs, gap, slack, speed)
                 if is_hit or wp.static(not reuses_last):
                     if is_hit:

@@ -1,13 +1,15 @@
 """Self-contacts in the block form: found in parallel, resolved in parallel rounds.
 
-Either half of the fixed sequence of :mod:`self_contact` is taken by itself. A contact of it, a circle of one link and
-one of another, has a key that orders as the sequence does, and a thread that works out its geometry once. In each
-round every contact that is not done lays its key upon its two links, where the smallest stays, and a contact that
-finds its own key on both goes: none before it in the sequence that shares a link is left. Contacts that go together
-share no link, so the outcome equals that of the sequence to the bit. The smallest key of all always goes, so there are
-at most as many rounds as contacts; a pile of 60 links needs four in all, one of 150 about sixteen.
+A contact, a circle of one link and one of another, has a key that orders as the fixed sequence of :mod:`self_contact`
+does, and a thread that works out its geometry once. In each round every contact that is not done lays its key upon its
+two links, where the smallest stays, and a contact that finds its own key on both goes: none before it in the sequence
+that shares a link is left. Contacts that go together share no link, so the outcome equals that of the sequence to the
+bit. The smallest key of all always goes, so there are at most as many rounds as contacts, and about as many as the
+busiest link has contacts.
 
-What counts in a round is how many instructions one thread has to get through, at four to six cycles each.
+A round costs one barrier: contacts that have to wait lay their keys for the next one while others go, on another board,
+while a third is cleared. If there are threads enough, both halves of the sequence go together. What counts in a round
+is how many instructions one thread has to get through, at four to six cycles each.
 """
 
 import functools
@@ -15,11 +17,11 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from .block_memory import barrier
+from .block_memory import barrier, barrier_if_any
 from .broadphase import list_layout
 from .elementary import TWO, ZERO
 from .layout import BOARD_LOST_SELF, RIGHT_X, RIGHT_Y
-from .self_contact import collide, links_of, touching_circles
+from .self_contact import collide, links_of, natural, touching_circles
 from .types import Chain
 
 wp.set_module_options({"enable_backward": False})
@@ -37,11 +39,11 @@ class TouchLayout:
 
     Attributes:
         width: Columns of the owners, at least the number of links.
-        owners: Two sets of ``width`` keys, one per link; rounds use them in turn.
+        owners: Three boards of ``width`` keys, one per link; rounds use them in turn.
         pairs: The first ``shared_pairs`` pairs of joints that touch; further ones lie in the list's row.
         shared_pairs: See ``pairs``.
         touching: Number of such pairs.
-        finished: Number of contacts that have gone.
+        votes: See :func:`block_memory.barrier_if_any`.
         fixed_hits: Impulses with floor or sprocket in this launch.
         self_hits: Impulses between links in this launch.
         mailbox: A status from one thread to all.
@@ -56,7 +58,7 @@ class TouchLayout:
     @property
     def pairs(self) -> int:
         """Offset."""
-        return self.owners + 2 * self.width
+        return self.owners + 3 * self.width
 
     @property
     def touching(self) -> int:
@@ -64,7 +66,7 @@ class TouchLayout:
         return self.pairs + self.shared_pairs
 
     @property
-    def finished(self) -> int:
+    def votes(self) -> int:
         """Offset."""
         return self.touching + 1
 
@@ -126,22 +128,41 @@ def second_joint(pair: int):
 
 
 @wp.func
-def links_at(key: int, half: int, n: int):
-    """The two links of a contact of this half."""
-    return links_of(first_joint(key >> 1), second_joint(key >> 1), half, key & 1, n)
+def contact_key(pair: int, half: int, second: int):
+    """Orders contacts as the sequence does: by half, pair of joints, and first or second of the pair's two."""
+    return half << wp.static(2 * JOINT_BITS + 3) | pair << 1 | second
+
+
+@wp.func
+def pair_of(key: int):
+    """The pair of joints of a contact."""
+    return key >> 1 & wp.static(2 ** (2 * JOINT_BITS + 2) - 1)
+
+
+@wp.func
+def half_of(key: int):
+    """The half of a contact, not of DONE."""
+    return key >> wp.static(2 * JOINT_BITS + 3)
+
+
+@wp.func
+def links_at(key: int, n: int):
+    """The two links of a contact."""
+    pair = pair_of(key)
+    return links_of(first_joint(pair), second_joint(pair), half_of(key) & 1, key & 1, n)
 
 
 @wp.func
 def claim(T: wp.array(dtype=wp.int32), owners: int, link_a: int, link_b: int, key: int):
     """Lays a key upon the links of a contact."""
-    wp.atomic_min(T, owners + link_a, key)
-    wp.atomic_min(T, owners + link_b, key)
+    wp.atomic_min(T, natural(owners + link_a), key)
+    wp.atomic_min(T, natural(owners + link_b), key)
 
 
 @wp.func
 def is_first(T: wp.array(dtype=wp.int32), owners: int, link_a: int, link_b: int, key: int):
     """True if no smaller key lies on the links of a contact."""
-    return T[owners + link_a] == key and T[owners + link_b] == key
+    return T[natural(owners + link_a)] == key and T[natural(owners + link_b)] == key
 
 
 @functools.cache
@@ -155,9 +176,9 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         if lane < n:
             T[wp.static(touch.owners) + lane] = FREE
             T[wp.static(touch.owners + touch.width) + lane] = FREE
+            T[wp.static(touch.owners + 2 * touch.width) + lane] = FREE
         if lane == 0:
             T[wp.static(touch.touching)] = 0
-            T[wp.static(touch.finished)] = 0
 
     @wp.func
     def pair_at(L: wp.array(dtype=wp.int32), T: wp.array(dtype=wp.int32), k: int):
@@ -241,15 +262,16 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         chain: Chain,
         pair: int,
         half: int,
+        second: int,
         lane: int,
     ):
         """Lays down the geometry of a thread's first contact; returns its key, or DONE for circles that do not meet."""
         depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = touching_circles(
-            K, chain, first_joint(pair), second_joint(pair), half, lane % 2
+            K, chain, first_joint(pair), second_joint(pair), half, second
         )
         key = int(DONE)
         if depth > ZERO:
-            key = 2 * pair + lane % 2
+            key = contact_key(pair, half, second)
             E[0, lane] = nx
             E[1, lane] = ny
             E[2, lane] = a_n
@@ -272,6 +294,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         lane: int,
     ):
         """The turn of a thread's first contact; returns the number of impulses."""
+        lost_before = K[BOARD_LOST_SELF, link_a]
         lost, hits = collide(
             K,
             chain,
@@ -286,7 +309,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
             F[1, lane],
             F[2, lane],
         )
-        K[BOARD_LOST_SELF, link_a] = K[BOARD_LOST_SELF, link_a] + lost
+        K[BOARD_LOST_SELF, link_a] = lost_before + lost
         return int(hits)
 
     @wp.func
@@ -301,10 +324,10 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         return wp.where(depth > ZERO, 1, 0)
 
     @wp.func
-    def go(K: wp.array2d(dtype=wp.float64), chain: Chain, key: int, half: int, link_a: int, link_b: int):
+    def go(K: wp.array2d(dtype=wp.float64), chain: Chain, key: int, link_a: int, link_b: int):
         """The turn of a further contact; returns the number of impulses."""
         _depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = touching_circles(
-            K, chain, first_joint(key >> 1), second_joint(key >> 1), half, key & 1
+            K, chain, first_joint(pair_of(key)), second_joint(pair_of(key)), half_of(key), key & 1
         )
         lost, hits = collide(K, chain, link_a, link_b, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant)
         K[BOARD_LOST_SELF, link_a] = K[BOARD_LOST_SELF, link_a] + lost
@@ -321,67 +344,70 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         lane: int,
         touching: int,
     ):
-        """All contacts; the board is filled. Returns this thread's impulses.
+        """All contacts; the board is filled. Returns this thread's impulses and leaves a barrier behind it.
 
         A thread keeps the geometry of its first contact in its columns of E and F; should there be more contacts than
         threads, it works that of the others out again in their turn.
         """
         impulses = int(0)
         owners = int(wp.static(touch.owners))
-        others = int(wp.static(touch.owners + touch.width))
+        next_owners = int(wp.static(touch.owners + touch.width))
+        last_owners = int(wp.static(touch.owners + 2 * touch.width))
+        # both halves at once if that leaves a thread to each contact: the second after the first, so that contacts
+        # that go together are in few warps
         contacts = 2 * touching
-        finished = int(0)
-        half = int(0)
-        while half < 2:
-            gone = int(0)
+        in_turn = 4 * touching > wp.static(block_dim)
+        if not in_turn:
+            contacts = 4 * touching
+        turn = int(0)
+        while turn < wp.where(in_turn, 2, 1):
             own_key = int(DONE)
             if lane < contacts:
-                own_key = prepare(K, T, E, F, chain, pair_at(L, T, lane // 2), half, lane)
-                gone = wp.where(own_key == DONE, 1, 0)
-            own_a, own_b = links_at(wp.max(own_key, 0), half, chain.link_count)
+                half = wp.where(lane < 2 * touching, turn, 1)
+                k = lane - wp.where(in_turn, 0, half * 2 * touching)
+                own_key = prepare(K, T, E, F, chain, pair_at(L, T, k >> 1), half, k & 1, lane)
+            own_a, own_b = links_at(own_key, chain.link_count)
+            left = wp.where(own_key == DONE, 0, 1)
+            if own_key != DONE:
+                claim(T, owners, own_a, own_b, own_key)
             k = lane + wp.static(block_dim)
             while k < contacts:
-                touches = measure(K, T, chain, pair_at(L, T, k // 2), half, k % 2)
+                pair = pair_at(L, T, k >> 1)
+                touches = measure(K, T, chain, pair, turn, k & 1)
                 L[wp.static(lists.pending) + k] = touches
-                gone += 1 - touches
+                left += touches
+                if touches != 0:
+                    key = contact_key(pair, turn, k & 1)
+                    link_a, link_b = links_at(key, chain.link_count)
+                    claim(T, owners, link_a, link_b, key)
                 k += wp.static(block_dim)
-            while finished < contacts * (half + 1):
-                if own_key != DONE:
-                    claim(T, owners, own_a, own_b, own_key)
-                k = lane + wp.static(block_dim)
-                while k < contacts:
-                    if L[wp.static(lists.pending) + k] != 0:
-                        key = 2 * pair_at(L, T, k // 2) + k % 2
-                        link_a, link_b = links_at(key, half, chain.link_count)
-                        claim(T, owners, link_a, link_b, key)
-                    k += wp.static(block_dim)
-                barrier()
+            while barrier_if_any(T, wp.static(touch.votes), left > 0):
                 if own_key != DONE:
                     if is_first(T, owners, own_a, own_b, own_key):
                         impulses += go_prepared(K, E, F, chain, own_a, own_b, lane)
-                        gone += 1
+                        left -= 1
                         own_key = DONE
+                    else:
+                        claim(T, next_owners, own_a, own_b, own_key)
                 k = lane + wp.static(block_dim)
                 while k < contacts:
                     if L[wp.static(lists.pending) + k] != 0:
-                        key = 2 * pair_at(L, T, k // 2) + k % 2
-                        link_a, link_b = links_at(key, half, chain.link_count)
+                        key = contact_key(pair_at(L, T, k >> 1), turn, k & 1)
+                        link_a, link_b = links_at(key, chain.link_count)
                         if is_first(T, owners, link_a, link_b, key):
-                            impulses += go(K, chain, key, half, link_a, link_b)
-                            gone += 1
+                            impulses += go(K, chain, key, link_a, link_b)
+                            left -= 1
                             L[wp.static(lists.pending) + k] = 0
+                        else:
+                            claim(T, next_owners, link_a, link_b, key)
                     k += wp.static(block_dim)
                 if lane < chain.link_count:
-                    T[others + lane] = FREE
-                if gone > 0:
-                    wp.atomic_add(T, wp.static(touch.finished), gone)
-                    gone = 0
-                barrier()
-                finished = T[wp.static(touch.finished)]
-                swapped = owners
-                owners = others
-                others = swapped
-            half += 1
+                    T[natural(last_owners + lane)] = FREE
+                used = owners
+                owners = next_owners
+                next_owners = last_owners
+                last_owners = used
+            turn += 1
         return impulses
 
     return clear, find, resolve

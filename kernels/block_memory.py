@@ -22,6 +22,30 @@ def barrier():
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
+    return __syncthreads_or(x) != 0;
+#else
+    int& seen = flags.data[slot];
+    if (x) {
+        seen = 1;
+    }
+    WP_TILE_SYNC();
+    const bool any = seen != 0;
+    WP_TILE_SYNC();
+    seen = 0;
+    WP_TILE_SYNC();
+    return any;
+#endif
+""")
+def barrier_if_any(flags: wp.array(dtype=wp.int32), slot: int, x: bool) -> bool:
+    """A barrier that tells all threads whether x is true in any of them; one instruction on a GPU.
+
+    Fibers have none: there ``flags[slot]``, 0 before and after, sees it.
+    """
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
     return __reduce_max_sync(0xffffffffu, x);
 #else
     return x;

@@ -100,7 +100,22 @@ class ListLayout:
     @property
     def size(self) -> int:
         """Integers in all."""
-        return self.owners + 2 * self.columns + 8
+        return self.geometry + 2 * self.geometry_rows * self.geometry_columns
+
+    @property
+    def geometry_rows(self) -> int:
+        """Rows of the CPU's scratch for contacts, see :mod:`self_contact`."""
+        return 34
+
+    @property
+    def geometry_columns(self) -> int:
+        """Pairs of joints whose contacts are worked out together, a multiple of 8."""
+        return 64
+
+    @property
+    def geometry(self) -> int:
+        """That scratch: doubles, on whole cache lines."""
+        return -(-(self.owners + 3 * self.columns + 8) // 16) * 16
 
 
 @functools.cache

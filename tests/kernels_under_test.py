@@ -118,7 +118,18 @@ def _link_pair(
     chain.chain_friction = cases[i, 2]
     chain.tangential_restitution = cases[i, 3]
     depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = circles_of_links(
-        scratch[i], chain, 0, cases[i, 4], cases[i, 5], 1, cases[i, 6], cases[i, 7]
+        chain.circle_radius,
+        cases[i, 4],
+        cases[i, 5],
+        cases[i, 6],
+        cases[i, 7],
+        scratch[i, layout.X, 0],
+        scratch[i, layout.Y, 0],
+        scratch[i, layout.X, 1],
+        scratch[i, layout.Y, 1],
+        scratch[i, layout.INVERSE_MASS, 0] + scratch[i, layout.INVERSE_MASS, 1],
+        scratch[i, layout.INVERSE_INERTIA, 0],
+        scratch[i, layout.INVERSE_INERTIA, 1],
     )
     lost = wp.float64(0.0)
     hits = wp.int64(0)

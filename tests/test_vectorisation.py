@@ -18,7 +18,7 @@ features = driver.Features(method=sys.argv[2], columns=200, fixed_body=sys.argv[
 wp.load_module(driver.make_advance(features).module, device="cpu")
 """
 
-COMMON = {"place_ends", "attempt", "greatest_opening", "greatest_speed", "greatest_displacement"}
+COMMON = {"place_ends", "attempt", "greatest_opening", "greatest_speed", "greatest_displacement", "work_out"}
 EXPLICIT = COMMON | {"begin_stages", "derivatives", "commit"}
 IMPLICIT = COMMON | {
     *("assemble", "eliminate_segments", "solve"),
