@@ -59,6 +59,7 @@ from .layout import (
     LAST_FLOOR_IMPULSE,
     LIST_BUILDS,
     MASS,
+    NOTE_CONTACT_STEP,
     NOTE_DEADLINE,
     NOTE_FIXED_DEPTH,
     NOTE_LAST_IMPULSE,
@@ -81,7 +82,7 @@ from .layout import (
 )
 from .methods import METHODS
 from .record import record_is_full, sampling, summarise, write_sample
-from .softening import change_joints, softened
+from .softening import change_joints, contact_step, softened
 from .types import Control, Model, Program, Record, State, read_chain
 
 wp.set_module_options({"enable_backward": False})
@@ -232,6 +233,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if wp.static(softens):
                 chain = softened(chain, control, state.softness[world])
             note_constants(K, chain)
+            K[BOARD_NOTES, NOTE_CONTACT_STEP] = contact_step(control, state.softness[world])
             K[BOARD_NOTES, NOTE_OPENING] = state.extremes[world, OPENING]
             K[BOARD_NOTES, NOTE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
             K[BOARD_NOTES, NOTE_LAST_IMPULSE] = state.watch[world, LAST_FLOOR_IMPULSE]
@@ -272,7 +274,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         tries_left = int(wp.min(wp.int64(control.tries), control.step_limit - tries_before))
         if record_is_full(record, world):
             tries_left = 0
-        bound = bound_of(control, pairs, gap, slack, speed)
+        bound = bound_of(K, control, pairs, gap, slack, speed)
         tries = int(0)
         accepted = int(0)
         barrier()
@@ -289,6 +291,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if wp.static(softens):
                         if state.softness[world] != softness:
                             note_constants(K, change_joints(seen, model, state, control, world))
+                            K[BOARD_NOTES, NOTE_CONTACT_STEP] = contact_step(control, state.softness[world])
                     K[BOARD_NOTES, NOTE_STOP_TIME] = state.stop_time[world]
                     K[BOARD_NOTES, NOTE_NEXT_LOOK] = wp.float64(state.next_sample[world]) * control.sample_interval
                     if clock() > K[BOARD_NOTES, NOTE_DEADLINE]:
@@ -301,6 +304,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if state.softness[world] != softness:
                         next_end = hand_over(ends, K, place, link_on(K, lane))
                         begin_step(forces, K, place, next_end)
+                        bound = bound_of(K, control, pairs, gap, slack, speed)
                 if pauses or status != RUNNING:
                     break
             stop_time = K[BOARD_NOTES, NOTE_STOP_TIME]
@@ -422,7 +426,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                                 wp.atomic_add(T, wp.static(touch.self_hits), hits)
                             if not is_hit:
                                 is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
-                bound = bound_of(control, pairs, gap, slack, speed)
+                bound = bound_of(K, control, pairs, gap, slack, speed)
                 if is_hit or wp.static(not reuses_last):
                     if is_hit:
                         next_end = hand_over(ends, K, place, link_on(K, lane))

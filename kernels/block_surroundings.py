@@ -18,6 +18,7 @@ from .layout import (
     INVERSE_INERTIA,
     INVERSE_MASS,
     NOTE_CIRCLE_RADIUS,
+    NOTE_CONTACT_STEP,
     NOTE_HALF_LENGTH,
     NOTE_SPROCKET_RADIUS,
     OMEGA,
@@ -93,7 +94,14 @@ def block_surroundings(features: Features, block_dim: int):
         )
 
     @wp.func
-    def bound_of(control: Control, pairs: int, gap: wp.float32, slack: wp.float32, speed: wp.float32):
+    def bound_of(
+        K: wp.array2d(dtype=wp.float64),
+        control: Control,
+        pairs: int,
+        gap: wp.float32,
+        slack: wp.float32,
+        speed: wp.float32,
+    ):
         """Longest step [s]: bounded near contacts; far from them nothing may come through the skin unseen."""
         near = pairs > 0
         room = wp.float32(control.skin)
@@ -102,7 +110,7 @@ def block_surroundings(features: Features, block_dim: int):
             room = wp.float32(0.5) * gap
         if wp.static(has_self):
             room = wp.min(room, slack)
-        bound = control.contact_step
+        bound = K[BOARD_NOTES, NOTE_CONTACT_STEP]
         if not near:
             bound = wp.max(bound, wp.float64(room / speed))
         return bound

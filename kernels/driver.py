@@ -55,7 +55,7 @@ from .layout import (
 from .methods import METHODS
 from .record import record_is_full, sampling, summarise, write_sample
 from .self_contact import self_contacts
-from .softening import change_joints, softened
+from .softening import change_joints, contact_step, softened
 from .types import Chain, Control, Model, Program, Record, State, read_chain
 
 wp.set_module_options({"enable_backward": False})
@@ -220,8 +220,10 @@ def make_advance(features: Features):
         if state.status[world] != RUNNING:
             return
         chain = read_chain(model, world)
+        longest = control.contact_step
         if wp.static(softens):
             chain = softened(chain, control, state.softness[world])
+            longest = contact_step(control, state.softness[world])
         block = scratch[world]
         K = wp.array(ptr=block.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
         block_list = lists[world]
@@ -257,6 +259,7 @@ def make_advance(features: Features):
                 if wp.static(softens):
                     if state.softness[world] != softness:
                         chain = change_joints(chain, model, state, control, world)
+                        longest = contact_step(control, state.softness[world])
                         has_first_stage = int(0)
                 if status != RUNNING:
                     break
@@ -265,7 +268,7 @@ def make_advance(features: Features):
                 status = state.stop_status[world]
                 break
             if wp.static(has_flight):
-                if flies == 0 and time >= closing_time:
+                if flies == 0 and time >= closing_time and state.softness[world] == ZERO:
                     closed, lost = close_joints(K, chain)
                     closing_time = time + QUIET_TIME
                     if closed:
@@ -292,9 +295,9 @@ def make_advance(features: Features):
                         near = near or L[wp.static(list_count)] > 0
                         room = wp.min(room, slack)
                     if near:
-                        h = wp.min(h, control.contact_step)
+                        h = wp.min(h, longest)
                     else:
-                        h = wp.min(h, wp.max(control.contact_step, room / greatest_speed(K, chain)))
+                        h = wp.min(h, wp.max(longest, room / greatest_speed(K, chain)))
                 if wp.static(has_flight):
                     if flies != 0:
                         approach = ZERO
@@ -303,7 +306,7 @@ def make_advance(features: Features):
                         if wp.static(has_self):
                             approach = wp.max(approach, meeting(K, L, chain))
                             approach = wp.max(approach, greatest_speed(K, chain) / wp.max(slack, SMALLEST_GAP))
-                        h = wp.min(h, wp.max(control.contact_step, ONE / approach))
+                        h = wp.min(h, wp.max(longest, ONE / approach))
             lands = time + h >= stop_time
             if lands:
                 h = stop_time - time

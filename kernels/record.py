@@ -44,7 +44,7 @@ from .layout import (
     X,
     Y,
 )
-from .softening import watch_collapse, watch_stiffening
+from .softening import watch_collapse, watch_spin_up, watch_stiffening
 from .types import Chain, Control, Program, Record, State
 
 wp.set_module_options({"enable_backward": False})
@@ -281,9 +281,11 @@ def sampling(watch: str, softens: bool = False):
             write_frame(record, K, chain, world, time)
         passed = wp.int64(wp.floor(time / control.sample_interval))
         state.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
-        if wp.static(softens):
+        if wp.static(softens and watches_rest):
             watch_stiffening(state, control, world, time)
             watch_collapse(K, chain, state, control, world, time, is_first)
+        if wp.static(softens and watches_steadiness):
+            watch_spin_up(state, program, control, world, time)
         if wp.static(watches_rest):
             return watch_rest(state, control, world, time, summary)
         if wp.static(watches_steadiness):

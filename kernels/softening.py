@@ -1,12 +1,15 @@
-"""Softer joints where nothing fast is left to resolve: in a loop that has collapsed, and just after the release.
+"""Softer joints where nothing fast is left to resolve: on the sprocket, just after the release, in the collapsed loop.
 
-A chain that was driven on soft joints is released with them; they get their own values back before it lands. Earlier
-was tried and rejected: nobody knows beforehand when the loop will be steady, and putting the release off by 0.25 s
-shifts Δx by 4 %, for the loop's width swings slowly.
+Stiff joints are what makes steps short. Softness s is 0 for the model's own k, b and 1/ω_c, 1 for those of soft joints
+and 2 for those of the softest; in between they are interpolated geometrically. No value ever becomes stiffer than the
+model's own. Softness changes at looks only, so that a run does not depend on how it is cut into launches. Beyond
+softness 1 steps near a contact may be longer too: there they would else be what keeps steps short.
 
-Stiff joints are what makes steps short. Softness s goes from 0, the model's own k, b and 1/ω_c, to 1, those of soft
-joints; in between they are interpolated geometrically. No value ever becomes stiffer than the model's own. Softness
-changes at looks only, so that a run does not depend on how it is cut into launches.
+*Drive.* Joints are soft while the chain settles, softest while the sprocket spins up, and soft again when the loop is
+to become steady. Softest up to the release was tried and rejected: C = T/k stretches a loop at 30 Hz by 0.3 %.
+*Release.* Soft joints get their own values back before the chain lands. Earlier was tried and rejected: nobody knows
+beforehand when the loop will be steady, and putting the release off by 0.25 s shifts Δx by 4 %, for the loop's width
+swings slowly. *Pile.* Joints are softest for good once the loop has collapsed.
 
 A change of k at openings C sets ½ (k_before − k_after) Σ C² of energy free, which is booked. Going soft is one jump: C
 has then grown to T/k_after within a few periods of the soft springs. Going back, C must shrink a hundredfold, which a
@@ -15,7 +18,7 @@ jump would turn into a pull of a hundred times T; so it takes many small ones, e
 
 import warp as wp
 
-from .elementary import HALF, ONE, ZERO
+from .elementary import HALF, ONE, TWO, ZERO
 from .layout import (
     LEFT_X,
     LEFT_Y,
@@ -25,7 +28,7 @@ from .layout import (
     SOFTENED_AT,
     SPRING,
 )
-from .types import Chain, Control, Model, State, read_chain
+from .types import Chain, Control, Model, Program, State, read_chain
 
 wp.set_module_options({"enable_backward": False})
 
@@ -42,13 +45,41 @@ def between(own: wp.float64, soft: wp.float64, softness: wp.float64):
 
 
 @wp.func
+def on_scale(own: wp.float64, soft: wp.float64, softest: wp.float64, softness: wp.float64):
+    """A joint's value from its own at 0 over the soft one at 1 to the softest at 2."""
+    return between(between(own, soft, softness), softest, softness - ONE)
+
+
+@wp.func
 def softened(own: Chain, control: Control, softness: wp.float64) -> Chain:
     """A chain whose joints have this softness, from one that has its own values."""
     chain = own
-    chain.joint_stiffness = between(own.joint_stiffness, control.soft_stiffness, softness)
-    chain.joint_damping = between(own.joint_damping, control.soft_damping, softness)
-    chain.inverse_smoothing = between(own.inverse_smoothing, ONE / control.soft_smoothing, softness)
+    chain.joint_stiffness = on_scale(
+        own.joint_stiffness, control.soft_stiffness, control.softest_stiffness, softness
+    )
+    chain.joint_damping = on_scale(own.joint_damping, control.soft_damping, control.softest_damping, softness)
+    chain.inverse_smoothing = on_scale(
+        own.inverse_smoothing, ONE / control.soft_smoothing, ONE / control.softest_smoothing, softness
+    )
     return chain
+
+
+@wp.func
+def is_stiffer(chain: Chain, other: Chain):
+    """Whether any value of a chain's joints is above the other's."""
+    return (
+        chain.joint_stiffness > other.joint_stiffness
+        or chain.joint_damping > other.joint_damping
+        or chain.inverse_smoothing > other.inverse_smoothing
+    )
+
+
+@wp.func
+def contact_step(control: Control, softness: wp.float64):
+    """Longest step [s] near a contact while joints have this softness."""
+    if softness > ONE:
+        return wp.max(control.contact_step, control.soft_contact_step)
+    return control.contact_step
 
 
 @wp.func
@@ -81,23 +112,27 @@ def watch_collapse(
     time: wp.float64,
     is_first: bool,
 ):
-    """Softens the joints for good once the loop encloses less than a fraction of what it did at the first look.
+    """Makes joints soft once the loop encloses less than a fraction of what it did at the first look, softest at half of it.
 
-    Joints that are soft already stay as they are, and no moment of softening is noted.
+    For good. Joints that are as soft already stay as they are, and no moment of softening is noted.
     """
     if is_first:
         state.first_area[world] = enclosed_area(K, chain)
-    soft = softened(chain, control, ONE)
-    is_stiffer = (
-        chain.joint_stiffness > soft.joint_stiffness
-        or chain.joint_damping > soft.joint_damping
-        or chain.inverse_smoothing > soft.inverse_smoothing
-    )
-    if is_first or state.softness[world] > ZERO or not is_stiffer:
         return
-    if enclosed_area(K, chain) / state.first_area[world] < control.soften_area:
-        state.softness[world] = ONE
-        state.watch[world, SOFTENED_AT] = time
+    softness = state.softness[world]
+    is_collapsed = state.watch[world, SOFTENED_AT] >= ZERO
+    if softness >= TWO or (softness > ZERO and not is_collapsed):
+        return
+    share = enclosed_area(K, chain) / state.first_area[world]
+    wanted = ZERO
+    if share < control.soften_area:
+        wanted = ONE
+    if share < HALF * control.soften_area:
+        wanted = TWO
+    if wanted > softness and is_stiffer(chain, softened(chain, control, wanted)):
+        state.softness[world] = wanted
+        if not is_collapsed:
+            state.watch[world, SOFTENED_AT] = time
 
 
 @wp.func
@@ -105,3 +140,13 @@ def watch_stiffening(state: State, control: Control, world: int, time: wp.float6
     """Gives joints that were soft on the sprocket their own values back, in the first moments after the release."""
     if state.softness[world] > ZERO and state.watch[world, SOFTENED_AT] < ZERO:
         state.softness[world] = wp.max(ZERO, ONE - time / control.stiffening_time)
+
+
+@wp.func
+def watch_spin_up(state: State, program: Program, control: Control, world: int, time: wp.float64):
+    """Makes joints softest while the sprocket spins up, and soft again by the time at which the hold begins."""
+    if time < program.spin_up_start[world]:
+        state.softness[world] = ONE
+    else:
+        ahead = (program.hold_start[world] - time) / control.stiffening_time
+        state.softness[world] = ONE + wp.clamp(ahead, ZERO, ONE)

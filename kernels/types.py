@@ -74,7 +74,7 @@ class State:
     next_sample: wp.array(dtype=wp.int64)  # index of the next sample mark
     status: wp.array(dtype=wp.int32)
     watch: wp.array2d(dtype=wp.float64)  # (W, WATCH_ROWS): memory of the watches
-    softness: wp.array(dtype=wp.float64)  # of the joints, from 0, the model's own, to 1, soft; see softening
+    softness: wp.array(dtype=wp.float64)  # of the joints: 0 the model's own, 1 soft, 2 softest; see softening
     first_area: wp.array(dtype=wp.float64)  # enclosed by the loop when its run began [m²]
     tries_before: wp.array(dtype=wp.int64)  # tries of the walk's earlier phases, for the limit
     first_look: wp.array2d(dtype=wp.float64)  # (W, SAMPLE_COLUMNS): the chain when its run began …
@@ -115,6 +115,10 @@ class Control:
     soft_stiffness: wp.float64  # k of soft joints [N/m]
     soft_damping: wp.float64  # b [N s/m]
     soft_smoothing: wp.float64  # ω_c [rad/s]
+    softest_stiffness: wp.float64  # the same of the softest
+    softest_damping: wp.float64
+    softest_smoothing: wp.float64
+    soft_contact_step: wp.float64  # longest step near a contact while joints are softer than soft [s]
     soften_area: wp.float64  # joints soften below this fraction of the first area
     stiffening_time: wp.float64  # from soft joints at the release to the model's own [s]
 

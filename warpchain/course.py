@@ -11,7 +11,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.engine import COUNTS, EXTREMES, SOFT, Batch
+from warpchain.engine import COUNTS, EXTREMES, Batch
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features
 from warpchain.motion import Motion
@@ -82,8 +82,7 @@ class Course:
             self._settled = self._at_full_speed = 0.0
             self._release(position, velocity)
             return
-        driven = soft_joints(parameters) if setup.options.soften_drive else parameters
-        batch.set_chain(world, driven, scene.links, contact_radius(scene, parameters))
+        batch.set_chain(world, parameters, scene.links, contact_radius(scene, parameters))
         self._settled = scene.settle_time if from_rest else 0.0
         spin_up = scene.spin_up_time if from_rest and speed > 0 else 0.0
         self._at_full_speed = self._settled + spin_up
@@ -93,7 +92,14 @@ class Course:
             parameters.link_length,
             0.0 if from_rest else speed,
         )
-        batch.load(world, position, velocity, stop_time=self._settled, stop_status=Status.FINISHED)
+        batch.load(
+            world,
+            position,
+            velocity,
+            stop_time=self._settled,
+            stop_status=Status.FINISHED,
+            softness=float(setup.options.soften_drive),
+        )
         batch.set_program(
             world,
             sprocket_speed=-2 * math.pi * scene.frequency,  # clockwise, so that the walk goes towards +x
@@ -244,17 +250,6 @@ class Course:
             softness=float(was_driven_soft),
         )
         self._released = True
-
-
-def soft_joints(parameters: Parameters) -> Parameters:
-    """The parameters with joints as soft as those of the preset `soft`, or softer if they were."""
-    return parameters.with_values(
-        {
-            "joint_stiffness": min(parameters.joint_stiffness, SOFT.joint_stiffness),
-            "joint_damping": min(parameters.joint_damping, SOFT.joint_damping),
-            "friction_smoothing": max(parameters.friction_smoothing, SOFT.friction_smoothing),
-        }
-    )
 
 
 def lowest_point(position: Array, parameters: Parameters) -> float:

@@ -45,7 +45,9 @@ LAUNCH_SECONDS = 0.1  # how long a launch should take: the grain of progress and
 CAPACITY_SAMPLES = 512
 CAPACITY_FRAMES = 64
 SOFT = preset("soft")
-"""Whose joints softened ones have."""
+"""Whose joints soft ones have."""
+SOFTEST = SOFT.with_values({"joint_stiffness": 1e6, "joint_damping": 30.0, "friction_smoothing": 1.0})
+"""Whose joints the softest have."""
 STIFFENING_TIME = 0.03
 """Time [s] in which joints that were soft on the sprocket get their own values back after the release."""
 UNSET_WATCHES = (layout.WINDOW_START, layout.STEADY_SINCE, layout.REST_SINCE, layout.SOFTENED_AT)
@@ -230,6 +232,10 @@ class Batch:
         self.control.soft_stiffness = SOFT.joint_stiffness
         self.control.soft_damping = SOFT.joint_damping
         self.control.soft_smoothing = SOFT.friction_smoothing
+        self.control.softest_stiffness = SOFTEST.joint_stiffness
+        self.control.softest_damping = SOFTEST.joint_damping
+        self.control.softest_smoothing = SOFTEST.friction_smoothing
+        self.control.soft_contact_step = options.soft_contact_step
         self.control.soften_area = options.soften_area if options.soften_pile else -math.inf
         self.control.stiffening_time = STIFFENING_TIME
 

@@ -42,7 +42,7 @@ def features_of(options: Options, columns: int, *, fixed_body: str, watch: str, 
         self_contact=options.self_contact,
         broad_phase=broad_phase,
         watch=watch,
-        softens=watch == "rest" and (options.soften_pile or options.soften_drive),
+        softens=(watch == "rest" and options.soften_pile) or (watch in ("rest", "steady") and options.soften_drive),
     )
 
 

@@ -194,6 +194,13 @@ class Options(BaseModel):
         description="longest step near a contact; bounds how deep circles sink in before a contact is seen",
         json_schema_extra={"unit": "s"},
     )
+    soft_contact_step: float = Field(
+        default=5e-5,
+        gt=0,
+        description="longest step near a contact, unless contact_step is longer, where joints are at their softest: "
+        "while the sprocket spins up (soften_drive) and in the collapsed loop (soften_pile)",
+        json_schema_extra={"unit": "s"},
+    )
     skin: float = Field(
         default=2e-3,
         gt=0,
