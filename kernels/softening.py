@@ -54,9 +54,7 @@ def on_scale(own: wp.float64, soft: wp.float64, softest: wp.float64, softness: w
 def softened(own: Chain, control: Control, softness: wp.float64) -> Chain:
     """A chain whose joints have this softness, from one that has its own values."""
     chain = own
-    chain.joint_stiffness = on_scale(
-        own.joint_stiffness, control.soft_stiffness, control.softest_stiffness, softness
-    )
+    chain.joint_stiffness = on_scale(own.joint_stiffness, control.soft_stiffness, control.softest_stiffness, softness)
     chain.joint_damping = on_scale(own.joint_damping, control.soft_damping, control.softest_damping, softness)
     chain.inverse_smoothing = on_scale(
         own.inverse_smoothing, ONE / control.soft_smoothing, ONE / control.softest_smoothing, softness
@@ -112,9 +110,10 @@ def watch_collapse(
     time: wp.float64,
     is_first: bool,
 ):
-    """Makes joints soft once the loop encloses less than a fraction of what it did at the first look, softest at half of it.
+    """Makes joints soft, for good, once the loop encloses less than a fraction of what it did at the first look.
 
-    For good. Joints that are as soft already stay as they are, and no moment of softening is noted.
+    Below half of that fraction they become softest. Joints that are as soft already stay as they are, and no moment of
+    softening is noted.
     """
     if is_first:
         state.first_area[world] = enclosed_area(K, chain)

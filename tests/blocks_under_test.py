@@ -76,6 +76,7 @@ def batch_of(
     if fixed_step:
         batch.control.skin = 1e-9
         batch.control.contact_step = FIXED_STEP
+        batch.control.soft_contact_step = FIXED_STEP
     for world, (position, velocity) in enumerate(chains):
         batch.set_chain(world, SOFT, len(position))
         batch.load(world, position, velocity, stop_time=stop_time, stop_status=Status.FINISHED)

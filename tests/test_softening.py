@@ -12,12 +12,12 @@ import warpchain
 from tests.blocks_under_test import FIXED_STEP, batch_of, heap, launch_blocks, launch_chains
 from warpchain import InputError, Status, ensemble, preset
 from warpchain.course import Course
-from warpchain.engine import SOFT, STIFFENING_TIME, Batch, start_device
+from warpchain.engine import SOFT, SOFTEST, STIFFENING_TIME, Batch, start_device
 from warpchain.kernels import block, driver, layout
 from warpchain.kernels.block import make_advance_block
 from warpchain.kernels.driver import load_state, make_advance
 from warpchain.kernels.explicit import place_ends
-from warpchain.kernels.softening import enclosed_area, softened
+from warpchain.kernels.softening import contact_step, enclosed_area, softened
 from warpchain.kernels.types import Chain, Control, Model, State, read_chain
 from warpchain.shapes import ellipse, lay_chain
 from warpchain.walker import setup_walk
@@ -83,6 +83,7 @@ def joints_of(stiffness: float, damping: float, smoothing: float, softness: floa
     chain.joint_stiffness, chain.joint_damping, chain.inverse_smoothing = stiffness, damping, 1 / smoothing
     control = Control()
     control.soft_stiffness, control.soft_damping, control.soft_smoothing = 1e7, 100.0, 0.1
+    control.softest_stiffness, control.softest_damping, control.softest_smoothing = 1e6, 25.0, 1.6
     chains = wp.array([chain], dtype=Chain, device="cpu")
     inputs = [chains, control, wp.array([softness], dtype=wp.float64, device="cpu")]
     wp.launch(_soften, dim=1, inputs=inputs, device="cpu")
@@ -90,20 +91,40 @@ def joints_of(stiffness: float, damping: float, smoothing: float, softness: floa
     return tuple(float(after[name]) for name in ("joint_stiffness", "joint_damping", "inverse_smoothing"))
 
 
-def test_softness_goes_geometrically_from_own_to_soft() -> None:
-    """Exactly the own values at 0, exactly the soft ones at 1, their geometric mean at 1/2, within bounds beyond."""
+def test_softness_goes_geometrically_from_own_over_soft_to_softest() -> None:
+    """Exactly the own values at 0, soft at 1, softest at 2; geometric means half-way, within bounds beyond."""
     for softness in (0.0, -0.1):
         assert joints_of(1e9, 1e3, 1e-3, softness) == (1e9, 1e3, 1 / 1e-3)
-    for softness in (1.0, 1.1):
-        assert joints_of(1e9, 1e3, 1e-3, softness) == (1e7, 100.0, 1 / 0.1)
+    assert joints_of(1e9, 1e3, 1e-3, 1.0) == (1e7, 100.0, 1 / 0.1)
+    for softness in (2.0, 2.1):
+        assert joints_of(1e9, 1e3, 1e-3, softness) == (1e6, 25.0, 1 / 1.6)
     assert_allclose(joints_of(1e9, 1e3, 1e-3, 0.5), [1e8, np.sqrt(1e5), 100.0], rtol=1e-14)
+    assert_allclose(joints_of(1e9, 1e3, 1e-3, 1.5), [np.sqrt(1e13), 50.0, 2.5], rtol=1e-14)
 
 
 def test_no_joint_becomes_stiffer() -> None:
-    """What is softer than the soft preset stays, undamped joints included; the rest softens."""
-    for softness in (0.0, 0.3, 1.0):
+    """What is softer than soft or softest joints stays, undamped joints included; the rest softens."""
+    for softness in (0.0, 0.3, 1.0, 1.7, 2.0):
         assert joints_of(1e6, 0.0, 2.0, softness) == (1e6, 0.0, 0.5)
     assert joints_of(1e6, 1e3, 2.0, 1.0) == (1e6, 100.0, 0.5)
+    assert joints_of(3e6, 1e3, 2.0, 2.0) == (1e6, 25.0, 0.5)
+
+
+@wp.kernel(module="unique", enable_backward=False)
+def _contact_step(control: Control, softness: wp.array(dtype=wp.float64), steps: wp.array(dtype=wp.float64)):
+    i = wp.tid()
+    steps[i] = contact_step(control, softness[i])
+
+
+@pytest.mark.parametrize(("own", "longest"), [(2e-5, 5e-5), (7e-5, 7e-5)])
+def test_steps_near_contacts_are_longer_only_beyond_soft(own: float, longest: float) -> None:
+    """Up to softness 1 the contact step bounds them, beyond it the greater of the two."""
+    control = Control()
+    control.contact_step, control.soft_contact_step = own, 5e-5
+    softness = wp.array([0.0, 0.5, 1.0, 1.01, 2.0], dtype=wp.float64, device="cpu")
+    steps = wp.full(5, np.nan, dtype=wp.float64, device="cpu")
+    wp.launch(_contact_step, dim=5, inputs=[control, softness, steps], device="cpu")
+    assert steps.numpy().tolist() == [own, own, own, longest, longest]
 
 
 # --- the pile ---
@@ -128,6 +149,12 @@ def softened_walk():
     return short_walk(soften_pile=True)
 
 
+@pytest.fixture(scope="module")
+def early_walk():
+    """The same, softened earlier, so that its area then halves."""
+    return short_walk(soften_pile=True, soften_area=0.6)
+
+
 def shoelace(joints: np.ndarray) -> np.ndarray:
     """Area (f,) inside polygons (f, n, 2)."""
     x, y = joints[..., 0], joints[..., 1]
@@ -142,12 +169,11 @@ def test_joints_soften_at_the_first_mark_of_a_small_area(softened_walk) -> None:
     assert softened_walk.softened_at == softened_walk.frame_time[first]
 
 
-def test_soften_area_sets_the_moment(softened_walk) -> None:
+def test_soften_area_sets_the_moment(softened_walk, early_walk) -> None:
     """A greater fraction is reached earlier, at the mark where the area says so."""
-    walk = short_walk(soften_pile=True, soften_area=0.6)
-    area = shoelace(walk.frame_joints)
-    assert walk.softened_at == walk.frame_time[np.flatnonzero(area / area[0] < 0.6)[0]]
-    assert walk.softened_at < softened_walk.softened_at
+    area = shoelace(early_walk.frame_joints)
+    assert early_walk.softened_at == early_walk.frame_time[np.flatnonzero(area / area[0] < 0.6)[0]]
+    assert early_walk.softened_at < softened_walk.softened_at
 
 
 def test_nothing_changes_before_the_joints_soften(stiff_walk, softened_walk) -> None:
@@ -168,14 +194,17 @@ def test_softened_walk_ends_alike_with_fewer_steps(stiff_walk, softened_walk) ->
 
 
 @pytest.mark.parametrize("method", ["rkf78", "dp5"])
-def test_ledger_of_a_softened_walk_closes(method: str, softened_walk) -> None:
-    """What softening frees is ½ (k − k') Σ C² at the switch; with it the ledger closes as before."""
-    walk = softened_walk if method == "rkf78" else short_walk(method=method, soften_pile=True)
+def test_ledger_of_a_softened_walk_closes(method: str, early_walk) -> None:
+    """What softening frees is ½ (k − k') Σ C² at the two switches; with it the ledger closes as before."""
+    walk = early_walk if method == "rkf78" else short_walk(method=method, soften_pile=True, soften_area=0.6)
     energy = walk.energy
     at_release = energy["kinetic_at_release"] + energy["potential_at_release"]
     assert abs(energy["residual"]) < 1e-5 * at_release
-    (freed_from,) = walk.spring_energy[walk.time == walk.softened_at]
-    assert energy["softening"] == pytest.approx(0.99 * freed_from, rel=1e-12)
+    area = shoelace(walk.frame_joints)
+    switches = [walk.frame_time[np.flatnonzero(area / area[0] < fraction)[0]] for fraction in (0.6, 0.3)]
+    assert switches[0] == walk.softened_at < switches[1]
+    (to_soft,), (to_softest,) = (walk.spring_energy[walk.time == moment] for moment in switches)
+    assert energy["softening"] == pytest.approx(0.99 * to_soft + 0.9 * to_softest, rel=1e-12)
 
 
 def test_ledger_closes_when_much_is_freed() -> None:
@@ -197,8 +226,9 @@ def test_ledger_closes_when_much_is_freed() -> None:
 
 
 def test_soft_joints_are_left_alone() -> None:
-    """A walk of the preset soft has nothing to soften: it is the same to the bit and says that it did not."""
-    walks = [short_walk(preset="soft", soften_pile=on) for on in (False, True)]
+    """A walk with the softest joints has nothing to soften: it is the same to the bit and says that it did not."""
+    joints = {name: getattr(SOFTEST, name) for name in ("joint_stiffness", "joint_damping", "friction_smoothing")}
+    walks = [short_walk(preset="soft", soften_pile=on, **joints) for on in (False, True)]
     for name in SERIES:
         assert_array_equal(getattr(walks[0], name), getattr(walks[1], name), err_msg=name)
     assert walks[0].energy == walks[1].energy
@@ -232,6 +262,39 @@ def test_a_soft_drive_takes_fewer_steps_and_as_long() -> None:
     stiff, soft = (warpchain.walk(**SPINNING, preset="paper", walk_limit=1e-3, soften_drive=on) for on in (False, True))
     assert soft.steps_accepted < 0.3 * stiff.steps_accepted
     assert soft.simulated_time == pytest.approx(stiff.simulated_time, abs=1e-4)
+
+
+def test_joints_are_softest_while_the_sprocket_spins_up() -> None:
+    """In the spin-up spring energy is n T²/2k of the softest joints, in the hold that of soft ones, T = m̄ v²/ℓ."""
+    settings = {"links": 30, "frequency": 15.0, "method": "standard", "settle_time": 0.1, "spin_up_time": 0.3}
+    setup = setup_walk("paper", settings, None)
+    batch = Batch(1, 30, setup.options)
+    course = Course(batch, 0, setup)
+    levels = []
+    for moment in (0.09, 0.4 - 1.1 * STIFFENING_TIME, 0.4 + 5e-3):
+        batch.resume(0, moment, Status.FINISHED)
+        batch.run([0], course.features)
+        look = batch.last_look(0)
+        levels.append((batch.state.softness.numpy()[0], look[layout.SPRING], look[layout.LOOP_SPEED]))
+    assert [softness for softness, _, _ in levels] == [1.0, 2.0, 1.0]
+    mass = (PAPER.inner_mass + PAPER.outer_mass) / 2
+    for (_, spring, speed), stiffness in zip(levels[1:], (SOFTEST.joint_stiffness, SOFT.joint_stiffness), strict=True):
+        tension = mass * speed**2 / PAPER.link_length
+        assert spring == pytest.approx(30 * tension**2 / (2 * stiffness), rel=0.5)
+
+
+def test_a_drive_on_softer_joints_ends_as_one_on_stiff_joints() -> None:
+    """Released after a drive on softer joints, a loop has the same shape and speed as after one on its own joints."""
+    settings = {"links": 36, "frequency": 15.0, "method": "dp5", "tolerance": 1e-4, "settle_time": 0.2}
+    settings |= {"spin_up_time": 0.5, "steady_time": 0.2, "walk_limit": 1e-3, "frame_interval": 1e-3}
+    stiff, soft = (warpchain.walk(**settings, preset="paper", soften_drive=on) for on in (False, True))
+    assert soft.steps_accepted < 0.15 * stiff.steps_accepted
+    assert soft.simulated_time == pytest.approx(stiff.simulated_time, abs=0.01)
+    assert soft.kinetic_energy[0] == pytest.approx(stiff.kinetic_energy[0], rel=5e-3)
+    for axis in (0, 1):
+        extents = [np.ptp(walk.frame_joints[0, :, axis]) for walk in (stiff, soft)]
+        assert extents[1] == pytest.approx(extents[0], rel=0.01)
+    assert soft.greatest_penetration["sprocket"] < 1e-3
 
 
 def test_a_soft_drive_alone_never_softens_the_pile() -> None:
@@ -288,13 +351,21 @@ def exact_kernels(monkeypatch: pytest.MonkeyPatch):
 LINKS = 12
 
 
+def soften_much(batch: Batch) -> Batch:
+    """A batch of soft chains with soft and softest joints that are softer still, and steps to tell them apart by."""
+    control = batch.control
+    control.soft_stiffness, control.soft_damping, control.soft_smoothing = 1e6, 10.0, 1.0
+    control.softest_stiffness, control.softest_damping, control.softest_smoothing = 1e5, 3.0, 2.0
+    control.soft_contact_step = 2 * FIXED_STEP
+    return batch
+
+
 def heaps(area: float) -> Batch:
     """Heaps on the floor that soften below a fraction of their first area, in fixed steps, looked at often."""
     batch = batch_of([heap(LINKS, 5, tilt=2.0), heap(LINKS, 10, tilt=2.0)], method="dp5", keeps=True)
     batch.control.sample_interval = 5 * FIXED_STEP
     batch.control.soften_area = area
-    batch.control.soft_stiffness, batch.control.soft_damping, batch.control.soft_smoothing = 1e6, 10.0, 1.0
-    return batch
+    return soften_much(batch)
 
 
 def released() -> Batch:
@@ -302,10 +373,21 @@ def released() -> Batch:
     batch = batch_of([lay_chain(ellipse(1.0), LINKS, SOFT.link_length, 2.0)], method="dp5", keeps=True)
     batch.control.sample_interval = 4 * FIXED_STEP
     batch.control.stiffening_time = 40 * FIXED_STEP
-    batch.control.soft_stiffness, batch.control.soft_damping, batch.control.soft_smoothing = 1e6, 10.0, 1.0
     batch.control.soften_area = -np.inf
     batch.state.softness.numpy()[0] = 1.0
-    return batch
+    return soften_much(batch)
+
+
+def driven() -> Batch:
+    """A heap on a sprocket that begins to turn after 12 steps; the hold begins after 70."""
+    raised = 0.9 * SOFT.sprocket_radius
+    batch = batch_of([heap(LINKS, 3, raised=raised)], method="dp5", keeps=True)
+    batch.control.sample_interval = 4 * FIXED_STEP
+    batch.control.stiffening_time = 30 * FIXED_STEP
+    times = {"spin_up_start": 12 * FIXED_STEP, "spin_up_time": 58 * FIXED_STEP, "hold_start": 70 * FIXED_STEP}
+    batch.set_program(0, **times, loop_speed=3.0, loop_period=1.0, steady_tolerance=0.01)
+    batch.state.softness.numpy()[0] = 1.0
+    return soften_much(batch)
 
 
 def assert_same_bits(ours: Batch, theirs: Batch) -> None:
@@ -323,16 +405,17 @@ def softening_features(batch: Batch, fixed_body: str, watch: str):
 
 
 @pytest.mark.parametrize("cut", [60, 7])
-def test_blocks_soften_a_pile_as_the_cpu_form_does(cut: int, exact_kernels: None) -> None:
-    """The block form softens at the same look, frees the same energy, and goes on to the same bits, however cut."""
-    area = 0.9975
+@pytest.mark.parametrize(("area", "softness"), [(0.9975, 1.0), (1.995, 2.0)])
+def test_blocks_soften_a_pile_as_the_cpu_form_does(area: float, softness: float, cut: int, exact_kernels: None) -> None:
+    """The block form softens at the same looks, frees the same energy, and goes on to the same bits, however cut."""
     ours, theirs = heaps(area), heaps(area)
     features = softening_features(ours, "floor", "rest")
     for _ in range(-(-60 // cut)):
         launch_blocks(ours, features, min(cut, 60), block_dim=LINKS)
     launch_chains(theirs, features, cut * -(-60 // cut))
     first, second = (theirs.softened_at(world) for world in range(2))
-    assert 0 < first < second < theirs.time(0)
+    assert 0 < first <= second < theirs.time(0)
+    assert theirs.state.softness.numpy().tolist() == [softness, softness]
     assert np.all(theirs.state.losses.numpy()[:, layout.LOSS_SOFTENING] > 0)
     assert_same_bits(ours, theirs)
 
@@ -350,6 +433,21 @@ def test_blocks_stiffen_as_the_cpu_form_does(cut: int, exact_kernels: None) -> N
     assert_same_bits(ours, theirs)
 
 
+@pytest.mark.parametrize("cut", [60, 7])
+def test_blocks_drive_on_softer_joints_as_the_cpu_form_does(cut: int, exact_kernels: None) -> None:
+    """The block form makes joints softest and soft again in the same steps of the drive, however cut into launches."""
+    ours, theirs = driven(), driven()
+    features = softening_features(ours, "sprocket", "steady")
+    for _ in range(-(-60 // cut)):
+        launch_blocks(ours, features, min(cut, 60), block_dim=LINKS)
+    launch_chains(theirs, features, cut * -(-60 // cut))
+    assert theirs.counts(0)["sprocket"] > 10
+    assert theirs.time(0) > 70 * FIXED_STEP
+    assert theirs.state.softness.numpy()[0] == 1.0
+    assert theirs.counts(0)["accepted"] < theirs.time(0) / (1.1 * FIXED_STEP)
+    assert_same_bits(ours, theirs)
+
+
 # --- refusals ---
 
 
@@ -359,6 +457,7 @@ def test_blocks_stiffen_as_the_cpu_form_does(cut: int, exact_kernels: None) -> N
         ({"soften_area": 0.0}, r"options\.soften_area: 0.0 is not greater than 0; .*"),
         ({"soften_area": 1.0}, r"options\.soften_area: 1.0 is not less than 1; .*"),
         ({"soften_area": float("nan")}, r"options\.soften_area: nan is not finite; .*"),
+        ({"soft_contact_step": 0.0}, r"options\.soft_contact_step: 0.0 is not greater than 0 s; .*"),
         ({"soften_pile": 1}, r"options\.soften_pile: 1 is not a truth value; .*"),
         ({"soften_drive": "yes"}, r"options\.soften_drive: 'yes' is not a truth value; .*"),
         (
