@@ -268,6 +268,7 @@ def make_advance(features: Features):
                 status = state.stop_status[world]
                 break
             if wp.static(has_flight):
+                # flights of soft joints save nothing: their springs ring longer than impulses pause
                 if flies == 0 and time >= closing_time and state.softness[world] == ZERO:
                     closed, lost = close_joints(K, chain)
                     closing_time = time + QUIET_TIME

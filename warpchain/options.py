@@ -197,8 +197,8 @@ class Options(BaseModel):
     soft_contact_step: float = Field(
         default=5e-5,
         gt=0,
-        description="longest step near a contact, unless contact_step is longer, where joints are at their softest: "
-        "while the sprocket spins up (soften_drive) and in the collapsed loop (soften_pile)",
+        description="longest step near a contact where soften_drive or soften_pile makes joints softest, unless "
+        "contact_step is longer",
         json_schema_extra={"unit": "s"},
     )
     skin: float = Field(
@@ -241,7 +241,8 @@ class Options(BaseModel):
     )
     soften_pile: bool = Field(
         default=False,
-        description="whether the joints of a walking loop that has collapsed get the values of the preset soft",
+        description="whether the joints of a walking loop that has collapsed become soft, and softest once it encloses "
+        "half of soften_area",
     )
     soften_area: float = Field(
         default=0.9,
@@ -252,7 +253,8 @@ class Options(BaseModel):
     )
     soften_drive: bool = Field(
         default=False,
-        description="whether joints have the values of the preset soft on the sprocket, their own from 0.03 s later",
+        description="whether joints are softest while the sprocket spins up, soft on it before and after, and have "
+        "their own values from 0.03 s after the release",
     )
     device: str = Field(default="cpu", description="where walks run: cpu, cuda (the first GPU) or cuda:N")
 
