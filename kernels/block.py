@@ -15,6 +15,7 @@ import functools
 import warp as wp
 
 from . import layout
+from .approach import FLIGHT_SKIN, LEAST_SLACK
 from .block_board import (
     contact_constants,
     link_is_finite,
@@ -29,10 +30,10 @@ from .block_board import (
 from .block_contact import block_self_contacts, touch_layout
 from .block_list import block_list
 from .block_memory import barrier, barrier_if_any, block_maxima, clock, tile_address, vec5i
-from .block_step import Link, Place, block_stage, error_of, link_on, note_first, vec3d, vec5d
-from .block_surroundings import block_surroundings, raised
+from .block_step import Link, Place, Trial, block_stage, error_of, link_on, note_first, vec3d, vec5d
+from .block_surroundings import block_approach, block_surroundings, raised
 from .broadphase import list_layout
-from .controller import LEAST_SHRINKAGE, step_controller
+from .controller import LEAST_SHRINKAGE, classical_controller, step_controller
 from .driver import (
     BOUNCE_PAUSE,
     COMPILER_FLAGS,
@@ -44,6 +45,7 @@ from .driver import (
     Features,
 )
 from .elementary import ONE, ZERO
+from .hand_over import QUIET_TIME
 from .layout import (
     ACCEPTED,
     BOARD_LOST_DAMPING,
@@ -58,13 +60,16 @@ from .layout import (
     INVERSE_MASS,
     LAST_FLOOR_IMPULSE,
     LIST_BUILDS,
+    LOSS_HAND_OVER,
     MASS,
+    NOTE_CLOSING_TIME,
     NOTE_CONTACT_STEP,
     NOTE_DEADLINE,
     NOTE_FIXED_DEPTH,
     NOTE_LAST_IMPULSE,
     NOTE_NEXT_LOOK,
     NOTE_OPENING,
+    NOTE_OTHER_STEP,
     NOTE_STOP_TIME,
     OMEGA,
     OPENING,
@@ -92,14 +97,21 @@ LARGEST_SHARED_BLOCK = 512
 """Longer chains keep their board in the scratch block: it would not fit into the memory that a block shares."""
 LARGEST_SHARED_MEMORY = 192
 """The same for what a method keeps, if anything."""
+LARGEST_SHARED_FLIGHT = 64
+"""The same for flights, which are rare: chains of more links would have to share a multiprocessor with fewer others."""
 
 
 def block_rows(method: str, block_dim: int, columns: int) -> int:
     """Rows of a chain's scratch block of this width that the block form needs: for the board and the method."""
     rows = _board_rows(block_dim, columns)
-    if block_dim > LARGEST_SHARED_MEMORY:
+    if not _holds_memory(method, block_dim):
         rows += -(-METHODS[method].block_memory(block_dim) // columns)
     return rows
+
+
+def _holds_memory(method: str, block_dim: int) -> bool:
+    """Whether what a method keeps lies in the memory that a block shares, or else in the scratch block."""
+    return block_dim <= (LARGEST_SHARED_FLIGHT if METHODS[method].flight else LARGEST_SHARED_MEMORY)
 
 
 def _board_rows(block_dim: int, columns: int) -> int:
@@ -107,6 +119,16 @@ def _board_rows(block_dim: int, columns: int) -> int:
     if block_dim <= LARGEST_SHARED_BLOCK:
         return layout.BOARD_NOTES
     return -(-layout.board_size(block_dim) // columns)
+
+
+@wp.func
+def take_turns(K: wp.array2d(dtype=wp.float64), lane: int, step: wp.float64):
+    """Keeps the step of one model of the joints while that of the other is taken."""
+    other = K[BOARD_NOTES, NOTE_OTHER_STEP]
+    barrier()
+    if lane == 0:
+        K[BOARD_NOTES, NOTE_OTHER_STEP] = step
+    return other
 
 
 @functools.cache
@@ -125,7 +147,6 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     if available < 255:
         registers = min(registers or available, available)
     method = METHODS[features.method]
-    memory_needed = max(method.block_memory(block_dim), 1)
     columns = features.columns
     lists = list_layout(columns)
     has_floor = features.fixed_body == "floor"
@@ -144,8 +165,12 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     board_size = layout.board_size(block_dim) if is_shared else 1
     touch = touch_layout(columns, block_dim, in_lists=not is_shared)
     touch_size = touch.size if is_shared else 1
-    holds_memory = block_dim <= LARGEST_SHARED_MEMORY
-    memory_size = memory_needed if holds_memory else 1
+    # on the sprocket impulses never pause
+    flight = None if has_sprocket else method.flight
+    has_flight = flight is not None
+    holds_memory = _holds_memory(features.method, block_dim)
+    needs_memory = has_flight or method.flight is None
+    memory_size = max(method.block_memory(block_dim), 1) if holds_memory and needs_memory else 1
     board_address = tile_address(wp.float64, board_size)
     touch_address = tile_address(wp.int32, touch_size)
     memory_address = tile_address(wp.float64, memory_size)
@@ -157,6 +182,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     growth, shrinkage = step_controller(method.order, method.error_order, wp.float32)
     build_list = block_list(columns, block_dim, features.broad_phase)
     clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, block_dim, touch)
+    attempt_flight, project, open_joints = flight.block_functions(block_dim) if flight else (None,) * 3
+    flight_growth, flight_shrinkage = classical_controller(flight.error_order) if flight else (None,) * 2
+    approach = block_approach(features, block_dim)
     softens = features.softens
     look = sampling(features.watch, softens)
 
@@ -211,8 +239,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         if wp.static(not holds_memory):
             memory_start = scratch[world].ptr + wp.uint64(wp.static(8 * _board_rows(block_dim, columns) * columns))
         # what stages hand over is not needed while contacts are resolved
-        E = wp.array(ptr=ends_address(ends), shape=(5, wp.static(block_dim)), dtype=wp.float64)
-        F = wp.array(ptr=forces_address(forces), shape=(3, wp.static(block_dim)), dtype=wp.float64)
+        ends_start = ends_address(ends)
+        forces_start = forces_address(forces)
+        E = wp.array(ptr=ends_start, shape=(5, wp.static(block_dim)), dtype=wp.float64)
+        F = wp.array(ptr=forces_start, shape=(3, wp.static(block_dim)), dtype=wp.float64)
 
         chain = read_chain(model, world)
         n = chain.link_count
@@ -239,6 +269,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             K[BOARD_NOTES, NOTE_LAST_IMPULSE] = state.watch[world, LAST_FLOOR_IMPULSE]
             K[BOARD_NOTES, NOTE_STOP_TIME] = state.stop_time[world]
             K[BOARD_NOTES, NOTE_NEXT_LOOK] = wp.float64(state.next_sample[world]) * control.sample_interval
+            if wp.static(has_flight):
+                K[BOARD_NOTES, NOTE_CLOSING_TIME] = state.closing_time[world]
+                K[BOARD_NOTES, NOTE_OTHER_STEP] = state.other_step[world]
             T[wp.static(touch.fixed_hits)] = 0
             T[wp.static(touch.self_hits)] = 0
             T[wp.static(touch.deepest)] = 0
@@ -275,6 +308,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         if record_is_full(record, world):
             tries_left = 0
         bound = bound_of(K, control, pairs, gap, slack, speed)
+        if wp.static(has_flight):
+            flies = state.flies[world]
         tries = int(0)
         accepted = int(0)
         barrier()
@@ -301,7 +336,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 pauses = record_is_full(record, world) or T[wp.static(touch.is_late)] != 0
                 barrier()
                 if wp.static(softens):
-                    if state.softness[world] != softness:
+                    changes_first = state.softness[world] != softness
+                    if wp.static(has_flight):
+                        changes_first = changes_first and flies == 0
+                    if changes_first:
                         next_end = hand_over(ends, K, place, link_on(K, lane))
                         begin_step(forces, K, place, next_end)
                         bound = bound_of(K, control, pairs, gap, slack, speed)
@@ -312,17 +350,47 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 status = state.stop_status[world]
                 break
 
+            if wp.static(has_flight):
+                if flies == 0 and time >= K[BOARD_NOTES, NOTE_CLOSING_TIME]:
+                    is_closed, _is_stiff, _kinetic, lost = project(
+                        ends_start, forces_start, memory_start, K, place, n, True
+                    )
+                    if is_closed:
+                        flies = int(1)
+                        slack = wp.float32(-1.0)  # the next list has the skin of flights
+                        last_error = wp.float32(1.0)
+                        step = take_turns(K, lane, step)
+                    if lane == 0:
+                        K[BOARD_NOTES, NOTE_CLOSING_TIME] = time + QUIET_TIME
+                        if is_closed:
+                            state.losses[world, LOSS_HAND_OVER] = state.losses[world, LOSS_HAND_OVER] + lost
+
             h = step
             if wp.static(has_contacts):
+                if wp.static(has_flight):
+                    if flies != 0:
+                        publish(K, n, place)
+                        barrier()
+                        fastest = approach(K, L, maxima, place, n, pairs, slack)
+                        bound = wp.max(control.contact_step, ONE / fastest)
                 h = wp.min(h, bound)
             lands = time + h >= stop_time
             if lands:
                 h = stop_time - time
 
-            trial = attempt(ends, forces, memory_start, K, place, n, h)
+            tolerance = control.tolerance
+            if wp.static(has_flight):
+                trial = Trial()
+                if flies == 0:
+                    trial = attempt(ends, forces, memory_start, K, place, n, h)
+                else:
+                    trial = attempt_flight(ends_start, forces_start, memory_start, K, place, n, h)
+                    tolerance = control.flight_tolerance
+            else:
+                trial = attempt(ends, forces, memory_start, K, place, n, h)
             own_error = int(0)
             if lane < n:
-                own_error = error_of(trial, control.tolerance)
+                own_error = error_of(trial, tolerance)
             error = wp.float32(0.0)
             if wp.static(reuses_last):
                 # the last stage is at the new state: what else is to be known of it comes with the error
@@ -342,7 +410,11 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             tries += 1
             if not (error <= wp.float32(1.0)):
                 if wp.isfinite(error):
-                    step = h * wp.float64(shrinkage(error))
+                    factor = wp.float64(shrinkage(error))
+                    if wp.static(has_flight):
+                        if flies != 0:
+                            factor = flight_shrinkage(wp.float64(error))
+                    step = h * factor
                 else:
                     step = h * LEAST_SHRINKAGE
                     broken = wp.where(lane >= n or link_is_finite(K, lane), 0, 1)
@@ -365,7 +437,11 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if wp.static(reuses_last):
                         note_first(K, lane, trial.last, wp.static(needs_first_power))
                 time = wp.where(lands, stop_time, time + h)
-                proposal = h * wp.float64(growth(error, last_error, control.proportional))
+                factor = wp.float64(growth(error, last_error, control.proportional))
+                if wp.static(has_flight):
+                    if flies != 0:
+                        factor = flight_growth(wp.float64(error), wp.float64(last_error), control.proportional)
+                proposal = h * factor
                 # a step that was cut short says nothing against the proposal that it was cut from
                 step = wp.where(h < step, wp.max(step, proposal), proposal)
                 last_error = wp.max(error, wp.float32(1e-4))
@@ -378,6 +454,17 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     link = link_on(K, lane)
                     next_end = hand_over(ends, K, place, link)
                     _error, opening, gap, displacement, speed = measure(K, maxima, n, place, link, next_end, 0)
+                if wp.static(has_flight):
+                    are_rigid = bool(True)
+                    kinetic = ZERO
+                    if flies != 0:
+                        is_closed, is_stiff, kinetic, _lost = project(
+                            ends_start, forces_start, memory_start, K, place, n, False
+                        )
+                        are_rigid = is_closed and is_stiff
+                        link = link_on(K, lane)
+                        next_end = hand_over(ends, K, place, link)
+                        _error, opening, gap, displacement, speed = measure(K, maxima, n, place, link, next_end, 0)
                 if lane == 0:
                     K[BOARD_NOTES, NOTE_OPENING] = wp.max(K[BOARD_NOTES, NOTE_OPENING], wp.float64(opening))
                 is_hit = bool(False)
@@ -392,8 +479,18 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                         if hits > 0:
                             wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
                 if wp.static(has_self):
-                    slack = wp.float32(0.5) * wp.float32(control.skin) - opening - displacement
-                    is_stale = not slack > wp.float32(0.0)
+                    skin = control.skin
+                    if wp.static(has_flight):
+                        least_slack = wp.float32(0.0)
+                        if flies != 0:
+                            skin = FLIGHT_SKIN * skin
+                            least_slack = wp.float32(LEAST_SLACK * skin)
+                        if slack > wp.float32(0.0):
+                            slack = wp.float32(0.5) * wp.float32(skin) - opening - displacement
+                        is_stale = not slack > least_slack
+                    else:
+                        slack = wp.float32(0.5) * wp.float32(skin) - opening - displacement
+                        is_stale = not slack > wp.float32(0.0)
                     if is_stale or pairs > 0:
                         is_near = bool(True)
                         publish(K, n, place)
@@ -412,11 +509,11 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if is_stale:
                         if lane == 0:
                             state.counts[world, LIST_BUILDS] = state.counts[world, LIST_BUILDS] + wp.int64(1)
-                        pairs = build_list(K, L, contact_constants(K, n), lane, control.skin, raised(opening))
+                        pairs = build_list(K, L, contact_constants(K, n), lane, skin, raised(opening))
                         if pairs > wp.static(lists.capacity):
                             status = int(LIST_OVERFLOW)
                             pairs = int(wp.static(lists.capacity))
-                        slack = wp.float32(0.5) * wp.float32(control.skin) - opening
+                        slack = wp.float32(0.5) * wp.float32(skin) - opening
                     if pairs > 0:
                         touched = contact_constants(K, n)
                         touching = find_contacts(K, L, T, touched, lane, pairs, raised(opening))
@@ -426,6 +523,22 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                                 wp.atomic_add(T, wp.static(touch.self_hits), hits)
                             if not is_hit:
                                 is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
+                if wp.static(has_flight):
+                    if is_hit or not are_rigid:
+                        if flies != 0:
+                            lost = ZERO
+                            # where the links lie on one line neither forces nor what opens the joints has a bound:
+                            # there the springs shall find their forces by themselves
+                            if is_stiff:
+                                lost = open_joints(ends_start, forces_start, memory_start, K, place, n, kinetic)
+                            flies = int(0)
+                            is_hit = bool(True)
+                            last_error = wp.float32(1.0)
+                            step = take_turns(K, lane, step)
+                            if lane == 0:
+                                state.losses[world, LOSS_HAND_OVER] = state.losses[world, LOSS_HAND_OVER] + lost
+                        if lane == 0:
+                            K[BOARD_NOTES, NOTE_CLOSING_TIME] = time + QUIET_TIME
                 bound = bound_of(K, control, pairs, gap, slack, speed)
                 if is_hit or wp.static(not reuses_last):
                     if is_hit:
@@ -465,6 +578,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             )
             state.extremes[world, fixed_depth] = K[BOARD_NOTES, NOTE_FIXED_DEPTH]
             state.watch[world, LAST_FLOOR_IMPULSE] = K[BOARD_NOTES, NOTE_LAST_IMPULSE]
+            if wp.static(has_flight):
+                state.flies[world] = flies
+                state.closing_time[world] = K[BOARD_NOTES, NOTE_CLOSING_TIME]
+                state.other_step[world] = K[BOARD_NOTES, NOTE_OTHER_STEP]
             state.is_fresh[world] = 0
             state.has_first_stage[world] = 1
             state.gap[world] = wp.float64(gap)

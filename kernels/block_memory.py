@@ -113,6 +113,42 @@ def write(memory: wp.uint64, index: int, value: wp.float64):
     ...
 
 
+@functools.cache
+def exchange(block_dim: int):
+    """Warp functions (hand, handed) for numbers that threads put down at an address, those of one kind side by side.
+
+    ``hand(memory, kind, lane, value)``, a barrier, ``handed(memory, kind, lane)`` → value.
+    """
+
+    @wp.func
+    def hand(memory: wp.uint64, kind: int, lane: int, value: wp.float64):
+        write(memory, kind * wp.static(block_dim) + lane, value)
+
+    @wp.func
+    def handed(memory: wp.uint64, kind: int, lane: int):
+        return read(memory, kind * wp.static(block_dim) + lane)
+
+    return hand, handed
+
+
+@functools.cache
+def constant_table(rows: tuple[tuple[float, ...], ...]):
+    """Warp function ``entry(row, column)`` of a table of numbers, rows of equal length.
+
+    Read from memory by all threads at once, so that a loop over stages need not be unrolled.
+    """
+    width = len(rows[0])
+    numbers = ", ".join(repr(number) for row in rows for number in row)
+
+    @wp.func_native(f"""
+    static constexpr double table[] = {{{numbers}}};
+    return table[{width} * row + column];
+    """)
+    def entry(row: int, column: int) -> wp.float64: ...
+
+    return entry
+
+
 vec5i = wp.types.vector(length=5, dtype=wp.int32)
 
 

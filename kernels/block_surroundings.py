@@ -4,9 +4,11 @@ import functools
 
 import warp as wp
 
-from .block_board import ends_of
+from .approach import SMALLEST_GAP, falling, meeting_of
+from .block_board import contact_constants, ends_of
 from .block_memory import block_maxima, vec5i
 from .block_step import Link, Place, link_on, vec5d
+from .broadphase import list_layout
 from .contact import meet_floor, meet_sprocket
 from .driver import Features, sprocket_turning
 from .elementary import TWO, ZERO, from_order_key_single, order_key_single
@@ -15,13 +17,16 @@ from .layout import (
     BOARD_LISTED_Y,
     BOARD_LOST_FIXED,
     BOARD_NOTES,
+    COSINE,
     INVERSE_INERTIA,
     INVERSE_MASS,
+    LEFT_Y,
     NOTE_CIRCLE_RADIUS,
     NOTE_CONTACT_STEP,
     NOTE_HALF_LENGTH,
     NOTE_SPROCKET_RADIUS,
     OMEGA,
+    RIGHT_Y,
     U,
     V,
 )
@@ -171,3 +176,52 @@ def block_surroundings(features: Features, block_dim: int):
         return int(hits)
 
     return measure, bound_of, meet_fixed_body
+
+
+@functools.cache
+def block_approach(features: Features, block_dim: int):
+    """Warp function: how soon something may touch in flight [1/s], see :mod:`approach`; 0 if nothing comes nearer."""
+    has_floor = features.fixed_body == "floor"
+    has_self = features.self_contact
+    lists = list_layout(features.columns)
+    _greatest, greatest_of_five = block_maxima(block_dim)
+
+    @wp.func
+    def approach(
+        K: wp.array2d(dtype=wp.float64),
+        L: wp.array(dtype=wp.int32),
+        maxima: wp.tile[vec5i, block_dim],
+        place: Place,
+        n: int,
+        pairs: int,
+        slack: wp.float32,
+    ):
+        """All threads, after a barrier behind the board's rows of ends."""
+        lane = place.lane
+        chain = contact_constants(K, n)
+        chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
+        values = vec5i()
+        if wp.static(has_floor):
+            if lane < n:
+                left, right = falling(
+                    chain, K[V, lane], K[OMEGA, lane], K[COSINE, lane], K[LEFT_Y, lane], K[RIGHT_Y, lane]
+                )
+                values[0] = wp.max(wp.cast(wp.float32(left), wp.int32), wp.cast(wp.float32(right), wp.int32))
+        if wp.static(has_self):
+            if lane < n:
+                turn = chain.half_length * K[OMEGA, lane]
+                speed = TWO * (K[U, lane] * K[U, lane] + K[V, lane] * K[V, lane] + turn * turn)
+                values[1] = wp.cast(wp.float32(speed), wp.int32)
+            k = lane
+            while k < pairs:
+                rate = meeting_of(K, chain, L[wp.static(lists.first) + k], L[wp.static(lists.second) + k])
+                values[0] = wp.max(values[0], wp.cast(wp.float32(rate), wp.int32))
+                k += wp.static(block_dim)
+        values = greatest_of_five(maxima, lane, values)
+        fastest = wp.cast(values[0], wp.float32)
+        if wp.static(has_self):
+            room = wp.max(slack, wp.float32(SMALLEST_GAP))
+            fastest = wp.max(fastest, wp.sqrt(wp.cast(values[1], wp.float32)) / room)
+        return wp.float64(fastest)
+
+    return approach

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import warp as wp
 
 from . import layout
-from .approach import FLIGHT_SKIN, SMALLEST_GAP, fastest_fall, fastest_meeting
+from .approach import FLIGHT_SKIN, LEAST_SLACK, SMALLEST_GAP, fastest_fall, fastest_meeting
 from .broadphase import list_layout, list_slack, neighbour_list
 from .contact import (
     floor_gap,
@@ -72,7 +72,6 @@ STEP_TOO_SMALL = wp.constant(5)
 NOT_FINITE = wp.constant(6)
 LIST_OVERFLOW = wp.constant(8)
 
-QUARTER = wp.constant(wp.float64(0.25))
 BOUNCE_PAUSE = wp.constant(wp.float64(0.01))
 """A floor impulse this long [s] after the one before it begins a new bounce."""
 
@@ -377,9 +376,8 @@ def make_advance(features: Features):
                     least_slack = ZERO
                     if wp.static(has_flight):
                         if flies != 0:
-                            # a new list costs less than the short steps in which the last of its slack is used up
                             skin = FLIGHT_SKIN * control.skin
-                            least_slack = QUARTER * skin
+                            least_slack = LEAST_SLACK * skin
                     if slack > ZERO:
                         slack = list_slack(K, chain, skin, opening)
                     if not slack > least_slack:

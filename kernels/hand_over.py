@@ -16,7 +16,7 @@ import warp as wp
 from .cyclic_solver import place_column, segment_places
 from .elementary import ONE, TWO, ZERO
 from .layout import THETA, X, Y
-from .rigid import GREATEST_STRETCHING, rigid_joints
+from .rigid import GREATEST_RINGING, GREATEST_STRETCHING, rigid_joints
 from .rigid_layout import BASE, FORCE, force_layout, link_at
 from .rigid_step import flight_memory
 from .types import Chain
@@ -29,8 +29,6 @@ QUIET_TIME = wp.constant(wp.float64(5e-5))
 That is 30 decay times of the paper's springs for neighbours; long waves round the loop take longer, and what is left
 of them is what the projection takes, and that is booked.
 """
-GREATEST_RINGING = wp.constant(wp.float64(1e-6))
-"""Part of the kinetic energy that the projection may take; more means that springs still oscillate."""
 
 
 @functools.cache

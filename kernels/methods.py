@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from . import layout
+from .block_flight import flight_attempt
+from .block_rigid import FlightLayout, block_rigid_joints
 from .block_rosenbrock import factor_layout, rosenbrock_attempt
 from .block_step import explicit_attempt
 from .explicit import explicit_method
@@ -56,11 +58,19 @@ class Flight:
         order: As that of a method.
         error_order: As that of a method.
         functions: Warp functions (attempt, commit, close joints, open joints) for scratch blocks of so many columns.
+        block_functions: Warp functions (attempt, project, open joints) for blocks of so many threads, with the
+            arguments of :mod:`block_flight` and :mod:`block_rigid`; ``block_memory`` of the method is for them.
     """
 
     order: int
     error_order: int
     functions: Callable[[int], Any]
+    block_functions: Callable[[int], Any]
+
+
+def _block_flight(threads: int) -> Any:
+    rigid = block_rigid_joints(threads)
+    return flight_attempt(threads), rigid.project, rigid.open_joints
 
 
 def _explicit(name: str) -> Method:
@@ -103,8 +113,15 @@ def _hybrid(name: str, burst: str) -> Method:
         order=ROS34PW2.order,
         error_order=ROS34PW2.error_order,
         functions=lambda columns: (*flight_method(columns, first_row), *hand_over(columns, first_row)),
+        block_functions=_block_flight,
     )
-    return replace(method, name=name, scratch_rows=lambda columns: first_row + flight_rows(columns), flight=flight)
+    return replace(
+        method,
+        name=name,
+        scratch_rows=lambda columns: first_row + flight_rows(columns),
+        block_memory=lambda threads: FlightLayout(threads).size,
+        flight=flight,
+    )
 
 
 METHODS = {

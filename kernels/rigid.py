@@ -45,6 +45,7 @@ from .rigid_layout import (
     link_at,
     pad_joints,
 )
+from .rigid_links import inward_pull, opening_of, opening_rate_of, pushed, turning_share
 from .rosenbrock_layout import pad_behind
 from .types import Chain
 
@@ -53,6 +54,8 @@ wp.set_module_options({"enable_backward": False})
 CLOSED = wp.constant(wp.float64(1e-11))
 """Opening [m] below which a joint counts as closed: 1e-2 N of a spring of 1e9 N/m."""
 MOST_CORRECTIONS = 5
+GREATEST_RINGING = wp.constant(wp.float64(1e-6))
+"""Part of the kinetic energy that closing joints may take; more means that springs still oscillate."""
 GREATEST_STRETCHING = wp.constant(wp.float64(3e-4))
 """Part of the kinetic energy that springs may hold and still be taken for rigid.
 
@@ -172,15 +175,8 @@ def rigid_joints(columns: int) -> RigidJoints:
             repeats = c < 16 and c >= 8 + full
             m_left = S[INVERSE_MASS, c]
             m_right = S[INVERSE_MASS, c + 8]
-            left = a * a * S[INVERSE_INERTIA, c]
-            right_turn = a * a * S[INVERSE_INERTIA, c + 8]
-            # t tᵀ with t = (−sin, cos)
-            xx = left * S[SINE, c] * S[SINE, c]
-            xy = -left * S[SINE, c] * S[COSINE, c]
-            yy = left * S[COSINE, c] * S[COSINE, c]
-            after_xx = right_turn * S[SINE, c + 8] * S[SINE, c + 8]
-            after_xy = -right_turn * S[SINE, c + 8] * S[COSINE, c + 8]
-            after_yy = right_turn * S[COSINE, c + 8] * S[COSINE, c + 8]
+            xx, xy, yy = turning_share(a, S[INVERSE_INERTIA, c], S[COSINE, c], S[SINE, c])
+            after_xx, after_xy, after_yy = turning_share(a, S[INVERSE_INERTIA, c + 8], S[COSINE, c + 8], S[SINE, c + 8])
             S[wp.static(diagonal), c] = wp.where(repeats, ONE, m_left + m_right + xx + after_xx)
             S[wp.static(diagonal + 1), c] = wp.where(repeats, ZERO, xy + after_xy)
             S[wp.static(diagonal + 2), c] = wp.where(repeats, ZERO, xy + after_xy)
@@ -229,26 +225,28 @@ def rigid_joints(columns: int) -> RigidJoints:
         c = int(8)
         while c < end:
             repeats = c < 16 and c >= 8 + full
-            left = S[SPIN, c] * S[SPIN, c]
-            after = S[SPIN, c + 8] * S[SPIN, c + 8]
-            rx = left * S[COSINE, c] + S[FREE, c] * S[SINE, c]
-            ry = left * S[SINE, c] - S[FREE, c] * S[COSINE, c]
-            rx += after * S[COSINE, c + 8] + S[FREE, c + 8] * S[SINE, c + 8]
-            ry += after * S[SINE, c + 8] - S[FREE, c + 8] * S[COSINE, c + 8]
-            S[wp.static(right), c] = wp.where(repeats, ZERO, a * rx)
-            S[wp.static(right + 1), c] = wp.where(repeats, ZERO, a * ry)
+            rx, ry = inward_pull(S[COSINE, c], S[SINE, c], S[SPIN, c], S[FREE, c])
+            after_x, after_y = inward_pull(S[COSINE, c + 8], S[SINE, c + 8], S[SPIN, c + 8], S[FREE, c + 8])
+            S[wp.static(right), c] = wp.where(repeats, ZERO, a * (rx + after_x))
+            S[wp.static(right + 1), c] = wp.where(repeats, ZERO, a * (ry + after_y))
             c += 1
         solve_joints(S, R, places, full)
         c = int(8)
         while c < end:
-            fx = S[wp.static(right), c]
-            fy = S[wp.static(right + 1), c]
-            before_x = S[wp.static(right), c - 8]
-            before_y = S[wp.static(right + 1), c - 8]
-            lever = a * (S[COSINE, c] * (fy + before_y) - S[SINE, c] * (fx + before_x))
-            S[RATE, c] = (fx - before_x) * S[INVERSE_MASS, c]
-            S[wp.static(RATE + 1), c] = (fy - before_y) * S[INVERSE_MASS, c] - chain.gravity
-            S[wp.static(RATE + 2), c] = S[FREE, c] + lever * S[INVERSE_INERTIA, c]
+            ax, ay, turn = pushed(
+                a,
+                S[INVERSE_MASS, c],
+                S[INVERSE_INERTIA, c],
+                S[COSINE, c],
+                S[SINE, c],
+                S[wp.static(right), c - 8],
+                S[wp.static(right + 1), c - 8],
+                S[wp.static(right), c],
+                S[wp.static(right + 1), c],
+            )
+            S[RATE, c] = ax
+            S[wp.static(RATE + 1), c] = ay - chain.gravity
+            S[wp.static(RATE + 2), c] = S[FREE, c] + turn
             c += 1
 
     def pusher(row: int):
@@ -260,14 +258,20 @@ def rigid_joints(columns: int) -> RigidJoints:
             end = place_column(places + 1)
             c = int(8)
             while c < end:
-                px = S[wp.static(right), c]
-                py = S[wp.static(right + 1), c]
-                before_x = S[wp.static(right), c - 8]
-                before_y = S[wp.static(right + 1), c - 8]
-                lever = a * (S[COSINE, c] * (py + before_y) - S[SINE, c] * (px + before_x))
-                S[wp.static(row), c] = S[wp.static(row), c] + (px - before_x) * S[INVERSE_MASS, c]
-                S[wp.static(row + 1), c] = S[wp.static(row + 1), c] + (py - before_y) * S[INVERSE_MASS, c]
-                S[wp.static(row + 2), c] = S[wp.static(row + 2), c] + lever * S[INVERSE_INERTIA, c]
+                dx, dy, turn = pushed(
+                    a,
+                    S[INVERSE_MASS, c],
+                    S[INVERSE_INERTIA, c],
+                    S[COSINE, c],
+                    S[SINE, c],
+                    S[wp.static(right), c - 8],
+                    S[wp.static(right + 1), c - 8],
+                    S[wp.static(right), c],
+                    S[wp.static(right + 1), c],
+                )
+                S[wp.static(row), c] = S[wp.static(row), c] + dx
+                S[wp.static(row + 1), c] = S[wp.static(row + 1), c] + dy
+                S[wp.static(row + 2), c] = S[wp.static(row + 2), c] + turn
                 c += 1
 
         return push
@@ -292,8 +296,17 @@ def rigid_joints(columns: int) -> RigidJoints:
         c = int(8)
         while c < end:
             repeats = c < 16 and c >= 8 + full
-            cx = S[BASE, c + 8] - S[BASE, c] - a * (S[COSINE, c] + S[COSINE, c + 8])
-            cy = S[wp.static(BASE + 1), c + 8] - S[wp.static(BASE + 1), c] - a * (S[SINE, c] + S[SINE, c + 8])
+            cx, cy = opening_of(
+                a,
+                S[BASE, c],
+                S[wp.static(BASE + 1), c],
+                S[COSINE, c],
+                S[SINE, c],
+                S[BASE, c + 8],
+                S[wp.static(BASE + 1), c + 8],
+                S[COSINE, c + 8],
+                S[SINE, c + 8],
+            )
             S[wp.static(right), c] = wp.where(repeats, ZERO, cx)
             S[wp.static(right + 1), c] = wp.where(repeats, ZERO, cy)
             greatest = wp.max(greatest, order_bits(cx * cx + cy * cy))
@@ -309,10 +322,19 @@ def rigid_joints(columns: int) -> RigidJoints:
         c = int(8)
         while c < end:
             repeats = c < 16 and c >= 8 + full
-            turn_x = S[SPIN, c] * S[SINE, c] + S[SPIN, c + 8] * S[SINE, c + 8]
-            turn_y = S[SPIN, c] * S[COSINE, c] + S[SPIN, c + 8] * S[COSINE, c + 8]
-            cu = S[wp.static(BASE + 3), c + 8] - S[wp.static(BASE + 3), c] + a * turn_x
-            cv = S[wp.static(BASE + 4), c + 8] - S[wp.static(BASE + 4), c] - a * turn_y
+            cu, cv = opening_rate_of(
+                a,
+                S[wp.static(BASE + 3), c],
+                S[wp.static(BASE + 4), c],
+                S[SPIN, c],
+                S[COSINE, c],
+                S[SINE, c],
+                S[wp.static(BASE + 3), c + 8],
+                S[wp.static(BASE + 4), c + 8],
+                S[SPIN, c + 8],
+                S[COSINE, c + 8],
+                S[SINE, c + 8],
+            )
             S[wp.static(right), c] = wp.where(repeats, ZERO, cu)
             S[wp.static(right + 1), c] = wp.where(repeats, ZERO, cv)
             c += 1

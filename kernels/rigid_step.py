@@ -46,15 +46,13 @@ from .rigid_layout import (
     link_at,
     pad_joints,
 )
+from .rigid_links import steepness, switch_smoothing
 from .rosenbrock import GREATEST_TURN
 from .rosenbrock_layout import pad_behind
 from .types import Chain
 from .w_tables import ROS34PW2
 
 wp.set_module_options({"enable_backward": False})
-
-SWITCH_WIDTH = wp.constant(wp.float64(0.2))
-"""c, see above."""
 
 # Rows in segment order, behind those of rigid. Slopes; the θ of r, Σ γ_ij k_j of the rates; power; the candidate.
 SLOPE, TARGET, COUPLED = ROWS_OF_RIGID, ROWS_OF_RIGID + 1, ROWS_OF_RIGID + 2
@@ -76,14 +74,6 @@ def flight_rows(columns: int) -> int:
     forces, friction = force_layout(columns), friction_layout(columns)
     doubles = (FLIGHT_SYSTEM + 63) * forces.columns + 16 * (forces.separator_rows + friction.separator_rows)
     return -(-doubles // columns)
-
-
-@wp.func
-def steepness(chain: Chain, spin: wp.float64, inverse_smoothing: wp.float64):
-    """About f(w)/w [N m s], which stands for f'(w) in the matrix."""
-    return chain.viscous_friction + chain.coulomb_friction * inverse_smoothing / (
-        ONE + wp.abs(spin) * inverse_smoothing
-    )
 
 
 @dataclass(frozen=True)
@@ -177,8 +167,7 @@ def flight_method(columns: int, first_row: int):
         pad_target(S, places, full)
         c = int(8)
         while c < end:
-            way = SWITCH_WIDTH * h * wp.abs(S[TARGET, c] - S[TARGET, c + 8])
-            inverse = chain.inverse_smoothing / wp.max(ONE, way * chain.inverse_smoothing)
+            inverse = switch_smoothing(chain, h, S[TARGET, c] - S[TARGET, c + 8])
             S[INVERSE_SMOOTHING, c] = inverse
             S[SLOPE, c] = g * steepness(chain, S[SPIN, c] - S[SPIN, c + 8], inverse)
             S[POWER, c] = ZERO

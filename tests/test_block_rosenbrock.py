@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 from numpy.testing import assert_allclose
 
-from tests.block_solver_under_test import RIGHT_SIDES, solve_loops
+from tests.block_solver_under_test import RIGHT_SIDES, solve_dense_loops, solve_loops
 from tests.blocks_under_test import FIXED_STEP, SOFT, batch_of, features_of, heap, launch_blocks, launch_chains
 from tests.test_rosenbrock import PAPER, dense, flying, jacobians
 from warpchain import reference
@@ -37,6 +37,22 @@ def test_solver_agrees_with_dense_elimination(block_dim: int, reductions: int | 
         found = solve_loops(lower, diagonal, upper, right, block_dim, reductions)
         matrix = dense(lower, diagonal[:, :, None] * np.eye(3), upper)
         exact = np.linalg.solve(matrix, right.reshape(RIGHT_SIDES, -1).T).T.reshape(right.shape)
+        assert_allclose(found, exact, rtol=0, atol=2e-15, err_msg=f"{links} links")
+
+
+@pytest.mark.parametrize("order", [2, 3])
+@pytest.mark.parametrize(("block_dim", "loops"), [(32, (4, 6, 8, 30)), (64, (34, 60)), (160, (150,))])
+def test_solver_of_full_diagonal_blocks_agrees_with_dense_elimination(
+    order: int, block_dim: int, loops: tuple[int, ...]
+) -> None:
+    """So are loops whose diagonal blocks are full, of either order."""
+    rng = np.random.default_rng(block_dim)
+    for links in loops:
+        lower, diagonal, upper = rng.normal(size=(3, links, order, order))
+        diagonal += 9 * np.eye(order)
+        right = rng.normal(size=(RIGHT_SIDES, links, order))
+        found = solve_dense_loops(lower, diagonal, upper, right, block_dim)
+        exact = np.linalg.solve(dense(lower, diagonal, upper), right.reshape(RIGHT_SIDES, -1).T).T.reshape(right.shape)
         assert_allclose(found, exact, rtol=0, atol=2e-15, err_msg=f"{links} links")
 
 

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import warpchain
 from tests.rigid_under_test import exact_flight, projected, rigid_motion, visit
-from warpchain import InputError, Status, preset, reference
+from warpchain import Status, preset, reference
 from warpchain.engine import Batch
 from warpchain.kernels.w_tables import ROS34PW2
 from warpchain.options import Options
@@ -252,9 +252,3 @@ def test_launch_size_changes_no_bit_of_flights_and_bursts():
     for end in ends[1:]:
         for first, other in zip(ends[0], end, strict=True):
             assert_array_equal(first, other)
-
-
-def test_hybrid_is_refused_on_a_gpu():
-    """There is no form of it for a GPU, which is said before anything runs."""
-    with pytest.raises(InputError, match=r"options\.method: hybrid runs on the CPU, not on cuda; give"):
-        warpchain.walk(method="hybrid", device="cuda")

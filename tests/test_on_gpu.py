@@ -7,6 +7,8 @@ import pytest
 import warp as wp
 
 from tests.blocks_under_test import FIXED_STEP, SOFT, heap
+from tests.test_block_hybrid import PAPER, bouncing
+from tests.test_hybrid import falling
 from tests.test_runner import brief_setup, data_of, outcomes
 from warpchain import ensemble, simulate, sweep, walk
 from warpchain.engine import Batch
@@ -64,14 +66,33 @@ def test_fixed_steps_agree_with_the_cpu(method: str, fixed_body: str) -> None:
     assert compare(fixed_steps("cuda", method, fixed_body), fixed_steps("cpu", method, fixed_body)) < 1e-9
 
 
-def test_a_walk_gives_the_same_bits_in_any_batch(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("method", ["dp5", "hybrid"])
+def test_a_walk_gives_the_same_bits_in_any_batch(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Alone, among others of other lengths, in few or many slots and launches, after whatever ran before."""
-    setups = [brief_setup(seed, device="cuda", links=links) for seed in range(3) for links in (30, 60, 90)]
+    settings = {"device": "cuda", "method": method}
+    setups = [brief_setup(seed, links=links, **settings) for seed in range(3) for links in (30, 60, 90)]
     together = outcomes(setups)
     assert [outcomes([setup])[0] for setup in setups] == together
     assert outcomes(setups[::-1], slots=2)[::-1] == together
     monkeypatch.setattr("warpchain.engine.LAUNCH_SECONDS", 0.0)
     assert outcomes(setups * 3) == together * 3
+
+
+def test_flights_and_landings_agree_with_the_cpu() -> None:
+    """Chains that fly on rigid joints, land, bounce on their springs and fly again, to 1e-6."""
+    batches = []
+    for device in ("cuda", "cpu"):
+        batch, features = bouncing([falling(12, PAPER, 0.3), falling(60, PAPER, 0.6)], device=device)
+        batch.launch(range(2), features, 240)
+        batches.append(batch)
+    ours, theirs = batches
+    for world in range(2):
+        assert theirs.losses(world)["hand_over"] != 0.0
+        assert ours.counts(world) == theirs.counts(world)
+        assert np.abs(ours.position(world) - theirs.position(world)).max() < 1e-6
+        assert np.abs(ours.velocity(world) - theirs.velocity(world)).max() < 1e-6 * np.abs(theirs.velocity(world)).max()
+        for name, loss in theirs.losses(world).items():
+            assert ours.losses(world)[name] == pytest.approx(loss, rel=1e-5, abs=1e-12)
 
 
 def test_memory_that_holds_few_chains_only_takes_longer(monkeypatch: pytest.MonkeyPatch) -> None:

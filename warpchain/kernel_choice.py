@@ -8,7 +8,7 @@ import warp as wp
 
 from warpchain.kernels.block import make_advance_block
 from warpchain.kernels.driver import Features, make_advance
-from warpchain.kernels.tableaus import TABLEAUS
+from warpchain.kernels.rosenbrock_tables import ROSENBROCK_TABLES
 from warpchain.options import Options
 
 REGISTERS = {160: 128, 224: 128, 256: 128}
@@ -24,7 +24,7 @@ one number for all keeps a walk's bits independent of its batch. rodas4p is fast
 
 def block_kernel(features: Features, threads: int) -> wp.Kernel:
     """The kernel of the block form for blocks of this many threads."""
-    registers = REGISTERS.get(threads, 168) if features.method in TABLEAUS else None
+    registers = None if features.method in ROSENBROCK_TABLES else REGISTERS.get(threads, 168)
     return make_advance_block(features, threads, registers)
 
 

@@ -148,7 +148,7 @@ METHODS_BY_NEED: Final[Mapping[str, Mapping[str, object]]] = MappingProxyType(
 """One word for a method and its settings, see `Options.method`.
 
 `standard` is the cheapest for CPU and GPU whose ensembles could not be told from those of `reference`, which is the
-paper's; `fast` is cheaper still, on the CPU only.
+paper's; `fast` is cheaper still.
 """
 
 
@@ -277,12 +277,6 @@ class Options(BaseModel):
         if not re.fullmatch(r"cpu|cuda(:\d{1,3})?", device):
             raise refusal("device", f"{shown(device)} is no device; give cpu, cuda or cuda:N")
         return device
-
-    @model_validator(mode="after")
-    def _method_on_device(self) -> Self:
-        if self.method == "hybrid" and self.device != "cpu":
-            raise refusal("method", f"hybrid runs on the CPU, not on {self.device}; give standard, or an integrator")
-        return self
 
     @model_validator(mode="after")
     def _steps_ordered(self) -> Self:
