@@ -24,7 +24,7 @@ from warpchain.options import Options, Scene, check_scene
 from warpchain.parameters import InputError, preset, shown, suggestion, validated
 from warpchain.planning import load_sweep
 from warpchain.results import replacing
-from warpchain.work_precision import TOLERANCES, TRIALS, Errors, make_reference, make_trial, points
+from warpchain.work_precision import TOLERANCES, TRIALS, Errors, make_reference, make_trial, methods, points
 
 PARTS: Final = ("work-precision", "walks", "ensembles", "hard-cases")
 FILE: Final = "accuracy.json"
@@ -65,7 +65,8 @@ class Plan:
     @property
     def methods(self) -> tuple[str, ...]:
         """Names of the methods, each once."""
-        return tuple(dict.fromkeys(one.method for one in self.contestants))
+        chosen = {one.method for one in self.contestants}
+        return tuple(name for name in methods() if name in chosen)
 
 
 def make_plan(

@@ -64,13 +64,6 @@ def figures(document: dict[str, Any]) -> Iterator[Picture]:
             f"far dp5 at 1e-11 is from that reference: nothing below it is certain.{note}"
         )
         yield Picture(f"work_precision_{true['trial']}_{true['links']}", caption, work_precision(true, rows))
-    for row in document["ensembles"]:
-        caption = (
-            f"Δx of {row['title']}, by method and tolerance: single walks (dots), mean with its 95 % bootstrap "
-            "interval (bar) and one standard deviation (box), the mean of rkf78 at 1e-6 with its interval (shaded) and "
-            "± 1 % (dotted); beside it what a walk costs."
-        )
-        yield Picture(f"ensemble_{row['name']}", caption, ensemble(row))
     for links in dict.fromkeys(row["links"] for row in document["walks"]):
         rows = [row for row in document["walks"] if row["links"] == links]
         caption = (
@@ -79,6 +72,13 @@ def figures(document: dict[str, Any]) -> Iterator[Picture]:
             "takes in the same run, and what the energy ledger leaves open, of the energy at release (median)."
         )
         yield Picture(f"walks_{links}", caption, walk_costs(rows))
+    for row in document["ensembles"]:
+        caption = (
+            f"Δx of {row['title']}, by method and tolerance: single walks (dots), mean with its 95 % bootstrap "
+            "interval (bar) and one standard deviation (box), the mean of rkf78 at 1e-6 with its interval (shaded) and "
+            "± 1 % (dotted); beside it what a walk costs."
+        )
+        yield Picture(f"ensemble_{row['name']}", caption, ensemble(row))
     if document["hard_cases"]:
         caption = (
             "Hard cases by method: seconds of one core, and what the energy ledger leaves open as a fraction of the "
@@ -146,7 +146,7 @@ def walk_costs(rows: Sequence[Row]) -> Figure:
         if row["seconds"] is not None:
             left.plot([row["seconds"]], [place], "|", color=INK, markersize=14, markeredgewidth=1.6, zorder=5)
             times = f"{row['seconds']:.2g} s" + (
-                f", {row['reference_seconds'] / row['seconds']:.3g}×" if row["reference_seconds"] else ""
+                f", {row['reference_seconds'] / row['seconds']:.2g}×" if row["reference_seconds"] else ""
             )
             left.annotate(times, (max(row["each"]), place), (8, 0), textcoords="offset points", va="center", color=INK)
         if row["ledger"]:
@@ -159,6 +159,7 @@ def walk_costs(rows: Sequence[Row]) -> Figure:
         _tidy(axes)
         _thin_out(axes.xaxis)
     left.set_xlim(right=3.5 * left.get_xlim()[1])
+    right.tick_params(left=False)
     left.set_xlabel("seconds of one core from the release to rest")
     right.set_xlabel("error of the energy ledger")
     first = rows[0]
