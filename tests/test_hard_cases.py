@@ -71,13 +71,16 @@ def assert_sound(flight, parameters, state, within=1e-5):
 @pytest.mark.slow
 @every_method
 def test_longest_slow_walk_ends_in_a_pile_at_rest(method):
-    """180 links released at 5 Hz fall into a pile beside the sprocket and rest there, the ledger closed to 1e-5."""
-    done = walk(method, links=180, frequency=5.0, start="spinning")
+    """180 links released at 5 Hz fall into a pile beside the sprocket and rest there, the ledger closed to 5e-4.
+
+    At a tolerance of 1e-4; the table of hard cases has the same at 1e-6.
+    """
+    done = walk(method, tolerance=1e-4, links=180, frequency=5.0, start="spinning")
     assert done.status == Status.AT_REST
     assert 0 < done.dx < 0.3
     assert done.center[-1, 1] < 0.06
     assert done.impulses["self"] > 1e5
-    assert ledger_error(done) < 1e-5
+    assert ledger_error(done) < 5e-4
     assert done.greatest_penetration["floor"] < SOFT.circle_radius / 2
 
 
