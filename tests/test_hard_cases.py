@@ -304,7 +304,7 @@ def test_walks_at_the_ends_of_the_collision_law(method, friction, restitution):
     else:
         assert 0.1 < done.dx < 1.0
     assert ledger_error(done) < 3e-4
-    assert abs(done.energy["hand_over"]) < 2e-3 * done.energy["kinetic_at_release"]
+    assert abs(done.energy["hand_over"]) < 1e-2 * done.energy["kinetic_at_release"]
 
 
 # --- short, long, fast and slow ---

@@ -13,6 +13,7 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from warpchain.plots import FAINT, GROUND, INK, LINE_COLORS, _tidy
+from warpchain.status import Status
 from warpchain.sweep_plots import Picture
 
 Row = dict[str, Any]
@@ -82,7 +83,8 @@ def figures(document: dict[str, Any]) -> Iterator[Picture]:
     if document["hard_cases"]:
         caption = (
             "Hard cases by method: seconds of one core, and what the energy ledger leaves open as a fraction of the "
-            "energy. Blue: status, result and energy are such as the case may have."
+            "energy; the status where it is neither at rest nor finished. Blue: status, result and energy are such as "
+            "the case may have."
         )
         yield Picture("hard_cases", caption, hard_cases(document["hard_cases"]))
 
@@ -220,8 +222,8 @@ def hard_cases(rows: Sequence[Row]) -> Figure:
         axes.add_patch(Rectangle((x - 0.48, y - 0.45), 0.96, 0.9, facecolor=(color, 0.25), edgecolor=color))
         numbers = [f"{row['seconds']:.2g} s"] * (row["tries"] > 0)
         numbers += [] if row["energy_error"] is None else [f"{row['energy_error']:.0e}"]
-        status = [] if row["sound"] and numbers else [row["status"].replace("_", " ")]
-        text = "   ".join([*status, *numbers])
+        expected = row["sound"] and numbers and row["status"] in (Status.AT_REST.label, Status.FINISHED.label)
+        text = "   ".join([*([] if expected else [row["status"].replace("_", " ")]), *numbers])
         axes.text(x, y, text, ha="center", va="center", color=INK, fontsize="small")
     axes.set_xlim(-0.55, len(chosen) - 0.45)
     axes.set_ylim(len(cases) - 0.4, -0.6)
@@ -232,7 +234,7 @@ def hard_cases(rows: Sequence[Row]) -> Figure:
     axes.spines[:].set_visible(False)
     handles = [
         Patch(facecolor=(color, 0.25), edgecolor=color, label=label)
-        for color, label in zip(LINE_COLORS[:2], ("sound", "not sound, with its status"), strict=True)
+        for color, label in zip(LINE_COLORS[:2], ("sound", "not sound"), strict=True)
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
     return figure
