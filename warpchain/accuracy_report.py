@@ -40,13 +40,13 @@ def write_pictures_and_page(folder: Path, document: dict[str, Any]) -> list[Path
 def _page(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
     """The whole page."""
     methods = {row["method"] for row in (*document["points"], *document["hard_cases"])}
-    ensembles = document["ensembles"]
-    methods |= {one["method"] for one in (*document["walks"], *(one for row in ensembles for one in row["methods"]))}
+    walks = [*document["walks"], *(one for row in document["ensembles"] for one in row["methods"])]
+    methods |= {one["method"] for one in walks}
     bad = sum(not row["sound"] for row in document["hard_cases"])
     tiles = {
         "methods": (len({name for name in methods if "SciPy" not in name}), ""),
         "measured points": (len(document["points"]), ""),
-        "walks": (sum(one["at_rest"] for row in ensembles for one in row["methods"]), ""),
+        "walks": (sum(one["at_rest"] for one in walks), ""),
         "hard cases": (len(document["hard_cases"]), ""),
         "not sound": (bad, "bad" if bad else ""),
     }
@@ -141,7 +141,8 @@ def _ensembles(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
         rows = [
             [
                 *(one["title"], f"{one['at_rest']}", _failures(one)),
-                *(_with_interval(one[name], one[f"{name}_interval"]) for name in ("mean", "sd")),
+                _with_interval(one["mean"], one["mean_interval"]),
+                _number(one["sd"], ".4f"),
                 *(text for suffix in suffixes for text in _agreement(one, suffix)),
                 _number(one["ledger"], ".1e"),
                 f"{one['seconds_per_walk']:.3g} s"
