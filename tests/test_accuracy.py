@@ -10,14 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+import warpchain
 from warpchain import InputError, reference
 from warpchain.accuracy import FILE, load_document, make_plan, run_accuracy
 from warpchain.accuracy_columns import COLUMNS
-from warpchain.accuracy_ensembles import REFERENCES, Contestant, Ensemble, run_ensemble, summary
+from warpchain.accuracy_contestants import LOOSE, TIGHT, Contestant, default_contestants
+from warpchain.accuracy_ensembles import Ensemble, run_ensemble, summary
 from warpchain.accuracy_plots import figures
+from warpchain.accuracy_walks import walk_costs
 from warpchain.hard_cases import HARD_CASES, Flight, Order, Outcome, Walk
 from warpchain.hard_starts import SOFT, dropped
 from warpchain.kernels.methods import METHODS
+from warpchain.options import METHODS_BY_NEED, Options
 from warpchain.scipy_trials import GAVE_UP, scipy_points
 from warpchain.status import Status
 from warpchain.work_precision import Trial, errors, evaluations, make_reference, make_trial, methods, points
@@ -45,7 +49,7 @@ def short() -> Trial:
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Answer, Path]:
-    """What a tiny run of all three parts answers, and its folder."""
+    """What a tiny run of all four parts answers, and its folder."""
     folder = tmp_path_factory.mktemp("accuracy")
     line = f"bench accuracy -o new/deep {TINY} {WALKS} --cases links-4,refused,hopeless-damping"
     return process(*line.split(), folder=folder), folder / "new/deep"
@@ -144,12 +148,12 @@ def test_impacts_and_sprocket_converge_to_what_they_say() -> None:
 def test_an_ensemble_goes_on_and_is_summed_up(tmp_path: Path) -> None:
     """Methods added later join those that are there, whose walks and costs stay; statistics are those of the walks."""
     ensemble = Ensemble(links=8, preset="soft", start="ellipse", samples=3)
-    for contestant in REFERENCES:
+    for contestant in (LOOSE, TIGHT):
         run_ensemble(tmp_path, ensemble, contestant, silent)
     before = summary(tmp_path, ensemble)
     shards = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.h5")}
     assert shards
-    for contestant in (Contestant("dp5", 1e-4), *REFERENCES):
+    for contestant in (Contestant("dp5", 1e-4), LOOSE, TIGHT):
         run_ensemble(tmp_path, ensemble, contestant, silent)
     after = summary(tmp_path, ensemble)
     assert [(row["method"], row["tolerance"]) for row in after] == [("rkf78", 1e-6), ("rkf78", 1e-9), ("dp5", 1e-4)]
@@ -163,20 +167,81 @@ def test_an_ensemble_goes_on_and_is_summed_up(tmp_path: Path) -> None:
         assert 0 < row["seconds_per_walk"] < 100 and math.isnan(row["walks_per_second"])
         assert row["difference_loose"] == pytest.approx(row["mean"] / after[0]["mean"] - 1)
         assert 0 < row["p_loose"] <= 1
+        assert 0 < row["ledger"] <= row["greatest_ledger"]
+    loose, tight, coarse = (row["ledger"] for row in after)
+    assert tight < loose < 1e-3 and 10 * loose < coarse < 0.1
     assert after[0]["difference_loose"] == after[0]["ks_loose"] == 0 and after[0]["passes"]
 
 
 def test_contestants_are_read_as_they_are_named() -> None:
-    """A name with tolerance and switches is read back from itself, which a folder's name needs."""
+    """A name with tolerance and settings, in any order, is read back from itself, which a folder's name needs."""
     for one in (
         Contestant("dp5"),
         Contestant("bs32", 1e-9),
-        Contestant("rkf78", 2e-3, ("soften_pile", "soften_drive")),
+        Contestant("rkf78", 2e-3, (("soften_pile", True), ("soften_area", 0.7), ("soften_drive", True))),
     ):
         assert Contestant.parse(one.name) == one
     assert Contestant.parse("dp5") == Contestant("dp5", 1e-6)
-    content = Ensemble(8, "soft").content(Contestant.parse("dp5@1e-3+soften_pile"))
-    assert content["options"] == {"method": "dp5", "tolerance": 1e-3, "device": "cpu", "soften_pile": True}
+    assert one == Contestant.parse("rkf78@2e-3+soften_drive+soften_area=0.7+soften_pile")
+    assert one.title == "rkf78 at 0.002, soften pile, soften area 0.7, soften drive"
+    content = Ensemble(8, "soft").content(Contestant.parse("dp5@1e-3+soften_pile+soften_area=0.5"))
+    expected = {"method": "dp5", "tolerance": 1e-3, "soften_pile": True, "soften_area": 0.5, "device": "cpu"}
+    assert content["options"] == expected
+
+
+@pytest.mark.parametrize("word", METHODS_BY_NEED)
+def test_words_are_what_the_options_make_of_them(word: str) -> None:
+    """A word means the options that it means in a walk, takes other settings, and is found again in a title."""
+    one = Contestant.parse(word)
+    assert Options.model_validate(one.options) == Options.model_validate({"method": word})
+    assert one.word == word and one.title.startswith(f"{word}: {one.method} at ")
+    changed = Contestant.parse(f"{word}@3e-5+contact_step=1e-5")
+    wanted = {"method": word, "tolerance": 3e-5, "contact_step": 1e-5}
+    assert Options.model_validate(changed.options) == Options.model_validate(wanted)
+    assert changed.word == ""
+
+
+def test_defaults_are_words_and_every_method() -> None:
+    """Each method that runs on the device has its turn, the words among them, no contestant twice."""
+    for device, without in (("cpu", set()), ("cuda", {"hybrid"})):
+        chosen = default_contestants(device)
+        assert len(set(chosen)) == len(chosen)
+        assert {one.method for one in chosen} == set(methods()) - without
+        assert {one.word for one in chosen} - {""} == set(METHODS_BY_NEED) - ({"fast"} if without else set())
+
+
+def test_the_tight_reference_is_an_extra() -> None:
+    """The dear ensembles of rkf78 at 1e-9 are made on demand only."""
+    assert not make_plan(parts=["ensembles"], contestants=["standard"]).tight
+    assert make_plan(parts=["ensembles"], contestants=["standard"], tight=True).tight
+
+
+# --- whole walks ---
+
+
+def test_walks_are_timed_in_turn_and_compared_with_the_reference() -> None:
+    """Methods take turns with the same samples, the reference among them; rows hold medians of walks at rest."""
+    said: list[str] = []
+    hopeless = Contestant.parse("dp5+smallest_step=1.9e-5")
+    rows = walk_costs(8, [Contestant.parse("dp5@1e-4"), hopeless, LOOSE], 2, said.append)
+    reference, loose, failed = rows
+    assert [row["name"] for row in rows] == [LOOSE.name, "dp5@0.0001", hopeless.name]
+    assert [line.split(", ", 1)[1] for line in said[1:]] == [row["title"] for row in rows] * 2
+    walks = [
+        warpchain.walk(links=8, start="ellipse", method="dp5", tolerance=1e-4, seed=seed, frame_interval=None)
+        for seed in (0, 1)
+    ]
+    released = [walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"] for walk in walks]
+    errors = [abs(walk.energy["residual"]) / energy for walk, energy in zip(walks, released, strict=True)]
+    assert loose["at_rest"] == 2
+    assert (loose["ledger"], loose["greatest_ledger"]) == (np.mean(errors), max(errors))
+    assert loose["walk_time"] == np.mean([walk.walk_time for walk in walks])
+    assert loose["tries"] == np.mean([walk.steps_accepted + walk.steps_rejected for walk in walks])
+    assert reference["ledger"] < loose["ledger"] / 10
+    for row in (reference, loose):
+        assert row["seconds"] == np.mean(row["each"]) and min(row["each"]) > 0
+        assert row["reference_seconds"] == reference["seconds"]
+    assert failed["at_rest"] == 0 and failed["walks"] == 2 and math.isnan(failed["seconds"])
 
 
 # --- hard cases ---
@@ -246,8 +311,8 @@ def test_command_writes_everything(results: tuple[Answer, Path]) -> None:
     answer, folder = results
     assert (answer.status, answer.err) == (0, "")
     names = [Path(line).name for line in answer.out.splitlines()]
-    ensemble = "ensemble_n8-15Hz-soft-ellipse-cpu-3.png"
-    assert names == [FILE, "work_precision_flight_8.png", ensemble, "hard_cases.png", "accuracy.html"]
+    pictures = ["work_precision_flight_8.png", "walks_8.png", "ensemble_n8-15Hz-soft-ellipse-cpu-3.png"]
+    assert names == [FILE, *pictures, "hard_cases.png", "accuracy.html"]
     for name in names[1:-1]:
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
 
@@ -277,16 +342,19 @@ def test_json_has_a_unit_for_every_number(results: tuple[Answer, Path]) -> None:
 
 
 def test_page_says_the_same_and_stands_alone(results: tuple[Answer, Path]) -> None:
-    """The page has the three parts with their figures and tables, the machine, and loads nothing."""
+    """The page has the four parts with their figures and tables, the machine, and loads nothing."""
     text = (results[1] / "accuracy.html").read_text(encoding="utf-8")
     page = Document(text)
-    assert list(page.texts) == ["", "work-and-precision", "ensembles", "hard-cases", "machines"]
-    assert len(page.images) == 3 and all(image.startswith("data:image/png;base64,") for image in page.images)
+    assert list(page.texts) == ["", "work-and-precision", "whole-walks", "ensembles", "hard-cases", "machines"]
+    assert len(page.images) == 4 and all(image.startswith("data:image/png;base64,") for image in page.images)
     assert len(page.rows["work-and-precision"]) == 1 + 4
     assert [row[:2] for row in page.rows["ensembles"][1:]] == [
-        ["rkf78 at 1e-06", "3"],
-        ["rkf78 at 1e-09", "3"],
+        ["reference: rkf78 at 1e-06", "3"],
         ["dp5 at 1e-06", "3"],
+    ]
+    assert [row[:4] for row in page.rows["whole-walks"][1:]] == [
+        ["8", "reference: rkf78 at 1e-06", "1", "1"],
+        ["8", "dp5 at 1e-06", "1", "1"],
     ]
     assert len(page.rows["hard-cases"]) == 1 + 6
     assert "warp-lang" in page.texts["machines"]
@@ -319,6 +387,11 @@ REFUSED = {
     "--methods rk4": "--methods: 'rk4' is unknown",
     "--methods dp5@soon": "--methods: 'dp5@soon' has no number after the @",
     "--methods dp5+soft": "--methods: 'soft' is unknown",
+    "--methods quick": "--methods: 'quick' is unknown; give one of standard, fast, reference, rkf78",
+    "--methods dp5+skin": "--methods: skin in 'dp5+skin' has no value; write skin=NUMBER",
+    "--methods dp5+skin=thin": "--methods: 'dp5+skin=thin' has no number after skin=",
+    "--methods dp5+skin=-1": "--methods.skin: -1.0 is not greater than 0",
+    "--methods dp5+soften_pile=1": "--methods: soften_pile in 'dp5+soften_pile=1' takes no value",
     "--methods dp5@1": "--methods.tolerance: 1.0 is greater than 0.1",
     "--tolerances 0": "--tolerances.tolerance: 0.0 is less than 1e-13",
     "--tolerances tight": "--tolerances: 'tight' is no number",

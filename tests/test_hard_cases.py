@@ -22,13 +22,29 @@ from warpchain.hard_starts import (
     set_down,
     turning_joints,
 )
+from warpchain.options import METHODS_BY_NEED
 
 METHODS = ("rkf78", "dp5", "bs32", "rodas4p", "hybrid")
 every_method = pytest.mark.parametrize("method", METHODS)
 every_method_walks = pytest.mark.parametrize(
-    "method", ["rkf78", "dp5", "rodas4p", pytest.param("bs32", marks=pytest.mark.slow)]
+    "method", ["rkf78", "dp5", "rodas4p", "hybrid", pytest.param("bs32", marks=pytest.mark.slow)]
 )
 """The same for walks, which need a kernel more: no other quick test uses that of bs32."""
+
+
+def walk(method, **settings):
+    """`warpchain.walk` at 1e-6 without frames, at the preset soft unless another is given.
+
+    Flights of hybrid are at 1e-4 there: their own tolerance, not that of the springs, is what its ledger closes to, and
+    at the default of 1e-3 that is 4e-4 (4 links) to 7e-4 (20 links without friction on the floor), hardly a test.
+    """
+    flights = {"flight_tolerance": 1e-4} if method == "hybrid" else {}
+    return warpchain.walk(**{"preset": "soft", "method": method, "frame_interval": None, **flights, **settings})
+
+
+def ledger_error(walk):
+    """What the energy ledger of a walk leaves open, as a fraction of the energy at release."""
+    return abs(walk.energy["residual"]) / (walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"])
 
 
 def simulate(parameters, state, duration, **settings):
@@ -53,32 +69,38 @@ def assert_sound(flight, parameters, state, within=1e-5):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", ["rkf78", "dp5"])
+@every_method
 def test_longest_slow_walk_ends_in_a_pile_at_rest(method):
-    """180 links released at 5 Hz fall into a pile beside the sprocket and rest there, the ledger closed to 1e-4."""
-    walk = warpchain.walk(preset="soft", method=method, links=180, frequency=5.0, start="spinning", frame_interval=None)
-    assert walk.status == Status.AT_REST
-    assert 0 < walk.dx < 0.3
-    assert walk.center[-1, 1] < 0.06
-    assert walk.impulses["self"] > 1e5
-    at_release = walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"]
-    assert abs(walk.energy["residual"]) < 1e-4 * at_release
-    assert walk.greatest_penetration["floor"] < SOFT.circle_radius / 2
+    """180 links released at 5 Hz fall into a pile beside the sprocket and rest there, the ledger closed to 5e-4.
+
+    At a tolerance of 1e-4; the table of hard cases has the same at 1e-6.
+    """
+    done = walk(method, tolerance=1e-4, links=180, frequency=5.0, start="spinning")
+    assert done.status == Status.AT_REST
+    assert 0 < done.dx < 0.3
+    assert done.center[-1, 1] < 0.06
+    assert done.impulses["self"] > 1e5
+    assert ledger_error(done) < 5e-4
+    assert done.greatest_penetration["floor"] < SOFT.circle_radius / 2
 
 
 @pytest.mark.slow
+@every_method
 @pytest.mark.parametrize("name", ["paper", "soft"])
 @pytest.mark.parametrize("links", [60, 180])
-def test_chain_dropped_without_spin_rests_below(name, links):
-    """An upright ellipse at rest drops, collapses and rests within a few centimetres of where it hung."""
-    walk = warpchain.walk(
-        preset=name, links=links, frequency=0.0, start="ellipse", ellipse_aspect=2.0, frame_interval=None
-    )
-    assert walk.status == Status.AT_REST
-    assert abs(walk.dx) < 0.03
-    assert walk.bounces >= 1
-    assert walk.impulses["self"] > 1000
-    assert walk.center[-1, 1] < walk.center[0, 1] / 3
+def test_chain_dropped_without_spin_rests_below(name, links, method):
+    """An upright ellipse at rest drops, collapses and rests within a few centimetres of where it hung.
+
+    With the settings of standard: at 1e-6 and on stiff joints a pile takes minutes.
+    """
+    settings = {**METHODS_BY_NEED["standard"], "method": method}
+    done = walk(preset=name, links=links, frequency=0.0, start="ellipse", ellipse_aspect=2.0, **settings)
+    assert done.status == Status.AT_REST
+    assert abs(done.dx) < 0.03
+    assert done.bounces >= 1
+    assert done.impulses["self"] > 1000
+    assert done.center[-1, 1] < done.center[0, 1] / 3
+    assert ledger_error(done) < 1e-3
 
 
 # --- stiffness, damping, friction ---
@@ -126,16 +148,21 @@ def test_any_damping(method, damping, duration):
     assert (flight.losses["joint_damping"] > 0) == (damping > 0)
 
 
-@pytest.mark.parametrize("method", ["rkf78", "dp5", "bs32"])
+@every_method
 def test_hopeless_damping_is_a_status(method):
-    """Damping that asks explicit methods for steps of 1e-12 s ends in a limit that says so, where it stood then."""
+    """Damping that asks explicit methods for steps of 1e-12 s ends in a limit that says so, where it stood then.
+
+    rodas4p and hybrid, which needs springs only after the first impulse, come as far as the impact.
+    """
     chain = SOFT.with_values({"joint_damping": 1e9})
     state = dropped()
     flight = simulate(chain, state, 1e-2, method=method, step_limit=20_000)
     assert flight.status in (Status.STEP_LIMIT, Status.STEP_TOO_SMALL)
     assert 0 <= flight.time[-1] < 1e-2
     assert flight.steps_accepted + flight.steps_rejected <= 20_000
-    assert_allclose(flight.position[-1], state[0] + state[1] * flight.time[-1], rtol=0, atol=1e-6)
+    assert energy_error(flight, chain, state) < 1e-6
+    if method not in ("rodas4p", "hybrid"):
+        assert_allclose(flight.position[-1], state[0] + state[1] * flight.time[-1], rtol=0, atol=1e-6)
 
 
 @every_method
@@ -187,7 +214,13 @@ def test_extreme_values(method, values):
 
 @pytest.mark.parametrize(
     ("method", "tolerance", "bound"),
-    [("rkf78", 1e-8, 1e-5), ("dp5", 1e-8, 5e-5), ("bs32", 1e-7, 3e-3), ("rodas4p", 1e-8, 1e-4)],
+    [
+        ("rkf78", 1e-8, 1e-5),
+        ("dp5", 1e-8, 5e-5),
+        ("bs32", 1e-7, 3e-3),
+        ("rodas4p", 1e-8, 1e-4),
+        ("hybrid", 1e-8, 5e-5),
+    ],
 )
 def test_elastic_bouncing_keeps_the_energy_for_a_second(method, tolerance, bound):
     """Without any dissipation a bouncing chain keeps its energy and its momentum along the floor over 1 s.
@@ -216,12 +249,14 @@ def test_elastic_bouncing_keeps_the_energy_for_a_second(method, tolerance, bound
         ("dp5", [4e-5, 2e-5, 1e-5], 5),
         ("bs32", [1e-5, 5e-6, 2.5e-6], 3),
         ("rodas4p", [2e-5, 1e-5, 5e-6], 5),
+        ("hybrid", [4e-5, 2e-5, 1e-5], 5),
     ],
 )
 def test_elastic_bouncing_shows_the_order(method, steps, slope):
     """The energy that bouncing undamped springs lose falls as h^p for odd order p, as h^(p+1) for even p.
 
-    One step multiplies the energy of an oscillator by |R(iωh)|², which leaves 1 by an even power of h.
+    One step multiplies the energy of an oscillator by |R(iωh)|², which leaves 1 by an even power of h. Springs that
+    nothing damps ring for ever, so that hybrid never takes its joints for rigid here: it is dp5.
     """
     state = dropped(links=6, fall=0.0, gap=0.02)
     energy = reference.total_energy(*state, ELASTIC)
@@ -239,30 +274,22 @@ def test_elastic_bouncing_shows_the_order(method, steps, slope):
 @every_method_walks
 def test_endless_bouncing_meets_the_time_limit(method):
     """A chain that nothing brings to rest ends with time_limit at that time, and has no Δx."""
-    walk = warpchain.walk(
-        preset="soft",
-        method=method,
-        links=6,
-        frequency=2.0,
-        start="ellipse",
-        walk_limit=0.3,
-        **UNDISSIPATIVE,
-    )
-    assert walk.status == Status.TIME_LIMIT
-    assert walk.walk_time == 0.3
-    assert np.isnan(walk.dx)
-    assert walk.bounces >= 2
-    assert walk.time[-1] == 0.3
+    done = walk(method, links=6, frequency=2.0, start="ellipse", walk_limit=0.3, **UNDISSIPATIVE)
+    assert done.status == Status.TIME_LIMIT
+    assert done.walk_time == 0.3
+    assert np.isnan(done.dx)
+    assert done.bounces >= 2
+    assert done.time[-1] == 0.3
+    assert ledger_error(done) < 5e-3
 
 
-@pytest.mark.parametrize("method", ["rkf78", "dp5"])
+@every_method_walks
 @pytest.mark.parametrize("friction", [0.0, 1.0])
 @pytest.mark.parametrize("restitution", [0.0, 1.0])
 def test_walks_at_the_ends_of_the_collision_law(method, friction, restitution):
     """With e and μ of 0 or 1 a chain still comes to rest; without friction of the floor it stays above its start."""
-    walk = warpchain.walk(
-        preset="soft",
-        method=method,
+    done = walk(
+        method,
         links=20,
         frequency=10.0,
         start="ellipse",
@@ -270,15 +297,14 @@ def test_walks_at_the_ends_of_the_collision_law(method, friction, restitution):
         floor_friction=friction,
         chain_restitution=restitution,
         chain_friction=friction,
-        frame_interval=None,
     )
-    assert walk.status == Status.AT_REST
+    assert done.status == Status.AT_REST
     if friction == 0:
-        assert abs(walk.dx) < 1e-12
+        assert abs(done.dx) < 1e-12
     else:
-        assert 0.1 < walk.dx < 1.0
-    at_release = walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"]
-    assert abs(walk.energy["residual"]) < 1e-4 * at_release
+        assert 0.1 < done.dx < 1.0
+    assert ledger_error(done) < 3e-4
+    assert abs(done.energy["hand_over"]) < 1e-2 * done.energy["kinetic_at_release"]
 
 
 # --- short, long, fast and slow ---
@@ -287,16 +313,15 @@ def test_walks_at_the_ends_of_the_collision_law(method, friction, restitution):
 @every_method_walks
 @pytest.mark.parametrize("links", [4, 6, 8])
 def test_short_chains(method, links):
-    """The shortest chains drop, bounce and come to rest, flat on the floor."""
-    walk = warpchain.walk(
-        preset="soft", method=method, links=links, frequency=4.0, start="ellipse", frame_interval=None
-    )
-    assert walk.status == Status.AT_REST
-    assert walk.bounces >= 1
-    assert 0 < walk.dx < 0.5
-    assert walk.center[-1, 1] < SOFT.circle_radius + links * SOFT.link_length / 4
-    at_release = walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"]
-    assert abs(walk.energy["residual"]) < 2e-4 * at_release
+    """The shortest chains drop, bounce and come to rest, flat on the floor, where they do with the reference."""
+    done = walk(method, links=links, frequency=4.0, start="ellipse")
+    assert done.status == Status.AT_REST
+    assert done.bounces >= 1
+    if method != "rkf78":
+        # after two or three bounces chaos has not come far
+        assert done.dx == pytest.approx(walk("rkf78", links=links, frequency=4.0, start="ellipse").dx, rel=0.02)
+    assert done.center[-1, 1] < SOFT.circle_radius + links * SOFT.link_length / 4
+    assert ledger_error(done) < 2e-4
 
 
 @pytest.mark.slow
@@ -310,30 +335,34 @@ def test_thousand_links(method):
 
 
 @pytest.mark.slow
-def test_sixty_turns_per_second():
-    """At 60 Hz the chain walks for many metres and comes to rest, its ledger closed to 1e-4."""
-    walk = warpchain.walk(preset="soft", method="dp5", links=60, frequency=60.0, start="spinning", frame_interval=None)
-    assert walk.status == Status.AT_REST
-    assert 10 < walk.dx < 40
-    at_release = walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"]
-    assert abs(walk.energy["residual"]) < 1e-4 * at_release
+@every_method
+def test_sixty_turns_per_second(method):
+    """At 60 Hz the chain walks for many metres and comes to rest, its ledger closed to 5e-4."""
+    done = walk(method, links=60, frequency=60.0, start="spinning")
+    assert done.status == Status.AT_REST
+    assert 15 < done.dx < 25
+    assert ledger_error(done) < 5e-4
 
 
+@pytest.mark.parametrize(
+    "method", ["dp5", *(pytest.param(name, marks=pytest.mark.slow) for name in METHODS if name != "dp5")]
+)
 @pytest.mark.parametrize("start", ["rest", "spinning"])
-def test_standing_sprocket(start):
+def test_standing_sprocket(start, method):
     """At 0 Hz the chain hangs on its sprocket until it is let go, falls, and rests within a few centimetres.
 
     A pile amplifies the last digits, so the symmetry of the hanging loop says no more than that: |Δx| well below the
     loop's half width.
     """
-    walk = warpchain.walk(preset="soft", method="dp5", links=60, frequency=0.0, start=start, frame_interval=None)
-    assert walk.status == Status.AT_REST
-    assert walk.impulses["sprocket"] > 0
-    assert walk.greatest_penetration["sprocket"] < 1e-3
-    assert walk.sprocket_center is not None
+    done = walk(method, links=60, frequency=0.0, start=start)
+    assert done.status == Status.AT_REST
+    assert done.impulses["sprocket"] > 0
+    assert done.greatest_penetration["sprocket"] < 1e-3
+    assert done.sprocket_center is not None
     # it hangs: the centre is one loop's height above the floor
-    assert walk.sprocket_center[1] < 60 * SOFT.link_length / 2
-    assert abs(walk.dx) < 0.03
+    assert done.sprocket_center[1] < 60 * SOFT.link_length / 2
+    assert abs(done.dx) < 0.03
+    assert ledger_error(done) < 1e-5
 
 
 # --- bad starts ---
@@ -451,9 +480,10 @@ def test_trajectory_ends_where_the_chain_broke_off(method):
     assert np.all(np.isfinite(flight.position))
 
 
-def test_crowd_beyond_the_list_is_a_status():
+@every_method
+def test_crowd_beyond_the_list_is_a_status(method):
     """More close pairs than the neighbour list holds end in list_overflow, not in contacts that are overlooked."""
-    flight = simulate(SOFT, folded(60), 1e-3, method="bs32", skin=1.0)
+    flight = simulate(SOFT, folded(60), 1e-3, method=method, skin=1.0)
     assert flight.status == Status.LIST_OVERFLOW
     assert flight.time[-1] == 0.0
 

@@ -1,6 +1,6 @@
-"""``warpchain bench accuracy``: error against cost of every method, its ensembles of walks, and the hard cases.
+"""``warpchain bench accuracy``: error against cost of every method, its walks and ensembles of them, the hard cases.
 
-Three parts, each of which can be run by itself: what the others have left in the folder stays. Numbers are kept in one
+Four parts, each of which can be run by itself: what the others have left in the folder stays. Numbers are kept in one
 JSON file with the machine they were measured on, figures and a page are drawn from it.
 """
 
@@ -14,7 +14,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from warpchain.accuracy_columns import COLUMNS
-from warpchain.accuracy_ensembles import REFERENCES, Contestant, Ensemble, default_samples, run_ensemble, summary
+from warpchain.accuracy_contestants import LOOSE, TIGHT, Contestant, default_contestants
+from warpchain.accuracy_ensembles import Ensemble, default_samples, run_ensemble, summary
+from warpchain.accuracy_walks import walk_costs
 from warpchain.bench import machine
 from warpchain.engine import start_device
 from warpchain.hard_cases import HARD_CASES
@@ -24,16 +26,17 @@ from warpchain.planning import load_sweep
 from warpchain.results import replacing
 from warpchain.work_precision import TOLERANCES, TRIALS, Errors, make_reference, make_trial, methods, points
 
-PARTS: Final = ("work-precision", "ensembles", "hard-cases")
+PARTS: Final = ("work-precision", "walks", "ensembles", "hard-cases")
 FILE: Final = "accuracy.json"
 FORMAT: Final = "warpchain accuracy"
-VERSION: Final = 1
+VERSION: Final = 2
 SCIPY_TOLERANCES: Final = (1e-3, 1e-6, 1e-9)
 """Those of the tolerances that SciPy's solvers, which take a minute each, are run at."""
 
 KEYS: Final = {
     "references": ("trial", "links"),
     "points": ("trial", "links", "method", "tolerance"),
+    "walks": ("links", "name"),
     "ensembles": ("name",),
     "hard_cases": ("case", "method"),
 }
@@ -54,6 +57,7 @@ class Plan:
     links: tuple[int, ...]
     trials: tuple[str, ...]
     ensembles: tuple[Ensemble, ...]
+    tight: bool
     cases: tuple[str, ...]
     rounds: int
     scipy: bool
@@ -61,7 +65,8 @@ class Plan:
     @property
     def methods(self) -> tuple[str, ...]:
         """Names of the methods, each once."""
-        return tuple(dict.fromkeys(one.method for one in self.contestants))
+        chosen = {one.method for one in self.contestants}
+        return tuple(name for name in methods() if name in chosen)
 
 
 def make_plan(
@@ -75,6 +80,7 @@ def make_plan(
     start: str = "spinning",
     samples: int | None = None,
     device: str = "cpu",
+    tight: bool = False,
     cases: Sequence[str] | None = None,
     rounds: int = 5,
     scipy: bool = True,
@@ -83,17 +89,18 @@ def make_plan(
 
     Args:
         parts: Some of `PARTS`.
-        contestants: Methods, each as `Contestant.parse` reads it; None: all, at 1e-6. Tolerances and switches are for
-            the ensembles.
+        contestants: Methods, each as `Contestant.parse` reads it; None: those of `default_contestants`. Tolerances and
+            other settings are for walks and ensembles.
         tolerances: Of the work–precision diagrams.
-        links: Numbers of links in the diagrams and the ensembles.
+        links: Numbers of links in the diagrams, the walks and the ensembles.
         trials: Some of `TRIALS`.
         presets: Of the ensembles.
         start: Of the ensembles.
         samples: Walks of each ensemble; None: 200, and 60 from 100 links on.
         device: Where the ensembles run; the other parts are measured on one CPU core.
+        tight: Make the ensembles of `TIGHT` as well.
         cases: Names of hard cases; None: all.
-        rounds: Measurements of each run in the diagrams.
+        rounds: Measurements of each run in the diagrams, and walks of each method that are timed.
         scipy: Run SciPy's solvers as well.
 
     Raises:
@@ -114,7 +121,7 @@ def make_plan(
         preset(name)
     plan = Plan(
         parts=tuple(parts),
-        contestants=tuple(map(Contestant.parse, methods() if contestants is None else contestants)),
+        contestants=default_contestants(device) if contestants is None else tuple(map(Contestant.parse, contestants)),
         tolerances=tuple(tolerances),
         links=tuple(validated(Scene, {"links": count}, "--links").links for count in links),
         trials=tuple(trials),
@@ -123,6 +130,7 @@ def make_plan(
             for count in links
             for name in presets
         ),
+        tight=tight,
         cases=tuple(names if cases is None else cases),
         rounds=rounds,
         scipy=scipy,
@@ -162,6 +170,9 @@ def run_accuracy(folder: Path, plan: Plan, report: Report) -> Document:
         for links in plan.links:
             for name in plan.trials:
                 _record(folder, here, _trial_rows(plan, name, links, report), _scipy_note(plan))
+    if "walks" in plan.parts:
+        for links in plan.links:
+            _record(folder, here, {"walks": walk_costs(links, plan.contestants, plan.rounds, report)})
     if "hard-cases" in plan.parts:
         for case in HARD_CASES:
             for method in plan.methods if case.name in plan.cases else ():
@@ -178,7 +189,8 @@ def run_accuracy(folder: Path, plan: Plan, report: Report) -> Document:
                 "frequency": ensemble.frequency,
                 **asdict(ensemble),
             }
-            for contestant in dict.fromkeys((*REFERENCES, *plan.contestants)):
+            references = (LOOSE, TIGHT) if plan.tight else (LOOSE,)
+            for contestant in dict.fromkeys((*references, *plan.contestants)):
                 run_ensemble(folder / "ensembles", ensemble, contestant, report)
                 row = about | {"methods": summary(folder / "ensembles", ensemble)}
                 _record(folder, on, {"ensembles": [row]})

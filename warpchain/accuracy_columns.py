@@ -20,6 +20,18 @@ _TRIAL: Final = {
 
 _MACHINE: Final = {"machine": ("1", "index in machines")}
 
+_CONTESTANT: Final = {
+    "method": ("1", "method of the engine"),
+    "tolerance": ("1", "its tolerance"),
+    "settings": ("1", "other options that differ from their defaults, in SI units"),
+    "title": ("1", "the same for people"),
+}
+
+_LEDGER: Final = {
+    "ledger": ("1", "what the energy ledger of a walk leaves open, of the energy at release, median"),
+    "greatest_ledger": ("1", "the same, greatest"),
+}
+
 COLUMNS: Final[dict[str, dict[str, tuple[str, str]]]] = {
     "references": {
         **_TRIAL,
@@ -41,6 +53,22 @@ COLUMNS: Final[dict[str, dict[str, tuple[str, str]]]] = {
         "rejected": ("1", "rejected steps in it; null if the solver does not tell"),
         **_MACHINE,
     },
+    "walks": {
+        "links": ("1", "number of links"),
+        "frequency": ("Hz", "turns of a sprocket per second that the speed along the ellipse stands for"),
+        "preset": ("1", "parameters that the walks are drawn around; walk k has the seed k, whatever the method"),
+        **_CONTESTANT,
+        "name": ("1", "as --methods takes it"),
+        "walks": ("1", "walks that were timed, the methods in turn"),
+        "at_rest": ("1", "those of them that came to rest: the medians are theirs"),
+        "seconds": ("s", "processor time of one core from the release to rest, median"),
+        "each": ("s", "the same of each walk"),
+        "reference_seconds": ("s", "the same of rkf78 at 1e-6 in the same run, median"),
+        "tries": ("1", "steps tried, accepted or not, median"),
+        "walk_time": ("s", "simulated time from the release to rest, median"),
+        **_LEDGER,
+        **_MACHINE,
+    },
     "ensembles": {
         "name": ("1", "folder of the ensembles"),
         "links": ("1", "number of links"),
@@ -49,9 +77,7 @@ COLUMNS: Final[dict[str, dict[str, tuple[str, str]]]] = {
         "start": ("1", "how the chain starts"),
         "samples": ("1", "walks of each method, the same samples for all"),
         "device": ("1", "where they ran"),
-        "tolerance": ("1", "tolerance of a method"),
-        "switches": ("1", "options that were switched on"),
-        "title": ("1", "method, tolerance and switches, for people"),
+        **_CONTESTANT,
         "at_rest": ("1", "walks that came to rest: those that the statistics are of"),
         "missing": ("1", "walks not run yet"),
         "failed": ("1", "walks that ended otherwise, by status"),
@@ -59,6 +85,7 @@ COLUMNS: Final[dict[str, dict[str, tuple[str, str]]]] = {
         "mean_interval": ("m", "its 95 % bootstrap interval"),
         "sd": ("m", "standard deviation of Δx, divisor count − 1"),
         "sd_interval": ("m", "its 95 % bootstrap interval"),
+        **_LEDGER,
         "dx": ("m", "Δx of the walks at rest"),
         "ks_loose": ("1", "greatest distance of the distribution functions of Δx from that of rkf78 at 1e-6"),
         "p_loose": ("1", "probability of one at least as great (exact two-sample Kolmogorov–Smirnov test)"),

@@ -10,14 +10,14 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.accuracy_contestants import LOOSE, TIGHT, Contestant
 from warpchain.ensemble import compile_kernels
-from warpchain.options import Options
-from warpchain.parameters import InputError, shown, suggestion, validated
+from warpchain.options import METHODS_BY_NEED
 from warpchain.planning import load_sweep
 from warpchain.results import replacing
 from warpchain.runner import SweepProgress, sweep
@@ -27,62 +27,9 @@ from warpchain.two_samples import bootstrap_interval, kolmogorov_smirnov, means,
 from warpchain.work_precision import methods
 
 Array = NDArray[np.float64]
-TOLERANCE: Final = 1e-6
-"""Of a method unless one says otherwise."""
-SWITCHES: Final = tuple(
-    name for name, field in Options.model_fields.items() if field.annotation is bool and field.default is False
-)
-"""Options that can be switched on beside a method."""
 SEED: Final = 20180602
 LONG: Final = 100
 """From this number of links on, walks are released at 20 Hz instead of 15 and there are 60 instead of 200 of them."""
-
-
-@dataclass(frozen=True)
-class Contestant:
-    """How the walks of an ensemble are computed.
-
-    Attributes:
-        method: Name of the method.
-        tolerance: Its tolerance.
-        switches: Some of `SWITCHES`.
-    """
-
-    method: str
-    tolerance: float = TOLERANCE
-    switches: tuple[str, ...] = ()
-
-    @property
-    def name(self) -> str:
-        """As `parse` reads it, and good for a folder: ``dp5@1e-06+soften_pile``."""
-        return "+".join([f"{self.method}@{self.tolerance:g}", *self.switches])
-
-    @property
-    def title(self) -> str:
-        """For people."""
-        return ", ".join([f"{self.method} at {self.tolerance:g}", *(name.replace("_", " ") for name in self.switches)])
-
-    @classmethod
-    def parse(cls, text: str) -> Self:
-        """Read ``METHOD[@TOLERANCE][+SWITCH…]``.
-
-        Raises:
-            InputError: the method or a switch is unknown, or the tolerance is no tolerance.
-        """
-        start, *switches = text.split("+")
-        method, at, tolerance = start.partition("@")
-        for name, known in ((method, methods()), *((switch, SWITCHES) for switch in switches)):
-            if name not in known:
-                raise InputError(f"--methods: {shown(name)} is unknown; {suggestion(name, known)}")
-        try:
-            value = float(tolerance) if at else TOLERANCE
-        except ValueError:
-            raise InputError(f"--methods: {shown(text)} has no number after the @; write {method}@1e-6") from None
-        return cls(method, validated(Options, {"tolerance": value}, "--methods").tolerance, tuple(switches))
-
-
-REFERENCES: Final = (Contestant("rkf78", 1e-6), Contestant("rkf78", 1e-9))
-"""What the others are tested against."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +53,7 @@ class Ensemble:
     @property
     def frequency(self) -> float:
         """Turns of the sprocket per second at the release [Hz]."""
-        return 20.0 if self.links >= LONG else 15.0
+        return release_frequency(self.links)
 
     @property
     def name(self) -> str:
@@ -121,21 +68,20 @@ class Ensemble:
 
     def content(self, contestant: Contestant) -> dict[str, Any]:
         """The sweep of a method."""
-        switches = dict.fromkeys(contestant.switches, True)
         return {
             "version": 1,
-            "name": f"{self.title}, {contestant.title}",
+            "name": f"{self.title}, {contestant.name}",
             "seed": SEED,
             "preset": self.preset,
             "samples": self.samples,
             "scene": {"links": self.links, "frequency": self.frequency, "start": self.start},
-            "options": {
-                "method": contestant.method,
-                "tolerance": contestant.tolerance,
-                "device": self.device,
-                **switches,
-            },
+            "options": {**contestant.options, "device": self.device},
         }
+
+
+def release_frequency(links: int) -> float:
+    """Turns of the sprocket per second [Hz] of a chain of this length."""
+    return 20.0 if links >= LONG else 15.0
 
 
 def default_samples(links: int) -> int:
@@ -179,7 +125,7 @@ def run_ensemble(folder: Path, ensemble: Ensemble, contestant: Contestant, repor
 
 
 def summary(folder: Path, ensemble: Ensemble) -> list[dict[str, Any]]:
-    """What the ensembles on disk say, one row for each method and tolerance; the references first.
+    """What the ensembles on disk say, one row for each contestant; the references first.
 
     Walks that did not come to rest are counted and in no mean. NaN stands for what cannot be known: intervals of fewer
     than two walks, tests against a reference without walks, cost of walks made without a record of it.
@@ -188,9 +134,13 @@ def summary(folder: Path, ensemble: Ensemble) -> list[dict[str, Any]]:
     for place in sorted((folder / ensemble.name).glob("*@*")):
         if place.is_dir():
             found[Contestant.parse(place.name)] = load(place)
-    known = methods()
+    ranks = {name: rank for rank, name in enumerate((*METHODS_BY_NEED, *methods()))}
     ordered = sorted(
-        found, key=lambda one: (one not in REFERENCES, known.index(one.method), -one.tolerance, one.switches)
+        found,
+        key=lambda one: (
+            *(one != LOOSE, one != TIGHT, ranks[one.word or one.method], -one.tolerance, len(one.settings)),
+            one.name,
+        ),
     )
     distances = {one: _distances(result) for one, result in found.items()}
     rows = []
@@ -200,7 +150,7 @@ def summary(folder: Path, ensemble: Ensemble) -> list[dict[str, Any]]:
         row: dict[str, Any] = {
             "method": one.method,
             "tolerance": one.tolerance,
-            "switches": list(one.switches),
+            "settings": dict(one.settings),
             "title": one.title,
             "at_rest": len(at_rest),
             "missing": counts["missing"],
@@ -209,9 +159,10 @@ def summary(folder: Path, ensemble: Ensemble) -> list[dict[str, Any]]:
             "mean_interval": bootstrap_interval(at_rest, means),
             "sd": float(at_rest.std(ddof=1)) if len(at_rest) > 1 else float("nan"),
             "sd_interval": bootstrap_interval(at_rest, standard_deviations),
+            **ledger_errors(_ledgers(found[one])),
             "dx": at_rest.tolist(),
         }
-        for against, suffix in zip(REFERENCES, ("loose", "tight"), strict=True):
+        for against, suffix in ((LOOSE, "loose"), (TIGHT, "tight")):
             true = distances.get(against, np.empty(0))
             both = len(true) > 0 and len(at_rest) > 0
             row[f"ks_{suffix}"], row[f"p_{suffix}"] = kolmogorov_smirnov(at_rest, true) if both else (float("nan"),) * 2
@@ -244,6 +195,21 @@ def _distances(result: SweepResult) -> Array:
     (block,) = result.blocks.values()
     values: Array = block.columns["dx"][block.columns["status"] == Status.AT_REST]
     return values
+
+
+def ledger_errors(errors: Array) -> dict[str, float]:
+    """Median and greatest error of energy ledgers (k,), under the names of the tables; NaN of none."""
+    if len(errors) == 0:
+        return {"ledger": float("nan"), "greatest_ledger": float("nan")}
+    return {"ledger": float(np.median(errors)), "greatest_ledger": float(errors.max())}
+
+
+def _ledgers(result: SweepResult) -> Array:
+    """What the energy ledgers of the walks at rest leave open, as fractions of the energy at release."""
+    (block,) = result.blocks.values()
+    at_rest = block.columns["status"] == Status.AT_REST
+    errors: Array = np.abs(block.columns["energy_residual"] / block.columns["energy_at_release"])[at_rest]
+    return errors
 
 
 def _cost(place: Path, device: str) -> dict[str, float]:

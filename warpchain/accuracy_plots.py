@@ -13,6 +13,7 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from warpchain.plots import FAINT, GROUND, INK, LINE_COLORS, _tidy
+from warpchain.status import Status
 from warpchain.sweep_plots import Picture
 
 Row = dict[str, Any]
@@ -64,6 +65,14 @@ def figures(document: dict[str, Any]) -> Iterator[Picture]:
             f"far dp5 at 1e-11 is from that reference: nothing below it is certain.{note}"
         )
         yield Picture(f"work_precision_{true['trial']}_{true['links']}", caption, work_precision(true, rows))
+    for links in dict.fromkeys(row["links"] for row in document["walks"]):
+        rows = [row for row in document["walks"] if row["links"] == links]
+        caption = (
+            f"Walks of {links} links at Table 1's values, started as an ellipse: processor time of one core from the "
+            "release to rest, single walks (dots) and their median (bar), how many times less than rkf78 at 1e-6 "
+            "takes in the same run, and what the energy ledger leaves open, of the energy at release (median)."
+        )
+        yield Picture(f"walks_{links}", caption, walk_costs(rows))
     for row in document["ensembles"]:
         caption = (
             f"Δx of {row['title']}, by method and tolerance: single walks (dots), mean with its 95 % bootstrap "
@@ -74,7 +83,8 @@ def figures(document: dict[str, Any]) -> Iterator[Picture]:
     if document["hard_cases"]:
         caption = (
             "Hard cases by method: seconds of one core, and what the energy ledger leaves open as a fraction of the "
-            "energy. Blue: status, result and energy are such as the case may have."
+            "energy; the status where it is neither at rest nor finished. Blue: status, result and energy are such as "
+            "the case may have."
         )
         yield Picture("hard_cases", caption, hard_cases(document["hard_cases"]))
 
@@ -123,6 +133,40 @@ def work_precision(true: Row, rows: Sequence[Row]) -> Figure:
     if _ON_FIGURE[true["trial"]]:
         figure.supxlabel(_ON_FIGURE[true["trial"]], fontsize="small", color=FAINT)
     figure.suptitle(f"{_TITLES[true['trial']]}, $n$ = {true['links']}", fontsize="medium", x=0.01, ha="left")
+    return figure
+
+
+def walk_costs(rows: Sequence[Row]) -> Figure:
+    """Cost of single walks of one number of links by method, and how their ledgers close."""
+    figure = Figure(figsize=(9.0, 1.4 + 0.42 * len(rows)), layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=(2.0, 1.0), sharey=True)
+    ordered = sorted(rows, key=lambda row: -math.inf if row["seconds"] is None else -row["seconds"])
+    colors = _colors([row["method"] for row in rows])
+    for place, row in enumerate(ordered):
+        color = colors[row["method"]]
+        left.plot(row["each"], [place] * len(row["each"]), "o", color=(color, 0.45), markersize=5, markeredgewidth=0)
+        if row["seconds"] is not None:
+            left.plot([row["seconds"]], [place], "|", color=INK, markersize=14, markeredgewidth=1.6, zorder=5)
+            times = f"{row['seconds']:.2g} s" + (
+                f", {row['reference_seconds'] / row['seconds']:.2g}×" if row["reference_seconds"] else ""
+            )
+            left.annotate(times, (max(row["each"]), place), (8, 0), textcoords="offset points", va="center", color=INK)
+        if row["ledger"]:
+            right.plot([row["ledger"]], [place], "o", color=color, markersize=6)
+    left.set_yticks(range(len(ordered)), [_contestant_text(row) for row in ordered])
+    left.set_ylim(len(ordered) - 0.4, -0.6)
+    for axes in (left, right):
+        axes.set_xscale("log")
+        axes.grid(axis="x", **_GRID)
+        _tidy(axes)
+        _thin_out(axes.xaxis)
+    left.set_xlim(right=3.5 * left.get_xlim()[1])
+    right.tick_params(left=False)
+    left.set_xlabel("seconds of one core from the release to rest")
+    right.set_xlabel("error of the energy ledger")
+    first = rows[0]
+    title = f"{first['links']} links, {first['frequency']:g} Hz, {first['preset']}, ellipse"
+    left.set_title(title, fontsize="medium", loc="left")
     return figure
 
 
@@ -178,8 +222,8 @@ def hard_cases(rows: Sequence[Row]) -> Figure:
         axes.add_patch(Rectangle((x - 0.48, y - 0.45), 0.96, 0.9, facecolor=(color, 0.25), edgecolor=color))
         numbers = [f"{row['seconds']:.2g} s"] * (row["tries"] > 0)
         numbers += [] if row["energy_error"] is None else [f"{row['energy_error']:.0e}"]
-        status = [] if row["sound"] and numbers else [row["status"].replace("_", " ")]
-        text = "   ".join([*status, *numbers])
+        expected = row["sound"] and numbers and row["status"] in (Status.AT_REST.label, Status.FINISHED.label)
+        text = "   ".join([*([] if expected else [row["status"].replace("_", " ")]), *numbers])
         axes.text(x, y, text, ha="center", va="center", color=INK, fontsize="small")
     axes.set_xlim(-0.55, len(chosen) - 0.45)
     axes.set_ylim(len(cases) - 0.4, -0.6)
@@ -190,7 +234,7 @@ def hard_cases(rows: Sequence[Row]) -> Figure:
     axes.spines[:].set_visible(False)
     handles = [
         Patch(facecolor=(color, 0.25), edgecolor=color, label=label)
-        for color, label in zip(LINE_COLORS[:2], ("sound", "not sound, with its status"), strict=True)
+        for color, label in zip(LINE_COLORS[:2], ("sound", "not sound"), strict=True)
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
     return figure
@@ -239,6 +283,10 @@ def _marker(method: str, chosen: Sequence[str]) -> str:
 
 
 def _contestant_text(row: Row) -> str:
-    lost = sum(row["failed"].values())
-    notes = [f"{lost} failed"] * (lost > 0) + [f"{row['missing']} missing"] * (row["missing"] > 0)
-    return "\n".join([row["title"], *notes])
+    """Title of a contestant, its settings in a line of their own, and how many of its walks are not drawn."""
+    method, *settings = row["title"].split(", ")
+    failed = sum(row["failed"].values()) if "failed" in row else row["walks"] - row["at_rest"]
+    missing = row.get("missing", 0)
+    notes = [", ".join(settings)] * bool(settings)
+    notes += [f"{failed} failed"] * (failed > 0) + [f"{missing} missing"] * (missing > 0)
+    return "\n".join([method, *notes])

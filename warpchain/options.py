@@ -141,7 +141,7 @@ _SOFTENED: Final = {"soften_pile": True, "soften_drive": True}
 METHODS_BY_NEED: Final[Mapping[str, Mapping[str, object]]] = MappingProxyType(
     {
         "standard": MappingProxyType({"method": "dp5", "tolerance": 1e-4, **_SOFTENED}),
-        "fast": MappingProxyType({"method": "hybrid", "tolerance": 1e-3, **_SOFTENED}),
+        "fast": MappingProxyType({"method": "hybrid", "tolerance": 1e-4, **_SOFTENED}),
         "reference": MappingProxyType({"method": "rkf78", "tolerance": 1e-6}),
     }
 )

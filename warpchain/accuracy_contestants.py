@@ -1,0 +1,141 @@
+"""How walks of ``warpchain bench accuracy`` are computed: a method, its tolerance and other options, in one word."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final, Self
+
+from warpchain.options import METHODS_BY_NEED, Options
+from warpchain.parameters import InputError, shown, suggestion, validated
+from warpchain.work_precision import methods
+
+TOLERANCE: Final = 1e-6
+"""Of a method unless one says otherwise."""
+SWITCHES: Final = tuple(
+    name for name, field in Options.model_fields.items() if field.annotation is bool and field.default is False
+)
+"""Options that can be switched on beside a method."""
+NUMBERS: Final = tuple(
+    name for name, field in Options.model_fields.items() if field.annotation is float and name != "tolerance"
+)
+"""Options that can be given a number beside a method."""
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """How walks are computed.
+
+    Attributes:
+        method: Name of the method.
+        tolerance: Its tolerance.
+        settings: Options that differ from their defaults, in the order of `Options`: True for those of `SWITCHES`, a
+            number for those of `NUMBERS`.
+    """
+
+    method: str
+    tolerance: float = TOLERANCE
+    settings: tuple[tuple[str, float], ...] = ()
+
+    @classmethod
+    def of(cls, options: Mapping[str, object]) -> Self:
+        """The contestant with these options; those that have their default values anyway are left out.
+
+        Raises:
+            InputError: One of them is unknown or impossible.
+        """
+        checked = validated(Options, options, "--methods")
+        settings = tuple(
+            (name, getattr(checked, name))
+            for name, field in Options.model_fields.items()
+            if name in (*SWITCHES, *NUMBERS) and getattr(checked, name) != field.default
+        )
+        return cls(checked.method, checked.tolerance, settings)
+
+    @property
+    def options(self) -> dict[str, object]:
+        """As `Options` takes them."""
+        return {"method": self.method, "tolerance": self.tolerance, **dict(self.settings)}
+
+    @property
+    def name(self) -> str:
+        """As `parse` reads it, and good for a folder: ``dp5@1e-06+soften_pile+soften_area=0.7``."""
+        settings = (name if value is True else f"{name}={value:g}" for name, value in self.settings)
+        return "+".join([f"{self.method}@{self.tolerance:g}", *settings])
+
+    @property
+    def word(self) -> str:
+        """The key of `METHODS_BY_NEED` that means the same; empty if none does."""
+        return next((word for word in METHODS_BY_NEED if Contestant.of({"method": word}) == self), "")
+
+    @property
+    def title(self) -> str:
+        """For people."""
+        settings = (name.replace("_", " ") + ("" if value is True else f" {value:g}") for name, value in self.settings)
+        text = ", ".join([f"{self.method} at {self.tolerance:g}", *settings])
+        return f"{self.word}: {text}" if self.word else text
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Read ``NAME[@TOLERANCE][+SWITCH][+NUMBER=VALUE]…``, the name that of a method or a word for a need.
+
+        Raises:
+            InputError: A name is unknown, or a value is no number or impossible.
+        """
+        start, *settings = text.split("+")
+        method, at, tolerance = start.partition("@")
+        known = (*METHODS_BY_NEED, *methods())
+        if method not in known:
+            raise InputError(f"--methods: {shown(method)} is unknown; {suggestion(method, known)}")
+        options: dict[str, object] = {"method": method}
+        if at:
+            options["tolerance"] = _number(text, tolerance, f"after the @; write {method}@1e-6")
+        elif method not in METHODS_BY_NEED:
+            options["tolerance"] = TOLERANCE
+        for setting in settings:
+            name, equals, value = setting.partition("=")
+            if equals and name in NUMBERS:
+                options[name] = _number(text, value, f"after {name}=; write one")
+            elif name in SWITCHES and not equals:
+                options[name] = True
+            elif name in NUMBERS:
+                raise InputError(f"--methods: {name} in {shown(text)} has no value; write {name}=NUMBER")
+            elif name in SWITCHES:
+                raise InputError(f"--methods: {name} in {shown(text)} takes no value; write +{name} to switch it on")
+            else:
+                raise InputError(f"--methods: {shown(name)} is unknown; {suggestion(name, (*SWITCHES, *NUMBERS))}")
+        return cls.of(options)
+
+
+def _number(text: str, number: str, place: str) -> float:
+    """The number in a text.
+
+    Raises:
+        InputError: There is none at that place.
+    """
+    try:
+        return float(number)
+    except ValueError:
+        raise InputError(f"--methods: {shown(text)} has no number {place}") from None
+
+
+LOOSE: Final = Contestant("rkf78", 1e-6)
+"""What the others are tested against."""
+TIGHT: Final = Contestant("rkf78", 1e-9)
+"""What they are tested against as well where it is there, and it costs."""
+
+
+def default_contestants(device: str) -> tuple[Contestant, ...]:
+    """The words, and every method with the settings of `standard`, each once, as far as they run on a device.
+
+    At 1e-6 and without softer joints the implicit method and those of low order walk for half a minute and longer.
+    """
+    words = [Contestant.parse(word) for word in METHODS_BY_NEED]
+    alike = [Contestant.of({**METHODS_BY_NEED["standard"], "method": method}) for method in methods()]
+    return tuple(one for one in dict.fromkeys((*words, *alike)) if _runs_on(device, one))
+
+
+def _runs_on(device: str, contestant: Contestant) -> bool:
+    try:
+        validated(Options, {**contestant.options, "device": device}, "options")
+    except InputError:
+        return False
+    return True
