@@ -351,7 +351,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 break
 
             if wp.static(has_flight):
-                if flies == 0 and time >= K[BOARD_NOTES, NOTE_CLOSING_TIME]:
+                # flights of soft joints save nothing: their springs ring longer than impulses pause
+                if flies == 0 and time >= K[BOARD_NOTES, NOTE_CLOSING_TIME] and state.softness[world] == ZERO:
                     is_closed, _is_stiff, _kinetic, lost = project(
                         ends_start, forces_start, memory_start, K, place, n, True
                     )
@@ -372,7 +373,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                         publish(K, n, place)
                         barrier()
                         fastest = approach(K, L, maxima, place, n, pairs, slack)
-                        bound = wp.max(control.contact_step, ONE / fastest)
+                        bound = wp.max(K[BOARD_NOTES, NOTE_CONTACT_STEP], ONE / fastest)
                 h = wp.min(h, bound)
             lands = time + h >= stop_time
             if lands:
