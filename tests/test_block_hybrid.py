@@ -116,17 +116,17 @@ def test_landings_equal_the_cpu_form():
 
 
 def test_softness_changes_as_in_the_cpu_form():
-    """Joints that stiffen at each look, with the energy that this takes; none are closed before they are stiff."""
+    """Joints that stiffen at each look, with the energy that this takes, and are not closed meanwhile."""
     chains = [falling(12, SOFT, 0.3), loop(12, SOFT)]
     settings = {"parameters": PAPER, "soften_drive": True, "record_interval": 2e-5, "softness": 1.0}
     (ours, features), (theirs, _) = (bouncing(chains, **settings) for _ in range(2))
     for batch in (ours, theirs):
-        batch.control.stiffening_time = 4e-4
+        batch.control.stiffening_time = 2e-3
     both(ours, theirs, features, 100)
-    assert (theirs.state.softness.numpy() < 0.9).all()
+    assert (theirs.state.softness.numpy() < 0.99).all()
     assert theirs.losses(0)["softening"] != 0.0
-    assert list(theirs.state.softness.numpy() > 0) == [True, False]
-    assert list(theirs.state.flies.numpy()) == [0, 1]
+    assert (theirs.state.softness.numpy() > 0).all()
+    assert not theirs.state.flies.numpy().any()
     assert_close(ours, theirs, 1e-6)
 
 
