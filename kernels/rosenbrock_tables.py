@@ -1,5 +1,6 @@
 """Coefficients of Rosenbrock methods, as data."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -51,6 +52,69 @@ class RosenbrockTable:
             for j, coupling in enumerate(self.couplings[i]):
                 weights[j] += self.gamma * coupling * weights[i]
         return tuple(self.gamma * weight for weight in weights)
+
+    @cached_property
+    def second_order(self) -> "SecondOrderTable":
+        """The method for equations of second order."""
+        couplings = [[self.gamma * entry for entry in row] for row in self.couplings]
+        free: list[float] = []
+        parts: list[list[float]] = []
+        for row, coupling in zip(self.matrix, couplings, strict=True):
+            free.append(1.0 + _product(coupling, free))
+            part = [-entry for entry in coupling] + [1.0]
+            for entry, other in zip(row, parts, strict=True):
+                for k, value in enumerate(other):
+                    part[k] -= entry * value
+            parts.append(part)
+
+        def through_parts(row: Sequence[float]) -> tuple[float, ...]:
+            return tuple(sum(row[j] * parts[j][k] for j in range(k, len(row))) for k in range(len(row)))
+
+        velocity = tuple(through_parts(row) for row in self.matrix)
+        return SecondOrderTable(
+            free=tuple(free),
+            place=tuple(_product(row, free) for row in self.matrix),
+            velocity=velocity,
+            shift=tuple(
+                tuple(entry + other for entry, other in zip(*rows, strict=True))
+                for rows in zip(velocity, couplings, strict=True)
+            ),
+            drive=tuple(through_parts(row) for row in couplings),
+            loss=through_parts(self.quadrature),
+            loss_place=_product(self.quadrature, free),
+        )
+
+
+def _product(row: Sequence[float], values: Sequence[float]) -> float:
+    return sum(entry * value for entry, value in zip(row, values, strict=False))
+
+
+@dataclass(frozen=True)
+class SecondOrderTable:
+    """A method for q' = v, v' = a(q, v) in terms of what accelerations change, W_i = U_q,i / (hγ) − free_i v.
+
+    v is the velocity at the start of the step. A chain that no force acts on has W = 0: U_q,i = hγ free_i v, where
+    (1 − γ C) free = (1, …, 1). From U_q,i / (hγ) = v_i + γ Σ_j C_ij U_q,j / (hγ) + U_v,i follows U_v = P W with
+    (1 + A) P = 1 − γ C. So a stage leaves half as many numbers as it has. Without the subtraction of free motion the
+    rounding of coefficients would change velocities in each step alike.
+
+    Attributes:
+        free: See above.
+        place: Stage i is at q + hγ (place_i v + Σ_j<i A_ij W_j) …
+        velocity: … with the velocity v + Σ_j<i velocity_ij W_j; row i has i entries, as in all below.
+        shift: r_q,i / (hγ) is free_i v + Σ shift_ij W_j, and U_v,i is W_i less that sum.
+        drive: γ Σ_j C_ij U_v,j is Σ drive_ij W_j.
+        loss: Σ w_i U_v,i is Σ loss_i W_i, with the quadrature's weights w, …
+        loss_place: … and Σ w_i U_q,i is hγ (loss_place v + Σ w_i W_i).
+    """
+
+    free: tuple[float, ...]
+    place: tuple[float, ...]
+    velocity: tuple[tuple[float, ...], ...]
+    shift: tuple[tuple[float, ...], ...]
+    drive: tuple[tuple[float, ...], ...]
+    loss: tuple[float, ...]
+    loss_place: float
 
 
 _FOURTH = (-7.170454962423024, -4.741636671481785, -16.31002631330971, -1.062004044111401)
