@@ -7,6 +7,7 @@ from typing import Any
 from . import layout
 from .block_rosenbrock import factor_layout, rosenbrock_attempt
 from .block_step import explicit_attempt
+from .controller import implicit_controller, step_controller
 from .explicit import explicit_method
 from .hand_over import hand_over
 from .rigid_step import flight_method, flight_rows
@@ -24,6 +25,7 @@ class Method:
         name: What a user writes for ``method``.
         order: Order of the solution that is propagated.
         error_order: Order of the embedded solution; both set the controller's exponents.
+        controller: Warp functions (factor after acceptance, factor after rejection) for errors of this type.
         stages: Number of stages.
         reuses_last: Whether a step leaves the first stage of the next.
         scratch_rows: Rows of a chain's scratch block of so many columns.
@@ -38,6 +40,7 @@ class Method:
     name: str
     order: int
     error_order: int
+    controller: Callable[[type], Any]
     stages: int
     reuses_last: bool
     scratch_rows: Callable[[int], int]
@@ -69,6 +72,7 @@ def _explicit(name: str) -> Method:
         name=name,
         order=tableau.order,
         error_order=tableau.error_order,
+        controller=lambda real: step_controller(tableau.order, tableau.error_order, real),
         stages=tableau.stages,
         reuses_last=tableau.first_same_as_last,
         scratch_rows=lambda columns: layout.scratch_rows(tableau.stages),
@@ -85,6 +89,7 @@ def _rosenbrock(name: str) -> Method:
         name=name,
         order=table.order,
         error_order=table.error_order,
+        controller=lambda real: implicit_controller(table.error_order, real),
         stages=table.stages,
         reuses_last=False,
         scratch_rows=lambda columns: rosenbrock_rows(name, columns),
