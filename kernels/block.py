@@ -33,7 +33,7 @@ from .block_memory import barrier, barrier_if_any, block_maxima, clock, tile_add
 from .block_step import Link, Place, Trial, block_stage, error_of, link_on, note_first, vec3d, vec5d
 from .block_surroundings import block_approach, block_surroundings, raised
 from .broadphase import list_layout
-from .controller import LEAST_SHRINKAGE, classical_controller, step_controller
+from .controller import LEAST_SHRINKAGE, classical_controller
 from .driver import (
     BOUNCE_PAUSE,
     COMPILER_FLAGS,
@@ -179,7 +179,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     hand_over, stage = block_stage(block_dim)
     greatest, _greatest_of_five = block_maxima(block_dim)
     measure, bound_of, meet_fixed_body = block_surroundings(features, block_dim)
-    growth, shrinkage = step_controller(method.order, method.error_order, wp.float32)
+    growth, shrinkage = method.controller(wp.float32)
     build_list = block_list(columns, block_dim, features.broad_phase)
     clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, block_dim, touch)
     attempt_flight, project, open_joints = flight.block_functions(block_dim) if flight else (None,) * 3

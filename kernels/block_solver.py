@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import warp as wp
 
 from .block_memory import barrier, read, write
-from .cyclic_solver import block_algebra, block_type
+from .cyclic_solver import block_inverse, block_type
 from .elementary import ONE, quotient
 
 wp.set_module_options({"enable_backward": False})
@@ -218,7 +218,7 @@ def block_solver(memory: FactorLayout, couplings_of, diagonal_of=None):
     backward = [memory.backward(level) for level in range(reductions + 1)]
     widths = [memory.width(level) for level in range(reductions + 1)]
     load_block, store_block, load_vector, store_vector = block_access(order)
-    *_, inverse_block = block_algebra(order)
+    inverse_block = block_inverse(order)
 
     @wp.func
     def rows_at(n: int, level: int):

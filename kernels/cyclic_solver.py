@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from .elementary import ONE, ZERO, quotient
+from .elementary import ONE, quotient
 
 wp.set_module_options({"enable_backward": False})
 
@@ -26,10 +26,6 @@ LANES = 8
 """Segments of a loop: doubles in the widest vectors of a CPU."""
 ROUNDS = 3
 """Rounds of cyclic reduction, after which each separator's equation holds that separator alone: log₂ of the lanes."""
-
-GAP = 32
-"""Rows of 16 columns between a round and the next: clang fears that a shifted load waits for a store less than 4 KiB
-behind it, and makes shorter vectors."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +40,8 @@ class SegmentLayout:
     Attributes:
         size: Order B of the blocks.
         columns: Static width of a memory row, see :func:`segment_columns`.
-        matrix: First memory row of the matrix: blocks L, D, U, then three that elimination adds.
-        right: First of 3 B memory rows: the right-hand side, which the solution replaces, and what solving needs.
+        matrix: First memory row of the matrix: blocks L, D, U, then two that elimination adds.
+        right: First of B memory rows: the right-hand side, which the solution replaces.
     """
 
     size: int
@@ -60,22 +56,12 @@ class SegmentLayout:
     @property
     def matrix_rows(self) -> int:
         """Memory rows of the matrix."""
-        return 6 * self.size**2
-
-    @property
-    def right_rows(self) -> int:
-        """Memory rows of the right-hand side."""
-        return 3 * self.size
+        return 5 * self.size**2
 
     @property
     def separator_rows(self) -> int:
-        """Rows of 16 columns for the system of the separators."""
-        return self.round_rows * (ROUNDS + 1) + self.size**2 * (2 * ROUNDS + 1) + 3 * self.size
-
-    @property
-    def round_rows(self) -> int:
-        """Such rows from one round of cyclic reduction to the next."""
-        return 4 * self.size**2 + self.size + GAP
+        """Rows of eight columns for the system of the separators."""
+        return (2 * ROUNDS + 2) * self.size**2
 
 
 def segment_columns(links: int) -> int:
@@ -116,45 +102,9 @@ def block_type(size: int):
 
 
 @functools.cache
-def block_algebra(size: int):
-    """Warp functions on B × B blocks, B = 2 or 3: (load, store, load and store a vector, multiple of one, invert)."""
+def block_inverse(size: int):
+    """Warp function that inverts a B × B block by cofactors, B = 2 or 3."""
     Block = block_type(size)
-    Vector = wp.types.vector(length=size, dtype=wp.float64)
-
-    @wp.func
-    def load(S: wp.array2d(dtype=wp.float64), row: int, column: int):
-        block = Block()
-        for i in range(wp.static(size)):
-            for j in range(wp.static(size)):
-                block[i, j] = S[row + wp.static(size * i + j), column]
-        return block
-
-    @wp.func
-    def store(S: wp.array2d(dtype=wp.float64), row: int, column: int, block: Block):
-        for i in range(wp.static(size)):
-            for j in range(wp.static(size)):
-                S[row + wp.static(size * i + j), column] = block[i, j]
-
-    @wp.func
-    def load_vector(S: wp.array2d(dtype=wp.float64), row: int, column: int):
-        vector = Vector()
-        for i in range(wp.static(size)):
-            vector[i] = S[row + i, column]
-        return vector
-
-    @wp.func
-    def store_vector(S: wp.array2d(dtype=wp.float64), row: int, column: int, vector: Vector):
-        for i in range(wp.static(size)):
-            S[row + i, column] = vector[i]
-
-    @wp.func
-    def scalar_block(value: wp.float64):
-        block = Block()
-        for i in range(wp.static(size)):
-            for j in range(wp.static(size)):
-                block[i, j] = ZERO
-            block[i, i] = value
-        return block
 
     if size == 2:
 
@@ -183,220 +133,246 @@ def block_algebra(size: int):
                 (m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]) * scale,
             )
 
-    return load, store, load_vector, store_vector, scalar_block, inverse
+    return inverse
+
+
+_INVERSES = {
+    2: """
+        const lanes scale = 1.0 / (m(0, 0) * m(1, 1) - m(0, 1) * m(1, 0));
+        to(0, 0) = m(1, 1) * scale;
+        to(0, 1) = -m(0, 1) * scale;
+        to(1, 0) = -m(1, 0) * scale;
+        to(1, 1) = m(0, 0) * scale;
+    """,
+    3: """
+        const lanes a = m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1);
+        const lanes b = m(1, 2) * m(2, 0) - m(1, 0) * m(2, 2);
+        const lanes c = m(1, 0) * m(2, 1) - m(1, 1) * m(2, 0);
+        const lanes scale = 1.0 / (m(0, 0) * a + m(0, 1) * b + m(0, 2) * c);
+        to(0, 0) = a * scale;
+        to(0, 1) = (m(0, 2) * m(2, 1) - m(0, 1) * m(2, 2)) * scale;
+        to(0, 2) = (m(0, 1) * m(1, 2) - m(0, 2) * m(1, 1)) * scale;
+        to(1, 0) = b * scale;
+        to(1, 1) = (m(0, 0) * m(2, 2) - m(0, 2) * m(2, 0)) * scale;
+        to(1, 2) = (m(0, 2) * m(1, 0) - m(0, 0) * m(1, 2)) * scale;
+        to(2, 0) = c * scale;
+        to(2, 1) = (m(0, 1) * m(2, 0) - m(0, 0) * m(2, 1)) * scale;
+        to(2, 2) = (m(0, 0) * m(1, 1) - m(0, 1) * m(1, 0)) * scale;
+    """,
+}
+
+
+def _rotated(name: str, by: int) -> str:
+    """C++ for the vector (or, lane by lane, the block) whose lane s is lane s + by of this one."""
+    return f"__builtin_shufflevector({name}, {name}, {', '.join(str((s + by) % LANES) for s in range(LANES))})"
+
+
+def _vectors(layout: SegmentLayout) -> str:
+    """C++ for numbers of all segments at once: a vector has a lane a segment, a block or a column is made of such."""
+    size = layout.size
+    turns = "".join(
+        f"""
+        const auto turned_{by} = [](const auto& from) {{
+            auto to = from;
+            for (auto& number : to.m) number = {_rotated("number", by)};
+            return to;
+        }};"""
+        for by in sorted({1, LANES - 1} | {2**r for r in range(ROUNDS)} | {LANES - 2**r for r in range(ROUNDS)})
+    )
+    return f"""
+        typedef double lanes __attribute__((vector_size({8 * LANES}), aligned(8), may_alias));
+        struct column {{
+            enum {{ width = 1 }};
+            lanes m[{size}];
+        }};
+        struct block {{
+            enum {{ width = {size} }};
+            lanes m[{size * size}];
+            lanes& operator()(int i, int j) {{ return m[{size} * i + j]; }}
+            const lanes& operator()(int i, int j) const {{ return m[{size} * i + j]; }}
+        }};
+        const long next_row = {layout.columns // LANES};
+        const auto at_place = [=](int row, int p) {{
+            return reinterpret_cast<lanes*>(segments) + next_row * row + p;
+        }};
+        const auto at_separators = [=](int row) {{
+            return reinterpret_cast<lanes*>(separators) + row;
+        }};
+        const auto load = [](auto& to, const lanes* from, long stride) {{
+            for (auto& number : to.m) {{
+                number = *from;
+                from += stride;
+            }}
+        }};
+        const auto store = [](const auto& from, lanes* to, long stride) {{
+            for (const auto& number : from.m) {{
+                *to = number;
+                to += stride;
+            }}
+        }};
+        // to += sign a b; the sign is known when this is compiled
+        const auto add = [](auto& to, const block& a, const auto& b, double sign) {{
+            const int width = b.width;
+            for (int i = 0; i < {size}; i++)
+                for (int j = 0; j < width; j++)
+                    for (int k = 0; k < {size}; k++)
+                        to.m[width * i + j] += sign * a(i, k) * b.m[width * k + j];
+        }};
+        const auto invert = [](const block& m) {{
+            block to;
+            {_INVERSES[size]}
+            return to;
+        }};
+        const auto multiple_of_one = [](lanes value) {{
+            block to = {{}};
+            for (int i = 0; i < {size}; i++) to(i, i) = value;
+            return to;
+        }};
+        {turns}"""
 
 
 @functools.cache
 def cyclic_solver(layout: SegmentLayout):
     """Warp functions (factor, solve) for systems that lie as this layout says.
 
+    Native, in vectors of all segments: what a place needs of the one before stays in registers. As loops of Warp over
+    lanes it went through memory, and the processor waited for its stores.
+
     Returns:
-        ``factor(S, R, places, full, lanes)`` and ``solve(S, R, places, lanes)``. S is the block of memory, R one of
-        ``separator_rows`` × 16; ``lanes`` is 8, but unknown to the compiler, which would otherwise unroll loops over
-        lanes instead of making vectors of them. The matrix at a repeated separator must be L = −1, D = 1, U = 0, the
-        right-hand side 0. After solving, the place before the first holds the separators before the segments.
+        ``factor(S, R, places, full)`` and ``solve(S, R, places)``. S is the block of memory, R one of
+        ``separator_rows`` × 8. The matrix at a repeated separator must be L = −1, D = 1, U = 0, the right-hand side 0.
     """
     size = layout.size
-    Block = block_type(size)
     square = size * size
-    load, store, load_vector, store_vector, scalar_block, inverse = block_algebra(size)
-    lower, diagonal, upper, fill, head, first_sum = (layout.block(k) for k in range(6))
-    right, partial, before_segment = (layout.right + size * k for k in range(3))
-    # rows of R: a round after the other, what rows take from one another, and what leads there and back
-    per_round = layout.round_rows
-    below, centre, above, pivots, values = (
-        tuple(per_round * r + square * k for r in range(ROUNDS + 1)) for k in range(5)
+    lower, diagonal, upper, fill, head = (layout.block(k) for k in range(5))
+    # rows of R: what leads from sums to separators, what rows take from one another in each round, the last pivots
+    coupling, last_pivot = 0, square
+    take_before, take_after = ([square * (2 + 2 * r + k) for r in range(ROUNDS)] for k in range(2))
+    vectors = _vectors(layout)
+    reduce = "".join(
+        f"""
+        {{
+            const block pivot = invert(centre);
+            const block pivot_before = turned_{LANES - 2**r}(pivot), pivot_after = turned_{2**r}(pivot);
+            block from_before = {{}}, from_after = {{}}, next_below = {{}}, next_above = {{}};
+            add(from_before, below, pivot_before, 1.0);
+            add(from_after, above, pivot_after, 1.0);
+            store(from_before, at_separators({take_before[r]}), 1);
+            store(from_after, at_separators({take_after[r]}), 1);
+            add(centre, from_before, turned_{LANES - 2**r}(above), -1.0);
+            add(centre, from_after, turned_{2**r}(below), -1.0);
+            add(next_below, from_before, turned_{LANES - 2**r}(below), -1.0);
+            add(next_above, from_after, turned_{2**r}(above), -1.0);
+            below = next_below;
+            above = next_above;
+        }}"""
+        for r in range(ROUNDS)
     )
-    taken = per_round * (ROUNDS + 1)
-    take_before, take_after = (tuple(taken + square * (2 * r + k) for r in range(ROUNDS)) for k in range(2))
-    coupling = taken + square * 2 * ROUNDS
-    first_parts = coupling + square
-    own_parts = first_parts + size
-    separators = own_parts + size
+    take = "".join(
+        f"""
+        {{
+            const column from_before = turned_{LANES - 2**r}(value), from_after = turned_{2**r}(value);
+            load(factor, at_separators({take_before[r]}), 1);
+            add(value, factor, from_before, -1.0);
+            load(factor, at_separators({take_after[r]}), 1);
+            add(value, factor, from_after, -1.0);
+        }}"""
+        for r in range(ROUNDS)
+    )
+
+    # Row p becomes x_p = y_p − U x_{p+1} + fill e, y_p = D (r_p − L y_{p−1}), with new D, U and fill; e is the
+    # separator before the segment. The first unknown that the segment owns is Σ head y + sum e plus the segment's
+    # separator times the head that is left over.
+    @wp.func_native(f"""
+        {vectors}
+        lanes owns = {{}}, begins = {{}};
+        for (int s = 0; s < {LANES}; s++) {{
+            owns[s] = s < full;
+            begins[s] = s >= full;
+        }}
+        block ahead = {{}}, sum = {{}}, across = multiple_of_one(lanes{{}} + 1.0), head = multiple_of_one(owns);
+        block low, up;
+        for (int p = 1; p < places; p++) {{
+            block pivot, product = {{}};
+            load(low, at_place({lower}, p), next_row);
+            load(up, at_place({upper}, p), next_row);
+            load(pivot, at_place({diagonal}, p), next_row);
+            add(pivot, low, ahead, -1.0);
+            pivot = invert(pivot);
+            add(product, low, across, 1.0);
+            ahead = block{{}};
+            across = block{{}};
+            add(ahead, pivot, up, 1.0);
+            add(across, pivot, product, -1.0);
+            add(sum, head, across, 1.0);
+            store(pivot, at_place({diagonal}, p), next_row);
+            store(ahead, at_place({upper}, p), next_row);
+            store(across, at_place({fill}, p), next_row);
+            store(head, at_place({head}, p), next_row);
+            block left_over = multiple_of_one(p == 1 ? begins : lanes{{}});
+            add(left_over, head, ahead, -1.0);
+            head = left_over;
+        }}
+        block below = {{}}, centre, above = {{}};
+        load(low, at_place({lower}, places), next_row);
+        load(up, at_place({upper}, places), next_row);
+        load(centre, at_place({diagonal}, places), next_row);
+        add(below, low, across, 1.0);
+        add(centre, low, ahead, -1.0);
+        add(centre, up, turned_1(sum), 1.0);
+        add(above, up, turned_1(head), 1.0);
+        store(up, at_separators({coupling}), 1);
+        {reduce}
+        for (int k = 0; k < {square}; k++) centre.m[k] += below.m[k] + above.m[k];
+        store(invert(centre), at_separators({last_pivot}), 1);
+    """)
+    def factor_lanes(segments: wp.uint64, separators: wp.uint64, places: int, full: int): ...
+
+    @wp.func_native(f"""
+        {vectors}
+        block factor;
+        column value = {{}}, first = {{}}, next;
+        for (int p = 1; p < places; p++) {{
+            load(next, at_place({layout.right}, p), next_row);
+            load(factor, at_place({lower}, p), next_row);
+            add(next, factor, value, -1.0);
+            value = column{{}};
+            load(factor, at_place({diagonal}, p), next_row);
+            add(value, factor, next, 1.0);
+            load(factor, at_place({head}, p), next_row);
+            add(first, factor, value, 1.0);
+            store(value, at_place({layout.right}, p), next_row);
+        }}
+        load(next, at_place({layout.right}, places), next_row);
+        load(factor, at_place({lower}, places), next_row);
+        add(next, factor, value, -1.0);
+        value = next;
+        load(factor, at_separators({coupling}), 1);
+        add(value, factor, turned_1(first), -1.0);
+        {take}
+        next = column{{}};
+        load(factor, at_separators({last_pivot}), 1);
+        add(next, factor, value, 1.0);
+        store(next, at_place({layout.right}, places), next_row);
+        const column before = turned_{LANES - 1}(next);
+        for (int p = places - 1; p > 0; p--) {{
+            load(value, at_place({layout.right}, p), next_row);
+            load(factor, at_place({fill}, p), next_row);
+            add(value, factor, before, 1.0);
+            load(factor, at_place({upper}, p), next_row);
+            add(value, factor, next, -1.0);
+            store(value, at_place({layout.right}, p), next_row);
+            next = value;
+        }}
+    """)
+    def solve_lanes(segments: wp.uint64, separators: wp.uint64, places: int): ...
 
     @wp.func
-    def copy_twice(
-        S: wp.array2d(dtype=wp.float64), row: int, column: int, R: wp.array2d(dtype=wp.float64), to: int, lanes: int
-    ):
-        s = int(0)
-        while s < lanes:
-            R[to, s] = S[row, column + s]
-            s += 1
-        s = int(0)
-        while s < lanes:
-            R[to, s + 8] = R[to, s]
-            s += 1
+    def factor(S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), places: int, full: int):
+        factor_lanes(S.ptr, R.ptr, places, full)
 
     @wp.func
-    def store_twice(R: wp.array2d(dtype=wp.float64), row: int, s: int, block: Block):
-        store(R, row, s, block)
-        store(R, row, s + 8, block)
-
-    @wp.func
-    def eliminate_segments(S: wp.array2d(dtype=wp.float64), places: int, full: int, lanes: int):
-        """Row p becomes x_p = D r'_p − U x_{p+1} + fill e with r'_p = r_p − L r'_{p−1}, all four of them new.
-
-        e is the separator before the segment. The first unknown that the segment owns is Σ head r' + first_sum e plus
-        the segment's separator times the head that is left over, one place further.
-        """
-        s = int(0)
-        while s < lanes:
-            store(S, wp.static(diagonal), s, scalar_block(ZERO))
-            store(S, wp.static(upper), s, scalar_block(ZERO))
-            store(S, wp.static(fill), s, scalar_block(ONE))
-            store(S, wp.static(head), 8 + s, scalar_block(wp.where(s < full, ONE, ZERO)))
-            store(S, wp.static(first_sum), s, scalar_block(ZERO))
-            s += 1
-        p = int(1)
-        while p < places:
-            c = place_column(p)
-            s = int(0)
-            while s < lanes:
-                here = c + s
-                before = here - 8
-                low = load(S, wp.static(lower), here)
-                pivot = inverse(load(S, wp.static(diagonal), here) - low * load(S, wp.static(upper), before))
-                up = pivot * load(S, wp.static(upper), here)
-                across = -(pivot * (low * load(S, wp.static(fill), before)))
-                first = load(S, wp.static(head), here)
-                begins = wp.where(p == 1 and s >= full, ONE, ZERO)
-                store(S, wp.static(head), here + 8, scalar_block(begins) - first * up)
-                store(S, wp.static(first_sum), here, load(S, wp.static(first_sum), before) + first * across)
-                store(S, wp.static(head), here, first * pivot)
-                store(S, wp.static(lower), here, low * load(S, wp.static(diagonal), before))
-                store(S, wp.static(diagonal), here, pivot)
-                store(S, wp.static(upper), here, up)
-                store(S, wp.static(fill), here, across)
-                s += 1
-            p += 1
-
-    @wp.func
-    def factor(S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), places: int, full: int, lanes: int):
-        eliminate_segments(S, places, full, lanes)
-        # what the first unknown of the next segment depends on, beside its separator
-        last = place_column(places)
-        k = int(0)
-        while k < wp.static(square):
-            copy_twice(S, wp.static(head) + k, last, R, wp.static(above[0]) + k, lanes)
-            copy_twice(S, wp.static(first_sum) + k, place_column(places - 1), R, wp.static(centre[0]) + k, lanes)
-            s = int(0)
-            while s < lanes:
-                S[wp.static(head) + k, last + s] = R[wp.static(above[0]) + k, s + 1]
-                S[wp.static(first_sum) + k, last + s] = R[wp.static(centre[0]) + k, s + 1]
-                s += 1
-            k += 1
-        here = int(last)
-        while here < last + lanes:
-            before = here - 8
-            low = load(S, wp.static(lower), here)
-            up = load(S, wp.static(upper), here)
-            middle = load(S, wp.static(diagonal), here) - low * load(S, wp.static(upper), before)
-            store(S, wp.static(fill), here, low * load(S, wp.static(fill), before))
-            store(S, wp.static(first_sum), here, middle + up * load(S, wp.static(first_sum), here))
-            store(S, wp.static(head), here, up * load(S, wp.static(head), here))
-            store(S, wp.static(lower), here, low * load(S, wp.static(diagonal), before))
-            here += 1
-        k = int(0)
-        while k < wp.static(square):
-            copy_twice(S, wp.static(fill) + k, last, R, wp.static(below[0]) + k, lanes)
-            copy_twice(S, wp.static(first_sum) + k, last, R, wp.static(centre[0]) + k, lanes)
-            copy_twice(S, wp.static(head) + k, last, R, wp.static(above[0]) + k, lanes)
-            copy_twice(S, wp.static(upper) + k, last, R, wp.static(coupling) + k, lanes)
-            k += 1
-        for r in range(wp.static(ROUNDS)):
-            s = int(0)
-            while s < lanes:
-                store_twice(R, wp.static(pivots[r]), s, inverse(load(R, wp.static(centre[r]), s)))
-                s += 1
-            s = int(0)
-            while s < lanes:
-                before = s + wp.static(8 - 2**r)
-                after = s + wp.static(2**r)
-                from_before = load(R, wp.static(below[r]), s) * load(R, wp.static(pivots[r]), before)
-                from_after = load(R, wp.static(above[r]), s) * load(R, wp.static(pivots[r]), after)
-                middle = load(R, wp.static(centre[r]), s) - from_before * load(R, wp.static(above[r]), before)
-                store(R, wp.static(centre[r + 1]), s, middle - from_after * load(R, wp.static(below[r]), after))
-                store_twice(R, wp.static(below[r + 1]), s, -(from_before * load(R, wp.static(below[r]), before)))
-                store_twice(R, wp.static(above[r + 1]), s, -(from_after * load(R, wp.static(above[r]), after)))
-                store(R, wp.static(take_before[r]), s, from_before)
-                store(R, wp.static(take_after[r]), s, from_after)
-                s += 1
-        s = int(0)
-        while s < lanes:
-            middle = load(R, wp.static(centre[ROUNDS]), s) + load(R, wp.static(below[ROUNDS]), s)
-            store(R, wp.static(pivots[ROUNDS]), s, inverse(middle + load(R, wp.static(above[ROUNDS]), s)))
-            s += 1
-
-    @wp.func
-    def solve(S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), places: int, lanes: int):
-        last = place_column(places)
-        s = int(0)
-        while s < lanes:
-            for k in range(wp.static(size)):
-                S[wp.static(right + k), s] = ZERO
-                S[wp.static(partial + k), s] = ZERO
-            s += 1
-        p = int(1)
-        while p < places + 1:
-            c = place_column(p)
-            s = int(0)
-            while s < lanes:
-                here = c + s
-                value = load_vector(S, wp.static(right), here)
-                value -= load(S, wp.static(lower), here) * load_vector(S, wp.static(right), here - 8)
-                first = load_vector(S, wp.static(partial), here - 8) + load(S, wp.static(head), here) * value
-                store_vector(S, wp.static(right), here, value)
-                store_vector(S, wp.static(partial), here, first)
-                s += 1
-            p += 1
-        for k in range(wp.static(size)):
-            copy_twice(S, wp.static(partial + k), place_column(places - 1), R, wp.static(first_parts + k), lanes)
-            copy_twice(S, wp.static(right + k), last, R, wp.static(own_parts + k), lanes)
-        s = int(0)
-        while s < lanes:
-            value = load_vector(R, wp.static(own_parts), s)
-            value -= load(R, wp.static(coupling), s) * load_vector(R, wp.static(first_parts), s + 1)
-            store_vector(R, wp.static(values[0]), s, value)
-            store_vector(R, wp.static(values[0]), s + 8, value)
-            s += 1
-        for r in range(wp.static(ROUNDS)):
-            s = int(0)
-            while s < lanes:
-                value = load_vector(R, wp.static(values[r]), s)
-                value -= load(R, wp.static(take_before[r]), s) * load_vector(
-                    R, wp.static(values[r]), s + wp.static(8 - 2**r)
-                )
-                value -= load(R, wp.static(take_after[r]), s) * load_vector(
-                    R, wp.static(values[r]), s + wp.static(2**r)
-                )
-                store_vector(R, wp.static(values[r + 1]), s, value)
-                store_vector(R, wp.static(values[r + 1]), s + 8, value)
-                s += 1
-        s = int(0)
-        while s < lanes:
-            value = load(R, wp.static(pivots[ROUNDS]), s) * load_vector(R, wp.static(values[ROUNDS]), s)
-            store_vector(R, wp.static(separators), s, value)
-            store_vector(R, wp.static(separators), s + 8, value)
-            s += 1
-        for k in range(wp.static(size)):
-            s = int(0)
-            while s < lanes:
-                S[wp.static(right + k), last + s] = R[wp.static(separators + k), s]
-                S[wp.static(before_segment + k), last + s] = R[wp.static(separators + k), s + 7]
-                s += 1
-        p = places - 1
-        while p > 0:
-            c = place_column(p)
-            s = int(0)
-            while s < lanes:
-                here = c + s
-                across = load_vector(S, wp.static(before_segment), here + 8)
-                value = load(S, wp.static(diagonal), here) * load_vector(S, wp.static(right), here)
-                value += load(S, wp.static(fill), here) * across
-                value -= load(S, wp.static(upper), here) * load_vector(S, wp.static(right), here + 8)
-                store_vector(S, wp.static(right), here, value)
-                store_vector(S, wp.static(before_segment), here, across)
-                s += 1
-            p -= 1
+    def solve(S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), places: int):
+        solve_lanes(S.ptr, R.ptr, places)
 
     return factor, solve

@@ -21,7 +21,7 @@ from .contact import (
     resolve_sprocket,
     sprocket_gap,
 )
-from .controller import LEAST_SHRINKAGE, classical_controller, step_controller
+from .controller import LEAST_SHRINKAGE, classical_controller
 from .elementary import HALF, ONE, TWO, ZERO
 from .explicit import place_ends
 from .hand_over import QUIET_TIME
@@ -193,7 +193,7 @@ def make_advance(features: Features):
     softens = features.softens
     look = sampling(features.watch, softens)
     first_stage, attempt, commit = method.functions(columns)
-    growth, shrinkage = step_controller(method.order, method.error_order)
+    growth, shrinkage = method.controller(wp.float64)
     # on the sprocket impulses never pause
     flight = None if has_sprocket else method.flight
     has_flight = flight is not None

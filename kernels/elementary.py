@@ -86,15 +86,22 @@ def quotient(a: wp.float64, b: wp.float64) -> wp.float64:
 
 
 @wp.func
+def turn(angle: wp.float64):
+    """Cosine and sine of an angle [rad], to rounding within ±π/4, to 4e-14 within ±1."""
+    z = angle * angle
+    sine = angle + angle * z * (S1 + z * (S2 + z * (S3 + z * (S4 + z * (S5 + z * S6)))))
+    cosine = ONE - (HALF * z - z * z * (C1 + z * (C2 + z * (C3 + z * (C4 + z * (C5 + z * C6))))))
+    return cosine, sine
+
+
+@wp.func
 def cos_sin(angle: wp.float64):
     """Cosine and sine of an angle [rad], to about one unit in the last place for |angle| < 1e5."""
     shifted = angle * TWO_OVER_PI + ROUNDER
     quarter = shifted - ROUNDER
     turns = wp.cast(shifted, wp.int64)
     r = ((angle - quarter * HALF_PI_1) - quarter * HALF_PI_2) - quarter * HALF_PI_3
-    z = r * r
-    s = r + r * z * (S1 + z * (S2 + z * (S3 + z * (S4 + z * (S5 + z * S6)))))
-    c = ONE - (HALF * z - z * z * (C1 + z * (C2 + z * (C3 + z * (C4 + z * (C5 + z * C6))))))
+    c, s = turn(r)
     odd = (turns & wp.int64(1)) != wp.int64(0)
     cosine = wp.where(odd, s, c)
     sine = wp.where(odd, c, s)

@@ -9,6 +9,7 @@ from .block_flight import flight_attempt
 from .block_rigid import FlightLayout, block_rigid_joints
 from .block_rosenbrock import factor_layout, rosenbrock_attempt
 from .block_step import explicit_attempt
+from .controller import implicit_controller, step_controller
 from .explicit import explicit_method
 from .hand_over import hand_over
 from .rigid_step import flight_method, flight_rows
@@ -26,6 +27,7 @@ class Method:
         name: What a user writes for ``method``.
         order: Order of the solution that is propagated.
         error_order: Order of the embedded solution; both set the controller's exponents.
+        controller: Warp functions (factor after acceptance, factor after rejection) for errors of this type.
         stages: Number of stages.
         reuses_last: Whether a step leaves the first stage of the next.
         scratch_rows: Rows of a chain's scratch block of so many columns.
@@ -40,6 +42,7 @@ class Method:
     name: str
     order: int
     error_order: int
+    controller: Callable[[type], Any]
     stages: int
     reuses_last: bool
     scratch_rows: Callable[[int], int]
@@ -79,6 +82,7 @@ def _explicit(name: str) -> Method:
         name=name,
         order=tableau.order,
         error_order=tableau.error_order,
+        controller=lambda real: step_controller(tableau.order, tableau.error_order, real),
         stages=tableau.stages,
         reuses_last=tableau.first_same_as_last,
         scratch_rows=lambda columns: layout.scratch_rows(tableau.stages),
@@ -95,6 +99,7 @@ def _rosenbrock(name: str) -> Method:
         name=name,
         order=table.order,
         error_order=table.error_order,
+        controller=lambda real: implicit_controller(table.error_order, real),
         stages=table.stages,
         reuses_last=False,
         scratch_rows=lambda columns: rosenbrock_rows(name, columns),

@@ -20,7 +20,7 @@ from typing import Any
 
 import warp as wp
 
-from .cyclic_solver import cyclic_solver, place_column, row_at, segment_places
+from .cyclic_solver import LANES, cyclic_solver, place_column, row_at, segment_places
 from .elementary import HALF, ONE, ZERO, cos_sin, order_bits
 from .joint import smoothed_torque
 from .layout import OMEGA, STAGES, THETA, U, V, X, Y
@@ -203,12 +203,12 @@ def rigid_joints(columns: int) -> RigidJoints:
     ):
         """S of the directions, ready to solve with; ``factor`` and ``solve`` keep it until the next call."""
         assemble(S, chain, places, full)
-        factor(S, R, places, full, wp.min(8 * places, 8))
+        factor(S, R, places, full)
 
     @wp.func
     def solve_joints(S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), places: int, full: int):
         """The right-hand side becomes the solution, also before the first places."""
-        solve(S, R, places, wp.min(8 * places, 8))
+        solve(S, R, places)
         pad_solution(S, places, full)
 
     @wp.func
@@ -371,7 +371,7 @@ def rigid_joints(columns: int) -> RigidJoints:
         """
         # clang does not inline this: without the static shapes anew its loops would not vectorise
         S = wp.array(ptr=rows.ptr, shape=(wp.static(ROWS_OF_RIGID), wp.static(width)), dtype=wp.float64)
-        R = wp.array(ptr=separators.ptr, shape=(wp.static(separator_rows), 16), dtype=wp.float64)
+        R = wp.array(ptr=separators.ptr, shape=(wp.static(separator_rows), LANES), dtype=wp.float64)
         corrections = int(0)
         widest = openings(S, chain, places, full)
         factorise(S, R, chain, places, full)

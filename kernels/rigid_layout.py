@@ -24,13 +24,13 @@ FORCE = 22
 BASE_RATE = 24
 # The system S F = r.
 SYSTEM = 27
-ROWS_OF_RIGID = SYSTEM + 30
+ROWS_OF_RIGID = SYSTEM + 22
 
 
 @functools.cache
 def force_layout(columns: int) -> SegmentLayout:
     """Where S, r and F lie, for scratch blocks of this width."""
-    return SegmentLayout(size=2, columns=segment_columns(columns), matrix=SYSTEM, right=SYSTEM + 24)
+    return SegmentLayout(size=2, columns=segment_columns(columns), matrix=SYSTEM, right=SYSTEM + 20)
 
 
 @wp.func

@@ -23,7 +23,7 @@ from typing import Any
 import warp as wp
 
 from .controller import error_bits
-from .cyclic_solver import SegmentLayout, cyclic_solver, place_column, segment_places
+from .cyclic_solver import LANES, SegmentLayout, cyclic_solver, place_column, segment_places
 from .elementary import ONE, TWO, ZERO, cos_sin, order_bits
 from .layout import LOST_FRICTION
 from .rigid import rigid_joints
@@ -66,13 +66,13 @@ FLIGHT_SYSTEM = FIRST_STAGE_ROW + 6 * ROS34PW2.stages
 def friction_layout(columns: int) -> SegmentLayout:
     """Where the system of the stages lies, for scratch blocks of this width."""
     width = force_layout(columns).columns
-    return SegmentLayout(size=3, columns=width, matrix=FLIGHT_SYSTEM, right=FLIGHT_SYSTEM + 54)
+    return SegmentLayout(size=3, columns=width, matrix=FLIGHT_SYSTEM, right=FLIGHT_SYSTEM + 45)
 
 
 def flight_rows(columns: int) -> int:
     """Rows that a flight takes of a chain's scratch block of this width."""
     forces, friction = force_layout(columns), friction_layout(columns)
-    doubles = (FLIGHT_SYSTEM + 63) * forces.columns + 16 * (forces.separator_rows + friction.separator_rows)
+    doubles = (FLIGHT_SYSTEM + 48) * forces.columns + LANES * (forces.separator_rows + friction.separator_rows)
     return -(-doubles // columns)
 
 
@@ -95,11 +95,11 @@ class FlightMemory:
 def flight_memory(columns: int, first_row: int) -> FlightMemory:
     """Memory of flights in the rows of scratch blocks of this width from ``first_row`` on."""
     forces, friction = force_layout(columns), friction_layout(columns)
-    count, width = FLIGHT_SYSTEM + 63, forces.columns
+    count, width = FLIGHT_SYSTEM + 48, forces.columns
     force_count, friction_count = forces.separator_rows, friction.separator_rows
     offset = 8 * first_row * columns
     force_offset = offset + 8 * count * width
-    friction_offset = force_offset + 8 * 16 * force_count
+    friction_offset = force_offset + 8 * LANES * force_count
 
     @wp.func
     def rows(K: wp.array2d(dtype=wp.float64)):
@@ -110,13 +110,15 @@ def flight_memory(columns: int, first_row: int) -> FlightMemory:
     @wp.func
     def force_rows(K: wp.array2d(dtype=wp.float64)):
         return wp.array(
-            ptr=K.ptr + wp.uint64(wp.static(force_offset)), shape=(wp.static(force_count), 16), dtype=wp.float64
+            ptr=K.ptr + wp.uint64(wp.static(force_offset)), shape=(wp.static(force_count), LANES), dtype=wp.float64
         )
 
     @wp.func
     def friction_rows(K: wp.array2d(dtype=wp.float64)):
         return wp.array(
-            ptr=K.ptr + wp.uint64(wp.static(friction_offset)), shape=(wp.static(friction_count), 16), dtype=wp.float64
+            ptr=K.ptr + wp.uint64(wp.static(friction_offset)),
+            shape=(wp.static(friction_count), LANES),
+            dtype=wp.float64,
         )
 
     return FlightMemory(rows, force_rows, friction_rows)
@@ -281,7 +283,7 @@ def flight_method(columns: int, first_row: int):
             S[wp.static(right + 1), c] = ZERO
             S[wp.static(right + 2), c] = wp.where(repeats, ZERO, S[DRAG, c - 8] - S[DRAG, c])
             c += 1
-        solve(S, R, places, wp.min(8 * places, 8))
+        solve(S, R, places)
         pad_solution(S, places, full)
 
     @wp.func
@@ -316,7 +318,7 @@ def flight_method(columns: int, first_row: int):
         places, full, _ = segment_places(chain.link_count)
         end = place_column(places + 1)
         prepare(S, chain, h, places, full)
-        factor(S, Q, places, full, wp.min(8 * places, 8))
+        factor(S, Q, places, full)
         stage = int(0)
         while stage < wp.static(stages):
             place_stage(S, stage, end)

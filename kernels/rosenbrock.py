@@ -3,9 +3,10 @@
 With v = q̇ and M q̈ = Q(q, v), put g = hγ, K = −∂Q/∂q and D = −∂Q/∂v. A stage of :class:`RosenbrockTable`,
 (1 − g J) U = r with r_q = g v + γ Σ C U_q, r_v = g M⁻¹ Q + γ Σ C U_v at the stage's place, is freed of its velocities:
 
-    (M + g D + g² K) U_q = g M r_v + (M + g D) r_q,    U_v = (U_q − r_q) / g.
+    (M + g D + g² K) Z = M (r_q / g + r_v) + g D r_q / g,    Z = U_q / g,    U_v = Z − r_q / g.
 
-The matrix couples neighbouring links only: 3 × 3 blocks along the loop, the same for all stages of a step.
+The matrix couples neighbouring links only: 3 × 3 blocks along the loop, the same for all stages of a step. All else of
+a stage are sums over the Z of those before, see :class:`SecondOrderTable`.
 
 All is done in the order of :mod:`cyclic_solver`: eight segments of the loop side by side, so that the next link is the
 next vector of memory. A joint lies at the column of the link on its left, rows of joints one place further.
@@ -16,11 +17,12 @@ import functools
 import warp as wp
 
 from .controller import error_bits
-from .cyclic_solver import cyclic_solver, place_column, row_at, segment_places
-from .elementary import ONE, TWO, ZERO, cos_sin, order_bits
-from .geometry import end_velocities
+from .cyclic_solver import LANES, cyclic_solver, place_column, row_at, segment_places
+from .elementary import ONE, TWO, ZERO, cos_sin, order_bits, turn
 from .joint import friction_slope, friction_torque, joint_force
+from .layout import INERTIA as LINK_INERTIA
 from .layout import LOST_DAMPING, LOST_FRICTION, OMEGA, STAGE_ROWS, STAGES, THETA, U, V, X, Y
+from .layout import MASS as LINK_MASS
 from .rosenbrock_layout import (
     BASE,
     BASE_COSINE,
@@ -32,28 +34,33 @@ from .rosenbrock_layout import (
     BASE_SINE,
     BASE_SPIN,
     BASE_TORQUE,
+    CHANGE,
+    COSINE,
     COUNTED,
     DRIVE,
     FIRST_STAGE_ROW,
     FORCE_X,
     INERTIA,
-    LEFT,
     MASS,
     NEW,
     POWER_DAMPING,
     POWER_FRICTION,
-    RIGHT,
     RIGHT_SIDE,
     SHIFT,
-    SHIFT_LEFT,
-    SHIFT_RIGHT,
+    SINE,
     SLOPE,
-    SPIN,
     pad_before,
     pad_behind,
     segments_of,
 )
-from .rosenbrock_system import assemble, first_right_hand_side, place_link, pull_joints, right_hand_side
+from .rosenbrock_system import (
+    assemble,
+    first_right_hand_side,
+    opening,
+    opening_rate,
+    pull_joints,
+    right_hand_side,
+)
 from .rosenbrock_tables import ROSENBROCK_TABLES
 from .types import Chain
 
@@ -66,8 +73,8 @@ GREATEST_TURN = wp.constant(wp.float64(1.0))
 def rosenbrock_rows(name: str, columns: int) -> int:
     """Rows of a chain's scratch block of this width."""
     segments = segments_of(columns)
-    rows = FIRST_STAGE_ROW + 6 * ROSENBROCK_TABLES[name].stages
-    doubles = rows * segments.columns + segments.separator_rows * 16
+    rows = FIRST_STAGE_ROW + 3 * ROSENBROCK_TABLES[name].stages
+    doubles = rows * segments.columns + segments.separator_rows * LANES
     return STAGES + STAGE_ROWS + -(-doubles // columns)
 
 
@@ -85,11 +92,14 @@ def rosenbrock_method(name: str, columns: int):
     """
     table = ROSENBROCK_TABLES[name]
     stages, gamma = table.stages, table.gamma
-    matrix, couplings, quadrature = table.matrix, table.couplings, table.quadrature
+    matrix, quadrature = table.matrix, table.quadrature
+    second = table.second_order
+    free, place = second.free, second.place
+    velocity, shift, drive = second.velocity, second.shift, second.drive
     segments = segments_of(columns)
     factor, solve = cyclic_solver(segments)
     width = segments.columns
-    rows = FIRST_STAGE_ROW + 6 * stages
+    rows = FIRST_STAGE_ROW + 3 * stages
     separator_rows = segments.separator_rows
     first_row = STAGES + STAGE_ROWS
     offset = 8 * first_row * columns
@@ -104,19 +114,21 @@ def rosenbrock_method(name: str, columns: int):
     @wp.func
     def separator_rows_of(K: wp.array2d(dtype=wp.float64)):
         return wp.array(
-            ptr=K.ptr + wp.uint64(wp.static(separator_offset)), shape=(wp.static(separator_rows), 16), dtype=wp.float64
+            ptr=K.ptr + wp.uint64(wp.static(separator_offset)),
+            shape=(wp.static(separator_rows), LANES),
+            dtype=wp.float64,
         )
 
     @wp.func
-    def link_at(place: int, segment: int, places: int, full: int, link_count: int):
-        row = row_at(place, segment, places, full)
+    def first_link(segment: int, places: int, full: int, link_count: int):
+        """Link at the first place of a segment."""
+        row = row_at(0, segment, places, full)
         return wp.where(row >= link_count, row - link_count, row)
 
-    first_rows = (LEFT, LEFT + 1, LEFT + 2, LEFT + 3, SPIN, BASE_COSINE, BASE_SINE, BASE + 5)
-    behind_start = pad_behind(first_rows)
-    behind_stage = pad_behind((*first_rows[:5], SHIFT_LEFT, SHIFT_LEFT + 1, SHIFT + 2))
-    behind_end = pad_behind((LEFT + 2, LEFT + 3, SPIN))
-    before_start = pad_before(first_rows[5:], 0)
+    behind_start = pad_behind((*range(BASE, BASE + 6), BASE_COSINE, BASE_SINE))
+    behind_stage = pad_behind((NEW, NEW + 1, NEW + 3, NEW + 4, NEW + 5, COSINE, SINE, SHIFT, SHIFT + 1, SHIFT + 2))
+    behind_end = pad_behind(tuple(range(CHANGE, CHANGE + 4)))
+    before_start = pad_before((BASE + 5, BASE_COSINE, BASE_SINE), 0)
     joints_start = pad_before(tuple(range(SLOPE, SLOPE + 7)), 1)
     joints_stage = pad_before(tuple(range(FORCE_X, FORCE_X + 6)), 1)
 
@@ -126,52 +138,36 @@ def rosenbrock_method(name: str, columns: int):
         n = chain.link_count
         places, full, _ = segment_places(n)
         end = place_column(places + 1)
-        p = int(0)
-        while p < places:
-            s = int(0)
-            while s < 8:
-                i = link_at(p, s, places, full, n)
-                c = 8 * p + 8 + s
+        # segment by segment: links lie one behind the other
+        s = int(0)
+        while s < 8:
+            i = int(first_link(s, places, full, n))
+            c = 8 + s
+            while c < end:
                 S[BASE, c] = K[X, i]
                 S[wp.static(BASE + 1), c] = K[Y, i]
                 S[wp.static(BASE + 2), c] = K[THETA, i]
                 S[wp.static(BASE + 3), c] = K[U, i]
                 S[wp.static(BASE + 4), c] = K[V, i]
                 S[wp.static(BASE + 5), c] = K[OMEGA, i]
-                inner = i % 2 == 0
-                S[MASS, c] = wp.where(inner, chain.inner_mass, chain.outer_mass)
-                S[INERTIA, c] = wp.where(inner, chain.inner_inertia, chain.outer_inertia)
-                repeats = (p == 0 and s >= full) or row_at(p, s, places, full) >= n
-                S[COUNTED, c] = wp.where(repeats, ZERO, ONE)
-                s += 1
-            p += 1
+                S[MASS, c] = K[LINK_MASS, i]
+                S[INERTIA, c] = K[LINK_INERTIA, i]
+                S[COUNTED, c] = wp.where((c < 16 and s >= full) or row_at(c // 8 - 1, s, places, full) >= n, ZERO, ONE)
+                i = wp.where(i == n - 1, 0, i + 1)
+                c += 8
+            s += 1
         c = int(8)
         while c < end:
             cosine, sine = cos_sin(S[wp.static(BASE + 2), c])
             S[BASE_COSINE, c] = cosine
             S[BASE_SINE, c] = sine
-            place_link(
-                S,
-                chain,
-                c,
-                S[BASE, c],
-                S[wp.static(BASE + 1), c],
-                S[wp.static(BASE + 3), c],
-                S[wp.static(BASE + 4), c],
-                S[wp.static(BASE + 5), c],
-                cosine,
-                sine,
-            )
             c += 1
         behind_start(S, places, full)
         before_start(S, places)
         c = int(8)
         while c < end:
-            cx = S[LEFT, c + 8] - S[RIGHT, c]
-            cy = S[wp.static(LEFT + 1), c + 8] - S[wp.static(RIGHT + 1), c]
-            cu = S[wp.static(LEFT + 2), c + 8] - S[wp.static(RIGHT + 2), c]
-            cv = S[wp.static(LEFT + 3), c + 8] - S[wp.static(RIGHT + 3), c]
-            spin = S[SPIN, c] - S[SPIN, c + 8]
+            cx, cy = opening(S, chain, c, BASE, BASE_COSINE)
+            cu, cv, spin = opening_rate(S, chain, c, wp.static(BASE + 3), BASE_COSINE)
             S[BASE_FORCE_X, c + 8] = joint_force(chain, cx, cu)
             S[BASE_FORCE_Y, c + 8] = joint_force(chain, cy, cv)
             S[BASE_TORQUE, c + 8] = friction_torque(chain, spin)
@@ -192,113 +188,61 @@ def rosenbrock_method(name: str, columns: int):
             S[wp.static(BASE_RATE + 1), c] = fy / S[MASS, c] - chain.gravity
             S[wp.static(BASE_RATE + 2), c] = (lever + S[BASE_TORQUE, c] - S[BASE_TORQUE, c + 8]) / S[INERTIA, c]
             c += 1
-        # where the driver looks for rates that are not finite
-        p = int(0)
-        while p < places:
-            s = int(0)
-            while s < 8:
-                i = link_at(p, s, places, full, n)
-                for k in range(3):
-                    K[wp.static(STAGES + k), i] = S[wp.static(BASE_RATE + k), 8 * p + 8 + s]
-                s += 1
-            p += 1
+        # the driver looks there for rates that are not finite
+        greatest = wp.int64(0)
+        c = int(8)
+        while c < end:
+            for k in range(3):
+                greatest = wp.max(greatest, order_bits(S[wp.static(BASE_RATE + k), c]))
+            c += 1
+        i = int(0)
+        while i < n:
+            for k in range(3):
+                K[wp.static(STAGES + k), i] = wp.cast(greatest, wp.float64)
+            i += 1
 
     @wp.func
-    def place_stage(S: wp.array2d(dtype=wp.float64), chain: Chain, stage: int, g: wp.float64, end: int):
-        """U of the stage before, this stage's place in the links' rows, r_q and γ Σ C U_v."""
-        inverse = ONE / g
+    def place_stage(S: wp.array2d(dtype=wp.float64), stage: int, g: wp.float64, end: int):
+        """W of the stage before, this stage's place and directions, r_q / g and γ Σ C U_v."""
         for i in range(1, wp.static(stages)):
             if stage == i:
                 c = int(8)
                 while c < end:
                     for k in range(3):
-                        change = S[wp.static(RIGHT_SIDE + k), c]
-                        speed_change = (change - S[wp.static(SHIFT + k), c]) * inverse
-                        S[wp.static(FIRST_STAGE_ROW + 6 * (i - 1) + k), c] = change
-                        S[wp.static(FIRST_STAGE_ROW + 6 * (i - 1) + 3 + k), c] = speed_change
-                    x = S[BASE, c]
-                    y = S[wp.static(BASE + 1), c]
-                    theta = S[wp.static(BASE + 2), c]
-                    u = S[wp.static(BASE + 3), c]
-                    v = S[wp.static(BASE + 4), c]
-                    w = S[wp.static(BASE + 5), c]
-                    rx = ZERO
-                    ry = ZERO
-                    rt = ZERO
-                    ru = ZERO
-                    rv = ZERO
-                    rw = ZERO
-                    for j in range(wp.static(i)):
-                        ux = S[wp.static(FIRST_STAGE_ROW + 6 * j), c]
-                        uy = S[wp.static(FIRST_STAGE_ROW + 6 * j + 1), c]
-                        ut = S[wp.static(FIRST_STAGE_ROW + 6 * j + 2), c]
-                        uu = S[wp.static(FIRST_STAGE_ROW + 6 * j + 3), c]
-                        uv = S[wp.static(FIRST_STAGE_ROW + 6 * j + 4), c]
-                        uw = S[wp.static(FIRST_STAGE_ROW + 6 * j + 5), c]
-                        x += wp.static(wp.float64(matrix[i][j])) * ux
-                        y += wp.static(wp.float64(matrix[i][j])) * uy
-                        theta += wp.static(wp.float64(matrix[i][j])) * ut
-                        u += wp.static(wp.float64(matrix[i][j])) * uu
-                        v += wp.static(wp.float64(matrix[i][j])) * uv
-                        w += wp.static(wp.float64(matrix[i][j])) * uw
-                        rx += wp.static(wp.float64(gamma * couplings[i][j])) * ux
-                        ry += wp.static(wp.float64(gamma * couplings[i][j])) * uy
-                        rt += wp.static(wp.float64(gamma * couplings[i][j])) * ut
-                        ru += wp.static(wp.float64(gamma * couplings[i][j])) * uu
-                        rv += wp.static(wp.float64(gamma * couplings[i][j])) * uv
-                        rw += wp.static(wp.float64(gamma * couplings[i][j])) * uw
-                    S[SHIFT, c] = rx + g * u
-                    S[wp.static(SHIFT + 1), c] = ry + g * v
-                    S[wp.static(SHIFT + 2), c] = rt + g * w
-                    S[DRIVE, c] = ru
-                    S[wp.static(DRIVE + 1), c] = rv
-                    S[wp.static(DRIVE + 2), c] = rw
-                    S[NEW, c] = x
-                    S[wp.static(NEW + 1), c] = y
-                    S[wp.static(NEW + 2), c] = theta
-                    S[wp.static(NEW + 3), c] = u
-                    S[wp.static(NEW + 4), c] = v
-                    S[wp.static(NEW + 5), c] = w
+                        at_start = S[wp.static(BASE + 3 + k), c]
+                        change = S[wp.static(RIGHT_SIDE + k), c] - wp.static(wp.float64(free[i - 1])) * at_start
+                        S[wp.static(FIRST_STAGE_ROW + 3 * (i - 1) + k), c] = change
+                        moved = wp.static(wp.float64(place[i])) * at_start
+                        speed = at_start + ZERO
+                        shifted = wp.static(wp.float64(free[i])) * at_start
+                        driven = ZERO
+                        for j in range(wp.static(i)):
+                            change = S[wp.static(FIRST_STAGE_ROW + 3 * j + k), c]
+                            moved += wp.static(wp.float64(matrix[i][j])) * change
+                            speed += wp.static(wp.float64(velocity[i][j])) * change
+                            shifted += wp.static(wp.float64(shift[i][j])) * change
+                            driven += wp.static(wp.float64(drive[i][j])) * change
+                        S[wp.static(SHIFT + k), c] = shifted
+                        S[wp.static(DRIVE + k), c] = driven
+                        S[wp.static(NEW + k), c] = S[wp.static(BASE + k), c] + g * moved
+                        S[wp.static(NEW + 3 + k), c] = speed
                     c += 1
         c = int(8)
         while c < end:
-            cosine, sine = cos_sin(S[wp.static(NEW + 2), c])
-            place_link(
-                S,
-                chain,
-                c,
-                S[NEW, c],
-                S[wp.static(NEW + 1), c],
-                S[wp.static(NEW + 3), c],
-                S[wp.static(NEW + 4), c],
-                S[wp.static(NEW + 5), c],
-                cosine,
-                sine,
-            )
-            left_x, left_y, right_x, right_y = end_velocities(
-                chain,
-                S[SHIFT, c],
-                S[wp.static(SHIFT + 1), c],
-                S[wp.static(SHIFT + 2), c],
-                S[BASE_COSINE, c],
-                S[BASE_SINE, c],
-            )
-            S[SHIFT_LEFT, c] = left_x
-            S[wp.static(SHIFT_LEFT + 1), c] = left_y
-            S[SHIFT_RIGHT, c] = right_x
-            S[wp.static(SHIFT_RIGHT + 1), c] = right_y
+            cosine, sine = turn(S[wp.static(NEW + 2), c] - S[wp.static(BASE + 2), c])
+            S[COSINE, c] = S[BASE_COSINE, c] * cosine - S[BASE_SINE, c] * sine
+            S[SINE, c] = S[BASE_SINE, c] * cosine + S[BASE_COSINE, c] * sine
             c += 1
 
     @wp.func
     def attempt(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64, tolerance: wp.float64):
         S = segment_rows(K)
         R = separator_rows_of(K)
-        places, full, total = segment_places(chain.link_count)
-        lanes = wp.min(total, 8)
+        places, full, _ = segment_places(chain.link_count)
         end = place_column(places + 1)
         g = wp.static(wp.float64(gamma)) * h
         assemble(S, chain, g, end, full)
-        factor(S, R, places, full, lanes)
+        factor(S, R, places, full)
         # stages are a loop at run time: unrolled, the code of a step would not fit into the cache for instructions
         stage = int(0)
         while stage < wp.static(stages):
@@ -308,24 +252,25 @@ def rosenbrock_method(name: str, columns: int):
                 weight = ZERO
                 for i in range(1, wp.static(stages)):
                     weight = wp.where(stage == i, wp.static(wp.float64(quadrature[i])), weight)
-                place_stage(S, chain, stage, g, end)
+                place_stage(S, stage, g, end)
                 behind_stage(S, places, full)
                 pull_joints(S, chain, weight, end)
                 joints_stage(S, places)
                 right_hand_side(S, chain, g, end, full)
-            solve(S, R, places, lanes)
+            solve(S, R, places)
             stage += 1
         # new state and error ratio
         worst = wp.int64(0)
         turned = wp.int64(0)
-        inverse = ONE / g
         c = int(8)
         while c < end:
             for k in range(3):
-                place_error = S[wp.static(RIGHT_SIDE + k), c]
-                speed_error = (place_error - S[wp.static(SHIFT + k), c]) * inverse
-                S[wp.static(FIRST_STAGE_ROW + 6 * (stages - 1) + k), c] = place_error
-                S[wp.static(FIRST_STAGE_ROW + 6 * (stages - 1) + 3 + k), c] = speed_error
+                z = S[wp.static(RIGHT_SIDE + k), c]
+                place_error = g * z
+                speed_error = z - S[wp.static(SHIFT + k), c]
+                S[wp.static(FIRST_STAGE_ROW + 3 * (stages - 1) + k), c] = (
+                    z - wp.static(wp.float64(free[stages - 1])) * S[wp.static(BASE + 3 + k), c]
+                )
                 S[wp.static(NEW + k), c] = S[wp.static(NEW + k), c] + place_error
                 S[wp.static(NEW + 3 + k), c] = S[wp.static(NEW + 3 + k), c] + speed_error
                 speed = S[wp.static(BASE + 3 + k), c]
@@ -351,41 +296,40 @@ def rosenbrock_method(name: str, columns: int):
         # Σ w U, and how the joints' spins and opening rates change by it
         c = int(8)
         while c < end:
-            dt = ZERO
+            dt = wp.static(wp.float64(second.loss_place)) * S[wp.static(BASE + 5), c]
             du = ZERO
             dv = ZERO
             dw = ZERO
             for j in range(wp.static(stages)):
-                dt += wp.static(wp.float64(quadrature[j])) * S[wp.static(FIRST_STAGE_ROW + 6 * j + 2), c]
-                du += wp.static(wp.float64(quadrature[j])) * S[wp.static(FIRST_STAGE_ROW + 6 * j + 3), c]
-                dv += wp.static(wp.float64(quadrature[j])) * S[wp.static(FIRST_STAGE_ROW + 6 * j + 4), c]
-                dw += wp.static(wp.float64(quadrature[j])) * S[wp.static(FIRST_STAGE_ROW + 6 * j + 5), c]
-            left_u, left_v, right_u, right_v = end_velocities(chain, du, dv, dw, S[BASE_COSINE, c], S[BASE_SINE, c])
-            turn_x = a * S[wp.static(BASE + 5), c] * S[BASE_COSINE, c] * dt
-            turn_y = a * S[wp.static(BASE + 5), c] * S[BASE_SINE, c] * dt
-            S[wp.static(LEFT + 2), c] = left_u + turn_x
-            S[wp.static(LEFT + 3), c] = left_v + turn_y
-            S[wp.static(RIGHT + 2), c] = right_u - turn_x
-            S[wp.static(RIGHT + 3), c] = right_v - turn_y
-            S[SPIN, c] = dw
+                change = S[wp.static(FIRST_STAGE_ROW + 3 * j + 2), c]
+                dt += wp.static(wp.float64(quadrature[j])) * change
+                du += wp.static(wp.float64(second.loss[j])) * S[wp.static(FIRST_STAGE_ROW + 3 * j), c]
+                dv += wp.static(wp.float64(second.loss[j])) * S[wp.static(FIRST_STAGE_ROW + 3 * j + 1), c]
+                dw += wp.static(wp.float64(second.loss[j])) * change
+            dt = wp.static(wp.float64(gamma)) * h * dt
+            S[CHANGE, c] = dt
+            S[wp.static(CHANGE + 1), c] = du
+            S[wp.static(CHANGE + 2), c] = dv
+            S[wp.static(CHANGE + 3), c] = dw
             c += 1
         behind_end(S, places, full)
         c = int(8)
         while c < end:
-            cu = S[wp.static(LEFT + 2), c + 8] - S[wp.static(RIGHT + 2), c]
-            cv = S[wp.static(LEFT + 3), c + 8] - S[wp.static(RIGHT + 3), c]
-            spin = S[SPIN, c] - S[SPIN, c + 8]
+            cu, cv, spin = opening_rate(S, chain, c, wp.static(CHANGE + 1), BASE_COSINE)
+            swing = a * S[wp.static(BASE + 5), c] * S[CHANGE, c]
+            next_swing = a * S[wp.static(BASE + 5), c + 8] * S[CHANGE, c + 8]
+            cu += next_swing * S[BASE_COSINE, c + 8] + swing * S[BASE_COSINE, c]
+            cv += next_swing * S[BASE_SINE, c + 8] + swing * S[BASE_SINE, c]
             friction = (S[SLOPE, c + 8] * S[BASE_SPIN, c + 8] + S[BASE_TORQUE, c + 8]) * spin
             damping = TWO * chain.joint_damping * (S[BASE_RATE_X, c + 8] * cu + S[BASE_RATE_Y, c + 8] * cv)
             S[POWER_FRICTION, c + 8] = h * S[COUNTED, c] * (S[POWER_FRICTION, c + 8] + friction)
             S[POWER_DAMPING, c + 8] = h * S[COUNTED, c] * (S[POWER_DAMPING, c + 8] + damping)
             c += 1
-        p = int(0)
-        while p < places:
-            s = int(0)
-            while s < 8:
-                i = link_at(p, s, places, full, n)
-                c = 8 * p + 8 + s
+        s = int(0)
+        while s < 8:
+            i = int(first_link(s, places, full, n))
+            c = 8 + s
+            while c < end:
                 K[X, i] = S[NEW, c]
                 K[Y, i] = S[wp.static(NEW + 1), c]
                 K[THETA, i] = S[wp.static(NEW + 2), c]
@@ -394,7 +338,8 @@ def rosenbrock_method(name: str, columns: int):
                 K[OMEGA, i] = S[wp.static(NEW + 5), c]
                 K[LOST_FRICTION, i] = K[LOST_FRICTION, i] + S[POWER_FRICTION, c + 8]
                 K[LOST_DAMPING, i] = K[LOST_DAMPING, i] + S[POWER_DAMPING, c + 8]
-                s += 1
-            p += 1
+                i = wp.where(i == n - 1, 0, i + 1)
+                c += 8
+            s += 1
 
     return first_stage, attempt, commit

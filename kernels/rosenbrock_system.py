@@ -33,22 +33,18 @@ from .rosenbrock_layout import (
     FORCE_X,
     FORCE_Y,
     INERTIA,
-    LEFT,
     LOWER,
     MASS,
+    NEW,
     POWER_DAMPING,
     POWER_FRICTION,
-    RIGHT,
     RIGHT_SIDE,
     SHIFT,
-    SHIFT_LEFT,
-    SHIFT_RIGHT,
     SHIFT_TORQUE,
     SHIFT_X,
     SHIFT_Y,
     SINE,
     SLOPE,
-    SPIN,
     TORQUE,
     UPPER,
 )
@@ -58,32 +54,27 @@ wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def place_link(
-    S: wp.array2d(dtype=wp.float64),
-    chain: Chain,
-    c: int,
-    x: wp.float64,
-    y: wp.float64,
-    u: wp.float64,
-    v: wp.float64,
-    w: wp.float64,
-    cosine: wp.float64,
-    sine: wp.float64,
-):
-    """Rows of a stage for one link: direction, spin, ends and their velocities."""
-    S[COSINE, c] = cosine
-    S[SINE, c] = sine
-    S[SPIN, c] = w
-    left_x, left_y, right_x, right_y = end_positions(chain, x, y, cosine, sine)
-    left_u, left_v, right_u, right_v = end_velocities(chain, u, v, w, cosine, sine)
-    S[LEFT, c] = left_x
-    S[LEFT + 1, c] = left_y
-    S[LEFT + 2, c] = left_u
-    S[LEFT + 3, c] = left_v
-    S[RIGHT, c] = right_x
-    S[RIGHT + 1, c] = right_y
-    S[RIGHT + 2, c] = right_u
-    S[RIGHT + 3, c] = right_v
+def opening(S: wp.array2d(dtype=wp.float64), chain: Chain, c: int, place: int, direction: int):
+    """Opening C of the joint on the right of a link, from the rows of places x, y and of directions."""
+    _left_x, _left_y, right_x, right_y = end_positions(
+        chain, S[place, c], S[place + 1, c], S[direction, c], S[direction + 1, c]
+    )
+    left_x, left_y, _right_x, _right_y = end_positions(
+        chain, S[place, c + 8], S[place + 1, c + 8], S[direction, c + 8], S[direction + 1, c + 8]
+    )
+    return left_x - right_x, left_y - right_y
+
+
+@wp.func
+def opening_rate(S: wp.array2d(dtype=wp.float64), chain: Chain, c: int, speed: int, direction: int):
+    """Opening rate Ċ of that joint and its spin, from the rows of velocities u, v, ω and of directions."""
+    _left_u, _left_v, right_u, right_v = end_velocities(
+        chain, S[speed, c], S[speed + 1, c], S[speed + 2, c], S[direction, c], S[direction + 1, c]
+    )
+    left_u, left_v, _right_u, _right_v = end_velocities(
+        chain, S[speed, c + 8], S[speed + 1, c + 8], S[speed + 2, c + 8], S[direction, c + 8], S[direction + 1, c + 8]
+    )
+    return left_u - right_u, left_v - right_v, S[speed + 2, c] - S[speed + 2, c + 8]
 
 
 @wp.func
@@ -156,12 +147,12 @@ def first_right_hand_side(
         gt = S[SLOPE, c + 8] * S[BASE_SPIN, c + 8] - S[SLOPE, c] * S[BASE_SPIN, c]
         gt = gt - a * (S[BASE_COSINE, c] * sum_gy - S[BASE_SINE, c] * sum_gx)
         m = S[MASS, c]
-        sx = g * S[wp.static(BASE + 3), c]
-        sy = g * S[wp.static(BASE + 4), c]
-        st = g * S[wp.static(BASE + 5), c]
-        rx = m * (g * g * S[BASE_RATE, c] + sx) - g * g * gx
-        ry = m * (g * g * S[wp.static(BASE_RATE + 1), c] + sy) - g * g * gy
-        rt = S[INERTIA, c] * (g * g * S[wp.static(BASE_RATE + 2), c] + st) + g * g * gt
+        sx = S[wp.static(BASE + 3), c]
+        sy = S[wp.static(BASE + 4), c]
+        st = S[wp.static(BASE + 5), c]
+        rx = m * (g * S[BASE_RATE, c] + sx) - g * gx
+        ry = m * (g * S[wp.static(BASE_RATE + 1), c] + sy) - g * gy
+        rt = S[INERTIA, c] * (g * S[wp.static(BASE_RATE + 2), c] + st) + g * gt
         S[SHIFT, c] = sx
         S[wp.static(SHIFT + 1), c] = sy
         S[wp.static(SHIFT + 2), c] = st
@@ -178,23 +169,19 @@ def first_right_hand_side(
 
 @wp.func
 def pull_joints(S: wp.array2d(dtype=wp.float64), chain: Chain, weight: wp.float64, end: int):
-    """Forces and torques of the joints at the stage's place, and g D r_q over g; sums up the powers lost."""
+    """Forces and torques of the joints at the stage's place, and D r_q / g; sums up the powers lost."""
     c = int(8)
     while c < end:
-        cx = S[LEFT, c + 8] - S[RIGHT, c]
-        cy = S[wp.static(LEFT + 1), c + 8] - S[wp.static(RIGHT + 1), c]
-        cu = S[wp.static(LEFT + 2), c + 8] - S[wp.static(RIGHT + 2), c]
-        cv = S[wp.static(LEFT + 3), c + 8] - S[wp.static(RIGHT + 3), c]
-        spin = S[SPIN, c] - S[SPIN, c + 8]
+        cx, cy = opening(S, chain, c, NEW, COSINE)
+        cu, cv, spin = opening_rate(S, chain, c, wp.static(NEW + 3), COSINE)
         torque = friction_torque(chain, spin)
         S[FORCE_X, c + 8] = joint_force(chain, cx, cu)
         S[FORCE_Y, c + 8] = joint_force(chain, cy, cv)
         S[TORQUE, c + 8] = torque
-        sx = S[SHIFT_LEFT, c + 8] - S[SHIFT_RIGHT, c]
-        sy = S[wp.static(SHIFT_LEFT + 1), c + 8] - S[wp.static(SHIFT_RIGHT + 1), c]
+        sx, sy, shift_spin = opening_rate(S, chain, c, SHIFT, BASE_COSINE)
         S[SHIFT_X, c + 8] = chain.joint_damping * sx
         S[SHIFT_Y, c + 8] = chain.joint_damping * sy
-        S[SHIFT_TORQUE, c + 8] = S[SLOPE, c + 8] * (S[wp.static(SHIFT + 2), c] - S[wp.static(SHIFT + 2), c + 8])
+        S[SHIFT_TORQUE, c + 8] = S[SLOPE, c + 8] * shift_spin
         damping = chain.joint_damping * (cu * cu + cv * cv)
         S[POWER_FRICTION, c + 8] = S[POWER_FRICTION, c + 8] + weight * (torque * spin)
         S[POWER_DAMPING, c + 8] = S[POWER_DAMPING, c + 8] + weight * damping
@@ -203,7 +190,7 @@ def pull_joints(S: wp.array2d(dtype=wp.float64), chain: Chain, weight: wp.float6
 
 @wp.func
 def right_hand_side(S: wp.array2d(dtype=wp.float64), chain: Chain, g: wp.float64, end: int, full: int):
-    """g M r_v + (M + g D) r_q of the stage."""
+    """M (r_q / g + r_v) + D r_q of the stage."""
     a = chain.half_length
     c = int(8)
     while c < end:
@@ -220,11 +207,9 @@ def right_hand_side(S: wp.array2d(dtype=wp.float64), chain: Chain, g: wp.float64
         gt = S[SHIFT_TORQUE, c + 8] - S[SHIFT_TORQUE, c]
         gt = gt - a * (S[BASE_COSINE, c] * sum_gy - S[BASE_SINE, c] * sum_gx)
         m = S[MASS, c]
-        rx = g * (g * fx - gx) + m * (g * S[DRIVE, c] + S[SHIFT, c])
-        ry = g * (g * (fy - m * chain.gravity) - gy)
-        ry = ry + m * (g * S[wp.static(DRIVE + 1), c] + S[wp.static(SHIFT + 1), c])
-        rt = g * (g * turn + gt)
-        rt = rt + S[INERTIA, c] * (g * S[wp.static(DRIVE + 2), c] + S[wp.static(SHIFT + 2), c])
+        rx = g * (fx - gx) + m * (S[DRIVE, c] + S[SHIFT, c])
+        ry = g * (fy - m * chain.gravity - gy) + m * (S[wp.static(DRIVE + 1), c] + S[wp.static(SHIFT + 1), c])
+        rt = g * (turn + gt) + S[INERTIA, c] * (S[wp.static(DRIVE + 2), c] + S[wp.static(SHIFT + 2), c])
         S[wp.static(RIGHT_SIDE), c] = wp.where(repeats, ZERO, rx)
         S[wp.static(RIGHT_SIDE + 1), c] = wp.where(repeats, ZERO, ry)
         S[wp.static(RIGHT_SIDE + 2), c] = wp.where(repeats, ZERO, rt)

@@ -37,19 +37,18 @@ def places_of(rows: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
 
 @functools.cache
 def _solver(size: int, columns: int) -> tuple[wp.Kernel, SegmentLayout]:
-    segments = SegmentLayout(size=size, columns=columns, matrix=0, right=6 * size * size)
+    segments = SegmentLayout(size=size, columns=columns, matrix=0, right=5 * size * size)
     factor, solve = cyclic_solver(segments)
-    rows = segments.matrix_rows + segments.right_rows
+    rows = segments.matrix_rows + size
     separator_rows = segments.separator_rows
 
     @_compiled
     def solver(block: wp.array2d(dtype=wp.float64), separators: wp.array2d(dtype=wp.float64), links: int):
         rows_of_loop = wp.array(ptr=block.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
-        rows_of_separators = wp.array(ptr=separators.ptr, shape=(wp.static(separator_rows), 16), dtype=wp.float64)
-        places, full, total = segment_places(links)
-        lanes = wp.min(total, 8)
-        factor(rows_of_loop, rows_of_separators, places, full, lanes)
-        solve(rows_of_loop, rows_of_separators, places, lanes)
+        rows_of_separators = wp.array(ptr=separators.ptr, shape=(wp.static(separator_rows), 8), dtype=wp.float64)
+        places, full, _ = segment_places(links)
+        factor(rows_of_loop, rows_of_separators, places, full)
+        solve(rows_of_loop, rows_of_separators, places)
 
     return solver, segments
 
@@ -60,7 +59,7 @@ def solve_loop(lower: Array, diagonal: Array, upper: Array, right: Array) -> Arr
     kernel, segments = _solver(size, segment_columns(max(rows, 2 * rows if rows < 8 else 0)))
     at, repeats = (values.ravel() for values in places_of(rows))
     used = slice(8, 8 + len(at))
-    block = np.full((segments.matrix_rows + segments.right_rows, segments.columns), np.nan)
+    block = np.full((segments.matrix_rows + size, segments.columns), np.nan)
     for index, (values, unit) in enumerate(((lower, -1.0), (diagonal, 1.0), (upper, 0.0))):
         placed = values[at]
         placed[repeats] = unit * np.eye(size)
@@ -70,7 +69,7 @@ def solve_loop(lower: Array, diagonal: Array, upper: Array, right: Array) -> Arr
     placed[repeats] = 0.0
     block[segments.right : segments.right + size, used] = placed.T
     memory = wp.array(block, dtype=wp.float64, device=DEVICE)
-    separators = wp.full((segments.separator_rows, 16), np.nan, dtype=wp.float64, device=DEVICE)
+    separators = wp.full((segments.separator_rows, 8), np.nan, dtype=wp.float64, device=DEVICE)
     wp.launch(kernel, dim=1, inputs=[memory, separators, rows], device=DEVICE)
     solution = memory.numpy()[segments.right : segments.right + size, used].T
     result = np.full((rows, size), np.nan)

@@ -241,7 +241,10 @@ def test_a_kernel_compiles_for_gpus(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "body_and_watch", "self_contact"),
-    [*itertools.product(ALL_METHODS, ALL_BODIES, (True, False)), *itertools.product(["rodas4p"], ALL_BODIES, [True])],
+    [
+        *itertools.product(ALL_METHODS, ALL_BODIES, (True, False)),
+        *itertools.product(["rodas4p", "rodas5p"], ALL_BODIES, [True]),
+    ],
 )
 def test_every_kernel_compiles_for_gpus(
     tmp_path: Path, method: str, body_and_watch: tuple[str, str], self_contact: bool

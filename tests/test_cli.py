@@ -365,7 +365,11 @@ def test_bench_measures_every_method(tmp_path: Path) -> None:
     assert answer.status == 0 and answer.err == ""
     costs = json.loads(answer.out)
     methods = {(cost["scene"], cost["method"]) for cost in costs["steps"]}
-    ours = {(scene, method) for scene in ("flight", "pile") for method in ("rkf78", "dp5", "bs32", "rodas4p", "hybrid")}
+    ours = {
+        (scene, method)
+        for scene in ("flight", "pile")
+        for method in ("rkf78", "dp5", "bs32", "rodas4p", "rodas5p", "hybrid")
+    }
     assert methods == ours | {("flight", "DOP853 (SciPy)")}
     for cost in costs["steps"]:
         assert cost["links"] == 32 and 0 < cost["microseconds"] < 1e5 and cost["wall_per_simulated"] > 0

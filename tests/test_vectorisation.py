@@ -21,8 +21,7 @@ wp.load_module(driver.make_advance(features).module, device="cpu")
 COMMON = {"place_ends", "attempt", "greatest_opening", "greatest_speed", "greatest_displacement", "work_out"}
 EXPLICIT = COMMON | {"begin_stages", "derivatives", "commit"}
 IMPLICIT = COMMON | {
-    *("assemble", "eliminate_segments", "solve"),
-    *("first_right_hand_side", "place_stage", "pull_joints", "right_hand_side"),
+    *("assemble", "first_right_hand_side", "place_stage", "pull_joints", "right_hand_side"),
 }
 RIGID = COMMON | {
     *("fastest_fall", "meeting", "prepare", "place_stage", "assemble", "solve_forces", "damp", "keep_stage"),

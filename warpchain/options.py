@@ -165,9 +165,10 @@ class Options(BaseModel):
 
     model_config = _STRICT
 
-    method: Literal["rkf78", "dp5", "bs32", "rodas4p", "hybrid"] = Field(
+    method: Literal["rkf78", "dp5", "bs32", "rodas4p", "rodas5p", "hybrid"] = Field(
         default="rkf78",
-        description="embedded pair: Fehlberg 7(8), Dormand–Prince 5(4), Bogacki–Shampine 3(2) or RODAS4P 4(3); "
+        description="embedded pair: Fehlberg 7(8), Dormand–Prince 5(4), Bogacki–Shampine 3(2), RODAS4P 4(3) or "
+        "RODAS5P 5(4), the last two implicit; "
         "hybrid: rigid joints between impulses, dp5 around them",
     )
     tolerance: float = Field(
@@ -186,7 +187,8 @@ class Options(BaseModel):
     )
     controller: Literal["standard", "pi"] = Field(
         default="standard",
-        description="rule for the next step: from this error alone, or proportional–integral",
+        description="rule for the next step: from this error alone, or proportional–integral; "
+        "implicit methods have one of the latter kind for both",
     )
     contact_step: float = Field(
         default=2e-5,
