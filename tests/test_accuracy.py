@@ -202,12 +202,11 @@ def test_words_are_what_the_options_make_of_them(word: str) -> None:
 
 
 def test_defaults_are_words_and_every_method() -> None:
-    """Each method that runs on the device has its turn, the words among them, no contestant twice."""
-    for device, without in (("cpu", set()), ("cuda", {"hybrid"})):
-        chosen = default_contestants(device)
-        assert len(set(chosen)) == len(chosen)
-        assert {one.method for one in chosen} == set(methods()) - without
-        assert {one.word for one in chosen} - {""} == set(METHODS_BY_NEED) - ({"fast"} if without else set())
+    """Each method has its turn, the words among them, no contestant twice."""
+    chosen = default_contestants()
+    assert len(set(chosen)) == len(chosen)
+    assert {one.method for one in chosen} == set(methods())
+    assert {one.word for one in chosen} - {""} == set(METHODS_BY_NEED)
 
 
 def test_the_tight_reference_is_an_extra() -> None:

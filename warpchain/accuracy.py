@@ -121,7 +121,7 @@ def make_plan(
         preset(name)
     plan = Plan(
         parts=tuple(parts),
-        contestants=default_contestants(device) if contestants is None else tuple(map(Contestant.parse, contestants)),
+        contestants=default_contestants() if contestants is None else tuple(map(Contestant.parse, contestants)),
         tolerances=tuple(tolerances),
         links=tuple(validated(Scene, {"links": count}, "--links").links for count in links),
         trials=tuple(trials),
