@@ -386,7 +386,7 @@ REFUSED = {
     "--methods rk4": "--methods: 'rk4' is unknown",
     "--methods dp5@soon": "--methods: 'dp5@soon' has no number after the @",
     "--methods dp5+soft": "--methods: 'soft' is unknown",
-    "--methods quick": "--methods: 'quick' is unknown; give one of standard, fast, reference, rkf78",
+    "--methods quick": "--methods: 'quick' is unknown; give one of standard, explicit, reference, rkf78",
     "--methods dp5+skin": "--methods: skin in 'dp5+skin' has no value; write skin=NUMBER",
     "--methods dp5+skin=thin": "--methods: 'dp5+skin=thin' has no number after skin=",
     "--methods dp5+skin=-1": "--methods.skin: -1.0 is not greater than 0",

@@ -93,7 +93,7 @@ def test_chain_dropped_without_spin_rests_below(name, links, method):
 
     With the settings of standard: at 1e-6 and on stiff joints a pile takes minutes.
     """
-    settings = {**METHODS_BY_NEED["standard"], "method": method}
+    settings = {**METHODS_BY_NEED["explicit"], "method": method}
     done = walk(preset=name, links=links, frequency=0.0, start="ellipse", ellipse_aspect=2.0, **settings)
     assert done.status == Status.AT_REST
     assert abs(done.dx) < 0.03

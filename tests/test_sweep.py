@@ -76,7 +76,7 @@ def test_blocks_inherit_and_override() -> None:
     assert sweep.walk_count == 13
     first, second, paper, soft = (sweep.planned(index).setup for index in (0, 5, 7, 10))
     assert (first.preset, first.scene.links, first.scene.start) == ("soft", 60, "rest")
-    assert (first.scene.frequency, first.options.tolerance, first.options.method) == (15, 1e-7, "dp5")
+    assert (first.scene.frequency, first.options.tolerance, first.options.method) == (15, 1e-7, "hybrid")
     assert (second.preset, second.scene.links, second.scene.start) == ("paper", 90, "ellipse")
     assert (second.scene.frequency, second.options.tolerance, second.options.method) == (20, 1e-5, "bs32")
     assert second.parameters.floor_friction == 0.3 != first.parameters.floor_friction
@@ -147,7 +147,7 @@ def test_from_a_file(tmp_path: Path) -> None:
         (content(scene={"clearance": None}), "sweep.scene.clearance: empty; give a plain number in m"),
         (
             content(options={"method": "rk4"}),
-            "sweep.options.method: 'rk4' is unknown; give one of standard, fast, reference,",
+            "sweep.options.method: 'rk4' is unknown; give one of standard, explicit, reference,",
         ),
         (content(parameters={"outer_mass": 0}), "sweep.parameters.outer_mass: 0 is not greater than 0 kg"),
         (content(record={"serie": True}), "sweep.record.serie: unknown key; did you mean series"),

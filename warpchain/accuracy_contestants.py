@@ -129,5 +129,5 @@ def default_contestants() -> tuple[Contestant, ...]:
     At 1e-6 and without softer joints the implicit method and those of low order walk for half a minute and longer.
     """
     words = [Contestant.parse(word) for word in METHODS_BY_NEED]
-    alike = [Contestant.of({**METHODS_BY_NEED["standard"], "method": method}) for method in methods()]
+    alike = [Contestant.of({**METHODS_BY_NEED["explicit"], "method": method}) for method in methods()]
     return tuple(dict.fromkeys((*words, *alike)))

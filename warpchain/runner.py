@@ -17,8 +17,8 @@ from typing import Any, Protocol
 from warpchain.course import Course
 from warpchain.ensemble import compile_kernels, run_setups
 from warpchain.motion import Motion
-from warpchain.options import Setup
-from warpchain.parameters import InputError
+from warpchain.options import Options, Setup
+from warpchain.parameters import InputError, validated
 from warpchain.planning import PlannedWalk, Sweep, load_sweep
 from warpchain.results import LOST
 from warpchain.status import Status
@@ -122,10 +122,12 @@ def sweep(
 
 
 def _on_device(planned: Sweep, device: str) -> Sweep:
-    """The same sweep on another device."""
+    """The same sweep on another device; a method that was named by need is what this means there."""
     canonical = planned.canonical()
-    for block in canonical["blocks"]:
-        block["options"]["device"] = device
+    for block, content in zip(planned.blocks, canonical["blocks"], strict=True):
+        given = {**block.plan.sections["options"], "device": device}
+        options = validated(Options, given, "options").model_dump()
+        content["options"] = {name: options[name] for name in content["options"]}
     return load_sweep(canonical)
 
 
