@@ -5,9 +5,9 @@ of threads is cheap. Stages live in registers, the state on a board in the memor
 and contacts meet. Everything that decides (error, gap, status …) is known to all threads alike, so that all take the
 same branches. What a run gives depends neither on how it is cut into launches nor on the other chains.
 
-A try costs two barriers a stage and one for the error; an accepted one two more unless its last stage is the first of
-the next step. Contacts cost nothing more while the
-floor or sprocket is out of reach and the neighbour list is empty.
+A try on springs costs two barriers a stage and one for the error; an accepted one two more unless its last stage is the
+first of the next step. Contacts cost nothing more while the floor or sprocket is out of reach and the neighbour list is
+empty.
 """
 
 import functools

@@ -19,7 +19,7 @@ import functools
 
 import warp as wp
 
-from .block_memory import barrier, read, write
+from .block_memory import barrier, constant_table, read, write
 from .block_solver import FactorLayout, block_solver, mat33d, reductions_for
 from .block_step import (
     Link,
@@ -88,13 +88,12 @@ def coefficients(name: str):
         for row in matrix:
             rows.append([scale * entry for entry in row] + [0.0] * (table.stages - len(row)))
     rows.extend([weight] * table.stages for weight in table.quadrature)
-    numbers = ", ".join(repr(entry) for row in rows for entry in row)
+    entry_of = constant_table(tuple(map(tuple, rows)))
+    stages = table.stages
 
-    @wp.func_native(f"""
-    static constexpr double table[] = {{{numbers}}};
-    return table[({table.stages} * kind + i) * {table.stages} + j];
-    """)
-    def coefficient(kind: int, i: int, j: int) -> wp.float64: ...
+    @wp.func
+    def coefficient(kind: int, i: int, j: int):
+        return entry_of(wp.static(stages) * kind + i, j)
 
     return coefficient
 

@@ -7,7 +7,7 @@ left fits into one hardware warp. There parallel cyclic reduction (R. W. Hockney
 its last link, the *border*, which is never eliminated; a row that has lost its neighbour on one side is coupled to the
 border in that neighbour's place. So no more numbers have to be carried than for a chain with free ends.
 
-Factors stay in the memory that the block shares, S below being its address. Then a solution costs an exchange of three
+Factors stay in the memory that the block shares, S below being its address. Then a solution costs an exchange of B
 numbers and two products of a block with a vector a level. Blocks are inverted whole by cofactors, which is as good as
 any elimination while they are well conditioned. They are not when a step is long for the springs, because links then
 seem rigid: of the solution 1e-13 is lost at h = 1e-4 s and k = 1e9 N/m, 1e-9 at 1e-3 s.

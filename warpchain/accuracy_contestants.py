@@ -124,7 +124,7 @@ TIGHT: Final = Contestant("rkf78", 1e-9)
 
 
 def default_contestants() -> tuple[Contestant, ...]:
-    """The words, and every method with the settings of `standard`, each once.
+    """The words, and every method with the settings of `explicit`, each once.
 
     At 1e-6 and without softer joints the implicit method and those of low order walk for half a minute and longer.
     """

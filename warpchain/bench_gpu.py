@@ -211,6 +211,7 @@ class _Crowd:
         self.batches = [Batch(min(worlds, chains - first), self.links, options) for first in range(0, chains, worlds)]
         for batch in self.batches:
             batch.control.rest_speed = 0.0  # a pile is at rest, and goes on
+            batch.control.launch_time = math.inf  # launches are cut by tries alone, which are counted on
             for world in range(len(batch.links)):
                 batch.set_chain(world, parameters, self.links)
                 batch.load(world, position, velocity, stop_time=FAR, stop_status=Status.FINISHED)

@@ -207,8 +207,16 @@ class Sweep:
                     f"give numbers from 0 to {most - 1}"
                 )
         for block in self.blocks:
+            shared = block.fixed((0,) * len(block.axes)).options.model_dump(exclude=set(block.axes))
             for cell in block.cells():
                 fixed = block.fixed(cell)
+                for name, value in shared.items():
+                    if getattr(fixed.options, name) != value:
+                        raise InputError(
+                            f"{block.plan.path}.grid: {name} is {value!r} in one cell and "
+                            f"{getattr(fixed.options, name)!r} in another, because a method in one word sets several "
+                            "options; give each such method, and each kind of device, a block of its own"
+                        )
                 for name, choice in self.recording.choices.items():
                     choice.steps(fixed.options, f"sweep.record.{name}")
                 distributions = block.placed(fixed)
