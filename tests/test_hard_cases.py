@@ -73,14 +73,15 @@ def assert_sound(flight, parameters, state, within=1e-5):
 def test_longest_slow_walk_ends_in_a_pile_at_rest(method):
     """180 links released at 5 Hz fall into a pile beside the sprocket and rest there, the ledger closed to 5e-4.
 
-    At a tolerance of 1e-4; the table of hard cases has the same at 1e-6.
+    Methods that take minutes at 1e-6 do it at 1e-4; the table of hard cases has them at 1e-6.
     """
-    done = walk(method, tolerance=1e-4, links=180, frequency=5.0, start="spinning")
+    tolerance = 1e-6 if method in ("rkf78", "dp5") else 1e-4
+    done = walk(method, tolerance=tolerance, links=180, frequency=5.0, start="spinning")
     assert done.status == Status.AT_REST
     assert 0 < done.dx < 0.3
     assert done.center[-1, 1] < 0.06
     assert done.impulses["self"] > 1e5
-    assert ledger_error(done) < 5e-4
+    assert ledger_error(done) < (1e-4 if tolerance == 1e-6 else 5e-4)
     assert done.greatest_penetration["floor"] < SOFT.circle_radius / 2
 
 
@@ -152,7 +153,7 @@ def test_any_damping(method, damping, duration):
 def test_hopeless_damping_is_a_status(method):
     """Damping that asks explicit methods for steps of 1e-12 s ends in a limit that says so, where it stood then.
 
-    rodas4p and hybrid, which needs springs only after the first impulse, come as far as the impact.
+    The implicit methods and hybrid, which needs springs only after the first impulse, come as far as the impact.
     """
     chain = SOFT.with_values({"joint_damping": 1e9})
     state = dropped()
@@ -161,7 +162,7 @@ def test_hopeless_damping_is_a_status(method):
     assert 0 <= flight.time[-1] < 1e-2
     assert flight.steps_accepted + flight.steps_rejected <= 20_000
     assert energy_error(flight, chain, state) < 1e-6
-    if method not in ("rodas4p", "hybrid"):
+    if method not in ("rodas4p", "rodas5p", "hybrid"):
         assert_allclose(flight.position[-1], state[0] + state[1] * flight.time[-1], rtol=0, atol=1e-6)
 
 

@@ -119,9 +119,12 @@ def make_plan(
         validated(Options, {"tolerance": tolerance}, "--tolerances")
     for name in presets:
         preset(name)
+    validated(Options, {"device": device}, "options")
     plan = Plan(
         parts=tuple(parts),
-        contestants=default_contestants() if contestants is None else tuple(map(Contestant.parse, contestants)),
+        contestants=default_contestants(device)
+        if contestants is None
+        else tuple(Contestant.parse(text, device) for text in contestants),
         tolerances=tuple(tolerances),
         links=tuple(validated(Scene, {"links": count}, "--links").links for count in links),
         trials=tuple(trials),

@@ -74,8 +74,8 @@ class Contestant:
         return f"{self.word}: {text}" if self.word else text
 
     @classmethod
-    def parse(cls, text: str) -> Self:
-        """Read ``NAME[@TOLERANCE][+SWITCH][+NUMBER=VALUE]…``, the name that of a method or a word for a need.
+    def parse(cls, text: str, device: str = "cpu") -> Self:
+        """Read ``NAME[@TOLERANCE][+SWITCH][+NUMBER=VALUE]…``, the name that of a method or a word for a need there.
 
         Raises:
             InputError: A name is unknown, or a value is no number or impossible.
@@ -85,7 +85,7 @@ class Contestant:
         known = (*METHODS_BY_NEED, *methods())
         if method not in known:
             raise InputError(f"--methods: {shown(method)} is unknown; {suggestion(method, known)}")
-        options: dict[str, object] = {"method": method}
+        options: dict[str, object] = {"method": method, "device": device}
         if at:
             options["tolerance"] = _number(text, tolerance, f"after the @; write {method}@1e-6")
         elif method not in METHODS_BY_NEED:
@@ -123,11 +123,11 @@ TIGHT: Final = Contestant("rkf78", 1e-9)
 """What they are tested against as well where it is there, and it costs."""
 
 
-def default_contestants() -> tuple[Contestant, ...]:
+def default_contestants(device: str = "cpu") -> tuple[Contestant, ...]:
     """The words, and every method with the settings of `explicit`, each once.
 
     At 1e-6 and without softer joints the implicit method and those of low order walk for half a minute and longer.
     """
-    words = [Contestant.parse(word) for word in METHODS_BY_NEED]
+    words = [Contestant.parse(word, device) for word in METHODS_BY_NEED]
     alike = [Contestant.of({**METHODS_BY_NEED["explicit"], "method": method}) for method in methods()]
     return tuple(dict.fromkeys((*words, *alike)))
