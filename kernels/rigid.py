@@ -212,6 +212,22 @@ def rigid_joints(columns: int) -> RigidJoints:
         pad_solution(S, places, full)
 
     @wp.func
+    def pushed_at(S: wp.array2d(dtype=wp.float64), a: wp.float64, c: int):
+        """What the last solution, forces or impulses of the joints, does to the link of a column."""
+        ax, ay, turn = pushed(
+            a,
+            S[INVERSE_MASS, c],
+            S[INVERSE_INERTIA, c],
+            S[COSINE, c],
+            S[SINE, c],
+            S[wp.static(right), c - 8],
+            S[wp.static(right + 1), c - 8],
+            S[wp.static(right), c],
+            S[wp.static(right + 1), c],
+        )
+        return ax, ay, turn
+
+    @wp.func
     def solve_forces(
         S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int
     ):
@@ -239,17 +255,7 @@ def rigid_joints(columns: int) -> RigidJoints:
         solve_joints(S, R, places, full)
         c = int(8)
         while c < end:
-            ax, ay, turn = pushed(
-                a,
-                S[INVERSE_MASS, c],
-                S[INVERSE_INERTIA, c],
-                S[COSINE, c],
-                S[SINE, c],
-                S[wp.static(right), c - 8],
-                S[wp.static(right + 1), c - 8],
-                S[wp.static(right), c],
-                S[wp.static(right + 1), c],
-            )
+            ax, ay, turn = pushed_at(S, a, c)
             S[RATE, c] = ax
             S[wp.static(RATE + 1), c] = ay - chain.gravity
             S[wp.static(RATE + 2), c] = S[FREE, c] + turn
@@ -264,17 +270,7 @@ def rigid_joints(columns: int) -> RigidJoints:
             end = place_column(places + 1)
             c = int(8)
             while c < end:
-                dx, dy, turn = pushed(
-                    a,
-                    S[INVERSE_MASS, c],
-                    S[INVERSE_INERTIA, c],
-                    S[COSINE, c],
-                    S[SINE, c],
-                    S[wp.static(right), c - 8],
-                    S[wp.static(right + 1), c - 8],
-                    S[wp.static(right), c],
-                    S[wp.static(right + 1), c],
-                )
+                dx, dy, turn = pushed_at(S, a, c)
                 S[wp.static(row), c] = S[wp.static(row), c] + dx
                 S[wp.static(row + 1), c] = S[wp.static(row + 1), c] + dy
                 S[wp.static(row + 2), c] = S[wp.static(row + 2), c] + turn
