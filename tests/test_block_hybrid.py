@@ -5,38 +5,18 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.blocks_under_test import launch_blocks, launch_chains
+from tests.bouncing_chains import CONTACT_STEP, PAPER, batch_with, bouncing, falling, loop
 from tests.test_block import compiles_for_gpus
-from tests.test_hybrid import falling, loop, shaken
+from tests.test_hybrid import shaken
 from warpchain import Status, preset
-from warpchain.engine import Batch
 from warpchain.kernels import block, layout
 from warpchain.kernels.block import make_advance_block
 from warpchain.kernels.block_rigid import FlightLayout
 from warpchain.kernels.driver import Features
 from warpchain.kernels.methods import METHODS
-from warpchain.options import Options
 
-PAPER, SOFT = preset("paper"), preset("soft")
+SOFT = preset("soft")
 THREADS = 24
-CONTACT_STEP = 1e-6
-"""In s; on springs every step then has this length, in both forms to the bit."""
-
-
-def batch_with(chains, parameters=PAPER, *, softness=0.0, **options):
-    """A batch of method hybrid with these chains (position, velocity), on springs that may close at once."""
-    batch = Batch(len(chains), max(len(position) for position, _ in chains), Options(method="hybrid", **options))
-    batch.control.launch_time = np.inf
-    for world, (position, velocity) in enumerate(chains):
-        batch.set_chain(world, parameters, len(position))
-        batch.load(world, position, velocity, stop_time=1.0, stop_status=Status.FINISHED, softness=softness)
-    return batch
-
-
-def bouncing(chains, **options):
-    """A batch whose chains meet the floor, one another's links and a watch, in steps of CONTACT_STEP on springs."""
-    settings = {"tolerance": 1e-3, "soften_pile": True, "contact_step": CONTACT_STEP} | options
-    batch = batch_with(chains, **settings)
-    return batch, batch.features(fixed_body="floor", watch="rest")
 
 
 def in_the_air(chains, parameters=PAPER):

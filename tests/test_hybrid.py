@@ -5,24 +5,18 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import warpchain
-from tests.rigid_under_test import exact_flight, projected, rigid_motion, visit
+from tests.bouncing_chains import PAPER, falling, loop
+from tests.rigid_joints import exact_rigid_flight, projected, rigid_motion
+from tests.rigid_under_test import visit
 from warpchain import Status, preset, reference
 from warpchain.engine import Batch
 from warpchain.kernels.w_tables import ROS34PW2
 from warpchain.options import Options
 from warpchain.shapes import ellipse, lay_chain
 
-PAPER, SOFT = preset("paper"), preset("soft")
+SOFT = preset("soft")
 LENGTHS = (4, 6, 8, 10, 12, 14, 16, 22, 60)
 """Every way in which a loop is cut into eight segments: less than a link each, full ones, short ones, one of each."""
-
-
-def loop(links, parameters=PAPER, speed=2.0):
-    """A circulating ellipse with joints that are closed and stay so, in NumPy to rounding."""
-    position, velocity = lay_chain(ellipse(1.3), links, parameters.link_length, speed, 0.1)
-    position[:, 1] += 0.3
-    velocity[:, 2] += 0.5 * np.sin(7.0 * np.arange(links))
-    return projected(position, velocity, parameters)
 
 
 def shaken(links, size, parameters=PAPER, seed=1):
@@ -150,7 +144,7 @@ def test_error_of_a_flight_falls_with_order_three(links):
     chain = PAPER.with_values({"friction_smoothing": 20.0})
     position, velocity = loop(links, chain)
     duration = 4e-3
-    place, speed = exact_flight(position, velocity, chain, duration)
+    place, speed = exact_rigid_flight(position, velocity, chain, duration)
     lost = energy(position, velocity) - energy(place, speed)
     counts = [8, 16, 32]
     errors = []
@@ -206,14 +200,6 @@ def test_flight_takes_a_hundredth_of_the_steps():
 
 
 # --- bouncing ---
-
-
-def falling(links, parameters, phase, speed=2.0, fall=2.0):
-    """A circulating ellipse 0.1 mm above the floor, falling."""
-    position, velocity = lay_chain(ellipse(1.3), links, parameters.link_length, speed, phase)
-    ends = np.concatenate(reference.link_ends(position, parameters))
-    position[:, 1] += parameters.circle_radius + 1e-4 - ends[:, 1].min()
-    return position, velocity - [0.0, fall, 0.0]
 
 
 @pytest.mark.parametrize(("parameters", "duration"), [(PAPER, 3e-3), (SOFT, 3e-3)], ids=["paper", "soft"])

@@ -1,14 +1,23 @@
-"""What can only be seen on a GPU; skipped where there is none, for what is shared with the CPU is tested there."""
+"""What can only be seen on a GPU; skipped where there is none, for what is shared with the CPU is tested there.
 
+Nothing here needs a Warp that can compile for the CPU, except the tests that compare with it.
+"""
+
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 import warp as wp
+import yaml
 
 from tests.blocks_under_test import FIXED_STEP, SOFT, heap
-from tests.test_block_hybrid import PAPER, bouncing
-from tests.test_hybrid import falling
+from tests.bouncing_chains import PAPER, bouncing, falling, loop
+from tests.rigid_joints import exact_rigid_flight
+from tests.test_flight import FLIGHTS, exact_flight, greatest
 from tests.test_runner import brief_setup, data_of, outcomes
 from warpchain import ensemble, simulate, sweep, walk
 from warpchain.engine import Batch
@@ -60,6 +69,14 @@ def gpu() -> None:
         pytest.skip("no GPU")
 
 
+@pytest.fixture
+def cpu() -> None:
+    """Skips where Warp came without its CPU compiler, as on machines that have GPUs only."""
+    if not wp.is_cpu_available():
+        pytest.skip("this Warp cannot compile for the CPU, which is compared with")
+
+
+@pytest.mark.usefixtures("cpu")
 @pytest.mark.parametrize(("method", "fixed_body"), CASES)
 def test_fixed_steps_agree_with_the_cpu(method: str, fixed_body: str) -> None:
     """Three hundred steps with hundreds of impulses end in the same state, to 1e-9."""
@@ -78,6 +95,7 @@ def test_a_walk_gives_the_same_bits_in_any_batch(method: str, monkeypatch: pytes
     assert outcomes(setups * 3) == together * 3
 
 
+@pytest.mark.usefixtures("cpu")
 def test_flights_and_landings_agree_with_the_cpu() -> None:
     """Chains that fly on rigid joints, land, bounce on their springs and fly again, to 1e-6."""
     batches = []
@@ -103,35 +121,90 @@ def test_memory_that_holds_few_chains_only_takes_longer(monkeypatch: pytest.Monk
     assert outcomes(setups) == together
 
 
-def test_a_sweep_keeps_series_and_goes_on(tmp_path: Path) -> None:
-    """A sweep that was interrupted ends with the same bytes; its series are those of single walks."""
-    content = {
-        "version": 1,
-        "name": "brief",
-        "seed": 1,
-        "preset": "soft",
-        "samples": 20,
-        "scene": {"links": 30, "start": "ellipse", "walk_limit": 0.05},
-        "options": {"device": "cuda"},
-        "grid": {"frequency": [10.0, 12.0]},
-        "record": {"series": {"samples": [0]}},
-    }
-    whole = sweep(content, tmp_path / "whole")
-
-    def interrupt(progress) -> None:
-        if progress.done > 10:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        sweep(content, tmp_path / "cut", workers=4, on_progress=interrupt)
-    sweep(content, tmp_path / "cut")
-    assert data_of(tmp_path / "cut") == data_of(tmp_path / "whole")
-    series = whole.series(frequency=10.0, sample=0)
-    assert len(series.time) > 40
-    assert np.isfinite(series.center).all()
+ON_GPU = {"device": "cuda"}
+BRIEF_AND_LONG = {
+    "version": 1,
+    "name": "brief and long",
+    "seed": 1,
+    "preset": "soft",
+    "samples": 20,
+    "scene": {"links": 30, "frequency": 12.0, "start": "ellipse"},
+    "options": {"method": "dp5", "rest_time": 100.0},
+    "grid": {"walk_limit": [0.02, 1.0]},
+    "record": {"series": {"samples": [0]}},
+}
+"""Half of the walks are over at once; the others take a second or so."""
 
 
-def test_simulations_and_walks_run_on_a_gpu() -> None:
+def interrupted_sweep(source: Path, folder: Path, shards: int) -> int:
+    """Run a sweep in a process of its own, press Ctrl-C when so many shards are there; its exit status."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "warpchain", "sweep", str(source), "-o", str(folder), "--workers", "2"],
+        stdout=subprocess.DEVNULL,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    try:
+        until = time.monotonic() + 120
+        while len(list((folder / "shards").glob("[0-9]*.h5"))) < shards:
+            assert process.poll() is None, "it ended by itself"
+            assert time.monotonic() < until, "no shards"
+            time.sleep(0.005)
+        process.send_signal(signal.SIGINT)
+        return process.wait(60)
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_a_sweep_ended_by_ctrl_c_goes_on(tmp_path: Path) -> None:
+    """It leaves whole shards and exit status 130, and ends with the same bytes; its series are those of a walk."""
+    content = BRIEF_AND_LONG | {"options": BRIEF_AND_LONG["options"] | ON_GPU}
+    source = tmp_path / "sweep.yaml"
+    source.write_text(yaml.safe_dump(content, sort_keys=False))
+    whole = sweep(source, tmp_path / "whole")
+    assert whole.summary() == {"time_limit": 40, "at_rest": 0, "missing": 0}
+    expected = data_of(tmp_path / "whole")
+    assert interrupted_sweep(source, tmp_path / "cut", shards=2) == 130
+    kept = data_of(tmp_path / "cut")
+    assert 2 <= len(kept) < len(expected)
+    assert kept.items() <= expected.items()
+    sweep(source, tmp_path / "cut")
+    assert data_of(tmp_path / "cut") == expected
+
+    series = whole.series(walk_limit=0.02, sample=0)
+    values = BRIEF_AND_LONG["scene"] | BRIEF_AND_LONG["options"] | ON_GPU
+    alone = walk(preset="soft", seed=1, walk_limit=0.02, **values)
+    assert len(series.time) == 21
+    assert np.array_equal(series.time, alone.time)
+    assert np.array_equal(series.center, alone.center)
+
+
+@pytest.mark.parametrize(("method", "within"), [("rkf78", 1e-8), ("dp5", 1e-8), ("bs32", 1e-7), ("rodas4p", 1e-8)])
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_flights_agree_with_scipy(name: str, method: str, within: float) -> None:
+    """At tolerance 1e-9 a flight with friction and damping agrees with DOP853 to 1e-8, bs32's rates to 1e-7."""
+    start, (position, velocity) = exact_flight(name)
+    settings = {"method": method, "tolerance": 1e-9, "device": "cuda"}
+    flight = simulate(name, *start, FLIGHTS[name], times=[FLIGHTS[name]], **settings)
+    assert flight.status == Status.FINISHED
+    assert greatest(flight.position[-1], position) < 1e-8
+    assert greatest(flight.velocity[-1], velocity) < within
+    assert flight.losses["joint_friction"] > 1e-4
+
+
+def test_rigid_flights_agree_with_scipy() -> None:
+    """At a tight tolerance a flight on rigid joints agrees with DOP853 on the dense equations of such joints."""
+    start, duration = loop(12), 4e-3
+    position, velocity = exact_rigid_flight(*start, PAPER, duration)
+    settings = {"method": "hybrid", "flight_tolerance": 1e-7, "device": "cuda"}
+    flight = simulate("paper", *start, duration, times=[duration], **settings)
+    assert flight.losses["joint_damping"] == 0.0
+    assert np.abs(flight.position[-1] - position)[:, :2].max() < 1e-9
+    assert np.abs(flight.velocity[-1] - velocity)[:, :2].max() < 1e-6
+
+
+@pytest.mark.usefixtures("cpu")
+def test_simulations_agree_with_the_cpu() -> None:
     """The same call with another device: the same statuses, samples at the same times, and nearly the same motion."""
     position, velocity = heap(12, 3)
     position[:, 1] += 0.1
@@ -139,6 +212,15 @@ def test_simulations_and_walks_run_on_a_gpu() -> None:
     assert motions[0].status == motions[1].status
     assert np.array_equal(motions[0].time, motions[1].time)
     assert np.allclose(motions[0].position[:4], motions[1].position[:4], rtol=0, atol=1e-6)
-    ours = walk(links=30, start="ellipse", walk_limit=0.1, device="cuda")
-    assert ours.status == Status.TIME_LIMIT
-    assert len(ours.time) > 90
+
+
+@pytest.mark.parametrize("method", ["explicit", "hybrid"])
+def test_a_walk_comes_to_rest_and_its_ledger_closes(method: str) -> None:
+    """Spun up, released, walked and at rest: the distance is that of such chains, no energy is unaccounted for."""
+    found = walk(preset="soft", links=60, frequency=15.0, start="spinning", method=method, device="cuda")
+    assert found.status == Status.AT_REST
+    assert 0.5 < found.dx < 0.85
+    energy = found.energy
+    at_release = energy["kinetic_at_release"] + energy["potential_at_release"]
+    assert abs(energy["residual"]) < 5e-4 * at_release
+    assert found.impulses["floor"] > 1000
