@@ -32,6 +32,16 @@ def test_each_worker_has_a_gpu_of_its_own(monkeypatch: pytest.MonkeyPatch) -> No
     assert visible_gpus(3) == ["0", "1", "2"]
 
 
+def test_each_worker_is_asked_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However quickly the first one answers; what fails in one of them reaches the caller, and nothing hangs."""
+    monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
+    with gpu_workers(3) as executor:
+        first, again = executor.in_each(os.getpid), executor.in_each(os.getpid)
+        assert len(set(first)) == 3 and set(first) == set(again)
+    with gpu_workers(2) as executor, pytest.raises(ZeroDivisionError):
+        executor.in_each(eval, "1 // int(__import__('os').environ['CUDA_VISIBLE_DEVICES'])")
+
+
 def test_a_sweep_runs_on_gpu_workers(tmp_path: Path) -> None:
     """What such workers write are the bytes of one thread; on the CPU here, whatever GPU they were given."""
     sweep(TINY, tmp_path / "one", workers=1)

@@ -114,6 +114,15 @@ def test_threads_and_processes_write_the_same_bytes(tmp_path, uninterrupted):
     assert data_of(tmp_path / "processes") == uninterrupted
 
 
+def test_progress_tells_when_the_walks_begin(tmp_path):
+    """First kernels are compiled; then the walks begin, and no time has passed; then shards are done."""
+    seen = []
+    sweep(TINY, tmp_path / "sweep", workers=1, on_progress=lambda p: seen.append((p.compiling, p.done, p.seconds)))
+    assert seen[:2] == [(True, 0, 0.0), (False, 0, 0.0)]
+    assert [compiling for compiling, _, _ in seen].count(True) == 1
+    assert seen[2][1] > 0 and seen[2][2] > 0 and seen[-1][1] == 80
+
+
 def test_a_finished_sweep_is_not_run_again(tmp_path, uninterrupted):
     """A second run of a complete sweep computes nothing and gives the same result."""
     folder = tmp_path / "sweep"

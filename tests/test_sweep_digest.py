@@ -9,7 +9,7 @@ import pytest
 from tests.sweep_content import UNIFORM, blocks, content
 from warpchain.parameters import PRESETS, preset
 from warpchain.planning import load_sweep
-from warpchain.runner import _on_device
+from warpchain.runner import on_device
 
 
 def digest(given: Mapping[str, Any]) -> str:
@@ -50,11 +50,11 @@ def test_digest_ignores_what_does_not_matter(change: dict[str, Any]) -> None:
 def test_a_method_by_need_is_that_of_the_device(options: dict[str, Any], expected: tuple[str, str]) -> None:
     """The same file on another device has the method that its word means there, with the settings given."""
     planned = load_sweep(content(options=options))
-    here, there = (sweep.planned(0).setup.options for sweep in (planned, _on_device(planned, "cuda:1")))
+    here, there = (sweep.planned(0).setup.options for sweep in (planned, on_device(planned, "cuda:1")))
     assert (here.method, there.method) == expected
     assert there.device == "cuda:1"
     assert there.tolerance == options.get("tolerance", here.tolerance)
-    again = load_sweep(_on_device(planned, "cuda:1").canonical())
+    again = load_sweep(on_device(planned, "cuda:1").canonical())
     assert again.planned(0).setup.options == there
 
 

@@ -1,4 +1,4 @@
-"""The command `warpchain bench accuracy`."""
+"""The commands `warpchain bench accuracy` and `warpchain bench sweep`."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -106,6 +106,53 @@ def accuracy(
         return
     for path in (output / "accuracy.json", *paths):
         print(path)
+
+
+@bench_app.command("sweep")
+def sweep(
+    source: Annotated[
+        Path, typer.Argument(metavar="FILE.yaml", help="The sweep, as those in sweeps/.", show_default=False)
+    ],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="DIR", help="Folder of the results, with a folder for each place."),
+    ],
+    devices: Annotated[
+        str,
+        typer.Option(
+            metavar="[Kx]NAME[@N],…",
+            help="Places to run on: cpu, one core; Kxcpu, K cores; cuda or cuda:N, a GPU; Kxcuda, K GPUs, a process "
+            "for each, as --gpus K. @N takes N samples per cell there. Ratios are to the first place.",
+        ),
+    ],
+    samples: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, help="Samples per cell where @N does not say. Default: as the sweep says."),
+    ] = None,
+    rounds: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Runs on each place, in turn; medians are printed.")
+    ] = 1,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Discard what an earlier measurement left in DIR.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print DIR/scaling.json, which is written in any case, instead of a table.")
+    ] = False,
+) -> None:
+    """Run a sweep on several places: walks a second on one core, many, a GPU, several; whether their bits are equal.
+
+    The clock runs from when every worker has its kernels loaded until the last walk is on disk.
+    """
+    from warpchain.places import places_of
+    from warpchain.scaling import FILE, measure
+    from warpchain.terminal import print_scaling, status_line, try_folder
+
+    places = places_of(_words("--devices", devices), samples)
+    try_folder(output)
+    with status_line() as show:
+        scaling = measure(source, output, places, rounds=rounds, fresh=fresh, report=show)
+    if as_json:
+        print((output / FILE).read_text(encoding="utf-8"), end="")
+    else:
+        print_scaling(scaling)
 
 
 def _words(option: str, text: str) -> list[str]:

@@ -3,15 +3,47 @@
 import contextlib
 import multiprocessing
 import os
-from collections.abc import Iterator, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing.queues import SimpleQueue
+from multiprocessing.synchronize import Barrier
+from typing import Any, TypeVar
 
 from warpchain.parameters import InputError
 
+Answer = TypeVar("Answer")
+
+
+class GpuWorkers(ProcessPoolExecutor):
+    """Worker processes of which each sees one GPU only."""
+
+    def __init__(self, gpus: Sequence[str]) -> None:
+        """Prepare a process for each of these values of CUDA_VISIBLE_DEVICES; they start with their first task."""
+        context = multiprocessing.get_context("spawn")  # CUDA does not survive a fork
+        free = context.SimpleQueue()
+        for gpu in gpus:
+            free.put(gpu)
+        self.count = len(gpus)
+        meeting = context.Barrier(self.count)
+        super().__init__(self.count, mp_context=context, initializer=_take_gpu, initargs=(free, meeting))
+
+    def in_each(self, function: Callable[..., Answer], /, *arguments: Any) -> list[Answer]:
+        """Run ``function(*arguments)`` once in every worker, when nothing else is running; what they returned.
+
+        Raises:
+            Exception: What one of them raised; the workers can then only be shut down.
+        """
+        # one that is done waits for the others, so that none runs it twice
+        futures = [self.submit(_meet_after, function, *arguments) for _ in range(self.count)]
+        errors = [error for future in futures if (error := future.exception()) is not None]
+        for error in sorted(errors, key=lambda error: isinstance(error, threading.BrokenBarrierError)):
+            raise error
+        return [future.result() for future in futures]
+
 
 @contextlib.contextmanager
-def gpu_workers(count: int) -> Iterator[ProcessPoolExecutor]:
+def gpu_workers(count: int) -> Iterator[GpuWorkers]:
     """As many worker processes, each of which sees one GPU only and runs a sweep with the device ``cuda``.
 
     Args:
@@ -20,11 +52,7 @@ def gpu_workers(count: int) -> Iterator[ProcessPoolExecutor]:
     Raises:
         InputError: CUDA_VISIBLE_DEVICES has fewer.
     """
-    context = multiprocessing.get_context("spawn")  # CUDA does not survive a fork
-    free = context.SimpleQueue()
-    for gpu in visible_gpus(count):
-        free.put(gpu)
-    with ProcessPoolExecutor(count, mp_context=context, initializer=_take_gpu, initargs=(free,)) as executor:
+    with GpuWorkers(visible_gpus(count)) as executor:
         yield executor
 
 
@@ -43,6 +71,24 @@ def visible_gpus(count: int) -> Sequence[str]:
     return gpus[:count]
 
 
-def _take_gpu(free: "SimpleQueue[str]") -> None:
+_meeting: "Barrier | None" = None
+"""Where the workers of a pool wait for one another; in a worker only."""
+
+
+def _take_gpu(free: "SimpleQueue[str]", meeting: "Barrier") -> None:
     """Let this process see just one GPU; at its start, for CUDA looks once, when a sweep's first walk starts Warp."""
+    global _meeting
     os.environ["CUDA_VISIBLE_DEVICES"] = free.get()
+    _meeting = meeting
+
+
+def _meet_after(function: Callable[..., Answer], /, *arguments: Any) -> Answer:
+    """Run a function, then wait until all workers have; if it fails, none of them waits any longer."""
+    assert _meeting is not None
+    try:
+        answer = function(*arguments)
+    except BaseException:
+        _meeting.abort()
+        raise
+    _meeting.wait()
+    return answer

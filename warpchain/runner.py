@@ -95,7 +95,7 @@ def sweep(
         workers: Tasks in work at the same time; default: processors of this machine, and on a GPU two, each of which
             keeps thousands of walks going. With an executor, at least the number of its workers.
         fresh: Discard what another sweep left in the folder.
-        on_progress: Called before kernels are compiled and after each shard.
+        on_progress: Called before kernels are compiled, when the walks begin and after each shard.
 
     Raises:
         InputError: The sweep or the folder is refused; one line with the remedy. It is a ``ValueError``.
@@ -103,7 +103,7 @@ def sweep(
     """
     planned = load_sweep(source)
     if device is not None:
-        planned = _on_device(planned, device)
+        planned = on_device(planned, device)
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
         raise InputError(f"workers: {workers!r} is not a number of workers; give a whole number from 1")
     at_once = workers or (GPU_WORKERS if _is_on_gpu(planned) else len(os.sched_getaffinity(0)))
@@ -121,7 +121,7 @@ def sweep(
     return load(out)
 
 
-def _on_device(planned: Sweep, device: str) -> Sweep:
+def on_device(planned: Sweep, device: str) -> Sweep:
     """The same sweep on another device; a method that was named by need is what this means there."""
     canonical = planned.canonical()
     for block, content in zip(planned.blocks, canonical["blocks"], strict=True):
@@ -214,7 +214,7 @@ def _run_in_threads(
     progress.compiling = True
     if on_progress is not None:
         on_progress(progress)
-    compile_kernels(_one_of_each_cell(planned))
+    prepare(planned)
     progress.compiling = False
     stop = threading.Event()
     with concurrent.futures.ThreadPoolExecutor(workers) as threads:
@@ -225,7 +225,16 @@ def _run_in_threads(
             raise
 
 
-def _one_of_each_cell(planned: Sweep) -> list[Setup]:
+def prepare(source: Mapping[str, Any] | Sweep) -> None:
+    """Load every kernel that the walks of a sweep need into this process, compiled if need be.
+
+    Args:
+        source: The sweep, or its canonical form.
+    """
+    compile_kernels(one_of_each_cell(load_sweep(source)))
+
+
+def one_of_each_cell(planned: Sweep) -> list[Setup]:
     """The first walk of every cell."""
     return [
         planned.planned(first).setup
@@ -245,6 +254,8 @@ def _run(
     on_progress: Callable[[SweepProgress], None] | None,
 ) -> None:
     """Keep the workers busy with two tasks each; memory does not grow with the sweep."""
+    if on_progress is not None:
+        on_progress(progress)
     began = time.perf_counter()
     canonical, digest = planned.canonical(), planned.digest()
     waiting = _tasks(planned, missing, workers)

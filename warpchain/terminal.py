@@ -15,6 +15,7 @@ from warpchain.results import LOST, WalkResult, replacing
 if TYPE_CHECKING:
     from warpchain.bench import BroadPhaseCost, StepCost
     from warpchain.bench_gpu import GpuCost
+    from warpchain.scaling import Scaling
     from warpchain.walker import Progress
 
 PICTURE_DPI: Final = 200
@@ -149,6 +150,31 @@ def print_gpu_costs(machine: Mapping[str, str], costs: "Sequence[GpuCost]") -> N
         peak = "" if math.isnan(cost.peak) else f"{cost.peak:.0%}"
         table.add_row(cost.scene, str(cost.links), cost.method, str(cost.chains), *rates, *needs, peak)
     console.print(table)
+
+
+def print_scaling(scaling: "Scaling") -> None:
+    """Print on standard output what a sweep cost on several places; /s is per second of wall time."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else WIDE)
+    console.print(", ".join(f"{name} {value}" for name, value in scaling.machine.items()), "\n")
+    console.print(f"{scaling.sweep}, medians of {scaling.rounds}, kernels loaded before")
+    table = Table(box=None, pad_edge=False)
+    for heading in ("place", "methods"):
+        table.add_column(heading)
+    for heading in ("walks", "not at rest", "s", "walks/s", "simulated s/s", "processor s", "ratio", "loading s"):
+        table.add_column(heading, justify="right")
+    for cost in scaling.costs:
+        walks = f"{cost.walks:,}", f"{cost.walks - cost.statuses.get('at_rest', 0):,}"
+        rates = f"{cost.seconds:.1f}", f"{cost.walks_per_second:.3g}", f"{cost.simulated_per_second:.3g}"
+        others = f"{cost.processor_seconds:.1f}", f"{cost.ratio:.2f}", f"{cost.loading_seconds:.1f}"
+        table.add_row(cost.name, cost.methods, *walks, *rates, *others)
+    console.print(table, "\n")
+    for one in scaling.comparisons:
+        who = f"{one.first} and {one.second}" if one.first != one.second else f"{one.first}, one round and another"
+        equal = f"all {one.walks:,} walks equal, bit by bit" if not one.different else ""
+        console.print(f"{who}: {equal or f'{one.different:,} of {one.walks:,} walks differ'}")
 
 
 def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iterator[Path]:
