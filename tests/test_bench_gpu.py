@@ -1,12 +1,17 @@
 """The bench of a GPU: what of it needs none."""
 
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from warpchain import bench_gpu
-from warpchain.bench_gpu import STAGE_FLOPS, GpuCost, as_json, evaluations, flops_per_try, gpu_costs
-from warpchain.parameters import InputError
+from warpchain.bench import LONGEST_STRETCH, flying
+from warpchain.bench_gpu import STAGE_FLOPS, Crowd, GpuCost, as_json, evaluations, flops_per_try, gpu_costs
+from warpchain.kernels.tableaus import TABLEAUS
+from warpchain.options import Options
+from warpchain.parameters import InputError, preset
 from warpchain.terminal import print_gpu_costs
 
 COST = GpuCost(
@@ -48,7 +53,7 @@ def test_json_holds_everything_and_no_nan() -> None:
     assert content["machine"] == {"gpu": "some GPU"}
     assert content["tries"][0]["peak"] is None
     assert content["tries"][0]["microseconds"] == 6.5
-    assert set(content["flops_per_try"]) == set(bench_gpu.METHODS)
+    assert set(content["flops_per_try"]) == set(TABLEAUS)
 
 
 def test_table_shows_a_row_for_each_measurement(capsys: pytest.CaptureFixture[str]) -> None:
@@ -57,7 +62,32 @@ def test_table_shows_a_row_for_each_measurement(capsys: pytest.CaptureFixture[st
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("gpu some GPU")
     rows = [line.split() for line in lines if line.startswith("flight")]
-    assert rows == [["flight", "60", "dp5", "1000", "6.50", "5.50e+10", "210", "25.0%", "168", "6", "(19%)"]] * 2
+    assert rows == [["flight", "60", "dp5", "1000", "6.50", "5.50e+10", "210", "25.0%", "168", "160", "6", "(19%)"]] * 2
+
+
+def test_what_has_no_meaning_for_a_method_is_left_out(capsys: pytest.CaptureFixture[str]) -> None:
+    """Methods that solve equations have no stages and no arithmetic of a tableau; the rest is shown."""
+    for method in ("hybrid", "rodas4p", "rodas5p"):
+        assert math.isnan(evaluations(method)) and math.isnan(flops_per_try(method))
+    cost = replace(COST, method="hybrid", link_stages=math.nan)
+    assert as_json({}, [cost])["tries"][0]["link_stages"] is None
+    print_gpu_costs({}, [cost])
+    rows = [line.split() for line in capsys.readouterr().out.splitlines() if line.startswith("flight")]
+    assert rows == [["flight", "60", "hybrid", "1000", "6.50", "210", "25.0%", "168", "160", "6", "(19%)"]]
+
+
+@pytest.mark.parametrize("method", ["hybrid", "rodas4p", "dp5"])
+def test_a_crowd_flies_and_never_lands(method: str) -> None:
+    """Stretches are of flight alone, however far a try goes; on the CPU here, where a crowd does the same."""
+    parameters = preset("paper")
+    crowd = Crowd(parameters, Options(method=method), *flying(16, parameters), 5)
+    stretches = crowd.measure(5)
+    assert all(stretch.floor == 0 and stretch.tried > 0 and stretch.seconds > 0 for stretch in stretches)
+    assert max(batch.time(0) for batch in crowd.batches) < 1.5 * LONGEST_STRETCH
+    steps = [stretch.simulated / stretch.accepted for stretch in stretches]
+    assert (min(steps) > 1e-4) == (method == "hybrid")
+    first, *others = (batch.position(world) for batch in crowd.batches for world in range(len(batch.links)))
+    assert len(others) == 4 and all(np.array_equal(first, other) for other in others)
 
 
 @pytest.mark.parametrize(

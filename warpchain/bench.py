@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain import reference
-from warpchain.engine import Batch, versions
+from warpchain.engine import COUNTS, Batch, versions
 from warpchain.kernels.methods import METHODS
 from warpchain.options import Options
 from warpchain.parameters import Parameters, preset
@@ -29,6 +29,10 @@ Array = NDArray[np.float64]
 DOP853_STAGES = 12
 FAR = 1e9
 """A stop time [s] that no measurement reaches."""
+LONGEST_STRETCH = 0.5
+"""Simulated time [s] after which a measured chain begins anew: on rigid joints it flies so far that it would land."""
+SETTLING_TRIES = 200
+"""Tries past the first, small steps, which are not measured."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,7 @@ class StepCost:
         method: A method of the engine, or ``"DOP853 (SciPy)"`` on the NumPy model in flight, without contacts.
         links: n.
         microseconds: Median time per try [µs].
-        per_link_stage: The same per link and stage [ns].
+        per_link_stage: The same per link and stage [ns]; NaN where tries are of two kinds.
         step: Mean accepted step [s].
         rejected: Fraction of tries that were rejected.
         wall_per_simulated: Seconds of one core per simulated second.
@@ -123,15 +127,14 @@ def step_costs(
         scipy_starts[n] = starts["flight"]
         for scene, (position, velocity) in starts.items():
             for method in METHODS:
-                stepper = _Stepper(parameters, Options.model_validate({"method": method}), position, velocity)
-                stepper.run(tries)  # past the first, small steps
-                runs[scene, method, n] = stepper
+                options = Options.model_validate({"method": method})
+                runs[scene, method, n] = _Stepper(parameters, options, position, velocity)
     seconds: dict[tuple[str, str, int], list[float]] = {key: [] for key in runs}
     scipy_seconds: dict[int, list[float]] = {n: [] for n in links}
     for turn in range(rounds):
         report(f"round {turn + 1} of {rounds}")
         for key, stepper in runs.items():
-            seconds[key].append(stepper.run(tries) / tries)
+            seconds[key].append(stepper.run(tries))
         for n, (position, velocity) in scipy_starts.items():
             began = time.perf_counter()
             for _ in range(200):
@@ -192,7 +195,7 @@ def broad_phase_costs(
             stepper.run(tries)
         for _ in range(rounds):
             for name, stepper in (("kept", kept), ("grid", grid), ("pairs", pairs)):
-                seconds[name].append(stepper.run(tries) / tries * 1e6)
+                seconds[name].append(1e6 * stepper.run(tries))
         base = statistics.median(seconds["kept"])
         costs.append(
             BroadPhaseCost(
@@ -231,31 +234,53 @@ class _Stepper:
     ) -> None:
         self.batch = Batch(1, len(position), options)
         self.batch.set_chain(0, parameters, len(position))
-        self.batch.load(0, position, velocity, stop_time=FAR, stop_status=Status.FINISHED)
         self.features = self.batch.features(fixed_body="floor", watch="none", broad_phase=broad_phase)
         self.batch.compile(self.features)
+        self.counts = dict.fromkeys(COUNTS, 0)
+        self.simulated = 0.0
+        self._start = position, velocity
+        self._advance = self._begin()
+
+    def _begin(self) -> float:
+        """Put the chain back to its start, and past the first steps; returns the mean simulated time of a try [s]."""
+        self.batch.load(0, *self._start, stop_time=FAR, stop_status=Status.FINISHED)
+        self.batch.launch([0], self.features, SETTLING_TRIES)
+        return self.batch.time(0) / SETTLING_TRIES
 
     def run(self, tries: int) -> float:
-        """Carry on; returns the wall time [s]."""
+        """Carry on by so many tries, or as many as there is room for; returns the wall time of a try [s].
+
+        What happens is added to ``counts`` and ``simulated`` [s].
+        """
+        tries = max(1, min(tries, round(LONGEST_STRETCH / self._advance) - SETTLING_TRIES))
+        if self.batch.time(0) + tries * self._advance > LONGEST_STRETCH:
+            self._begin()
+        time_before, before = self.batch.time(0), self.batch.counts(0)
         seconds = self.batch.launch([0], self.features, tries)
         if self.batch.status(0) != Status.RUNNING:
             raise RuntimeError(f"a measured chain stopped: {self.batch.status(0).sentence}")
-        return seconds
+        self.simulated += self.batch.time(0) - time_before
+        for name, count in self.batch.counts(0).items():
+            self.counts[name] += count - before[name]
+        return seconds / tries
 
     def listed_pairs(self) -> int:
         """Pairs in the neighbour list now."""
         return self.batch.listed_pairs(0)
 
     def cost(self, scene: str, method: str, links: int, seconds: float) -> StepCost:
-        counts, simulated, tries = self.batch.counts(0), self.batch.time(0), self.batch.tries(0)
-        stages = METHODS[method].stages
+        """What was measured, at so much wall time [s] a try."""
+        accepted, tries = self.counts["accepted"], self.counts["accepted"] + self.counts["rejected"]
+        if scene == "flight" and self.counts["floor"]:
+            raise RuntimeError(f"a chain of {links} links that was to fly came down, with {method}")
+        stages = math.nan if METHODS[method].flight else METHODS[method].stages
         return StepCost(
             scene=scene,
             method=method,
             links=links,
             microseconds=seconds * 1e6,
             per_link_stage=seconds * 1e9 / (links * stages),
-            step=simulated / counts["accepted"],
-            rejected=counts["rejected"] / tries,
-            wall_per_simulated=seconds * tries / simulated,
+            step=self.simulated / accepted,
+            rejected=1 - accepted / tries,
+            wall_per_simulated=seconds * tries / self.simulated,
         )

@@ -16,11 +16,12 @@ from typing import Any, Final
 
 import warp as wp
 
-from warpchain.bench import FAR, Array, dropped, flying
+from warpchain.bench import FAR, LONGEST_STRETCH, SETTLING_TRIES, Array, dropped, flying
 from warpchain.engine import Batch, start_device, versions
 from warpchain.ensemble import CREWS
 from warpchain.kernel_choice import block_kernel, block_threads, features_of, load_kernels
 from warpchain.kernels import layout
+from warpchain.kernels.methods import METHODS as ALL_METHODS
 from warpchain.kernels.tableaus import TABLEAUS
 from warpchain.options import Options
 from warpchain.parameters import InputError, Parameters, preset, shown
@@ -29,7 +30,8 @@ from warpchain.status import Status
 LINKS: Final = (60, 90, 120, 150, 180)
 CHAINS: Final = (1, 132, 400, 1000, 4000)
 SCENES: Final = ("flight", "pile")
-METHODS: Final = tuple(TABLEAUS)
+METHODS: Final = ("rkf78", "dp5", "bs32")
+"""Those that are measured if none is named; any method of the engine can be."""
 
 SECONDS: Final = 0.04
 """Length of a measurement, about."""
@@ -58,7 +60,7 @@ class GpuCost:
         links: n.
         chains: Chains that are carried on together.
         microseconds: Median wall time of one try of all of them [µs].
-        link_stages: Stages of a link per second [1/s].
+        link_stages: Stages of a link per second [1/s]; NaN for methods that also solve equations.
         chain_seconds: Simulated time of all chains per wall time.
         rejected: Fraction of tries that were rejected.
         registers: Of a thread.
@@ -66,7 +68,7 @@ class GpuCost:
         blocks: Chains that a multiprocessor holds at a time.
         occupancy: Threads that a multiprocessor then holds, as a fraction of the most it can.
         peak: Arithmetic in double precision as a fraction of what the device could do at its highest clock, see
-            :func:`flops_per_try`; NaN where that is unknown.
+            :func:`flops_per_try`; NaN where either is unknown.
     """
 
     scene: str
@@ -84,12 +86,14 @@ class GpuCost:
     peak: float
 
 
-def flops_per_try(method: str) -> int:
+def flops_per_try(method: str) -> float:
     """Arithmetic of a link and a try in double precision, contacts not counted, see :data:`STAGE_FLOPS`.
 
     Every coefficient of the tableau that is not zero is a product and a sum for each of three components, for
-    velocities and for positions.
+    velocities and for positions. NaN for methods that also solve equations.
     """
+    if method not in TABLEAUS:
+        return math.nan
     tableau = TABLEAUS[method]
     rows = [*tableau.velocity, *tableau.position]
     rows += [tableau.velocity_weights, tableau.position_weights, tableau.velocity_errors, tableau.position_errors]
@@ -97,8 +101,13 @@ def flops_per_try(method: str) -> int:
     return evaluations(method) * sum(STAGE_FLOPS.values()) + 2 * 3 * products + END_FLOPS
 
 
-def evaluations(method: str) -> int:
-    """Stages that a try evaluates: one less if the last stage of a step is the first of the next."""
+def evaluations(method: str) -> float:
+    """Stages that a try evaluates: one less if the last stage of a step is the first of the next.
+
+    NaN for methods that also solve equations.
+    """
+    if method not in TABLEAUS:
+        return math.nan
     tableau = TABLEAUS[method]
     return tableau.stages - int(tableau.first_same_as_last)
 
@@ -113,12 +122,12 @@ def gpu_costs(
     rounds: int = 5,
     report: Callable[[str], None],
 ) -> list[GpuCost]:
-    """Cost of a try at the parameters of Table 1 and tolerance 1e-6.
+    """Cost of a try at the parameters of Table 1 and tolerance 1e-6, on rigid joints that of ``Options``.
 
     Args:
         device: ``"cuda"`` or ``"cuda:N"``.
         scenes: Of :data:`SCENES`.
-        methods: Of :data:`METHODS`.
+        methods: Any of the engine.
         links: Chain lengths.
         chains: Numbers of chains.
         rounds: Measurements of each.
@@ -127,7 +136,7 @@ def gpu_costs(
     Raises:
         InputError: This machine has no such GPU, or a scene or method is unknown.
     """
-    for name, given, known in (("scene", scenes, SCENES), ("method", methods, METHODS)):
+    for name, given, known in (("scene", scenes, SCENES), ("method", methods, ALL_METHODS)):
         for value in given:
             if value not in known:
                 raise InputError(f"bench.{name}: {shown(value)} is unknown; give one of {', '.join(known)}")
@@ -149,7 +158,7 @@ def gpu_costs(
             starts[scene] = flying(n, parameters) if scene == "flight" else dropped(n, device)
         for scene, method, count in itertools.product(scenes, methods, chains):
             report(f"{scene}, {n} links, {method}, {count} chains")
-            crowd = _Crowd(parameters, options[method], *starts[scene], count)
+            crowd = Crowd(parameters, options[method], *starts[scene], count)
             costs.append(crowd.cost(scene, method, rounds))
     return costs
 
@@ -169,7 +178,7 @@ def gpu_machine(device: str) -> dict[str, str]:
 def as_json(machine: Mapping[str, str], costs: Sequence[GpuCost]) -> dict[str, Any]:
     """Everything measured, as JSON has it."""
     rows = [{name: None if value != value else value for name, value in asdict(cost).items()} for cost in costs]
-    return {"machine": dict(machine), "flops_per_try": {name: flops_per_try(name) for name in METHODS}, "tries": rows}
+    return {"machine": dict(machine), "flops_per_try": {name: flops_per_try(name) for name in TABLEAUS}, "tries": rows}
 
 
 def highest_clock(device: wp.Device) -> float:
@@ -202,10 +211,35 @@ def _kernel_needs(kernel: wp.Kernel, threads: int, device: wp.Device) -> tuple[i
     return registers.value, local.value, blocks.value
 
 
-class _Crowd:
+@dataclass(frozen=True)
+class Stretch:
+    """What a crowd did between two looks; its chains are all alike.
+
+    Attributes:
+        seconds: Wall time of one try of all chains [s].
+        simulated: Simulated time of a chain [s].
+        accepted: Accepted tries of a chain.
+        rejected: Rejected tries of a chain.
+        floor: Impulses with the floor of a chain.
+    """
+
+    seconds: float
+    simulated: float
+    accepted: int
+    rejected: int
+    floor: int
+
+    @property
+    def tried(self) -> int:
+        """Tries of a chain."""
+        return self.accepted + self.rejected
+
+
+class Crowd:
     """Chains all alike, in as many batches as a sweep would use."""
 
     def __init__(self, parameters: Parameters, options: Options, position: Array, velocity: Array, chains: int) -> None:
+        """Put so many chains into one state; position (n, 3) and velocity (n, 3)."""
         self.links, self.chains = len(position), chains
         worlds = -(-chains // CREWS)
         self.batches = [Batch(min(worlds, chains - first), self.links, options) for first in range(0, chains, worlds)]
@@ -214,35 +248,63 @@ class _Crowd:
             batch.control.launch_time = math.inf  # launches are cut by tries alone, which are counted on
             for world in range(len(batch.links)):
                 batch.set_chain(world, parameters, self.links)
-                batch.load(world, position, velocity, stop_time=FAR, stop_status=Status.FINISHED)
         self.features = self.batches[0].features(fixed_body="floor", watch="rest")
+        self._start = position, velocity
 
-    def run(self, tries: int) -> float:
-        """Carry all chains on by about so many tries; returns the wall time of one try [s]."""
+    def begin(self) -> Stretch:
+        """Put all chains back to their start and past the first, small steps; what they did then."""
+        for batch in self.batches:
+            for world in range(len(batch.links)):
+                batch.load(world, *self._start, stop_time=FAR, stop_status=Status.FINISHED)
+        self.run(SETTLING_TRIES)
+        return self.run(SETTLING_TRIES)
+
+    def run(self, tries: int) -> Stretch:
+        """Carry all chains on by about so many tries."""
+        batch = self.batches[0]
+        time_before, before = batch.time(0), batch.counts(0)
         share = -(-tries // LAUNCHES)
         began = time.perf_counter()
         for _ in range(LAUNCHES):
-            for batch in self.batches:
-                batch.start({self.features: range(len(batch.links))}, share)
-        for batch in self.batches:
-            batch.finish()
+            for each in self.batches:
+                each.start({self.features: range(len(each.links))}, share)
+        for each in self.batches:
+            each.finish()
         seconds = time.perf_counter() - began
-        for batch in self.batches:
-            if (batch.statuses() != Status.RUNNING).any():
-                raise RuntimeError(f"a measured chain stopped: {batch.status(0).sentence}")
-        return seconds / (share * LAUNCHES)
+        for each in self.batches:
+            if (each.statuses() != Status.RUNNING).any():
+                raise RuntimeError(f"a measured chain stopped: {each.status(0).sentence}")
+        did = {name: count - before[name] for name, count in batch.counts(0).items()}
+        return Stretch(
+            seconds=seconds / (share * LAUNCHES),
+            simulated=batch.time(0) - time_before,
+            accepted=did["accepted"],
+            rejected=did["rejected"],
+            floor=did["floor"],
+        )
+
+    def measure(self, rounds: int) -> list[Stretch]:
+        """So many stretches of :data:`SECONDS` each, or shorter ones that end before a flying chain lands."""
+        first = self.begin()
+        advance = first.simulated / first.tried
+        room = round(LONGEST_STRETCH / advance) - 2 * SETTLING_TRIES
+        tries = max(LAUNCHES, min(round(SECONDS / first.seconds), room))
+        stretches = []
+        for _ in range(rounds):
+            if self.batches[0].time(0) + tries * advance > LONGEST_STRETCH:
+                self.begin()
+            stretches.append(self.run(tries))
+        return stretches
 
     def cost(self, scene: str, method: str, rounds: int) -> GpuCost:
-        """Measure, past the first, small steps."""
-        batch = self.batches[0]
-        tries = max(LAUNCHES, round(SECONDS / self.run(200)))
-        before, counts_before = batch.time(0), batch.counts(0)
-        seconds = statistics.median(self.run(tries) for _ in range(rounds))
-        simulated, counts = batch.time(0) - before, batch.counts(0)
-        accepted = counts["accepted"] - counts_before["accepted"]
-        tried = accepted + counts["rejected"] - counts_before["rejected"]
+        """Medians of so many measurements."""
+        stretches = self.measure(rounds)
+        if scene == "flight" and any(stretch.floor for stretch in stretches):
+            raise RuntimeError(f"chains of {self.links} links that were to fly came down, with {method}")
+        seconds = statistics.median(stretch.seconds for stretch in stretches)
+        tried = sum(stretch.tried for stretch in stretches)
         threads = block_threads(self.links)
-        kernel, device = block_kernel(self.features, threads), batch.device
+        kernel, device = block_kernel(self.features, threads), self.batches[0].device
         registers, spilled, blocks = _kernel_needs(kernel, threads, device)
         lanes = FP64_LANES.get(device.arch, math.nan)
         peak = 2 * lanes * device.sm_count * highest_clock(device)
@@ -253,8 +315,8 @@ class _Crowd:
             chains=self.chains,
             microseconds=1e6 * seconds,
             link_stages=self.links * self.chains * evaluations(method) / seconds,
-            chain_seconds=self.chains * simulated / (tried * seconds),
-            rejected=1 - accepted / tried,
+            chain_seconds=self.chains * sum(stretch.simulated for stretch in stretches) / (tried * seconds),
+            rejected=sum(stretch.rejected for stretch in stretches) / tried,
             registers=registers,
             spilled=spilled,
             blocks=blocks,

@@ -10,7 +10,6 @@ from typing import Final
 import warp as wp
 
 from warpchain.engine import start_device
-from warpchain.gpu_workers import visible_gpus
 from warpchain.parameters import InputError, shown
 from warpchain.planning import Sweep, load_sweep
 from warpchain.runner import on_device
@@ -56,19 +55,17 @@ class Place:
         own = samples if found[3] is None else int(found[3])
         if count == 0 or own == 0:
             raise InputError(f"--devices: {shown(text)} asks for none; give numbers from 1")
+        if count is not None and device.startswith("cuda:"):
+            raise InputError(f"--devices: {shown(text)}: {device} is one GPU; give {device}, or {count}xcuda")
+        start_device(device)
         if device == "cpu":
             processors = len(os.sched_getaffinity(0))
             if (count or 1) > processors:
                 raise InputError(f"--devices: {shown(text)}, but there are {processors} processors; give no more")
             name = text.removeprefix("1x")
             return cls(name, device, threads=count or 1, samples=own)
-        if count is not None and device != "cuda":
-            raise InputError(f"--devices: {shown(text)}: {device} is one GPU; give {device}, or {count}xcuda")
-        start_device(device)
-        if count is not None:
-            visible_gpus(count)
-            if count > (gpus := wp.get_cuda_device_count()):
-                raise InputError(f"--devices: {shown(text)}, but this machine has {gpus} GPUs; give no more")
+        if (count or 1) > (gpus := wp.get_cuda_device_count()):
+            raise InputError(f"--devices: {shown(text)}, but there are {gpus} GPUs; give no more")
         return cls(text, device, processes=count or 0, samples=own)
 
     @property

@@ -22,7 +22,9 @@ def bench(
     ] = "cpu",
     methods: Annotated[
         list[str] | None,
-        typer.Option("--method", metavar="NAME", help="On a GPU, one integrator; may be repeated. Default: all."),
+        typer.Option(
+            "--method", metavar="NAME", help="On a GPU, one integrator; may be repeated. Default: rkf78, dp5, bs32."
+        ),
     ] = None,
     chains: Annotated[
         list[int] | None,

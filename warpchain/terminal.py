@@ -119,7 +119,8 @@ def print_costs(
         table.add_column(heading, justify="right")
     for cost in sorted(steps, key=lambda cost: (cost.scene, cost.links)):
         rejected = "" if math.isnan(cost.rejected) else f"{cost.rejected:.1%}"
-        times = f"{cost.microseconds:.2f}", f"{cost.per_link_stage:.2f}", f"{1e6 * cost.step:.3g}"
+        per_stage = "" if math.isnan(cost.per_link_stage) else f"{cost.per_link_stage:.2f}"
+        times = f"{cost.microseconds:.2f}", per_stage, f"{1e6 * cost.step:.3g}"
         last = rejected, f"{cost.wall_per_simulated:.3g}"
         table.add_row(cost.scene, str(cost.links), cost.method, *times, *last)
     console.print(table, "\n")
@@ -142,11 +143,14 @@ def print_gpu_costs(machine: Mapping[str, str], costs: "Sequence[GpuCost]") -> N
     table = Table(box=None, pad_edge=False)
     for heading in ("scene", "links", "method"):
         table.add_column(heading)
-    for heading in ("chains", "µs/try", "link stages/s", "chain·s/s", "rejected", "registers", "blocks", "of peak"):
+    for heading in ("chains", "µs/try", "link stages/s", "chain·s/s", "rejected"):
+        table.add_column(heading, justify="right")
+    for heading in ("registers", "spilled B", "blocks", "of peak"):
         table.add_column(heading, justify="right")
     for cost in costs:
-        rates = f"{cost.microseconds:.2f}", f"{cost.link_stages:.2e}", f"{cost.chain_seconds:.3g}"
-        needs = f"{cost.rejected:.1%}", str(cost.registers), f"{cost.blocks} ({cost.occupancy:.0%})"
+        stages = "" if math.isnan(cost.link_stages) else f"{cost.link_stages:.2e}"
+        rates = f"{cost.microseconds:.2f}", stages, f"{cost.chain_seconds:.3g}", f"{cost.rejected:.1%}"
+        needs = str(cost.registers), str(cost.spilled), f"{cost.blocks} ({cost.occupancy:.0%})"
         peak = "" if math.isnan(cost.peak) else f"{cost.peak:.0%}"
         table.add_row(cost.scene, str(cost.links), cost.method, str(cost.chains), *rates, *needs, peak)
     console.print(table)
