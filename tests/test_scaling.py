@@ -69,7 +69,7 @@ def test_loading_kernels_is_not_timed_and_workers_are_counted(measured: tuple[sc
     """Starting two processes takes longer than the walks; the processor time is that of the same walks anywhere."""
     one, _, processes, _ = measured[0].costs
     assert processes.loading_seconds > processes.seconds
-    assert 0 < one.processor_seconds < 1.1 * one.seconds
+    assert 0 < one.processor_seconds < 2.1 * one.seconds  # one thread runs walks, another looks after them
     assert 0.3 < processes.processor_seconds / one.processor_seconds < 4
 
 
