@@ -71,6 +71,7 @@ from .layout import (
     NOTE_OPENING,
     NOTE_OTHER_STEP,
     NOTE_STOP_TIME,
+    NOTE_TOLERANCE,
     OMEGA,
     OPENING,
     REJECTED,
@@ -87,7 +88,7 @@ from .layout import (
 )
 from .methods import METHODS
 from .record import record_is_full, sampling, summarise, write_sample
-from .softening import change_joints, contact_step, softened
+from .softening import change_joints, contact_step, softened, spring_tolerance
 from .types import Control, Model, Program, Record, State, read_chain
 
 wp.set_module_options({"enable_backward": False})
@@ -264,6 +265,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 chain = softened(chain, control, state.softness[world])
             note_constants(K, chain)
             K[BOARD_NOTES, NOTE_CONTACT_STEP] = contact_step(control, state.softness[world])
+            K[BOARD_NOTES, NOTE_TOLERANCE] = spring_tolerance(control, state.softness[world])
             K[BOARD_NOTES, NOTE_OPENING] = state.extremes[world, OPENING]
             K[BOARD_NOTES, NOTE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
             K[BOARD_NOTES, NOTE_LAST_IMPULSE] = state.watch[world, LAST_FLOOR_IMPULSE]
@@ -327,6 +329,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                         if state.softness[world] != softness:
                             note_constants(K, change_joints(seen, model, state, control, world))
                             K[BOARD_NOTES, NOTE_CONTACT_STEP] = contact_step(control, state.softness[world])
+                            K[BOARD_NOTES, NOTE_TOLERANCE] = spring_tolerance(control, state.softness[world])
                     K[BOARD_NOTES, NOTE_STOP_TIME] = state.stop_time[world]
                     K[BOARD_NOTES, NOTE_NEXT_LOOK] = wp.float64(state.next_sample[world]) * control.sample_interval
                     if clock() > K[BOARD_NOTES, NOTE_DEADLINE]:
@@ -379,7 +382,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if lands:
                 h = stop_time - time
 
-            tolerance = control.tolerance
+            tolerance = K[BOARD_NOTES, NOTE_TOLERANCE]
             if wp.static(has_flight):
                 trial = Trial()
                 if flies == 0:

@@ -59,7 +59,8 @@ def step_controller(order: int, error_order: int, real: type = wp.float64):
         bounded = wp.max(error, wp.static(real(least_error)))
         if proportional != 0:
             factor = wp.static(real(SAFETY)) * power(bounded, wp.static(real(-0.7 / (error_order + 1))))
-            factor = factor * power(last_error, wp.static(real(0.4 / (error_order + 1))))
+            before = wp.max(last_error, wp.static(real(least_error)))
+            factor = factor * power(before, wp.static(real(0.4 / (error_order + 1))))
             return wp.clamp(factor, wp.static(real(least_shrinkage)), wp.static(real(GREATEST_GROWTH)))
         if error < wp.static(real(0.5)):
             factor = wp.static(real(SAFETY)) * power(bounded, wp.static(real(-1.0 / order)))

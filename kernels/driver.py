@@ -55,7 +55,7 @@ from .layout import (
 from .methods import METHODS
 from .record import record_is_full, sampling, summarise, write_sample
 from .self_contact import self_contacts
-from .softening import change_joints, contact_step, softened
+from .softening import change_joints, contact_step, softened, spring_tolerance
 from .types import Chain, Control, Model, Program, Record, State, read_chain
 
 wp.set_module_options({"enable_backward": False})
@@ -220,9 +220,11 @@ def make_advance(features: Features):
             return
         chain = read_chain(model, world)
         longest = control.contact_step
+        tolerance = control.tolerance
         if wp.static(softens):
             chain = softened(chain, control, state.softness[world])
             longest = contact_step(control, state.softness[world])
+            tolerance = spring_tolerance(control, state.softness[world])
         block = scratch[world]
         K = wp.array(ptr=block.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
         block_list = lists[world]
@@ -259,6 +261,7 @@ def make_advance(features: Features):
                     if state.softness[world] != softness:
                         chain = change_joints(chain, model, state, control, world)
                         longest = contact_step(control, state.softness[world])
+                        tolerance = spring_tolerance(control, state.softness[world])
                         has_first_stage = int(0)
                 if status != RUNNING:
                     break
@@ -313,7 +316,7 @@ def make_advance(features: Features):
 
             error_bits = wp.int64(0)
             if flies == 0:
-                error_bits = attempt(K, chain, h, control.tolerance)
+                error_bits = attempt(K, chain, h, tolerance)
             if wp.static(has_flight):
                 if flies != 0:
                     error_bits = attempt_flight(K, chain, h, control.flight_tolerance)

@@ -132,5 +132,5 @@ def _hybrid(name: str, burst: str) -> Method:
 METHODS = {
     **{name: _explicit(name) for name in TABLEAUS},
     **{name: _rosenbrock(name) for name in ROSENBROCK_TABLES},
-    "hybrid": _hybrid("hybrid", "dp5"),
+    "hybrid": _hybrid("hybrid", "os32"),
 }

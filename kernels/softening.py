@@ -84,6 +84,12 @@ def contact_step(control: Control, softness: wp.float64):
 
 
 @wp.func
+def spring_tolerance(control: Control, softness: wp.float64):
+    """Error allowed in a step of the springs while joints have this softness."""
+    return wp.where(softness >= ONE, control.soft_tolerance, control.tolerance)
+
+
+@wp.func
 def change_joints(before: Chain, model: Model, state: State, control: Control, world: int) -> Chain:
     """The chain after a look that has changed its softness; books the energy that this sets free."""
     after = softened(read_chain(model, world), control, state.softness[world])
@@ -147,8 +153,5 @@ def watch_stiffening(state: State, control: Control, world: int, time: wp.float6
 @wp.func
 def watch_spin_up(state: State, program: Program, control: Control, world: int, time: wp.float64):
     """Makes joints softest while the sprocket spins up, and soft again by the time at which the hold begins."""
-    if time < program.spin_up_start[world]:
-        state.softness[world] = ONE
-    else:
-        ahead = (program.hold_start[world] - time) / control.stiffening_time
-        state.softness[world] = ONE + wp.clamp(ahead, ZERO, ONE)
+    ahead = (program.hold_start[world] - time) / control.stiffening_time
+    state.softness[world] = ONE + wp.clamp(ahead, ZERO, ONE)

@@ -161,4 +161,32 @@ BS32 = Tableau(
     source="P. Bogacki, L. F. Shampine, Appl. Math. Lett. 2 (1989) 321-325",
 )
 
-TABLEAUS = {tableau.name: tableau for tableau in (RKF78, DP5, BS32)}
+OS32 = Tableau(
+    name="os32",
+    order=3,
+    error_order=2,
+    matrix=(
+        (),
+        (F(23, 400),),
+        (F(0), F(3, 25)),
+        (F(0), F(0), F(39, 200)),
+        (F(0), F(0), F(0), F(1, 3)),
+        (F(0), F(0), F(0), F(0), F(2, 3)),
+        (F(1, 4), F(0), F(0), F(0), F(0), F(3, 4)),
+    ),
+    weights=(F(1, 4), F(0), F(0), F(0), F(0), F(3, 4), F(0)),
+    embedded=(F(3, 16), F(0), F(0), F(0), F(0), F(15, 16), F(-1, 8)),
+    source="K. Heun's method of order 3 (Z. Math. Phys. 45 (1900) 23-38) with three stages before it, each from the one "
+    "before alone, for the longest stable step",
+)
+"""Six stages and one reused, of order 3, for steps that stability bounds.
+
+A stage from the one before alone leaves the stability polynomial 1 + z + z²/2 + z³/6 + c₄ z⁴ + c₅ z⁵ + c₆ z⁶ free beyond
+order 3: c₄ = 1/6 · 1/5, c₅ = c₄ · 3/25, c₆ = c₅ · 3/50. They are rounded from what D. I. Ketcheson and A. J. Ahmadia,
+Commun. Appl. Math. Comput. Sci. 7 (2012) 247, call the optimal polynomial: of the largest h for which |P(h λ)| ≤ 1 on the
+chain's eigenvalues λ. Those of joints with Table 1's k and b lie on a curve up to |λ| = 1.08e6/s, 57° off the negative
+axis; sticking friction adds negative ones. The same linear programme says: with these stages steps can be 6.3/|λ|, here
+6.1, as long as eigenvalues on the axis are no greater, where dp5's six stages reach 3.3 and bs32's three 2.5.
+"""
+
+TABLEAUS = {tableau.name: tableau for tableau in (RKF78, DP5, BS32, OS32)}

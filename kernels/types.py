@@ -100,6 +100,7 @@ class Control:
     """Numerical settings of a launch, the same for all its worlds."""
 
     tolerance: wp.float64  # absolute and relative
+    soft_tolerance: wp.float64  # the same while joints are soft or softer
     flight_tolerance: wp.float64  # the same on rigid joints
     proportional: wp.int32  # 1: proportional-integral controller, 0: odeint's standard one
     contact_step: wp.float64  # longest step near a contact [s]

@@ -223,6 +223,7 @@ class Batch:
 
         self.control = Control()
         self.control.tolerance = options.tolerance
+        self.control.soft_tolerance = options.tolerance if options.soft_tolerance is None else options.soft_tolerance
         self.control.flight_tolerance = options.flight_tolerance
         self.control.proportional = int(options.controller == "pi")
         self.control.contact_step = options.contact_step

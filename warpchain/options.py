@@ -137,11 +137,17 @@ class Scene(BaseModel):
         return self
 
 
-_SOFTENED: Final = {"soften_pile": True, "soften_drive": True}
+_LOOSE: Final = {
+    "tolerance": 1e-3,
+    "soft_tolerance": 1e-2,
+    "controller": "pi",
+    "soften_pile": True,
+    "soften_drive": True,
+}
 METHODS_BY_NEED: Final[Mapping[str, Mapping[str, object]]] = MappingProxyType(
     {
-        "standard": MappingProxyType({"method": "hybrid", "tolerance": 1e-4, **_SOFTENED}),
-        "explicit": MappingProxyType({"method": "dp5", "tolerance": 1e-4, **_SOFTENED}),
+        "standard": MappingProxyType({"method": "hybrid", **_LOOSE}),
+        "explicit": MappingProxyType({"method": "os32", **_LOOSE}),
         "reference": MappingProxyType({"method": "rkf78", "tolerance": 1e-6}),
     }
 )
@@ -165,9 +171,10 @@ class Options(BaseModel):
 
     model_config = _STRICT
 
-    method: Literal["rkf78", "dp5", "bs32", "rodas4p", "rodas5p", "hybrid"] = Field(
+    method: Literal["rkf78", "dp5", "bs32", "os32", "rodas4p", "rodas5p", "hybrid"] = Field(
         default="rkf78",
-        description="embedded pair: Fehlberg 7(8), Dormand–Prince 5(4), Bogacki–Shampine 3(2), RODAS4P 4(3) or "
+        description="embedded pair: Fehlberg 7(8), Dormand–Prince 5(4), Bogacki–Shampine 3(2), six stages of order 3(2) for "
+        "the longest stable steps, RODAS4P 4(3) or "
         "RODAS5P 5(4), the last two implicit; "
         "hybrid: rigid joints between impulses, dp5 around them",
     )
@@ -176,6 +183,13 @@ class Options(BaseModel):
         ge=1e-13,
         le=1e-1,
         description="error allowed in a step, absolute (SI units) and relative alike",
+        json_schema_extra={"unit": "1"},
+    )
+    soft_tolerance: float | None = Field(
+        default=None,
+        ge=1e-13,
+        le=1e-1,
+        description="the same where soften_drive or soften_pile has made joints soft or softest; null: tolerance",
         json_schema_extra={"unit": "1"},
     )
     flight_tolerance: float = Field(
