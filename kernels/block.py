@@ -386,12 +386,12 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if wp.static(has_flight):
                 trial = Trial()
                 if flies == 0:
-                    trial = attempt(ends, forces, memory_start, K, place, n, h)
+                    trial = attempt(ends, forces, memory_start, K, place, n, h, tolerance)
                 else:
                     trial = attempt_flight(ends_start, forces_start, memory_start, K, place, n, h)
                     tolerance = control.flight_tolerance
             else:
-                trial = attempt(ends, forces, memory_start, K, place, n, h)
+                trial = attempt(ends, forces, memory_start, K, place, n, h, tolerance)
             own_error = int(0)
             if lane < n:
                 own_error = error_of(trial, tolerance)

@@ -12,7 +12,8 @@ couplings of links free of it:
     D_i = diag(m + 2σ, m + 2σ, I/a² + 2σ + g (φ_i + φ_i₋₁)/a² + g² u·(F_i + F_i₋₁)/a),
     U_i = −(1; t_iᵀ) (σ, −c_i₊₁) − g φ_i/a²,    L_i = −(1; −t_iᵀ) (σ, c_i₋₁) − g φ_i₋₁/a²,
 
-with σ = g b + g² k, c = σ t − g² b ω u and φ = f'(w), in the corner of the angles.
+with σ = g b + g² k, c = σ t − g² b ω u and φ of :func:`friction_secant`, in the corner of the angles. A stage's joints
+open by what they do at the start plus the change, for the reason that :mod:`rosenbrock_system` gives.
 """
 
 import functools
@@ -22,7 +23,6 @@ import warp as wp
 from .block_memory import barrier, constant_table, read, write
 from .block_solver import FactorLayout, block_solver, mat33d, reductions_for
 from .block_step import (
-    Link,
     Place,
     Trial,
     block_stage,
@@ -33,10 +33,11 @@ from .block_step import (
     vec3d,
     vec5d,
 )
-from .elementary import ONE, TWO, ZERO, cos_sin
+from .elementary import ONE, TWO, ZERO, versine_sine
 from .geometry import end_positions, end_velocities
 from .joint import friction_slope, friction_torque, joint_force, link_acceleration
 from .layout import (
+    BOARD_FIRST,
     BOARD_NOTES,
     INERTIA,
     INVERSE_INERTIA,
@@ -49,8 +50,11 @@ from .layout import (
     NOTE_GRAVITY,
     RIGHT_X,
     THETA,
+    X,
+    Y,
 )
 from .rosenbrock import GREATEST_TURN
+from .rosenbrock_system import friction_secant
 from .rosenbrock_tables import ROSENBROCK_TABLES
 
 wp.set_module_options({"enable_backward": False})
@@ -153,8 +157,8 @@ def rosenbrock_attempt(name: str, block_dim: int):
         block_dim: Threads in a block.
 
     Returns:
-        ``attempt(ends, forces, S, K, place, n, h)`` → Trial, from the state and first stage on the board, with S the
-        block's memory for the linear systems, laid out by :func:`factor_layout`.
+        ``attempt(ends, forces, S, K, place, n, h, tolerance)`` → Trial, from the state and first stage on the board,
+        with S the block's memory for the linear systems, laid out by :func:`factor_layout`.
     """
     table = ROSENBROCK_TABLES[name]
     stages, gamma = table.stages, table.gamma
@@ -201,6 +205,7 @@ def rosenbrock_attempt(name: str, block_dim: int):
         place: Place,
         n: int,
         h: wp.float64,
+        tolerance: wp.float64,
     ):
         lane = place.lane
         column = place.column
@@ -208,7 +213,6 @@ def rosenbrock_attempt(name: str, block_dim: int):
         chain = joint_constants(K)
         inverse_length = ONE / chain.half_length
         g = wp.static(wp.float64(gamma)) * h
-        theta = K[THETA, lane]
         link = link_on(K, lane)
         first = first_on(K, lane)
         next_end = hand_over(ends, K, place, link)
@@ -217,11 +221,23 @@ def rosenbrock_attempt(name: str, block_dim: int):
         base_cu = next_end[2] - right_u
         base_cv = next_end[3] - right_v
         base_spin = link.omega - next_end[4]
-        force_x = joint_force(chain, next_end[0] - right_x, base_cu)
-        force_y = joint_force(chain, next_end[1] - right_y, base_cv)
-        slope = friction_slope(chain, base_spin)
+        opening_x = next_end[0] - right_x
+        opening_y = next_end[1] - right_y
+        force_x = joint_force(chain, opening_x, base_cu)
+        force_y = joint_force(chain, opening_y, base_cv)
+        power_slope = friction_torque(chain, base_spin)
+        slope = friction_secant(
+            chain,
+            friction_slope(chain, base_spin),
+            power_slope,
+            base_spin,
+            first.theta - K[BOARD_FIRST + 2, place.after],
+            link.omega,
+            h,
+            tolerance,
+        )
         torque = slope * base_spin
-        power_slope = friction_torque(chain, base_spin) + torque
+        power_slope += torque
         sigma = g * (chain.joint_damping + g * chain.joint_stiffness)
         turning = g * g * chain.joint_damping * link.omega
         own_slope = g * slope * inverse_length * inverse_length
@@ -308,18 +324,22 @@ def rosenbrock_attempt(name: str, block_dim: int):
                 sx += weight * ux[j]
                 sy += weight * uy[j]
                 st += weight * ut[j]
-            x = link.x + g * dx
-            y = link.y + g * dy
-            angle = theta + g * turn
+            dx = g * dx
+            dy = g * dy
+            turn = g * turn
             rx += u
             ry += v
             rt += omega
             weight = coefficient(QUADRATURE, i, 0)
             if i > 0:
                 constants = joint_constants(K)
-                cosine, sine = cos_sin(angle)
-                _left_x, _left_y, right_x, right_y = end_positions(constants, x, y, cosine, sine)
-                _left_u, _left_v, right_u, right_v = end_velocities(constants, u, v, omega, cosine, sine)
+                versine, sine = versine_sine(turn)
+                turn_x = -(link.cosine * versine + link.sine * sine)
+                turn_y = link.cosine * sine - link.sine * versine
+                cosine = link.cosine + turn_x
+                sine = link.sine + turn_y
+                left_x, left_y, right_x, right_y = end_positions(constants, dx, dy, turn_x, turn_y)
+                left_u, left_v, right_u, right_v = end_velocities(constants, u, v, omega, cosine, sine)
                 shift_left_u, shift_left_v, shift_u, shift_v = end_velocities(
                     constants, rx, ry, rt, link.cosine, link.sine
                 )
@@ -328,20 +348,13 @@ def rosenbrock_attempt(name: str, block_dim: int):
                     hand(K, SHIFT_V, lane, shift_left_v)
                     hand(K, SHIFT_SPIN, lane, rt)
                 after = place.after
-                there = Link()
-                there.x = x
-                there.y = y
-                there.u = u
-                there.v = v
-                there.omega = omega
-                there.cosine = cosine
-                there.sine = sine
-                next_end = hand_over(ends, K, place, there)
+                ends[lane] = vec5d(left_x, left_y, left_u, left_v, omega)
+                next_end = ends[after]
                 cu = next_end[2] - right_u
                 cv = next_end[3] - right_v
                 spin = omega - next_end[4]
-                force_x = joint_force(constants, next_end[0] - right_x, cu)
-                force_y = joint_force(constants, next_end[1] - right_y, cv)
+                force_x = joint_force(constants, opening_x + (next_end[0] - right_x), cu)
+                force_y = joint_force(constants, opening_y + (next_end[1] - right_y), cv)
                 torque = friction_torque(constants, spin)
                 friction += weight * (torque * spin)
                 damping += weight * (constants.joint_damping * (cu * cu + cv * cv))
@@ -411,13 +424,17 @@ def rosenbrock_attempt(name: str, block_dim: int):
             i += 1
             if i == wp.static(stages):
                 # the last change is the error, too
-                trial.x = x + g * z[0]
-                trial.y = y + g * z[1]
-                trial.theta = angle + g * z[2]
+                theta = K[THETA, lane]
+                turn += g * z[2]
+                link.x = K[X, lane]
+                link.y = K[Y, lane]
+                trial.x = link.x + (dx + g * z[0])
+                trial.y = link.y + (dy + g * z[1])
+                trial.theta = theta + turn
                 trial.u = u + du
                 trial.v = v + dv
                 trial.omega = omega + dw
-                trial.turns_far = wp.abs(trial.theta - theta) > GREATEST_TURN
+                trial.turns_far = wp.abs(turn) > GREATEST_TURN
                 error, scale = greatest_error(link, theta, first, h, g * z[0], g * z[1], g * z[2], du, dv, dw)
                 trial.error = error
                 trial.scale = scale

@@ -279,8 +279,8 @@ def explicit_attempt(name: str, block_dim: int):
         block_dim: Threads in a block.
 
     Returns:
-        ``attempt(ends, forces, S, K, place, n, h)`` → Trial, from the state and first stage on the board; it needs no
-        memory S.
+        ``attempt(ends, forces, S, K, place, n, h, tolerance)`` → Trial, from the state and first stage on the board;
+        it needs neither the memory S nor the tolerance.
     """
     tableau = TABLEAUS[name]
     stages = tableau.stages
@@ -299,6 +299,7 @@ def explicit_attempt(name: str, block_dim: int):
         place: Place,
         n: int,
         h: wp.float64,
+        tolerance: wp.float64,
     ):
         hh = h * h
         lane = place.lane

@@ -86,12 +86,19 @@ def quotient(a: wp.float64, b: wp.float64) -> wp.float64:
 
 
 @wp.func
-def turn(angle: wp.float64):
-    """Cosine and sine of an angle [rad], to rounding within ±π/4, to 4e-14 within ±1."""
+def versine_sine(angle: wp.float64):
+    """1 − cos and sin of an angle [rad], each to its own rounding within ±π/4, to 4e-14 within ±1."""
     z = angle * angle
     sine = angle + angle * z * (S1 + z * (S2 + z * (S3 + z * (S4 + z * (S5 + z * S6)))))
-    cosine = ONE - (HALF * z - z * z * (C1 + z * (C2 + z * (C3 + z * (C4 + z * (C5 + z * C6))))))
-    return cosine, sine
+    versine = HALF * z - z * z * (C1 + z * (C2 + z * (C3 + z * (C4 + z * (C5 + z * C6)))))
+    return versine, sine
+
+
+@wp.func
+def turn(angle: wp.float64):
+    """Cosine and sine of an angle [rad], to rounding within ±π/4, to 4e-14 within ±1."""
+    versine, sine = versine_sine(angle)
+    return ONE - versine, sine
 
 
 @wp.func

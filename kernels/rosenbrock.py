@@ -18,7 +18,7 @@ import warp as wp
 
 from .controller import error_bits
 from .cyclic_solver import LANES, cyclic_solver, place_column, row_at, segment_places
-from .elementary import ONE, TWO, ZERO, cos_sin, order_bits, turn
+from .elementary import ONE, TWO, ZERO, cos_sin, order_bits, versine_sine
 from .joint import friction_slope, friction_torque, joint_force
 from .layout import INERTIA as LINK_INERTIA
 from .layout import LOST_DAMPING, LOST_FRICTION, OMEGA, STAGE_ROWS, STAGES, THETA, U, V, X, Y
@@ -28,6 +28,8 @@ from .rosenbrock_layout import (
     BASE_COSINE,
     BASE_FORCE_X,
     BASE_FORCE_Y,
+    BASE_OPENING_X,
+    BASE_OPENING_Y,
     BASE_RATE,
     BASE_RATE_X,
     BASE_RATE_Y,
@@ -49,6 +51,8 @@ from .rosenbrock_layout import (
     SHIFT,
     SINE,
     SLOPE,
+    SPIN_RATE,
+    TANGENT,
     pad_before,
     pad_behind,
     segments_of,
@@ -56,6 +60,7 @@ from .rosenbrock_layout import (
 from .rosenbrock_system import (
     assemble,
     first_right_hand_side,
+    friction_secant,
     opening,
     opening_rate,
     pull_joints,
@@ -127,9 +132,11 @@ def rosenbrock_method(name: str, columns: int):
 
     behind_start = pad_behind((*range(BASE, BASE + 6), BASE_COSINE, BASE_SINE))
     behind_stage = pad_behind((NEW, NEW + 1, NEW + 3, NEW + 4, NEW + 5, COSINE, SINE, SHIFT, SHIFT + 1, SHIFT + 2))
+    behind_rate = pad_behind((BASE_RATE + 2,))
     behind_end = pad_behind(tuple(range(CHANGE, CHANGE + 4)))
     before_start = pad_before((BASE + 5, BASE_COSINE, BASE_SINE), 0)
-    joints_start = pad_before(tuple(range(SLOPE, SLOPE + 7)), 1)
+    joints_start = pad_before(tuple(range(BASE_TORQUE, BASE_TORQUE + 6)), 1)
+    joints_slope = pad_before((SLOPE,), 1)
     joints_stage = pad_before(tuple(range(FORCE_X, FORCE_X + 6)), 1)
 
     @wp.func
@@ -168,10 +175,12 @@ def rosenbrock_method(name: str, columns: int):
         while c < end:
             cx, cy = opening(S, chain, c, BASE, BASE_COSINE)
             cu, cv, spin = opening_rate(S, chain, c, wp.static(BASE + 3), BASE_COSINE)
+            S[BASE_OPENING_X, c + 8] = cx
+            S[BASE_OPENING_Y, c + 8] = cy
             S[BASE_FORCE_X, c + 8] = joint_force(chain, cx, cu)
             S[BASE_FORCE_Y, c + 8] = joint_force(chain, cy, cv)
             S[BASE_TORQUE, c + 8] = friction_torque(chain, spin)
-            S[SLOPE, c + 8] = friction_slope(chain, spin)
+            S[TANGENT, c + 8] = friction_slope(chain, spin)
             S[BASE_SPIN, c + 8] = spin
             S[BASE_RATE_X, c + 8] = cu
             S[BASE_RATE_Y, c + 8] = cv
@@ -188,6 +197,16 @@ def rosenbrock_method(name: str, columns: int):
             S[wp.static(BASE_RATE + 1), c] = fy / S[MASS, c] - chain.gravity
             S[wp.static(BASE_RATE + 2), c] = (lever + S[BASE_TORQUE, c] - S[BASE_TORQUE, c + 8]) / S[INERTIA, c]
             c += 1
+        behind_rate(S, places, full)
+        c = int(8)
+        while c < end:
+            S[SPIN_RATE, c + 8] = S[wp.static(BASE_RATE + 2), c] - S[wp.static(BASE_RATE + 2), c + 8]
+            c += 1
+        # a repeated separator has no rate of its own; the joint behind it is the last of the segment before
+        s = full
+        while s < 8:
+            S[SPIN_RATE, 16 + s] = S[SPIN_RATE, 8 * places + 7 + s]
+            s += 1
         # the driver looks there for rates that are not finite
         greatest = wp.int64(0)
         c = int(8)
@@ -203,7 +222,7 @@ def rosenbrock_method(name: str, columns: int):
 
     @wp.func
     def place_stage(S: wp.array2d(dtype=wp.float64), stage: int, g: wp.float64, end: int):
-        """W of the stage before, this stage's place and directions, r_q / g and γ Σ C U_v."""
+        """W of the stage before, how this stage's place differs from the start, r_q / g and γ Σ C U_v."""
         for i in range(1, wp.static(stages)):
             if stage == i:
                 c = int(8)
@@ -224,14 +243,14 @@ def rosenbrock_method(name: str, columns: int):
                             driven += wp.static(wp.float64(drive[i][j])) * change
                         S[wp.static(SHIFT + k), c] = shifted
                         S[wp.static(DRIVE + k), c] = driven
-                        S[wp.static(NEW + k), c] = S[wp.static(BASE + k), c] + g * moved
+                        S[wp.static(NEW + k), c] = g * moved
                         S[wp.static(NEW + 3 + k), c] = speed
                     c += 1
         c = int(8)
         while c < end:
-            cosine, sine = turn(S[wp.static(NEW + 2), c] - S[wp.static(BASE + 2), c])
-            S[COSINE, c] = S[BASE_COSINE, c] * cosine - S[BASE_SINE, c] * sine
-            S[SINE, c] = S[BASE_SINE, c] * cosine + S[BASE_COSINE, c] * sine
+            versine, sine = versine_sine(S[wp.static(NEW + 2), c])
+            S[COSINE, c] = -(S[BASE_COSINE, c] * versine + S[BASE_SINE, c] * sine)
+            S[SINE, c] = S[BASE_COSINE, c] * sine - S[BASE_SINE, c] * versine
             c += 1
 
     @wp.func
@@ -241,6 +260,20 @@ def rosenbrock_method(name: str, columns: int):
         places, full, _ = segment_places(chain.link_count)
         end = place_column(places + 1)
         g = wp.static(wp.float64(gamma)) * h
+        c = int(8)
+        while c < end:
+            S[SLOPE, c + 8] = friction_secant(
+                chain,
+                S[TANGENT, c + 8],
+                S[BASE_TORQUE, c + 8],
+                S[BASE_SPIN, c + 8],
+                S[SPIN_RATE, c + 8],
+                S[wp.static(BASE + 5), c],
+                h,
+                tolerance,
+            )
+            c += 1
+        joints_slope(S, places)
         assemble(S, chain, g, end, full)
         factor(S, R, places, full)
         # stages are a loop at run time: unrolled, the code of a step would not fit into the cache for instructions
@@ -271,14 +304,16 @@ def rosenbrock_method(name: str, columns: int):
                 S[wp.static(FIRST_STAGE_ROW + 3 * (stages - 1) + k), c] = (
                     z - wp.static(wp.float64(free[stages - 1])) * S[wp.static(BASE + 3 + k), c]
                 )
-                S[wp.static(NEW + k), c] = S[wp.static(NEW + k), c] + place_error
+                moved = S[wp.static(NEW + k), c] + place_error
+                if wp.static(k == 2):
+                    turned = wp.max(turned, order_bits(moved))
+                S[wp.static(NEW + k), c] = S[wp.static(BASE + k), c] + moved
                 S[wp.static(NEW + 3 + k), c] = S[wp.static(NEW + 3 + k), c] + speed_error
                 speed = S[wp.static(BASE + 3 + k), c]
                 # repeated places have no rate of their own
                 counted = S[COUNTED, c]
                 worst = wp.max(worst, error_bits(counted * place_error, S[wp.static(BASE + k), c], speed, h))
                 worst = wp.max(worst, error_bits(counted * speed_error, speed, S[wp.static(BASE_RATE + k), c], h))
-            turned = wp.max(turned, order_bits(S[wp.static(NEW + 2), c] - S[wp.static(BASE + 2), c]))
             c += 1
         greatest = order_bits(wp.cast(worst, wp.float64) / tolerance)
         # a greater turn is refused as an error of 2: the step shrinks

@@ -8,19 +8,26 @@ links' columns of the first part are c = −σ a t + g² b a ω u. So the diagon
     D_i = diag(m + 2σ, m + 2σ, I + 2σ a² + g (φ_i + φ_i₋₁) + g² a u·(F_i + F_i₋₁)),
     U_i = −(1; a t_iᵀ) (σ, c_i₊₁) − g φ_i,    L_i = (1; −a t_iᵀ) (−σ, c_i₋₁) − g φ_i₋₁,
 
-with φ = f'(w) of the joints' friction, in the corner of the angles.
+with φ = f'(w) of the joints' friction, see :func:`friction_secant`, in the corner of the angles.
+
+Stiff joints open by 1e-8 m, of which the rounding of places, 1e-16 m, is a force of 1e-7 N. It would be another one in
+each stage, and the error estimate, a sum over the stages with coefficients up to 100, would see it at tolerances of
+1e-9. So the opening of a stage is that at the start plus what changes of places and directions, which round a thousand
+times finer, add to it: the estimate then is that of a chain whose joints open by 1e-16 m more or less.
 """
 
 import warp as wp
 
 from .elementary import ONE, TWO, ZERO
-from .geometry import end_positions, end_velocities
+from .geometry import end_velocities
 from .joint import friction_torque, joint_force
 from .rosenbrock_layout import (
     BASE,
     BASE_COSINE,
     BASE_FORCE_X,
     BASE_FORCE_Y,
+    BASE_OPENING_X,
+    BASE_OPENING_Y,
     BASE_RATE,
     BASE_RATE_X,
     BASE_RATE_Y,
@@ -53,16 +60,20 @@ from .types import Chain
 wp.set_module_options({"enable_backward": False})
 
 
+UNSEEN = wp.constant(wp.float64(10.0))
+"""Tolerances below which a joint's spin may be found sticking, see :func:`friction_secant`."""
+SATURATED = wp.constant(wp.float64(4.0))
+"""Spin over ω_c beyond which friction is constant to a thousandth."""
+
+
 @wp.func
 def opening(S: wp.array2d(dtype=wp.float64), chain: Chain, c: int, place: int, direction: int):
-    """Opening C of the joint on the right of a link, from the rows of places x, y and of directions."""
-    _left_x, _left_y, right_x, right_y = end_positions(
-        chain, S[place, c], S[place + 1, c], S[direction, c], S[direction + 1, c]
+    """Opening C of the joint on the right of a link, from the rows of places x, y and of directions, or its change."""
+    a = chain.half_length
+    return (
+        (S[place, c + 8] - S[place, c]) - a * (S[direction, c + 8] + S[direction, c]),
+        (S[place + 1, c + 8] - S[place + 1, c]) - a * (S[direction + 1, c + 8] + S[direction + 1, c]),
     )
-    left_x, left_y, _right_x, _right_y = end_positions(
-        chain, S[place, c + 8], S[place + 1, c + 8], S[direction, c + 8], S[direction + 1, c + 8]
-    )
-    return left_x - right_x, left_y - right_y
 
 
 @wp.func
@@ -75,6 +86,65 @@ def opening_rate(S: wp.array2d(dtype=wp.float64), chain: Chain, c: int, speed: i
         chain, S[speed, c + 8], S[speed + 1, c + 8], S[speed + 2, c + 8], S[direction, c + 8], S[direction + 1, c + 8]
     )
     return left_u - right_u, left_v - right_v, S[speed + 2, c] - S[speed + 2, c + 8]
+
+
+@wp.func
+def stage_opening_rate(S: wp.array2d(dtype=wp.float64), chain: Chain, c: int):
+    """The same at a stage's place, whose directions are those at the start and their changes."""
+    _left_u, _left_v, right_u, right_v = end_velocities(
+        chain,
+        S[wp.static(NEW + 3), c],
+        S[wp.static(NEW + 4), c],
+        S[wp.static(NEW + 5), c],
+        S[BASE_COSINE, c] + S[COSINE, c],
+        S[BASE_SINE, c] + S[SINE, c],
+    )
+    left_u, left_v, _right_u, _right_v = end_velocities(
+        chain,
+        S[wp.static(NEW + 3), c + 8],
+        S[wp.static(NEW + 4), c + 8],
+        S[wp.static(NEW + 5), c + 8],
+        S[BASE_COSINE, c + 8] + S[COSINE, c + 8],
+        S[BASE_SINE, c + 8] + S[SINE, c + 8],
+    )
+    return left_u - right_u, left_v - right_v, S[wp.static(NEW + 5), c] - S[wp.static(NEW + 5), c + 8]
+
+
+@wp.func
+def friction_secant(
+    chain: Chain,
+    tangent: wp.float64,
+    torque: wp.float64,
+    spin: wp.float64,
+    spin_rate: wp.float64,
+    omega: wp.float64,
+    h: wp.float64,
+    tolerance: wp.float64,
+):
+    """φ of a joint for a step h [N m s]: f'(w), or f(w)/w where the step would jump over the change of sign unseen.
+
+    A joint that slides has hardly any f'(w). Near w = 0 such a joint is thrown to the other side in each step, by less
+    than the tolerance, and never found where it would stick; its errors fall with h alone, so the controller, which
+    knows of higher orders, stayed at steps of 4 µs at a tolerance of 1e-3 where 1e-4 took 20 µs. With f(w)/w the joint
+    sticks at once. It is used where w, beyond the smoothing (4 ω_c), would change its sign and is below
+    :data:`UNSEEN` tolerances of ω: limits of 3, 30 and none cost the same at 1e-3, but none adds rejected steps and
+    errors at 1e-7. Steps that resolve the switch, and so the orders, have f'(w).
+
+    Args:
+        chain: The joint's chain.
+        tangent: f'(w) [N m s].
+        torque: f(w) [N m].
+        spin: w [rad/s].
+        spin_rate: ẇ at the start of the step [rad/s²].
+        omega: Angular velocity of the link on the joint's left [rad/s].
+        h: Step [s].
+        tolerance: Of the step's errors.
+    """
+    size = wp.abs(spin)
+    turns_round = spin * (spin + h * spin_rate) < ZERO
+    is_unseen = size < UNSEEN * tolerance * (ONE + wp.abs(omega))
+    jumps = turns_round and is_unseen and size * chain.inverse_smoothing > SATURATED
+    return wp.where(jumps, torque / wp.where(jumps, spin, ONE), tangent)
 
 
 @wp.func
@@ -173,7 +243,9 @@ def pull_joints(S: wp.array2d(dtype=wp.float64), chain: Chain, weight: wp.float6
     c = int(8)
     while c < end:
         cx, cy = opening(S, chain, c, NEW, COSINE)
-        cu, cv, spin = opening_rate(S, chain, c, wp.static(NEW + 3), COSINE)
+        cx += S[BASE_OPENING_X, c + 8]
+        cy += S[BASE_OPENING_Y, c + 8]
+        cu, cv, spin = stage_opening_rate(S, chain, c)
         torque = friction_torque(chain, spin)
         S[FORCE_X, c + 8] = joint_force(chain, cx, cu)
         S[FORCE_Y, c + 8] = joint_force(chain, cy, cv)
@@ -199,7 +271,8 @@ def right_hand_side(S: wp.array2d(dtype=wp.float64), chain: Chain, g: wp.float64
         fy = S[FORCE_Y, c + 8] - S[FORCE_Y, c]
         sum_x = S[FORCE_X, c + 8] + S[FORCE_X, c]
         sum_y = S[FORCE_Y, c + 8] + S[FORCE_Y, c]
-        turn = a * (S[COSINE, c] * sum_y - S[SINE, c] * sum_x) + S[TORQUE, c] - S[TORQUE, c + 8]
+        turn = a * ((S[BASE_COSINE, c] + S[COSINE, c]) * sum_y - (S[BASE_SINE, c] + S[SINE, c]) * sum_x)
+        turn += S[TORQUE, c] - S[TORQUE, c + 8]
         gx = S[SHIFT_X, c + 8] - S[SHIFT_X, c]
         gy = S[SHIFT_Y, c + 8] - S[SHIFT_Y, c]
         sum_gx = S[SHIFT_X, c + 8] + S[SHIFT_X, c]

@@ -173,6 +173,18 @@ def test_an_ensemble_goes_on_and_is_summed_up(tmp_path: Path) -> None:
     assert after[0]["difference_loose"] == after[0]["ks_loose"] == 0 and after[0]["passes"]
 
 
+def test_contestants_that_differ_in_the_last_digit_have_different_names() -> None:
+    """Names and titles hold every digit of tolerances and settings, so no two contestants share a folder or a row."""
+    next_tolerance, next_area = math.nextafter(1e-4, 1), math.nextafter(0.7, 1)
+    alike = [
+        Contestant("rkf78", tolerance, (("soften_pile", True), ("soften_area", area)))
+        for tolerance in (1e-4, next_tolerance)
+        for area in (0.7, next_area)
+    ]
+    assert len({one.name for one in alike}) == len({one.title for one in alike}) == len(alike)
+    assert [Contestant.parse(one.name) for one in alike] == alike
+
+
 def test_contestants_are_read_as_they_are_named() -> None:
     """A name with tolerance and settings, in any order, is read back from itself, which a folder's name needs."""
     for one in (

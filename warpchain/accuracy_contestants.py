@@ -57,9 +57,9 @@ class Contestant:
 
     @property
     def name(self) -> str:
-        """As `parse` reads it, and good for a folder: ``dp5@1e-06+soften_pile+soften_area=0.7``."""
-        settings = (name if value is True else f"{name}={value:g}" for name, value in self.settings)
-        return "+".join([f"{self.method}@{self.tolerance:g}", *settings])
+        """As `parse` reads it, no two alike, and good for a folder: ``dp5@1e-06+soften_pile+soften_area=0.7``."""
+        settings = (name if value is True else f"{name}={_exact(value)}" for name, value in self.settings)
+        return "+".join([f"{self.method}@{_exact(self.tolerance)}", *settings])
 
     @property
     def word(self) -> str:
@@ -69,8 +69,10 @@ class Contestant:
     @property
     def title(self) -> str:
         """For people."""
-        settings = (name.replace("_", " ") + ("" if value is True else f" {value:g}") for name, value in self.settings)
-        text = ", ".join([f"{self.method} at {self.tolerance:g}", *settings])
+        settings = (
+            name.replace("_", " ") + ("" if value is True else f" {_exact(value)}") for name, value in self.settings
+        )
+        text = ", ".join([f"{self.method} at {_exact(self.tolerance)}", *settings])
         return f"{self.word}: {text}" if self.word else text
 
     @classmethod
@@ -103,6 +105,12 @@ class Contestant:
             else:
                 raise InputError(f"--methods: {shown(name)} is unknown; {suggestion(name, (*SWITCHES, *NUMBERS))}")
         return cls.of(options)
+
+
+def _exact(value: float) -> str:
+    """A number so that it can be read back: in six digits if they are all it has."""
+    short = f"{value:g}"
+    return short if float(short) == value else repr(float(value))
 
 
 def _number(text: str, number: str, place: str) -> float:
