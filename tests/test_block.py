@@ -60,7 +60,7 @@ def assert_same(ours: Batch, theirs: Batch) -> None:
 
 @pytest.mark.parametrize(
     ("method", "fixed_body", "self_contact", "block_dim"),
-    [("rkf78", "floor", True, LINKS), ("dp5", "sprocket", True, 5 * LINKS), ("bs32", "floor", False, LINKS)],
+    [("rkf78", "floor", True, LINKS), ("dp5", "sprocket", True, 5 * LINKS), ("bs32", "floor", False, LINKS), ("os32", "sprocket", True, LINKS)],
 )
 def test_fixed_steps_equal_the_cpu_form(method: str, fixed_body: str, self_contact: bool, block_dim: int) -> None:
     """Forty steps with dozens of impulses of every kind end in the same state, to the bit.
