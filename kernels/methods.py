@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from . import layout
-from .block_chain import chained_attempt
 from .block_flight import flight_attempt
 from .block_rigid import FlightLayout, block_rigid_joints
 from .block_rosenbrock import factor_layout, rosenbrock_attempt
@@ -90,7 +89,7 @@ def _explicit(name: str) -> Method:
         functions=lambda columns: explicit_method(name),
         needs_first_power=tableau.velocity_weights[0] != 0.0,
         block_memory=lambda threads: 0,
-        block_attempt=lambda threads: (chained_attempt if tableau.is_chained else explicit_attempt)(name, threads),
+        block_attempt=lambda threads: explicit_attempt(name, threads),
     )
 
 

@@ -153,5 +153,8 @@ def watch_stiffening(state: State, control: Control, world: int, time: wp.float6
 @wp.func
 def watch_spin_up(state: State, program: Program, control: Control, world: int, time: wp.float64):
     """Makes joints softest while the sprocket spins up, and soft again by the time at which the hold begins."""
-    ahead = (program.hold_start[world] - time) / control.stiffening_time
-    state.softness[world] = ONE + wp.clamp(ahead, ZERO, ONE)
+    if time < program.spin_up_start[world]:
+        state.softness[world] = ONE
+    else:
+        ahead = (program.hold_start[world] - time) / control.stiffening_time
+        state.softness[world] = ONE + wp.clamp(ahead, ZERO, ONE)

@@ -44,20 +44,6 @@ class Tableau:
         """True when the last stage is evaluated at the new state, so that the next step can start from it."""
         return self.matrix[-1] == self.weights[:-1]
 
-    @property
-    def is_chained(self) -> bool:
-        """True when a stage needs the one before and, to step with, the first, and the error no other but the last two."""
-
-        def others(row: tuple[F, ...], *needed: int) -> bool:
-            return any(value for place, value in enumerate(row) if place not in needed)
-
-        last = self.stages - 1
-        return self.first_same_as_last and not (
-            any(others(row, len(row) - 1) for row in self.matrix[:-1])
-            or others(self.matrix[-1], 0, last - 1)
-            or others(self._error_weights, 0, last - 1, last)
-        )
-
     @cached_property
     def nodes(self) -> tuple[float, ...]:
         """Stage times c as fractions of the step."""

@@ -24,7 +24,7 @@ from warpchain.hard_starts import (
 )
 from warpchain.options import METHODS_BY_NEED
 
-METHODS = ("rkf78", "dp5", "bs32", "rodas4p", "rodas5p", "hybrid")
+METHODS = ("rkf78", "dp5", "bs32", "os32", "rodas4p", "rodas5p", "hybrid")
 every_method = pytest.mark.parametrize("method", METHODS)
 every_method_walks = pytest.mark.parametrize(
     "method", ["rkf78", "dp5", "rodas4p", "hybrid", pytest.param("bs32", marks=pytest.mark.slow)]

@@ -209,7 +209,7 @@ def test_parameter_bounds(name: str, accepted: float, rejected: float) -> None:
         (
             "options",
             {"method": "rk45"},
-            "options.method: 'rk45' is unknown; give one of standard, explicit, reference, rkf78, dp5, bs32, "
+            "options.method: 'rk45' is unknown; give one of standard, explicit, reference, rkf78, dp5, bs32, os32, "
             "rodas4p, rodas5p, hybrid",
         ),
         ("options", {"tolerance": 1e-14}, "options.tolerance: 1e-14 is less than 1e-13; give 1e-13 or more"),

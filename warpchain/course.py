@@ -98,7 +98,7 @@ class Course:
             velocity,
             stop_time=self._settled,
             stop_status=Status.FINISHED,
-            softness=setup.options.soften_drive * (2.0 if from_rest else 1.0),
+            softness=float(setup.options.soften_drive),
         )
         batch.set_program(
             world,

@@ -139,7 +139,7 @@ class Scene(BaseModel):
 
 _LOOSE: Final = {
     "tolerance": 1e-3,
-    "soft_tolerance": 1e-2,
+    "soft_tolerance": 3e-3,
     "controller": "pi",
     "soften_pile": True,
     "soften_drive": True,
@@ -176,7 +176,7 @@ class Options(BaseModel):
         description="embedded pair: Fehlberg 7(8), Dormand–Prince 5(4), Bogacki–Shampine 3(2), six stages of order 3(2) for "
         "the longest stable steps, RODAS4P 4(3) or "
         "RODAS5P 5(4), the last two implicit; "
-        "hybrid: rigid joints between impulses, dp5 around them",
+        "hybrid: rigid joints between impulses, os32 around them",
     )
     tolerance: float = Field(
         default=1e-6,

@@ -64,10 +64,10 @@ def walk(
         links: Number of links n, even.
         frequency: Turns of the sprocket per second [Hz].
         preset: ``"paper"`` (Table 1) or ``"soft"`` (softer joints, 10 to 15 times fewer steps).
-        method: ``"standard"`` (``"hybrid"`` at 1e-4, with joints softened on the sprocket and in the pile; on a GPU
-            the next), ``"explicit"`` (``"dp5"`` at 1e-4, softened likewise), ``"reference"`` (``"rkf78"`` at 1e-6, as
-            in the paper), or an integrator: ``"rkf78"``, ``"dp5"``, ``"bs32"``, ``"rodas4p"``, ``"rodas5p"`` or
-            ``"hybrid"``.
+        method: ``"standard"`` (``"hybrid"`` at 1e-3, with joints softened on the sprocket and in the pile; on a GPU
+            the next), ``"explicit"`` (``"os32"`` at 1e-3, softened likewise), ``"reference"`` (``"rkf78"`` at 1e-6, as
+            in the paper), or an integrator: ``"rkf78"``, ``"dp5"``, ``"bs32"``, ``"os32"``, ``"rodas4p"``,
+            ``"rodas5p"`` or ``"hybrid"``.
         tolerance: Error allowed in a step, absolute (SI units) and relative alike; None: the method's, 1e-6 for an
             integrator.
         start: ``"rest"``, ``"spinning"`` or ``"ellipse"``.
