@@ -7,7 +7,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from tests.blocks_under_test import fibers
-from warpchain.engine import start_device
+from warpchain.devices import start_device
 from warpchain.kernels.block_memory import barrier, tile_address, write
 from warpchain.kernels.block_solver import FactorLayout, block_access, block_solver, reductions_for, vec3d
 from warpchain.kernels.elementary import ONE, ZERO

@@ -6,7 +6,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpchain.engine import start_device
+from warpchain.devices import start_device
 from warpchain.kernels import layout
 from warpchain.kernels.cyclic_solver import SegmentLayout, cyclic_solver, segment_columns, segment_places
 from warpchain.kernels.driver import COMPILER_FLAGS, load_state

@@ -11,8 +11,10 @@ from scipy.special import ellipe
 import warpchain
 from tests.blocks_under_test import FIXED_STEP, batch_of, heap, launch_blocks, launch_chains
 from warpchain import InputError, Status, ensemble, preset
+from warpchain.control import SOFT, SOFTEST, STIFFENING_TIME
 from warpchain.course import Course
-from warpchain.engine import SOFT, SOFTEST, STIFFENING_TIME, Batch, start_device
+from warpchain.devices import start_device
+from warpchain.engine import Batch
 from warpchain.kernels import block, driver, layout
 from warpchain.kernels.block import make_advance_block
 from warpchain.kernels.driver import load_state, make_advance
