@@ -16,8 +16,9 @@ from typing import Any
 import warp as wp
 
 from .block_board import point
+from .block_factors import FactorLayout, reductions_for
 from .block_memory import barrier, exchange, read, warp_greatest, warp_width, write
-from .block_solver import FactorLayout, block_solver, reductions_for
+from .block_solver import block_solver
 from .block_step import Place, joint_constants, link_on
 from .cyclic_solver import block_type
 from .elementary import HALF, ONE, TWO, ZERO

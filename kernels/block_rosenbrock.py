@@ -20,8 +20,9 @@ import functools
 
 import warp as wp
 
+from .block_factors import FactorLayout, reductions_for
 from .block_memory import barrier, constant_table, read, write
-from .block_solver import FactorLayout, block_solver, mat33d, reductions_for
+from .block_solver import block_solver
 from .block_step import (
     Place,
     Trial,
@@ -33,6 +34,7 @@ from .block_step import (
     vec3d,
     vec5d,
 )
+from .cyclic_solver import block_type
 from .elementary import ONE, TWO, ZERO, versine_sine
 from .geometry import end_positions, end_velocities
 from .joint import friction_slope, friction_torque, joint_force, link_acceleration
@@ -58,6 +60,8 @@ from .rosenbrock_system import friction_secant
 from .rosenbrock_tables import ROSENBROCK_TABLES
 
 wp.set_module_options({"enable_backward": False})
+
+mat33d = block_type(3)
 
 # Numbers of a link from which its couplings are made: t, c, g φ/a² of its right joint.
 NORMAL_X, NORMAL_Y, COLUMN_X, COLUMN_Y, SLOPE = 0, 1, 2, 3, 4

@@ -5,14 +5,14 @@ import pytest
 import warp as wp
 from numpy.testing import assert_allclose
 
-from tests.block_solver_under_test import RIGHT_SIDES, solve_dense_loops, solve_loops
+from tests.block_solver_under_test import RIGHT_SIDES, solve_loops
 from tests.blocks_under_test import FIXED_STEP, SOFT, batch_of, features_of, heap, launch_blocks, launch_chains
 from tests.test_rosenbrock import PAPER, dense, flying, jacobians
 from warpchain import reference
 from warpchain.kernels import block, layout
 from warpchain.kernels.block import block_rows, make_advance_block
+from warpchain.kernels.block_factors import FactorLayout, reductions_for
 from warpchain.kernels.block_rosenbrock import coefficients, factor_layout
-from warpchain.kernels.block_solver import FactorLayout, reductions_for
 from warpchain.kernels.methods import METHODS
 from warpchain.kernels.rosenbrock_tables import RODAS4P
 from warpchain.shapes import ellipse, lay_chain
@@ -51,7 +51,7 @@ def test_solver_of_full_diagonal_blocks_agrees_with_dense_elimination(
         lower, diagonal, upper = rng.normal(size=(3, links, order, order))
         diagonal += 9 * np.eye(order)
         right = rng.normal(size=(RIGHT_SIDES, links, order))
-        found = solve_dense_loops(lower, diagonal, upper, right, block_dim)
+        found = solve_loops(lower, diagonal, upper, right, block_dim)
         exact = np.linalg.solve(dense(lower, diagonal, upper), right.reshape(RIGHT_SIDES, -1).T).T.reshape(right.shape)
         assert_allclose(found, exact, rtol=0, atol=2e-15, err_msg=f"{links} links")
 
