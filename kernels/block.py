@@ -15,7 +15,6 @@ import functools
 import warp as wp
 
 from . import layout
-from .approach import FLIGHT_SKIN, LEAST_SLACK
 from .block_board import (
     contact_constants,
     link_is_finite,
@@ -28,12 +27,13 @@ from .block_board import (
     take_place,
 )
 from .block_contact import block_self_contacts, touch_layout
+from .block_hand_over import block_hand_over, flight_of, list_margins, step_factors, take_turns
 from .block_list import block_list
 from .block_memory import barrier, barrier_if_any, block_maxima, clock, tile_address, vec5i
 from .block_step import Link, Place, Trial, block_stage, error_of, link_on, note_first, vec3d, vec5d
-from .block_surroundings import block_approach, block_surroundings, raised
+from .block_surroundings import block_surroundings, raised
 from .broadphase import list_layout
-from .controller import LEAST_SHRINKAGE, classical_controller
+from .controller import LEAST_SHRINKAGE
 from .driver import (
     BOUNCE_PAUSE,
     COMPILER_FLAGS,
@@ -60,7 +60,6 @@ from .layout import (
     INVERSE_MASS,
     LAST_FLOOR_IMPULSE,
     LIST_BUILDS,
-    LOSS_HAND_OVER,
     MASS,
     NOTE_CLOSING_TIME,
     NOTE_CONTACT_STEP,
@@ -121,16 +120,6 @@ def _board_rows(block_dim: int, columns: int) -> int:
     return -(-layout.board_size(block_dim) // columns)
 
 
-@wp.func
-def take_turns(K: wp.array2d(dtype=wp.float64), lane: int, step: wp.float64):
-    """Keeps the step of one model of the joints while that of the other is taken."""
-    other = K[BOARD_NOTES, NOTE_OTHER_STEP]
-    barrier()
-    if lane == 0:
-        K[BOARD_NOTES, NOTE_OTHER_STEP] = step
-    return other
-
-
 @functools.cache
 def make_advance_block(features: Features, block_dim: int, registers: int | None = None):
     """Kernel with the arguments of :func:`driver.make_advance`, launched with ``wp.launch_tiled``, one block a world.
@@ -165,9 +154,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     board_size = layout.board_size(block_dim) if is_shared else 1
     touch = touch_layout(columns, block_dim, in_lists=not is_shared)
     touch_size = touch.size if is_shared else 1
-    # on the sprocket impulses never pause
-    flight = None if has_sprocket else method.flight
-    has_flight = flight is not None
+    has_flight = flight_of(features) is not None
     holds_memory = _holds_memory(features.method, block_dim)
     needs_memory = has_flight or method.flight is None
     memory_size = max(method.block_memory(block_dim), 1) if holds_memory and needs_memory else 1
@@ -179,12 +166,13 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     hand_over, stage = block_stage(block_dim)
     greatest, _greatest_of_five = block_maxima(block_dim)
     measure, bound_of, meet_fixed_body = block_surroundings(features, block_dim)
-    growth, shrinkage = method.controller(wp.float32)
+    grow, shrink = step_factors(features)
+    margins = list_margins(features)
     build_list = block_list(columns, block_dim, features.broad_phase)
     clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, block_dim, touch)
-    attempt_flight, project, open_joints = flight.block_functions(block_dim) if flight else (None,) * 3
-    flight_growth, flight_shrinkage = classical_controller(flight.error_order) if flight else (None,) * 2
-    approach = block_approach(features, block_dim)
+    flight = block_hand_over(features, block_dim) if has_flight else None
+    take_off, follow, land = (flight.take_off, flight.follow, flight.land) if flight else (None,) * 3
+    attempt_flight, longest_step = (flight.attempt, flight.longest_step) if flight else (None,) * 2
     softens = features.softens
     look = sampling(features.watch, softens)
 
@@ -308,6 +296,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         if record_is_full(record, world):
             tries_left = 0
         bound = bound_of(K, control, pairs, gap, slack, speed)
+        flies = int(0)
         if wp.static(has_flight):
             flies = state.flies[world]
         tries = int(0)
@@ -336,10 +325,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 pauses = record_is_full(record, world) or T[wp.static(touch.is_late)] != 0
                 barrier()
                 if wp.static(softens):
-                    changes_first = state.softness[world] != softness
-                    if wp.static(has_flight):
-                        changes_first = changes_first and flies == 0
-                    if changes_first:
+                    if state.softness[world] != softness and flies == 0:
                         next_end = hand_over(ends, K, place, link_on(K, lane))
                         begin_step(forces, K, place, next_end)
                         bound = bound_of(K, control, pairs, gap, slack, speed)
@@ -351,29 +337,18 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 break
 
             if wp.static(has_flight):
-                # flights of soft joints save nothing: their springs ring longer than impulses pause
-                if flies == 0 and time >= K[BOARD_NOTES, NOTE_CLOSING_TIME] and state.softness[world] == ZERO:
-                    is_closed, _is_stiff, _kinetic, lost = project(
-                        ends_start, forces_start, memory_start, K, place, n, True
-                    )
-                    if is_closed:
+                if flies == 0:
+                    if take_off(ends_start, forces_start, memory_start, K, state, world, place, n, time):
                         flies = int(1)
                         slack = wp.float32(-1.0)  # the next list has the skin of flights
                         last_error = wp.float32(1.0)
                         step = take_turns(K, lane, step)
-                    if lane == 0:
-                        K[BOARD_NOTES, NOTE_CLOSING_TIME] = time + QUIET_TIME
-                        if is_closed:
-                            state.losses[world, LOSS_HAND_OVER] = state.losses[world, LOSS_HAND_OVER] + lost
 
             h = step
             if wp.static(has_contacts):
                 if wp.static(has_flight):
                     if flies != 0:
-                        publish(K, n, place)
-                        barrier()
-                        fastest = approach(K, L, maxima, place, n, pairs, slack)
-                        bound = wp.max(K[BOARD_NOTES, NOTE_CONTACT_STEP], ONE / fastest)
+                        bound = longest_step(K, L, maxima, place, n, pairs, slack)
                 h = wp.min(h, bound)
             lands = time + h >= stop_time
             if lands:
@@ -411,11 +386,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             tries += 1
             if not (error <= wp.float32(1.0)):
                 if wp.isfinite(error):
-                    factor = wp.float64(shrinkage(error))
-                    if wp.static(has_flight):
-                        if flies != 0:
-                            factor = flight_shrinkage(wp.float64(error))
-                    step = h * factor
+                    step = h * shrink(error, flies)
                 else:
                     step = h * LEAST_SHRINKAGE
                     broken = wp.where(lane >= n or link_is_finite(K, lane), 0, 1)
@@ -438,11 +409,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if wp.static(reuses_last):
                         note_first(K, lane, trial.last, wp.static(needs_first_power))
                 time = wp.where(lands, stop_time, time + h)
-                factor = wp.float64(growth(error, last_error, control.proportional))
-                if wp.static(has_flight):
-                    if flies != 0:
-                        factor = flight_growth(wp.float64(error), wp.float64(last_error), control.proportional)
-                proposal = h * factor
+                proposal = h * grow(error, last_error, control.proportional, flies)
                 # a step that was cut short says nothing against the proposal that it was cut from
                 step = wp.where(h < step, wp.max(step, proposal), proposal)
                 last_error = wp.max(error, wp.float32(1e-4))
@@ -459,10 +426,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     are_rigid = bool(True)
                     kinetic = ZERO
                     if flies != 0:
-                        is_closed, is_stiff, kinetic, _lost = project(
-                            ends_start, forces_start, memory_start, K, place, n, False
-                        )
-                        are_rigid = is_closed and is_stiff
+                        are_rigid, is_stiff, kinetic = follow(ends_start, forces_start, memory_start, K, place, n)
                         link = link_on(K, lane)
                         next_end = hand_over(ends, K, place, link)
                         _error, opening, gap, displacement, speed = measure(K, maxima, n, place, link, next_end, 0)
@@ -480,18 +444,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                         if hits > 0:
                             wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
                 if wp.static(has_self):
-                    skin = control.skin
-                    if wp.static(has_flight):
-                        least_slack = wp.float32(0.0)
-                        if flies != 0:
-                            skin = FLIGHT_SKIN * skin
-                            least_slack = wp.float32(LEAST_SLACK * skin)
-                        if slack > wp.float32(0.0):
-                            slack = wp.float32(0.5) * wp.float32(skin) - opening - displacement
-                        is_stale = not slack > least_slack
-                    else:
-                        slack = wp.float32(0.5) * wp.float32(skin) - opening - displacement
-                        is_stale = not slack > wp.float32(0.0)
+                    skin, slack, is_stale = margins(control, flies, slack, opening, displacement)
                     if is_stale or pairs > 0:
                         is_near = bool(True)
                         publish(K, n, place)
@@ -527,17 +480,11 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 if wp.static(has_flight):
                     if is_hit or not are_rigid:
                         if flies != 0:
-                            lost = ZERO
-                            # where the links lie on one line neither forces nor what opens the joints has a bound:
-                            # there the springs shall find their forces by themselves
-                            if is_stiff:
-                                lost = open_joints(ends_start, forces_start, memory_start, K, place, n, kinetic)
+                            land(ends_start, forces_start, memory_start, K, state, world, place, n, is_stiff, kinetic)
                             flies = int(0)
                             is_hit = bool(True)
                             last_error = wp.float32(1.0)
                             step = take_turns(K, lane, step)
-                            if lane == 0:
-                                state.losses[world, LOSS_HAND_OVER] = state.losses[world, LOSS_HAND_OVER] + lost
                         if lane == 0:
                             K[BOARD_NOTES, NOTE_CLOSING_TIME] = time + QUIET_TIME
                 bound = bound_of(K, control, pairs, gap, slack, speed)
