@@ -29,7 +29,9 @@ from .block_board import (
 from .block_contact import block_self_contacts, touch_layout
 from .block_hand_over import block_hand_over, flight_of, list_margins, step_factors, take_turns
 from .block_list import block_list
+from .block_look import block_look
 from .block_memory import barrier, barrier_if_any, block_maxima, clock, tile_address, vec5i
+from .block_room import board_rows, shares_board, shares_memory
 from .block_step import Link, Place, Trial, block_stage, error_of, link_on, note_first, vec3d, vec5d
 from .block_surroundings import block_surroundings, raised
 from .broadphase import list_layout
@@ -85,39 +87,13 @@ from .layout import (
     Y,
 )
 from .methods import METHODS
-from .record import record_is_full, sampling, summarise, write_sample
-from .softening import change_joints, contact_step, softened
+from .record import record_is_full, summarise, write_sample
+from .softening import contact_step, softened
 from .types import Control, Model, Program, Record, State, read_chain
 
 wp.set_module_options({"enable_backward": False})
 
 REGISTERS_OF_MULTIPROCESSOR = 65536
-LARGEST_SHARED_BLOCK = 512
-"""Longer chains keep their board in the scratch block: it would not fit into the memory that a block shares."""
-LARGEST_SHARED_MEMORY = 192
-"""The same for what a method keeps, if anything."""
-LARGEST_SHARED_FLIGHT = 64
-"""The same for flights, which are rare: chains of more links would have to share a multiprocessor with fewer others."""
-
-
-def block_rows(method: str, block_dim: int, columns: int) -> int:
-    """Rows of a chain's scratch block of this width that the block form needs: for the board and the method."""
-    rows = _board_rows(block_dim, columns)
-    if not _holds_memory(method, block_dim):
-        rows += -(-METHODS[method].block_memory(block_dim) // columns)
-    return rows
-
-
-def _holds_memory(method: str, block_dim: int) -> bool:
-    """Whether what a method keeps lies in the memory that a block shares, or else in the scratch block."""
-    return block_dim <= (LARGEST_SHARED_FLIGHT if METHODS[method].flight else LARGEST_SHARED_MEMORY)
-
-
-def _board_rows(block_dim: int, columns: int) -> int:
-    """Rows of this width for what a chain keeps of its board between launches, or for all of a board not shared."""
-    if block_dim <= LARGEST_SHARED_BLOCK:
-        return layout.BOARD_NOTES
-    return -(-layout.board_size(block_dim) // columns)
 
 
 @functools.cache
@@ -130,7 +106,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         registers: Greatest number of registers a thread may take on a GPU; None: as many as a block of this size can
             have.
 
-    scratch: (W, ≥ block_rows(features.method, block_dim, columns), columns) float64; lists as for the CPU form.
+    scratch: (W, ≥ :func:`block_room.block_rows`, columns) float64; lists as for the CPU form.
     """
     available = REGISTERS_OF_MULTIPROCESSOR // block_dim // 8 * 8
     if available < 255:
@@ -148,14 +124,14 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     fixed_count = SPROCKET_IMPULSES if has_sprocket else FLOOR_IMPULSES
     reuses_last, needs_first_power = method.reuses_last, method.needs_first_power
     attempt = method.block_attempt(block_dim)
-    is_shared = block_dim <= LARGEST_SHARED_BLOCK
+    is_shared = shares_board(block_dim)
     width = block_dim + 1
     kept_width = columns if is_shared else width
     board_size = layout.board_size(block_dim) if is_shared else 1
     touch = touch_layout(columns, block_dim, in_lists=not is_shared)
     touch_size = touch.size if is_shared else 1
     has_flight = flight_of(features) is not None
-    holds_memory = _holds_memory(features.method, block_dim)
+    holds_memory = shares_memory(features.method, block_dim)
     needs_memory = has_flight or method.flight is None
     memory_size = max(method.block_memory(block_dim), 1) if holds_memory and needs_memory else 1
     board_address = tile_address(wp.float64, board_size)
@@ -174,7 +150,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     take_off, follow, land = (flight.take_off, flight.follow, flight.land) if flight else (None,) * 3
     attempt_flight, longest_step = (flight.attempt, flight.longest_step) if flight else (None,) * 2
     softens = features.softens
-    look = sampling(features.watch, softens)
+    look = block_look(features, touch)
 
     @wp.func
     def begin_step(forces: wp.tile[vec3d, block_dim], K: wp.array2d(dtype=wp.float64), place: Place, next_end: vec5d):
@@ -225,7 +201,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         T = wp.array(ptr=touch_start, shape=(wp.static(touch.size),), dtype=wp.int32)
         memory_start = memory_address(memory)
         if wp.static(not holds_memory):
-            memory_start = scratch[world].ptr + wp.uint64(wp.static(8 * _board_rows(block_dim, columns) * columns))
+            memory_start = scratch[world].ptr + wp.uint64(wp.static(8 * board_rows(block_dim, columns) * columns))
         # what stages hand over is not needed while contacts are resolved
         ends_start = ends_address(ends)
         forces_start = forces_address(forces)
@@ -308,18 +284,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 publish(K, n, place)
                 barrier()
                 if lane == 0:
-                    seen = read_chain(model, world)
-                    if wp.static(softens):
-                        seen = softened(seen, control, softness)
-                    T[wp.static(touch.mailbox)] = look(K, seen, program, state, record, control, world, time)
-                    if wp.static(softens):
-                        if state.softness[world] != softness:
-                            note_constants(K, change_joints(seen, model, state, control, world))
-                            K[BOARD_NOTES, NOTE_CONTACT_STEP] = contact_step(control, state.softness[world])
-                    K[BOARD_NOTES, NOTE_STOP_TIME] = state.stop_time[world]
-                    K[BOARD_NOTES, NOTE_NEXT_LOOK] = wp.float64(state.next_sample[world]) * control.sample_interval
-                    if clock() > K[BOARD_NOTES, NOTE_DEADLINE]:
-                        T[wp.static(touch.is_late)] = 1
+                    look(K, T, model, program, state, record, control, world, time)
                 barrier()
                 status = T[wp.static(touch.mailbox)]
                 pauses = record_is_full(record, world) or T[wp.static(touch.is_late)] != 0

@@ -48,7 +48,7 @@ class BlockHandOver:
 
     Attributes:
         attempt: Tries a step of a flight, see :mod:`block_flight`.
-        take_off: ``(ends, forces, S, K, state, world, place, n, time)``, on springs → whether the joints are closed now.
+        take_off: ``(ends, forces, S, K, state, world, place, n, time)``, on springs → whether joints are closed now.
         longest_step: ``(K, L, maxima, place, n, pairs, slack)`` → bound [s] of the next step of a flight.
         follow: ``(ends, forces, S, K, place, n)``, after a step of a flight → whether that may go on, whether springs
             would hold little enough energy for it, kinetic energy [J].

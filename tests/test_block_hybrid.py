@@ -9,7 +9,7 @@ from tests.bouncing_chains import CONTACT_STEP, PAPER, batch_with, bouncing, fal
 from tests.test_block import compiles_for_gpus
 from tests.test_hybrid import shaken
 from warpchain import Status, preset
-from warpchain.kernels import block, layout
+from warpchain.kernels import block_room, layout
 from warpchain.kernels.block import make_advance_block
 from warpchain.kernels.block_rigid import FlightLayout
 from warpchain.kernels.driver import Features
@@ -136,7 +136,7 @@ def test_cuts_neighbours_and_memory_do_not_change_a_bit(monkeypatch):
     start = falling(12, PAPER, 0.3)
     runs = []
     for tries, others, limit in ((240, 0, 64), (1, 0, 64), (13, 2, 64), (240, 0, 0)):
-        monkeypatch.setattr(block, "LARGEST_SHARED_FLIGHT", limit)
+        monkeypatch.setattr(block_room, "LARGEST_SHARED_FLIGHT", limit)
         make_advance_block.cache_clear()
         batch, features = bouncing([*(falling(20, PAPER, 0.6),) * others, start])
         while batch.tries(others) < 240:
@@ -151,11 +151,11 @@ def test_cuts_neighbours_and_memory_do_not_change_a_bit(monkeypatch):
 
 def test_memory_of_flights_fits_into_a_block():
     """Up to the limit it leaves room for three blocks on a multiprocessor; above, the scratch block has room for it."""
-    limit = block.LARGEST_SHARED_FLIGHT
+    limit = block_room.LARGEST_SHARED_FLIGHT
     assert 3 * 8 * (FlightLayout(limit).size + layout.board_size(limit)) < 227 * 1024
     for threads in (96, 192, 512, 1024):
-        board = layout.BOARD_NOTES * 200 if threads <= block.LARGEST_SHARED_BLOCK else layout.board_size(threads)
-        assert block.block_rows("hybrid", threads, 200) * 200 >= board + FlightLayout(threads).size
+        board = layout.BOARD_NOTES * 200 if threads <= block_room.LARGEST_SHARED_BLOCK else layout.board_size(threads)
+        assert block_room.block_rows("hybrid", threads, 200) * 200 >= board + FlightLayout(threads).size
     assert METHODS["hybrid"].block_memory(limit) == FlightLayout(limit).size
 
 

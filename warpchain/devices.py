@@ -13,7 +13,7 @@ import warp as wp
 
 from warpchain.kernel_choice import block_threads
 from warpchain.kernels import layout
-from warpchain.kernels.block import block_rows
+from warpchain.kernels.block_room import block_rows
 from warpchain.kernels.broadphase import list_layout
 from warpchain.kernels.methods import METHODS
 from warpchain.options import Options
