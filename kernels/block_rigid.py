@@ -21,7 +21,7 @@ from .block_memory import barrier, exchange, read, warp_greatest, warp_width, wr
 from .block_solver import block_solver
 from .block_step import Place, joint_constants, link_on
 from .cyclic_solver import block_type
-from .elementary import HALF, ONE, TWO, ZERO
+from .elementary import HALF, ONE, TWO, ZERO, order_bits_single
 from .joint import friction_torque
 from .layout import (
     BOARD_FIRST,
@@ -257,7 +257,7 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
     @wp.func
     def greatest_square(S: wp.uint64, lane: int, x: wp.float64, y: wp.float64):
         """The greatest x² + y² of all threads, in single precision; a NaN before any number."""
-        bits = warp_greatest(wp.cast(wp.float32(x * x + y * y), wp.int32))
+        bits = warp_greatest(order_bits_single(wp.float32(x * x + y * y)))
         write(S, wp.static(maxima) + lane // warp_width(), wp.float64(bits))
         barrier()
         top = read(S, wp.static(maxima))

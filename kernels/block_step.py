@@ -13,7 +13,7 @@ import functools
 import warp as wp
 
 from .controller import error_scale
-from .elementary import LARGEST_TURN, ZERO
+from .elementary import LARGEST_TURN, ZERO, order_bits_single
 from .geometry import end_positions, end_velocities, turned_direction
 from .joint import friction_torque, joint_force, link_acceleration
 from .layout import (
@@ -164,7 +164,7 @@ def error_of(trial: Trial, tolerance: wp.float64):
     ratio = wp.abs(trial.error) / (trial.scale * wp.float32(tolerance))
     if trial.turns_far and ratio < wp.float32(2.0):
         ratio = wp.float32(2.0)
-    return wp.cast(ratio, wp.int32)
+    return order_bits_single(ratio)
 
 
 @wp.func

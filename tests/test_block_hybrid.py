@@ -72,6 +72,18 @@ def test_adaptive_flight_equals_the_cpu_form():
     assert_close(ours, theirs, 1e-5)
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_nan_of_either_sign_ends_a_flight_at_once(sign):
+    """A place that is no number is seen after one step, when joints cannot be closed there, whatever its sign bit."""
+    batch, features = in_the_air([loop(12)])
+    launch_blocks(batch, features, 3, block_dim=THREADS)
+    assert batch.state.flies.numpy()[0] == 1
+    batch.state.links.numpy()[0, layout.X, 4] = np.copysign(np.nan, sign)
+    launch_blocks(batch, features, 30, block_dim=THREADS)
+    assert batch.status(0) == Status.NOT_FINITE
+    assert batch.counts(0)["accepted"] == 3 + 1
+
+
 @pytest.mark.parametrize(("size", "parameters"), [(1e-6, PAPER), (1e-7, PAPER.with_values({"joint_stiffness": 1e4}))])
 def test_springs_that_ring_or_stretch_stay_springs(size, parameters):
     """Where joints must not be closed, the chain goes on from the very state on its springs."""
