@@ -243,11 +243,11 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             T[wp.static(touch.votes)] = 0
             K[BOARD_NOTES, NOTE_DEADLINE] = clock() + control.launch_time
         barrier()  # the chain's constants are on the board
-        publish(K, n, place)
+        publish(K, place)
         barrier()
         link = link_on(K, lane)
         next_end = hand_over(ends, K, place, link)
-        _error, opening, gap, displacement, speed = measure(K, maxima, n, place, link, next_end, 0)
+        _error, opening, gap, displacement, speed = measure(K, maxima, place, link, next_end, 0)
         status = int(RUNNING)
         pairs = int(0)
         slack = wp.float32(0.5) * wp.float32(control.skin) - opening
@@ -281,7 +281,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         while status == RUNNING and tries < tries_left:
             if time >= K[BOARD_NOTES, NOTE_NEXT_LOOK]:
                 softness = state.softness[world]
-                publish(K, n, place)
+                publish(K, place)
                 barrier()
                 if lane == 0:
                     look(K, T, model, program, state, record, control, world, time)
@@ -303,7 +303,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
 
             if wp.static(has_flight):
                 if flies == 0:
-                    if take_off(ends_start, forces_start, memory_start, K, state, world, place, n, time):
+                    if take_off(ends_start, forces_start, memory_start, K, state, world, place, time):
                         flies = int(1)
                         slack = wp.float32(-1.0)  # the next list has the skin of flights
                         last_error = wp.float32(1.0)
@@ -313,7 +313,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if wp.static(has_contacts):
                 if wp.static(has_flight):
                     if flies != 0:
-                        bound = longest_step(K, L, maxima, place, n, pairs, slack)
+                        bound = longest_step(K, L, maxima, place, pairs, slack)
                 h = wp.min(h, bound)
             lands = time + h >= stop_time
             if lands:
@@ -323,12 +323,12 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if wp.static(has_flight):
                 trial = Trial()
                 if flies == 0:
-                    trial = attempt(ends, forces, memory_start, K, place, n, h, tolerance)
+                    trial = attempt(ends, forces, memory_start, K, place, h, tolerance)
                 else:
-                    trial = attempt_flight(ends_start, forces_start, memory_start, K, place, n, h)
+                    trial = attempt_flight(ends_start, forces_start, memory_start, K, place, h)
                     tolerance = control.flight_tolerance
             else:
-                trial = attempt(ends, forces, memory_start, K, place, n, h, tolerance)
+                trial = attempt(ends, forces, memory_start, K, place, h, tolerance)
             own_error = int(0)
             if lane < n:
                 own_error = error_of(trial, tolerance)
@@ -344,7 +344,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 candidate.cosine = trial.cosine
                 candidate.sine = trial.sine
                 error, new_opening, new_gap, new_displacement, new_speed = measure(
-                    K, maxima, n, place, candidate, trial.next_end, own_error
+                    K, maxima, place, candidate, trial.next_end, own_error
                 )
             else:
                 error = wp.cast(greatest(errors, lane, own_error), wp.float32)
@@ -386,15 +386,15 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 else:
                     link = link_on(K, lane)
                     next_end = hand_over(ends, K, place, link)
-                    _error, opening, gap, displacement, speed = measure(K, maxima, n, place, link, next_end, 0)
+                    _error, opening, gap, displacement, speed = measure(K, maxima, place, link, next_end, 0)
                 if wp.static(has_flight):
                     are_rigid = bool(True)
                     kinetic = ZERO
                     if flies != 0:
-                        are_rigid, is_stiff, kinetic = follow(ends_start, forces_start, memory_start, K, place, n)
+                        are_rigid, is_stiff, kinetic = follow(ends_start, forces_start, memory_start, K, place)
                         link = link_on(K, lane)
                         next_end = hand_over(ends, K, place, link)
-                        _error, opening, gap, displacement, speed = measure(K, maxima, n, place, link, next_end, 0)
+                        _error, opening, gap, displacement, speed = measure(K, maxima, place, link, next_end, 0)
                 if lane == 0:
                     K[BOARD_NOTES, NOTE_OPENING] = wp.max(K[BOARD_NOTES, NOTE_OPENING], wp.float64(opening))
                 is_hit = bool(False)
@@ -412,7 +412,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     skin, slack, is_stale = margins(control, flies, slack, opening, displacement)
                     if is_stale or pairs > 0:
                         is_near = bool(True)
-                        publish(K, n, place)
+                        publish(K, place)
                         clear_contacts(T, lane, n)
                 if is_near:
                     is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
@@ -445,7 +445,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 if wp.static(has_flight):
                     if is_hit or not are_rigid:
                         if flies != 0:
-                            land(ends_start, forces_start, memory_start, K, state, world, place, n, is_stiff, kinetic)
+                            land(ends_start, forces_start, memory_start, K, state, world, place, is_stiff, kinetic)
                             flies = int(0)
                             is_hit = bool(True)
                             last_error = wp.float32(1.0)
@@ -461,7 +461,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         if status == RUNNING and tries_before + wp.int64(tries) >= control.step_limit:
             status = int(STEP_LIMIT)
         is_last = status != RUNNING and status != NOT_FINITE and state.last_look[world, TIME] != time
-        publish(K, n, place)
+        publish(K, place)
         barrier()
         if lane < n:
             store_link(K, state, world, lane)

@@ -40,7 +40,7 @@ def flight_attempt(block_dim: int):
     """Warp function that tries a step on rigid joints in blocks of this size.
 
     Returns:
-        ``attempt(ends, forces, S, K, place, n, h)`` → Trial, from the state and the accelerations on the board, with S
+        ``attempt(ends, forces, S, K, place, h)`` → Trial, from the state and the accelerations on the board, with S
         the block's memory, laid out by :class:`FlightLayout`.
     """
     memory = FlightLayout(block_dim)
@@ -104,7 +104,6 @@ def flight_attempt(block_dim: int):
         S: wp.uint64,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
-        n: int,
         h: wp.float64,
     ):
         lane = place.lane
@@ -126,7 +125,7 @@ def flight_attempt(block_dim: int):
         write(Q, wp.static(TURNING * block_dim) + lane, K[INERTIA, column])
         write(Q, wp.static(SLOPE * block_dim) + lane, slope)
         barrier()
-        factor(Q, n, lane, ZERO)
+        factor(Q, place.links, lane, ZERO)
         barrier()
         power = ZERO
         i = int(0)
@@ -140,13 +139,13 @@ def flight_attempt(block_dim: int):
             coupled_v = change(S, lane, wp.static(COUPLINGS) + i, i, 4)
             coupled_omega = change(S, lane, wp.static(COUPLINGS) + i, i, 5)
             cosine, sine = cos_sin(theta)
-            factorise(S, K, place, n, cosine, sine)
+            factorise(S, K, place, cosine, sine)
             hand(forces, 0, lane, omega)
             barrier()
             spin = omega - handed(forces, 0, place.after)
             torque = smoothed_torque(chain, spin, smoothing)
             power += coefficient(WEIGHTS, i) * torque * spin
-            _force, ax, ay, at = accelerate(ends, forces, S, K, place, n, cosine, sine, omega, torque)
+            _force, ax, ay, at = accelerate(ends, forces, S, K, place, cosine, sine, omega, torque)
             # (λ, y) of the stage
             target = h * at + wp.static(wp.float64(1.0 / gamma)) * coupled_omega
             hand(forces, 0, lane, target)
@@ -154,7 +153,7 @@ def flight_attempt(block_dim: int):
             drag = slope * (target - handed(forces, 0, place.after))
             hand(ends, 0, lane, drag)
             barrier()
-            pull = solve(Q, n, lane, ZERO, vec3d(ZERO, ZERO, handed(ends, 0, place.before) - drag))
+            pull = solve(Q, place.links, lane, ZERO, vec3d(ZERO, ZERO, handed(ends, 0, place.before) - drag))
             hand(forces, 0, lane, pull[0])
             hand(forces, 1, lane, pull[1])
             barrier()

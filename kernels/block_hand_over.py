@@ -48,11 +48,11 @@ class BlockHandOver:
 
     Attributes:
         attempt: Tries a step of a flight, see :mod:`block_flight`.
-        take_off: ``(ends, forces, S, K, state, world, place, n, time)``, on springs → whether joints are closed now.
-        longest_step: ``(K, L, maxima, place, n, pairs, slack)`` → bound [s] of the next step of a flight.
-        follow: ``(ends, forces, S, K, place, n)``, after a step of a flight → whether that may go on, whether springs
+        take_off: ``(ends, forces, S, K, state, world, place, time)``, on springs → whether joints are closed now.
+        longest_step: ``(K, L, maxima, place, pairs, slack)`` → bound [s] of the next step of a flight.
+        follow: ``(ends, forces, S, K, place)``, after a step of a flight → whether that may go on, whether springs
             would hold little enough energy for it, kinetic energy [J].
-        land: ``(ends, forces, S, K, state, world, place, n, is_stiff, kinetic)``, with what ``follow`` said: opens the
+        land: ``(ends, forces, S, K, state, world, place, is_stiff, kinetic)``, with what ``follow`` said: opens the
             joints.
     """
 
@@ -78,13 +78,12 @@ def block_hand_over(features: Features, block_dim: int) -> BlockHandOver:
         state: State,
         world: int,
         place: Place,
-        n: int,
         time: wp.float64,
     ):
         is_closed = bool(False)
         # flights of soft joints save nothing: their springs ring longer than impulses pause
         if time >= K[BOARD_NOTES, NOTE_CLOSING_TIME] and state.softness[world] == ZERO:
-            is_closed, _is_stiff, _kinetic, lost = project(ends, forces, S, K, place, n, True)
+            is_closed, _is_stiff, _kinetic, lost = project(ends, forces, S, K, place, True)
             if place.lane == 0:
                 K[BOARD_NOTES, NOTE_CLOSING_TIME] = time + QUIET_TIME
                 if is_closed:
@@ -97,17 +96,16 @@ def block_hand_over(features: Features, block_dim: int) -> BlockHandOver:
         L: wp.array(dtype=wp.int32),
         maxima: wp.tile[vec5i, block_dim],
         place: Place,
-        n: int,
         pairs: int,
         slack: wp.float32,
     ):
-        publish(K, n, place)
+        publish(K, place)
         barrier()
-        return wp.max(K[BOARD_NOTES, NOTE_CONTACT_STEP], ONE / approach(K, L, maxima, place, n, pairs, slack))
+        return wp.max(K[BOARD_NOTES, NOTE_CONTACT_STEP], ONE / approach(K, L, maxima, place, pairs, slack))
 
     @wp.func
-    def follow(ends: wp.uint64, forces: wp.uint64, S: wp.uint64, K: wp.array2d(dtype=wp.float64), place: Place, n: int):
-        is_closed, is_stiff, kinetic, _lost = project(ends, forces, S, K, place, n, False)
+    def follow(ends: wp.uint64, forces: wp.uint64, S: wp.uint64, K: wp.array2d(dtype=wp.float64), place: Place):
+        is_closed, is_stiff, kinetic, _lost = project(ends, forces, S, K, place, False)
         return is_closed and is_stiff, is_stiff, kinetic
 
     @wp.func
@@ -119,14 +117,13 @@ def block_hand_over(features: Features, block_dim: int) -> BlockHandOver:
         state: State,
         world: int,
         place: Place,
-        n: int,
         is_stiff: bool,
         kinetic: wp.float64,
     ):
         # where the links lie on one line neither forces nor what opens the joints has a bound: there the springs shall
         # find their forces by themselves
         if is_stiff:
-            lost = open_joints(ends, forces, S, K, place, n, kinetic)
+            lost = open_joints(ends, forces, S, K, place, kinetic)
             if place.lane == 0:
                 state.losses[world, LOSS_HAND_OVER] = state.losses[world, LOSS_HAND_OVER] + lost
 

@@ -112,14 +112,14 @@ class BlockRigidJoints:
     """Warp functions for blocks of one size; S is the address of the block's memory.
 
     Attributes:
-        factorise: ``(S, K, place, n, cosine, sine)``: makes S of the links' directions ready to solve with.
-        accelerate: ``(ends, forces, S, K, place, n, cosine, sine, spin, torque)`` → force of the right joint and
+        factorise: ``(S, K, place, cosine, sine)``: makes S of the links' directions ready to solve with.
+        accelerate: ``(ends, forces, S, K, place, cosine, sine, spin, torque)`` → force of the right joint and
             acceleration of the link, from its direction and spin and its right joint's friction torque.
-        project: ``(ends, forces, S, K, place, n, is_closing)`` → whether C = 0 and Ċ = 0 hold now, whether
+        project: ``(ends, forces, S, K, place, is_closing)`` → whether C = 0 and Ċ = 0 hold now, whether
             springs would hold so little energy that they may count as rigid, kinetic energy and energy [J] that went.
             Leaves joint forces, accelerations and S factorised. ``is_closing``: from springs, which may also be
             refused; then nothing has changed.
-        open_joints: ``(ends, forces, S, K, place, n, kinetic)``, after ``project`` and impulses → energy [J] that went.
+        open_joints: ``(ends, forces, S, K, place, kinetic)``, after ``project`` and impulses → energy [J] that went.
     """
 
     factorise: Any
@@ -158,9 +158,7 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
     factor, solve = block_solver(memory.forces, couplings_of, diagonal_of)
 
     @wp.func
-    def factorise(
-        S: wp.uint64, K: wp.array2d(dtype=wp.float64), place: Place, n: int, cosine: wp.float64, sine: wp.float64
-    ):
+    def factorise(S: wp.uint64, K: wp.array2d(dtype=wp.float64), place: Place, cosine: wp.float64, sine: wp.float64):
         lane = place.lane
         xx, xy, yy = turning_share(K[BOARD_NOTES, NOTE_HALF_LENGTH], K[INVERSE_INERTIA, place.column], cosine, sine)
         write(S, wp.static(SHARE * block_dim) + lane, K[INVERSE_MASS, place.column])
@@ -168,7 +166,7 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
         write(S, wp.static(SHARE_XY * block_dim) + lane, xy)
         write(S, wp.static(SHARE_YY * block_dim) + lane, yy)
         barrier()
-        factor(S, n, lane, ZERO)
+        factor(S, place.links, place.lane, ZERO)
         barrier()
 
     @wp.func
@@ -201,7 +199,6 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
         S: wp.uint64,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
-        n: int,
         cosine: wp.float64,
         sine: wp.float64,
         spin: wp.float64,
@@ -218,7 +215,7 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
         right_x = own_x + handed(forces, 0, place.after)
         right_y = own_y + handed(forces, 1, place.after)
         a = K[BOARD_NOTES, NOTE_HALF_LENGTH]
-        own = solve(S, n, lane, ZERO, vec2d(a * right_x, a * right_y))
+        own = solve(S, place.links, lane, ZERO, vec2d(a * right_x, a * right_y))
         hand(ends, 0, lane, own[0])
         hand(ends, 1, lane, own[1])
         barrier()
@@ -228,7 +225,7 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
         return own, ax, ay - K[BOARD_NOTES, NOTE_GRAVITY], free + turn
 
     @wp.func
-    def opening(ends: wp.uint64, K: wp.array2d(dtype=wp.float64), place: Place, n: int):
+    def opening(ends: wp.uint64, K: wp.array2d(dtype=wp.float64), place: Place):
         """C of the right joint on the board, none behind the last link, and the next link's direction."""
         link = link_on(K, place.lane)
         hand(ends, 0, place.lane, link.x)
@@ -249,7 +246,7 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
             after_cosine,
             after_sine,
         )
-        if place.lane >= n:
+        if place.lane >= place.links:
             cx = ZERO
             cy = ZERO
         return cx, cy, after_cosine, after_sine
@@ -268,16 +265,17 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
         return wp.cast(int(top), wp.float32)
 
     @wp.func
-    def two_sums(S: wp.uint64, lane: int, n: int, first: wp.float64, second: wp.float64):
+    def two_sums(S: wp.uint64, place: Place, first: wp.float64, second: wp.float64):
         """Sums over all links, in their order, the same in all threads."""
-        if lane < n:
+        lane = place.lane
+        if lane < place.links:
             write(S, wp.static(sums) + lane, first)
             write(S, wp.static(sums + block_dim) + lane, second)
         barrier()
         total_first = ZERO
         total_second = ZERO
         i = int(0)
-        while i < n:
+        while i < place.links:
             total_first += read(S, wp.static(sums) + i)
             total_second += read(S, wp.static(sums + block_dim) + i)
             i += 1
@@ -297,7 +295,6 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
         S: wp.uint64,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
-        n: int,
         is_closing: bool,
     ):
         lane = place.lane
@@ -305,13 +302,13 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
         held = ZERO
         kinetic = ZERO
         may_close = bool(True)
-        cx, cy, after_cosine, after_sine = opening(ends, K, place, n)
+        cx, cy, after_cosine, after_sine = opening(ends, K, place)
         if is_closing:
             row = int(0)
             while row < 6:
                 write(S, wp.static(kept) + row * wp.static(block_dim) + lane, K[row, lane])
                 row += 1
-            square, doubled = two_sums(S, lane, n, cx * cx + cy * cy, twice_kinetic(K, place))
+            square, doubled = two_sums(S, place, cx * cx + cy * cy, twice_kinetic(K, place))
             held = HALF * chain.joint_stiffness * square
             kinetic = HALF * doubled
             may_close = held <= GREATEST_STRETCHING * kinetic
@@ -327,13 +324,13 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
                 # a NaN goes on to nothing
                 goes_on = widest > CLOSED_SQUARE and corrections < wp.static(MOST_CORRECTIONS)
                 link = link_on(K, lane)
-                factorise(S, K, place, n, link.cosine, link.sine)
+                factorise(S, K, place, link.cosine, link.sine)
                 hand(forces, 0, lane, link.u)
                 hand(forces, 1, lane, link.v)
                 hand(forces, 2, lane, link.omega)
                 barrier()
                 right = vec2d(cx, cy)
-                if not goes_on and lane < n:
+                if not goes_on and lane < place.links:
                     cu, cv = opening_rate_of(
                         chain.half_length,
                         link.u,
@@ -348,7 +345,7 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
                         after_sine,
                     )
                     right = vec2d(cu, cv)
-                own = solve(S, n, lane, ZERO, right)
+                own = solve(S, place.links, lane, ZERO, right)
                 hand(ends, 0, lane, own[0])
                 hand(ends, 1, lane, own[1])
                 barrier()
@@ -356,21 +353,21 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
                 left_y = handed(ends, 1, place.before)
                 px, py, turn = push_of(K, place, link.cosine, link.sine, left_x, left_y, own)
                 first = wp.where(goes_on, X, U)
-                if lane < n:
+                if lane < place.links:
                     K[first, lane] = K[first, lane] + px
                     K[first + 1, lane] = K[first + 1, lane] + py
                     K[first + 2, lane] = K[first + 2, lane] + turn
                 barrier()
                 if goes_on:
                     point(K, lane)
-                    cx, cy, after_cosine, after_sine = opening(ends, K, place, n)
+                    cx, cy, after_cosine, after_sine = opening(ends, K, place)
                     corrections += 1
             link = link_on(K, lane)
             hand(forces, 0, lane, link.omega)
             barrier()
             torque = friction_torque(chain, link.omega - handed(forces, 0, place.after))
-            pull, ax, ay, at = accelerate(ends, forces, S, K, place, n, link.cosine, link.sine, link.omega, torque)
-            square, doubled = two_sums(S, lane, n, pull[0] * pull[0] + pull[1] * pull[1], twice_kinetic(K, place))
+            pull, ax, ay, at = accelerate(ends, forces, S, K, place, link.cosine, link.sine, link.omega, torque)
+            square, doubled = two_sums(S, place, pull[0] * pull[0] + pull[1] * pull[1], twice_kinetic(K, place))
             left_over = HALF * doubled
             is_stiff = HALF * square / chain.joint_stiffness <= GREATEST_STRETCHING * left_over
             keeps = bool(True)
@@ -400,7 +397,6 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
         S: wp.uint64,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
-        n: int,
         kinetic: wp.float64,
     ):
         lane = place.lane
@@ -408,15 +404,15 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
         x = K[X, lane]
         y = K[Y, lane]
         theta = K[THETA, lane]
-        cx, cy, _cosine, _sine = opening(ends, K, place, n)
-        before, _none = two_sums(S, lane, n, cx * cx + cy * cy, ZERO)
+        cx, cy, _cosine, _sine = opening(ends, K, place)
+        before, _none = two_sums(S, place, cx * cx + cy * cy, ZERO)
         give = ONE / chain.joint_stiffness
         right = vec2d()
-        if lane < n:
+        if lane < place.links:
             right = vec2d(
                 cx - give * read(S, wp.static(force) + lane), cy - give * read(S, wp.static(force + block_dim) + lane)
             )
-        own = solve(S, n, lane, ZERO, right)
+        own = solve(S, place.links, lane, ZERO, right)
         hand(forces, 0, lane, own[0])
         hand(forces, 1, lane, own[1])
         barrier()
@@ -424,13 +420,13 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
         left_y = handed(forces, 1, place.before)
         link = link_on(K, lane)
         px, py, turn = push_of(K, place, link.cosine, link.sine, left_x, left_y, own)
-        if lane < n:
+        if lane < place.links:
             K[X, lane] = x + px
             K[Y, lane] = y + py
             K[THETA, lane] = theta + turn
             point(K, lane)
-        cx, cy, _cosine, _sine = opening(ends, K, place, n)
-        after, _none = two_sums(S, lane, n, cx * cx + cy * cy, ZERO)
+        cx, cy, _cosine, _sine = opening(ends, K, place)
+        after, _none = two_sums(S, place, cx * cx + cy * cy, ZERO)
         half_stiffness = HALF * chain.joint_stiffness
         lost = half_stiffness * (before - after)
         if half_stiffness * after > TWO * GREATEST_STRETCHING * kinetic:

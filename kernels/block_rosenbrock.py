@@ -161,7 +161,7 @@ def rosenbrock_attempt(name: str, block_dim: int):
         block_dim: Threads in a block.
 
     Returns:
-        ``attempt(ends, forces, S, K, place, n, h, tolerance)`` → Trial, from the state and first stage on the board,
+        ``attempt(ends, forces, S, K, place, h, tolerance)`` → Trial, from the state and first stage on the board,
         with S the block's memory for the linear systems, laid out by :func:`factor_layout`.
     """
     table = ROSENBROCK_TABLES[name]
@@ -207,12 +207,12 @@ def rosenbrock_attempt(name: str, block_dim: int):
         S: wp.uint64,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
-        n: int,
         h: wp.float64,
         tolerance: wp.float64,
     ):
         lane = place.lane
         column = place.column
+        n = place.links
         # the joint at the start of the step, as it enters the system
         chain = joint_constants(K)
         inverse_length = ONE / chain.half_length

@@ -67,6 +67,7 @@ class Place:
     column: wp.int32  # the same, of the last link for threads beyond
     before: wp.int32  # the link to the left
     after: wp.int32  # the link to the right
+    links: wp.int32  # how many the chain has
 
 
 @wp.struct
@@ -279,7 +280,7 @@ def explicit_attempt(name: str, block_dim: int):
         block_dim: Threads in a block.
 
     Returns:
-        ``attempt(ends, forces, S, K, place, n, h, tolerance)`` → Trial, from the state and first stage on the board;
+        ``attempt(ends, forces, S, K, place, h, tolerance)`` → Trial, from the state and first stage on the board;
         it needs neither the memory S nor the tolerance.
     """
     tableau = TABLEAUS[name]
@@ -297,7 +298,6 @@ def explicit_attempt(name: str, block_dim: int):
         S: wp.uint64,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
-        n: int,
         h: wp.float64,
         tolerance: wp.float64,
     ):

@@ -57,7 +57,6 @@ def block_surroundings(features: Features, block_dim: int):
     def measure(
         K: wp.array2d(dtype=wp.float64),
         maxima: wp.tile[vec5i, block_dim],
-        n: int,
         place: Place,
         link: Link,
         next_end: vec5d,
@@ -70,7 +69,7 @@ def block_surroundings(features: Features, block_dim: int):
         """
         left_x, left_y, right_x, right_y = ends_of(K, link)
         values = vec5i(0, order_key_single(wp.float32(-wp.inf)), 0, 0, error)
-        if place.lane < n:
+        if place.lane < place.links:
             cx = next_end[0] - right_x
             cy = next_end[1] - right_y
             values[0] = order_bits_single(wp.float32(cx * cx + cy * cy))
@@ -192,12 +191,12 @@ def block_approach(features: Features, block_dim: int):
         L: wp.array(dtype=wp.int32),
         maxima: wp.tile[vec5i, block_dim],
         place: Place,
-        n: int,
         pairs: int,
         slack: wp.float32,
     ):
         """All threads, after a barrier behind the board's rows of ends."""
         lane = place.lane
+        n = place.links
         chain = contact_constants(K, n)
         chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
         values = vec5i()
