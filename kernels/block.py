@@ -31,6 +31,7 @@ from .block_hand_over import block_hand_over, flight_of, list_margins, step_fact
 from .block_list import block_list
 from .block_look import block_look
 from .block_memory import barrier, barrier_if_any, block_maxima, clock, tile_address, vec5i
+from .block_rigid import FlightMemory
 from .block_room import board_rows, shares_board, shares_memory
 from .block_step import Link, Place, Trial, block_stage, error_of, link_on, note_first, vec3d, vec5d
 from .block_surroundings import block_surroundings, raised
@@ -207,6 +208,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         forces_start = forces_address(forces)
         E = wp.array(ptr=ends_start, shape=(5, wp.static(block_dim)), dtype=wp.float64)
         F = wp.array(ptr=forces_start, shape=(3, wp.static(block_dim)), dtype=wp.float64)
+        flight_memory = FlightMemory()
+        flight_memory.ends = ends_start
+        flight_memory.forces = forces_start
+        flight_memory.memory = memory_start
 
         chain = read_chain(model, world)
         n = chain.link_count
@@ -303,7 +308,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
 
             if wp.static(has_flight):
                 if flies == 0:
-                    if take_off(ends_start, forces_start, memory_start, K, state, world, place, time):
+                    if take_off(flight_memory, K, state, world, place, time):
                         flies = int(1)
                         slack = wp.float32(-1.0)  # the next list has the skin of flights
                         last_error = wp.float32(1.0)
@@ -325,7 +330,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 if flies == 0:
                     trial = attempt(ends, forces, memory_start, K, place, h, tolerance)
                 else:
-                    trial = attempt_flight(ends_start, forces_start, memory_start, K, place, h)
+                    trial = attempt_flight(flight_memory, K, place, h)
                     tolerance = control.flight_tolerance
             else:
                 trial = attempt(ends, forces, memory_start, K, place, h, tolerance)
@@ -391,7 +396,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     are_rigid = bool(True)
                     kinetic = ZERO
                     if flies != 0:
-                        are_rigid, is_stiff, kinetic = follow(ends_start, forces_start, memory_start, K, place)
+                        are_rigid, is_stiff, kinetic = follow(flight_memory, K, place)
                         link = link_on(K, lane)
                         next_end = hand_over(ends, K, place, link)
                         _error, opening, gap, displacement, speed = measure(K, maxima, place, link, next_end, 0)
@@ -445,7 +450,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 if wp.static(has_flight):
                     if is_hit or not are_rigid:
                         if flies != 0:
-                            land(ends_start, forces_start, memory_start, K, state, world, place, is_stiff, kinetic)
+                            land(flight_memory, K, state, world, place, is_stiff, kinetic)
                             flies = int(0)
                             is_hit = bool(True)
                             last_error = wp.float32(1.0)

@@ -1,8 +1,7 @@
 """Between springs and rigid joints in the block form: when a chain takes off, how far it may go, when it lands.
 
-The counterpart of :mod:`hand_over` and :mod:`approach`. S is the address of what the block keeps of a flight, ``ends``
-and ``forces`` are those of the two places where neighbours meet, see :mod:`block_rigid`. All threads call these
-functions together and get the same results.
+The counterpart of :mod:`hand_over` and :mod:`approach`. M says where in memory, see :mod:`block_rigid`. All threads
+call these functions together and get the same results.
 """
 
 import functools
@@ -14,6 +13,7 @@ import warp as wp
 from .approach import FLIGHT_SKIN, LEAST_SLACK
 from .block_board import publish
 from .block_memory import barrier, vec5i
+from .block_rigid import FlightMemory
 from .block_step import Place
 from .block_surroundings import block_approach
 from .controller import classical_controller
@@ -48,12 +48,11 @@ class BlockHandOver:
 
     Attributes:
         attempt: Tries a step of a flight, see :mod:`block_flight`.
-        take_off: ``(ends, forces, S, K, state, world, place, time)``, on springs → whether joints are closed now.
+        take_off: ``(M, K, state, world, place, time)``, on springs → whether joints are closed now.
         longest_step: ``(K, L, maxima, place, pairs, slack)`` → bound [s] of the next step of a flight.
-        follow: ``(ends, forces, S, K, place)``, after a step of a flight → whether that may go on, whether springs
-            would hold little enough energy for it, kinetic energy [J].
-        land: ``(ends, forces, S, K, state, world, place, is_stiff, kinetic)``, with what ``follow`` said: opens the
-            joints.
+        follow: ``(M, K, place)``, after a step of a flight → whether that may go on, whether springs would hold little
+            enough energy for it, kinetic energy [J].
+        land: ``(M, K, state, world, place, is_stiff, kinetic)``, with what ``follow`` said: opens the joints.
     """
 
     attempt: Any
@@ -71,9 +70,7 @@ def block_hand_over(features: Features, block_dim: int) -> BlockHandOver:
 
     @wp.func
     def take_off(
-        ends: wp.uint64,
-        forces: wp.uint64,
-        S: wp.uint64,
+        M: FlightMemory,
         K: wp.array2d(dtype=wp.float64),
         state: State,
         world: int,
@@ -83,7 +80,7 @@ def block_hand_over(features: Features, block_dim: int) -> BlockHandOver:
         is_closed = bool(False)
         # flights of soft joints save nothing: their springs ring longer than impulses pause
         if time >= K[BOARD_NOTES, NOTE_CLOSING_TIME] and state.softness[world] == ZERO:
-            is_closed, _is_stiff, _kinetic, lost = project(ends, forces, S, K, place, True)
+            is_closed, _is_stiff, _kinetic, lost = project(M, K, place, True)
             if place.lane == 0:
                 K[BOARD_NOTES, NOTE_CLOSING_TIME] = time + QUIET_TIME
                 if is_closed:
@@ -104,15 +101,13 @@ def block_hand_over(features: Features, block_dim: int) -> BlockHandOver:
         return wp.max(K[BOARD_NOTES, NOTE_CONTACT_STEP], ONE / approach(K, L, maxima, place, pairs, slack))
 
     @wp.func
-    def follow(ends: wp.uint64, forces: wp.uint64, S: wp.uint64, K: wp.array2d(dtype=wp.float64), place: Place):
-        is_closed, is_stiff, kinetic, _lost = project(ends, forces, S, K, place, False)
+    def follow(M: FlightMemory, K: wp.array2d(dtype=wp.float64), place: Place):
+        is_closed, is_stiff, kinetic, _lost = project(M, K, place, False)
         return is_closed and is_stiff, is_stiff, kinetic
 
     @wp.func
     def land(
-        ends: wp.uint64,
-        forces: wp.uint64,
-        S: wp.uint64,
+        M: FlightMemory,
         K: wp.array2d(dtype=wp.float64),
         state: State,
         world: int,
@@ -123,7 +118,7 @@ def block_hand_over(features: Features, block_dim: int) -> BlockHandOver:
         # where the links lie on one line neither forces nor what opens the joints has a bound: there the springs shall
         # find their forces by themselves
         if is_stiff:
-            lost = open_joints(ends, forces, S, K, place, kinetic)
+            lost = open_joints(M, K, place, kinetic)
             if place.lane == 0:
                 state.losses[world, LOSS_HAND_OVER] = state.losses[world, LOSS_HAND_OVER] + lost
 

@@ -57,6 +57,15 @@ FRICTION_NUMBERS = 5
 """Of the system of the stages, see :mod:`block_flight`."""
 
 
+@wp.struct
+class FlightMemory:
+    """Addresses of what the threads of a block share on rigid joints."""
+
+    ends: wp.uint64  # five numbers a thread, between neighbours
+    forces: wp.uint64  # three
+    memory: wp.uint64  # what a flight keeps, laid out by FlightLayout
+
+
 @dataclass(frozen=True)
 class FlightLayout:
     """Where a block keeps what flights need, in doubles from the beginning of its memory; nothing outlasts a step.
@@ -109,17 +118,17 @@ class FlightLayout:
 
 @dataclass(frozen=True)
 class BlockRigidJoints:
-    """Warp functions for blocks of one size; S is the address of the block's memory.
+    """Warp functions for blocks of one size.
 
     Attributes:
-        factorise: ``(S, K, place, cosine, sine)``: makes S of the links' directions ready to solve with.
-        accelerate: ``(ends, forces, S, K, place, cosine, sine, spin, torque)`` → force of the right joint and
-            acceleration of the link, from its direction and spin and its right joint's friction torque.
-        project: ``(ends, forces, S, K, place, is_closing)`` → whether C = 0 and Ċ = 0 hold now, whether
-            springs would hold so little energy that they may count as rigid, kinetic energy and energy [J] that went.
-            Leaves joint forces, accelerations and S factorised. ``is_closing``: from springs, which may also be
-            refused; then nothing has changed.
-        open_joints: ``(ends, forces, S, K, place, kinetic)``, after ``project`` and impulses → energy [J] that went.
+        factorise: ``(M.memory, K, place, cosine, sine)``: makes S of the links' directions ready to solve with.
+        accelerate: ``(M, K, place, cosine, sine, spin, torque)`` → force of the right joint and acceleration of the
+            link, from its direction and spin and its right joint's friction torque.
+        project: ``(M, K, place, is_closing)`` → whether C = 0 and Ċ = 0 hold now, whether springs would hold so little
+            energy that they may count as rigid, kinetic energy and energy [J] that went. Leaves joint forces,
+            accelerations and S factorised. ``is_closing``: from springs, which may also be refused; then nothing has
+            changed.
+        open_joints: ``(M, K, place, kinetic)``, after ``project`` and impulses → energy [J] that went.
     """
 
     factorise: Any
@@ -194,9 +203,7 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
 
     @wp.func
     def accelerate(
-        ends: wp.uint64,
-        forces: wp.uint64,
-        S: wp.uint64,
+        M: FlightMemory,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
         cosine: wp.float64,
@@ -205,22 +212,22 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
         torque: wp.float64,
     ):
         lane = place.lane
-        hand(ends, 0, lane, torque)
+        hand(M.ends, 0, lane, torque)
         barrier()
-        free = (handed(ends, 0, place.before) - torque) * K[INVERSE_INERTIA, place.column]
+        free = (handed(M.ends, 0, place.before) - torque) * K[INVERSE_INERTIA, place.column]
         own_x, own_y = inward_pull(cosine, sine, spin, free)
-        hand(forces, 0, lane, own_x)
-        hand(forces, 1, lane, own_y)
+        hand(M.forces, 0, lane, own_x)
+        hand(M.forces, 1, lane, own_y)
         barrier()
-        right_x = own_x + handed(forces, 0, place.after)
-        right_y = own_y + handed(forces, 1, place.after)
+        right_x = own_x + handed(M.forces, 0, place.after)
+        right_y = own_y + handed(M.forces, 1, place.after)
         a = K[BOARD_NOTES, NOTE_HALF_LENGTH]
-        own = solve(S, place.links, lane, ZERO, vec2d(a * right_x, a * right_y))
-        hand(ends, 0, lane, own[0])
-        hand(ends, 1, lane, own[1])
+        own = solve(M.memory, place.links, lane, ZERO, vec2d(a * right_x, a * right_y))
+        hand(M.ends, 0, lane, own[0])
+        hand(M.ends, 1, lane, own[1])
         barrier()
-        left_x = handed(ends, 0, place.before)
-        left_y = handed(ends, 1, place.before)
+        left_x = handed(M.ends, 0, place.before)
+        left_y = handed(M.ends, 1, place.before)
         ax, ay, turn = push_of(K, place, cosine, sine, left_x, left_y, own)
         return own, ax, ay - K[BOARD_NOTES, NOTE_GRAVITY], free + turn
 
@@ -290,19 +297,18 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
 
     @wp.func
     def project(
-        ends: wp.uint64,
-        forces: wp.uint64,
-        S: wp.uint64,
+        M: FlightMemory,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
         is_closing: bool,
     ):
         lane = place.lane
+        S = M.memory
         chain = joint_constants(K)
         held = ZERO
         kinetic = ZERO
         may_close = bool(True)
-        cx, cy, after_cosine, after_sine = opening(ends, K, place)
+        cx, cy, after_cosine, after_sine = opening(M.ends, K, place)
         if is_closing:
             row = int(0)
             while row < 6:
@@ -325,9 +331,9 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
                 goes_on = widest > CLOSED_SQUARE and corrections < wp.static(MOST_CORRECTIONS)
                 link = link_on(K, lane)
                 factorise(S, K, place, link.cosine, link.sine)
-                hand(forces, 0, lane, link.u)
-                hand(forces, 1, lane, link.v)
-                hand(forces, 2, lane, link.omega)
+                hand(M.forces, 0, lane, link.u)
+                hand(M.forces, 1, lane, link.v)
+                hand(M.forces, 2, lane, link.omega)
                 barrier()
                 right = vec2d(cx, cy)
                 if not goes_on and lane < place.links:
@@ -338,19 +344,19 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
                         link.omega,
                         link.cosine,
                         link.sine,
-                        handed(forces, 0, place.after),
-                        handed(forces, 1, place.after),
-                        handed(forces, 2, place.after),
+                        handed(M.forces, 0, place.after),
+                        handed(M.forces, 1, place.after),
+                        handed(M.forces, 2, place.after),
                         after_cosine,
                         after_sine,
                     )
                     right = vec2d(cu, cv)
                 own = solve(S, place.links, lane, ZERO, right)
-                hand(ends, 0, lane, own[0])
-                hand(ends, 1, lane, own[1])
+                hand(M.ends, 0, lane, own[0])
+                hand(M.ends, 1, lane, own[1])
                 barrier()
-                left_x = handed(ends, 0, place.before)
-                left_y = handed(ends, 1, place.before)
+                left_x = handed(M.ends, 0, place.before)
+                left_y = handed(M.ends, 1, place.before)
                 px, py, turn = push_of(K, place, link.cosine, link.sine, left_x, left_y, own)
                 first = wp.where(goes_on, X, U)
                 if lane < place.links:
@@ -360,13 +366,13 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
                 barrier()
                 if goes_on:
                     point(K, lane)
-                    cx, cy, after_cosine, after_sine = opening(ends, K, place)
+                    cx, cy, after_cosine, after_sine = opening(M.ends, K, place)
                     corrections += 1
             link = link_on(K, lane)
-            hand(forces, 0, lane, link.omega)
+            hand(M.forces, 0, lane, link.omega)
             barrier()
-            torque = friction_torque(chain, link.omega - handed(forces, 0, place.after))
-            pull, ax, ay, at = accelerate(ends, forces, S, K, place, link.cosine, link.sine, link.omega, torque)
+            torque = friction_torque(chain, link.omega - handed(M.forces, 0, place.after))
+            pull, ax, ay, at = accelerate(M, K, place, link.cosine, link.sine, link.omega, torque)
             square, doubled = two_sums(S, place, pull[0] * pull[0] + pull[1] * pull[1], twice_kinetic(K, place))
             left_over = HALF * doubled
             is_stiff = HALF * square / chain.joint_stiffness <= GREATEST_STRETCHING * left_over
@@ -392,19 +398,18 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
 
     @wp.func
     def open_joints(
-        ends: wp.uint64,
-        forces: wp.uint64,
-        S: wp.uint64,
+        M: FlightMemory,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
         kinetic: wp.float64,
     ):
         lane = place.lane
+        S = M.memory
         chain = joint_constants(K)
         x = K[X, lane]
         y = K[Y, lane]
         theta = K[THETA, lane]
-        cx, cy, _cosine, _sine = opening(ends, K, place)
+        cx, cy, _cosine, _sine = opening(M.ends, K, place)
         before, _none = two_sums(S, place, cx * cx + cy * cy, ZERO)
         give = ONE / chain.joint_stiffness
         right = vec2d()
@@ -413,11 +418,11 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
                 cx - give * read(S, wp.static(force) + lane), cy - give * read(S, wp.static(force + block_dim) + lane)
             )
         own = solve(S, place.links, lane, ZERO, right)
-        hand(forces, 0, lane, own[0])
-        hand(forces, 1, lane, own[1])
+        hand(M.forces, 0, lane, own[0])
+        hand(M.forces, 1, lane, own[1])
         barrier()
-        left_x = handed(forces, 0, place.before)
-        left_y = handed(forces, 1, place.before)
+        left_x = handed(M.forces, 0, place.before)
+        left_y = handed(M.forces, 1, place.before)
         link = link_on(K, lane)
         px, py, turn = push_of(K, place, link.cosine, link.sine, left_x, left_y, own)
         if lane < place.links:
@@ -425,7 +430,7 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
             K[Y, lane] = y + py
             K[THETA, lane] = theta + turn
             point(K, lane)
-        cx, cy, _cosine, _sine = opening(ends, K, place)
+        cx, cy, _cosine, _sine = opening(M.ends, K, place)
         after, _none = two_sums(S, place, cx * cx + cy * cy, ZERO)
         half_stiffness = HALF * chain.joint_stiffness
         lost = half_stiffness * (before - after)
