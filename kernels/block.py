@@ -15,7 +15,6 @@ import functools
 import warp as wp
 
 from . import layout
-from .approach import FLIGHT_SKIN, LEAST_SLACK
 from .block_board import (
     contact_constants,
     link_is_finite,
@@ -28,12 +27,16 @@ from .block_board import (
     take_place,
 )
 from .block_contact import block_self_contacts, touch_layout
+from .block_hand_over import block_hand_over, flight_of, list_margins, step_factors, take_turns
 from .block_list import block_list
+from .block_look import block_look
 from .block_memory import barrier, barrier_if_any, block_maxima, clock, tile_address, vec5i
+from .block_rigid import FlightMemory
+from .block_room import board_rows, shares_board, shares_memory
 from .block_step import Link, Place, Trial, block_stage, error_of, link_on, note_first, vec3d, vec5d
-from .block_surroundings import block_approach, block_surroundings, raised
+from .block_surroundings import block_surroundings, raised
 from .broadphase import list_layout
-from .controller import LEAST_SHRINKAGE, classical_controller
+from .controller import LEAST_SHRINKAGE
 from .driver import (
     BOUNCE_PAUSE,
     COMPILER_FLAGS,
@@ -60,7 +63,6 @@ from .layout import (
     INVERSE_MASS,
     LAST_FLOOR_IMPULSE,
     LIST_BUILDS,
-    LOSS_HAND_OVER,
     MASS,
     NOTE_CLOSING_TIME,
     NOTE_CONTACT_STEP,
@@ -87,49 +89,13 @@ from .layout import (
     Y,
 )
 from .methods import METHODS
-from .record import record_is_full, sampling, summarise, write_sample
-from .softening import change_joints, contact_step, softened, spring_tolerance
+from .record import record_is_full, summarise, write_sample
+from .softening import contact_step, softened, spring_tolerance
 from .types import Control, Model, Program, Record, State, read_chain
 
 wp.set_module_options({"enable_backward": False})
 
 REGISTERS_OF_MULTIPROCESSOR = 65536
-LARGEST_SHARED_BLOCK = 512
-"""Longer chains keep their board in the scratch block: it would not fit into the memory that a block shares."""
-LARGEST_SHARED_MEMORY = 192
-"""The same for what a method keeps, if anything."""
-LARGEST_SHARED_FLIGHT = 64
-"""The same for flights, which are rare: chains of more links would have to share a multiprocessor with fewer others."""
-
-
-def block_rows(method: str, block_dim: int, columns: int) -> int:
-    """Rows of a chain's scratch block of this width that the block form needs: for the board and the method."""
-    rows = _board_rows(block_dim, columns)
-    if not _holds_memory(method, block_dim):
-        rows += -(-METHODS[method].block_memory(block_dim) // columns)
-    return rows
-
-
-def _holds_memory(method: str, block_dim: int) -> bool:
-    """Whether what a method keeps lies in the memory that a block shares, or else in the scratch block."""
-    return block_dim <= (LARGEST_SHARED_FLIGHT if METHODS[method].flight else LARGEST_SHARED_MEMORY)
-
-
-def _board_rows(block_dim: int, columns: int) -> int:
-    """Rows of this width for what a chain keeps of its board between launches, or for all of a board not shared."""
-    if block_dim <= LARGEST_SHARED_BLOCK:
-        return layout.BOARD_NOTES
-    return -(-layout.board_size(block_dim) // columns)
-
-
-@wp.func
-def take_turns(K: wp.array2d(dtype=wp.float64), lane: int, step: wp.float64):
-    """Keeps the step of one model of the joints while that of the other is taken."""
-    other = K[BOARD_NOTES, NOTE_OTHER_STEP]
-    barrier()
-    if lane == 0:
-        K[BOARD_NOTES, NOTE_OTHER_STEP] = step
-    return other
 
 
 @functools.cache
@@ -142,7 +108,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         registers: Greatest number of registers a thread may take on a GPU; None: as many as a block of this size can
             have.
 
-    scratch: (W, ≥ block_rows(features.method, block_dim, columns), columns) float64; lists as for the CPU form.
+    scratch: (W, ≥ :func:`block_room.block_rows`, columns) float64; lists as for the CPU form.
     """
     available = REGISTERS_OF_MULTIPROCESSOR // block_dim // 8 * 8
     if available < 255:
@@ -160,16 +126,14 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     fixed_count = SPROCKET_IMPULSES if has_sprocket else FLOOR_IMPULSES
     reuses_last, needs_first_power = method.reuses_last, method.needs_first_power
     attempt = method.block_attempt(block_dim)
-    is_shared = block_dim <= LARGEST_SHARED_BLOCK
+    is_shared = shares_board(block_dim)
     width = block_dim + 1
     kept_width = columns if is_shared else width
     board_size = layout.board_size(block_dim) if is_shared else 1
     touch = touch_layout(columns, block_dim, in_lists=not is_shared)
     touch_size = touch.size if is_shared else 1
-    # on the sprocket impulses never pause
-    flight = None if has_sprocket else method.flight
-    has_flight = flight is not None
-    holds_memory = _holds_memory(features.method, block_dim)
+    has_flight = flight_of(features) is not None
+    holds_memory = shares_memory(features.method, block_dim)
     needs_memory = has_flight or method.flight is None
     memory_size = max(method.block_memory(block_dim), 1) if holds_memory and needs_memory else 1
     board_address = tile_address(wp.float64, board_size)
@@ -180,14 +144,15 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     hand_over, stage = block_stage(block_dim)
     greatest, _greatest_of_five = block_maxima(block_dim)
     measure, bound_of, meet_fixed_body = block_surroundings(features, block_dim)
-    growth, shrinkage = method.controller(wp.float32)
+    grow, shrink = step_factors(features)
+    margins = list_margins(features)
     build_list = block_list(columns, block_dim, features.broad_phase)
     clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, block_dim, touch)
-    attempt_flight, project, open_joints = flight.block_functions(block_dim) if flight else (None,) * 3
-    flight_growth, flight_shrinkage = classical_controller(flight.error_order) if flight else (None,) * 2
-    approach = block_approach(features, block_dim)
+    flight = block_hand_over(features, block_dim) if has_flight else None
+    take_off, follow, land = (flight.take_off, flight.follow, flight.land) if flight else (None,) * 3
+    attempt_flight, longest_step = (flight.attempt, flight.longest_step) if flight else (None,) * 2
     softens = features.softens
-    look = sampling(features.watch, softens)
+    look = block_look(features, touch)
 
     @wp.func
     def begin_step(forces: wp.tile[vec3d, block_dim], K: wp.array2d(dtype=wp.float64), place: Place, next_end: vec5d):
@@ -238,12 +203,16 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         T = wp.array(ptr=touch_start, shape=(wp.static(touch.size),), dtype=wp.int32)
         memory_start = memory_address(memory)
         if wp.static(not holds_memory):
-            memory_start = scratch[world].ptr + wp.uint64(wp.static(8 * _board_rows(block_dim, columns) * columns))
+            memory_start = scratch[world].ptr + wp.uint64(wp.static(8 * board_rows(block_dim, columns) * columns))
         # what stages hand over is not needed while contacts are resolved
         ends_start = ends_address(ends)
         forces_start = forces_address(forces)
         E = wp.array(ptr=ends_start, shape=(5, wp.static(block_dim)), dtype=wp.float64)
         F = wp.array(ptr=forces_start, shape=(3, wp.static(block_dim)), dtype=wp.float64)
+        flight_memory = FlightMemory()
+        flight_memory.ends = ends_start
+        flight_memory.forces = forces_start
+        flight_memory.memory = memory_start
 
         chain = read_chain(model, world)
         n = chain.link_count
@@ -281,11 +250,11 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             T[wp.static(touch.votes)] = 0
             K[BOARD_NOTES, NOTE_DEADLINE] = clock() + control.launch_time
         barrier()  # the chain's constants are on the board
-        publish(K, n, place)
+        publish(K, place)
         barrier()
         link = link_on(K, lane)
         next_end = hand_over(ends, K, place, link)
-        _error, opening, gap, displacement, speed = measure(K, maxima, n, place, link, next_end, 0)
+        _error, opening, gap, displacement, speed = measure(K, maxima, place, link, next_end, 0)
         status = int(RUNNING)
         pairs = int(0)
         slack = wp.float32(0.5) * wp.float32(control.skin) - opening
@@ -310,6 +279,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         if record_is_full(record, world):
             tries_left = 0
         bound = bound_of(K, control, pairs, gap, slack, speed)
+        flies = int(0)
         if wp.static(has_flight):
             flies = state.flies[world]
         tries = int(0)
@@ -318,31 +288,16 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         while status == RUNNING and tries < tries_left:
             if time >= K[BOARD_NOTES, NOTE_NEXT_LOOK]:
                 softness = state.softness[world]
-                publish(K, n, place)
+                publish(K, place)
                 barrier()
                 if lane == 0:
-                    seen = read_chain(model, world)
-                    if wp.static(softens):
-                        seen = softened(seen, control, softness)
-                    T[wp.static(touch.mailbox)] = look(K, seen, program, state, record, control, world, time)
-                    if wp.static(softens):
-                        if state.softness[world] != softness:
-                            note_constants(K, change_joints(seen, model, state, control, world))
-                            K[BOARD_NOTES, NOTE_CONTACT_STEP] = contact_step(control, state.softness[world])
-                            K[BOARD_NOTES, NOTE_TOLERANCE] = spring_tolerance(control, state.softness[world])
-                    K[BOARD_NOTES, NOTE_STOP_TIME] = state.stop_time[world]
-                    K[BOARD_NOTES, NOTE_NEXT_LOOK] = wp.float64(state.next_sample[world]) * control.sample_interval
-                    if clock() > K[BOARD_NOTES, NOTE_DEADLINE]:
-                        T[wp.static(touch.is_late)] = 1
+                    look(K, T, model, program, state, record, control, world, time)
                 barrier()
                 status = T[wp.static(touch.mailbox)]
                 pauses = record_is_full(record, world) or T[wp.static(touch.is_late)] != 0
                 barrier()
                 if wp.static(softens):
-                    changes_first = state.softness[world] != softness
-                    if wp.static(has_flight):
-                        changes_first = changes_first and flies == 0
-                    if changes_first:
+                    if state.softness[world] != softness and flies == 0:
                         next_end = hand_over(ends, K, place, link_on(K, lane))
                         begin_step(forces, K, place, next_end)
                         bound = bound_of(K, control, pairs, gap, slack, speed)
@@ -354,29 +309,18 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 break
 
             if wp.static(has_flight):
-                # flights of soft joints save nothing: their springs ring longer than impulses pause
-                if flies == 0 and time >= K[BOARD_NOTES, NOTE_CLOSING_TIME] and state.softness[world] == ZERO:
-                    is_closed, _is_stiff, _kinetic, lost = project(
-                        ends_start, forces_start, memory_start, K, place, n, True
-                    )
-                    if is_closed:
+                if flies == 0:
+                    if take_off(flight_memory, K, state, world, place, time):
                         flies = int(1)
                         slack = wp.float32(-1.0)  # the next list has the skin of flights
                         last_error = wp.float32(1.0)
                         step = take_turns(K, lane, step)
-                    if lane == 0:
-                        K[BOARD_NOTES, NOTE_CLOSING_TIME] = time + QUIET_TIME
-                        if is_closed:
-                            state.losses[world, LOSS_HAND_OVER] = state.losses[world, LOSS_HAND_OVER] + lost
 
             h = step
             if wp.static(has_contacts):
                 if wp.static(has_flight):
                     if flies != 0:
-                        publish(K, n, place)
-                        barrier()
-                        fastest = approach(K, L, maxima, place, n, pairs, slack)
-                        bound = wp.max(K[BOARD_NOTES, NOTE_CONTACT_STEP], ONE / fastest)
+                        bound = longest_step(K, L, maxima, place, pairs, slack)
                 h = wp.min(h, bound)
             lands = time + h >= stop_time
             if lands:
@@ -386,12 +330,12 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if wp.static(has_flight):
                 trial = Trial()
                 if flies == 0:
-                    trial = attempt(ends, forces, memory_start, K, place, n, h, tolerance)
+                    trial = attempt(ends, forces, memory_start, K, place, h, tolerance)
                 else:
-                    trial = attempt_flight(ends_start, forces_start, memory_start, K, place, n, h)
+                    trial = attempt_flight(flight_memory, K, place, h)
                     tolerance = control.flight_tolerance
             else:
-                trial = attempt(ends, forces, memory_start, K, place, n, h, tolerance)
+                trial = attempt(ends, forces, memory_start, K, place, h, tolerance)
             own_error = int(0)
             if lane < n:
                 own_error = error_of(trial, tolerance)
@@ -407,18 +351,14 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 candidate.cosine = trial.cosine
                 candidate.sine = trial.sine
                 error, new_opening, new_gap, new_displacement, new_speed = measure(
-                    K, maxima, n, place, candidate, trial.next_end, own_error
+                    K, maxima, place, candidate, trial.next_end, own_error
                 )
             else:
                 error = wp.cast(greatest(errors, lane, own_error), wp.float32)
             tries += 1
             if not (error <= wp.float32(1.0)):
                 if wp.isfinite(error):
-                    factor = wp.float64(shrinkage(error))
-                    if wp.static(has_flight):
-                        if flies != 0:
-                            factor = flight_shrinkage(wp.float64(error))
-                    step = h * factor
+                    step = h * shrink(error, flies)
                 else:
                     step = h * LEAST_SHRINKAGE
                     broken = wp.where(lane >= n or link_is_finite(K, lane), 0, 1)
@@ -441,11 +381,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if wp.static(reuses_last):
                         note_first(K, lane, trial.last, wp.static(needs_first_power))
                 time = wp.where(lands, stop_time, time + h)
-                factor = wp.float64(growth(error, last_error, control.proportional))
-                if wp.static(has_flight):
-                    if flies != 0:
-                        factor = flight_growth(wp.float64(error), wp.float64(last_error), control.proportional)
-                proposal = h * factor
+                proposal = h * grow(error, last_error, control.proportional, flies)
                 # a step that was cut short says nothing against the proposal that it was cut from
                 step = wp.where(h < step, wp.max(step, proposal), proposal)
                 last_error = wp.max(error, wp.float32(1e-4))
@@ -457,18 +393,15 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 else:
                     link = link_on(K, lane)
                     next_end = hand_over(ends, K, place, link)
-                    _error, opening, gap, displacement, speed = measure(K, maxima, n, place, link, next_end, 0)
+                    _error, opening, gap, displacement, speed = measure(K, maxima, place, link, next_end, 0)
                 if wp.static(has_flight):
                     are_rigid = bool(True)
                     kinetic = ZERO
                     if flies != 0:
-                        is_closed, is_stiff, kinetic, _lost = project(
-                            ends_start, forces_start, memory_start, K, place, n, False
-                        )
-                        are_rigid = is_closed and is_stiff
+                        are_rigid, is_stiff, kinetic = follow(flight_memory, K, place)
                         link = link_on(K, lane)
                         next_end = hand_over(ends, K, place, link)
-                        _error, opening, gap, displacement, speed = measure(K, maxima, n, place, link, next_end, 0)
+                        _error, opening, gap, displacement, speed = measure(K, maxima, place, link, next_end, 0)
                 if lane == 0:
                     K[BOARD_NOTES, NOTE_OPENING] = wp.max(K[BOARD_NOTES, NOTE_OPENING], wp.float64(opening))
                 is_hit = bool(False)
@@ -483,21 +416,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                         if hits > 0:
                             wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
                 if wp.static(has_self):
-                    skin = control.skin
-                    if wp.static(has_flight):
-                        least_slack = wp.float32(0.0)
-                        if flies != 0:
-                            skin = FLIGHT_SKIN * skin
-                            least_slack = wp.float32(LEAST_SLACK * skin)
-                        if slack > wp.float32(0.0):
-                            slack = wp.float32(0.5) * wp.float32(skin) - opening - displacement
-                        is_stale = not slack > least_slack
-                    else:
-                        slack = wp.float32(0.5) * wp.float32(skin) - opening - displacement
-                        is_stale = not slack > wp.float32(0.0)
+                    skin, slack, is_stale = margins(control, flies, slack, opening, displacement)
                     if is_stale or pairs > 0:
                         is_near = bool(True)
-                        publish(K, n, place)
+                        publish(K, place)
                         clear_contacts(T, lane, n)
                 if is_near:
                     is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
@@ -530,17 +452,11 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 if wp.static(has_flight):
                     if is_hit or not are_rigid:
                         if flies != 0:
-                            lost = ZERO
-                            # where the links lie on one line neither forces nor what opens the joints has a bound:
-                            # there the springs shall find their forces by themselves
-                            if is_stiff:
-                                lost = open_joints(ends_start, forces_start, memory_start, K, place, n, kinetic)
+                            land(flight_memory, K, state, world, place, is_stiff, kinetic)
                             flies = int(0)
                             is_hit = bool(True)
                             last_error = wp.float32(1.0)
                             step = take_turns(K, lane, step)
-                            if lane == 0:
-                                state.losses[world, LOSS_HAND_OVER] = state.losses[world, LOSS_HAND_OVER] + lost
                         if lane == 0:
                             K[BOARD_NOTES, NOTE_CLOSING_TIME] = time + QUIET_TIME
                 bound = bound_of(K, control, pairs, gap, slack, speed)
@@ -552,7 +468,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         if status == RUNNING and tries_before + wp.int64(tries) >= control.step_limit:
             status = int(STEP_LIMIT)
         is_last = status != RUNNING and status != NOT_FINITE and state.last_look[world, TIME] != time
-        publish(K, n, place)
+        publish(K, place)
         barrier()
         if lane < n:
             store_link(K, state, world, lane)

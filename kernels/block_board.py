@@ -56,6 +56,7 @@ def take_place(chain: Chain, lane: int) -> Place:
     n = chain.link_count
     place = Place()
     place.lane = lane
+    place.links = n
     place.column = wp.min(lane, n - 1)
     place.before = lane
     place.after = lane
@@ -168,9 +169,10 @@ def ends_of(K: wp.array2d(dtype=wp.float64), link: Link):
 
 
 @wp.func
-def publish(K: wp.array2d(dtype=wp.float64), n: int, place: Place):
+def publish(K: wp.array2d(dtype=wp.float64), place: Place):
     """Fills the board's rows of ends from those of the state, with no barrier."""
     lane = place.lane
+    n = place.links
     if lane < n:
         left_x, left_y, right_x, right_y = ends_of(K, link_on(K, lane))
         K[LEFT_X, lane] = left_x

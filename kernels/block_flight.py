@@ -8,7 +8,7 @@ import functools
 import warp as wp
 
 from .block_memory import barrier, constant_table, exchange, read, write
-from .block_rigid import FRICTION_NUMBERS, FlightLayout, block_rigid_joints
+from .block_rigid import FRICTION_NUMBERS, FlightLayout, FlightMemory, block_rigid_joints
 from .block_solver import block_solver
 from .block_step import Place, Trial, first_on, greatest_error, joint_constants, link_on, vec3d
 from .cyclic_solver import block_type
@@ -40,8 +40,7 @@ def flight_attempt(block_dim: int):
     """Warp function that tries a step on rigid joints in blocks of this size.
 
     Returns:
-        ``attempt(ends, forces, S, K, place, n, h)`` → Trial, from the state and the accelerations on the board, with S
-        the block's memory, laid out by :class:`FlightLayout`.
+        ``attempt(M, K, place, h)`` → Trial, from the state and the accelerations on the board.
     """
     memory = FlightLayout(block_dim)
     kept, friction_start = memory.stages, memory.forces.size
@@ -99,26 +98,24 @@ def flight_attempt(block_dim: int):
 
     @wp.func
     def attempt(
-        ends: wp.uint64,
-        forces: wp.uint64,
-        S: wp.uint64,
+        M: FlightMemory,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
-        n: int,
         h: wp.float64,
     ):
         lane = place.lane
         column = place.column
+        S = M.memory
         Q = S + wp.uint64(wp.static(8 * friction_start))
         chain = joint_constants(K)
         # smoothing and slopes of friction for this step, and the matrix of its stages
         link = link_on(K, lane)
         first = first_on(K, lane)
-        hand(forces, 0, lane, first.theta)
-        hand(forces, 1, lane, link.omega)
+        hand(M.forces, 0, lane, first.theta)
+        hand(M.forces, 1, lane, link.omega)
         barrier()
-        smoothing = switch_smoothing(chain, h, first.theta - handed(forces, 0, place.after))
-        spin = link.omega - handed(forces, 1, place.after)
+        smoothing = switch_smoothing(chain, h, first.theta - handed(M.forces, 0, place.after))
+        spin = link.omega - handed(M.forces, 1, place.after)
         slope = wp.static(wp.float64(gamma)) * h * steepness(chain, spin, smoothing)
         write(Q, wp.static(COSINE * block_dim) + lane, chain.half_length * link.cosine)
         write(Q, wp.static(SINE * block_dim) + lane, chain.half_length * link.sine)
@@ -126,7 +123,7 @@ def flight_attempt(block_dim: int):
         write(Q, wp.static(TURNING * block_dim) + lane, K[INERTIA, column])
         write(Q, wp.static(SLOPE * block_dim) + lane, slope)
         barrier()
-        factor(Q, n, lane, ZERO)
+        factor(Q, place.links, lane, ZERO)
         barrier()
         power = ZERO
         i = int(0)
@@ -140,27 +137,27 @@ def flight_attempt(block_dim: int):
             coupled_v = change(S, lane, wp.static(COUPLINGS) + i, i, 4)
             coupled_omega = change(S, lane, wp.static(COUPLINGS) + i, i, 5)
             cosine, sine = cos_sin(theta)
-            factorise(S, K, place, n, cosine, sine)
-            hand(forces, 0, lane, omega)
+            factorise(S, K, place, cosine, sine)
+            hand(M.forces, 0, lane, omega)
             barrier()
-            spin = omega - handed(forces, 0, place.after)
+            spin = omega - handed(M.forces, 0, place.after)
             torque = smoothed_torque(chain, spin, smoothing)
             power += coefficient(WEIGHTS, i) * torque * spin
-            _force, ax, ay, at = accelerate(ends, forces, S, K, place, n, cosine, sine, omega, torque)
+            _force, ax, ay, at = accelerate(M, K, place, cosine, sine, omega, torque)
             # (λ, y) of the stage
             target = h * at + wp.static(wp.float64(1.0 / gamma)) * coupled_omega
-            hand(forces, 0, lane, target)
+            hand(M.forces, 0, lane, target)
             barrier()
-            drag = slope * (target - handed(forces, 0, place.after))
-            hand(ends, 0, lane, drag)
+            drag = slope * (target - handed(M.forces, 0, place.after))
+            hand(M.ends, 0, lane, drag)
             barrier()
-            pull = solve(Q, n, lane, ZERO, vec3d(ZERO, ZERO, handed(ends, 0, place.before) - drag))
-            hand(forces, 0, lane, pull[0])
-            hand(forces, 1, lane, pull[1])
+            pull = solve(Q, place.links, lane, ZERO, vec3d(ZERO, ZERO, handed(M.ends, 0, place.before) - drag))
+            hand(M.forces, 0, lane, pull[0])
+            hand(M.forces, 1, lane, pull[1])
             barrier()
             share = K[INVERSE_MASS, column]
-            ku = h * ax + share * (pull[0] - handed(forces, 0, place.before))
-            kv = h * ay + share * (pull[1] - handed(forces, 1, place.before))
+            ku = h * ax + share * (pull[0] - handed(M.forces, 0, place.before))
+            kv = h * ay + share * (pull[1] - handed(M.forces, 1, place.before))
             kw = h * at + pull[2]
             row = wp.static(kept) + 6 * i * wp.static(block_dim) + lane
             write(S, row, h * (u + coupled_u + wp.static(wp.float64(gamma)) * ku))

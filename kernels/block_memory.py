@@ -73,6 +73,30 @@ def warp_width() -> int:
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
+    __syncwarp();
+#else
+    WP_TILE_SYNC();
+#endif
+""")
+def warp_barrier():
+    """Wait until all threads of a hardware warp are here; on fibers all of the block."""
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    return lane < 32;
+#else
+    return true;
+#endif
+""")
+def is_in_first_warp(lane: int) -> bool:
+    """Whether a thread belongs to the hardware warp that carries the last level; fibers all wait with it."""
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
     unsigned long long now;
     asm volatile("mov.u64 %0, %globaltimer;" : "=l"(now));
     return 1e-9 * now;

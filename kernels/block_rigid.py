@@ -16,11 +16,12 @@ from typing import Any
 import warp as wp
 
 from .block_board import point
+from .block_factors import FactorLayout, reductions_for
 from .block_memory import barrier, exchange, read, warp_greatest, warp_width, write
-from .block_solver import FactorLayout, block_solver, reductions_for
+from .block_solver import block_solver
 from .block_step import Place, joint_constants, link_on
 from .cyclic_solver import block_type
-from .elementary import HALF, ONE, TWO, ZERO
+from .elementary import HALF, ONE, TWO, ZERO, order_bits_single
 from .joint import friction_torque
 from .layout import (
     BOARD_FIRST,
@@ -54,6 +55,15 @@ SHARE, SHARE_XX, SHARE_XY, SHARE_YY = 0, 1, 2, 3
 FORCE_NUMBERS = 4
 FRICTION_NUMBERS = 5
 """Of the system of the stages, see :mod:`block_flight`."""
+
+
+@wp.struct
+class FlightMemory:
+    """Addresses of what the threads of a block share on rigid joints."""
+
+    ends: wp.uint64  # five numbers a thread, between neighbours
+    forces: wp.uint64  # three
+    memory: wp.uint64  # what a flight keeps, laid out by FlightLayout
 
 
 @dataclass(frozen=True)
@@ -108,17 +118,17 @@ class FlightLayout:
 
 @dataclass(frozen=True)
 class BlockRigidJoints:
-    """Warp functions for blocks of one size; S is the address of the block's memory.
+    """Warp functions for blocks of one size.
 
     Attributes:
-        factorise: ``(S, K, place, n, cosine, sine)``: makes S of the links' directions ready to solve with.
-        accelerate: ``(ends, forces, S, K, place, n, cosine, sine, spin, torque)`` → force of the right joint and
-            acceleration of the link, from its direction and spin and its right joint's friction torque.
-        project: ``(ends, forces, S, K, place, n, is_closing)`` → whether C = 0 and Ċ = 0 hold now, whether
-            springs would hold so little energy that they may count as rigid, kinetic energy and energy [J] that went.
-            Leaves joint forces, accelerations and S factorised. ``is_closing``: from springs, which may also be
-            refused; then nothing has changed.
-        open_joints: ``(ends, forces, S, K, place, n, kinetic)``, after ``project`` and impulses → energy [J] that went.
+        factorise: ``(M.memory, K, place, cosine, sine)``: makes S of the links' directions ready to solve with.
+        accelerate: ``(M, K, place, cosine, sine, spin, torque)`` → force of the right joint and acceleration of the
+            link, from its direction and spin and its right joint's friction torque.
+        project: ``(M, K, place, is_closing)`` → whether C = 0 and Ċ = 0 hold now, whether springs would hold so little
+            energy that they may count as rigid, kinetic energy and energy [J] that went. Leaves joint forces,
+            accelerations and S factorised. ``is_closing``: from springs, which may also be refused; then nothing has
+            changed.
+        open_joints: ``(M, K, place, kinetic)``, after ``project`` and impulses → energy [J] that went.
     """
 
     factorise: Any
@@ -157,9 +167,7 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
     factor, solve = block_solver(memory.forces, couplings_of, diagonal_of)
 
     @wp.func
-    def factorise(
-        S: wp.uint64, K: wp.array2d(dtype=wp.float64), place: Place, n: int, cosine: wp.float64, sine: wp.float64
-    ):
+    def factorise(S: wp.uint64, K: wp.array2d(dtype=wp.float64), place: Place, cosine: wp.float64, sine: wp.float64):
         lane = place.lane
         xx, xy, yy = turning_share(K[BOARD_NOTES, NOTE_HALF_LENGTH], K[INVERSE_INERTIA, place.column], cosine, sine)
         write(S, wp.static(SHARE * block_dim) + lane, K[INVERSE_MASS, place.column])
@@ -167,7 +175,7 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
         write(S, wp.static(SHARE_XY * block_dim) + lane, xy)
         write(S, wp.static(SHARE_YY * block_dim) + lane, yy)
         barrier()
-        factor(S, n, lane, ZERO)
+        factor(S, place.links, place.lane, ZERO)
         barrier()
 
     @wp.func
@@ -195,39 +203,36 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
 
     @wp.func
     def accelerate(
-        ends: wp.uint64,
-        forces: wp.uint64,
-        S: wp.uint64,
+        M: FlightMemory,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
-        n: int,
         cosine: wp.float64,
         sine: wp.float64,
         spin: wp.float64,
         torque: wp.float64,
     ):
         lane = place.lane
-        hand(ends, 0, lane, torque)
+        hand(M.ends, 0, lane, torque)
         barrier()
-        free = (handed(ends, 0, place.before) - torque) * K[INVERSE_INERTIA, place.column]
+        free = (handed(M.ends, 0, place.before) - torque) * K[INVERSE_INERTIA, place.column]
         own_x, own_y = inward_pull(cosine, sine, spin, free)
-        hand(forces, 0, lane, own_x)
-        hand(forces, 1, lane, own_y)
+        hand(M.forces, 0, lane, own_x)
+        hand(M.forces, 1, lane, own_y)
         barrier()
-        right_x = own_x + handed(forces, 0, place.after)
-        right_y = own_y + handed(forces, 1, place.after)
+        right_x = own_x + handed(M.forces, 0, place.after)
+        right_y = own_y + handed(M.forces, 1, place.after)
         a = K[BOARD_NOTES, NOTE_HALF_LENGTH]
-        own = solve(S, n, lane, ZERO, vec2d(a * right_x, a * right_y))
-        hand(ends, 0, lane, own[0])
-        hand(ends, 1, lane, own[1])
+        own = solve(M.memory, place.links, lane, ZERO, vec2d(a * right_x, a * right_y))
+        hand(M.ends, 0, lane, own[0])
+        hand(M.ends, 1, lane, own[1])
         barrier()
-        left_x = handed(ends, 0, place.before)
-        left_y = handed(ends, 1, place.before)
+        left_x = handed(M.ends, 0, place.before)
+        left_y = handed(M.ends, 1, place.before)
         ax, ay, turn = push_of(K, place, cosine, sine, left_x, left_y, own)
         return own, ax, ay - K[BOARD_NOTES, NOTE_GRAVITY], free + turn
 
     @wp.func
-    def opening(ends: wp.uint64, K: wp.array2d(dtype=wp.float64), place: Place, n: int):
+    def opening(ends: wp.uint64, K: wp.array2d(dtype=wp.float64), place: Place):
         """C of the right joint on the board, none behind the last link, and the next link's direction."""
         link = link_on(K, place.lane)
         hand(ends, 0, place.lane, link.x)
@@ -248,7 +253,7 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
             after_cosine,
             after_sine,
         )
-        if place.lane >= n:
+        if place.lane >= place.links:
             cx = ZERO
             cy = ZERO
         return cx, cy, after_cosine, after_sine
@@ -256,7 +261,7 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
     @wp.func
     def greatest_square(S: wp.uint64, lane: int, x: wp.float64, y: wp.float64):
         """The greatest x² + y² of all threads, in single precision; a NaN before any number."""
-        bits = warp_greatest(wp.cast(wp.float32(x * x + y * y), wp.int32))
+        bits = warp_greatest(order_bits_single(wp.float32(x * x + y * y)))
         write(S, wp.static(maxima) + lane // warp_width(), wp.float64(bits))
         barrier()
         top = read(S, wp.static(maxima))
@@ -267,16 +272,17 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
         return wp.cast(int(top), wp.float32)
 
     @wp.func
-    def two_sums(S: wp.uint64, lane: int, n: int, first: wp.float64, second: wp.float64):
+    def two_sums(S: wp.uint64, place: Place, first: wp.float64, second: wp.float64):
         """Sums over all links, in their order, the same in all threads."""
-        if lane < n:
+        lane = place.lane
+        if lane < place.links:
             write(S, wp.static(sums) + lane, first)
             write(S, wp.static(sums + block_dim) + lane, second)
         barrier()
         total_first = ZERO
         total_second = ZERO
         i = int(0)
-        while i < n:
+        while i < place.links:
             total_first += read(S, wp.static(sums) + i)
             total_second += read(S, wp.static(sums + block_dim) + i)
             i += 1
@@ -291,26 +297,24 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
 
     @wp.func
     def project(
-        ends: wp.uint64,
-        forces: wp.uint64,
-        S: wp.uint64,
+        M: FlightMemory,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
-        n: int,
         is_closing: bool,
     ):
         lane = place.lane
+        S = M.memory
         chain = joint_constants(K)
         held = ZERO
         kinetic = ZERO
         may_close = bool(True)
-        cx, cy, after_cosine, after_sine = opening(ends, K, place, n)
+        cx, cy, after_cosine, after_sine = opening(M.ends, K, place)
         if is_closing:
             row = int(0)
             while row < 6:
                 write(S, wp.static(kept) + row * wp.static(block_dim) + lane, K[row, lane])
                 row += 1
-            square, doubled = two_sums(S, lane, n, cx * cx + cy * cy, twice_kinetic(K, place))
+            square, doubled = two_sums(S, place, cx * cx + cy * cy, twice_kinetic(K, place))
             held = HALF * chain.joint_stiffness * square
             kinetic = HALF * doubled
             may_close = held <= GREATEST_STRETCHING * kinetic
@@ -326,13 +330,13 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
                 # a NaN goes on to nothing
                 goes_on = widest > CLOSED_SQUARE and corrections < wp.static(MOST_CORRECTIONS)
                 link = link_on(K, lane)
-                factorise(S, K, place, n, link.cosine, link.sine)
-                hand(forces, 0, lane, link.u)
-                hand(forces, 1, lane, link.v)
-                hand(forces, 2, lane, link.omega)
+                factorise(S, K, place, link.cosine, link.sine)
+                hand(M.forces, 0, lane, link.u)
+                hand(M.forces, 1, lane, link.v)
+                hand(M.forces, 2, lane, link.omega)
                 barrier()
                 right = vec2d(cx, cy)
-                if not goes_on and lane < n:
+                if not goes_on and lane < place.links:
                     cu, cv = opening_rate_of(
                         chain.half_length,
                         link.u,
@@ -340,36 +344,36 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
                         link.omega,
                         link.cosine,
                         link.sine,
-                        handed(forces, 0, place.after),
-                        handed(forces, 1, place.after),
-                        handed(forces, 2, place.after),
+                        handed(M.forces, 0, place.after),
+                        handed(M.forces, 1, place.after),
+                        handed(M.forces, 2, place.after),
                         after_cosine,
                         after_sine,
                     )
                     right = vec2d(cu, cv)
-                own = solve(S, n, lane, ZERO, right)
-                hand(ends, 0, lane, own[0])
-                hand(ends, 1, lane, own[1])
+                own = solve(S, place.links, lane, ZERO, right)
+                hand(M.ends, 0, lane, own[0])
+                hand(M.ends, 1, lane, own[1])
                 barrier()
-                left_x = handed(ends, 0, place.before)
-                left_y = handed(ends, 1, place.before)
+                left_x = handed(M.ends, 0, place.before)
+                left_y = handed(M.ends, 1, place.before)
                 px, py, turn = push_of(K, place, link.cosine, link.sine, left_x, left_y, own)
                 first = wp.where(goes_on, X, U)
-                if lane < n:
+                if lane < place.links:
                     K[first, lane] = K[first, lane] + px
                     K[first + 1, lane] = K[first + 1, lane] + py
                     K[first + 2, lane] = K[first + 2, lane] + turn
                 barrier()
                 if goes_on:
                     point(K, lane)
-                    cx, cy, after_cosine, after_sine = opening(ends, K, place, n)
+                    cx, cy, after_cosine, after_sine = opening(M.ends, K, place)
                     corrections += 1
             link = link_on(K, lane)
-            hand(forces, 0, lane, link.omega)
+            hand(M.forces, 0, lane, link.omega)
             barrier()
-            torque = friction_torque(chain, link.omega - handed(forces, 0, place.after))
-            pull, ax, ay, at = accelerate(ends, forces, S, K, place, n, link.cosine, link.sine, link.omega, torque)
-            square, doubled = two_sums(S, lane, n, pull[0] * pull[0] + pull[1] * pull[1], twice_kinetic(K, place))
+            torque = friction_torque(chain, link.omega - handed(M.forces, 0, place.after))
+            pull, ax, ay, at = accelerate(M, K, place, link.cosine, link.sine, link.omega, torque)
+            square, doubled = two_sums(S, place, pull[0] * pull[0] + pull[1] * pull[1], twice_kinetic(K, place))
             left_over = HALF * doubled
             is_stiff = HALF * square / chain.joint_stiffness <= GREATEST_STRETCHING * left_over
             keeps = bool(True)
@@ -394,42 +398,40 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
 
     @wp.func
     def open_joints(
-        ends: wp.uint64,
-        forces: wp.uint64,
-        S: wp.uint64,
+        M: FlightMemory,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
-        n: int,
         kinetic: wp.float64,
     ):
         lane = place.lane
+        S = M.memory
         chain = joint_constants(K)
         x = K[X, lane]
         y = K[Y, lane]
         theta = K[THETA, lane]
-        cx, cy, _cosine, _sine = opening(ends, K, place, n)
-        before, _none = two_sums(S, lane, n, cx * cx + cy * cy, ZERO)
+        cx, cy, _cosine, _sine = opening(M.ends, K, place)
+        before, _none = two_sums(S, place, cx * cx + cy * cy, ZERO)
         give = ONE / chain.joint_stiffness
         right = vec2d()
-        if lane < n:
+        if lane < place.links:
             right = vec2d(
                 cx - give * read(S, wp.static(force) + lane), cy - give * read(S, wp.static(force + block_dim) + lane)
             )
-        own = solve(S, n, lane, ZERO, right)
-        hand(forces, 0, lane, own[0])
-        hand(forces, 1, lane, own[1])
+        own = solve(S, place.links, lane, ZERO, right)
+        hand(M.forces, 0, lane, own[0])
+        hand(M.forces, 1, lane, own[1])
         barrier()
-        left_x = handed(forces, 0, place.before)
-        left_y = handed(forces, 1, place.before)
+        left_x = handed(M.forces, 0, place.before)
+        left_y = handed(M.forces, 1, place.before)
         link = link_on(K, lane)
         px, py, turn = push_of(K, place, link.cosine, link.sine, left_x, left_y, own)
-        if lane < n:
+        if lane < place.links:
             K[X, lane] = x + px
             K[Y, lane] = y + py
             K[THETA, lane] = theta + turn
             point(K, lane)
-        cx, cy, _cosine, _sine = opening(ends, K, place, n)
-        after, _none = two_sums(S, lane, n, cx * cx + cy * cy, ZERO)
+        cx, cy, _cosine, _sine = opening(M.ends, K, place)
+        after, _none = two_sums(S, place, cx * cx + cy * cy, ZERO)
         half_stiffness = HALF * chain.joint_stiffness
         lost = half_stiffness * (before - after)
         if half_stiffness * after > TWO * GREATEST_STRETCHING * kinetic:

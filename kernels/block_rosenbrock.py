@@ -20,8 +20,9 @@ import functools
 
 import warp as wp
 
+from .block_factors import FactorLayout, reductions_for
 from .block_memory import barrier, constant_table, read, write
-from .block_solver import FactorLayout, block_solver, mat33d, reductions_for
+from .block_solver import block_solver
 from .block_step import (
     Place,
     Trial,
@@ -33,6 +34,7 @@ from .block_step import (
     vec3d,
     vec5d,
 )
+from .cyclic_solver import block_type
 from .elementary import ONE, TWO, ZERO, versine_sine
 from .geometry import end_positions, end_velocities
 from .joint import friction_slope, friction_torque, joint_force, link_acceleration
@@ -58,6 +60,8 @@ from .rosenbrock_system import friction_secant
 from .rosenbrock_tables import ROSENBROCK_TABLES
 
 wp.set_module_options({"enable_backward": False})
+
+mat33d = block_type(3)
 
 # Numbers of a link from which its couplings are made: t, c, g φ/a² of its right joint.
 NORMAL_X, NORMAL_Y, COLUMN_X, COLUMN_Y, SLOPE = 0, 1, 2, 3, 4
@@ -157,7 +161,7 @@ def rosenbrock_attempt(name: str, block_dim: int):
         block_dim: Threads in a block.
 
     Returns:
-        ``attempt(ends, forces, S, K, place, n, h, tolerance)`` → Trial, from the state and first stage on the board,
+        ``attempt(ends, forces, S, K, place, h, tolerance)`` → Trial, from the state and first stage on the board,
         with S the block's memory for the linear systems, laid out by :func:`factor_layout`.
     """
     table = ROSENBROCK_TABLES[name]
@@ -203,12 +207,12 @@ def rosenbrock_attempt(name: str, block_dim: int):
         S: wp.uint64,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
-        n: int,
         h: wp.float64,
         tolerance: wp.float64,
     ):
         lane = place.lane
         column = place.column
+        n = place.links
         # the joint at the start of the step, as it enters the system
         chain = joint_constants(K)
         inverse_length = ONE / chain.half_length

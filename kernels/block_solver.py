@@ -16,179 +16,15 @@ Rows are numbered anew on each level: row q of level l is link (q + 1)·2^l − 
 """
 
 import functools
-from dataclasses import dataclass
 
 import warp as wp
 
-from .block_memory import barrier, read, write
+from .block_factors import FactorLayout, block_access
+from .block_memory import barrier, is_in_first_warp, warp_barrier
 from .cyclic_solver import block_inverse, block_type
 from .elementary import ONE, quotient
 
 wp.set_module_options({"enable_backward": False})
-
-vec3d = wp.types.vector(length=3, dtype=wp.float64)
-mat33d = block_type(3)
-
-LAST_ROWS = 24
-"""Rows of the last level: no more than a hardware warp has threads; fewer take less memory."""
-LEAST_REDUCTIONS = 2
-"""With one, residuals are up to 1e5 times as large: parallel cyclic reduction suffers where links seem rigid."""
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-    __syncwarp();
-#else
-    WP_TILE_SYNC();
-#endif
-""")
-def warp_barrier():
-    """Wait until all threads of a hardware warp are here; on fibers all of the block."""
-    ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-    return lane < 32;
-#else
-    return true;
-#endif
-""")
-def is_in_first_warp(lane: int) -> bool:
-    """Whether a thread belongs to the hardware warp that carries the last level; fibers all wait with it."""
-    ...
-
-
-@dataclass(frozen=True)
-class FactorLayout:
-    """Where the factors of a block's system lie in shared memory, in doubles; numbers of one kind side by side.
-
-    While a system is factored, its rows are handed about where vectors and later factors will lie.
-
-    Attributes:
-        block_dim: Threads in a block, at least the number of links.
-        reductions: Levels of cyclic reduction, at least one.
-        link_numbers: Numbers a link from which its blocks are made; they lie at the beginning.
-        order: Order B of the blocks, 2 or 3.
-        has_diagonals: Whether the blocks D are diagonal matrices; others have their inverses kept.
-    """
-
-    block_dim: int
-    reductions: int
-    link_numbers: int
-    order: int = 3
-    has_diagonals: bool = True
-
-    def width(self, level: int) -> int:
-        """Greatest number of rows of a level."""
-        return -(-self.block_dim // 2**level)
-
-    @property
-    def block(self) -> int:
-        """Entries of a block."""
-        return self.order**2
-
-    @property
-    def last_width(self) -> int:
-        """Greatest number of rows of the last level."""
-        return self.width(self.reductions)
-
-    @property
-    def pivots(self) -> int:
-        """Unless D is diagonal, a block for every other link: inverse of its D."""
-        return self.link_numbers * self.block_dim
-
-    @property
-    def vectors(self) -> int:
-        """Right-hand sides, then solutions, by link."""
-        return self.pivots + (0 if self.has_diagonals else self.block * self.width(1))
-
-    @property
-    def hands(self) -> int:
-        """Two vectors a row of the last level, which are written in turn."""
-        return self.vectors + self.order * self.block_dim
-
-    def forward(self, level: int) -> int:
-        """Two blocks a row of a level from 2 on: what it takes of the two rows that were eliminated beside it."""
-        handed = max(self.order * (self.block_dim + 2 * self.last_width), 3 * self.block * self.last_width)
-        return self.vectors + handed + 2 * self.block * sum(map(self.width, range(2, level)))
-
-    def backward(self, level: int) -> int:
-        """Three blocks a row eliminated on a level from 1 on: inverse pivot, that times its two couplings."""
-        return self.forward(self.reductions + 1) + 3 * self.block * sum(map(self.width, range(2, level + 1)))
-
-    @property
-    def rounds(self) -> int:
-        """Two blocks a row and round: what it takes of the rows coupled to it."""
-        return self.backward(self.reductions)
-
-    @property
-    def inverse(self) -> int:
-        """Two blocks a row of the last level: inverse pivot, that times the coupling to the border."""
-        return self.rounds + 2 * self.block * self.last_width * max(self.last_width - 2, 0).bit_length()
-
-    @property
-    def border(self) -> int:
-        """Three blocks: inverse pivot of the border, that times its two couplings."""
-        return self.inverse + 2 * self.block * self.last_width
-
-    @property
-    def size(self) -> int:
-        """Doubles in all."""
-        return max(self.border + 3 * self.block, self.rounds + 3 * self.block * self.width(1))
-
-
-def reductions_for(block_dim: int) -> int:
-    """Least number of reductions, at least LEAST_REDUCTIONS, that leaves no more rows than LAST_ROWS."""
-    return max(LEAST_REDUCTIONS, (-(-block_dim // LAST_ROWS) - 1).bit_length())
-
-
-@functools.cache
-def block_access(order: int):
-    """Warp functions on memory at an address: (load, store, load and store a vector) of blocks of this order.
-
-    Entries of a block or vector lie ``width`` apart.
-    """
-    Block = block_type(order)
-    Vector = wp.types.vector(length=order, dtype=wp.float64)
-
-    @wp.func
-    def load(S: wp.uint64, start: int, width: int, column: int):
-        block = Block()
-        for i in range(wp.static(order)):
-            for j in range(wp.static(order)):
-                block[i, j] = read(S, start + wp.static(order * i + j) * width + column)
-        return block
-
-    @wp.func
-    def store(S: wp.uint64, start: int, width: int, column: int, block: Block):
-        for i in range(wp.static(order)):
-            for j in range(wp.static(order)):
-                write(S, start + wp.static(order * i + j) * width + column, block[i, j])
-
-    @wp.func
-    def load_vector(S: wp.uint64, start: int, width: int, column: int):
-        vector = Vector()
-        for i in range(wp.static(order)):
-            vector[i] = read(S, start + wp.static(i) * width + column)
-        return vector
-
-    @wp.func
-    def store_vector(S: wp.uint64, start: int, width: int, column: int, vector: Vector):
-        for i in range(wp.static(order)):
-            write(S, start + wp.static(i) * width + column, vector[i])
-
-    return load, store, load_vector, store_vector
-
-
-@wp.func
-def columns_scaled(m: mat33d, scale: vec3d):
-    """m diag(scale)."""
-    block = mat33d()
-    for i in range(3):
-        for j in range(3):
-            block[i, j] = m[i, j] * scale[j]
-    return block
 
 
 @functools.cache
@@ -454,89 +290,68 @@ def block_solver(memory: FactorLayout, couplings_of, diagonal_of=None):
                 up = wp.where(2 * lane + 2 == rows_at(n, level), n - 1, link + half)
                 to_link(S, link, eliminated - take_low * at_link(S, low) - take_up * at_link(S, up))
 
+    # An even link's inverse D is given by its pivot: a vector if D is diagonal, which it is for all links or none.
     if diagonal_of is None:
+        Pivot = Vector
 
         @wp.func
-        def reduce_diagonal(S: wp.uint64, n: int, row: int, constant: wp.float64):
-            """(D, L, U) of a row of level 1: an odd link, the links beside it eliminated."""
-            link = 2 * row + 1
-            up = wp.where(link == n - 1, 0, link + 1)
-            lower, upper = couplings_of(S, n, link, constant)
-            low_lower, low_upper = couplings_of(S, n, link - 1, constant)
-            up_lower, up_upper = couplings_of(S, n, up, constant)
-            take_low = columns_scaled(lower, load_vector(S, wp.static(vectors), wp.static(threads), link - 1))
-            take_up = columns_scaled(upper, load_vector(S, wp.static(vectors), wp.static(threads), up))
-            middle = wp.diag(load_vector(S, wp.static(vectors), wp.static(threads), link))
-            middle = middle - take_low * low_upper - take_up * up_lower
-            return middle, -(take_low * low_lower), -(take_up * up_upper)
+        def times(pivot: Vector, vector: Vector):
+            return wp.cw_mul(pivot, vector)
 
         @wp.func
-        def factor_diagonal(S: wp.uint64, n: int, lane: int, own: Vector, constant: wp.float64):
-            pivot = Vector(quotient(ONE, own[0]), quotient(ONE, own[1]), quotient(ONE, own[2]))
-            if lane < n:
-                store_vector(S, wp.static(vectors), wp.static(threads), lane, wp.where(lane % 2 == 0, pivot, own))
-            barrier()
-            middle = Block()
-            lower = Block()
-            upper = Block()
-            if lane < n // 2:
-                middle, lower, upper = reduce_diagonal(S, n, lane, constant)
-            factor_levels(S, n, lane, middle, lower, upper)
-            return pivot
+        def over_pivot(S: wp.uint64, block: Block, link: int):
+            pivot = at_link(S, link)
+            product = Block()
+            for i in range(wp.static(order)):
+                for j in range(wp.static(order)):
+                    product[i, j] = block[i, j] * pivot[j]
+            return product
 
         @wp.func
-        def solve_diagonal(S: wp.uint64, n: int, lane: int, constant: wp.float64, pivot: Vector, right: Vector):
-            own = right
-            if lane % 2 == 0:
-                own = wp.cw_mul(pivot, right)
-            solve_levels(S, n, lane, constant, own)
-            lower, upper = couplings_of(S, n, wp.min(lane, n - 1), constant)
-            solution = Vector()
-            barrier()
-            if lane < n:
-                if lane % 2 == 0:
-                    low = wp.where(lane == 0, n - 1, lane - 1)
-                    remainder = lower * at_link(S, low) + upper * at_link(S, lane + 1)
-                    solution = own - wp.cw_mul(pivot, remainder)
-                else:
-                    solution = at_link(S, lane)
-            return solution
+        def middle_of(S: wp.uint64, n: int, link: int, constant: wp.float64):
+            return wp.diag(at_link(S, link))
 
-        return factor_diagonal, solve_diagonal
+    else:
+        Pivot = Block
+        middle_of = diagonal_of
+
+        @wp.func
+        def times(pivot: Block, vector: Vector):
+            return pivot * vector
+
+        @wp.func
+        def over_pivot(S: wp.uint64, block: Block, link: int):
+            return block * load_block(S, wp.static(pivots), wp.static(first_width), link // 2)
 
     @wp.func
-    def reduce_links(S: wp.uint64, n: int, row: int, constant: wp.float64):
+    def reduce(S: wp.uint64, n: int, row: int, constant: wp.float64):
         """(D, L, U) of a row of level 1: an odd link, the links beside it eliminated."""
         link = 2 * row + 1
         up = wp.where(link == n - 1, 0, link + 1)
         lower, upper = couplings_of(S, n, link, constant)
         low_lower, low_upper = couplings_of(S, n, link - 1, constant)
         up_lower, up_upper = couplings_of(S, n, up, constant)
-        take_low = lower * load_block(S, wp.static(pivots), wp.static(first_width), row)
-        take_up = upper * load_block(S, wp.static(pivots), wp.static(first_width), up // 2)
-        middle = diagonal_of(S, n, link, constant) - take_low * low_upper - take_up * up_lower
+        take_low = over_pivot(S, lower, link - 1)
+        take_up = over_pivot(S, upper, up)
+        middle = middle_of(S, n, link, constant) - take_low * low_upper - take_up * up_lower
         return middle, -(take_low * low_lower), -(take_up * up_upper)
 
     @wp.func
-    def factor(S: wp.uint64, n: int, lane: int, constant: wp.float64):
-        if lane < n // 2:
-            pivot = inverse_block(diagonal_of(S, n, 2 * lane, constant))
-            store_block(S, wp.static(pivots), wp.static(first_width), lane, pivot)
+    def factor_behind_pivots(S: wp.uint64, n: int, lane: int, constant: wp.float64):
+        """The rest, given what even links have left of their own D."""
         barrier()
         middle = Block()
         lower = Block()
         upper = Block()
         if lane < n // 2:
-            middle, lower, upper = reduce_links(S, n, lane, constant)
+            middle, lower, upper = reduce(S, n, lane, constant)
         factor_levels(S, n, lane, middle, lower, upper)
 
     @wp.func
-    def solve(S: wp.uint64, n: int, lane: int, constant: wp.float64, right: Vector):
-        row = wp.min(lane, n - 1) // 2
-        pivot = load_block(S, wp.static(pivots), wp.static(first_width), row)
+    def solve_given_pivot(S: wp.uint64, n: int, lane: int, constant: wp.float64, pivot: Pivot, right: Vector):
         own = right
         if lane % 2 == 0:
-            own = pivot * right
+            own = times(pivot, right)
         solve_levels(S, n, lane, constant, own)
         lower, upper = couplings_of(S, n, wp.min(lane, n - 1), constant)
         solution = Vector()
@@ -544,9 +359,35 @@ def block_solver(memory: FactorLayout, couplings_of, diagonal_of=None):
         if lane < n:
             if lane % 2 == 0:
                 low = wp.where(lane == 0, n - 1, lane - 1)
-                solution = own - pivot * (lower * at_link(S, low) + upper * at_link(S, lane + 1))
+                solution = own - times(pivot, lower * at_link(S, low) + upper * at_link(S, lane + 1))
             else:
                 solution = at_link(S, lane)
         return solution
+
+    if diagonal_of is None:
+
+        @wp.func
+        def factor_diagonal(S: wp.uint64, n: int, lane: int, own: Vector, constant: wp.float64):
+            pivot = Vector()
+            for i in range(wp.static(order)):
+                pivot[i] = quotient(ONE, own[i])
+            if lane < n:
+                to_link(S, lane, wp.where(lane % 2 == 0, pivot, own))
+            factor_behind_pivots(S, n, lane, constant)
+            return pivot
+
+        return factor_diagonal, solve_given_pivot
+
+    @wp.func
+    def factor(S: wp.uint64, n: int, lane: int, constant: wp.float64):
+        if lane < n // 2:
+            pivot = inverse_block(diagonal_of(S, n, 2 * lane, constant))
+            store_block(S, wp.static(pivots), wp.static(first_width), lane, pivot)
+        factor_behind_pivots(S, n, lane, constant)
+
+    @wp.func
+    def solve(S: wp.uint64, n: int, lane: int, constant: wp.float64, right: Vector):
+        pivot = load_block(S, wp.static(pivots), wp.static(first_width), wp.min(lane, n - 1) // 2)
+        return solve_given_pivot(S, n, lane, constant, pivot, right)
 
     return factor, solve

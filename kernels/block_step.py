@@ -13,7 +13,7 @@ import functools
 import warp as wp
 
 from .controller import error_scale
-from .elementary import LARGEST_TURN, ZERO
+from .elementary import LARGEST_TURN, ZERO, order_bits_single
 from .geometry import end_positions, end_velocities, turned_direction
 from .joint import friction_torque, joint_force, link_acceleration
 from .layout import (
@@ -67,6 +67,7 @@ class Place:
     column: wp.int32  # the same, of the last link for threads beyond
     before: wp.int32  # the link to the left
     after: wp.int32  # the link to the right
+    links: wp.int32  # how many the chain has
 
 
 @wp.struct
@@ -164,7 +165,7 @@ def error_of(trial: Trial, tolerance: wp.float64):
     ratio = wp.abs(trial.error) / (trial.scale * wp.float32(tolerance))
     if trial.turns_far and ratio < wp.float32(2.0):
         ratio = wp.float32(2.0)
-    return wp.cast(ratio, wp.int32)
+    return order_bits_single(ratio)
 
 
 @wp.func
@@ -279,7 +280,7 @@ def explicit_attempt(name: str, block_dim: int):
         block_dim: Threads in a block.
 
     Returns:
-        ``attempt(ends, forces, S, K, place, n, h, tolerance)`` → Trial, from the state and first stage on the board;
+        ``attempt(ends, forces, S, K, place, h, tolerance)`` → Trial, from the state and first stage on the board;
         it needs neither the memory S nor the tolerance.
     """
     tableau = TABLEAUS[name]
@@ -297,7 +298,6 @@ def explicit_attempt(name: str, block_dim: int):
         S: wp.uint64,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
-        n: int,
         h: wp.float64,
         tolerance: wp.float64,
     ):

@@ -11,7 +11,7 @@ from .block_step import Link, Place, link_on, vec5d
 from .broadphase import list_layout
 from .contact import meet_floor, meet_sprocket
 from .driver import Features, sprocket_turning
-from .elementary import TWO, ZERO, from_order_key_single, order_key_single
+from .elementary import TWO, ZERO, from_order_key_single, order_bits_single, order_key_single
 from .layout import (
     BOARD_LISTED_X,
     BOARD_LISTED_Y,
@@ -57,7 +57,6 @@ def block_surroundings(features: Features, block_dim: int):
     def measure(
         K: wp.array2d(dtype=wp.float64),
         maxima: wp.tile[vec5i, block_dim],
-        n: int,
         place: Place,
         link: Link,
         next_end: vec5d,
@@ -70,10 +69,10 @@ def block_surroundings(features: Features, block_dim: int):
         """
         left_x, left_y, right_x, right_y = ends_of(K, link)
         values = vec5i(0, order_key_single(wp.float32(-wp.inf)), 0, 0, error)
-        if place.lane < n:
+        if place.lane < place.links:
             cx = next_end[0] - right_x
             cy = next_end[1] - right_y
-            values[0] = wp.cast(wp.float32(cx * cx + cy * cy), wp.int32)
+            values[0] = order_bits_single(wp.float32(cx * cx + cy * cy))
             if wp.static(has_floor):
                 gap = wp.min(left_y, right_y) - K[BOARD_NOTES, NOTE_CIRCLE_RADIUS]
                 values[1] = order_key_single(wp.float32(-gap))
@@ -84,11 +83,11 @@ def block_surroundings(features: Features, block_dim: int):
             if wp.static(has_self):
                 dx = right_x - K[BOARD_LISTED_X, place.lane]
                 dy = right_y - K[BOARD_LISTED_Y, place.lane]
-                values[2] = wp.cast(wp.float32(dx * dx + dy * dy), wp.int32)
+                values[2] = order_bits_single(wp.float32(dx * dx + dy * dy))
             if wp.static(has_contacts):
                 turn = K[BOARD_NOTES, NOTE_HALF_LENGTH] * link.omega
                 speed = TWO * (link.u * link.u + link.v * link.v + turn * turn)
-                values[3] = wp.cast(wp.float32(speed), wp.int32)
+                values[3] = order_bits_single(wp.float32(speed))
         values = greatest_of_five(maxima, place.lane, values)
         return (
             wp.cast(values[4], wp.float32),
@@ -192,12 +191,12 @@ def block_approach(features: Features, block_dim: int):
         L: wp.array(dtype=wp.int32),
         maxima: wp.tile[vec5i, block_dim],
         place: Place,
-        n: int,
         pairs: int,
         slack: wp.float32,
     ):
         """All threads, after a barrier behind the board's rows of ends."""
         lane = place.lane
+        n = place.links
         chain = contact_constants(K, n)
         chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
         values = vec5i()
@@ -206,16 +205,16 @@ def block_approach(features: Features, block_dim: int):
                 left, right = falling(
                     chain, K[V, lane], K[OMEGA, lane], K[COSINE, lane], K[LEFT_Y, lane], K[RIGHT_Y, lane]
                 )
-                values[0] = wp.max(wp.cast(wp.float32(left), wp.int32), wp.cast(wp.float32(right), wp.int32))
+                values[0] = wp.max(order_bits_single(wp.float32(left)), order_bits_single(wp.float32(right)))
         if wp.static(has_self):
             if lane < n:
                 turn = chain.half_length * K[OMEGA, lane]
                 speed = TWO * (K[U, lane] * K[U, lane] + K[V, lane] * K[V, lane] + turn * turn)
-                values[1] = wp.cast(wp.float32(speed), wp.int32)
+                values[1] = order_bits_single(wp.float32(speed))
             k = lane
             while k < pairs:
                 rate = meeting_of(K, chain, L[wp.static(lists.first) + k], L[wp.static(lists.second) + k])
-                values[0] = wp.max(values[0], wp.cast(wp.float32(rate), wp.int32))
+                values[0] = wp.max(values[0], order_bits_single(wp.float32(rate)))
                 k += wp.static(block_dim)
         values = greatest_of_five(maxima, lane, values)
         fastest = wp.cast(values[0], wp.float32)

@@ -54,11 +54,6 @@ class SegmentLayout:
         return self.matrix + self.size**2 * index
 
     @property
-    def matrix_rows(self) -> int:
-        """Memory rows of the matrix."""
-        return 5 * self.size**2
-
-    @property
     def separator_rows(self) -> int:
         """Rows of eight columns for the system of the separators."""
         return (2 * ROUNDS + 2) * self.size**2

@@ -152,6 +152,12 @@ def order_bits(x: wp.float64):
 
 
 @wp.func
+def order_bits_single(x: wp.float32):
+    """The same for single precision. A processor's NaN may be negative: its bits alone would be below all others."""
+    return wp.cast(wp.abs(x), wp.int32)
+
+
+@wp.func
 def order_key(x: wp.float64):
     """A number of any sign as an integer that orders as the number does."""
     bits = wp.cast(x, wp.int64)

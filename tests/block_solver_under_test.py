@@ -7,10 +7,11 @@ import warp as wp
 from numpy.typing import NDArray
 
 from tests.blocks_under_test import fibers
-from warpchain.engine import start_device
+from warpchain.devices import start_device
+from warpchain.kernels.block_factors import FactorLayout, block_access, reductions_for
 from warpchain.kernels.block_memory import barrier, tile_address, write
-from warpchain.kernels.block_solver import FactorLayout, block_access, block_solver, reductions_for, vec3d
-from warpchain.kernels.elementary import ONE, ZERO
+from warpchain.kernels.block_solver import block_solver
+from warpchain.kernels.elementary import ONE
 
 Array = NDArray[np.float64]
 
@@ -19,96 +20,10 @@ RIGHT_SIDES = 2
 
 
 @functools.cache
-def _solver(block_dim: int, reductions: int) -> wp.Kernel:
-    """Here a link's numbers are its couplings themselves."""
-    places = FactorLayout(block_dim=block_dim, reductions=reductions, link_numbers=18)
-    size = places.size
-    address = tile_address(wp.float64, size)
-
-    load_block, *_ = block_access(3)
-
-    @wp.func
-    def couplings_of(memory: wp.uint64, n: int, link: int, constant: wp.float64):
-        lower = load_block(memory, 0, wp.static(block_dim), link)
-        return lower, load_block(memory, wp.static(9 * block_dim), wp.static(block_dim), link)
-
-    factor, solve = block_solver(places, couplings_of)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def solver(
-        couplings: wp.array2d(dtype=wp.float64),
-        diagonal: wp.array(dtype=vec3d),
-        right: wp.array2d(dtype=vec3d),
-        solution: wp.array2d(dtype=vec3d),
-        n: int,
-    ):
-        _block, lane = wp.tid()
-        tile = wp.tile_empty(shape=(wp.static(size),), dtype=wp.float64, storage="shared")
-        shared = address(tile)
-        k = int(lane)
-        while k < wp.static(size):
-            write(shared, k, wp.float64(wp.nan))
-            k += wp.static(block_dim)
-        barrier()
-        own = vec3d(ONE, ONE, ONE)
-        if lane < n:
-            own = diagonal[lane]
-            for entry in range(18):
-                write(shared, entry * wp.static(block_dim) + lane, couplings[entry, lane])
-        pivot = factor(shared, n, lane, own, ZERO)
-        barrier()
-        for k in range(wp.static(RIGHT_SIDES)):
-            side = vec3d()
-            if lane < n:
-                side = right[k, lane]
-            found = solve(shared, n, lane, ZERO, pivot, side)
-            barrier()
-            if lane < n:
-                solution[k, lane] = found
-
-    return solver
-
-
-def solve_loops(
-    lower: Array, diagonal: Array, upper: Array, right: Array, block_dim: int, reductions: int | None = None
-) -> Array:
-    """Solutions (RIGHT_SIDES, n, 3) of L x_{i−1} + diag(D) x_i + U x_{i+1} = r, factored once.
-
-    Args:
-        lower: L (n, 3, 3).
-        diagonal: D (n, 3).
-        upper: U (n, 3, 3).
-        right: (RIGHT_SIDES, n, 3).
-        block_dim: Threads of the block.
-        reductions: Levels of cyclic reduction; None: as many as the block form takes.
-    """
-    links = len(diagonal)
-    couplings = np.concatenate([lower.reshape(links, 9), upper.reshape(links, 9)], axis=1).T
-    solution = wp.full((RIGHT_SIDES, links), vec3d(np.nan, np.nan, np.nan), dtype=vec3d, device=DEVICE)
-    inputs = [
-        wp.array(np.ascontiguousarray(couplings), dtype=wp.float64, device=DEVICE),
-        wp.array(diagonal, dtype=vec3d, device=DEVICE),
-        wp.array(right, dtype=vec3d, device=DEVICE),
-        solution,
-        links,
-    ]
-    kernel = _solver(block_dim, reductions_for(block_dim) if reductions is None else reductions)
-    with fibers():
-        wp.launch_tiled(kernel, dim=[1], inputs=inputs, block_dim=block_dim, device=DEVICE)
-    return solution.numpy()
-
-
-@functools.cache
-def _dense_solver(block_dim: int, order: int) -> wp.Kernel:
-    """The same for any D of this order; a link's numbers are its three blocks."""
+def _solver(block_dim: int, reductions: int, order: int, has_diagonals: bool) -> wp.Kernel:
+    """A link's numbers are its blocks themselves: L, U, and D unless that is diagonal."""
     entries = order**2
-    places = FactorLayout(
-        block_dim=block_dim,
-        reductions=reductions_for(block_dim),
-        link_numbers=3 * entries,
-        order=order,
-        has_diagonals=False,
-    )
+    places = FactorLayout(block_dim, reductions, 3 * entries, order=order, has_diagonals=has_diagonals)
     size = places.size
     address = tile_address(wp.float64, size)
     load_block, *_ = block_access(order)
@@ -123,7 +38,7 @@ def _dense_solver(block_dim: int, order: int) -> wp.Kernel:
     def diagonal_of(memory: wp.uint64, n: int, link: int, constant: wp.float64):
         return constant * load_block(memory, wp.static(2 * entries * block_dim), wp.static(block_dim), link)
 
-    factor, solve = block_solver(places, couplings_of, diagonal_of)
+    factor, solve = block_solver(places, couplings_of, None if has_diagonals else diagonal_of)
 
     @wp.kernel(module="unique", enable_backward=False)
     def solver(
@@ -140,18 +55,27 @@ def _dense_solver(block_dim: int, order: int) -> wp.Kernel:
             write(shared, k, wp.float64(wp.nan))
             k += wp.static(block_dim)
         barrier()
+        own = vector(ONE)
         if lane < n:
-            for entry in range(wp.static(3 * entries)):
+            for entry in range(wp.static((2 if has_diagonals else 3) * entries)):
                 write(shared, entry * wp.static(block_dim) + lane, blocks[entry, lane])
-        barrier()
-        factor(shared, n, lane, ONE)
+            for entry in range(wp.static(order)):
+                own[entry] = blocks[wp.static(2 * entries + (order + 1) * entry), lane]
+        if wp.static(has_diagonals):
+            pivot = factor(shared, n, lane, own, ONE)
+        else:
+            barrier()
+            factor(shared, n, lane, ONE)
         barrier()
         for k in range(wp.static(RIGHT_SIDES)):
             side = vector()
             if lane < n:
                 for entry in range(wp.static(order)):
                     side[entry] = right[k, lane, entry]
-            found = solve(shared, n, lane, ONE, side)
+            if wp.static(has_diagonals):
+                found = solve(shared, n, lane, ONE, pivot, side)
+            else:
+                found = solve(shared, n, lane, ONE, side)
             barrier()
             if lane < n:
                 for entry in range(wp.static(order)):
@@ -160,9 +84,23 @@ def _dense_solver(block_dim: int, order: int) -> wp.Kernel:
     return solver
 
 
-def solve_dense_loops(lower: Array, diagonal: Array, upper: Array, right: Array, block_dim: int) -> Array:
-    """Solutions (RIGHT_SIDES, n, B) of L x_{i−1} + D x_i + U x_{i+1} = r_i, factored once; blocks (n, B, B)."""
+def solve_loops(
+    lower: Array, diagonal: Array, upper: Array, right: Array, block_dim: int, reductions: int | None = None
+) -> Array:
+    """Solutions (RIGHT_SIDES, n, B) of L x_{i−1} + D x_i + U x_{i+1} = r_i, factored once.
+
+    Args:
+        lower: L (n, B, B).
+        diagonal: D (n, B, B), or (n, B) for the solver of diagonal D.
+        upper: U (n, B, B).
+        right: (RIGHT_SIDES, n, B).
+        block_dim: Threads of the block.
+        reductions: Levels of cyclic reduction; None: as many as the block form takes.
+    """
     links, order = diagonal.shape[:2]
+    has_diagonals = diagonal.ndim == 2
+    if has_diagonals:
+        diagonal = diagonal[:, :, None] * np.eye(order)
     blocks = np.concatenate([block.reshape(links, -1) for block in (lower, upper, diagonal)], axis=1).T
     solution = wp.full((RIGHT_SIDES, links, order), np.nan, dtype=wp.float64, device=DEVICE)
     inputs = [
@@ -171,7 +109,8 @@ def solve_dense_loops(lower: Array, diagonal: Array, upper: Array, right: Array,
         solution,
         links,
     ]
+    levels = reductions_for(block_dim) if reductions is None else reductions
+    kernel = _solver(block_dim, levels, order, has_diagonals)
     with fibers():
-        kernel = _dense_solver(block_dim, order)
         wp.launch_tiled(kernel, dim=[1], inputs=inputs, block_dim=block_dim, device=DEVICE)
     return solution.numpy()

@@ -29,7 +29,7 @@ UNIT = preset("paper").with_values(
 
 @dataclass(frozen=True)
 class Collision:
-    """One collision of A and B; the fields are the arguments of `reference.collision_impulse`, in its order."""
+    """One collision of A and B; the fields are the arguments of `collision_impulse`, in its order."""
 
     v_rel: Vector
     normal: Vector
@@ -65,7 +65,7 @@ class Collision:
         return inv_mass * impulse + spin * np.array([-lever[1], lever[0]])
 
 
-# Case groups. Notation: n̂ from A to B, t̂ = ẑ × n̂, W, J₁, J₂ as in `reference.collision_impulse`, D = J₂ − J₁, and
+# Case groups. Notation: n̂ from A to B, t̂ = ẑ × n̂, W, J₁, J₂ as in `collision_impulse`, D = J₂ − J₁, and
 # vectors in brackets are (n, t) components unless they say "world".
 
 # Two equal masses of 1 kg, head-on: W_nn = 2, so v_n = 2 gives J₁ = 1 and J = 1 + e.

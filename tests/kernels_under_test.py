@@ -12,7 +12,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpchain.engine import start_device
+from warpchain.devices import start_device
 from warpchain.kernels import layout
 from warpchain.kernels.broadphase import greatest_displacement, list_layout, list_slack, neighbour_list
 from warpchain.kernels.contact import (

@@ -7,7 +7,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpchain.engine import start_device
+from warpchain.devices import start_device
 from warpchain.kernels import layout
 from warpchain.kernels.driver import COMPILER_FLAGS, load_state
 from warpchain.kernels.methods import METHODS

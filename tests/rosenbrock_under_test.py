@@ -6,7 +6,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpchain.engine import start_device
+from warpchain.devices import start_device
 from warpchain.kernels import layout
 from warpchain.kernels.cyclic_solver import SegmentLayout, cyclic_solver, segment_columns, segment_places
 from warpchain.kernels.driver import COMPILER_FLAGS, load_state
@@ -39,7 +39,7 @@ def places_of(rows: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
 def _solver(size: int, columns: int) -> tuple[wp.Kernel, SegmentLayout]:
     segments = SegmentLayout(size=size, columns=columns, matrix=0, right=5 * size * size)
     factor, solve = cyclic_solver(segments)
-    rows = segments.matrix_rows + size
+    rows = segments.right + size
     separator_rows = segments.separator_rows
 
     @_compiled
@@ -59,7 +59,7 @@ def solve_loop(lower: Array, diagonal: Array, upper: Array, right: Array) -> Arr
     kernel, segments = _solver(size, segment_columns(max(rows, 2 * rows if rows < 8 else 0)))
     at, repeats = (values.ravel() for values in places_of(rows))
     used = slice(8, 8 + len(at))
-    block = np.full((segments.matrix_rows + size, segments.columns), np.nan)
+    block = np.full((segments.right + size, segments.columns), np.nan)
     for index, (values, unit) in enumerate(((lower, -1.0), (diagonal, 1.0), (upper, 0.0))):
         placed = values[at]
         placed[repeats] = unit * np.eye(size)

@@ -130,9 +130,8 @@ def play_killed(directory: Path) -> None:
 def play_holder(directory: Path) -> None:
     """Hold a folder, with a forked worker that outlives this process when it is killed."""
     Store.open(directory, SWEEP, shard_size=SHARD_SIZE)
-    worker = os.fork()
-    if worker:
-        print(worker, flush=True)
+    if not os.fork():
+        print(os.getpid(), flush=True)  # by itself: it has begun to live, and given up the lock
     time.sleep(60)
 
 

@@ -25,7 +25,7 @@ from tests.blocks_under_test import (
     listed_pairs,
 )
 from warpchain.engine import Batch
-from warpchain.kernels import block, driver, layout
+from warpchain.kernels import block, block_room, driver, layout
 from warpchain.kernels.block import make_advance_block
 from warpchain.kernels.driver import Features, make_advance
 from warpchain.shapes import ellipse, lay_chain
@@ -60,7 +60,12 @@ def assert_same(ours: Batch, theirs: Batch) -> None:
 
 @pytest.mark.parametrize(
     ("method", "fixed_body", "self_contact", "block_dim"),
-    [("rkf78", "floor", True, LINKS), ("dp5", "sprocket", True, 5 * LINKS), ("bs32", "floor", False, LINKS), ("os32", "sprocket", True, LINKS)],
+    [
+        ("rkf78", "floor", True, LINKS),
+        ("dp5", "sprocket", True, 5 * LINKS),
+        ("bs32", "floor", False, LINKS),
+        ("os32", "sprocket", True, LINKS),
+    ],
 )
 def test_fixed_steps_equal_the_cpu_form(method: str, fixed_body: str, self_contact: bool, block_dim: int) -> None:
     """Forty steps with dozens of impulses of every kind end in the same state, to the bit.
@@ -83,7 +88,7 @@ def test_fixed_steps_equal_the_cpu_form(method: str, fixed_body: str, self_conta
 @pytest.mark.parametrize("block_dim", [LINKS, 224])
 def test_chains_too_long_for_shared_memory_equal_the_cpu_form(block_dim: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Long chains keep their board in the scratch block, with the same result, even with more threads than columns."""
-    monkeypatch.setattr(block, "LARGEST_SHARED_BLOCK", LINKS - 1)
+    monkeypatch.setattr(block_room, "LARGEST_SHARED_BLOCK", LINKS - 1)
     make_advance_block.cache_clear()
     ours, theirs = (batch_of([heap(LINKS)], method="bs32") for _ in range(2))
     features = features_of(ours, fixed_body="floor")

@@ -9,7 +9,7 @@ from tests.bouncing_chains import CONTACT_STEP, PAPER, batch_with, bouncing, fal
 from tests.test_block import compiles_for_gpus
 from tests.test_hybrid import shaken
 from warpchain import Status, preset
-from warpchain.kernels import block, layout
+from warpchain.kernels import block_room, layout
 from warpchain.kernels.block import make_advance_block
 from warpchain.kernels.block_rigid import FlightLayout
 from warpchain.kernels.driver import Features
@@ -70,6 +70,18 @@ def test_adaptive_flight_equals_the_cpu_form():
     assert theirs.counts(0)["rejected"] > 0
     assert theirs.time(0) > 1e-3
     assert_close(ours, theirs, 1e-5)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_nan_of_either_sign_ends_a_flight_at_once(sign):
+    """A place that is no number is seen after one step, when joints cannot be closed there, whatever its sign bit."""
+    batch, features = in_the_air([loop(12)])
+    launch_blocks(batch, features, 3, block_dim=THREADS)
+    assert batch.state.flies.numpy()[0] == 1
+    batch.state.links.numpy()[0, layout.X, 4] = np.copysign(np.nan, sign)
+    launch_blocks(batch, features, 30, block_dim=THREADS)
+    assert batch.status(0) == Status.NOT_FINITE
+    assert batch.counts(0)["accepted"] == 3 + 1
 
 
 @pytest.mark.parametrize(("size", "parameters"), [(1e-6, PAPER), (1e-7, PAPER.with_values({"joint_stiffness": 1e4}))])
@@ -136,7 +148,7 @@ def test_cuts_neighbours_and_memory_do_not_change_a_bit(monkeypatch):
     start = falling(12, PAPER, 0.3)
     runs = []
     for tries, others, limit in ((240, 0, 64), (1, 0, 64), (13, 2, 64), (240, 0, 0)):
-        monkeypatch.setattr(block, "LARGEST_SHARED_FLIGHT", limit)
+        monkeypatch.setattr(block_room, "LARGEST_SHARED_FLIGHT", limit)
         make_advance_block.cache_clear()
         batch, features = bouncing([*(falling(20, PAPER, 0.6),) * others, start])
         while batch.tries(others) < 240:
@@ -151,11 +163,11 @@ def test_cuts_neighbours_and_memory_do_not_change_a_bit(monkeypatch):
 
 def test_memory_of_flights_fits_into_a_block():
     """Up to the limit it leaves room for three blocks on a multiprocessor; above, the scratch block has room for it."""
-    limit = block.LARGEST_SHARED_FLIGHT
+    limit = block_room.LARGEST_SHARED_FLIGHT
     assert 3 * 8 * (FlightLayout(limit).size + layout.board_size(limit)) < 227 * 1024
     for threads in (96, 192, 512, 1024):
-        board = layout.BOARD_NOTES * 200 if threads <= block.LARGEST_SHARED_BLOCK else layout.board_size(threads)
-        assert block.block_rows("hybrid", threads, 200) * 200 >= board + FlightLayout(threads).size
+        board = layout.BOARD_NOTES * 200 if threads <= block_room.LARGEST_SHARED_BLOCK else layout.board_size(threads)
+        assert block_room.block_rows("hybrid", threads, 200) * 200 >= board + FlightLayout(threads).size
     assert METHODS["hybrid"].block_memory(limit) == FlightLayout(limit).size
 
 

@@ -5,14 +5,15 @@ import pytest
 import warp as wp
 from numpy.testing import assert_allclose
 
-from tests.block_solver_under_test import RIGHT_SIDES, solve_dense_loops, solve_loops
+from tests.block_solver_under_test import RIGHT_SIDES, solve_loops
 from tests.blocks_under_test import FIXED_STEP, SOFT, batch_of, features_of, heap, launch_blocks, launch_chains
 from tests.test_rosenbrock import PAPER, dense, flying, jacobians
 from warpchain import reference
-from warpchain.kernels import block, layout
-from warpchain.kernels.block import block_rows, make_advance_block
+from warpchain.kernels import block_room, layout
+from warpchain.kernels.block import make_advance_block
+from warpchain.kernels.block_factors import FactorLayout, reductions_for
+from warpchain.kernels.block_room import block_rows
 from warpchain.kernels.block_rosenbrock import coefficients, factor_layout
-from warpchain.kernels.block_solver import FactorLayout, reductions_for
 from warpchain.kernels.methods import METHODS
 from warpchain.kernels.rosenbrock_tables import RODAS4P
 from warpchain.shapes import ellipse, lay_chain
@@ -51,7 +52,7 @@ def test_solver_of_full_diagonal_blocks_agrees_with_dense_elimination(
         lower, diagonal, upper = rng.normal(size=(3, links, order, order))
         diagonal += 9 * np.eye(order)
         right = rng.normal(size=(RIGHT_SIDES, links, order))
-        found = solve_dense_loops(lower, diagonal, upper, right, block_dim)
+        found = solve_loops(lower, diagonal, upper, right, block_dim)
         exact = np.linalg.solve(dense(lower, diagonal, upper), right.reshape(RIGHT_SIDES, -1).T).T.reshape(right.shape)
         assert_allclose(found, exact, rtol=0, atol=2e-15, err_msg=f"{links} links")
 
@@ -101,10 +102,10 @@ def test_last_level_fits_into_a_warp() -> None:
 
 def test_memory_fits_into_a_block() -> None:
     """Blocks up to the limit keep their factors in 62 KB; longer chains have room for them in their scratch block."""
-    assert 8 * factor_layout(block.LARGEST_SHARED_MEMORY).size < 62_000
+    assert 8 * factor_layout(block_room.LARGEST_SHARED_MEMORY).size < 62_000
     for links in (200, 512, 1000):
         threads = -(-links // 32) * 32
-        is_shared = threads <= block.LARGEST_SHARED_BLOCK
+        is_shared = threads <= block_room.LARGEST_SHARED_BLOCK
         board = layout.BOARD_NOTES * 200 if is_shared else layout.board_size(threads)
         assert block_rows("rodas4p", threads, 200) * 200 >= board + factor_layout(threads).size
 
@@ -163,8 +164,8 @@ def test_memory_in_the_scratch_block_changes_no_bit(monkeypatch: pytest.MonkeyPa
     """Long chains keep factors and board in their scratch block, with the same result."""
     runs = []
     for limit in (512, LINKS - 1):
-        monkeypatch.setattr(block, "LARGEST_SHARED_BLOCK", limit)
-        monkeypatch.setattr(block, "LARGEST_SHARED_MEMORY", limit)
+        monkeypatch.setattr(block_room, "LARGEST_SHARED_BLOCK", limit)
+        monkeypatch.setattr(block_room, "LARGEST_SHARED_MEMORY", limit)
         make_advance_block.cache_clear()
         batch = batch_of([heap(LINKS)], method="rodas4p")
         launch_blocks(batch, features_of(batch, fixed_body="floor"), 10, block_dim=LINKS)

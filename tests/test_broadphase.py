@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import warpchain
-from warpchain import Status, reference
+from warpchain import Status, reference, reference_contacts
 from warpchain.engine import Batch
 from warpchain.kernels import layout
 from warpchain.kernels.broadphase import list_layout
@@ -34,7 +34,7 @@ def pairs_within_reach(position, skin):
     opening = np.linalg.norm(reference.joint_opening(position, PAPER), axis=1).max()
     gaps = joints[:, None] - joints[None]
     near = np.linalg.norm(gaps, axis=2) < 2 * PAPER.circle_radius + skin + 2 * opening
-    return sorted(map(tuple, np.argwhere(np.triu(near, 1)).tolist()), key=reference.self_contact_order)
+    return sorted(map(tuple, np.argwhere(np.triu(near, 1)).tolist()), key=reference_contacts.self_contact_order)
 
 
 def touching_of(pairs, position):
@@ -105,7 +105,7 @@ def test_chain_in_one_cell():
             for parts in (GRID, ALL_PAIRS):
                 (result,) = contact_pass.run(parts)
                 assert result["fits"]
-                assert contact_pass.listed_pairs(0) == sorted(expected, key=reference.self_contact_order)
+                assert contact_pass.listed_pairs(0) == sorted(expected, key=reference_contacts.self_contact_order)
 
 
 @given(
@@ -127,7 +127,7 @@ def test_no_heap_has_another_list(n, seed, tilt, skin, opening, place):
     assert grid["fits"] == fits
     if fits:
         assert contact_pass.listed_pairs(0) == expected
-        assert touching_of(expected, position) == reference.touching_pairs(position, PAPER)
+        assert touching_of(expected, position) == reference_contacts.touching_pairs(position, PAPER)
     (every,) = contact_pass.run(ALL_PAIRS)
     assert every["fits"] == fits
     if fits:
@@ -138,7 +138,7 @@ def test_no_heap_has_another_list(n, seed, tilt, skin, opening, place):
 def test_list_holds_every_touching_pair(n, tilt):
     """The touching pairs of the list are all that the reference finds, whatever the skin."""
     heaps = [folded_chain(n, seed, LENGTH, tilt=tilt)[0] for seed in range(5)]
-    expected = [reference.touching_pairs(position, PAPER) for position in heaps]
+    expected = [reference_contacts.touching_pairs(position, PAPER) for position in heaps]
     assert any(expected)
     for skin in (1e-6, SKIN, 5e-3):
         contact_pass = ContactPass([at_rest(position) for position in heaps], skin=skin)
@@ -216,7 +216,7 @@ def test_list_stays_complete_while_it_lasts():
     far_before = 0
     for world, (before, after) in enumerate(moves):
         assert old[world]["slack"] > 0
-        touching = reference.touching_pairs(after, PAPER)
+        touching = reference_contacts.touching_pairs(after, PAPER)
         assert touching_of(contact_pass.listed_pairs(world), after) == touching
         assert_array_equal(contact_pass.velocity(world), fresh_pass.velocity(world))
         for kind in ("self", "self_loss", "self_depth"):
@@ -403,7 +403,7 @@ def test_depth_of_self_contacts_is_bounded_by_the_contact_step(lean):
     )
     rate = 150.0
     position, velocity = flattening_hexagon(lean, rate)
-    assert reference.touching_pairs(position, limber) == []
+    assert reference_contacts.touching_pairs(position, limber) == []
     run = {"floor": False, "gravity": False, "tolerance": 1e-3, "method": "rkf78", "contact_step": 2e-5}
     trajectory = warpchain.simulate(limber, position, velocity, 0.42 / rate, times=[0.0], **run)
     assert trajectory.status == Status.FINISHED

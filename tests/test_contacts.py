@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from warpchain import reference
+from warpchain import reference, reference_contacts
 from warpchain.parameters import preset
 
 from .folded_chains import chain_of_angles, folded_chain
@@ -77,7 +77,7 @@ def resolved_in_order(position, velocity, parameters, circle_pairs):
         arm_a, arm_b = point - position[a, :2], point - position[b, :2]
         v_a = velocity[a, :2] + velocity[a, 2] * np.array([-arm_a[1], arm_a[0]])
         v_b = velocity[b, :2] + velocity[b, 2] * np.array([-arm_b[1], arm_b[0]])
-        j = reference.collision_impulse(v_a - v_b, normal, arm_a, arm_b, *inverse[a], *inverse[b], *law)
+        j = reference_contacts.collision_impulse(v_a - v_b, normal, arm_a, arm_b, *inverse[a], *inverse[b], *law)
         velocity[a] -= [*(j * inverse[a, 0]), (arm_a[0] * j[1] - arm_a[1] * j[0]) * inverse[a, 1]]
         velocity[b] += [*(j * inverse[b, 0]), (arm_b[0] * j[1] - arm_b[1] * j[0]) * inverse[b, 1]]
         count += bool(j.any())
@@ -93,7 +93,7 @@ def test_floor_sprocket_and_self_contacts_equal_reference(n, seed, tilt):
     heap = placed_heap(n, seed, tilt)
     contact_pass = ContactPass([heap], sprocket_speed=TURNING)
     (result,) = contact_pass.run(GRID | FLOOR | SPROCKET | SELF)
-    expected, counts = reference.resolve_contacts(heap.position, heap.velocity, PAPER, sprocket=HUB)
+    expected, counts = reference_contacts.resolve_contacts(heap.position, heap.velocity, PAPER, sprocket=HUB)
     assert {kind: result[kind] for kind in counts} == counts
     if n > 4:
         assert min(counts.values()) > 0
@@ -112,7 +112,7 @@ def test_each_kind_alone_equals_reference(kind):
         "self_contact": kind == "self",
     }
     for world, (heap, result) in enumerate(zip(heaps, results, strict=True)):
-        expected, counts = reference.resolve_contacts(heap.position, heap.velocity, heap.parameters, **chosen)
+        expected, counts = reference_contacts.resolve_contacts(heap.position, heap.velocity, heap.parameters, **chosen)
         assert result[kind] == counts[kind]
         assert_same_velocity(contact_pass.velocity(world), expected)
     assert sum(result[kind] for result in results) > 100
@@ -141,7 +141,7 @@ def test_link_order_does_not_matter_for_floor_and_sprocket(seed):
     order = np.empty(n, dtype=int)
     generator = np.random.default_rng(seed)
     order[0::2], order[1::2] = generator.permutation(n // 2) * 2, generator.permutation(n // 2) * 2 + 1
-    shuffled, counts = reference.resolve_contacts(
+    shuffled, counts = reference_contacts.resolve_contacts(
         heap.position[order], heap.velocity[order], PAPER, sprocket=HUB, self_contact=False
     )
     assert result["floor"] == counts["floor"] > 10
@@ -176,7 +176,7 @@ def test_circles_almost_as_wide_as_links_meet_past_one_link(seed):
     generator = np.random.default_rng(seed)
     position[:, :2] += generator.normal(size=(20, 2)) * 1e-5
     velocity += generator.normal(size=(20, 3))
-    expected, counts = reference.resolve_contacts(position, velocity, wide, floor=False)
+    expected, counts = reference_contacts.resolve_contacts(position, velocity, wide, floor=False)
     assert counts["self"] > 3
     contact_pass = ContactPass([Placed(position, velocity, wide)])
     (result,) = contact_pass.run(GRID | SELF)
@@ -290,7 +290,7 @@ def test_circle_at_the_sprockets_centre_is_left_alone():
     position[0, 1] = 0.0
     assert_array_equal(reference.link_ends(position, PAPER)[0][0], [0.0, 0.0])
     velocity = np.tile([1.0, 2.0, 3.0], (4, 1))
-    expected, counts = reference.resolve_contacts(
+    expected, counts = reference_contacts.resolve_contacts(
         position, velocity, PAPER, floor=False, sprocket=HUB, self_contact=False
     )
     contact_pass = ContactPass([Placed(position, velocity, PAPER)], sprocket_speed=TURNING)
@@ -363,7 +363,7 @@ def test_last_joint_carries_the_first_links_circle():
     # a figure of eight of two rhombi, whose waist holds joints 3 and 7, 1.4 mm apart
     loop = np.array([0.1, 1.2, np.pi, np.pi + 1.3])
     position = chain_of_angles(np.concatenate([loop, loop + np.pi]), PAPER.link_length)
-    assert reference.touching_pairs(position, PAPER) == [(3, 7)]
+    assert reference_contacts.touching_pairs(position, PAPER) == [(3, 7)]
     velocity = np.random.default_rng(5).normal(size=(8, 3)) * 0.1
     velocity[[0, 7], :2] += [[2.0, 1.0], [1.0, 1.0]]
     contact_pass = ContactPass([Placed(position, velocity, PAPER)])

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from warpchain import reference
+from warpchain import reference_contacts
 
 from .impulse_cases import BALL, HAND_CASES, PAIR, PAIR_TURNED, Collision, collisions, law_violations
 from .kernels_under_test import fixed_contacts, impulses_of_law, link_pairs
@@ -202,7 +202,7 @@ class Fixed:
 
 def assert_reference_impulses(contact, cases):
     """Each contact is hit once, with the reference's impulse to 1e-12 of what enters."""
-    expected = np.array([reference.collision_impulse(*collision.arguments()) for collision in cases])
+    expected = np.array([reference_contacts.collision_impulse(*collision.arguments()) for collision in cases])
     # an impulse is seen as a change of a velocity, hence to the rounding error of that
     heaviest = np.array([1 / (collision.inv_mass_b or collision.inv_mass_a) for collision in cases])
     error = np.linalg.norm(contact.impulse() - expected, axis=1)
@@ -316,7 +316,7 @@ def test_link_above_surface_keeps_its_velocity(gap):
 
 def test_law_agrees_with_reference():
     """Impulses of ten thousand random collisions are those of the reference, to 1e-12."""
-    expected = np.array([reference.collision_impulse(*collision.arguments()) for collision in MANY])
+    expected = np.array([reference_contacts.collision_impulse(*collision.arguments()) for collision in MANY])
     size = np.linalg.norm(expected, axis=1)
     assert np.all(size > 0)
     assert_allclose(np.linalg.norm(law_impulses(MANY) - expected, axis=1) / size, 0, atol=1e-12)
@@ -420,7 +420,7 @@ def test_no_collision_breaks_a_law(cases):
     """Hypothesis finds no collision whose impulse breaks a law or differs from the reference."""
     for collision, impulse in zip(cases, law_impulses(cases), strict=True):
         assert law_violations(collision, impulse) == []
-        expected = reference.collision_impulse(*collision.arguments())
+        expected = reference_contacts.collision_impulse(*collision.arguments())
         assert np.linalg.norm(impulse - expected) <= 1e-12 * np.linalg.norm(expected)
 
 

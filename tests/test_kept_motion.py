@@ -17,7 +17,7 @@ import xarray
 import yaml
 
 import warpchain
-from warpchain.engine import CAPACITY_SAMPLES
+from warpchain.devices import CAPACITY_SAMPLES
 from warpchain.ensemble import run_setups
 from warpchain.html_report import write_report
 from warpchain.kept_walk import KeptWalk

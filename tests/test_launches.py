@@ -9,7 +9,8 @@ import warp as wp
 
 from tests.test_runner import brief_setup, outcomes
 from warpchain import ensemble
-from warpchain.engine import CAPACITY_FRAMES, CAPACITY_SAMPLES, Batch, start_device, world_bytes
+from warpchain.devices import CAPACITY_FRAMES, CAPACITY_SAMPLES, start_device, world_bytes
+from warpchain.engine import Batch
 from warpchain.kernel_choice import block_threads, features_of, kernels_of
 from warpchain.kernels import layout
 from warpchain.mirror import Mirror

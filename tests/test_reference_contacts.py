@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from numpy.testing import assert_allclose, assert_array_equal
 
-from warpchain import reference
+from warpchain import reference, reference_contacts
 from warpchain.parameters import preset
 
 from .impulse_cases import (
@@ -37,14 +37,14 @@ def scattered_links(n: int):
 def test_impulse_by_hand(name):
     """Impulses worked out by hand."""
     collision, expected = HAND_CASES[name]
-    assert_allclose(reference.collision_impulse(*collision.arguments()), expected, rtol=1e-14, atol=1e-14)
+    assert_allclose(reference_contacts.collision_impulse(*collision.arguments()), expected, rtol=1e-14, atol=1e-14)
 
 
 @given(collisions())
 @settings(max_examples=1000, deadline=None, derandomize=True)
 def test_impulse_obeys_the_law(collision: Collision):
     """Any approaching collision: v'_n = −e v_n, |J_t| ≤ μ J_n, and kinetic energy never rises."""
-    assert law_violations(collision, reference.collision_impulse(*collision.arguments())) == []
+    assert law_violations(collision, reference_contacts.collision_impulse(*collision.arguments())) == []
 
 
 @given(collisions())
@@ -55,7 +55,7 @@ def test_energy_change_is_the_stated_sum_of_losses(collision: Collision):
     w = np.column_stack([v - collision.relative_velocity_after(unit) for unit in np.eye(2)])
     stop_approach = normal * (normal @ v) / (normal @ w @ normal)
     slide = np.linalg.solve(w, v) - stop_approach
-    impulse = reference.collision_impulse(*collision.arguments())
+    impulse = reference_contacts.collision_impulse(*collision.arguments())
     rest = impulse - (1 + collision.restitution) * stop_approach
     size = np.linalg.norm(slide) * (np.linalg.norm(slide) + np.linalg.norm(impulse))
     assert abs(rest[0] * slide[1] - rest[1] * slide[0]) <= 1e-11 * size
@@ -70,7 +70,7 @@ def test_energy_can_rise_beyond_the_bounds_of_restitution():
     """With e_t = 1.5 the sticking ball gains 11.25 J, so the bound e_t ≤ 1 is needed."""
     # e = 1, μ = 1: J = [16, 2.5·6 = 15]; D = [0, 6], DᵀWD = 18, −½·2.5·(2 − 2.5)·18 = 11.25.
     collision = replace(BALL, restitution=1.0, friction=1.0, tangential_restitution=1.5)
-    impulse = reference.collision_impulse(*collision.arguments())
+    impulse = reference_contacts.collision_impulse(*collision.arguments())
     assert_allclose(impulse, [-15, 16], rtol=1e-14)
     assert collision.kinetic_energy_change(impulse) == pytest.approx(11.25)
 
@@ -95,12 +95,12 @@ def test_floor_contact_by_hand():
     position, velocity = scattered_links(4)
     position[0] = [0.0, 0.4995, 1e-3]
     velocity[0] = [0.0, -3.0, 0.0]
-    result, counts = reference.resolve_contacts(position, velocity, UNIT)
+    result, counts = reference_contacts.resolve_contacts(position, velocity, UNIT)
     assert counts == {"floor": 1, "sprocket": 0, "self": 0}
     assert_allclose(result[0], [2 / 3, -4 / 3, -4 / 3], atol=5e-3)
     assert_array_equal(result[1:], 0)
     assert_array_equal(velocity[0], [0.0, -3.0, 0.0])
-    _, counts = reference.resolve_contacts(position, velocity, UNIT, floor=False)
+    _, counts = reference_contacts.resolve_contacts(position, velocity, UNIT, floor=False)
     assert counts["floor"] == 0
 
 
@@ -109,7 +109,7 @@ def test_left_circle_goes_before_right():
     position, velocity = scattered_links(4)
     position[2] = [0.0, 0.4, 0.0]
     velocity[2] = [0.0, -3.0, 0.0]
-    result, counts = reference.resolve_contacts(position, velocity, UNIT)
+    result, counts = reference_contacts.resolve_contacts(position, velocity, UNIT)
     assert counts["floor"] == 2
     # The left circle leaves (2/3, −4/3, −4/3). The right one, P = (1, −0.5), then moves with (0, −8/3), so J = (8/9)
     # of the left one's mirror image: (−16/27, 40/27) world, with torque (1)(40/27) − (−1/2)(−16/27) = 32/27.
@@ -123,8 +123,8 @@ def test_touching_but_not_overlapping_is_no_contact():
     position[0] = [0.0, 0.5, 0.0]
     position[3] = [0.0, 0.5 + 1.0, 0.0]
     velocity[0], velocity[3] = [0.0, -3.0, 0.0], [0.0, -6.0, 0.0]
-    assert reference.touching_pairs(position, UNIT) == []
-    result, counts = reference.resolve_contacts(position, velocity, UNIT)
+    assert reference_contacts.touching_pairs(position, UNIT) == []
+    result, counts = reference_contacts.resolve_contacts(position, velocity, UNIT)
     assert_array_equal(result, velocity)
     assert sum(counts.values()) == 0
 
@@ -138,10 +138,10 @@ def test_sprocket_drags_a_link_by_hand():
     position[1] = [1.0, 50 + 3.4, 0.0]
     velocity[1] = [0.0, -3.0, 0.0]
     sprocket = (np.array([0.0, 50.0]), 3.0, 1.0)
-    result, counts = reference.resolve_contacts(position, velocity, UNIT, sprocket=sprocket)
+    result, counts = reference_contacts.resolve_contacts(position, velocity, UNIT, sprocket=sprocket)
     assert counts == {"floor": 0, "sprocket": 1, "self": 0}
     assert_allclose(result[1], [-1.2, -3 + 1.2, -1.8], rtol=1e-12)
-    _, counts = reference.resolve_contacts(position, velocity, UNIT)
+    _, counts = reference_contacts.resolve_contacts(position, velocity, UNIT)
     assert counts["sprocket"] == 0
 
 
@@ -153,11 +153,11 @@ def test_two_links_by_hand():
     position[0] = [0.0, 50.0, 0.0]
     position[2] = [2.8, 50.0, np.pi]
     velocity[0] = [2.0, 0.0, 0.0]
-    assert reference.touching_pairs(position, UNIT) == [(0, 2)]
-    result, counts = reference.resolve_contacts(position, velocity, UNIT)
+    assert reference_contacts.touching_pairs(position, UNIT) == [(0, 2)]
+    result, counts = reference_contacts.resolve_contacts(position, velocity, UNIT)
     assert counts == {"floor": 0, "sprocket": 0, "self": 1}
     assert_allclose(result[[0, 2]], [[1, 0, 0], [1, 0, 0]], atol=1e-12)
-    _, counts = reference.resolve_contacts(position, velocity, UNIT, self_contact=False)
+    _, counts = reference_contacts.resolve_contacts(position, velocity, UNIT, self_contact=False)
     assert counts["self"] == 0
 
 
@@ -174,7 +174,7 @@ def test_each_kind_of_contact_has_its_own_coefficients(kind):
         position[2], velocity[2] = [0.0, height, np.pi / 2], [speed, -3.0, 0.0]
         position[0] = [0.0, 100.0, np.pi / 2]
         sprocket = (np.array([0.0, 80.0]), 3.0, 0.0)
-        result, counts = reference.resolve_contacts(position, velocity, parameters, sprocket=sprocket)
+        result, counts = reference_contacts.resolve_contacts(position, velocity, parameters, sprocket=sprocket)
         assert counts == {"floor": kind == "floor", "sprocket": kind == "sprocket", "self": kind == "chain"}
         assert_allclose(result[2, :2], [speed - share * pull, share * 3.9 - 3], atol=1e-7)
         assert_allclose(result[2, 2], -1.5 * share * pull, atol=1e-7)
@@ -186,9 +186,9 @@ def test_concentric_circles_are_left_alone():
     position[0] = [0.0, 50.0, 0.0]
     position[3] = [2.0, 50.0, 0.0]
     velocity[0] = [2.0, 0.0, 0.0]
-    assert reference.touching_pairs(position, UNIT) == [(0, 2)]
+    assert reference_contacts.touching_pairs(position, UNIT) == [(0, 2)]
     sprocket = (np.array([3.0, 50.0]), 0.1, 1.0)
-    result, counts = reference.resolve_contacts(position, velocity, UNIT, sprocket=sprocket)
+    result, counts = reference_contacts.resolve_contacts(position, velocity, UNIT, sprocket=sprocket)
     assert_array_equal(result, velocity)
     assert sum(counts.values()) == 0
 
@@ -219,14 +219,14 @@ def test_self_contacts_go_in_the_documented_order():
                 arm_a, arm_b = point - position[a, :2], point - position[b, :2]
                 v_a = velocity[a, :2] + velocity[a, 2] * np.array([-arm_a[1], arm_a[0]])
                 v_b = velocity[b, :2] + velocity[b, 2] * np.array([-arm_b[1], arm_b[0]])
-                j = reference.collision_impulse(v_a - v_b, normal, arm_a, arm_b, *[1.0] * 4, 0.0, 1.0, 0.0)
+                j = reference_contacts.collision_impulse(v_a - v_b, normal, arm_a, arm_b, *[1.0] * 4, 0.0, 1.0, 0.0)
                 velocity[a] -= [*j, arm_a[0] * j[1] - arm_a[1] * j[0]]
                 velocity[b] += [*j, arm_b[0] * j[1] - arm_b[1] * j[0]]
                 count += bool(j.any())
         return velocity, count
 
     expected, count = in_order(order)
-    result, counts = reference.resolve_contacts(position, start, UNIT, floor=False)
+    result, counts = reference_contacts.resolve_contacts(position, start, UNIT, floor=False)
     assert counts["self"] == count > 5
     assert_allclose(result, expected, rtol=1e-12, atol=1e-12)
     assert np.abs(in_order(sorted(order))[0] - expected).max() > 1e-3
@@ -238,7 +238,7 @@ def test_self_contacts_keep_momenta_and_never_raise_energy(heap):
     """In any heap, self-contacts keep linear and angular momentum, and kinetic energy doesn't rise."""
     n, seed, size = heap
     position, velocity = crumpled_chain(n, seed, PAPER.link_length, size)
-    result, _ = reference.resolve_contacts(position, velocity, PAPER, floor=False)
+    result, _ = reference_contacts.resolve_contacts(position, velocity, PAPER, floor=False)
     momentum = reference.linear_momentum(velocity, PAPER)
     assert_allclose(reference.linear_momentum(result, PAPER), momentum, atol=1e-15)
     spin = reference.angular_momentum(position, velocity, PAPER)
@@ -254,7 +254,7 @@ def test_floor_and_resting_sprocket_never_raise_energy(heap):
     n, seed, size = heap
     position, velocity = crumpled_chain(n, seed, PAPER.link_length, size)
     sprocket = (np.array([0.0, 0.01]), 0.01, 0.0)
-    result, counts = reference.resolve_contacts(position, velocity, PAPER, sprocket=sprocket)
+    result, counts = reference_contacts.resolve_contacts(position, velocity, PAPER, sprocket=sprocket)
     energy = reference.kinetic_energy(velocity, PAPER)
     assert reference.kinetic_energy(result, PAPER) <= energy * (1 + 1e-14)
     if sum(counts.values()) == 0:
@@ -276,4 +276,4 @@ def test_touching_pairs_are_those_of_all_link_pairs(heap):
                     for joint_b, end_b in ((b, right[b]), ((b - 1) % n, left[b])):
                         if np.linalg.norm(end_a - end_b) < 2 * PAPER.circle_radius:
                             expected.add((min(joint_a, joint_b), max(joint_a, joint_b)))
-    assert reference.touching_pairs(position, PAPER) == sorted(expected)
+    assert reference_contacts.touching_pairs(position, PAPER) == sorted(expected)

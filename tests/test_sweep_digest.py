@@ -58,6 +58,18 @@ def test_a_method_by_need_is_that_of_the_device(options: dict[str, Any], expecte
     assert again.planned(0).setup.options == there
 
 
+def test_a_stored_sweep_keeps_its_method_unless_it_is_given_a_word_again() -> None:
+    """What a folder keeps of a sweep goes on as it was, has its method on any device, and takes a word in its place."""
+    planned = load_sweep(content(options={}))
+    stored = planned.canonical()
+    assert load_sweep(stored).digest() == planned.digest()
+    assert on_device(load_sweep(stored), "cuda").planned(0).setup.options.method == "hybrid"
+    for block in stored["blocks"]:
+        block["options"]["method"] = "standard"
+    assert load_sweep(stored).digest() == planned.digest()
+    assert on_device(load_sweep(stored), "cuda").digest() == on_device(planned, "cuda").digest()
+
+
 def test_digest_tells_apart_what_matters() -> None:
     """Whatever changes a number or its place changes the digest."""
     changes: list[dict[str, Any]] = [

@@ -18,7 +18,7 @@ from warpchain.accuracy_contestants import LOOSE, TIGHT, Contestant, default_con
 from warpchain.accuracy_ensembles import Ensemble, default_samples, run_ensemble, summary
 from warpchain.accuracy_walks import walk_costs
 from warpchain.bench import machine
-from warpchain.engine import start_device
+from warpchain.devices import start_device
 from warpchain.hard_cases import HARD_CASES
 from warpchain.options import Options, Scene, check_scene
 from warpchain.parameters import InputError, preset, shown, suggestion, validated

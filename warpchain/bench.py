@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain import reference
-from warpchain.engine import COUNTS, Batch, versions
+from warpchain.devices import versions
+from warpchain.engine import COUNTS, Batch
 from warpchain.kernels.methods import METHODS
 from warpchain.options import Options
 from warpchain.parameters import Parameters, preset

@@ -17,7 +17,8 @@ from typing import Any, Final
 import warp as wp
 
 from warpchain.bench import FAR, LONGEST_STRETCH, SETTLING_TRIES, Array, dropped, flying
-from warpchain.engine import Batch, start_device, versions
+from warpchain.devices import start_device, versions
+from warpchain.engine import Batch
 from warpchain.ensemble import CREWS
 from warpchain.kernel_choice import block_kernel, block_threads, features_of, load_kernels
 from warpchain.kernels import layout

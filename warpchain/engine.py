@@ -1,33 +1,26 @@
 """The one module that launches kernels: a batch of chains in arrays on a device, carried on in bounded launches."""
 
-import contextlib
-import functools
-import importlib.metadata
 import itertools
 import math
-import os
-import platform
-import sys
-import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpchain.control import control_of
+from warpchain.devices import CAPACITY_FRAMES, CAPACITY_SAMPLES, scratch_rows, start_device
 from warpchain.kernel_choice import block_kernel, block_threads, features_of, kernels_of
 from warpchain.kernels import layout
-from warpchain.kernels.block import block_rows
 from warpchain.kernels.broadphase import list_layout
 from warpchain.kernels.driver import Features, make_advance
-from warpchain.kernels.methods import METHODS
-from warpchain.kernels.types import Control, Model, Program, Record, State
+from warpchain.kernels.types import Model, Program, Record, State
 from warpchain.mirror import Mirror
 from warpchain.options import Options
-from warpchain.parameters import InputError, Parameters, preset
+from warpchain.parameters import Parameters
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
@@ -39,23 +32,7 @@ PROGRAM = (
 """Fields of :class:`warpchain.kernels.types.Program`."""
 FIRST_STEP = 1e-7  # s; the controller grows it fivefold per step
 LANES = 3  # streams of a batch for kernels side by side: chains of one length do not fill the device
-CONNECTIONS = "32"  # queues between host and GPU; with fewer than streams, streams wait for one another
-BLOCKS_OF_MULTIPROCESSOR = 32  # most that an NVIDIA multiprocessor holds
 LAUNCH_SECONDS = 0.1  # how long a launch should take: the grain of progress and of Ctrl-C
-CAPACITY_SAMPLES = 512
-CAPACITY_FRAMES = 64
-SOFT = preset("soft")
-"""Whose joints soft ones have, see :mod:`warpchain.kernels.softening`."""
-SOFTEST = SOFT.with_values({"joint_stiffness": 1e6, "joint_damping": 30.0, "friction_smoothing": 1.0})
-"""Whose joints the softest have.
-
-Measured with `paper` and dp5 at 1e-4 on walks that are the same until the loop encloses half of its first area: Δx then
-shifts by 0.01 ± 0.04 mm (24 walks of 60 links at 15 Hz) and 1.5 ± 1.5 mm (16 of 150 at 20 Hz; 0.01 ± 0.08 mm from 0.3
-of the area), in 2.7 times fewer tries. k = 3e5 N/m takes 1.6 times fewer again, but circles sink 2 mm into the
-floor. From 0.9 of the area 1e6 N/m may shift Δx: by 8 ± 4 mm of 1 m (12 walks of 150 links).
-"""
-STIFFENING_TIME = 0.03
-"""Time [s] in which joints that were soft on the sprocket get their own values back after the release."""
 UNSET_WATCHES = (layout.WINDOW_START, layout.STEADY_SINCE, layout.REST_SINCE, layout.SOFTENED_AT)
 """Moments of :attr:`State.watch` that are negative until they come."""
 
@@ -65,88 +42,6 @@ EXTREMES = ("opening", "floor", "sprocket", "self")
 """Greatest joint opening and depths of a world, likewise."""
 LOSSES = ("joint_friction", "joint_damping", "floor", "sprocket", "self_contact", "softening", "hand_over")
 """Losses of energy of a world, likewise."""
-
-
-@functools.cache
-def start_device(device: str) -> wp.Device:
-    """Start Warp and return the device.
-
-    Raises:
-        InputError: This machine has no such device.
-    """
-    wp.config.log_level = wp.LOG_ERROR
-    os.environ.setdefault("CUDA_DEVICE_MAX_CONNECTIONS", CONNECTIONS)  # CUDA reads it when it starts
-    with _without_driver_warning():
-        wp.init()
-    name = "cuda:0" if device == "cuda" else device
-    known = [found.alias for found in wp.get_devices()]
-    if name not in known:
-        raise InputError(f"options.device: there is no {device} on this machine; give one of {', '.join(known)}")
-    return wp.get_device(name)
-
-
-@contextlib.contextmanager
-def _without_driver_warning() -> Iterator[None]:
-    """Pass on what Warp's native code writes to stderr, but for its line about a missing NVIDIA driver.
-
-    That line appears on every machine without a GPU, where it says nothing that the user asked for; whoever asks for
-    a missing GPU gets an error.
-    """
-    sys.stderr.flush()
-    kept = os.dup(2)
-    with tempfile.TemporaryFile() as caught:
-        os.dup2(caught.fileno(), 2)
-        try:
-            yield
-        finally:
-            os.dup2(kept, 2)
-            os.close(kept)
-            caught.seek(0)
-            for line in caught:
-                if b"NVIDIA CUDA driver" not in line:
-                    os.write(2, line)
-
-
-def versions() -> dict[str, str]:
-    """Versions of all that may change a number: for the provenance of a result."""
-    packages = ("warpchain", "warp-lang", "numpy")
-    return {name: importlib.metadata.version(name) for name in packages} | {"python": platform.python_version()}
-
-
-def scratch_rows(options: Options, longest: int, device: wp.Device) -> int:
-    """Rows of a chain's scratch block on a device, for chains of up to this many links."""
-    columns = layout.padded_width(longest)
-    if device.is_cuda:
-        return block_rows(options.method, block_threads(longest), columns)
-    return METHODS[options.method].scratch_rows(columns)
-
-
-def world_bytes(longest: int, options: Options, samples: int, frames: int, device: wp.Device) -> int:
-    """Memory [B] that a batch takes on a device for each of its worlds.
-
-    Args:
-        longest: Greatest number of links.
-        options: Of the batch.
-        samples: Capacity of the time series.
-        frames: Capacity of the frames.
-        device: Where.
-    """
-    columns = layout.padded_width(longest)
-    few = len(Parameters.model_fields) + len(PROGRAM) + 80  # numbers of a world in model, program and state
-    numbers = columns * scratch_rows(options, longest, device) + 6 * longest + few
-    numbers += samples * layout.SAMPLE_COLUMNS + frames * (2 * longest + 1)
-    return 8 * numbers + 4 * list_layout(columns).size
-
-
-def most_worlds(longest: int, options: Options, *, keeps_samples: bool, keeps_frames: bool) -> int:
-    """Chains that a GPU should carry on together: what could ever reside on it, as far as they fit into free memory.
-
-    Half of what is free is left to others, such as batches of other threads.
-    """
-    device = start_device(options.device)
-    samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * keeps_frames
-    fitting = int(device.free_memory) // 2 // world_bytes(longest, options, samples, frames, device)
-    return max(1, min(BLOCKS_OF_MULTIPROCESSOR * int(device.sm_count), fitting))
 
 
 class Batch:
@@ -221,30 +116,9 @@ class Batch:
         self.record.frames = self._array(np.zeros((worlds, frames, 2 * longest)))
         self.record.frame_times = self._array(np.zeros((worlds, frames)))
 
-        self.control = Control()
-        self.control.tolerance = options.tolerance
-        self.control.soft_tolerance = options.tolerance if options.soft_tolerance is None else options.soft_tolerance
-        self.control.flight_tolerance = options.flight_tolerance
-        self.control.proportional = int(options.controller == "pi")
-        self.control.contact_step = options.contact_step
-        self.control.skin = options.skin
-        self.control.smallest_step = options.smallest_step
-        self.control.step_limit = options.step_limit
-        self.control.tries = 0
+        self.control = control_of(options)
         self.control.launch_time = LAUNCH_SECONDS
-        self.control.sample_interval = options.record_interval
         self.control.frame_every = frame_every or 1
-        self.control.rest_speed = options.rest_speed
-        self.control.rest_time = options.rest_time
-        self.control.soft_stiffness = SOFT.joint_stiffness
-        self.control.soft_damping = SOFT.joint_damping
-        self.control.soft_smoothing = SOFT.friction_smoothing
-        self.control.softest_stiffness = SOFTEST.joint_stiffness
-        self.control.softest_damping = SOFTEST.joint_damping
-        self.control.softest_smoothing = SOFTEST.friction_smoothing
-        self.control.soft_contact_step = options.soft_contact_step
-        self.control.soften_area = options.soften_area if options.soften_pile else -math.inf
-        self.control.stiffening_time = STIFFENING_TIME
 
         self._tries = 500
         self.scratch = wp.zeros((worlds, rows, self.columns), dtype=wp.float64, device=self.device)

@@ -6,7 +6,8 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from warpchain.course import Course
-from warpchain.engine import Batch, most_worlds, start_device
+from warpchain.devices import most_worlds, start_device
+from warpchain.engine import Batch
 from warpchain.kernel_choice import block_threads, features_of, load_kernels
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features

@@ -9,7 +9,7 @@ from typing import Final
 
 import warp as wp
 
-from warpchain.engine import start_device
+from warpchain.devices import start_device
 from warpchain.parameters import InputError, shown
 from warpchain.planning import Sweep, load_sweep
 from warpchain.runner import on_device

@@ -90,7 +90,8 @@ def sweep(
         source: A sweep file (YAML), its content, or a :class:`Sweep`.
         out: Folder of the results. A sweep that was killed goes on where it was; the data come out the same, to the
             byte.
-        device: ``"cpu"``, ``"cuda"`` or ``"cuda:N"`` instead of what the sweep says.
+        device: ``"cpu"``, ``"cuda"`` or ``"cuda:N"`` instead of what the sweep says. Method ``standard`` is then what
+            it means there; the ``sweep.yaml`` of a folder names the method that was run, which stays.
         executor: Where shards are run; it must see ``out``. Default: threads of this process.
         workers: Tasks in work at the same time; default: processors of this machine, and on a GPU two, each of which
             keeps thousands of walks going. With an executor, at least the number of its workers.
@@ -122,7 +123,11 @@ def sweep(
 
 
 def on_device(planned: Sweep, device: str) -> Sweep:
-    """The same sweep on another device; a method that was named by need is what this means there."""
+    """The same sweep on another device; a method that was named by need is what this means there.
+
+    The canonical form, in which a folder keeps its sweep, names the method itself: what was run once is run again, on
+    whatever device, and does not change with the meaning of a word.
+    """
     canonical = planned.canonical()
     for block, content in zip(planned.blocks, canonical["blocks"], strict=True):
         given = {**block.plan.sections["options"], "device": device}

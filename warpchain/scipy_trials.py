@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain import reference
+from warpchain import reference, reference_contacts
 from warpchain.options import Options
 from warpchain.work_precision import Errors, Point, Reference, State, Trial, errors
 
@@ -119,7 +119,7 @@ def _after_contacts(trial: Trial, position: Array, velocity: Array) -> Array | N
     ends = np.concatenate(reference.link_ends(position, trial.parameters))
     if ends[:, 1].min() > trial.parameters.circle_radius:
         return None
-    after, hits = reference.resolve_contacts(position, velocity, trial.parameters, self_contact=False)
+    after, hits = reference_contacts.resolve_contacts(position, velocity, trial.parameters, self_contact=False)
     return after if hits["floor"] else None
 
 

@@ -61,7 +61,10 @@ _DISCARDED: Final = re.compile(r"\.discarded-[0-9a-f]{8}")
 
 _HOLDER: Final = re.compile(r"process \d+ on \S*")
 
-_YAML_HEAD: Final = "# The sweep of this folder with all its values. A changed copy of it needs another folder.\n"
+_YAML_HEAD: Final = """\
+# The sweep of this folder with all its values. A changed copy of it needs another folder.
+# It names the method that was run: for the one that suits another device, give a copy of it method: standard.
+"""
 
 
 class Store:

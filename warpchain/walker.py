@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from warpchain.course import Course
-from warpchain.engine import Batch, versions
+from warpchain.devices import versions
+from warpchain.engine import Batch
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features
 from warpchain.options import Options, Scene, Setup, check_scene, contact_radius, resolve

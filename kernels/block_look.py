@@ -1,0 +1,56 @@
+"""A look at a chain in the block form: samples, watches, and what follows from them for the steps to come."""
+
+import functools
+
+import warp as wp
+
+from .block_board import note_constants
+from .block_contact import TouchLayout
+from .block_memory import clock
+from .driver import Features
+from .layout import BOARD_NOTES, NOTE_CONTACT_STEP, NOTE_DEADLINE, NOTE_NEXT_LOOK, NOTE_STOP_TIME, NOTE_TOLERANCE
+from .record import sampling
+from .softening import change_joints, contact_step, softened, spring_tolerance
+from .types import Control, Model, Program, Record, State, read_chain
+
+wp.set_module_options({"enable_backward": False})
+
+
+@functools.cache
+def block_look(features: Features, touch: TouchLayout):
+    """Warp function ``look(K, T, model, program, state, record, control, world, time)`` for one thread of a block.
+
+    It is called behind a barrier behind the board's rows of ends, and leaves none; it puts the status into the mailbox
+    and says when the launch has lasted long enough.
+    """
+    softens = features.softens
+    look_at_chain = sampling(features.watch, softens)
+
+    @wp.func
+    def look(
+        K: wp.array2d(dtype=wp.float64),
+        T: wp.array(dtype=wp.int32),
+        model: Model,
+        program: Program,
+        state: State,
+        record: Record,
+        control: Control,
+        world: int,
+        time: wp.float64,
+    ):
+        softness = state.softness[world]
+        chain = read_chain(model, world)
+        if wp.static(softens):
+            chain = softened(chain, control, softness)
+        T[wp.static(touch.mailbox)] = look_at_chain(K, chain, program, state, record, control, world, time)
+        if wp.static(softens):
+            if state.softness[world] != softness:
+                note_constants(K, change_joints(chain, model, state, control, world))
+                K[BOARD_NOTES, NOTE_CONTACT_STEP] = contact_step(control, state.softness[world])
+                K[BOARD_NOTES, NOTE_TOLERANCE] = spring_tolerance(control, state.softness[world])
+        K[BOARD_NOTES, NOTE_STOP_TIME] = state.stop_time[world]
+        K[BOARD_NOTES, NOTE_NEXT_LOOK] = wp.float64(state.next_sample[world]) * control.sample_interval
+        if clock() > K[BOARD_NOTES, NOTE_DEADLINE]:
+            T[wp.static(touch.is_late)] = 1
+
+    return look

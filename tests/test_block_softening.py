@@ -1,0 +1,126 @@
+"""The block form softens and stiffens joints in the same steps, and to the same bits, as the CPU form does."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from tests.blocks_under_test import FIXED_STEP, batch_of, heap, launch_blocks, launch_chains
+from warpchain.control import SOFT
+from warpchain.engine import Batch
+from warpchain.kernels import block, driver, layout
+from warpchain.kernels.block import make_advance_block
+from warpchain.kernels.driver import Features, make_advance
+from warpchain.shapes import ellipse, lay_chain
+
+LINKS = 12
+
+
+@pytest.fixture
+def exact_kernels(monkeypatch: pytest.MonkeyPatch):
+    """Kernels without fused operations, in which the block form and the CPU form do the same operations."""
+    for module in (driver, block):
+        monkeypatch.setattr(module, "COMPILER_FLAGS", "-ffp-contract=off")
+    for factory in (make_advance, make_advance_block):
+        factory.cache_clear()
+    yield
+    for factory in (make_advance, make_advance_block):
+        factory.cache_clear()
+
+
+def soften_much(batch: Batch) -> Batch:
+    """A batch of soft chains with soft and softest joints that are softer still, and steps to tell them apart by."""
+    control = batch.control
+    control.soft_stiffness, control.soft_damping, control.soft_smoothing = 1e6, 10.0, 1.0
+    control.softest_stiffness, control.softest_damping, control.softest_smoothing = 1e5, 3.0, 2.0
+    control.soft_contact_step = 2 * FIXED_STEP
+    return batch
+
+
+def heaps(area: float) -> Batch:
+    """Heaps on the floor that soften below a fraction of their first area, in fixed steps, looked at often."""
+    batch = batch_of([heap(LINKS, 5, tilt=2.0), heap(LINKS, 10, tilt=2.0)], method="dp5", keeps=True)
+    batch.control.sample_interval = 5 * FIXED_STEP
+    batch.control.soften_area = area
+    return soften_much(batch)
+
+
+def released() -> Batch:
+    """A ring above the floor, just released with soft joints."""
+    batch = batch_of([lay_chain(ellipse(1.0), LINKS, SOFT.link_length, 2.0)], method="dp5", keeps=True)
+    batch.control.sample_interval = 4 * FIXED_STEP
+    batch.control.stiffening_time = 40 * FIXED_STEP
+    batch.control.soften_area = -np.inf
+    batch.state.softness.numpy()[0] = 1.0
+    return soften_much(batch)
+
+
+def driven() -> Batch:
+    """A heap on a sprocket that begins to turn after 12 steps; the hold begins after 70."""
+    raised = 0.9 * SOFT.sprocket_radius
+    batch = batch_of([heap(LINKS, 3, raised=raised)], method="dp5", keeps=True)
+    batch.control.sample_interval = 4 * FIXED_STEP
+    batch.control.stiffening_time = 30 * FIXED_STEP
+    times = {"spin_up_start": 12 * FIXED_STEP, "spin_up_time": 58 * FIXED_STEP, "hold_start": 70 * FIXED_STEP}
+    batch.set_program(0, **times, loop_speed=3.0, loop_period=1.0, steady_tolerance=0.01)
+    batch.state.softness.numpy()[0] = 1.0
+    return soften_much(batch)
+
+
+def assert_same_bits(ours: Batch, theirs: Batch) -> None:
+    """States, moments and samples agree to the bit, losses to the order of their sums."""
+    for name in ("links", "time", "status", "softness", "first_area", "watch", "stop_time"):
+        assert_array_equal(getattr(ours.state, name).numpy(), getattr(theirs.state, name).numpy(), err_msg=name)
+    assert_allclose(ours.state.losses.numpy(), theirs.state.losses.numpy(), rtol=1e-12)
+    for world in range(len(ours.links)):
+        assert_array_equal(ours.drain_samples(world), theirs.drain_samples(world))
+
+
+def softening_features(batch: Batch, fixed_body: str, watch: str) -> Features:
+    """What the kernels are compiled for."""
+    return dataclasses.replace(batch.features(fixed_body=fixed_body, watch=watch), softens=True)
+
+
+@pytest.mark.parametrize("cut", [60, 7])
+@pytest.mark.parametrize(("area", "softness"), [(0.9975, 1.0), (1.995, 2.0)])
+def test_blocks_soften_a_pile_as_the_cpu_form_does(area: float, softness: float, cut: int, exact_kernels: None) -> None:
+    """The block form softens at the same looks, frees the same energy, and goes on to the same bits, however cut."""
+    ours, theirs = heaps(area), heaps(area)
+    features = softening_features(ours, "floor", "rest")
+    for _ in range(-(-60 // cut)):
+        launch_blocks(ours, features, min(cut, 60), block_dim=LINKS)
+    launch_chains(theirs, features, cut * -(-60 // cut))
+    first, second = (theirs.softened_at(world) for world in range(2))
+    assert 0 < first <= second < theirs.time(0)
+    assert theirs.state.softness.numpy().tolist() == [softness, softness]
+    assert np.all(theirs.state.losses.numpy()[:, layout.LOSS_SOFTENING] > 0)
+    assert_same_bits(ours, theirs)
+
+
+@pytest.mark.parametrize("cut", [60, 7])
+def test_blocks_stiffen_as_the_cpu_form_does(cut: int, exact_kernels: None) -> None:
+    """The block form gives the joints their values back in the same steps, however cut into launches."""
+    ours, theirs = released(), released()
+    features = softening_features(ours, "floor", "rest")
+    for _ in range(-(-60 // cut)):
+        launch_blocks(ours, features, min(cut, 60), block_dim=LINKS)
+    launch_chains(theirs, features, cut * -(-60 // cut))
+    assert theirs.state.softness.numpy()[0] == 0.0
+    assert theirs.state.losses.numpy()[0, layout.LOSS_SOFTENING] < 0
+    assert_same_bits(ours, theirs)
+
+
+@pytest.mark.parametrize("cut", [60, 7])
+def test_blocks_drive_on_softer_joints_as_the_cpu_form_does(cut: int, exact_kernels: None) -> None:
+    """The block form makes joints softest and soft again in the same steps of the drive, however cut into launches."""
+    ours, theirs = driven(), driven()
+    features = softening_features(ours, "sprocket", "steady")
+    for _ in range(-(-60 // cut)):
+        launch_blocks(ours, features, min(cut, 60), block_dim=LINKS)
+    launch_chains(theirs, features, cut * -(-60 // cut))
+    assert theirs.counts(0)["sprocket"] > 10
+    assert theirs.time(0) > 70 * FIXED_STEP
+    assert theirs.state.softness.numpy()[0] == 1.0
+    assert theirs.counts(0)["accepted"] < theirs.time(0) / (1.1 * FIXED_STEP)
+    assert_same_bits(ours, theirs)
