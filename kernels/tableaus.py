@@ -180,12 +180,13 @@ OS32 = Tableau(
 )
 """Six stages, and one reused, of order 3, for steps that stability bounds.
 
-Each stage follows from the one before alone. That leaves the stability polynomial 1 + z + z²/2 + z³/6 + c₄ z⁴ + c₅ z⁵ +
-c₆ z⁶ free beyond order 3: c₄ = 1/6 · 39/200, c₅ = c₄ · 3/25, c₆ = c₅ · 23/400. They are near what D. I. Ketcheson and
-A. J. Ahmadia (Commun. Appl. Math. Comput. Sci. 7 (2012) 247) call the optimal polynomial, that of the largest h for which
-|P(hλ)| ≤ 1 on the eigenvalues λ: those of joints with k and b of Table 1 lie on a curve that ends at |λ| = 1.08e6/s, 57°
-off the negative axis, those of sticking friction on the axis. Steps may be 6.2/|λ| on the curve and 7.3/|λ| on the axis,
-with `dp5`, which has as many stages, 3.4 and 3.3, with `bs32`, which has half as many, 2.5 and 2.5.
+Each stage follows from the one before alone. That leaves the stability polynomial 1 + z + z²/2 + z³/6 + c₄ z⁴ +
+c₅ z⁵ + c₆ z⁶ free beyond order 3: c₄ = 1/6 · 39/200, c₅ = c₄ · 3/25, c₆ = c₅ · 23/400. They are near what D. I.
+Ketcheson and A. J. Ahmadia (Commun. Appl. Math. Comput. Sci. 7 (2012) 247) call the optimal polynomial, that of the
+largest h for which |P(hλ)| ≤ 1 on the eigenvalues λ: those of joints with k and b of Table 1 lie on a curve that ends
+at |λ| = 1.08e6/s, 57° off the negative axis, those of sticking friction on the axis. Steps may be 6.2/|λ| on the curve
+and 7.3/|λ| on the axis, with `dp5`, which has as many stages, 3.4 and 3.3, with `bs32`, which has half as many, 2.5
+and 2.5.
 """
 
 TABLEAUS = {tableau.name: tableau for tableau in (RKF78, DP5, BS32, OS32)}

@@ -55,7 +55,7 @@ def exact_flight(name):
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_flight_agrees_with_scipy(name, method):
-    """At tolerance 1e-9 a flight with friction, damping and gravity agrees with DOP853 to 1e-8, rates of order 3 to 1e-7.
+    """At tolerance 1e-9 flights with friction, damping, gravity agree with DOP853 to 1e-8, rates of order 3 to 1e-7.
 
     bs32 and os32 take their longest accurate steps at the springs' period, so their rates err by some tens of
     tolerances; a tolerance of 1e-10 brings them below 1e-8 too.

@@ -10,9 +10,10 @@ from warpchain.hard_starts import SOFT, UNDISSIPATIVE
 from warpchain.options import METHODS_BY_NEED
 
 every_method_walks = pytest.mark.parametrize(
-    "method", ["rkf78", "dp5", "rodas4p", "hybrid", pytest.param("bs32", marks=pytest.mark.slow)]
+    "method",
+    ["rkf78", "dp5", "rodas4p", "hybrid", *(pytest.param(name, marks=pytest.mark.slow) for name in ("bs32", "os32"))],
 )
-"""Walks need a kernel more than short runs: no other quick test uses that of bs32."""
+"""Walks need a kernel more than short runs: no other quick test uses those of bs32 and os32."""
 
 
 def walk(method, **settings):
