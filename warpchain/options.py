@@ -173,8 +173,8 @@ class Options(BaseModel):
 
     method: Literal["rkf78", "dp5", "bs32", "os32", "rodas4p", "rodas5p", "hybrid"] = Field(
         default="rkf78",
-        description="embedded pair: Fehlberg 7(8), Dormand–Prince 5(4), Bogacki–Shampine 3(2), six stages of order 3(2) "
-        "for long stable steps, RODAS4P 4(3) or RODAS5P 5(4), the last two implicit; "
+        description="embedded pair: Fehlberg 7(8), Dormand–Prince 5(4), Bogacki–Shampine 3(2), six stages of order "
+        "3(2) for long stable steps, RODAS4P 4(3) or RODAS5P 5(4), the last two implicit; "
         "hybrid: rigid joints between impulses, os32 around them",
     )
     tolerance: float = Field(

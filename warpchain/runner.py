@@ -27,8 +27,10 @@ from warpchain.sweep_result import SweepResult, load
 
 SHARD_WALKS = 256
 """Most walks in a shard."""
-GPU_TASK_WALKS = 8192
-"""Walks that a worker with a GPU is given at a time."""
+GPU_TASK_WALKS = 65536
+"""Most walks that a worker with a GPU is given at a time: while the last ones come to rest the device runs dry."""
+POLL = 1.0
+"""Time [s] between two looks for shards that tasks under way have written."""
 GPU_WORKERS = 2
 """Tasks at a time on a GPU: while the last walks of one come to rest, the other fills the device."""
 SHARDS = 128
@@ -274,21 +276,31 @@ def _run(
         pending[executor.submit(run_shards, canonical, str(store.directory), shards, *more)] = task
         return True
 
+    counted: set[range] = set()
+
+    def count(shard: range) -> None:
+        counted.add(shard)
+        statuses = read_shard(store.directory, digest, shard)["status"]
+        progress.statuses.update(Status(int(code)).label for code in statuses)
+        progress.done += len(shard)
+
     while len(pending) < 2 * workers and submit():
         pass
     try:
         while pending:
-            finished, _ = concurrent.futures.wait(pending, return_when=concurrent.futures.FIRST_COMPLETED)
+            finished, _ = concurrent.futures.wait(pending, POLL, concurrent.futures.FIRST_COMPLETED)
+            written: list[range] = []
             for future in finished:
-                task = pending.pop(future)
+                written += pending.pop(future)
                 future.result()
                 submit()
-                for shard in task:
-                    statuses = read_shard(store.directory, digest, shard)["status"]
-                    progress.statuses.update(Status(int(code)).label for code in statuses)
-                    progress.done += len(shard)
+            missing_still = set(store.missing())
+            written += [shard for task in pending.values() for shard in task if shard not in missing_still]
+            new = [shard for shard in written if shard not in counted]
+            for shard in new:
+                count(shard)
             progress.seconds = time.perf_counter() - began
-            if on_progress is not None:
+            if new and on_progress is not None:
                 on_progress(progress)
     finally:
         for future in pending:
