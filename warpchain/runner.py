@@ -308,17 +308,20 @@ def _run(
 
 
 def _tasks(planned: Sweep, missing: Sequence[range], workers: int) -> Iterator[list[range]]:
-    """What is handed to a worker at a time: a shard, or for a GPU enough shards to fill it, if there are enough."""
-    fair_share = -(-sum(map(len, missing)) // workers)
-    task: list[range] = []
+    """What is handed to a worker at a time: a shard, or for a GPU enough shards to fill it, if there are enough.
+
+    Shards that follow one another are alike and a GPU's tasks are few: each takes every so many-th, so that all tasks
+    take as long.
+    """
+    on_gpu: list[range] = []
     for shard in missing:
-        task.append(shard)
-        on_gpu = planned.planned(shard.start).setup.options.device.startswith("cuda")
-        if not on_gpu or sum(map(len, task)) >= min(GPU_TASK_WALKS, fair_share):
-            yield task
-            task = []
-    if task:
-        yield task
+        if planned.planned(shard.start).setup.options.device.startswith("cuda"):
+            on_gpu.append(shard)
+        else:
+            yield [shard]
+    count = workers * -(-sum(map(len, on_gpu)) // (workers * GPU_TASK_WALKS))
+    for first in range(min(count, len(on_gpu))):
+        yield on_gpu[first::count]
 
 
 def _counts(statuses: Counter[str]) -> str:
