@@ -277,7 +277,7 @@ def test_sweep_refuses_what_it_cannot_do(tmp_path):
 
 
 def test_tasks_of_gpus_are_alike(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every shard is in one task; tasks hold as many walks of each number of links, and hardly more than a GPU is given."""
+    """Every shard is in one task; tasks hold like walks and hardly more of them than a GPU is given."""
     grid = {"links": [60, 90, 120, 150, 180], "frequency": [5.0, 10.0]}
     given = {"version": 1, "name": "alike", "seed": 1, "preset": "soft", "samples": 24, "grid": grid}
     planned = load_sweep(given | {"options": {"device": "cuda"}})

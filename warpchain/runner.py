@@ -28,7 +28,7 @@ from warpchain.sweep_result import SweepResult, load
 SHARD_WALKS = 256
 """Most walks in a shard."""
 GPU_TASK_WALKS = 65536
-"""About the most walks that a worker with a GPU is given at a time: while the last ones come to rest the device runs dry."""
+"""About the most walks that a GPU is given at a time: while the last of them come to rest it runs dry."""
 POLL = 1.0
 """Time [s] between two looks for shards that tasks under way have written."""
 GPU_WORKERS = 2
