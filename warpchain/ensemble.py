@@ -3,7 +3,7 @@
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from warpchain.course import Course
 from warpchain.devices import most_worlds, start_device
@@ -30,6 +30,7 @@ NAP = 5e-4
 def run_setups(
     setups: Sequence[Setup],
     *,
+    draw: Callable[[int], Setup] | None = None,
     keeps: Sequence[Keep] | None = None,
     slots: int | None = None,
     stop: threading.Event | None = None,
@@ -40,7 +41,8 @@ def run_setups(
     to the bit, on the others or on the number of slots.
 
     Args:
-        setups: The walks, samples drawn.
+        setups: The walks, samples drawn; with ``draw``, options and links suffice.
+        draw: Asked for a walk, by its place, when it begins; its options and links are those of ``setups``.
         keeps: What is kept of the motion of each, for ``course.motion``; None: nothing. Walks of equal options keep
             frames equally often.
         slots: Chains that are carried on together in one launch. Default: on a GPU as many as fill it, on a CPU, where
@@ -53,7 +55,7 @@ def run_setups(
     for (options, _), places in buckets.items():
         wanted = {place: keeps[place] if keeps is not None else NOTHING for place in places}
         batches = _batches(options, [setups[place].scene.links for place in places], list(wanted.values()), slots)
-        yield from _run_bucket(setups, wanted, batches, stop)
+        yield from _run_bucket(setups, draw or setups.__getitem__, wanted, batches, stop)
 
 
 def _batches(options: Options, links: Sequence[int], keeps: Sequence[Keep], slots: int | None) -> list[Batch]:
@@ -93,9 +95,9 @@ def compile_kernels(setups: Iterable[Setup]) -> None:
 class _Crew:
     """A batch and the walks on its worlds."""
 
-    def __init__(self, batch: Batch, setups: Sequence[Setup], wanted: Mapping[int, Keep]) -> None:
+    def __init__(self, batch: Batch, draw: Callable[[int], Setup], wanted: Mapping[int, Keep]) -> None:
         self.batch = batch
-        self._setups, self._wanted = setups, wanted
+        self._draw, self._wanted = draw, wanted
         self._free = list(reversed(range(len(batch.links))))
         self._running: dict[int, tuple[int, Course]] = {}
         self._features: dict[int, Features] = {}
@@ -104,7 +106,7 @@ class _Crew:
         """Give waiting walks the free worlds and begin a launch; False if there is nothing to carry on."""
         while self._free and (place := next(waiting, None)) is not None:
             world = self._free.pop()
-            course = Course(self.batch, world, self._setups[place], self._wanted[place])
+            course = Course(self.batch, world, self._draw(place), self._wanted[place])
             self._running[world] = place, course
             self._features[world] = course.features
         together: dict[Features, list[int]] = defaultdict(list)
@@ -130,12 +132,16 @@ class _Crew:
 
 
 def _run_bucket(
-    setups: Sequence[Setup], wanted: Mapping[int, Keep], batches: Sequence[Batch], stop: threading.Event | None
+    setups: Sequence[Setup],
+    draw: Callable[[int], Setup],
+    wanted: Mapping[int, Keep],
+    batches: Sequence[Batch],
+    stop: threading.Event | None,
 ) -> Iterator[tuple[int, Course]]:
     """Run walks, by place, that share options and the width of their arrays."""
     # long chains take longest: begun first, they are not what is waited for in the end
     waiting = iter(sorted(wanted, key=lambda place: -setups[place].scene.links))
-    crews = [_Crew(batch, setups, wanted) for batch in batches]
+    crews = [_Crew(batch, draw, wanted) for batch in batches]
     try:
         under_way = [crew for crew in crews if crew.begin(waiting)]
         while under_way and not (stop is not None and stop.is_set()):

@@ -164,16 +164,8 @@ class Sweep:
             IndexError: there is no such walk.
             InputError: no draw made a possible walk.
         """
-        if not 0 <= index < self.walk_count:
-            raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
-        number = bisect.bisect_right(self.blocks, index, key=lambda block: block.first) - 1
+        number, cell, sample = self._located(index)
         block = self.blocks[number]
-        rest, sample = divmod(index - block.first, block.samples)
-        places = []
-        for values in reversed(block.axes.values()):
-            rest, place = divmod(rest, len(values))
-            places.append(place)
-        cell = tuple(reversed(places))
         fixed = block.fixed(cell)
         if not block.drawn:
             return PlannedWalk(index, number, cell, sample, fixed, {})
@@ -184,6 +176,32 @@ class Sweep:
             candidates = itertools.chain([self._designed(block, stream, row, distributions)], candidates)
         points, setups = _first_possible(block, fixed, candidates)
         return PlannedWalk(index, number, cell, sample, setups[member], points[member])
+
+    def undrawn(self, indices: Iterable[int]) -> Iterator[PlannedWalk]:
+        """Walks before anything is drawn for them, which takes most of the time: options and links are theirs already.
+
+        Raises:
+            IndexError: there is no such walk.
+        """
+        before: tuple[int, tuple[int, ...]] | None = None
+        for index in indices:
+            number, cell, sample = self._located(index)
+            if (number, cell) != before:
+                before, fixed = (number, cell), self.blocks[number].fixed(cell)
+            yield PlannedWalk(index, number, cell, sample, fixed, {})
+
+    def _located(self, index: int) -> tuple[int, tuple[int, ...], int]:
+        """Number of a walk's block, its cell and its sample."""
+        if not 0 <= index < self.walk_count:
+            raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
+        number = bisect.bisect_right(self.blocks, index, key=lambda block: block.first) - 1
+        block = self.blocks[number]
+        rest, sample = divmod(index - block.first, block.samples)
+        places = []
+        for values in reversed(block.axes.values()):
+            rest, place = divmod(rest, len(values))
+            places.append(place)
+        return number, tuple(reversed(places)), sample
 
     def keep(self, walk: PlannedWalk) -> Keep:
         """What is kept of the motion of a walk."""

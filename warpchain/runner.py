@@ -21,6 +21,7 @@ from warpchain.options import Options, Setup
 from warpchain.parameters import InputError, validated
 from warpchain.planning import PlannedWalk, Sweep, load_sweep
 from warpchain.results import LOST
+from warpchain.shards import shard_name
 from warpchain.status import Status
 from warpchain.store import Store, empty_rows, read_shard, write_shard
 from warpchain.sweep_result import SweepResult, load
@@ -167,15 +168,21 @@ def run_shards(
     """
     planned = load_sweep(sweep)
     digest = planned.digest()
-    walks = [planned.planned(index) for first, last in shards for index in range(first, last)]
+    undrawn = list(planned.undrawn(index for first, last in shards for index in range(first, last)))
+    under_way: dict[int, PlannedWalk] = {}
     shard_of = {index: shard for shard in shards for index in range(*shard)}
     rows = {shard: empty_rows(planned, range(*shard)) for shard in shards}
     left = {shard: shard[1] - shard[0] for shard in shards}
     motions: dict[tuple[int, int], dict[int, Motion]] = {shard: {} for shard in shards}
-    keeps = [planned.keep(walk) for walk in walks]
+    keeps = [planned.keep(walk) for walk in undrawn]
     keys = []
-    for place, course in run_setups([walk.setup for walk in walks], keeps=keeps, stop=stop):
-        walk = walks[place]
+
+    def draw(place: int) -> Setup:
+        under_way[place] = planned.planned(undrawn[place].index)
+        return under_way[place].setup
+
+    for place, course in run_setups([walk.setup for walk in undrawn], draw=draw, keeps=keeps, stop=stop):
+        walk = under_way.pop(place)
         shard = shard_of[walk.index]
         _fill(rows[shard][walk.index - shard[0]], walk, course)
         if keeps[place].series_every is not None:
@@ -266,7 +273,8 @@ def _run(
     began = time.perf_counter()
     canonical, digest = planned.canonical(), planned.digest()
     waiting = _tasks(planned, missing, workers)
-    pending: dict[concurrent.futures.Future[list[str]], list[range]] = {}
+    folder = store.directory / "shards"
+    pending: dict[concurrent.futures.Future[list[str]], list[range]] = {}  # with the shards still to be counted
 
     def submit() -> bool:
         task = next(waiting, None)
@@ -276,10 +284,7 @@ def _run(
         pending[executor.submit(run_shards, canonical, str(store.directory), shards, *more)] = task
         return True
 
-    counted: set[range] = set()
-
     def count(shard: range) -> None:
-        counted.add(shard)
         statuses = read_shard(store.directory, digest, shard)["status"]
         progress.statuses.update(Status(int(code)).label for code in statuses)
         progress.done += len(shard)
@@ -294,13 +299,14 @@ def _run(
                 written += pending.pop(future)
                 future.result()
                 submit()
-            missing_still = set(store.missing())
-            written += [shard for task in pending.values() for shard in task if shard not in missing_still]
-            new = [shard for shard in written if shard not in counted]
-            for shard in new:
+            for task in pending.values():
+                there = [shard for shard in task if (folder / shard_name(shard)).exists()]
+                task[:] = [shard for shard in task if shard not in there]
+                written += there
+            for shard in written:
                 count(shard)
             progress.seconds = time.perf_counter() - began
-            if new and on_progress is not None:
+            if written and on_progress is not None:
                 on_progress(progress)
     finally:
         for future in pending:
@@ -314,14 +320,15 @@ def _tasks(planned: Sweep, missing: Sequence[range], workers: int) -> Iterator[l
     take as long.
     """
     on_gpu: list[range] = []
-    for shard in missing:
-        if planned.planned(shard.start).setup.options.device.startswith("cuda"):
+    firsts = planned.undrawn(shard.start for shard in missing)
+    for shard, first in zip(missing, firsts, strict=True):
+        if first.setup.options.device.startswith("cuda"):
             on_gpu.append(shard)
         else:
             yield [shard]
     count = workers * -(-sum(map(len, on_gpu)) // (workers * GPU_TASK_WALKS))
-    for first in range(min(count, len(on_gpu))):
-        yield on_gpu[first::count]
+    for number in range(min(count, len(on_gpu))):
+        yield on_gpu[number::count]
 
 
 def _counts(statuses: Counter[str]) -> str:
