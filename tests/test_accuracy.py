@@ -190,6 +190,7 @@ def test_contestants_are_read_as_they_are_named() -> None:
     for one in (
         Contestant("dp5"),
         Contestant("bs32", 1e-9),
+        Contestant("os32", 1e-3, (("soft_tolerance", 3e-3), ("controller", "pi"))),
         Contestant("rkf78", 2e-3, (("soften_pile", True), ("soften_area", 0.7), ("soften_drive", True))),
     ):
         assert Contestant.parse(one.name) == one
@@ -400,6 +401,8 @@ REFUSED = {
     "--methods dp5+soft": "--methods: 'soft' is unknown",
     "--methods quick": "--methods: 'quick' is unknown; give one of standard, explicit, reference, rkf78",
     "--methods dp5+skin": "--methods: skin in 'dp5+skin' has no value; write skin=NUMBER",
+    "--methods dp5+controller": "--methods: controller in 'dp5+controller' has no value; write controller=WORD",
+    "--methods dp5+controller=p": "--methods.controller: 'p' is unknown",
     "--methods dp5+skin=thin": "--methods: 'dp5+skin=thin' has no number after skin=",
     "--methods dp5+skin=-1": "--methods.skin: -1.0 is not greater than 0",
     "--methods dp5+soften_pile=1": "--methods: soften_pile in 'dp5+soften_pile=1' takes no value",

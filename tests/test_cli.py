@@ -98,8 +98,8 @@ def test_help_tells_the_defaults(command: Command) -> None:
         assert type(default)(match[1]) == default
     method = re.search(r"--method .*?Default: (\S+)\.(?: |$)", words)[1]
     assert options == Options(method=method)
-    assert f"{method}: {options.method} at 1e-4, joints softened on the sprocket and in the pile" in words
-    assert (options.tolerance, options.soften_drive, options.soften_pile) == (1e-4, True, True)
+    assert f"{method}: {options.method} at 1e-3, joints softened on the sprocket and in the pile" in words
+    assert (options.tolerance, options.soften_drive, options.soften_pile) == (1e-3, True, True)
     assert "Default: that of the method, 1e-6 for an integrator." in words
     assert Options(method="rkf78") == Options(method="reference")
     assert Options(method="bs32").tolerance == 1e-6

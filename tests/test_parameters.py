@@ -280,6 +280,15 @@ def test_contact_and_pitch_radius() -> None:
     assert joint_radius(pitch, parameters) == 5.56e-2
 
 
+@pytest.mark.parametrize("word", ["standard", "explicit"])
+def test_a_tolerance_given_beside_a_word_is_that_of_soft_joints_too(word: str) -> None:
+    """A word's tolerance of soft joints goes with the word's own tolerance only; one that is given stays."""
+    assert Options(method=word).soft_tolerance == 3 * Options(method=word).tolerance
+    assert Options(method=word, tolerance=1e-5).soft_tolerance is None
+    assert Options(method=word, tolerance=1e-5, soft_tolerance=1e-4).soft_tolerance == 1e-4
+    assert Options(method=word, tolerance=1e-5).soften_pile
+
+
 def test_pitch_needs_a_sprocket_larger_than_a_circle() -> None:
     """With the radius of the joints, a sprocket no larger than a circle is refused; otherwise it is not."""
     small = preset("paper").with_values({"sprocket_radius": 4.2e-3})

@@ -41,8 +41,8 @@ def test_digest_ignores_what_does_not_matter(change: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
-        ({}, ("hybrid", "dp5")),
-        ({"method": "standard", "tolerance": 1e-3}, ("hybrid", "dp5")),
+        ({}, ("hybrid", "os32")),
+        ({"method": "standard", "tolerance": 1e-4}, ("hybrid", "os32")),
         ({"method": "hybrid"}, ("hybrid", "hybrid")),
         ({"method": "reference"}, ("rkf78", "rkf78")),
     ],
@@ -56,6 +56,15 @@ def test_a_method_by_need_is_that_of_the_device(options: dict[str, Any], expecte
     assert there.tolerance == options.get("tolerance", here.tolerance)
     again = load_sweep(on_device(planned, "cuda:1").canonical())
     assert again.planned(0).setup.options == there
+
+
+def test_a_device_changes_nothing_else_of_methods_on_an_axis() -> None:
+    """Methods named along an axis keep the settings they have without a device, and so do tolerances along one."""
+    for grid in ({"method": ["dp5", "bs32"]}, {"tolerance": [1e-4, 1e-5]}):
+        planned = load_sweep(content(grid=grid, options={}))
+        there = on_device(planned, "cpu")
+        indices = range(planned.walk_count)
+        assert [there.planned(i).setup.options for i in indices] == [planned.planned(i).setup.options for i in indices]
 
 
 def test_a_stored_sweep_keeps_its_method_unless_it_is_given_a_word_again() -> None:

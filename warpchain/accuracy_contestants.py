@@ -15,9 +15,13 @@ SWITCHES: Final = tuple(
 )
 """Options that can be switched on beside a method."""
 NUMBERS: Final = tuple(
-    name for name, field in Options.model_fields.items() if field.annotation is float and name != "tolerance"
+    name
+    for name, field in Options.model_fields.items()
+    if field.annotation in (float, float | None) and name != "tolerance"
 )
 """Options that can be given a number beside a method."""
+CHOICES: Final = ("controller",)
+"""Options that can be given a word beside a method."""
 
 
 @dataclass(frozen=True)
@@ -28,12 +32,12 @@ class Contestant:
         method: Name of the method.
         tolerance: Its tolerance.
         settings: Options that differ from their defaults, in the order of `Options`: True for those of `SWITCHES`, a
-            number for those of `NUMBERS`.
+            number for those of `NUMBERS`, a word for those of `CHOICES`.
     """
 
     method: str
     tolerance: float = TOLERANCE
-    settings: tuple[tuple[str, float], ...] = ()
+    settings: tuple[tuple[str, float | str], ...] = ()
 
     @classmethod
     def of(cls, options: Mapping[str, object]) -> Self:
@@ -46,7 +50,7 @@ class Contestant:
         settings = tuple(
             (name, getattr(checked, name))
             for name, field in Options.model_fields.items()
-            if name in (*SWITCHES, *NUMBERS) and getattr(checked, name) != field.default
+            if name in (*SWITCHES, *NUMBERS, *CHOICES) and getattr(checked, name) != field.default
         )
         return cls(checked.method, checked.tolerance, settings)
 
@@ -77,7 +81,7 @@ class Contestant:
 
     @classmethod
     def parse(cls, text: str, device: str = "cpu") -> Self:
-        """Read ``NAME[@TOLERANCE][+SWITCH][+NUMBER=VALUE]…``, the name that of a method or a word for a need there.
+        """Read ``NAME[@TOLERANCE][+SWITCH][+NAME=VALUE]…``, the first name that of a method or a word for a need there.
 
         Raises:
             InputError: A name is unknown, or a value is no number or impossible.
@@ -96,19 +100,27 @@ class Contestant:
             name, equals, value = setting.partition("=")
             if equals and name in NUMBERS:
                 options[name] = _number(text, value, f"after {name}=; write one")
+            elif equals and name in CHOICES:
+                options[name] = value
             elif name in SWITCHES and not equals:
                 options[name] = True
+            elif name in CHOICES:
+                raise InputError(f"--methods: {name} in {shown(text)} has no value; write {name}=WORD")
             elif name in NUMBERS:
                 raise InputError(f"--methods: {name} in {shown(text)} has no value; write {name}=NUMBER")
             elif name in SWITCHES:
                 raise InputError(f"--methods: {name} in {shown(text)} takes no value; write +{name} to switch it on")
             else:
-                raise InputError(f"--methods: {shown(name)} is unknown; {suggestion(name, (*SWITCHES, *NUMBERS))}")
+                raise InputError(
+                    f"--methods: {shown(name)} is unknown; {suggestion(name, (*SWITCHES, *NUMBERS, *CHOICES))}"
+                )
         return cls.of(options)
 
 
-def _exact(value: float) -> str:
-    """A number so that it can be read back: in six digits if they are all it has."""
+def _exact(value: float | str) -> str:
+    """A number so that it can be read back, in six digits if they are all it has; a word as it is."""
+    if isinstance(value, str):
+        return value
     short = f"{value:g}"
     return short if float(short) == value else repr(float(value))
 

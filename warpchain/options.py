@@ -161,8 +161,8 @@ is the cheapest on a CPU; on a GPU, where it saves nothing, the word means the s
 class Options(BaseModel):
     """How a walk is computed.
 
-    `method` also takes a word of `METHODS_BY_NEED`: then the word's settings are what the fields default to. A method
-    that is named itself has the defaults below.
+    `method` also takes a word of `METHODS_BY_NEED`: then the word's settings are what the fields default to, but with
+    a `tolerance` its `soft_tolerance` does not apply. A method that is named itself has the defaults below.
 
     Raises:
         pydantic.ValidationError: a value is unknown or out of bounds, the smallest step is not below the
@@ -286,7 +286,10 @@ class Options(BaseModel):
             return values
         if word == "standard" and str(values.get("device")).startswith("cuda"):
             word = "explicit"
-        return {**METHODS_BY_NEED[word], **{name: value for name, value in values.items() if name != "method"}}
+        defaults = dict(METHODS_BY_NEED[word])
+        if "tolerance" in values:
+            defaults.pop("soft_tolerance", None)  # whoever asks for a tolerance means it everywhere
+        return {**defaults, **{name: value for name, value in values.items() if name != "method"}}
 
     @field_validator("device")
     @classmethod

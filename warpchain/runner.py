@@ -133,7 +133,8 @@ def on_device(planned: Sweep, device: str) -> Sweep:
     """
     canonical = planned.canonical()
     for block, content in zip(planned.blocks, canonical["blocks"], strict=True):
-        given = {**block.plan.sections["options"], "device": device}
+        first = {name: values[0] for name, values in block.axes.items() if name in Options.model_fields}
+        given = {**block.plan.sections["options"], **first, "device": device}
         options = validated(Options, given, "options").model_dump()
         content["options"] = {name: options[name] for name in content["options"]}
     return load_sweep(canonical)
