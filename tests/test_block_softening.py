@@ -124,3 +124,33 @@ def test_blocks_drive_on_softer_joints_as_the_cpu_form_does(cut: int, exact_kern
     assert theirs.state.softness.numpy()[0] == 1.0
     assert theirs.counts(0)["accepted"] < theirs.time(0) / (1.1 * FIXED_STEP)
     assert_same_bits(ours, theirs)
+
+
+def advance(batch: Batch, form: str, features: Features, tries: int) -> None:
+    """Carry a batch on in the block form or in the CPU form."""
+    if form == "block":
+        launch_blocks(batch, features, tries, block_dim=LINKS)
+    else:
+        launch_chains(batch, features, tries)
+
+
+@pytest.mark.parametrize("form", ["block", "cpu"])
+@pytest.mark.parametrize("made", ["heap", "ring"])
+def test_soft_tolerance_is_that_of_soft_joints_only(made: str, form: str) -> None:
+    """A soft tolerance that no step meets refuses every step of joints at softness 1, and none of stiffer ones."""
+    batch = heaps(0.9975) if made == "heap" else released()
+    features = softening_features(batch, "floor", "rest")
+    if made == "ring":
+        advance(batch, form, features, 8)  # until it has begun to stiffen
+    batch.control.soft_tolerance = 1e-13
+    refused_before = [0] * len(batch.links)
+    seen = set()
+    for _ in range(60):
+        advance(batch, form, features, 1)
+        refused = [batch.counts(world)["rejected"] for world in range(len(batch.links))]
+        softness = batch.state.softness.numpy().tolist()  # a look that changes it comes before the try
+        assert np.subtract(refused, refused_before).tolist() == [soft >= 1.0 for soft in softness]
+        seen.update(soft >= 1.0 for soft in softness)
+        refused_before = refused
+        batch.state.step.numpy()[:] = FIXED_STEP
+    assert seen == ({False, True} if made == "heap" else {False})

@@ -88,6 +88,18 @@ def test_both_controllers_reach_the_same_flight():
     assert flights[0].steps_accepted != flights[1].steps_accepted
 
 
+@pytest.mark.parametrize(("method", "stable"), [("bs32", 2.5), ("os32", 6.2), ("dp5", 3.4)])
+def test_steps_of_a_loose_tolerance_stay_at_the_bound_of_stability(method, stable):
+    """At 1e-3 stability bounds steps, to 1/(1.08e6/s) times what the method bears; `pi` grows back to it for ever."""
+    duration = 2e-3
+    start = spinning_ellipse(PAPER)
+    flight = warpchain.simulate(
+        PAPER, *start, duration, times=[duration], method=method, tolerance=1e-3, controller="pi", step_limit=20_000
+    )
+    assert flight.status == Status.FINISHED
+    assert 0.75 < duration / flight.steps_accepted / (stable / 1.08e6) < 1.05
+
+
 def test_features_left_out_do_not_change_a_flight():
     """Without floor and self-contacts in the kernel a flight that meets neither is the same to rounding."""
     start = spinning_ellipse(SOFT)

@@ -186,6 +186,21 @@ def test_nothing_changes_before_the_joints_soften(stiff_walk, softened_walk) -> 
     assert np.isnan(stiff_walk.softened_at)
 
 
+def test_soft_tolerance_changes_a_walk_from_where_its_joints_soften(stiff_walk, softened_walk) -> None:
+    """A walk that never softens has the same bits for any; one that does has them up to there, then fewer steps."""
+    unsoftened = short_walk(soft_tolerance=1e-3)
+    loose = short_walk(soften_pile=True, soft_tolerance=1e-3)
+    switch = int(np.flatnonzero(softened_walk.time == softened_walk.softened_at)[0])
+    for name in SERIES:
+        assert_array_equal(getattr(unsoftened, name), getattr(stiff_walk, name), err_msg=name)
+        tight, after = getattr(softened_walk, name), getattr(loose, name)
+        assert_array_equal(after[: switch + 1], tight[: switch + 1], err_msg=name)
+        assert not np.array_equal(after[switch + 1], tight[switch + 1]), name
+    assert loose.softened_at == softened_walk.softened_at
+    assert loose.steps_accepted < softened_walk.steps_accepted
+    assert loose.dx == pytest.approx(softened_walk.dx, abs=1e-3)
+
+
 def test_softened_walk_ends_alike_with_fewer_steps(stiff_walk, softened_walk) -> None:
     """The chain comes to rest at the same place to a millimetre, in far fewer steps."""
     assert softened_walk.status == Status.AT_REST
@@ -345,6 +360,7 @@ def test_cuts_into_launches_do_not_change_a_softened_walk(monkeypatch: pytest.Mo
         ({"soften_area": 0.0}, r"options\.soften_area: 0.0 is not greater than 0; .*"),
         ({"soften_area": 1.0}, r"options\.soften_area: 1.0 is not less than 1; .*"),
         ({"soften_area": float("nan")}, r"options\.soften_area: nan is not finite; .*"),
+        ({"soft_tolerance": 0.0}, r"options\.soft_tolerance: 0.0 is less than 1e-13; .*"),
         ({"soft_contact_step": 0.0}, r"options\.soft_contact_step: 0.0 is not greater than 0 s; .*"),
         ({"soften_pile": 1}, r"options\.soften_pile: 1 is not a truth value; .*"),
         ({"soften_drive": "yes"}, r"options\.soften_drive: 'yes' is not a truth value; .*"),
