@@ -1,6 +1,7 @@
 """A worker process for each GPU: what each sees, what is refused; no GPU is needed for that."""
 
 import os
+import time
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,18 @@ def test_each_worker_is_asked_once(monkeypatch: pytest.MonkeyPatch) -> None:
         assert len(set(first)) == 3 and set(first) == set(again)
     with gpu_workers(2) as executor, pytest.raises(ZeroDivisionError):
         executor.in_each(eval, "1 // int(__import__('os').environ['CUDA_VISIBLE_DEVICES'])")
+
+
+def test_an_exception_ends_what_workers_are_doing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C does not wait for tasks under way, nor for those that the pool has handed out already."""
+    monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
+    with pytest.raises(KeyboardInterrupt), gpu_workers(1) as executor:
+        executor.in_each(os.getpid)
+        for _ in range(3):
+            executor.submit(time.sleep, 30)
+        began = time.monotonic()
+        raise KeyboardInterrupt
+    assert time.monotonic() - began < 15
 
 
 def test_a_sweep_runs_on_gpu_workers(tmp_path: Path) -> None:

@@ -41,10 +41,17 @@ class GpuWorkers(ProcessPoolExecutor):
             raise error
         return [future.result() for future in futures]
 
+    def stop(self) -> None:
+        """End the processes at once; shards that they have written are whole."""
+        for process in list((self._processes or {}).values()):  # Python has a public name for this from 3.14 on
+            process.terminate()
+
 
 @contextlib.contextmanager
 def gpu_workers(count: int) -> Iterator[GpuWorkers]:
     """As many worker processes, each of which sees one GPU only and runs a sweep with the device ``cuda``.
+
+    An exception, such as by Ctrl-C, ends them in the middle of what they do: a task may be minutes of work.
 
     Args:
         count: Number of GPUs; the first ones, in the order of CUDA_VISIBLE_DEVICES if that is set.
@@ -53,7 +60,11 @@ def gpu_workers(count: int) -> Iterator[GpuWorkers]:
         InputError: CUDA_VISIBLE_DEVICES has fewer.
     """
     with GpuWorkers(visible_gpus(count)) as executor:
-        yield executor
+        try:
+            yield executor
+        except BaseException:
+            executor.stop()
+            raise
 
 
 def visible_gpus(count: int) -> Sequence[str]:
