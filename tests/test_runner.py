@@ -124,6 +124,31 @@ def test_progress_tells_when_the_walks_begin(tmp_path):
     assert seen[2][1] > 0 and seen[2][2] > 0 and seen[-1][1] == 80
 
 
+def test_progress_shows_the_shards_of_a_task_under_way(tmp_path, monkeypatch, uninterrupted):
+    """With all shards in one task, each is counted once, and most of them before the task is over."""
+    monkeypatch.setattr(runner, "POLL", 0.01)
+    monkeypatch.setattr(runner, "_tasks", lambda planned, missing, workers: iter([list(missing)]))
+    seen = []
+    sweep(TINY, tmp_path / "sweep", workers=1, on_progress=lambda p: seen.append((p.done, sum(p.statuses.values()))))
+    assert all(done == counted for done, counted in seen)
+    assert len({done for done, _ in seen}) > 5 and seen[-1] == (80, 80)
+    assert data_of(tmp_path / "sweep") == uninterrupted
+
+
+def test_walks_are_drawn_when_they_begin(tmp_path, monkeypatch):
+    """A task asks for the draw of a walk when the one before it is over, and for no walk twice."""
+    planned, events = load_sweep(TINY), []
+    draw, write = type(planned).planned, runner.write_shard
+    monkeypatch.setattr(type(planned), "planned", lambda self, index: events.append(index) or draw(self, index))
+    monkeypatch.setattr(runner, "write_shard", lambda *given: events.append("written") or write(*given))
+    monkeypatch.setattr(runner, "_tasks", lambda planned, missing, workers: iter([list(missing)]))
+    monkeypatch.setattr(runner, "prepare", lambda planned: None)
+    sweep(TINY, tmp_path / "sweep", workers=1)
+    drawn = [event for event in events if event != "written"]
+    assert sorted(drawn) == list(range(80))
+    assert events.index("written") < 10
+
+
 def test_a_finished_sweep_is_not_run_again(tmp_path, uninterrupted):
     """A second run of a complete sweep computes nothing and gives the same result."""
     folder = tmp_path / "sweep"

@@ -40,6 +40,24 @@ def test_more_samples_and_more_blocks_change_nothing_before() -> None:
     assert [few.planned(index).drawn for index in range(3)] == [many.planned(index).drawn for index in range(3)]
 
 
+def test_undrawn_walks_are_those_drawn_but_for_what_is_drawn() -> None:
+    """Place, links and options are those of the walk, in any order of asking; nothing is drawn."""
+    sweep = load_sweep(blocks({"grid": {"links": [60, 90], "tolerance": [1e-5, 1e-6]}}, {"samples": 2}))
+    indices = [*range(sweep.walk_count), *reversed(range(sweep.walk_count))]
+    for index, undrawn in zip(indices, sweep.undrawn(indices), strict=True):
+        walk = sweep.planned(index)
+        assert undrawn.drawn == {} != walk.drawn
+        assert (undrawn.index, undrawn.block, undrawn.cell, undrawn.sample) == (
+            walk.index,
+            walk.block,
+            walk.cell,
+            walk.sample,
+        )
+        assert (undrawn.setup.options, undrawn.setup.scene.links) == (walk.setup.options, walk.setup.scene.links)
+    with pytest.raises(IndexError):
+        list(sweep.undrawn([sweep.walk_count]))
+
+
 def test_first_sample_is_that_of_a_single_walk() -> None:
     """Sample 0 of cell 0 is what a single walk draws from the same seed; the others follow the same rule."""
     settings = {"links": 90, "frequency": 12.0, "floor_friction": 0.1}
