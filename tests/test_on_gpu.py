@@ -59,7 +59,7 @@ def compare(ours: dict[str, np.ndarray], theirs: dict[str, np.ndarray]) -> float
     return max(np.abs(ours[name] - theirs[name]).max() / np.abs(theirs[name]).max() for name in names)
 
 
-CASES = [("rkf78", "floor"), ("dp5", "sprocket"), ("bs32", "floor"), ("dp5", "floor")]
+CASES = [("rkf78", "floor"), ("dp5", "sprocket"), ("bs32", "floor"), ("os32", "floor"), ("dp5", "floor")]
 
 
 @pytest.fixture(autouse=True)
@@ -83,7 +83,7 @@ def test_fixed_steps_agree_with_the_cpu(method: str, fixed_body: str) -> None:
     assert compare(fixed_steps("cuda", method, fixed_body), fixed_steps("cpu", method, fixed_body)) < 1e-9
 
 
-@pytest.mark.parametrize("method", ["dp5", "hybrid"])
+@pytest.mark.parametrize("method", ["dp5", "os32", "hybrid"])
 def test_a_walk_gives_the_same_bits_in_any_batch(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Alone, among others of other lengths, in few or many slots and launches, after whatever ran before."""
     settings = {"device": "cuda", "method": method}
@@ -179,10 +179,12 @@ def test_a_sweep_ended_by_ctrl_c_goes_on(tmp_path: Path) -> None:
     assert np.array_equal(series.center, alone.center)
 
 
-@pytest.mark.parametrize(("method", "within"), [("rkf78", 1e-8), ("dp5", 1e-8), ("bs32", 1e-7), ("rodas4p", 1e-8)])
+@pytest.mark.parametrize(
+    ("method", "within"), [("rkf78", 1e-8), ("dp5", 1e-8), ("bs32", 1e-7), ("os32", 1e-7), ("rodas4p", 1e-8)]
+)
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_flights_agree_with_scipy(name: str, method: str, within: float) -> None:
-    """At tolerance 1e-9 a flight with friction and damping agrees with DOP853 to 1e-8, bs32's rates to 1e-7."""
+    """At tolerance 1e-9 a flight with friction and damping agrees with DOP853 to 1e-8, rates of order 3 to 1e-7."""
     start, (position, velocity) = exact_flight(name)
     settings = {"method": method, "tolerance": 1e-9, "device": "cuda"}
     flight = simulate(name, *start, FLIGHTS[name], times=[FLIGHTS[name]], **settings)
