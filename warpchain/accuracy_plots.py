@@ -270,7 +270,7 @@ def _draw_line(axes: Axes, drawn: Any, color: str, marker: str) -> None:
 def _colors(chosen: Sequence[str]) -> dict[str, str]:
     """A colour for each method; SciPy's are black."""
     ours = [*_FIRST, *(method for method in chosen if method not in _FIRST and method not in _SCIPY)]
-    free = LINE_COLORS[:-1]
+    free = (*LINE_COLORS[:-1], FAINT)
     return {method: free[k % len(free)] for k, method in enumerate(ours)} | dict.fromkeys(_SCIPY, LINE_COLORS[-1])
 
 
