@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from tests.sweep_content import UNIFORM, blocks, content
-from warpchain.parameters import PRESETS, preset
+from warpchain.parameters import PRESETS, InputError, preset
 from warpchain.planning import load_sweep
 from warpchain.runner import on_device
 
@@ -65,6 +65,13 @@ def test_a_device_changes_nothing_else_of_methods_on_an_axis() -> None:
         there = on_device(planned, "cpu")
         indices = range(planned.walk_count)
         assert [there.planned(i).setup.options for i in indices] == [planned.planned(i).setup.options for i in indices]
+
+
+def test_a_device_is_refused_beside_devices_on_an_axis() -> None:
+    """One of them would be passed over."""
+    planned = load_sweep(content(grid={"device": ["cuda:0", "cuda:1"]}, options={}))
+    with pytest.raises(InputError, match="device: cpu is given, but the sweep's grid goes over devices; leave one"):
+        on_device(planned, "cpu")
 
 
 def test_a_stored_sweep_keeps_its_method_unless_it_is_given_a_word_again() -> None:

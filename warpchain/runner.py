@@ -130,7 +130,12 @@ def on_device(planned: Sweep, device: str) -> Sweep:
 
     The canonical form, in which a folder keeps its sweep, names the method itself: what was run once is run again, on
     whatever device, and does not change with the meaning of a word.
+
+    Raises:
+        InputError: The sweep's grid goes over devices.
     """
+    if any("device" in block.axes for block in planned.blocks):
+        raise InputError(f"device: {device} is given, but the sweep's grid goes over devices; leave one of them out")
     canonical = planned.canonical()
     for block, content in zip(planned.blocks, canonical["blocks"], strict=True):
         first = {name: values[0] for name, values in block.axes.items() if name in Options.model_fields}
