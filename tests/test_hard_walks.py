@@ -55,9 +55,12 @@ def test_longest_slow_walk_ends_in_a_pile_at_rest(method):
 def test_chain_dropped_without_spin_rests_below(name, links, method):
     """An upright ellipse at rest drops, collapses and rests within a few centimetres of where it hung.
 
-    With the settings of standard: at 1e-6 and on stiff joints a pile takes minutes.
+    With the settings of explicit, for at 1e-6 and on stiff joints a pile takes minutes; but tolerances of 1e-3 are made
+    for os32, which hybrid has as well.
     """
     settings = {**METHODS_BY_NEED["explicit"], "method": method}
+    if method not in ("os32", "hybrid"):
+        settings |= {"tolerance": 1e-4, "soft_tolerance": 1e-4}
     done = walk(preset=name, links=links, frequency=0.0, start="ellipse", ellipse_aspect=2.0, **settings)
     assert done.status == Status.AT_REST
     assert abs(done.dx) < 0.03
