@@ -259,21 +259,23 @@ def test_walks_are_timed_in_turn_and_compared_with_the_reference() -> None:
 # --- hard cases ---
 
 
-@pytest.mark.parametrize("method", ["rkf78", "dp5"])
+@pytest.mark.parametrize(
+    "method",
+    [name if name in ("rkf78", "dp5") else pytest.param(name, marks=pytest.mark.slow) for name in methods()],
+)
 def test_quick_cases_are_sound(method: str) -> None:
-    """Every case that takes no longer than a moment ends as it may."""
-    for case in HARD_CASES:
-        if case.name not in SLOW_CASES:
-            outcome = case.subject.run(method)
-            assert outcome.sound, (case.name, outcome)
+    """Every case that takes no longer than a moment ends as it may, whatever the method."""
+    outcomes = {case.name: case.subject.run(method) for case in HARD_CASES if case.name not in SLOW_CASES}
+    assert len(outcomes) == len(HARD_CASES) - len(SLOW_CASES)
+    assert not {name: outcome for name, outcome in outcomes.items() if not outcome.sound}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", methods())
-def test_all_cases_are_sound(method: str) -> None:
-    """Every case ends as it may, whatever the method."""
-    outcomes = {case.name: case.subject.run(method) for case in HARD_CASES}
-    assert SLOW_CASES < set(outcomes)
+@pytest.mark.parametrize("method", ["rkf78", "os32", "hybrid"])
+def test_slow_cases_are_sound(method: str) -> None:
+    """The others do with the methods of the three words; tests of hard walks have the like for every method."""
+    outcomes = {case.name: case.subject.run(method) for case in HARD_CASES if case.name in SLOW_CASES}
+    assert set(outcomes) == SLOW_CASES
     assert not {name: outcome for name, outcome in outcomes.items() if not outcome.sound}
 
 
