@@ -29,7 +29,7 @@ from .block_board import (
 from .block_contact import block_self_contacts, touch_layout
 from .block_hand_over import block_hand_over, flight_of, list_margins, step_factors, take_turns
 from .block_list import block_list
-from .block_look import block_look
+from .block_look import block_look, note_bounds
 from .block_memory import barrier, barrier_if_any, block_maxima, clock, tile_address, vec5i
 from .block_rigid import FlightMemory
 from .block_room import board_rows, shares_board, shares_memory
@@ -65,7 +65,6 @@ from .layout import (
     LIST_BUILDS,
     MASS,
     NOTE_CLOSING_TIME,
-    NOTE_CONTACT_STEP,
     NOTE_DEADLINE,
     NOTE_FIXED_DEPTH,
     NOTE_LAST_IMPULSE,
@@ -90,7 +89,7 @@ from .layout import (
 )
 from .methods import METHODS
 from .record import record_is_full, summarise, write_sample
-from .softening import contact_step, softened, spring_tolerance
+from .softening import softened
 from .types import Control, Model, Program, Record, State, read_chain
 
 wp.set_module_options({"enable_backward": False})
@@ -233,8 +232,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if wp.static(softens):
                 chain = softened(chain, control, state.softness[world])
             note_constants(K, chain)
-            K[BOARD_NOTES, NOTE_CONTACT_STEP] = contact_step(control, state.softness[world])
-            K[BOARD_NOTES, NOTE_TOLERANCE] = spring_tolerance(control, state.softness[world])
+            note_bounds(K, control, state.softness[world])
             K[BOARD_NOTES, NOTE_OPENING] = state.extremes[world, OPENING]
             K[BOARD_NOTES, NOTE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
             K[BOARD_NOTES, NOTE_LAST_IMPULSE] = state.watch[world, LAST_FLOOR_IMPULSE]

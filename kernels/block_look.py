@@ -16,6 +16,13 @@ from .types import Control, Model, Program, Record, State, read_chain
 wp.set_module_options({"enable_backward": False})
 
 
+@wp.func
+def note_bounds(K: wp.array2d(dtype=wp.float64), control: Control, softness: wp.float64):
+    """Puts on the board what bounds steps of the springs while joints have this softness."""
+    K[BOARD_NOTES, NOTE_CONTACT_STEP] = contact_step(control, softness)
+    K[BOARD_NOTES, NOTE_TOLERANCE] = spring_tolerance(control, softness)
+
+
 @functools.cache
 def block_look(features: Features, touch: TouchLayout):
     """Warp function ``look(K, T, model, program, state, record, control, world, time)`` for one thread of a block.
@@ -46,8 +53,7 @@ def block_look(features: Features, touch: TouchLayout):
         if wp.static(softens):
             if state.softness[world] != softness:
                 note_constants(K, change_joints(chain, model, state, control, world))
-                K[BOARD_NOTES, NOTE_CONTACT_STEP] = contact_step(control, state.softness[world])
-                K[BOARD_NOTES, NOTE_TOLERANCE] = spring_tolerance(control, state.softness[world])
+                note_bounds(K, control, state.softness[world])
         K[BOARD_NOTES, NOTE_STOP_TIME] = state.stop_time[world]
         K[BOARD_NOTES, NOTE_NEXT_LOOK] = wp.float64(state.next_sample[world]) * control.sample_interval
         if clock() > K[BOARD_NOTES, NOTE_DEADLINE]:

@@ -82,15 +82,21 @@ def softening_features(batch: Batch, fixed_body: str, watch: str) -> Features:
     return dataclasses.replace(batch.features(fixed_body=fixed_body, watch=watch), softens=True)
 
 
+def launch_both(ours: Batch, theirs: Batch, features: Features, cut: int) -> None:
+    """Sixty tries or a few more: in blocks, so many to a launch, and in the CPU form, all at once."""
+    launches = -(-60 // cut)
+    for _ in range(launches):
+        launch_blocks(ours, features, cut, block_dim=LINKS)
+    launch_chains(theirs, features, cut * launches)
+
+
 @pytest.mark.parametrize("cut", [60, 7])
 @pytest.mark.parametrize(("area", "softness"), [(0.9975, 1.0), (1.995, 2.0)])
 def test_blocks_soften_a_pile_as_the_cpu_form_does(area: float, softness: float, cut: int, exact_kernels: None) -> None:
     """The block form softens at the same looks, frees the same energy, and goes on to the same bits, however cut."""
     ours, theirs = heaps(area), heaps(area)
     features = softening_features(ours, "floor", "rest")
-    for _ in range(-(-60 // cut)):
-        launch_blocks(ours, features, min(cut, 60), block_dim=LINKS)
-    launch_chains(theirs, features, cut * -(-60 // cut))
+    launch_both(ours, theirs, features, cut)
     first, second = (theirs.softened_at(world) for world in range(2))
     assert 0 < first <= second < theirs.time(0)
     assert theirs.state.softness.numpy().tolist() == [softness, softness]
@@ -103,9 +109,7 @@ def test_blocks_stiffen_as_the_cpu_form_does(cut: int, exact_kernels: None) -> N
     """The block form gives the joints their values back in the same steps, however cut into launches."""
     ours, theirs = released(), released()
     features = softening_features(ours, "floor", "rest")
-    for _ in range(-(-60 // cut)):
-        launch_blocks(ours, features, min(cut, 60), block_dim=LINKS)
-    launch_chains(theirs, features, cut * -(-60 // cut))
+    launch_both(ours, theirs, features, cut)
     assert theirs.state.softness.numpy()[0] == 0.0
     assert theirs.state.losses.numpy()[0, layout.LOSS_SOFTENING] < 0
     assert_same_bits(ours, theirs)
@@ -116,9 +120,7 @@ def test_blocks_drive_on_softer_joints_as_the_cpu_form_does(cut: int, exact_kern
     """The block form makes joints softest and soft again in the same steps of the drive, however cut into launches."""
     ours, theirs = driven(), driven()
     features = softening_features(ours, "sprocket", "steady")
-    for _ in range(-(-60 // cut)):
-        launch_blocks(ours, features, min(cut, 60), block_dim=LINKS)
-    launch_chains(theirs, features, cut * -(-60 // cut))
+    launch_both(ours, theirs, features, cut)
     assert theirs.counts(0)["sprocket"] > 10
     assert theirs.time(0) > 70 * FIXED_STEP
     assert theirs.state.softness.numpy()[0] == 1.0

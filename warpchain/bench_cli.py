@@ -5,6 +5,8 @@ from typing import Annotated, Literal
 
 import typer
 
+from warpchain.sweep_cli import SweepFile
+
 bench_app = typer.Typer()
 
 
@@ -110,9 +112,7 @@ def accuracy(
 
 @bench_app.command("sweep")
 def sweep(
-    source: Annotated[
-        Path, typer.Argument(metavar="FILE.yaml", help="The sweep, as those in sweeps/.", show_default=False)
-    ],
+    source: SweepFile,
     output: Annotated[
         Path,
         typer.Option("-o", "--output", metavar="DIR", help="Folder of the results, with a folder for each place."),

@@ -15,14 +15,15 @@ if TYPE_CHECKING:
 
 FAILED: Final = 1
 
+SweepFile = Annotated[
+    Path, typer.Argument(metavar="FILE.yaml", help="The sweep, as those in sweeps/.", show_default=False)
+]
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a sweep.", show_default=False)]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, in SI units, instead of a table.")]
 
 
 def sweep(
-    source: Annotated[
-        Path, typer.Argument(metavar="FILE.yaml", help="The sweep, as those in sweeps/.", show_default=False)
-    ],
+    source: SweepFile,
     output: Annotated[
         Path,
         typer.Option("-o", "--output", metavar="DIR", help="Folder of the results; a killed sweep goes on in it."),
