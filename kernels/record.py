@@ -282,7 +282,7 @@ def sampling(watch: str, softens: bool = False):
         passed = wp.int64(wp.floor(time / control.sample_interval))
         state.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
         if wp.static(softens and watches_rest):
-            watch_stiffening(state, control, world, time)
+            watch_stiffening(state, program, control, world, time)
             watch_collapse(K, chain, state, control, world, time, is_first)
         if wp.static(softens and watches_steadiness):
             watch_spin_up(state, program, control, world, time)

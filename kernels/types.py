@@ -48,6 +48,7 @@ class Program:
     steady_time: wp.array(dtype=wp.float64)  # how long the loop must have been steady [s]
     steady_tolerance: wp.array(dtype=wp.float64)  # relative change of its height and width in that time
     release_phase: wp.array(dtype=wp.float64)  # release this fraction of a loop period after steadiness
+    hold_softness: wp.array(dtype=wp.float64)  # of joints that are soft in the drive: 1 to 2
 
 
 @wp.struct
@@ -116,9 +117,8 @@ class Control:
     soft_stiffness: wp.float64  # k of soft joints [N/m]
     soft_damping: wp.float64  # b [N s/m]
     soft_smoothing: wp.float64  # ω_c [rad/s]
-    softest_stiffness: wp.float64  # the same of the softest
+    softest_stiffness: wp.float64  # the same of the softest, whose ω_c is that of soft ones
     softest_damping: wp.float64
-    softest_smoothing: wp.float64
     soft_contact_step: wp.float64  # longest step near a contact while joints are softer than soft [s]
     soften_area: wp.float64  # joints soften below this fraction of the first area
     stiffening_time: wp.float64  # from soft joints at the release to the model's own [s]

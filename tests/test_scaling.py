@@ -51,6 +51,15 @@ def test_every_place_runs_the_whole_sweep(measured: tuple[scaling.Scaling, Path]
     assert data_of(folder / "cpu@3") == data_of(tmp_path / "three")
 
 
+@pytest.mark.parametrize(("device", "method"), [("cpu", "hybrid"), ("cuda", "os32")])
+def test_a_word_means_what_it_does_on_the_place(device: str, method: str) -> None:
+    """The default method of a sweep is another one on a GPU, and so it is where a sweep is measured there."""
+    source = load_sweep({name: value for name, value in TINY.items() if name != "options"})
+    (block,) = Place(device, device, samples=3).planned(source).blocks
+    assert block.plan.sections["options"]["method"] == method
+    assert block.samples == 3
+
+
 def test_rates_are_those_of_the_walks(measured: tuple[scaling.Scaling, Path]) -> None:
     """Walks and simulated time per wall time; the ratio is of walks per second, however many samples were taken."""
     costs, _ = measured[0].costs, measured[1]

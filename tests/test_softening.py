@@ -10,7 +10,7 @@ from scipy.special import ellipe
 
 import warpchain
 from warpchain import InputError, Status, ensemble, preset
-from warpchain.control import SOFT, SOFTEST, STIFFENING_TIME
+from warpchain.control import SOFTEST, STIFFENING_TIME
 from warpchain.course import Course
 from warpchain.devices import start_device
 from warpchain.engine import Batch
@@ -83,7 +83,7 @@ def joints_of(stiffness: float, damping: float, smoothing: float, softness: floa
     chain.joint_stiffness, chain.joint_damping, chain.inverse_smoothing = stiffness, damping, 1 / smoothing
     control = Control()
     control.soft_stiffness, control.soft_damping, control.soft_smoothing = 1e7, 100.0, 0.1
-    control.softest_stiffness, control.softest_damping, control.softest_smoothing = 1e6, 25.0, 1.6
+    control.softest_stiffness, control.softest_damping = 1e6, 25.0
     chains = wp.array([chain], dtype=Chain, device="cpu")
     inputs = [chains, control, wp.array([softness], dtype=wp.float64, device="cpu")]
     wp.launch(_soften, dim=1, inputs=inputs, device="cpu")
@@ -97,9 +97,9 @@ def test_softness_goes_geometrically_from_own_over_soft_to_softest() -> None:
         assert joints_of(1e9, 1e3, 1e-3, softness) == (1e9, 1e3, 1 / 1e-3)
     assert joints_of(1e9, 1e3, 1e-3, 1.0) == (1e7, 100.0, 1 / 0.1)
     for softness in (2.0, 2.1):
-        assert joints_of(1e9, 1e3, 1e-3, softness) == (1e6, 25.0, 1 / 1.6)
+        assert joints_of(1e9, 1e3, 1e-3, softness) == (1e6, 25.0, 1 / 0.1)
     assert_allclose(joints_of(1e9, 1e3, 1e-3, 0.5), [1e8, np.sqrt(1e5), 100.0], rtol=1e-14)
-    assert_allclose(joints_of(1e9, 1e3, 1e-3, 1.5), [np.sqrt(1e13), 50.0, 2.5], rtol=1e-14)
+    assert_allclose(joints_of(1e9, 1e3, 1e-3, 1.5), [np.sqrt(1e13), 50.0, 10.0], rtol=1e-14)
 
 
 def test_no_joint_becomes_stiffer() -> None:
@@ -118,13 +118,13 @@ def _contact_step(control: Control, softness: wp.array(dtype=wp.float64), steps:
 
 @pytest.mark.parametrize(("own", "longest"), [(2e-5, 5e-5), (7e-5, 7e-5)])
 def test_steps_near_contacts_are_longer_only_beyond_soft(own: float, longest: float) -> None:
-    """Up to softness 1 the contact step bounds them, beyond it the greater of the two."""
+    """Up to softness 1 the contact step bounds them, at 2 the greater of the two, in between their geometric mean."""
     control = Control()
     control.contact_step, control.soft_contact_step = own, 5e-5
-    softness = wp.array([0.0, 0.5, 1.0, 1.01, 2.0], dtype=wp.float64, device="cpu")
+    softness = wp.array([0.0, 0.5, 1.0, 1.5, 2.0], dtype=wp.float64, device="cpu")
     steps = wp.full(5, np.nan, dtype=wp.float64, device="cpu")
     wp.launch(_contact_step, dim=5, inputs=[control, softness, steps], device="cpu")
-    assert steps.numpy().tolist() == [own, own, own, longest, longest]
+    assert_allclose(steps.numpy(), [own, own, own, np.sqrt(own * longest), longest], rtol=1e-14)
 
 
 # --- the pile ---
@@ -257,14 +257,14 @@ SPINNING = {"links": 30, "frequency": 15.0, "start": "spinning", "steady_time": 
 
 
 def test_joints_are_soft_on_the_sprocket_and_stiff_soon_after_the_release() -> None:
-    """Spring energy is n T²/2k' at the release of soft joints, T = m̄ v²/ℓ, and that of stiff ones before landing."""
+    """Spring energy is n T²/2k' at the release, T = m̄ v²/ℓ, k' such as stretches by 3e-4; as on stiff joints soon."""
     stiff, soft = (
         warpchain.walk(**SPINNING, preset="paper", clearance=0.02, walk_limit=0.06, soften_drive=on)
         for on in (False, True)
     )
     speed = 2 * np.pi * 15.0 * (PAPER.sprocket_radius + PAPER.circle_radius)
     tension = (PAPER.inner_mass + PAPER.outer_mass) / 2 * speed**2 / PAPER.link_length
-    for walk, stiffness in ((stiff, PAPER.joint_stiffness), (soft, SOFT.joint_stiffness)):
+    for walk, stiffness in ((stiff, PAPER.joint_stiffness), (soft, tension / (3e-4 * PAPER.link_length))):
         level = 30 * tension**2 / (2 * stiffness)
         assert walk.spring_energy[0] == pytest.approx(level, rel=0.5)
     assert stiff.lowest.min() > 0
@@ -279,9 +279,13 @@ def test_a_soft_drive_takes_fewer_steps_and_as_long() -> None:
     assert soft.simulated_time == pytest.approx(stiff.simulated_time, abs=1e-4)
 
 
-def test_joints_are_softest_while_the_sprocket_spins_up() -> None:
-    """In the spin-up spring energy is n T²/2k of the softest joints, in the hold that of soft ones, T = m̄ v²/ℓ."""
-    settings = {"links": 30, "frequency": 15.0, "method": "standard", "settle_time": 0.1, "spin_up_time": 0.3}
+@pytest.mark.parametrize(("frequency", "held"), [(9.0, 1e6), (15.0, 2.25e6), (35.0, 1e7)])
+def test_joints_are_softest_until_the_sprocket_has_spun_up(frequency: float, held: float) -> None:
+    """In the spin-up spring energy is n T²/2k of the softest joints, T = m̄ v²/ℓ; in the hold they stretch by 3e-4.
+
+    There k is as great as that needs, within bounds: 2.25e6 N/m at 15 Hz.
+    """
+    settings = {"links": 30, "frequency": frequency, "method": "standard", "settle_time": 0.1, "spin_up_time": 0.3}
     setup = setup_walk("paper", settings, None)
     batch = Batch(1, 30, setup.options)
     course = Course(batch, 0, setup)
@@ -291,9 +295,9 @@ def test_joints_are_softest_while_the_sprocket_spins_up() -> None:
         batch.run([0], course.features)
         look = batch.last_look(0)
         levels.append((batch.state.softness.numpy()[0], look[layout.SPRING], look[layout.LOOP_SPEED]))
-    assert [softness for softness, _, _ in levels] == [1.0, 2.0, 1.0]
+    assert_allclose([softness for softness, _, _ in levels], [2.0, 2.0, 1 + np.log10(1e7 / held)], atol=5e-3)
     mass = (PAPER.inner_mass + PAPER.outer_mass) / 2
-    for (_, spring, speed), stiffness in zip(levels[1:], (SOFTEST.joint_stiffness, SOFT.joint_stiffness), strict=True):
+    for (_, spring, speed), stiffness in zip(levels[1:], (SOFTEST.joint_stiffness, held), strict=True):
         tension = mass * speed**2 / PAPER.link_length
         assert spring == pytest.approx(30 * tension**2 / (2 * stiffness), rel=0.5)
 

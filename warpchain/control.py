@@ -4,20 +4,40 @@ import math
 
 from warpchain.kernels.types import Control
 from warpchain.options import Options
-from warpchain.parameters import preset
+from warpchain.parameters import Parameters, preset
 
 SOFT = preset("soft")
 """Whose joints soft ones have, see :mod:`warpchain.kernels.softening`."""
-SOFTEST = SOFT.with_values({"joint_stiffness": 1e6, "joint_damping": 30.0, "friction_smoothing": 1.0})
+SOFTEST = SOFT.with_values({"joint_stiffness": 1e6, "joint_damping": 30.0})
 """Whose joints the softest have.
 
 Measured with `paper` and dp5 at 1e-4 on walks that are the same until the loop encloses half of its first area: Δx then
 shifts by 0.01 ± 0.04 mm (24 walks of 60 links at 15 Hz) and 1.5 ± 1.5 mm (16 of 150 at 20 Hz; 0.01 ± 0.08 mm from 0.3
-of the area), in 2.7 times fewer tries. k = 3e5 N/m takes 1.6 times fewer again, but circles sink 2 mm into the
+of the area), in 2.7 times fewer tries; with ω_c = 1 rad/s, which takes 5 % fewer again but lets circles sink in half as
+deep again, as it then was. k = 3e5 N/m takes 1.6 times fewer again, but circles sink 2 mm into the
 floor. From 0.9 of the area 1e6 N/m may shift Δx: by 8 ± 4 mm of 1 m (12 walks of 150 links).
 """
 STIFFENING_TIME = 0.03
 """Time [s] in which joints that were soft on the sprocket get their own values back after the release."""
+
+HOLD_STRAIN = 3e-4
+"""Strain that the loop's speed may cause in joints that are softened while it is held."""
+
+
+def hold_softness(parameters: Parameters, speed: float) -> float:
+    """Softness of the joints while the loop is held, from 1 for soft ones to 2 for the softest.
+
+    A loop that circulates is under the tension m v² / ℓ, and stretches by that over k ℓ: slow ones may be softer.
+
+    Args:
+        parameters: Of the chain.
+        speed: Of the joints along the loop [m/s].
+    """
+    mass = (parameters.inner_mass + parameters.outer_mass) / 2
+    wanted = mass * (speed / parameters.link_length) ** 2 / HOLD_STRAIN
+    span = SOFT.joint_stiffness / SOFTEST.joint_stiffness
+    share = math.log(SOFT.joint_stiffness / max(wanted, SOFTEST.joint_stiffness)) / math.log(span)
+    return 1.0 + max(0.0, share)
 
 
 def control_of(options: Options) -> Control:
@@ -39,7 +59,6 @@ def control_of(options: Options) -> Control:
     control.soft_smoothing = SOFT.friction_smoothing
     control.softest_stiffness = SOFTEST.joint_stiffness
     control.softest_damping = SOFTEST.joint_damping
-    control.softest_smoothing = SOFTEST.friction_smoothing
     control.soft_contact_step = options.soft_contact_step
     control.soften_area = options.soften_area if options.soften_pile else -math.inf
     control.stiffening_time = STIFFENING_TIME

@@ -11,6 +11,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.control import hold_softness
 from warpchain.engine import COUNTS, EXTREMES, Batch
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features
@@ -79,9 +80,10 @@ class Course:
                     f"scene.ellipse_aspect: {scene.links} links cannot follow an ellipse of aspect "
                     f"{scene.ellipse_aspect}; give one closer to 1, or more links"
                 ) from None
-            self._settled = self._at_full_speed = 0.0
+            self._settled = self._at_full_speed = self._hold_softness = 0.0
             self._release(position, velocity)
             return
+        self._hold_softness = hold_softness(parameters, speed) if setup.options.soften_drive else 0.0
         batch.set_chain(world, parameters, scene.links, contact_radius(scene, parameters))
         self._settled = scene.settle_time if from_rest else 0.0
         spin_up = scene.spin_up_time if from_rest and speed > 0 else 0.0
@@ -98,7 +100,7 @@ class Course:
             velocity,
             stop_time=self._settled,
             stop_status=Status.FINISHED,
-            softness=float(setup.options.soften_drive),
+            softness=self._hold_softness,
         )
         batch.set_program(
             world,
@@ -111,6 +113,7 @@ class Course:
             steady_time=scene.steady_time,
             steady_tolerance=scene.steady_tolerance,
             release_phase=scene.phase,
+            hold_softness=self._hold_softness,
         )
         if not from_rest:
             self._start_drive()
@@ -238,7 +241,6 @@ class Course:
         measured = self._hanging_lowest if scene.clearance_of == "hanging" else lowest
         self.raised = scene.clearance - measured
         position[:, 1] += self.raised
-        was_driven_soft = self.setup.options.soften_drive and scene.start != "ellipse"
         self._batch.set_chain(self._world, self.setup.parameters, scene.links)
         self._batch.load(
             self._world,
@@ -247,7 +249,7 @@ class Course:
             stop_time=scene.walk_limit,
             stop_status=Status.TIME_LIMIT,
             tries_before=self.drive_counts["accepted"] + self.drive_counts["rejected"],
-            softness=float(was_driven_soft),
+            softness=self._hold_softness,
         )
         self._released = True
 

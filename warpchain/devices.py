@@ -35,7 +35,8 @@ def start_device(device: str) -> wp.Device:
         InputError: This machine has no such device.
     """
     wp.config.log_level = wp.LOG_ERROR
-    os.environ.setdefault("CUDA_DEVICE_MAX_CONNECTIONS", CONNECTIONS)  # CUDA reads it when it starts
+    os.environ.setdefault("CUDA_DEVICE_MAX_CONNECTIONS", CONNECTIONS)  # CUDA reads both when it starts
+    os.environ.setdefault("CUDA_MODULE_LOADING", "EAGER")  # else a kernel's first launch waits for those under way
     with _without_driver_warning():
         wp.init()
     name = "cuda:0" if device == "cuda" else device

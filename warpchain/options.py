@@ -268,8 +268,8 @@ class Options(BaseModel):
     )
     soften_drive: bool = Field(
         default=False,
-        description="whether joints are softest while the sprocket spins up, soft on it before and after, and have "
-        "their own values from 0.03 s after the release",
+        description="whether joints are softest until the sprocket has spun up, soft or softer until the release, and "
+        "have their own values from 0.03 s after the release",
     )
     device: str = Field(default="cpu", description="where walks run: cpu, cuda (the first GPU) or cuda:N")
 

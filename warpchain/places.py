@@ -74,15 +74,15 @@ class Place:
         return self.name.replace(":", "-")
 
     def planned(self, source: Sweep) -> Sweep:
-        """The sweep as it runs here.
+        """The sweep as it runs here, by the method that a word in it means here.
 
         Raises:
             InputError: The sweep cannot have so many samples, or cannot run on this device.
         """
-        canonical = source.canonical()
+        canonical = on_device(source, self.device).canonical()  # which names methods, no more words
         for block in canonical["blocks"]:
             block["samples"] = self.samples or block["samples"]
-        return on_device(load_sweep(canonical), self.device)
+        return load_sweep(canonical)
 
 
 def places_of(texts: Sequence[str], samples: int | None = None) -> list[Place]:

@@ -56,45 +56,18 @@ def stadium(radius: float) -> Curve:
     def points(s: Array, size: float) -> CurvePoints:
         turn = 4 * quarter + 2 * size
         laps, s = np.divmod(s, turn)
-        right, lower, left, last = quarter, quarter + size, 3 * quarter + size, 3 * quarter + 2 * size
-        piece = np.digitize(s, [right, lower, left, last])
-        zero, one = np.zeros_like(s), np.ones_like(s)
-        first = s / radius
-        below = (s - lower) / radius
-        final = (s - last) / radius
-
-        def pick(*rows: tuple[Array, Array]) -> Array:
-            x = np.choose(piece, [row[0] for row in rows])
-            y = np.choose(piece, [row[1] for row in rows])
-            return np.stack([x, y], axis=1)
-
-        along = pick(
-            (np.cos(first), -np.sin(first)),
-            (zero, -one),
-            (-np.sin(below), -np.cos(below)),
-            (zero, one),
-            (np.sin(final), np.cos(final)),
-        )
-        growth = pick(
-            (zero, zero),
-            (zero, zero),
-            (np.sin(below), np.cos(below) - 1),
-            (zero, -2 * one),
-            (-2 * np.sin(final), -2 * np.cos(final)),
-        )
-        # every lap before grows with the size, too
-        growth -= 2 * laps[:, None] * along
-        return CurvePoints(
-            point=pick(
-                (radius * np.sin(first), radius * np.cos(first)),
-                (radius * one, -(s - right)),
-                (radius * np.cos(below), -size - radius * np.sin(below)),
-                (-radius * one, -size + (s - left)),
-                (-radius * np.cos(final), radius * np.sin(final)),
-            ),
-            along=along,
-            growth=growth,
-        )
+        down = np.clip(s - quarter, 0.0, size)  # ways along the two straights
+        up = np.clip(s - 3 * quarter - size, 0.0, size)
+        angle = (s - down - up) / radius
+        sine, cosine = np.sin(angle), np.cos(angle)
+        along = np.stack([cosine, -sine], axis=1)
+        # what a longer straight changes at the same s: where it ends on the right, where it begins and ends on the left
+        down_growth = np.where(s > quarter + size, 1.0, 0.0)
+        up_growth = np.where(s > 3 * quarter + size, np.where(s > turn - quarter, 1.0, -1.0), 0.0)
+        growth = -(down_growth + up_growth + 2 * laps)[:, None] * along  # every lap before grows, too
+        growth[:, 1] += up_growth - down_growth
+        point = np.stack([radius * sine, radius * cosine - down + up], axis=1)
+        return CurvePoints(point=point, along=along, growth=growth)
 
     return Curve(
         points=points,
@@ -186,18 +159,13 @@ def _solve_loop(to_here: Array, to_following: Array, to_size: Array, right: Arra
     Chord i: to_here[i] δs[i] + to_following[i] δs[i + 1] + to_size[i] δsize = right[i], with δs[0] = δs[n] = 0.
     From the first chord on, each gives the next δs as a + b δsize; the last one then gives δsize.
     """
-    # plain floats: a loop over elements of arrays takes ten times as long
-    rows = list(zip(to_here.tolist(), to_following.tolist(), to_size.tolist(), right.tolist(), strict=True))
-    constant, slope = [0.0], [0.0]
-    try:
-        for here, following, growth, value in rows[:-1]:
-            constant.append((value - here * constant[-1]) / following)
-            slope.append(-(growth + here * slope[-1]) / following)
-        here, _, growth, value = rows[-1]
-        size = (value - here * constant[-1]) / (growth + here * slope[-1])
-    except ZeroDivisionError:  # a singular loop
-        return np.full(len(rows), np.nan)
-    return np.append(np.array(constant[1:]) + np.array(slope[1:]) * size, size)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a singular loop gives no finite change
+        scale = np.cumprod(np.append(1.0, -to_here[:-1] / to_following[:-1]))  # what a change of the first δs becomes
+        constant, slope = (
+            scale * np.append(0.0, np.cumsum(side[:-1] / (to_following[:-1] * scale[1:]))) for side in (right, -to_size)
+        )
+        size = (right[-1] - to_here[-1] * constant[-1]) / (to_size[-1] + to_here[-1] * slope[-1])
+        return np.append(constant[1:] + slope[1:] * size, size)
 
 
 def _chord_ends(points: CurvePoints) -> tuple[CurvePoints, CurvePoints]:
