@@ -1,7 +1,7 @@
 """Batches side by side, their memory, and the copies of their arrays on the host; what of it needs no GPU."""
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pytest
@@ -11,11 +11,12 @@ from tests.test_runner import brief_setup, outcomes
 from warpchain import ensemble
 from warpchain.devices import CAPACITY_FRAMES, CAPACITY_SAMPLES, start_device, world_bytes
 from warpchain.engine import Batch
-from warpchain.kernel_choice import block_threads, features_of, kernels_of
+from warpchain.kernel_choice import block_threads, features_of, kernels_of, registers, shared_threads
 from warpchain.kernels import layout
+from warpchain.kernels.driver import Features
 from warpchain.mirror import Mirror
 from warpchain.options import Options
-from warpchain.runner import SweepProgress
+from warpchain.runner import SweepProgress, prepare
 from warpchain.sweep_cli import _progress_text
 
 
@@ -45,7 +46,7 @@ class SlowBatch(Batch):
         return self.asked % 3 == 0
 
 
-def several_batches(options: Options, links: Sequence[int], _keeps: object, _slots: object) -> list[Batch]:
+def several_batches(options: Options, links: Sequence[int], *_: object) -> list[Batch]:
     """As many as a GPU gets, one larger than the others."""
     return [SlowBatch(worlds, max(links), options) for worlds in (1, 3, 1, 1)]
 
@@ -95,8 +96,36 @@ def test_a_block_has_a_thread_for_each_link() -> None:
     """Threads come in whole warps of 32, and chains of equal blocks share a kernel."""
     assert [block_threads(n) for n in (4, 32, 60, 64, 66, 180)] == [32, 32, 64, 64, 96, 192]
     features = features_of(Options(), layout.padded_width(60), fixed_body="floor", watch="rest")
-    ((_, threads),) = kernels_of(start_device("cpu"), features, [60, 180])
+    ((_, threads),) = kernels_of(start_device("cpu"), features, [64, 192])
     assert threads == 1
+
+
+def test_few_walks_of_several_lengths_share_a_kernel() -> None:
+    """The longest chain's block serves all, with the registers that each has in its own; many walks have their own."""
+    assert shared_threads("os32", [60, 90, 180], 504) == 192
+    assert shared_threads("os32", [60, 90], 504) == 96
+    assert shared_threads("os32", [60, 64], 504) is None
+    assert shared_threads("os32", [60, 90, 180], 20_000) is None
+    assert shared_threads("os32", [60, 240], 504) is None
+    assert shared_threads("dp5", [60, 90, 180], 504) is None
+    assert {registers("os32", threads) for threads in range(32, 193, 32)} == {168}
+
+
+def test_kernels_of_a_sweep_are_those_that_its_walks_ask_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is compiled beforehand for few walks on a GPU is one kernel for the drive and one for the walk."""
+    content = {"version": 1, "name": "few", "seed": 1, "preset": "soft", "samples": 2, "grid": {"links": [60, 150]}}
+    loaded: set[tuple[str, str, int]] = set()
+
+    def note(wanted: Iterable[tuple[wp.Device, Features, int]]) -> None:
+        loaded.update((features.method, features.fixed_body, threads) for _, features, threads in wanted)
+
+    monkeypatch.setattr(ensemble, "load_kernels", note)
+    monkeypatch.setattr(ensemble, "start_device", lambda _: None)
+    prepare(content | {"options": {"device": "cuda"}})
+    assert loaded == {("os32", "floor", 160), ("os32", "sprocket", 160)}
+    loaded.clear()
+    prepare(content | {"samples": 2000, "options": {"device": "cuda"}})
+    assert loaded == {("os32", body, threads) for body in ("floor", "sprocket") for threads in (64, 160)}
 
 
 def test_progress_says_when_kernels_are_compiled() -> None:

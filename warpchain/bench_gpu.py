@@ -147,8 +147,8 @@ def gpu_costs(
     report("compiling kernels")
     options = {method: Options.model_validate({"method": method, "device": device}) for method in methods}
     load_kernels(
-        (found, features_of(options[method], layout.padded_width(n), fixed_body="floor", watch="rest"), [n])
-        for method, n in itertools.product(methods, links)
+        (found, features_of(options[method], columns, fixed_body="floor", watch="rest"), block_threads(n))
+        for method, (n, columns) in itertools.product(methods, [(n, layout.padded_width(n)) for n in links])
     )
     parameters = preset("paper")
     costs = []

@@ -74,11 +74,11 @@ def versions() -> dict[str, str]:
     return {name: importlib.metadata.version(name) for name in packages} | {"python": platform.python_version()}
 
 
-def scratch_rows(options: Options, longest: int, device: wp.Device) -> int:
-    """Rows of a chain's scratch block on a device, for chains of up to this many links."""
+def scratch_rows(options: Options, longest: int, device: wp.Device, threads: int | None = None) -> int:
+    """Rows of a chain's scratch block on a device, for chains of up to this many links; threads as for a batch."""
     columns = layout.padded_width(longest)
     if device.is_cuda:
-        return block_rows(options.method, block_threads(longest), columns)
+        return block_rows(options.method, threads or block_threads(longest), columns)
     return METHODS[options.method].scratch_rows(columns)
 
 

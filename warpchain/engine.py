@@ -58,6 +58,7 @@ class Batch:
         *,
         keeps_samples: bool = False,
         frame_every: int | None = None,
+        threads: int | None = None,
     ) -> None:
         """Allocate a batch; all worlds are idle (status FINISHED) until a chain is loaded.
 
@@ -67,8 +68,10 @@ class Batch:
             options: Shared by all worlds.
             keeps_samples: Keep the time series.
             frame_every: Keep all joint positions at every so many samples; None keeps none.
+            threads: Of every block on a GPU, at least as many as links; None: as many as a chain needs.
         """
         self.options = options
+        self._threads = threads
         self.device = start_device(options.device)
         self.links = [0] * worlds
         self._mirrors: dict[int, Mirror] = {}
@@ -76,7 +79,7 @@ class Batch:
         self._done: wp.Event | None = None
         self._lanes = [wp.Stream(self.device) for _ in range(LANES)] if self.device.is_cuda else []
         self.columns = layout.padded_width(longest)
-        rows = scratch_rows(options, longest, self.device)
+        rows = scratch_rows(options, longest, self.device, threads)
 
         self.model = Model()
         self.model.link_count = self._array(np.zeros(worlds, dtype=np.int32))
@@ -256,8 +259,12 @@ class Batch:
             features: What they are compiled for.
             links: On a GPU, numbers of links, each of which may need a kernel of its own.
         """
-        for kernel, threads in kernels_of(self.device, features, links):
+        for kernel, threads in kernels_of(self.device, features, map(self.block_size, links)):
             wp.load_module(kernel.module, device=self.device, block_dim=threads)
+
+    def block_size(self, links: int) -> int:
+        """Threads of the block that carries a chain of so many links on a GPU."""
+        return self._threads or block_threads(links)
 
     def launch(self, worlds: Sequence[int], features: Features, tries: int) -> float:
         """Carry worlds on by at most this many tries each; returns the wall time [s]."""
@@ -285,7 +292,7 @@ class Batch:
         blocks: dict[tuple[Features, int], list[int]] = defaultdict(list)
         for features, worlds in groups.items():
             for world in worlds:
-                blocks[features, block_threads(self.links[world])].append(world)
+                blocks[features, self.block_size(self.links[world])].append(world)
         order = np.array([world for worlds in blocks.values() for world in worlds], dtype=np.int32)
         if not np.array_equal(self._order.view()[: len(order)], order):
             self._order.edit()[: len(order)] = order

@@ -33,6 +33,7 @@ def run_setups(
     draw: Callable[[int], Setup] | None = None,
     keeps: Sequence[Keep] | None = None,
     slots: int | None = None,
+    threads: int | None = None,
     stop: threading.Event | None = None,
 ) -> Iterator[tuple[int, Course]]:
     """Run walks and yield each when it is over, as (place in ``setups``, course).
@@ -47,6 +48,7 @@ def run_setups(
             frames equally often.
         slots: Chains that are carried on together in one launch. Default: on a GPU as many as fill it, on a CPU, where
             a launch is one core's work, one at a time, which stays in the cache.
+        threads: Of every block on a GPU, see :func:`warpchain.kernel_choice.shared_threads`; no bit depends on it.
         stop: When set, the walks are abandoned after the launch that is under way.
     """
     buckets: dict[tuple[Options, int], list[int]] = defaultdict(list)
@@ -54,11 +56,14 @@ def run_setups(
         buckets[setup.options, layout.padded_width(setup.scene.links)].append(place)
     for (options, _), places in buckets.items():
         wanted = {place: keeps[place] if keeps is not None else NOTHING for place in places}
-        batches = _batches(options, [setups[place].scene.links for place in places], list(wanted.values()), slots)
+        links = [setups[place].scene.links for place in places]
+        batches = _batches(options, links, list(wanted.values()), slots, threads)
         yield from _run_bucket(setups, draw or setups.__getitem__, wanted, batches, stop)
 
 
-def _batches(options: Options, links: Sequence[int], keeps: Sequence[Keep], slots: int | None) -> list[Batch]:
+def _batches(
+    options: Options, links: Sequence[int], keeps: Sequence[Keep], slots: int | None, threads: int | None
+) -> list[Batch]:
     """Room for walks: on a CPU one batch, on a GPU several, with as many worlds in all as are of use and fit."""
     longest = max(links)
     # Every batch keeps what any walk wants, although most may want nothing: others would wait for two slowest walks.
@@ -74,22 +79,34 @@ def _batches(options: Options, links: Sequence[int], keeps: Sequence[Keep], slot
         slots = min(fitting, len(links))
     worlds = -(-slots // CREWS) if on_gpu else slots
     return [
-        Batch(min(worlds, slots - first), longest, options, keeps_samples=keeps_samples, frame_every=frame_every)
+        Batch(
+            min(worlds, slots - first),
+            longest,
+            options,
+            keeps_samples=keeps_samples,
+            frame_every=frame_every,
+            threads=threads,
+        )
         for first in range(0, slots, worlds)
     ]
 
 
-def compile_kernels(setups: Iterable[Setup]) -> None:
-    """Make sure that every kernel these walks need is ready, before threads or processes ask for it at once."""
+def compile_kernels(setups: Iterable[Setup], threads: int | None = None) -> None:
+    """Make sure that every kernel these walks need is ready, before threads or processes ask for it at once.
+
+    Args:
+        setups: The walks.
+        threads: As for :func:`run_setups`.
+    """
     wanted: set[tuple[str, Features, int]] = set()
     for setup in setups:
         columns = layout.padded_width(setup.scene.links)
         bodies = [("floor", "rest")] + [("sprocket", "steady")] * (setup.scene.start != "ellipse")
         for fixed_body, watch in bodies:
             features = features_of(setup.options, columns, fixed_body=fixed_body, watch=watch)
-            threads = block_threads(setup.scene.links) if setup.options.device.startswith("cuda") else 1
-            wanted.add((setup.options.device, features, threads))
-    load_kernels((start_device(device), features, [threads]) for device, features, threads in wanted)
+            size = (threads or block_threads(setup.scene.links)) if setup.options.device.startswith("cuda") else 1
+            wanted.add((setup.options.device, features, size))
+    load_kernels((start_device(device), features, size) for device, features, size in wanted)
 
 
 class _Crew:

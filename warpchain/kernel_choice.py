@@ -1,7 +1,7 @@
 """Which kernels carry chains on: by device, what happens to the chains, and their numbers of links."""
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 
 import warp as wp
@@ -11,7 +11,7 @@ from warpchain.kernels.driver import Features, make_advance
 from warpchain.kernels.rosenbrock_tables import ROSENBROCK_TABLES
 from warpchain.options import Options
 
-REGISTERS = {160: 128, 224: 128, 256: 128}
+FEWER_REGISTERS = {160: 128, 224: 128, 256: 128}
 """Registers a thread may take, by threads of a block, where that lets another block onto a multiprocessor; else 168.
 
 A multiprocessor has four schedulers with 16384 registers each, so that a block's number of warps of 32 threads and
@@ -20,17 +20,50 @@ per try and chain, with 128 and 168: 60 links 12.2, 6.4, 3.9 and 9.9, 5.5, 3.3; 
 5.5; 150 links 28.7, 16.4, 10.1 and 32.9, 18.0, 10.7. Without a bound, few chains run up to 15 % faster and many slower;
 one number for all keeps a walk's bits independent of its batch. rodas4p is fastest without one.
 """
+SHARED_METHODS = ("os32",)
+"""Methods whose kernels take 168 registers for all chains of up to 192 links, whatever the table says.
+
+Then what a walk gives does not depend, to the bit, on the threads of its block, see :func:`shared_threads`.
+"""
+SHARED_THREADS = 192
+SHARED_WALKS = 2000
+
+
+def registers(method: str, threads: int) -> int | None:
+    """Registers that a thread of such a block may take; None: as many as it likes."""
+    if method in ROSENBROCK_TABLES:
+        return None
+    if method in SHARED_METHODS and threads <= SHARED_THREADS:
+        return 168
+    return FEWER_REGISTERS.get(threads, 168)
 
 
 def block_kernel(features: Features, threads: int) -> wp.Kernel:
     """The kernel of the block form for blocks of this many threads."""
-    registers = None if features.method in ROSENBROCK_TABLES else REGISTERS.get(threads, 168)
-    return make_advance_block(features, threads, registers)
+    return make_advance_block(features, threads, registers(features.method, threads))
 
 
 def block_threads(links: int) -> int:
     """Threads of a GPU's block that carries a chain: one per link, rounded up to whole warps of 32."""
     return -(-links // 32) * 32
+
+
+def shared_threads(method: str, links: Iterable[int], walks: int) -> int | None:
+    """Threads of every block of walks that should share a kernel; None: each chain has a block of its own size.
+
+    Kernels of blocks of different sizes that run on one multiprocessor take the instruction cache from one another. The
+    504 walks of Figure 6 (60 to 180 links, os32, one H200) take 6.4 s in blocks of five sizes and 5.3 s in blocks of
+    192 threads, although most have idle ones; 1008 walks 10.8 and 8.5 s, 2016 walks 15.8 and 15.5 s.
+
+    Args:
+        method: Of the walks.
+        links: Numbers of links.
+        walks: How many walks there are.
+    """
+    sizes = {block_threads(n) for n in links}
+    if len(sizes) < 2 or walks > SHARED_WALKS or method not in SHARED_METHODS or max(sizes) > SHARED_THREADS:
+        return None
+    return max(sizes)
 
 
 def features_of(options: Options, columns: int, *, fixed_body: str, watch: str, broad_phase: str = "grid") -> Features:
@@ -46,23 +79,23 @@ def features_of(options: Options, columns: int, *, fixed_body: str, watch: str, 
     )
 
 
-def kernels_of(device: wp.Device, features: Features, links: Iterable[int]) -> list[tuple[wp.Kernel, int]]:
-    """Kernels that carry chains with these numbers of links on, each with the threads of its blocks."""
+def kernels_of(device: wp.Device, features: Features, threads: Iterable[int]) -> list[tuple[wp.Kernel, int]]:
+    """Kernels that carry chains on in blocks of these numbers of threads, each with that; on a CPU one for all."""
     if not device.is_cuda:
         return [(make_advance(features), 1)]
-    return [(block_kernel(features, threads), threads) for threads in sorted({block_threads(n) for n in links})]
+    return [(block_kernel(features, size), size) for size in sorted(set(threads))]
 
 
-def load_kernels(wanted: Iterable[tuple[wp.Device, Features, Sequence[int]]]) -> None:
+def load_kernels(wanted: Iterable[tuple[wp.Device, Features, int]]) -> None:
     """Compile what is not yet in the cache, several kernels at a time.
 
     Args:
-        wanted: Device, features and numbers of links.
+        wanted: Device, features and threads of a block.
     """
     kernels = [
         (device, kernel, threads)
-        for device, features, links in wanted
-        for kernel, threads in kernels_of(device, features, links)
+        for device, features, size in wanted
+        for kernel, threads in kernels_of(device, features, [size])
     ]
 
     def load(item: tuple[wp.Device, wp.Kernel, int]) -> None:

@@ -16,6 +16,7 @@ from typing import Any, Protocol
 
 from warpchain.course import Course
 from warpchain.ensemble import compile_kernels, run_setups
+from warpchain.kernel_choice import shared_threads
 from warpchain.motion import Motion
 from warpchain.options import Options, Setup
 from warpchain.parameters import InputError, validated
@@ -187,7 +188,8 @@ def run_shards(
         under_way[place] = planned.planned(undrawn[place].index)
         return under_way[place].setup
 
-    for place, course in run_setups([walk.setup for walk in undrawn], draw=draw, keeps=keeps, stop=stop):
+    setups, threads = [walk.setup for walk in undrawn], _shared_threads(planned)
+    for place, course in run_setups(setups, draw=draw, keeps=keeps, threads=threads, stop=stop):
         walk = under_way.pop(place)
         shard = shard_of[walk.index]
         _fill(rows[shard][walk.index - shard[0]], walk, course)
@@ -251,16 +253,25 @@ def prepare(source: Mapping[str, Any] | Sweep) -> None:
     Args:
         source: The sweep, or its canonical form.
     """
-    compile_kernels(one_of_each_cell(load_sweep(source)))
+    planned = load_sweep(source)
+    compile_kernels(one_of_each_cell(planned), _shared_threads(planned))
 
 
 def one_of_each_cell(planned: Sweep) -> list[Setup]:
-    """The first walk of every cell."""
-    return [
-        planned.planned(first).setup
-        for block in planned.blocks
-        for first in range(block.first, block.first + block.walk_count, block.samples)
-    ]
+    """Options and links of every cell."""
+    firsts = (
+        first for block in planned.blocks for first in range(block.first, block.first + block.walk_count, block.samples)
+    )
+    return [walk.setup for walk in planned.undrawn(firsts)]
+
+
+def _shared_threads(planned: Sweep) -> int | None:
+    """Threads of every block of the walks of a sweep on a GPU, all of one method; None: as many as a chain needs."""
+    cells = one_of_each_cell(planned)
+    methods = {setup.options.method for setup in cells}
+    if not _is_on_gpu(planned) or len(methods) > 1:
+        return None
+    return shared_threads(methods.pop(), (setup.scene.links for setup in cells), planned.walk_count)
 
 
 def _run(
