@@ -280,6 +280,13 @@ def test_contact_and_pitch_radius() -> None:
     assert joint_radius(pitch, parameters) == 5.56e-2
 
 
+def test_hybrid_alone_has_the_tolerance_that_it_is_made_for() -> None:
+    """1e-3 for its bursts of order 3, unless one says otherwise; other integrators 1e-6."""
+    assert Options.model_validate({"method": "hybrid"}).tolerance == 1e-3
+    assert Options.model_validate({"method": "hybrid", "tolerance": 1e-5}).tolerance == 1e-5
+    assert Options.model_validate({"method": "os32"}).tolerance == 1e-6
+
+
 @pytest.mark.parametrize("word", ["standard", "explicit"])
 def test_a_tolerance_given_beside_a_word_is_that_of_soft_joints_too(word: str) -> None:
     """A word's tolerance of soft joints goes with the word's own tolerance only; one that is given stays."""

@@ -8,8 +8,6 @@ from warpchain.options import METHODS_BY_NEED, Options
 from warpchain.parameters import InputError, shown, suggestion, validated
 from warpchain.work_precision import methods
 
-TOLERANCE: Final = 1e-6
-"""Of a method unless one says otherwise."""
 SWITCHES: Final = tuple(
     name for name, field in Options.model_fields.items() if field.annotation is bool and field.default is False
 )
@@ -36,7 +34,7 @@ class Contestant:
     """
 
     method: str
-    tolerance: float = TOLERANCE
+    tolerance: float = 1e-6
     settings: tuple[tuple[str, float | str], ...] = ()
 
     @classmethod
@@ -94,8 +92,6 @@ class Contestant:
         options: dict[str, object] = {"method": method, "device": device}
         if at:
             options["tolerance"] = _number(text, tolerance, f"after the @; write {method}@1e-6")
-        elif method not in METHODS_BY_NEED:
-            options["tolerance"] = TOLERANCE
         for setting in settings:
             name, equals, value = setting.partition("=")
             if equals and name in NUMBERS:

@@ -31,7 +31,7 @@ from warpchain.status import Status
 LINKS: Final = (60, 90, 120, 150, 180)
 CHAINS: Final = (1, 132, 400, 1000, 4000)
 SCENES: Final = ("flight", "pile")
-METHODS: Final = ("rkf78", "dp5", "bs32")
+METHODS: Final = ("rkf78", "dp5", "bs32", "os32")
 """Those that are measured if none is named; any method of the engine can be."""
 
 SECONDS: Final = 0.04

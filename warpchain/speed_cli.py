@@ -23,7 +23,9 @@ def bench(
     methods: Annotated[
         list[str] | None,
         typer.Option(
-            "--method", metavar="NAME", help="On a GPU, one integrator; may be repeated. Default: rkf78, dp5, bs32."
+            "--method",
+            metavar="NAME",
+            help="On a GPU, one integrator; may be repeated. Default: rkf78, dp5, bs32, os32.",
         ),
     ] = None,
     chains: Annotated[
