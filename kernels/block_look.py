@@ -17,9 +17,9 @@ wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def note_bounds(K: wp.array2d(dtype=wp.float64), control: Control, softness: wp.float64):
+def note_bounds(K: wp.array2d(dtype=wp.float64), control: Control, softness: wp.float64, is_driven: bool):
     """Puts on the board what bounds steps of the springs while joints have this softness."""
-    K[BOARD_NOTES, NOTE_CONTACT_STEP] = contact_step(control, softness)
+    K[BOARD_NOTES, NOTE_CONTACT_STEP] = contact_step(control, softness, is_driven)
     K[BOARD_NOTES, NOTE_TOLERANCE] = spring_tolerance(control, softness)
 
 
@@ -31,6 +31,7 @@ def block_look(features: Features, touch: TouchLayout):
     and says when the launch has lasted long enough.
     """
     softens = features.softens
+    is_driven = features.watch == "steady"
     look_at_chain = sampling(features.watch, softens)
 
     @wp.func
@@ -53,7 +54,7 @@ def block_look(features: Features, touch: TouchLayout):
         if wp.static(softens):
             if state.softness[world] != softness:
                 note_constants(K, change_joints(chain, model, state, control, world))
-                note_bounds(K, control, state.softness[world])
+                note_bounds(K, control, state.softness[world], wp.static(is_driven))
         K[BOARD_NOTES, NOTE_STOP_TIME] = state.stop_time[world]
         K[BOARD_NOTES, NOTE_NEXT_LOOK] = wp.float64(state.next_sample[world]) * control.sample_interval
         if clock() > K[BOARD_NOTES, NOTE_DEADLINE]:

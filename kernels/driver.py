@@ -191,6 +191,7 @@ def make_advance(features: Features):
     fixed_loss = layout.LOSS_SPROCKET if has_sprocket else layout.LOSS_FLOOR
     reuses_last = method.reuses_last
     softens = features.softens
+    is_driven = features.watch == "steady"
     look = sampling(features.watch, softens)
     first_stage, attempt, commit = method.functions(columns)
     growth, shrinkage = method.controller(wp.float64)
@@ -223,7 +224,7 @@ def make_advance(features: Features):
         tolerance = control.tolerance
         if wp.static(softens):
             chain = softened(chain, control, state.softness[world])
-            longest = contact_step(control, state.softness[world])
+            longest = contact_step(control, state.softness[world], wp.static(is_driven))
             tolerance = spring_tolerance(control, state.softness[world])
         block = scratch[world]
         K = wp.array(ptr=block.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
@@ -260,7 +261,7 @@ def make_advance(features: Features):
                 if wp.static(softens):
                     if state.softness[world] != softness:
                         chain = change_joints(chain, model, state, control, world)
-                        longest = contact_step(control, state.softness[world])
+                        longest = contact_step(control, state.softness[world], wp.static(is_driven))
                         tolerance = spring_tolerance(control, state.softness[world])
                         has_first_stage = int(0)
                 if status != RUNNING:

@@ -111,20 +111,23 @@ def test_no_joint_becomes_stiffer() -> None:
 
 
 @wp.kernel(module="unique", enable_backward=False)
-def _contact_step(control: Control, softness: wp.array(dtype=wp.float64), steps: wp.array(dtype=wp.float64)):
+def _contact_step(
+    control: Control, softness: wp.array(dtype=wp.float64), is_driven: bool, steps: wp.array(dtype=wp.float64)
+):
     i = wp.tid()
-    steps[i] = contact_step(control, softness[i])
+    steps[i] = contact_step(control, softness[i], is_driven)
 
 
 @pytest.mark.parametrize(("own", "longest"), [(2e-5, 5e-5), (7e-5, 7e-5)])
-def test_steps_near_contacts_are_longer_only_beyond_soft(own: float, longest: float) -> None:
-    """Up to softness 1 the contact step bounds them, at 2 the greater of the two, in between their geometric mean."""
+@pytest.mark.parametrize("is_driven", [False, True])
+def test_steps_near_contacts_are_longer_on_soft_joints(own: float, longest: float, is_driven: bool) -> None:
+    """Below softness 1, and at 1 unless it is driven, the contact step bounds them; beyond, the greater of the two."""
     control = Control()
     control.contact_step, control.soft_contact_step = own, 5e-5
-    softness = wp.array([0.0, 0.5, 1.0, 1.5, 2.0], dtype=wp.float64, device="cpu")
+    softness = wp.array([0.0, 0.99, 1.0, 1.01, 2.0], dtype=wp.float64, device="cpu")
     steps = wp.full(5, np.nan, dtype=wp.float64, device="cpu")
-    wp.launch(_contact_step, dim=5, inputs=[control, softness, steps], device="cpu")
-    assert_allclose(steps.numpy(), [own, own, own, np.sqrt(own * longest), longest], rtol=1e-14)
+    wp.launch(_contact_step, dim=5, inputs=[control, softness, is_driven, steps], device="cpu")
+    assert steps.numpy().tolist() == [own, own, longest if is_driven else own, longest, longest]
 
 
 # --- the pile ---

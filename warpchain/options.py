@@ -215,7 +215,7 @@ class Options(BaseModel):
     soft_contact_step: float = Field(
         default=5e-5,
         gt=0,
-        description="longest step near a contact where soften_drive or soften_pile makes joints softest, unless "
+        description="longest step near a contact where soften_drive makes joints soft, or soften_pile softest, unless "
         "contact_step is longer",
         json_schema_extra={"unit": "s"},
     )
