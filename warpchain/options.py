@@ -215,8 +215,8 @@ class Options(BaseModel):
     soft_contact_step: float = Field(
         default=5e-5,
         gt=0,
-        description="longest step near a contact where soften_drive or soften_pile makes joints softest, unless "
-        "contact_step is longer",
+        description="longest step near a contact where soften_drive or soften_pile makes joints softest (shorter "
+        "where they are not quite), unless contact_step is longer",
         json_schema_extra={"unit": "s"},
     )
     skin: float = Field(
