@@ -35,9 +35,11 @@ def hold_softness(parameters: Parameters, speed: float) -> float:
     """
     mass = (parameters.inner_mass + parameters.outer_mass) / 2
     wanted = mass * (speed / parameters.link_length) ** 2 / HOLD_STRAIN
-    span = SOFT.joint_stiffness / SOFTEST.joint_stiffness
-    share = math.log(SOFT.joint_stiffness / max(wanted, SOFTEST.joint_stiffness)) / math.log(span)
-    return 1.0 + max(0.0, share)
+    soft = min(parameters.joint_stiffness, SOFT.joint_stiffness)  # as no joint becomes stiffer than its own
+    softest = SOFTEST.joint_stiffness
+    if soft <= softest:
+        return 2.0
+    return 1.0 + max(0.0, math.log(soft / max(wanted, softest)) / math.log(soft / softest))
 
 
 def control_of(options: Options) -> Control:
