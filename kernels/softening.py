@@ -19,8 +19,9 @@ swings slowly. *Pile.* Joints are soft for good once the loop begins to collapse
 what it did then; softest at once shifts Δx of long chains.
 
 A change of k at openings C sets ½ (k_before − k_after) Σ C² of energy free, which is booked. Going soft is one jump: C
-has then grown to T/k_after within a few periods of the soft springs. Going back, C must shrink a hundredfold, which a
-jump would turn into a pull of a hundred times T; so it takes many small ones, each damped away before the next.
+has then grown to T/k_after within a few periods of the soft springs. Going back, C must shrink a hundred- to a
+thousandfold, which a jump would turn into a pull of as many times T; so it takes many small ones, each damped away
+before the next.
 """
 
 import warp as wp

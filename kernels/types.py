@@ -48,7 +48,7 @@ class Program:
     steady_time: wp.array(dtype=wp.float64)  # how long the loop must have been steady [s]
     steady_tolerance: wp.array(dtype=wp.float64)  # relative change of its height and width in that time
     release_phase: wp.array(dtype=wp.float64)  # release this fraction of a loop period after steadiness
-    hold_softness: wp.array(dtype=wp.float64)  # of joints that are soft in the drive: 1 to 2
+    hold_softness: wp.array(dtype=wp.float64)  # from the hold to the release, 1 to 2; 0: own values
 
 
 @wp.struct

@@ -12,8 +12,8 @@ every_method = pytest.mark.parametrize("method", METHODS)
 
 
 def simulate(parameters, state, duration, **settings):
-    """`warpchain.simulate`, recording just the end."""
-    return warpchain.simulate(parameters, *state, duration, times=[duration], **settings)
+    """`warpchain.simulate` at 1e-6, recording just the end."""
+    return warpchain.simulate(parameters, *state, duration, times=[duration], **{"tolerance": 1e-6, **settings})
 
 
 def assert_sound(flight, parameters, state, within=1e-5):

@@ -188,13 +188,15 @@ def test_contestants_that_differ_in_the_last_digit_have_different_names() -> Non
 def test_contestants_are_read_as_they_are_named() -> None:
     """A name with tolerance and settings, in any order, is read back from itself, which a folder's name needs."""
     for one in (
-        Contestant("dp5"),
+        Contestant("dp5", 1e-6),
+        Contestant("hybrid", 1e-6),
         Contestant("bs32", 1e-9),
         Contestant("os32", 1e-3, (("soft_tolerance", 3e-3), ("controller", "pi"))),
         Contestant("rkf78", 2e-3, (("soften_pile", True), ("soften_area", 0.7), ("soften_drive", True))),
     ):
         assert Contestant.parse(one.name) == one
     assert Contestant.parse("dp5") == Contestant("dp5", 1e-6)
+    assert Contestant.parse("hybrid") == Contestant("hybrid", 1e-4)
     assert one == Contestant.parse("rkf78@2e-3+soften_drive+soften_area=0.7+soften_pile")
     assert one.title == "rkf78 at 0.002, soften pile, soften area 0.7, soften drive"
     content = Ensemble(8, "soft").content(Contestant.parse("dp5@1e-3+soften_pile+soften_area=0.5"))

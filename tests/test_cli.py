@@ -100,7 +100,7 @@ def test_help_tells_the_defaults(command: Command) -> None:
     assert options == Options(method=method)
     assert f"{method}: {options.method} at 1e-3, joints softened on the sprocket and in the pile" in words
     assert (options.tolerance, options.soften_drive, options.soften_pile) == (1e-3, True, True)
-    assert "Default: that of the word, 1e-6 for an integrator, 1e-3 for hybrid." in words
+    assert "Default: that of the word, 1e-6 for an integrator, 1e-4 for hybrid." in words
     assert Options(method="rkf78") == Options(method="reference")
     assert Options(method="bs32").tolerance == 1e-6
 

@@ -23,7 +23,8 @@ def walk(method, **settings):
     at the default of 1e-3 that is 4e-4 (4 links) to 7e-4 (20 links without friction on the floor), hardly a test.
     """
     flights = {"flight_tolerance": 1e-4} if method == "hybrid" else {}
-    return warpchain.walk(**{"preset": "soft", "method": method, "frame_interval": None, **flights, **settings})
+    fixed = {"preset": "soft", "method": method, "tolerance": 1e-6, "frame_interval": None}
+    return warpchain.walk(**fixed | flights | settings)
 
 
 def ledger_error(walk):

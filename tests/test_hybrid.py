@@ -209,7 +209,7 @@ def test_impacts_push_as_with_springs(parameters, duration):
     for phase in (np.arange(8) + 0.5) / 8:
         start = falling(20, parameters, phase)
         for method, push in pushes.items():
-            run = warpchain.simulate(parameters, *start, duration, times=[duration], method=method)
+            run = warpchain.simulate(parameters, *start, duration, times=[duration], method=method, tolerance=1e-6)
             assert run.status == Status.FINISHED
             assert run.impulses["floor"] > 0
             change = reference.linear_momentum(run.velocity[-1] - start[1], parameters)
@@ -219,6 +219,17 @@ def test_impacts_push_as_with_springs(parameters, duration):
             assert abs(run.losses["hand_over"]) < 1e-3 * at_start
             assert (run.losses["hand_over"] != 0) == (method == "hybrid")
     assert np.mean(pushes["hybrid"]) == pytest.approx(np.mean(pushes["rkf78"]), rel=0.02)
+
+
+def test_bursts_of_a_simulation_are_as_exact_as_those_of_a_walk():
+    """Unless a tolerance is given: then `simulate` and `Options` have the same one, and a tighter one gives others."""
+    start = falling(12, SOFT, 0.3)
+    default, same, tighter = (
+        warpchain.simulate(SOFT, *start, 2e-3, times=[2e-3], method="hybrid", **given).position
+        for given in ({}, {"tolerance": Options(method="hybrid").tolerance}, {"tolerance": 1e-5})
+    )
+    assert np.array_equal(default, same)
+    assert not np.array_equal(default, tighter)
 
 
 def test_launch_size_changes_no_bit_of_flights_and_bursts():

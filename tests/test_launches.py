@@ -1,23 +1,28 @@
 """Batches side by side, their memory, and the copies of their arrays on the host; what of it needs no GPU."""
 
 import threading
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 import pytest
 import warp as wp
 
 from tests.test_runner import brief_setup, outcomes
-from warpchain import ensemble
+from warpchain import ensemble, runner
+from warpchain.course import Course
 from warpchain.devices import CAPACITY_FRAMES, CAPACITY_SAMPLES, start_device, world_bytes
 from warpchain.engine import Batch
 from warpchain.kernel_choice import block_threads, features_of, kernels_of, registers, shared_threads
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features
 from warpchain.mirror import Mirror
-from warpchain.options import Options
-from warpchain.runner import SweepProgress, prepare
+from warpchain.options import Options, Setup
+from warpchain.planning import load_sweep
+from warpchain.runner import SweepProgress, prepare, run_shards
 from warpchain.sweep_cli import _progress_text
+
+FEW = {"version": 1, "name": "few", "seed": 1, "preset": "soft", "samples": 2, "grid": {"links": [60, 150]}}
+"""Content of a sweep of two lengths."""
 
 
 def test_a_mirror_carries_edits_and_changes() -> None:
@@ -113,7 +118,6 @@ def test_few_walks_of_several_lengths_share_a_kernel() -> None:
 
 def test_kernels_of_a_sweep_are_those_that_its_walks_ask_for(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is compiled beforehand for few walks on a GPU is one kernel for the drive and one for the walk."""
-    content = {"version": 1, "name": "few", "seed": 1, "preset": "soft", "samples": 2, "grid": {"links": [60, 150]}}
     loaded: set[tuple[str, str, int]] = set()
 
     def note(wanted: Iterable[tuple[wp.Device, Features, int]]) -> None:
@@ -121,11 +125,26 @@ def test_kernels_of_a_sweep_are_those_that_its_walks_ask_for(monkeypatch: pytest
 
     monkeypatch.setattr(ensemble, "load_kernels", note)
     monkeypatch.setattr(ensemble, "start_device", lambda _: None)
-    prepare(content | {"options": {"device": "cuda"}})
+    prepare(FEW | {"options": {"device": "cuda"}})
     assert loaded == {("os32", "floor", 160), ("os32", "sprocket", 160)}
     loaded.clear()
-    prepare(content | {"samples": 2000, "options": {"device": "cuda"}})
+    prepare(FEW | {"samples": 2000, "options": {"device": "cuda"}})
     assert loaded == {("os32", body, threads) for body in ("floor", "sprocket") for threads in (64, 160)}
+
+
+def test_every_task_of_a_sweep_runs_in_the_blocks_that_are_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A shard that has chains of one length only runs in blocks of the whole sweep; on a CPU there are none."""
+    asked: list[tuple[set[int], int | None]] = []
+
+    def note(setups: Sequence[Setup], *, threads: int | None, **_: object) -> Iterator[tuple[int, Course]]:
+        asked.append(({setup.scene.links for setup in setups}, threads))
+        return iter(())
+
+    monkeypatch.setattr(runner, "run_setups", note)
+    for device, samples in (("cuda", 2), ("cuda", 2000), ("cpu", 2)):
+        planned = load_sweep(FEW | {"samples": samples, "options": {"device": device, "method": "explicit"}})
+        run_shards(planned.canonical(), "nowhere", [(0, 1)])
+    assert asked == [({60}, 160), ({60}, None), ({60}, None)]
 
 
 def test_progress_says_when_kernels_are_compiled() -> None:

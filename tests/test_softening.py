@@ -10,7 +10,7 @@ from scipy.special import ellipe
 
 import warpchain
 from warpchain import InputError, Status, ensemble, preset
-from warpchain.control import SOFTEST, STIFFENING_TIME
+from warpchain.control import SOFTEST, STIFFENING_TIME, hold_softness
 from warpchain.course import Course
 from warpchain.devices import start_device
 from warpchain.engine import Batch
@@ -100,6 +100,18 @@ def test_softness_goes_geometrically_from_own_over_soft_to_softest() -> None:
         assert joints_of(1e9, 1e3, 1e-3, softness) == (1e6, 25.0, 1 / 0.1)
     assert_allclose(joints_of(1e9, 1e3, 1e-3, 0.5), [1e8, np.sqrt(1e5), 100.0], rtol=1e-14)
     assert_allclose(joints_of(1e9, 1e3, 1e-3, 1.5), [np.sqrt(1e13), 50.0, 10.0], rtol=1e-14)
+
+
+@pytest.mark.parametrize("own", [1e9, 1e7, 3e6])
+def test_the_loop_is_held_on_joints_that_it_stretches_by_no_more_than_it_may(own: float) -> None:
+    """k = m̄ v²/(3e-4 ℓ²), whatever the joints' own, between the softest and the lesser of that and the soft ones'."""
+    parameters = PAPER.with_values({"joint_stiffness": own})
+    mass = (PAPER.inner_mass + PAPER.outer_mass) / 2
+    for speed in (0.0, 2.0, 5.0, 20.0):
+        wanted = mass * speed**2 / (3e-4 * PAPER.link_length**2)
+        held, _, _ = joints_of(own, 1e3, 1e-3, hold_softness(parameters, speed))
+        assert held == pytest.approx(min(max(wanted, 1e6), 1e7, own))
+    assert hold_softness(PAPER.with_values({"joint_stiffness": 1e5}), 5.0) == 2.0
 
 
 def test_no_joint_becomes_stiffer() -> None:

@@ -210,11 +210,16 @@ def test_from_a_file(tmp_path: Path) -> None:
         (content(grid={"frequency": [5, 5.0]}), "sweep.grid.frequency[1]: 5.0 is given twice; leave one out"),
         (
             content(grid={"method": ["standard", "reference"]}),
-            "sweep.grid: tolerance is 0.001 in one cell and 1e-06 in another, because a method in one word sets",
+            "sweep.grid: tolerance is 0.001 in one cell and 1e-06 in another, as methods or devices have it; give",
+        ),
+        (
+            content(grid={"method": ["rkf78", "hybrid"]}, options={}),
+            "sweep.grid: tolerance is 1e-06 in one cell and 0.001 in another, as methods or devices have it; give "
+            "tolerance once for all, or each such method, and each kind of device, a block of its own",
         ),
         (
             content(grid={"device": ["cpu", "cuda"]}, options={}),
-            "sweep.grid: method is 'hybrid' in one cell and 'os32' in another, because a method in one word sets",
+            "sweep.grid: method is 'hybrid' in one cell and 'os32' in another, as methods or devices have it; give",
         ),
         (
             content(grid={"frequency": [5]}, scene={"frequency": 5}),

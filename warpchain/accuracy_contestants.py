@@ -34,7 +34,7 @@ class Contestant:
     """
 
     method: str
-    tolerance: float = 1e-6
+    tolerance: float
     settings: tuple[tuple[str, float | str], ...] = ()
 
     @classmethod

@@ -111,7 +111,7 @@ def dropped(links: int, device: str = "cpu") -> tuple[Array, Array]:
 def step_costs(
     links: Sequence[int] = (60, 150), tries: int = 2000, rounds: int = 7, *, report: Callable[[str], None]
 ) -> list[StepCost]:
-    """Cost of a step for each method, in flight and in the pile, at the parameters of Table 1 and tolerance 1e-6.
+    """Cost of a step for each method, in flight and in the pile, at Table 1's parameters and each method's tolerance.
 
     Args:
         links: Chain lengths.

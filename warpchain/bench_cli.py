@@ -25,7 +25,7 @@ def accuracy(
             "--methods",
             metavar="NAME[@TOL][+SETTING],…",
             help="standard, explicit, reference or integrators. In walks and ensembles @TOL sets the tolerance, by "
-            "default 1e-6 (hybrid 1e-3) or that of the word, +NAME an option that is off by default and +NAME=NUMBER "
+            "default 1e-6 (hybrid 1e-4) or that of the word, +NAME an option that is off by default and +NAME=NUMBER "
             "another, as in rkf78+soften_pile+soften_area=0.7. rkf78 at 1e-6, the reference, runs beside them in any "
             "case. Default: the three words, and every integrator with the settings of explicit.",
         ),

@@ -123,7 +123,7 @@ def gpu_costs(
     rounds: int = 5,
     report: Callable[[str], None],
 ) -> list[GpuCost]:
-    """Cost of a try at the parameters of Table 1 and tolerance 1e-6, on rigid joints that of ``Options``.
+    """Cost of a try at Table 1's parameters and each method's tolerances.
 
     Args:
         device: ``"cuda"`` or ``"cuda:N"``.

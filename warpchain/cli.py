@@ -126,7 +126,7 @@ def walk(
             "--tol",
             metavar="NUMBER",
             help="Error allowed in a step: absolute, in SI units (m, rad, m/s, rad/s), and relative alike. "
-            "Default: that of the word, 1e-6 for an integrator, 1e-3 for hybrid.",
+            "Default: that of the word, 1e-6 for an integrator, 1e-4 for hybrid.",
         ),
     ] = None,
     assignments: Annotated[

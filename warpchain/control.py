@@ -13,9 +13,9 @@ SOFTEST = SOFT.with_values({"joint_stiffness": 1e6, "joint_damping": 30.0})
 
 Measured with `paper` and dp5 at 1e-4 on walks that are the same until the loop encloses half of its first area: Δx then
 shifts by 0.01 ± 0.04 mm (24 walks of 60 links at 15 Hz) and 1.5 ± 1.5 mm (16 of 150 at 20 Hz; 0.01 ± 0.08 mm from 0.3
-of the area), in 2.7 times fewer tries; with ω_c = 1 rad/s, which takes 5 % fewer again but lets circles sink in half as
-deep again, as it then was. k = 3e5 N/m takes 1.6 times fewer again, but circles sink 2 mm into the
-floor. From 0.9 of the area 1e6 N/m may shift Δx: by 8 ± 4 mm of 1 m (12 walks of 150 links).
+of the area), in 2.7 times fewer tries. That was with ω_c = 1 rad/s, which takes 5 % fewer tries than the ω_c of soft
+joints but lets circles sink in half as deep again. k = 3e5 N/m takes 1.6 times fewer again, but circles sink 2 mm into
+the floor. From 0.9 of the area 1e6 N/m may shift Δx: by 8 ± 4 mm of 1 m (12 walks of 150 links).
 """
 STIFFENING_TIME = 0.03
 """Time [s] in which joints that were soft on the sprocket get their own values back after the release."""
@@ -35,9 +35,11 @@ def hold_softness(parameters: Parameters, speed: float) -> float:
     """
     mass = (parameters.inner_mass + parameters.outer_mass) / 2
     wanted = mass * (speed / parameters.link_length) ** 2 / HOLD_STRAIN
-    span = SOFT.joint_stiffness / SOFTEST.joint_stiffness
-    share = math.log(SOFT.joint_stiffness / max(wanted, SOFTEST.joint_stiffness)) / math.log(span)
-    return 1.0 + max(0.0, share)
+    soft = min(parameters.joint_stiffness, SOFT.joint_stiffness)  # as no joint becomes stiffer than its own
+    softest = SOFTEST.joint_stiffness
+    if soft <= softest:
+        return 2.0
+    return 1.0 + max(0.0, math.log(soft / max(wanted, softest)) / math.log(soft / softest))
 
 
 def control_of(options: Options) -> Control:

@@ -41,8 +41,8 @@ Array = NDArray[np.float64]
 
 STEP_LIMIT: Final = 20_000_000
 """Tries after which a case counts as hanging."""
-LIMITS: Final = {"step_limit": STEP_LIMIT, "flight_tolerance": 1e-4}
-"""Of every case; the energy error of `hybrid` follows the tolerance of its flights."""
+LIMITS: Final = {"step_limit": STEP_LIMIT, "tolerance": 1e-6, "flight_tolerance": 1e-4}
+"""Of every case that says nothing else; the energy error of `hybrid` follows the tolerance of its flights, too."""
 
 IMPOSSIBLE: Final[tuple[tuple[str, Mapping[str, object]], ...]] = (
     ("scene.links", {"links": 61}),

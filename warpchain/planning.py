@@ -232,8 +232,8 @@ class Sweep:
                     if getattr(fixed.options, name) != value:
                         raise InputError(
                             f"{block.plan.path}.grid: {name} is {value!r} in one cell and "
-                            f"{getattr(fixed.options, name)!r} in another, because a method in one word sets several "
-                            "options; give each such method, and each kind of device, a block of its own"
+                            f"{getattr(fixed.options, name)!r} in another, as methods or devices have it; give {name} "
+                            "once for all, or each such method, and each kind of device, a block of its own"
                         )
                 for name, choice in self.recording.choices.items():
                     choice.steps(fixed.options, f"sweep.record.{name}")

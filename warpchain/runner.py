@@ -267,9 +267,11 @@ def one_of_each_cell(planned: Sweep) -> list[Setup]:
 
 def _shared_threads(planned: Sweep) -> int | None:
     """Threads of every block of the walks of a sweep on a GPU, all of one method; None: as many as a chain needs."""
+    if not _is_on_gpu(planned):
+        return None
     cells = one_of_each_cell(planned)
     methods = {setup.options.method for setup in cells}
-    if not _is_on_gpu(planned) or len(methods) > 1:
+    if len(methods) > 1:
         return None
     return shared_threads(methods.pop(), (setup.scene.links for setup in cells), planned.walk_count)
 

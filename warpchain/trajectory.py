@@ -32,7 +32,7 @@ def simulate(
     gravity: bool = True,
     self_contact: bool = True,
     method: str = "rkf78",
-    tolerance: float = 1e-6,
+    tolerance: float | None = None,
     device: str = "cpu",
     **settings: object,
 ) -> Trajectory:
@@ -60,7 +60,9 @@ def simulate(
     Raises:
         InputError: A value is refused; nothing has been computed. It is a ``ValueError``.
     """
-    chosen = {"method": method, "tolerance": tolerance, "device": device, "self_contact": self_contact}
+    chosen: dict[str, object] = {"method": method, "device": device, "self_contact": self_contact}
+    if tolerance is not None:
+        chosen["tolerance"] = tolerance
     options = validated(Options, _UNSOFTENED | settings | chosen, "options")
     for name in _UNSOFTENED:
         if getattr(options, name):

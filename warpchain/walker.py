@@ -70,7 +70,7 @@ def walk(
             in the paper), or an integrator: ``"rkf78"``, ``"dp5"``, ``"bs32"``, ``"os32"``, ``"rodas4p"``,
             ``"rodas5p"`` or ``"hybrid"``.
         tolerance: Error allowed in a step, absolute (SI units) and relative alike; None: the method's, 1e-6 for an
-            integrator, and of ``"standard"`` and ``"explicit"`` 3e-3 while joints are soft.
+            integrator, 1e-4 for ``"hybrid"``, and of ``"standard"`` and ``"explicit"`` 3e-3 while joints are soft.
         start: ``"rest"``, ``"spinning"`` or ``"ellipse"``.
         seed: Draw parameters, phase and clearance from their distributions; None: Table 1's means, phase 0.
         frame_interval: Time between kept frames of all joints [s], to whole samples; None keeps none. Neither frames
