@@ -95,9 +95,10 @@ def test_a_walk_gives_the_same_bits_in_any_batch(method: str, monkeypatch: pytes
     assert outcomes(setups * 3) == together * 3
 
 
-def test_a_walk_gives_the_same_bits_in_any_block() -> None:
+@pytest.mark.parametrize("method", ["os32", "explicit"])
+def test_a_walk_gives_the_same_bits_in_any_block(method: str) -> None:
     """In the block of its own size, or in one that it shares with the longest chain, see `shared_threads`."""
-    setups = [brief_setup(links, links=links, device="cuda", method="os32") for links in (30, 60, 90, 120, 150, 180)]
+    setups = [brief_setup(links, links=links, device="cuda", method=method) for links in (30, 60, 90, 120, 150, 180)]
     assert outcomes(setups, threads=192) == outcomes(setups)
 
 

@@ -1,6 +1,7 @@
 """Figures of ``warpchain bench accuracy``: work–precision diagrams, ensembles by method, the table of hard cases."""
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
@@ -22,7 +23,7 @@ _MARKERS: Final = "osDvP*Xp"
 _GRID: Final = {"color": "#E6E6E6", "linewidth": 0.6}
 _SCIPY: Final = {"DOP853 (SciPy)": "s", "Radau (SciPy)": "^"}
 """Solvers of SciPy, all in black, and their markers."""
-_FIRST: Final = ("rkf78", "dp5", "bs32", "os32")
+_FIRST: Final = ("rkf78", "dp5", "bs32", "os32", "rodas4p", "rodas5p", "hybrid")
 """Methods that have the same colours in every figure, whichever others there are."""
 
 _TITLES: Final = {
@@ -153,7 +154,7 @@ def walk_costs(rows: Sequence[Row]) -> Figure:
             left.annotate(times, (max(row["each"]), place), (8, 0), textcoords="offset points", va="center", color=INK)
         if row["ledger"]:
             right.plot([row["ledger"]], [place], "o", color=color, markersize=6)
-    left.set_yticks(range(len(ordered)), [_contestant_text(row) for row in ordered])
+    left.set_yticks(range(len(ordered)), _contestant_texts(figure, ordered))
     left.set_ylim(len(ordered) - 0.4, -0.6)
     for axes in (left, right):
         axes.set_xscale("log")
@@ -198,7 +199,7 @@ def ensemble(row: Row) -> Figure:
         if one[cost] is not None:
             right.barh(place, one[cost], 0.5, color=color)
             right.text(one[cost], place, f" {one[cost]:.3g}", va="center", color=INK)
-    left.set_yticks(range(len(methods)), [_contestant_text(one) for one in methods])
+    left.set_yticks(range(len(methods)), _contestant_texts(figure, methods))
     left.set_ylim(len(methods) - 0.4, -0.6)
     left.set_xlabel("distance walked $Δx$ / m")
     right.set_xlabel("walks per second" if on_gpu else "seconds of one core per walk")
@@ -282,11 +283,21 @@ def _marker(method: str, chosen: Sequence[str]) -> str:
     return _MARKERS[ours.index(method) % len(_MARKERS)]
 
 
-def _contestant_text(row: Row) -> str:
-    """Title of a contestant, its settings in a line of their own, and how many of its walks are not drawn."""
-    method, *settings = row["title"].split(", ")
-    failed = sum(row["failed"].values()) if "failed" in row else row["walks"] - row["at_rest"]
-    missing = row.get("missing", 0)
-    notes = [", ".join(settings)] * bool(settings)
-    notes += [f"{failed} failed"] * (failed > 0) + [f"{missing} missing"] * (missing > 0)
-    return "\n".join([method, *notes])
+def _contestant_texts(figure: Figure, rows: Sequence[Row]) -> list[str]:
+    """Title of each contestant, its settings in a line of their own, and how many of its walks are not drawn.
+
+    The most common settings are written below the figure, and a star stands for them.
+    """
+    split = [row["title"].partition(", ") for row in rows]
+    counts = Counter(settings for _, _, settings in split if settings)
+    common = max(counts, key=counts.__getitem__, default="")
+    if common:
+        figure.supxlabel(f"* with {common}", fontsize="small", x=0.01, ha="left")
+    texts = []
+    for row, (method, _, settings) in zip(rows, split, strict=True):
+        failed = sum(row["failed"].values()) if "failed" in row else row["walks"] - row["at_rest"]
+        missing = row.get("missing", 0)
+        notes = [settings] * (settings not in ("", common))
+        notes += [f"{failed} failed"] * (failed > 0) + [f"{missing} missing"] * (missing > 0)
+        texts.append("\n".join([method + " *" * (settings == common != ""), *notes]))
+    return texts
