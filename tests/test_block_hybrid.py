@@ -114,6 +114,8 @@ def test_softness_changes_as_in_the_cpu_form():
     (ours, features), (theirs, _) = (bouncing(chains, **settings) for _ in range(2))
     for batch in (ours, theirs):
         batch.control.stiffening_time = 2e-3
+        for world in range(2):
+            batch.set_program(world, hold_softness=1.0)
     both(ours, theirs, features, 100)
     assert (theirs.state.softness.numpy() < 0.99).all()
     assert theirs.losses(0)["softening"] != 0.0

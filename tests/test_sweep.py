@@ -214,7 +214,7 @@ def test_from_a_file(tmp_path: Path) -> None:
         ),
         (
             content(grid={"method": ["rkf78", "hybrid"]}, options={}),
-            "sweep.grid: tolerance is 1e-06 in one cell and 0.001 in another, as methods or devices have it; give "
+            "sweep.grid: tolerance is 1e-06 in one cell and 0.0001 in another, as methods or devices have it; give "
             "tolerance once for all, or each such method, and each kind of device, a block of its own",
         ),
         (
