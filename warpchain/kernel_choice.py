@@ -11,8 +11,10 @@ from warpchain.kernels.driver import Features, make_advance
 from warpchain.kernels.rosenbrock_tables import ROSENBROCK_TABLES
 from warpchain.options import Options
 
+REGISTERS = 168
+"""Registers a thread may take."""
 FEWER_REGISTERS = {160: 128, 224: 128, 256: 128}
-"""Registers a thread may take, by threads of a block, where that lets another block onto a multiprocessor; else 168.
+"""The same, by threads of a block, where fewer let another block onto a multiprocessor.
 
 A multiprocessor has four schedulers with 16384 registers each, so that a block's number of warps of 32 threads and
 the registers decide how many blocks it holds. Measured on an H200, 4000 chains in flight with rkf78, dp5 and bs32, ns
@@ -21,12 +23,14 @@ per try and chain, with 128 and 168: 60 links 12.2, 6.4, 3.9 and 9.9, 5.5, 3.3; 
 one number for all keeps a walk's bits independent of its batch. rodas4p is fastest without one.
 """
 SHARED_METHODS = ("os32",)
-"""Methods whose kernels take 168 registers for all chains of up to 192 links, whatever the table says.
+"""Methods whose kernels take as many registers for all chains of up to 192 links, whatever the table says.
 
 Then what a walk gives does not depend, to the bit, on the threads of its block, see :func:`shared_threads`.
 """
 SHARED_THREADS = 192
+"""Most threads of a block that chains of several lengths share."""
 SHARED_WALKS = 2000
+"""Most walks of a sweep that are carried on in such blocks; with 2016 it made no difference."""
 
 
 def registers(method: str, threads: int) -> int | None:
@@ -34,8 +38,8 @@ def registers(method: str, threads: int) -> int | None:
     if method in ROSENBROCK_TABLES:
         return None
     if method in SHARED_METHODS and threads <= SHARED_THREADS:
-        return 168
-    return FEWER_REGISTERS.get(threads, 168)
+        return REGISTERS
+    return FEWER_REGISTERS.get(threads, REGISTERS)
 
 
 def block_kernel(features: Features, threads: int) -> wp.Kernel:
