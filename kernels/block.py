@@ -20,7 +20,6 @@ from .block_board import (
     link_is_finite,
     load_link,
     note_constants,
-    point,
     publish,
     store_link,
     store_losses,
@@ -56,6 +55,7 @@ from .layout import (
     BOARD_LOST_SELF,
     BOARD_NOTES,
     BOUNCES,
+    COSINE,
     FLOOR_DEPTH,
     FLOOR_IMPULSES,
     INERTIA,
@@ -78,6 +78,7 @@ from .layout import (
     REJECTED,
     SELF_DEPTH,
     SELF_IMPULSES,
+    SINE,
     SPROCKET_DEPTH,
     SPROCKET_IMPULSES,
     THETA,
@@ -156,7 +157,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     @wp.func
     def begin_step(forces: wp.tile[vec3d, block_dim], K: wp.array2d(dtype=wp.float64), place: Place, next_end: vec5d):
         """Works out the first stage of the next step; ``next_end``: left end of the next link."""
-        first = stage(forces, K, place, next_end, link_on(K, place.lane))
+        column = place.column
+        first = stage(
+            forces, K, place, next_end, link_on(K, place.lane), K[INVERSE_MASS, column], K[INVERSE_INERTIA, column]
+        )
         note_first(K, place.lane, first, wp.static(needs_first_power))
 
     @wp.kernel(
@@ -375,7 +379,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     K[U, lane] = trial.u
                     K[V, lane] = trial.v
                     K[OMEGA, lane] = trial.omega
-                    point(K, lane)
+                    K[COSINE, lane] = trial.cosine
+                    K[SINE, lane] = trial.sine
                     if wp.static(reuses_last):
                         note_first(K, lane, trial.last, wp.static(needs_first_power))
                 time = wp.where(lands, stop_time, time + h)

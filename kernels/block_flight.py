@@ -177,6 +177,9 @@ def flight_attempt(block_dim: int):
         trial.v = link.v + change(S, lane, WEIGHTS, wp.static(stages), 4)
         trial.omega = link.omega + change(S, lane, WEIGHTS, wp.static(stages), 5)
         trial.turns_far = wp.abs(turn) > GREATEST_TURN
+        new_cosine, new_sine = cos_sin(trial.theta)
+        trial.cosine = new_cosine
+        trial.sine = new_sine
         trial.friction = power
         error, scale = greatest_error(
             link,

@@ -35,7 +35,7 @@ from .block_step import (
     vec5d,
 )
 from .cyclic_solver import block_type
-from .elementary import ONE, TWO, ZERO, versine_sine
+from .elementary import ONE, TWO, ZERO, cos_sin, versine_sine
 from .geometry import end_positions, end_velocities
 from .joint import friction_slope, friction_torque, joint_force, link_acceleration
 from .layout import (
@@ -439,6 +439,9 @@ def rosenbrock_attempt(name: str, block_dim: int):
                 trial.v = v + dv
                 trial.omega = omega + dw
                 trial.turns_far = wp.abs(turn) > GREATEST_TURN
+                new_cosine, new_sine = cos_sin(trial.theta)
+                trial.cosine = new_cosine
+                trial.sine = new_sine
                 error, scale = greatest_error(link, theta, first, h, g * z[0], g * z[1], g * z[2], du, dv, dw)
                 trial.error = error
                 trial.scale = scale

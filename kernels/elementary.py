@@ -43,7 +43,7 @@ C4 = wp.constant(wp.float64(-2.75573143513906633035e-07))
 C5 = wp.constant(wp.float64(2.08757232129817482790e-09))
 C6 = wp.constant(wp.float64(-1.13596475577881948265e-11))
 
-# Taylor coefficients, for the small turns within a step and for exp on [-ln2/2, ln2/2].
+# Taylor coefficients, for the small turns within a step.
 T2 = wp.constant(wp.float64(1.0 / 2.0))
 T3 = wp.constant(wp.float64(1.0 / 6.0))
 T4 = wp.constant(wp.float64(1.0 / 24.0))
@@ -51,14 +51,20 @@ T5 = wp.constant(wp.float64(1.0 / 120.0))
 T6 = wp.constant(wp.float64(1.0 / 720.0))
 T7 = wp.constant(wp.float64(1.0 / 5040.0))
 T8 = wp.constant(wp.float64(1.0 / 40320.0))
-T9 = wp.constant(wp.float64(1.0 / 362880.0))
-T10 = wp.constant(wp.float64(1.0 / 3628800.0))
-T11 = wp.constant(wp.float64(1.0 / 39916800.0))
-T12 = wp.constant(wp.float64(1.0 / 479001600.0))
 
-LOG2_E = wp.constant(wp.float64(1.44269504088896338700e00))
-LN2_HIGH = wp.constant(wp.float64(6.93147180369123816490e-01))
-LN2_LOW = wp.constant(wp.float64(1.90821492927058770002e-10))
+# Polynomial P with exp(2 r) = 1 + 2 r + r² P(r) for |r| ≤ ln2/4 to a relative error of 3e-16, by Remez's algorithm.
+P0 = wp.constant(wp.float64(1.999999999999933))
+P1 = wp.constant(wp.float64(1.333333333328921))
+P2 = wp.constant(wp.float64(0.6666666666901995))
+P3 = wp.constant(wp.float64(0.2666666678685354))
+P4 = wp.constant(wp.float64(0.08888888650274396))
+P5 = wp.constant(wp.float64(0.025396717060622142))
+P6 = wp.constant(wp.float64(0.006349294542012403))
+P7 = wp.constant(wp.float64(0.0014149122969306315))
+P8 = wp.constant(wp.float64(0.0002813624154822916))
+
+TWO_LOG2_E = wp.constant(wp.float64(2.88539008177792681472))
+HALF_LN2 = wp.constant(wp.float64(3.46573590279972654709e-01))
 TANH_LIMIT = wp.constant(wp.float64(20.0))
 
 LARGEST_TURN = wp.constant(wp.float64(0.05))
@@ -126,19 +132,36 @@ def small_turn(turn: wp.float64):
     return versine, sine
 
 
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    double y;
+    asm("rcp.approx.ftz.f64 %0, %1;" : "=d"(y) : "d"(b));
+    const double e = fma(-b, y, 1.0);
+    return fma(y, fma(e, e, e), y);
+#else
+    return 1.0 / b;
+#endif
+""")
+def reciprocal(b: wp.float64) -> wp.float64:
+    """1 / b as for :func:`quotient`, to two units in the last place: three operations in a row instead of seven."""
+    ...
+
+
 @wp.func
 def tanh(x: wp.float64):
-    """Hyperbolic tangent to 1e-15 absolute: 1 − 2/(exp(2|x|) + 1), with |x| capped where the result is 1."""
-    y = TWO * wp.min(wp.abs(x), TANH_LIMIT)
-    shifted = y * LOG2_E + ROUNDER
-    power = shifted - ROUNDER
-    r = (y - power * LN2_HIGH) - power * LN2_LOW
-    series = T8 + r * (T9 + r * (T10 + r * (T11 + r * T12)))
-    series = T4 + r * (T5 + r * (T6 + r * (T7 + r * series)))
-    series = ONE + r * (ONE + r * (T2 + r * (T3 + r * series)))
-    exponent = wp.cast(shifted, wp.int64) - ROUNDER_BITS + EXPONENT_BIAS
-    exponential = series * wp.cast(exponent << EXPONENT_SHIFT, wp.float64)
-    value = ONE - quotient(TWO, exponential + ONE)
+    """Hyperbolic tangent to 1e-15 absolute: 1 − 2/(exp(2|x|) + 1), with |x| capped where the result is 1.
+
+    Every stage of a step waits for it, so that on a GPU its latency counts: the polynomial's terms are summed in
+    pairs, and exp(2|x|) = 2ᵏ exp(2 r) is reduced by one product with a rounded ln2/2, whose error grows as k, while
+    its weight in the result falls as 2⁻ᵏ.
+    """
+    y = wp.min(wp.abs(x), TANH_LIMIT)
+    shifted = y * TWO_LOG2_E + ROUNDER
+    r = y - (shifted - ROUNDER) * HALF_LN2
+    power = wp.cast((wp.cast(shifted, wp.int64) - ROUNDER_BITS + EXPONENT_BIAS) << EXPONENT_SHIFT, wp.float64)
+    z = r * r
+    series = ((P0 + r * P1) + z * (P2 + r * P3)) + (z * z) * (((P4 + r * P5) + z * (P6 + r * P7)) + (z * z) * P8)
+    value = ONE - TWO * reciprocal(((ONE + TWO * r) + z * series) * power + ONE)
     return wp.where(x < ZERO, -value, value)
 
 
