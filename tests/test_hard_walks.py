@@ -1,5 +1,7 @@
 """Walks that break careless integrators: each ends at rest or with a clear status, its ledger closed."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -65,14 +67,20 @@ def test_longest_slow_walk_ends_in_a_pile_at_rest(method, links, tolerance):
 
 
 @pytest.mark.slow
-@every_method
-@pytest.mark.parametrize("name", ["paper", "soft"])
-@pytest.mark.parametrize("links", [60, 180])
+@pytest.mark.parametrize(
+    ("method", "name", "links"),
+    [
+        (method, name, links)
+        for method, name, links in itertools.product(METHODS, ["paper", "soft"], [60, 180])
+        if (name, links) != ("paper", 180) or not method.startswith("rodas")
+    ],
+)
 def test_chain_dropped_without_spin_rests_below(name, links, method):
     """An upright ellipse at rest drops, collapses and rests within a few centimetres of where it hung.
 
     With the settings of explicit, for at 1e-6 and on stiff joints a pile takes minutes; but tolerances of 1e-3 are made
-    for os32, which hybrid has as well.
+    for os32, which hybrid has as well. The implicit methods, the slowest on stiff joints of a pile, have the longer
+    chain on soft ones only.
     """
     settings = {**METHODS_BY_NEED["explicit"], "method": method}
     if method not in ("os32", "hybrid"):
@@ -114,9 +122,14 @@ def test_sixty_turns_per_second(method):
 
 
 @pytest.mark.parametrize(
-    "method", ["dp5", *(pytest.param(name, marks=pytest.mark.slow) for name in METHODS if name != "dp5")]
+    ("start", "method"),
+    [
+        ("rest", "dp5"),
+        ("spinning", "dp5"),
+        *(pytest.param("rest", method, marks=pytest.mark.slow) for method in METHODS if method != "dp5"),
+        *(pytest.param("spinning", method, marks=pytest.mark.slow) for method in ("rkf78", "os32", "hybrid")),
+    ],
 )
-@pytest.mark.parametrize("start", ["rest", "spinning"])
 def test_standing_sprocket(start, method):
     """At 0 Hz the chain hangs on its sprocket until it is let go, falls, and rests within a few centimetres.
 

@@ -354,9 +354,9 @@ def test_list_overflow():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("links", [60, 120, 180])
+@pytest.mark.parametrize("links", [60, 180])
 def test_whole_range_ends_at_rest(links):
-    """From 5 to 30 Hz chains of 60 to 180 links come to rest, further off the faster the sprocket turned.
+    """From 5 to 30 Hz chains of 60 and of 180 links come to rest, further off the faster the sprocket turned.
 
     The slowest walk of the longest is the case ``pile-slow-walk`` of the hard ones: a pile beside the sprocket.
     """
