@@ -354,9 +354,12 @@ def test_list_overflow():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("links", [60, 120, 180])
+@pytest.mark.parametrize("links", [60, 180])
 def test_whole_range_ends_at_rest(links):
-    """From 5 to 30 Hz chains of 60 to 180 links come to rest, further off the faster the sprocket turned."""
+    """From 5 to 30 Hz chains of 60 and of 180 links come to rest, further off the faster the sprocket turned.
+
+    The slowest walk of the longest is the case ``pile-slow-walk`` of the hard ones: a pile beside the sprocket.
+    """
     walks = [soft_walk(links=links, frequency=frequency, start="spinning") for frequency in (5.0, 15.0, 30.0)]
     assert [walk.status for walk in walks] == [Status.AT_REST] * 3
     dx = [walk.dx for walk in walks]
@@ -364,3 +367,7 @@ def test_whole_range_ends_at_rest(links):
     for walk in walks:
         assert_ledger_closes(walk, 1e-4)
         assert walk.center[-1, 1] < 0.06
+        assert walk.greatest_penetration["floor"] < SOFT.circle_radius / 2
+    if links == 180:
+        assert dx[0] < 0.3
+        assert walks[0].impulses["self"] > 1e5
