@@ -1,9 +1,10 @@
 """How tests are spread over the cores of a machine."""
 
-import os
 from pathlib import Path
 
 import pytest
+
+from warpchain.processors import processors
 
 MOST_WORKERS = 16
 """With more, each would mostly compile kernels that another compiles at the same time."""
@@ -13,4 +14,4 @@ MOST_WORKERS = 16
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     """One worker per core for whole folders; tests that are picked by file or name run in this process, at once."""
     is_picked = config.option.keyword or not all(Path(argument).is_dir() for argument in config.args)
-    return 0 if is_picked else min(len(os.sched_getaffinity(0)), MOST_WORKERS)
+    return 0 if is_picked else min(processors(), MOST_WORKERS)

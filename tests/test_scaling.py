@@ -2,7 +2,6 @@
 
 import json
 import math
-import os
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ from warpchain.cli import main
 from warpchain.parameters import InputError
 from warpchain.places import Place, places_of
 from warpchain.planning import load_sweep
+from warpchain.processors import processors
 from warpchain.runner import sweep
 from warpchain.scaling import Run, different_walks, measure
 from warpchain.shards import empty_rows
@@ -175,7 +175,7 @@ def test_places_are_read() -> None:
         ("gpu", "--devices: 'gpu' is no place to run on; give such as cpu, 4xcpu, cuda"),
         ("0xcpu", "--devices: '0xcpu' asks for none; give numbers from 1"),
         ("cpu@0", "--devices: 'cpu@0' asks for none; give numbers from 1"),
-        ("9999xcpu", f"but there are {len(os.sched_getaffinity(0))} processors; give no more"),
+        ("9999xcpu", f"but there are {processors()} processors; give no more"),
         ("2xcuda:1", "--devices: '2xcuda:1': cuda:1 is one GPU; give cuda:1, or 2xcuda"),
         ("cuda:99", "options.device: there is no cuda:99 on this machine"),
         ("cpu,1xcpu", "--devices: 'cpu' is given twice; leave one out"),

@@ -1,6 +1,5 @@
 """Which kernels carry chains on: by device, what happens to the chains, and their numbers of links."""
 
-import os
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 
@@ -10,6 +9,7 @@ from warpchain.kernels.block import make_advance_block
 from warpchain.kernels.driver import Features, make_advance
 from warpchain.kernels.rosenbrock_tables import ROSENBROCK_TABLES
 from warpchain.options import Options
+from warpchain.processors import processors
 
 REGISTERS = 168
 """Registers a thread may take."""
@@ -106,5 +106,5 @@ def load_kernels(wanted: Iterable[tuple[wp.Device, Features, int]]) -> None:
         device, kernel, threads = item
         wp.load_module(kernel.module, device=device, block_dim=threads)
 
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+    with ThreadPoolExecutor(processors()) as pool:
         list(pool.map(load, kernels))

@@ -1,7 +1,6 @@
 """Places that a sweep can run on, named in a word: so many processor cores, a GPU, several GPUs."""
 
 import itertools
-import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ import warp as wp
 from warpchain.devices import start_device
 from warpchain.parameters import InputError, shown
 from warpchain.planning import Sweep, load_sweep
+from warpchain.processors import processors
 from warpchain.runner import on_device
 
 PLACE: Final = re.compile(r"(?:(\d{1,4})x)?(cpu|cuda(?::\d{1,3})?)(?:@(\d{1,9}))?")
@@ -59,9 +59,8 @@ class Place:
             raise InputError(f"--devices: {shown(text)}: {device} is one GPU; give {device}, or {count}xcuda")
         start_device(device)
         if device == "cpu":
-            processors = len(os.sched_getaffinity(0))
-            if (count or 1) > processors:
-                raise InputError(f"--devices: {shown(text)}, but there are {processors} processors; give no more")
+            if (count or 1) > (there := processors()):
+                raise InputError(f"--devices: {shown(text)}, but there are {there} processors; give no more")
             name = text.removeprefix("1x")
             return cls(name, device, threads=count or 1, samples=own)
         if (count or 1) > (gpus := wp.get_cuda_device_count()):

@@ -21,6 +21,7 @@ from warpchain.motion import Motion
 from warpchain.options import Options, Setup
 from warpchain.parameters import InputError, validated
 from warpchain.planning import PlannedWalk, Sweep, load_sweep
+from warpchain.processors import processors
 from warpchain.results import LOST
 from warpchain.shards import shard_name
 from warpchain.status import Status
@@ -111,7 +112,7 @@ def sweep(
         planned = on_device(planned, device)
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
         raise InputError(f"workers: {workers!r} is not a number of workers; give a whole number from 1")
-    at_once = workers or (GPU_WORKERS if _is_on_gpu(planned) else len(os.sched_getaffinity(0)))
+    at_once = workers or (GPU_WORKERS if _is_on_gpu(planned) else processors())
     with Store.open(Path(out), planned, fresh=fresh, shard_size=shard_size(planned.walk_count)) as store:
         missing = store.missing()
         before = planned.walk_count - sum(len(shard) for shard in missing)

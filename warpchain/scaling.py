@@ -26,6 +26,7 @@ from warpchain.gpu_workers import GpuWorkers, gpu_workers
 from warpchain.parameters import InputError
 from warpchain.places import Place
 from warpchain.planning import Sweep, load_sweep
+from warpchain.processors import processors
 from warpchain.results import CONTACTS, replacing
 from warpchain.rows import Rows
 from warpchain.runner import SweepProgress, one_of_each_cell, prepare
@@ -151,7 +152,7 @@ def measure(
     for place in places:
         if not fresh and (out / place.folder).exists():
             raise InputError(f"{out / place.folder}: is there already; give another folder, or --fresh to discard it")
-    about = machine() | {"processors": str(len(os.sched_getaffinity(0)))}
+    about = machine() | {"processors": str(processors())}
     if gpus := [place.device for place in places if place.device != "cpu"]:
         about |= gpu_machine(gpus[0]) | {"GPUs": str(wp.get_cuda_device_count())}
     runs: list[list[Run]] = [[] for _ in places]
