@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from warpchain.options import resolve
 from warpchain.results import CONTACTS, ENERGIES, STORED, WalkResult
+from warpchain.setups import resolve
 from warpchain.status import Status
 
 

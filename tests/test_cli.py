@@ -18,8 +18,9 @@ import pytest
 
 from warpchain import load_walk
 from warpchain.cli import main
-from warpchain.options import Options, Scene
+from warpchain.options import Options
 from warpchain.parameters import preset
+from warpchain.scene import Scene
 
 QUICK = "--links 32 --preset soft --method dp5 --start ellipse --frequency 5".split()
 """A walk of half a simulated second."""

@@ -16,9 +16,10 @@ from warpchain.kernel_choice import block_threads, features_of, kernels_of, regi
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features
 from warpchain.mirror import Mirror
-from warpchain.options import Options, Setup
+from warpchain.options import Options
 from warpchain.planning import load_sweep
 from warpchain.runner import SweepProgress, prepare, run_shards
+from warpchain.setups import Setup
 from warpchain.sweep_cli import _progress_text
 
 FEW = {"version": 1, "name": "few", "seed": 1, "preset": "soft", "samples": 2, "grid": {"links": [60, 150]}}

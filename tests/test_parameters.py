@@ -8,18 +8,10 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from tests.table_1 import TABLE_1
-from warpchain.options import (
-    Options,
-    Scene,
-    Setup,
-    check_scene,
-    contact_radius,
-    fewest_links,
-    joint_radius,
-    load_setup,
-    resolve,
-)
+from warpchain.options import Options
 from warpchain.parameters import PRESETS, InputError, Parameters, preset
+from warpchain.scene import Scene, check_scene, contact_radius, fewest_links, joint_radius
+from warpchain.setups import Setup, load_setup, resolve
 
 
 def refused(section: str, values: object) -> str:

@@ -16,9 +16,9 @@ import pytest
 
 from tests.made_walks import assert_same, make_unreleased, make_walk
 from warpchain import results
-from warpchain.options import resolve
 from warpchain.parameters import Parameters
 from warpchain.results import ENERGIES, STORED, WalkResult, load_walk
+from warpchain.setups import resolve
 from warpchain.status import Status
 
 # Status

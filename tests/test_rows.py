@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from warpchain.options import Options, Scene
+from warpchain.options import Options
 from warpchain.parameters import Parameters
 from warpchain.results import STORED
 from warpchain.rows import COLUMNS, MISSING, ROW, field_column, missing_rows, row_type
+from warpchain.scene import Scene
 from warpchain.sweep_result import BlockResult, SweepResult
 
 

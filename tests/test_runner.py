@@ -17,9 +17,9 @@ import yaml
 import warpchain
 import warpchain.runner as runner
 from warpchain.ensemble import run_setups
-from warpchain.options import Setup
 from warpchain.planning import load_sweep
 from warpchain.runner import run_shards, shard_size, sweep
+from warpchain.setups import Setup
 from warpchain.status import Status
 from warpchain.walker import setup_walk
 

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.table_1 import TABLE_1, UNCERTAIN
-from warpchain.options import Scene
 from warpchain.parameters import InputError, Parameters, preset
 from warpchain.sampling import DRAW_LIMIT, random_generator, sample_parameters, sample_scene
+from warpchain.scene import Scene
 
 
 @settings(max_examples=60, deadline=None)

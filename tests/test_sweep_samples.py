@@ -12,10 +12,11 @@ from scipy import stats
 
 from tests.sweep_content import TABLE_1, UNIFORM, blocks, content, drawn
 from warpchain.design import design_points, saltelli_outputs, sobol_indices
-from warpchain.options import check_scene, fewest_links, resolve
 from warpchain.parameters import Bounds, InputError
 from warpchain.planning import Sweep, load_sweep
 from warpchain.sampling import Gaussian, Uniform, random_generator, sample_parameters, sample_scene
+from warpchain.scene import check_scene, fewest_links
+from warpchain.setups import resolve
 from warpchain.walker import setup_walk
 
 # Random numbers

@@ -20,10 +20,11 @@ from warpchain.accuracy_walks import walk_costs
 from warpchain.bench import machine
 from warpchain.devices import start_device
 from warpchain.hard_cases import HARD_CASES
-from warpchain.options import Options, Scene, check_scene
+from warpchain.options import Options
 from warpchain.parameters import InputError, preset, shown, suggestion, validated
 from warpchain.planning import load_sweep
 from warpchain.results import replacing
+from warpchain.scene import Scene, check_scene
 from warpchain.work_precision import TOLERANCES, TRIALS, Errors, make_reference, make_trial, methods, points
 
 PARTS: Final = ("work-precision", "walks", "ensembles", "hard-cases")

@@ -39,7 +39,7 @@ class Ensemble:
     Attributes:
         links: n.
         preset: Parameters that samples are drawn around.
-        start: See `warpchain.options.Scene`.
+        start: See `warpchain.scene.Scene`.
         samples: Number of walks.
         device: Where they run.
     """

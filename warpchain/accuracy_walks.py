@@ -14,7 +14,7 @@ import numpy as np
 from warpchain.accuracy_contestants import LOOSE, Contestant
 from warpchain.accuracy_ensembles import ledger_errors, release_frequency
 from warpchain.ensemble import compile_kernels
-from warpchain.options import Setup
+from warpchain.setups import Setup
 from warpchain.status import Status
 from warpchain.walker import run_walk, setup_walk
 

@@ -20,7 +20,7 @@ from warpchain.speed_cli import bench
 from warpchain.sweep_cli import add_commands
 
 if TYPE_CHECKING:
-    from warpchain.options import Setup
+    from warpchain.setups import Setup
 
 FAILED: Final = 1
 REFUSED: Final = 2
@@ -263,8 +263,9 @@ def _located(name: str) -> tuple[str, str]:
     Raises:
         InputError: there is no such field.
     """
-    from warpchain.options import Options, Scene
+    from warpchain.options import Options
     from warpchain.parameters import InputError, Parameters, shown, suggestion
+    from warpchain.scene import Scene
 
     fields = {
         "parameters": list(Parameters.model_fields),
@@ -287,11 +288,11 @@ def _parsed(path: str, text: str) -> Any:
     """
     import yaml
 
-    from warpchain.options import _Loader
     from warpchain.parameters import InputError, shown
+    from warpchain.yaml_files import Loader
 
     try:
-        return yaml.load(text, Loader=_Loader)
+        return yaml.load(text, Loader=Loader)
     except (yaml.YAMLError, ValueError, RecursionError):
         raise InputError(f"{path}: {shown(text)} cannot be read; give a number, true, false or a name") from None
 
@@ -302,8 +303,8 @@ def _setup(config: Path | None, preset: str | None, given: Sections, seed: int |
     Raises:
         InputError: something is refused; one line with the field's path and the remedy.
     """
-    from warpchain.options import resolve
     from warpchain.parameters import InputError
+    from warpchain.setups import resolve
     from warpchain.walker import setup_walk
 
     file_preset, sections = _read_config(config) if config is not None else ("paper", {})
@@ -320,13 +321,13 @@ def _setup(config: Path | None, preset: str | None, given: Sections, seed: int |
 
 
 def _read_config(path: Path) -> tuple[Any, dict[str, Any]]:
-    """Preset and sections of a YAML file, see `warpchain.options.load_setup`.
+    """Preset and sections of a YAML file, see `warpchain.setups.load_setup`.
 
     Raises:
         InputError: the file cannot be read, or has other keys.
     """
-    from warpchain.options import read_yaml
     from warpchain.parameters import InputError, shown, suggestion
+    from warpchain.yaml_files import read_yaml
 
     keys = ("preset", "scene", "options", "parameters")
     content = read_yaml(path)

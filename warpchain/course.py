@@ -16,11 +16,12 @@ from warpchain.engine import COUNTS, EXTREMES, Batch
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features
 from warpchain.motion import Motion
-from warpchain.options import Setup, contact_radius, joint_radius
 from warpchain.parameters import InputError, Parameters
 from warpchain.recorder import Recorder
 from warpchain.recording import NOTHING, Keep
 from warpchain.results import LOST
+from warpchain.scene import contact_radius, joint_radius
+from warpchain.setups import Setup
 from warpchain.shapes import ellipse, lay_chain, stadium
 from warpchain.status import Status
 

@@ -11,8 +11,9 @@ from warpchain.engine import Batch
 from warpchain.kernel_choice import block_threads, features_of, load_kernels
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features
-from warpchain.options import Options, Setup
+from warpchain.options import Options
 from warpchain.recording import NOTHING, Keep
+from warpchain.setups import Setup
 from warpchain.status import Status
 
 TRIES = {"cpu": 20_000, "cuda": 200_000}

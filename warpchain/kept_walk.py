@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.motion import Motion
-from warpchain.options import Setup, contact_radius
 from warpchain.planning import load_sweep
 from warpchain.results import STORED, Stored
+from warpchain.scene import contact_radius
+from warpchain.setups import Setup
 from warpchain.shards import Manifest, read_motions
 from warpchain.status import Status
 

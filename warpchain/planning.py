@@ -18,10 +18,11 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from warpchain.design import design_points, saltelli_points, walks_per_sample
-from warpchain.options import Scene, Setup, check_scene, resolve
 from warpchain.parameters import PRESETS, InputError, validated
 from warpchain.recording import Keep, Recording
 from warpchain.sampling import DRAW_LIMIT, Distribution, Gaussian, draw, placed, random_generator
+from warpchain.scene import Scene, check_scene
+from warpchain.setups import Setup, resolve
 from warpchain.sweep_file import SECTIONS, VERSION, BlockPlan, Value, read_sweep
 
 CELL_LIMIT: Final = 100_000

@@ -21,8 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from warpchain.options import Options, Scene, Setup
+from warpchain.options import Options
 from warpchain.parameters import Parameters
+from warpchain.scene import Scene
+from warpchain.setups import Setup
 from warpchain.status import Status
 
 if TYPE_CHECKING:

@@ -10,9 +10,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.options import Options, Scene
+from warpchain.options import Options
 from warpchain.parameters import Parameters
 from warpchain.results import CONTACTS, ENERGIES, LOST, STORED
+from warpchain.scene import Scene
 
 Rows = NDArray[np.void]
 

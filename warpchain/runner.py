@@ -18,11 +18,12 @@ from warpchain.course import Course
 from warpchain.ensemble import compile_kernels, run_setups
 from warpchain.kernel_choice import shared_threads
 from warpchain.motion import Motion
-from warpchain.options import Options, Setup
+from warpchain.options import Options
 from warpchain.parameters import InputError, validated
 from warpchain.planning import PlannedWalk, Sweep, load_sweep
 from warpchain.processors import processors
 from warpchain.results import LOST
+from warpchain.setups import Setup
 from warpchain.shards import shard_name
 from warpchain.status import Status
 from warpchain.store import Store, empty_rows, read_shard, write_shard

@@ -15,8 +15,8 @@ from typing import Final
 
 import numpy as np
 
-from warpchain.options import Scene
 from warpchain.parameters import Bounds, InputError, Parameters, shown, validated
+from warpchain.scene import Scene
 
 CLEARANCE_RANGE: Final = (0.005, 0.015)
 """Interval of the release height that a sample draws from, in m."""

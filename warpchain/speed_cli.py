@@ -49,8 +49,9 @@ def bench(
     """Measure what integration costs: µs a step on one core beside SciPy's DOP853, or of many chains on a GPU."""
     if context.invoked_subcommand is not None:
         return
-    from warpchain.options import Options, Scene
+    from warpchain.options import Options
     from warpchain.parameters import InputError, validated
+    from warpchain.scene import Scene
     from warpchain.terminal import status_line
 
     where = validated(Options, {"device": device}, "bench").device

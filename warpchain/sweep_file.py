@@ -16,10 +16,12 @@ from typing import Any, Final
 from pydantic import BaseModel, ValidationError
 
 from warpchain.design import SAMPLERS, check_design
-from warpchain.options import METHODS_BY_NEED, Options, Scene, read_yaml
+from warpchain.options import METHODS_BY_NEED, Options
 from warpchain.parameters import InputError, Parameters, preset, shown, suggestion, validated
 from warpchain.recording import FRAME_INTERVAL, SERIES_INTERVAL, Choice, Recording
 from warpchain.sampling import TABLE, Distribution, Gaussian, Uniform, physical_values
+from warpchain.scene import Scene
+from warpchain.yaml_files import read_yaml
 
 Value = float | int | str
 """A value of a field; truth values are integers to Python."""

@@ -14,11 +14,13 @@ from warpchain.devices import versions
 from warpchain.engine import Batch
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features
-from warpchain.options import Options, Scene, Setup, check_scene, contact_radius, resolve
+from warpchain.options import Options
 from warpchain.parameters import InputError, Parameters, shown, suggestion, validated
 from warpchain.recorder import EVERYTHING
 from warpchain.results import CONTACTS, WalkResult
 from warpchain.sampling import random_generator, sample_parameters, sample_scene
+from warpchain.scene import Scene, check_scene, contact_radius
+from warpchain.setups import Setup, resolve
 
 Array = NDArray[np.float64]
 

@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 from warpchain import reference
 from warpchain.engine import Batch
 from warpchain.kernels.methods import METHODS
-from warpchain.options import Options, Scene, check_scene, joint_radius
+from warpchain.options import Options
 from warpchain.parameters import Parameters, preset, validated
+from warpchain.scene import Scene, check_scene, joint_radius
 from warpchain.shapes import ellipse, lay_chain, stadium
 from warpchain.status import Status
 

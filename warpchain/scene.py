@@ -1,0 +1,174 @@
+"""What happens in a walk: how long the chain is, how fast it is spun, from which height it is released."""
+
+import math
+from typing import Final, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from warpchain.parameters import InputError, Parameters, refusal
+
+_STRICT: Final = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class Scene(BaseModel):
+    """What one walk does, from hanging on the sprocket to the end.
+
+    Raises:
+        pydantic.ValidationError: a value is unknown or out of bounds, `links` is odd, or the clearance is
+            that of a hanging chain although the chain never hangs.
+    """
+
+    model_config = _STRICT
+
+    links: int = Field(
+        default=60,
+        ge=4,
+        description="number of links around the loop, even: inner and outer links alternate",
+        json_schema_extra={"unit": "1"},
+    )
+    frequency: float = Field(
+        default=15.0,
+        ge=0,
+        description="turns of the sprocket per second at the release",
+        json_schema_extra={"unit": "Hz"},
+    )
+    start: Literal["rest", "spinning", "ellipse"] = Field(
+        default="rest",
+        description="at rest on the sprocket, circulating on it, or a circulating ellipse without sprocket",
+    )
+    phase: float = Field(
+        default=0.0,
+        ge=0,
+        lt=1,
+        description="moment of the release as a fraction of a loop period",
+        json_schema_extra={"unit": "1"},
+    )
+    clearance: float = Field(
+        default=0.01,
+        ge=0,
+        description="height of the lowest circle above the floor, of the chain that clearance_of names",
+        json_schema_extra={"unit": "m"},
+    )
+    clearance_of: Literal["spinning", "hanging"] = Field(
+        default="spinning",
+        description="the chain that clearance is measured at: spinning at the release, or hanging at rest",
+    )
+    sprocket_radius_is: Literal["contact", "pitch"] = Field(
+        default="contact",
+        description="what sprocket_radius measures: where circles touch (contact) or joints ride (pitch)",
+    )
+    ellipse_aspect: float = Field(
+        default=1.5,
+        ge=0.05,
+        le=20,
+        description="height over width of the starting ellipse",
+        json_schema_extra={"unit": "1"},
+    )
+    settle_time: float = Field(
+        default=0.5,
+        ge=0,
+        description="time for the chain to settle on the sprocket at rest",
+        json_schema_extra={"unit": "s"},
+    )
+    spin_up_time: float = Field(
+        default=2.0,
+        gt=0,
+        description="time in which the sprocket reaches its frequency",
+        json_schema_extra={"unit": "s"},
+    )
+    steady_time: float = Field(
+        default=0.0,
+        ge=0,
+        description="the loop is steady once it has kept its shape and speed for this long, at least a loop period",
+        json_schema_extra={"unit": "s"},
+    )
+    steady_tolerance: float = Field(
+        default=0.01,
+        gt=0,
+        le=1,
+        description="relative change of the loop's height and width that still counts as kept",
+        json_schema_extra={"unit": "1"},
+    )
+    hold_limit: float = Field(
+        default=30.0,
+        gt=0,
+        description="longest time at full frequency to become steady; then the walk ends as not_steady",
+        json_schema_extra={"unit": "s"},
+    )
+    walk_limit: float = Field(
+        default=20.0,
+        gt=0,
+        description="longest time from the release to rest; then the walk ends as time_limit",
+        json_schema_extra={"unit": "s"},
+    )
+
+    @field_validator("links")
+    @classmethod
+    def _links_even(cls, links: int) -> int:
+        if links % 2:
+            raise refusal("links", f"{links} is odd; a chain alternates inner and outer links, so give an even number")
+        return links
+
+    @model_validator(mode="after")
+    def _hanging_needs_rest(self) -> Self:
+        if self.clearance_of == "hanging" and self.start != "rest":
+            raise refusal(
+                "clearance_of",
+                f"'hanging' needs a chain that hangs, but start is {self.start!r}; "
+                "give 'spinning' here, or start: rest",
+            )
+        return self
+
+
+def joint_radius(scene: Scene, parameters: Parameters) -> float:
+    """Distance from the sprocket's centre at which the joints ride, in m."""
+    if scene.sprocket_radius_is == "pitch":
+        return parameters.sprocket_radius
+    return parameters.sprocket_radius + parameters.circle_radius
+
+
+def contact_radius(scene: Scene, parameters: Parameters) -> float:
+    """Radius of the sprocket that the circles of the links touch, in m.
+
+    Raises:
+        InputError: the sprocket radius is that of the joints and leaves nothing to touch.
+    """
+    if scene.sprocket_radius_is == "contact":
+        return parameters.sprocket_radius
+    if parameters.sprocket_radius <= parameters.circle_radius:
+        raise InputError(
+            f"parameters.sprocket_radius: {parameters.sprocket_radius} is not greater than the circle radius "
+            f"{parameters.circle_radius}, as sprocket_radius_is: pitch needs; give a larger radius"
+        )
+    return parameters.sprocket_radius - parameters.circle_radius
+
+
+def fewest_links(scene: Scene, parameters: Parameters) -> int:
+    """Least even number of links whose loop can hang round the sprocket.
+
+    A link whose joints are both at least ρ from the centre is seen from there under an angle of at most
+    2 asin(ℓ / 2ρ), and a loop round the sprocket needs 2π in all: n ≥ π / asin(ℓ / 2ρ), with ρ of
+    `joint_radius`.
+    """
+    sine = parameters.link_length / (2 * joint_radius(scene, parameters))
+    around = math.ceil(math.pi / math.asin(sine)) if sine < 1 else 2
+    return max(4, around + around % 2)
+
+
+def check_scene(scene: Scene, parameters: Parameters) -> None:
+    """Check what a scene and its parameters must fulfil together.
+
+    A scene that starts as an ellipse has no sprocket, so nothing is asked of it.
+
+    Raises:
+        InputError: the chain is too short for its sprocket, or `contact_radius` finds none.
+    """
+    if scene.start == "ellipse":
+        return
+    contact_radius(scene, parameters)
+    fewest = fewest_links(scene, parameters)
+    if scene.links < fewest:
+        raise InputError(
+            f"scene.links: {scene.links} links of {parameters.link_length} m do not reach round the sprocket "
+            f"whose joints ride at {joint_radius(scene, parameters):g} m; give at least {fewest}"
+        )

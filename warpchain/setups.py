@@ -1,0 +1,82 @@
+"""The one door through which a user's values come in: scene, options and parameters of a walk, checked together.
+
+Values from keyword arguments go through `resolve`, those from a YAML file through `load_setup`; both check everything
+once and raise only `InputError`.
+"""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from warpchain.options import Options
+from warpchain.parameters import InputError, Parameters, shown, suggestion, validated
+from warpchain.parameters import preset as parameter_preset
+from warpchain.scene import Scene, check_scene
+from warpchain.yaml_files import read_yaml
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Everything that says what one walk is: checked, complete, and named by the preset it started from."""
+
+    preset: str
+    parameters: Parameters
+    scene: Scene
+    options: Options
+
+
+def resolve(
+    preset: str,
+    *,
+    scene: Mapping[str, object],
+    options: Mapping[str, object],
+    parameters: Mapping[str, object],
+) -> Setup:
+    """Check a user's values and complete them.
+
+    Args:
+        preset: name of the parameter preset to start from.
+        scene: fields of `Scene` that differ from their defaults.
+        options: fields of `Options` that differ from their defaults.
+        parameters: fields of `Parameters` that differ from the preset.
+
+    Raises:
+        InputError: anything is wrong; one line with the field's path and the remedy.
+    """
+    for path, values in (("scene", scene), ("options", options), ("parameters", parameters)):
+        if not isinstance(values, Mapping):
+            raise InputError(f"{path}: {shown(values)} is not a mapping; give names with values")
+    setup = Setup(
+        preset=preset,
+        parameters=parameter_preset(preset).with_values(parameters),
+        scene=validated(Scene, scene, "scene"),
+        options=validated(Options, options, "options"),
+    )
+    check_scene(setup.scene, setup.parameters)
+    return setup
+
+
+_SECTIONS: Final = ("scene", "options", "parameters")
+
+
+def load_setup(path: str | os.PathLike[str]) -> Setup:
+    """Read a setup from a YAML file with the keys `preset` (required), `scene`, `options`, `parameters`.
+
+    `1e9` is a number, as in YAML 1.2, and so is `1_000`; `060` and `1:30`, which the versions of YAML read
+    differently, are text and therefore refused.
+
+    Raises:
+        InputError: the file cannot be read, is not YAML, gives a key twice, or holds what `resolve` refuses.
+    """
+    content = read_yaml(path)
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: no mapping at the top; give the keys preset, {', '.join(_SECTIONS)}")
+    for key in content:
+        if key != "preset" and key not in _SECTIONS:
+            raise InputError(f"{shown(key)}: unknown key; {suggestion(key, ('preset', *_SECTIONS))}")
+    if "preset" not in content:
+        raise InputError("preset: missing; name the parameters to start from, such as preset: paper")
+    # A section with nothing under it is read as None; it changes nothing.
+    sections = {name: {} if content.get(name) is None else content[name] for name in _SECTIONS}
+    return resolve(content["preset"], **sections)
