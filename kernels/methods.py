@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from . import layout
+from .block_explicit import explicit_attempt
 from .block_flight import flight_attempt
 from .block_rigid import FlightLayout, block_rigid_joints
 from .block_rosenbrock import factor_layout, rosenbrock_attempt
-from .block_step import explicit_attempt
 from .controller import implicit_controller, step_controller
 from .explicit import explicit_method
 from .hand_over import hand_over
