@@ -49,15 +49,17 @@ def walk_of_case(name, method, **settings):
 @pytest.mark.parametrize(
     ("method", "links", "tolerance"),
     [
-        *((method, 180, 1e-6) for method in ("rkf78", "os32", "hybrid")),
+        ("rkf78", 180, 1e-6),
+        ("hybrid", 180, 1e-6),
+        ("os32", 100, 1e-6),
         *((method, 100, 1e-4) for method in ("bs32", "rodas4p", "rodas5p")),
     ],
 )
 def test_longest_slow_walk_ends_in_a_pile_at_rest(method, links, tolerance):
     """180 links released at 5 Hz fall into a pile beside the sprocket and rest there, the ledger closed to 1e-4.
 
-    So do 100 links with methods that would take minutes, the ledger closed to 5e-4. With dp5 180 links are among those
-    of the whole range, see `test_walk`.
+    So do 100 links with os32 and, the ledger closed to 5e-4, with methods that would take minutes. With dp5 180 links
+    are among those of the whole range, see `test_walk`.
     """
     done = walk_of_case("pile-slow-walk", method, links=links, tolerance=tolerance)
     assert done.center[-1, 1] < 0.06

@@ -316,13 +316,13 @@ def test_not_steady():
     assert walk.steps_accepted > 0
 
 
-@pytest.mark.parametrize("start", ["ellipse", "spinning"])
-def test_step_limit(start):
+@pytest.mark.parametrize(("start", "limit"), [("ellipse", 60_000), ("spinning", 180_000)])
+def test_step_limit(start, limit):
     """The tries of a walk, those before the release included, stop at the limit, and the status says so."""
-    walk = soft_walk(links=60, start=start, step_limit=150_000)
+    walk = soft_walk(links=60, start=start, step_limit=limit)
     assert walk.status == Status.STEP_LIMIT
     assert np.isnan(walk.dx)
-    assert walk.steps_accepted + walk.steps_rejected == 150_000
+    assert walk.steps_accepted + walk.steps_rejected == limit
     assert walk.walk_time > 0
 
 
