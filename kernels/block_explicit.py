@@ -45,8 +45,8 @@ class Ahead:
 FEW_STAGES = 7
 """Most stages with which the state of a link stays in registers and the next stage is begun ahead.
 
-It saves 5 to 9 % of a try with dp5 and 60 links. With the 13 stages of rkf78 and 150 links, which have fewer registers,
-it would cost 10 to 14 % (H100, 1 to 4000 chains).
+It saves about 4 % of a try with dp5 and 60 links. With the 13 stages of rkf78 and 150 links, where registers are fewer,
+it would cost some 10 % (H100 and H200, 1 to 4000 chains).
 """
 
 
