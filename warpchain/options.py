@@ -5,11 +5,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final, Literal, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, Field, field_validator, model_validator
 
-from warpchain.parameters import refusal, shown, suggestion
-
-_STRICT: Final = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+from warpchain.parameters import STRICT, refusal, shown, suggestion
 
 LONGEST_STIFFENING_INTERVAL: Final = 2e-3
 """Greatest time [s] between two of the small steps in which soft joints on the sprocket become stiff."""
@@ -52,7 +50,7 @@ class Options(BaseModel):
             contact step, or the device is not supported.
     """
 
-    model_config = _STRICT
+    model_config = STRICT
 
     method: Literal["rkf78", "dp5", "bs32", "os32", "rodas4p", "rodas5p", "hybrid"] = Field(
         default="rkf78",

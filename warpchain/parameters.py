@@ -19,6 +19,9 @@ from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError, core_sc
 
 Source = Literal["measured", "looked up", "adjusted", "assumed"]
 
+STRICT: Final = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+"""Of models that hold a user's values."""
+
 DIMENSIONLESS: Final = "1"
 
 

@@ -1,13 +1,11 @@
 """What happens in a walk: how long the chain is, how fast it is spun, from which height it is released."""
 
 import math
-from typing import Final, Literal, Self
+from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, Field, field_validator, model_validator
 
-from warpchain.parameters import InputError, Parameters, refusal
-
-_STRICT: Final = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+from warpchain.parameters import STRICT, InputError, Parameters, refusal
 
 
 class Scene(BaseModel):
@@ -18,7 +16,7 @@ class Scene(BaseModel):
             that of a hanging chain although the chain never hangs.
     """
 
-    model_config = _STRICT
+    model_config = STRICT
 
     links: int = Field(
         default=60,
