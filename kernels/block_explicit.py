@@ -22,7 +22,7 @@ from .block_step import (
     vec3d,
     vec5d,
 )
-from .elementary import LARGEST_TURN, ZERO, cos_sin
+from .elementary import LARGEST_TURN, ONE, ZERO, cos_sin
 from .geometry import turned_direction
 from .layout import INVERSE_INERTIA, INVERSE_MASS, THETA
 from .tableaus import TABLEAUS
@@ -128,8 +128,8 @@ def explicit_attempt(name: str, block_dim: int):
             trial.friction = wp.static(wp.float64(velocity_weights[0])) * first.friction
             trial.damping = wp.static(wp.float64(velocity_weights[0])) * first.damping
         row = wp.static(rows[1])(link, h, ax, ay, at)
-        error = wp.float32(0.0)
-        scale = wp.float32(1.0)
+        error = ZERO
+        scale = ONE
         eu = ZERO
         ev = ZERO
         ew = ZERO

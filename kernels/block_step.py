@@ -11,7 +11,7 @@ import functools
 
 import warp as wp
 
-from .controller import error_scale
+from .controller import error_scale, quick_quotient
 from .elementary import order_bits_single
 from .geometry import end_positions, end_velocities
 from .joint import friction_torque, joint_force, link_acceleration
@@ -92,8 +92,8 @@ class Trial:
     sine: wp.float64
     friction: wp.float64
     damping: wp.float64
-    error: wp.float32  # greatest error times tolerance, a quotient not yet divided, and …
-    scale: wp.float32  # … its divisor
+    error: wp.float64  # greatest error times tolerance, a quotient not yet divided, and …
+    scale: wp.float64  # … its divisor
     turns_far: bool  # further than the method allows in one step
 
 
@@ -148,7 +148,7 @@ def joint_constants(K: wp.array2d(dtype=wp.float64)) -> Chain:
 
 
 @wp.func
-def greater(error_a: wp.float32, scale_a: wp.float32, error_b: wp.float32, scale_b: wp.float32):
+def greater(error_a: wp.float64, scale_a: wp.float64, error_b: wp.float64, scale_b: wp.float64):
     """The greater of two quotients |error| / scale with positive scales, a NaN before any number."""
     keeps_a = wp.abs(error_a) * scale_b >= wp.abs(error_b) * scale_a or error_a != error_a
     return wp.where(keeps_a, error_a, error_b), wp.where(keeps_a, scale_a, scale_b)
@@ -157,7 +157,7 @@ def greater(error_a: wp.float32, scale_a: wp.float32, error_b: wp.float32, scale
 @wp.func
 def error_of(trial: Trial, tolerance: wp.float64):
     """Error ratio of a link as ordered bits, a NaN above all numbers; turning too far counts as an error of 2."""
-    ratio = wp.abs(trial.error) / (trial.scale * wp.float32(tolerance))
+    ratio = quick_quotient(wp.float32(wp.abs(trial.error)), wp.float32(trial.scale * tolerance))
     if trial.turns_far and ratio < wp.float32(2.0):
         ratio = wp.float32(2.0)
     return order_bits_single(ratio)
@@ -165,12 +165,12 @@ def error_of(trial: Trial, tolerance: wp.float64):
 
 @wp.func
 def greatest_of_three(
-    error_a: wp.float32,
-    scale_a: wp.float32,
-    error_b: wp.float32,
-    scale_b: wp.float32,
-    error_c: wp.float32,
-    scale_c: wp.float32,
+    error_a: wp.float64,
+    scale_a: wp.float64,
+    error_b: wp.float64,
+    scale_b: wp.float64,
+    error_c: wp.float64,
+    scale_c: wp.float64,
 ):
     """The greatest of three such quotients."""
     error, scale = greater(error_a, scale_a, error_b, scale_b)
@@ -186,11 +186,11 @@ def greatest_position_error(
     Found by cross-multiplication, so that only one needs a division.
     """
     return greatest_of_three(
-        wp.float32(ex),
+        ex,
         error_scale(link.x, link.u, h),
-        wp.float32(ey),
+        ey,
         error_scale(link.y, link.v, h),
-        wp.float32(et),
+        et,
         error_scale(theta, link.omega, h),
     )
 
@@ -199,11 +199,11 @@ def greatest_position_error(
 def greatest_velocity_error(link: Link, first: Rates, h: wp.float64, eu: wp.float64, ev: wp.float64, ew: wp.float64):
     """The same of u, v and ω."""
     return greatest_of_three(
-        wp.float32(eu),
+        eu,
         error_scale(link.u, first.x, h),
-        wp.float32(ev),
+        ev,
         error_scale(link.v, first.y, h),
-        wp.float32(ew),
+        ew,
         error_scale(link.omega, first.theta, h),
     )
 

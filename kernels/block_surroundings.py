@@ -8,6 +8,7 @@ from .approach import SMALLEST_GAP, falling, meeting_of
 from .block_board import contact_constants, ends_of
 from .block_memory import block_maxima, vec5i
 from .block_step import Link, Place, link_on, vec5d
+from .controller import quick_quotient, quick_root
 from .broadphase import list_layout
 from .contact import meet_floor, meet_sprocket
 from .driver import Features, sprocket_turning
@@ -91,10 +92,10 @@ def block_surroundings(features: Features, block_dim: int):
         values = greatest_of_five(maxima, place.lane, values)
         return (
             wp.cast(values[4], wp.float32),
-            wp.sqrt(wp.cast(values[0], wp.float32)),
+            quick_root(wp.cast(values[0], wp.float32)),
             -from_order_key_single(values[1]),
-            wp.sqrt(wp.cast(values[2], wp.float32)),
-            wp.sqrt(wp.cast(values[3], wp.float32)),
+            quick_root(wp.cast(values[2], wp.float32)),
+            quick_root(wp.cast(values[3], wp.float32)),
         )
 
     @wp.func
@@ -116,7 +117,7 @@ def block_surroundings(features: Features, block_dim: int):
             room = wp.min(room, slack)
         bound = K[BOARD_NOTES, NOTE_CONTACT_STEP]
         if not near:
-            bound = wp.max(bound, wp.float64(room / speed))
+            bound = wp.max(bound, wp.float64(quick_quotient(room, speed)))
         return bound
 
     @wp.func
