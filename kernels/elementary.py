@@ -147,6 +147,31 @@ def reciprocal(b: wp.float64) -> wp.float64:
     ...
 
 
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    return __hiloint2double(min(__double2hiint(x) & 0x7fffffff, 0x40340000), __double2loint(x));
+#else
+    const double y = x < 0.0 ? -x : x;
+    return y < 20.0 ? y : 20.0;
+#endif
+""")
+def capped(x: wp.float64) -> wp.float64:
+    """|x| up to 20."""
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    return __hiloint2double(__double2hiint(value) | (__double2hiint(x) & 0x80000000), __double2loint(value));
+#else
+    return x < 0.0 ? -value : value;
+#endif
+""")
+def with_sign(value: wp.float64, x: wp.float64) -> wp.float64:
+    """A positive number with the sign of x."""
+    ...
+
+
 @wp.func
 def tanh(x: wp.float64):
     """Hyperbolic tangent to 1e-15 absolute: 1 − 2/(exp(2|x|) + 1), with |x| capped where the result is 1.
@@ -155,14 +180,14 @@ def tanh(x: wp.float64):
     pairs, and exp(2|x|) = 2ᵏ exp(2 r) is reduced by one product with a rounded ln2/2, whose error grows as k, while
     its weight in the result falls as 2⁻ᵏ.
     """
-    y = wp.min(wp.abs(x), TANH_LIMIT)
+    y = capped(x)
     shifted = y * TWO_LOG2_E + ROUNDER
     r = y - (shifted - ROUNDER) * HALF_LN2
     power = wp.cast((wp.cast(shifted, wp.int64) - ROUNDER_BITS + EXPONENT_BIAS) << EXPONENT_SHIFT, wp.float64)
     z = r * r
     series = ((P0 + r * P1) + z * (P2 + r * P3)) + (z * z) * (((P4 + r * P5) + z * (P6 + r * P7)) + (z * z) * P8)
     value = ONE - TWO * reciprocal(((ONE + TWO * r) + z * series) * power + ONE)
-    return wp.where(x < ZERO, -value, value)
+    return with_sign(value, x)
 
 
 @wp.func
