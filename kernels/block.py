@@ -255,7 +255,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         publish(K, place)
         barrier()
         link = link_on(K, lane)
-        next_end = hand_over(ends, K, place, link)
+        next_end = hand_over(ends, place, link)
         _error, opening, gap, displacement, speed = measure(K, maxima, place, link, next_end, 0)
         status = int(RUNNING)
         pairs = int(0)
@@ -300,7 +300,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 barrier()
                 if wp.static(softens):
                     if state.softness[world] != softness and flies == 0:
-                        next_end = hand_over(ends, K, place, link_on(K, lane))
+                        next_end = hand_over(ends, place, link_on(K, lane))
                         begin_step(forces, K, place, next_end)
                         bound = bound_of(K, control, pairs, gap, slack, speed)
                 if pauses or status != RUNNING:
@@ -350,8 +350,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 candidate.u = trial.u
                 candidate.v = trial.v
                 candidate.omega = trial.omega
-                candidate.cosine = trial.cosine
-                candidate.sine = trial.sine
+                half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
+                candidate.arm_x = half_length * trial.cosine
+                candidate.arm_y = half_length * trial.sine
                 error, new_opening, new_gap, new_displacement, new_speed = measure(
                     K, maxima, place, candidate, trial.next_end, own_error
                 )
@@ -395,7 +396,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     speed = new_speed
                 else:
                     link = link_on(K, lane)
-                    next_end = hand_over(ends, K, place, link)
+                    next_end = hand_over(ends, place, link)
                     _error, opening, gap, displacement, speed = measure(K, maxima, place, link, next_end, 0)
                 if wp.static(has_flight):
                     are_rigid = bool(True)
@@ -403,7 +404,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if flies != 0:
                         are_rigid, is_stiff, kinetic = follow(flight_memory, K, place)
                         link = link_on(K, lane)
-                        next_end = hand_over(ends, K, place, link)
+                        next_end = hand_over(ends, place, link)
                         _error, opening, gap, displacement, speed = measure(K, maxima, place, link, next_end, 0)
                 if lane == 0:
                     K[BOARD_NOTES, NOTE_OPENING] = wp.max(K[BOARD_NOTES, NOTE_OPENING], wp.float64(opening))
@@ -465,7 +466,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 bound = bound_of(K, control, pairs, gap, slack, speed)
                 if is_hit or wp.static(not reuses_last):
                     if is_hit:
-                        next_end = hand_over(ends, K, place, link_on(K, lane))
+                        next_end = hand_over(ends, place, link_on(K, lane))
                     begin_step(forces, K, place, next_end)
         tries_before = state.tries_before[world] + state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
         if status == RUNNING and tries_before + wp.int64(tries) >= control.step_limit:

@@ -161,11 +161,9 @@ def point(K: wp.array2d(dtype=wp.float64), lane: int):
 
 
 @wp.func
-def ends_of(K: wp.array2d(dtype=wp.float64), link: Link):
+def ends_of(link: Link):
     """Left and right end of a link [m]."""
-    chain = Chain()
-    chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
-    return end_positions(chain, link.x, link.y, link.cosine, link.sine)
+    return end_positions(link.x, link.y, link.arm_x, link.arm_y)
 
 
 @wp.func
@@ -174,7 +172,7 @@ def publish(K: wp.array2d(dtype=wp.float64), place: Place):
     lane = place.lane
     n = place.links
     if lane < n:
-        left_x, left_y, right_x, right_y = ends_of(K, link_on(K, lane))
+        left_x, left_y, right_x, right_y = ends_of(link_on(K, lane))
         K[LEFT_X, lane] = left_x
         K[LEFT_Y, lane] = left_y
         K[RIGHT_X, lane] = right_x

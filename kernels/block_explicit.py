@@ -23,7 +23,7 @@ from .block_step import (
     vec5d,
 )
 from .elementary import LARGEST_TURN, ONE, ZERO, cos_sin
-from .geometry import turned_direction
+from .geometry import turned
 from .layout import INVERSE_INERTIA, INVERSE_MASS, THETA
 from .tableaus import TABLEAUS
 
@@ -140,9 +140,9 @@ def explicit_attempt(name: str, block_dim: int):
             there = Link()
             there.x = row.x
             there.y = row.y
-            cosine, sine = turned_direction(link.cosine, link.sine, row.turn)
-            there.cosine = cosine
-            there.sine = sine
+            arm_x, arm_y = turned(link.arm_x, link.arm_y, row.turn)
+            there.arm_x = arm_x
+            there.arm_y = arm_y
             if wp.static(velocity[s][s - 1] != 0.0):
                 row.u += wp.static(wp.float64(velocity[s][s - 1])) * ax[s - 1]
                 row.v += wp.static(wp.float64(velocity[s][s - 1])) * ay[s - 1]
@@ -150,7 +150,7 @@ def explicit_attempt(name: str, block_dim: int):
             there.u = link.u + h * row.u
             there.v = link.v + h * row.v
             there.omega = link.omega + h * row.omega
-            next_end = hand_over(ends, K, place, there)
+            next_end = hand_over(ends, place, there)
             # what does not depend on this stage, while its friction is worked out
             if wp.static((s < last and has_room) or (s == last and not reuses_last)):
                 row = wp.static(rows[s + 1])(link, h, ax, ay, at)

@@ -19,7 +19,7 @@ from .block_board import point
 from .block_factors import FactorLayout, reductions_for
 from .block_memory import barrier, exchange, read, warp_greatest, warp_width, write
 from .block_solver import block_solver
-from .block_step import Place, joint_constants, link_on
+from .block_step import Place, direction_on, joint_constants, link_on
 from .cyclic_solver import block_type
 from .elementary import HALF, ONE, TWO, ZERO, order_bits_single
 from .joint import friction_torque
@@ -237,8 +237,9 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
         link = link_on(K, place.lane)
         hand(ends, 0, place.lane, link.x)
         hand(ends, 1, place.lane, link.y)
-        hand(ends, 2, place.lane, link.cosine)
-        hand(ends, 3, place.lane, link.sine)
+        cosine, sine = direction_on(K, place.lane)
+        hand(ends, 2, place.lane, cosine)
+        hand(ends, 3, place.lane, sine)
         barrier()
         after_cosine = handed(ends, 2, place.after)
         after_sine = handed(ends, 3, place.after)
@@ -246,8 +247,8 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
             K[BOARD_NOTES, NOTE_HALF_LENGTH],
             link.x,
             link.y,
-            link.cosine,
-            link.sine,
+            cosine,
+            sine,
             handed(ends, 0, place.after),
             handed(ends, 1, place.after),
             after_cosine,
@@ -330,7 +331,8 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
                 # a NaN goes on to nothing
                 goes_on = widest > CLOSED_SQUARE and corrections < wp.static(MOST_CORRECTIONS)
                 link = link_on(K, lane)
-                factorise(S, K, place, link.cosine, link.sine)
+                cosine, sine = direction_on(K, lane)
+                factorise(S, K, place, cosine, sine)
                 hand(M.forces, 0, lane, link.u)
                 hand(M.forces, 1, lane, link.v)
                 hand(M.forces, 2, lane, link.omega)
@@ -342,8 +344,8 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
                         link.u,
                         link.v,
                         link.omega,
-                        link.cosine,
-                        link.sine,
+                        cosine,
+                        sine,
                         handed(M.forces, 0, place.after),
                         handed(M.forces, 1, place.after),
                         handed(M.forces, 2, place.after),
@@ -357,7 +359,7 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
                 barrier()
                 left_x = handed(M.ends, 0, place.before)
                 left_y = handed(M.ends, 1, place.before)
-                px, py, turn = push_of(K, place, link.cosine, link.sine, left_x, left_y, own)
+                px, py, turn = push_of(K, place, cosine, sine, left_x, left_y, own)
                 first = wp.where(goes_on, X, U)
                 if lane < place.links:
                     K[first, lane] = K[first, lane] + px
@@ -372,7 +374,8 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
             hand(M.forces, 0, lane, link.omega)
             barrier()
             torque = friction_torque(chain, link.omega - handed(M.forces, 0, place.after))
-            pull, ax, ay, at = accelerate(M, K, place, link.cosine, link.sine, link.omega, torque)
+            cosine, sine = direction_on(K, lane)
+            pull, ax, ay, at = accelerate(M, K, place, cosine, sine, link.omega, torque)
             square, doubled = two_sums(S, place, pull[0] * pull[0] + pull[1] * pull[1], twice_kinetic(K, place))
             left_over = HALF * doubled
             is_stiff = HALF * square / chain.joint_stiffness <= GREATEST_STRETCHING * left_over
@@ -423,8 +426,8 @@ def block_rigid_joints(block_dim: int) -> BlockRigidJoints:
         barrier()
         left_x = handed(M.forces, 0, place.before)
         left_y = handed(M.forces, 1, place.before)
-        link = link_on(K, lane)
-        px, py, turn = push_of(K, place, link.cosine, link.sine, left_x, left_y, own)
+        cosine, sine = direction_on(K, lane)
+        px, py, turn = push_of(K, place, cosine, sine, left_x, left_y, own)
         if lane < place.links:
             K[X, lane] = x + px
             K[Y, lane] = y + py

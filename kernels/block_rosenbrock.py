@@ -27,6 +27,7 @@ from .block_step import (
     Place,
     Trial,
     block_stage,
+    direction_on,
     first_on,
     greatest_error,
     joint_constants,
@@ -218,10 +219,11 @@ def rosenbrock_attempt(name: str, block_dim: int):
         inverse_length = ONE / chain.half_length
         g = wp.static(wp.float64(gamma)) * h
         link = link_on(K, lane)
+        start_cosine, start_sine = direction_on(K, lane)
         first = first_on(K, lane)
-        next_end = hand_over(ends, K, place, link)
-        _left_x, _left_y, right_x, right_y = end_positions(chain, link.x, link.y, link.cosine, link.sine)
-        _left_u, _left_v, right_u, right_v = end_velocities(chain, link.u, link.v, link.omega, link.cosine, link.sine)
+        next_end = hand_over(ends, place, link)
+        _left_x, _left_y, right_x, right_y = end_positions(link.x, link.y, link.arm_x, link.arm_y)
+        _left_u, _left_v, right_u, right_v = end_velocities(link.u, link.v, link.omega, link.arm_x, link.arm_y)
         base_cu = next_end[2] - right_u
         base_cv = next_end[3] - right_v
         base_spin = link.omega - next_end[4]
@@ -254,13 +256,13 @@ def rosenbrock_attempt(name: str, block_dim: int):
         forces[lane] = vec3d(force_x, force_y, torque)
         before = place.before
         pull = forces[before]
-        tension = link.cosine * (force_x + pull[0]) + link.sine * (force_y + pull[1])
+        tension = start_cosine * (force_x + pull[0]) + start_sine * (force_y + pull[1])
         own_angle = K[INERTIA, column] * inverse_length * inverse_length + TWO * sigma
         own_angle += own_slope + handed(K, JOINT_SLOPE, before) + g * g * inverse_length * tension
-        write(S, wp.static(NORMAL_X * block_dim) + lane, -link.sine)
-        write(S, wp.static(NORMAL_Y * block_dim) + lane, link.cosine)
-        write(S, wp.static(COLUMN_X * block_dim) + lane, -sigma * link.sine - turning * link.cosine)
-        write(S, wp.static(COLUMN_Y * block_dim) + lane, sigma * link.cosine - turning * link.sine)
+        write(S, wp.static(NORMAL_X * block_dim) + lane, -start_sine)
+        write(S, wp.static(NORMAL_Y * block_dim) + lane, start_cosine)
+        write(S, wp.static(COLUMN_X * block_dim) + lane, -sigma * start_sine - turning * start_cosine)
+        write(S, wp.static(COLUMN_Y * block_dim) + lane, sigma * start_cosine - turning * start_sine)
         write(S, wp.static(SLOPE * block_dim) + lane, own_slope)
         own_place = K[MASS, column] + TWO * sigma
         # accelerations less what the dampers do with r_q, which are the velocities in the first stage
@@ -269,8 +271,8 @@ def rosenbrock_attempt(name: str, block_dim: int):
             chain,
             K[INVERSE_MASS, column],
             K[INVERSE_INERTIA, column],
-            link.cosine,
-            link.sine,
+            link.arm_x,
+            link.arm_y,
             handed(K, DAMPER_X, before),
             handed(K, DAMPER_Y, before),
             damper_x,
@@ -337,16 +339,15 @@ def rosenbrock_attempt(name: str, block_dim: int):
             weight = coefficient(QUADRATURE, i, 0)
             if i > 0:
                 constants = joint_constants(K)
+                a = constants.half_length
                 versine, sine = versine_sine(turn)
-                turn_x = -(link.cosine * versine + link.sine * sine)
-                turn_y = link.cosine * sine - link.sine * versine
-                cosine = link.cosine + turn_x
-                sine = link.sine + turn_y
-                left_x, left_y, right_x, right_y = end_positions(constants, dx, dy, turn_x, turn_y)
-                left_u, left_v, right_u, right_v = end_velocities(constants, u, v, omega, cosine, sine)
-                shift_left_u, shift_left_v, shift_u, shift_v = end_velocities(
-                    constants, rx, ry, rt, link.cosine, link.sine
-                )
+                turn_x = -(start_cosine * versine + start_sine * sine)
+                turn_y = start_cosine * sine - start_sine * versine
+                cosine = start_cosine + turn_x
+                sine = start_sine + turn_y
+                left_x, left_y, right_x, right_y = end_positions(dx, dy, a * turn_x, a * turn_y)
+                left_u, left_v, right_u, right_v = end_velocities(u, v, a * omega, cosine, sine)
+                shift_left_u, shift_left_v, shift_u, shift_v = end_velocities(rx, ry, rt, link.arm_x, link.arm_y)
                 if lane < n:
                     hand(K, SHIFT_U, lane, shift_left_u)
                     hand(K, SHIFT_V, lane, shift_left_v)
@@ -377,8 +378,8 @@ def rosenbrock_attempt(name: str, block_dim: int):
                     constants,
                     inverse_mass,
                     inverse_inertia,
-                    cosine,
-                    sine,
+                    a * cosine,
+                    a * sine,
                     pull[0],
                     pull[1],
                     force_x,
@@ -391,8 +392,8 @@ def rosenbrock_attempt(name: str, block_dim: int):
                     constants,
                     inverse_mass,
                     inverse_inertia,
-                    link.cosine,
-                    link.sine,
+                    link.arm_x,
+                    link.arm_y,
                     handed(K, DAMPER_X, before),
                     handed(K, DAMPER_Y, before),
                     damper_x,
@@ -446,12 +447,12 @@ def rosenbrock_attempt(name: str, block_dim: int):
                 trial.error = error
                 trial.scale = scale
         # lost power: how the joint's spin and opening rate change by Σ w U
-        left_u, left_v, right_u, right_v = end_velocities(chain, lost_u, lost_v, lost_omega, link.cosine, link.sine)
-        swing = chain.half_length * link.omega * g * lost_turn
-        ends[lane] = vec5d(ZERO, ZERO, left_u + swing * link.cosine, left_v + swing * link.sine, lost_omega)
+        left_u, left_v, right_u, right_v = end_velocities(lost_u, lost_v, lost_omega, link.arm_x, link.arm_y)
+        swing = link.omega * g * lost_turn
+        ends[lane] = vec5d(ZERO, ZERO, left_u + swing * link.arm_x, left_v + swing * link.arm_y, lost_omega)
         change = ends[place.after]
-        cu = change[2] - (right_u - swing * link.cosine)
-        cv = change[3] - (right_v - swing * link.sine)
+        cu = change[2] - (right_u - swing * link.arm_x)
+        cv = change[3] - (right_v - swing * link.arm_y)
         trial.friction = friction + power_slope * (lost_omega - change[4])
         trial.damping = damping + TWO * chain.joint_damping * (base_cu * cu + base_cv * cv)
         return trial

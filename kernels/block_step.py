@@ -43,15 +43,15 @@ vec5d = wp.types.vector(length=5, dtype=wp.float64)
 
 @wp.struct
 class Link:
-    """State of a link but for its angle, which no stage needs."""
+    """State of a link with its arm, see :mod:`geometry`, instead of its angle, which no stage needs."""
 
     x: wp.float64  # [m]
     y: wp.float64  # [m]
     u: wp.float64  # ẋ [m/s]
     v: wp.float64  # ẏ [m/s]
     omega: wp.float64  # θ̇ [rad/s]
-    cosine: wp.float64
-    sine: wp.float64
+    arm_x: wp.float64  # [m]
+    arm_y: wp.float64
 
 
 @wp.struct
@@ -106,9 +106,16 @@ def link_on(K: wp.array2d(dtype=wp.float64), column: int) -> Link:
     link.u = K[U, column]
     link.v = K[V, column]
     link.omega = K[OMEGA, column]
-    link.cosine = K[COSINE, column]
-    link.sine = K[SINE, column]
+    half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
+    link.arm_x = half_length * K[COSINE, column]
+    link.arm_y = half_length * K[SINE, column]
     return link
+
+
+@wp.func
+def direction_on(K: wp.array2d(dtype=wp.float64), column: int):
+    """Cosine and sine of a link as it stands on the board."""
+    return K[COSINE, column], K[SINE, column]
 
 
 @wp.func
@@ -235,21 +242,18 @@ def block_stage(block_dim: int):
         block_dim: Threads in a block.
 
     Returns:
-        ``hand_over(ends, K, place, link)`` → left end of the next link;
+        ``hand_over(ends, place, link)`` → left end of the next link;
         ``stage(forces, K, place, next_end, link, 1/m, 1/I)`` → Rates.
     """
 
     @wp.func
     def hand_over(
         ends: wp.tile[vec5d, block_dim],
-        K: wp.array2d(dtype=wp.float64),
         place: Place,
         link: Link,
     ):
-        chain = Chain()
-        chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
-        left_x, left_y, _right_x, _right_y = end_positions(chain, link.x, link.y, link.cosine, link.sine)
-        left_u, left_v, _right_u, _right_v = end_velocities(chain, link.u, link.v, link.omega, link.cosine, link.sine)
+        left_x, left_y, _right_x, _right_y = end_positions(link.x, link.y, link.arm_x, link.arm_y)
+        left_u, left_v, _right_u, _right_v = end_velocities(link.u, link.v, link.omega, link.arm_x, link.arm_y)
         ends[place.lane] = vec5d(left_x, left_y, left_u, left_v, link.omega)
         return ends[place.after]
 
@@ -265,8 +269,8 @@ def block_stage(block_dim: int):
     ):
         # constants are read from the board where they are needed: registers are dearer than such reads
         chain = joint_constants(K)
-        _left_x, _left_y, right_x, right_y = end_positions(chain, link.x, link.y, link.cosine, link.sine)
-        _left_u, _left_v, right_u, right_v = end_velocities(chain, link.u, link.v, link.omega, link.cosine, link.sine)
+        _left_x, _left_y, right_x, right_y = end_positions(link.x, link.y, link.arm_x, link.arm_y)
+        _left_u, _left_v, right_u, right_v = end_velocities(link.u, link.v, link.omega, link.arm_x, link.arm_y)
         cu = next_end[2] - right_u
         cv = next_end[3] - right_v
         spin = link.omega - next_end[4]
@@ -283,8 +287,8 @@ def block_stage(block_dim: int):
             chain,
             inverse_mass,
             inverse_inertia,
-            link.cosine,
-            link.sine,
+            link.arm_x,
+            link.arm_y,
             left[0],
             left[1],
             force_x,

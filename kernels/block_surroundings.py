@@ -8,9 +8,9 @@ from .approach import SMALLEST_GAP, falling, meeting_of
 from .block_board import contact_constants, ends_of
 from .block_memory import block_maxima, vec5i
 from .block_step import Link, Place, link_on, vec5d
-from .controller import quick_quotient, quick_root
 from .broadphase import list_layout
 from .contact import meet_floor, meet_sprocket
+from .controller import quick_quotient, quick_root
 from .driver import Features, sprocket_turning
 from .elementary import TWO, ZERO, from_order_key_single, order_bits_single, order_key_single
 from .layout import (
@@ -68,7 +68,7 @@ def block_surroundings(features: Features, block_dim: int):
         Computed in double, compared in single precision, which keeps signs. ``error``: bits of a link's error ratio,
         of which the greatest comes first.
         """
-        left_x, left_y, right_x, right_y = ends_of(K, link)
+        left_x, left_y, right_x, right_y = ends_of(link)
         values = vec5i(0, order_key_single(wp.float32(-wp.inf)), 0, 0, error)
         if place.lane < place.links:
             cx = next_end[0] - right_x
@@ -131,7 +131,7 @@ def block_surroundings(features: Features, block_dim: int):
     ):
         """This link, on the board, after floor or sprocket; returns the number of impulses."""
         link = link_on(K, place.lane)
-        left_x, left_y, right_x, right_y = ends_of(K, link)
+        left_x, left_y, right_x, right_y = ends_of(link)
         u = link.u
         v = link.v
         omega = link.omega

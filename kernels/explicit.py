@@ -10,7 +10,7 @@ import warp as wp
 
 from .controller import error_bits
 from .elementary import LARGEST_TURN, TWO, ZERO, cos_sin, order_bits
-from .geometry import end_positions, end_velocities, turned_direction
+from .geometry import end_positions, end_velocities, turned
 from .joint import friction_torque, joint_force, link_acceleration
 from .layout import (
     COSINE,
@@ -37,9 +37,9 @@ from .layout import (
     RIGHT_X,
     RIGHT_Y,
     SINE,
-    STAGE_COSINE,
+    STAGE_ARM_X,
+    STAGE_ARM_Y,
     STAGE_ROWS,
-    STAGE_SINE,
     STAGE_SPIN,
     STAGES,
     THETA,
@@ -59,12 +59,13 @@ wp.set_module_options({"enable_backward": False})
 def place_ends(K: wp.array2d(dtype=wp.float64), chain: Chain):
     """Directions and end positions of the links, exactly, from the state rows."""
     n = chain.link_count
+    a = chain.half_length
     i = int(0)
     while i < n:
         c, s = cos_sin(K[THETA, i])
         K[COSINE, i] = c
         K[SINE, i] = s
-        left_x, left_y, right_x, right_y = end_positions(chain, K[X, i], K[Y, i], c, s)
+        left_x, left_y, right_x, right_y = end_positions(K[X, i], K[Y, i], a * c, a * s)
         K[LEFT_X, i] = left_x
         K[LEFT_Y, i] = left_y
         K[RIGHT_X, i] = right_x
@@ -76,17 +77,18 @@ def place_ends(K: wp.array2d(dtype=wp.float64), chain: Chain):
 
 @wp.func
 def begin_stages(K: wp.array2d(dtype=wp.float64), chain: Chain):
-    """First stage's rows from the state: end velocities and directions; ``place_ends`` did the positions."""
+    """First stage's rows from the state: arms and end velocities; ``place_ends`` did the positions."""
     n = chain.link_count
+    a = chain.half_length
     i = int(0)
     while i < n:
-        c = K[COSINE, i]
-        s = K[SINE, i]
+        arm_x = a * K[COSINE, i]
+        arm_y = a * K[SINE, i]
         w = K[OMEGA, i]
-        K[STAGE_COSINE, i] = c
-        K[STAGE_SINE, i] = s
+        K[STAGE_ARM_X, i] = arm_x
+        K[STAGE_ARM_Y, i] = arm_y
         K[STAGE_SPIN, i] = w
-        left_u, left_v, right_u, right_v = end_velocities(chain, K[U, i], K[V, i], w, c, s)
+        left_u, left_v, right_u, right_v = end_velocities(K[U, i], K[V, i], w, arm_x, arm_y)
         K[LEFT_U, i] = left_u
         K[LEFT_V, i] = left_v
         K[RIGHT_U, i] = right_u
@@ -148,8 +150,8 @@ def explicit_method(name: str):
                 chain,
                 K[INVERSE_MASS, i],
                 K[INVERSE_INERTIA, i],
-                K[STAGE_COSINE, i],
-                K[STAGE_SINE, i],
+                K[STAGE_ARM_X, i],
+                K[STAGE_ARM_Y, i],
                 K[FORCE_X, i],
                 K[FORCE_Y, i],
                 K[FORCE_X, i + 1],
@@ -170,8 +172,8 @@ def explicit_method(name: str):
     @wp.func
     def attempt(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64, tolerance: wp.float64):
         n = chain.link_count
+        a = chain.half_length
         hh = h * h
-        turned = wp.int64(0)
         for s in range(1, wp.static(stages)):
             ch = wp.static(wp.float64(nodes[s])) * h
             i = int(0)
@@ -192,17 +194,17 @@ def explicit_method(name: str):
                         dy += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
                         turn += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
                 turn = ch * K[OMEGA, i] + hh * turn
-                c, q = turned_direction(K[COSINE, i], K[SINE, i], turn)
+                arm_x, arm_y = turned(a * K[COSINE, i], a * K[SINE, i], turn)
                 x = K[X, i] + (ch * K[U, i] + hh * dx)
                 y = K[Y, i] + (ch * K[V, i] + hh * dy)
                 u = K[U, i] + h * du
                 v = K[V, i] + h * dv
                 w = K[OMEGA, i] + h * dw
-                K[STAGE_COSINE, i] = c
-                K[STAGE_SINE, i] = q
+                K[STAGE_ARM_X, i] = arm_x
+                K[STAGE_ARM_Y, i] = arm_y
                 K[STAGE_SPIN, i] = w
-                left_x, left_y, right_x, right_y = end_positions(chain, x, y, c, q)
-                left_u, left_v, right_u, right_v = end_velocities(chain, u, v, w, c, q)
+                left_x, left_y, right_x, right_y = end_positions(x, y, arm_x, arm_y)
+                left_u, left_v, right_u, right_v = end_velocities(u, v, w, arm_x, arm_y)
                 K[LEFT_X, i] = left_x
                 K[LEFT_Y, i] = left_y
                 K[LEFT_U, i] = left_u
@@ -279,15 +281,15 @@ def explicit_method(name: str):
             )
             K[ERROR, i] = wp.cast(worst, wp.float64) / tolerance
             i += 1
-        turned = wp.int64(0)
+        furthest = wp.int64(0)
         greatest = wp.int64(0)
         i = int(0)
         while i < n:
             greatest = wp.max(greatest, order_bits(K[ERROR, i]))
-            turned = wp.max(turned, order_bits(K[NEW_THETA, i] - K[THETA, i]))
+            furthest = wp.max(furthest, order_bits(K[NEW_THETA, i] - K[THETA, i]))
             i += 1
         # a turn beyond the polynomials' range is refused as an error of 2: the step shrinks
-        if wp.cast(turned, wp.float64) > LARGEST_TURN:
+        if wp.cast(furthest, wp.float64) > LARGEST_TURN:
             greatest = wp.max(greatest, order_bits(TWO))
         return greatest
 

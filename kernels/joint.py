@@ -50,8 +50,8 @@ def link_acceleration(
     chain: Chain,
     inverse_mass: wp.float64,
     inverse_inertia: wp.float64,
-    cosine: wp.float64,
-    sine: wp.float64,
+    arm_x: wp.float64,
+    arm_y: wp.float64,
     left_x: wp.float64,
     left_y: wp.float64,
     right_x: wp.float64,
@@ -61,10 +61,10 @@ def link_acceleration(
 ):
     """Accelerations (ẍ, ÿ [m/s²], θ̈ [rad/s²]) of a link.
 
-    m Ẍ = F_right − F_left − m g ŷ and I θ̈ = a t·(F_right + F_left) + f_left − f_right, where F_left and F_right are
+    m Ẍ = F_right − F_left − m g ŷ and I θ̈ = arm × (F_right + F_left) + f_left − f_right, where F_left and F_right are
     the forces of the joints at its two ends, f_left and f_right their friction torques f(ω_before − ω_after).
     """
     ax = (right_x - left_x) * inverse_mass
     ay = (right_y - left_y) * inverse_mass - chain.gravity
-    lever = chain.half_length * (cosine * (right_y + left_y) - sine * (right_x + left_x))
+    lever = arm_x * (right_y + left_y) - arm_y * (right_x + left_x)
     return ax, ay, (lever + left_torque - right_torque) * inverse_inertia

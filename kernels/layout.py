@@ -9,10 +9,10 @@ X, Y, THETA, U, V, OMEGA = 0, 1, 2, 3, 4, 5
 COSINE, SINE = 6, 7
 # Constants of the links.
 MASS, INERTIA, INVERSE_MASS, INVERSE_INERTIA = 8, 9, 10, 11
-# A stage: link ends (left rows are padded: column n repeats column 0), direction, spin (padded).
+# A stage: link ends (left rows are padded: column n repeats column 0), arm, spin (padded).
 LEFT_X, LEFT_Y, LEFT_U, LEFT_V = 12, 13, 14, 15
 RIGHT_X, RIGHT_Y, RIGHT_U, RIGHT_V = 16, 17, 18, 19
-STAGE_COSINE, STAGE_SINE, STAGE_SPIN = 20, 21, 22
+STAGE_ARM_X, STAGE_ARM_Y, STAGE_SPIN = 20, 21, 22
 # A finished try: candidate state and its error ratio.
 NEW_X, NEW_Y, NEW_THETA, NEW_U, NEW_V, NEW_OMEGA = 23, 24, 25, 26, 27, 28
 ERROR = 29

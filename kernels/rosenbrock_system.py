@@ -79,11 +79,12 @@ def opening(S: wp.array2d(dtype=wp.float64), chain: Chain, c: int, place: int, d
 @wp.func
 def opening_rate(S: wp.array2d(dtype=wp.float64), chain: Chain, c: int, speed: int, direction: int):
     """Opening rate Ċ of that joint and its spin, from the rows of velocities u, v, ω and of directions."""
+    a = chain.half_length
     _left_u, _left_v, right_u, right_v = end_velocities(
-        chain, S[speed, c], S[speed + 1, c], S[speed + 2, c], S[direction, c], S[direction + 1, c]
+        S[speed, c], S[speed + 1, c], a * S[speed + 2, c], S[direction, c], S[direction + 1, c]
     )
     left_u, left_v, _right_u, _right_v = end_velocities(
-        chain, S[speed, c + 8], S[speed + 1, c + 8], S[speed + 2, c + 8], S[direction, c + 8], S[direction + 1, c + 8]
+        S[speed, c + 8], S[speed + 1, c + 8], a * S[speed + 2, c + 8], S[direction, c + 8], S[direction + 1, c + 8]
     )
     return left_u - right_u, left_v - right_v, S[speed + 2, c] - S[speed + 2, c + 8]
 
@@ -91,19 +92,18 @@ def opening_rate(S: wp.array2d(dtype=wp.float64), chain: Chain, c: int, speed: i
 @wp.func
 def stage_opening_rate(S: wp.array2d(dtype=wp.float64), chain: Chain, c: int):
     """The same at a stage's place, whose directions are those at the start and their changes."""
+    a = chain.half_length
     _left_u, _left_v, right_u, right_v = end_velocities(
-        chain,
         S[wp.static(NEW + 3), c],
         S[wp.static(NEW + 4), c],
-        S[wp.static(NEW + 5), c],
+        a * S[wp.static(NEW + 5), c],
         S[BASE_COSINE, c] + S[COSINE, c],
         S[BASE_SINE, c] + S[SINE, c],
     )
     left_u, left_v, _right_u, _right_v = end_velocities(
-        chain,
         S[wp.static(NEW + 3), c + 8],
         S[wp.static(NEW + 4), c + 8],
-        S[wp.static(NEW + 5), c + 8],
+        a * S[wp.static(NEW + 5), c + 8],
         S[BASE_COSINE, c + 8] + S[COSINE, c + 8],
         S[BASE_SINE, c + 8] + S[SINE, c + 8],
     )
