@@ -29,10 +29,10 @@ from .block_contact import block_self_contacts, touch_layout
 from .block_hand_over import block_hand_over, flight_of, list_margins, step_factors, take_turns
 from .block_list import block_list
 from .block_look import block_look, note_bounds
-from .block_memory import barrier, barrier_if_any, block_maxima, clock, tile_address, vec5i
+from .block_memory import barrier, barrier_if_any, block_maxima, clock, tile_address, vec4i
 from .block_rigid import FlightMemory
 from .block_room import board_rows, shares_board, shares_memory
-from .block_step import Link, Place, Trial, block_stage, error_of, link_on, note_first, vec3d, vec5d
+from .block_step import Place, Trial, block_stage, error_of, link_on, note_first, vec3d, vec5d
 from .block_surroundings import block_surroundings, raised
 from .broadphase import list_layout
 from .controller import LEAST_SHRINKAGE
@@ -65,6 +65,7 @@ from .layout import (
     LIST_BUILDS,
     MASS,
     NOTE_CLOSING_TIME,
+    NOTE_DAMPING,
     NOTE_DEADLINE,
     NOTE_FIXED_DEPTH,
     NOTE_LAST_IMPULSE,
@@ -125,7 +126,6 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     fixed_depth = SPROCKET_DEPTH if has_sprocket else FLOOR_DEPTH
     fixed_count = SPROCKET_IMPULSES if has_sprocket else FLOOR_IMPULSES
     reuses_last, needs_first_power = method.reuses_last, method.needs_first_power
-    attempt = method.block_attempt(block_dim)
     is_shared = shares_board(block_dim)
     width = block_dim + 1
     kept_width = columns if is_shared else width
@@ -142,8 +142,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     ends_address = tile_address(vec5d, block_dim)
     forces_address = tile_address(vec3d, block_dim)
     hand_over, stage = block_stage(block_dim)
-    greatest, _greatest_of_five = block_maxima(block_dim)
-    measure, bound_of, meet_fixed_body = block_surroundings(features, block_dim)
+    greatest, _note, _noted = block_maxima(block_dim)
+    maxima_address = tile_address(vec4i, block_dim)
+    survey, surveyed, bound_of, meet_fixed_body = block_surroundings(features, block_dim)
+    attempt = method.block_attempt(block_dim, survey, surveyed)
     grow, shrink = step_factors(features)
     margins = list_margins(features)
     build_list = block_list(columns, block_dim, features.broad_phase)
@@ -186,7 +188,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         forces = wp.tile_empty(shape=(wp.static(block_dim),), dtype=vec3d, storage="shared")
         errors = wp.tile_empty(shape=(wp.static(block_dim),), dtype=wp.int32, storage="shared")
         votes = wp.tile_empty(shape=(wp.static(block_dim),), dtype=wp.int32, storage="shared")
-        maxima = wp.tile_empty(shape=(wp.static(block_dim),), dtype=vec5i, storage="shared")
+        maxima = wp.tile_empty(shape=(wp.static(block_dim),), dtype=vec4i, storage="shared")
         board = wp.tile_empty(shape=(wp.static(board_size),), dtype=wp.float64, storage="shared")
         touches = wp.tile_empty(shape=(wp.static(touch_size),), dtype=wp.int32, storage="shared")
         memory = wp.tile_empty(shape=(wp.static(memory_size),), dtype=wp.float64, storage="shared")
@@ -212,6 +214,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         forces_start = forces_address(forces)
         E = wp.array(ptr=ends_start, shape=(5, wp.static(block_dim)), dtype=wp.float64)
         F = wp.array(ptr=forces_start, shape=(3, wp.static(block_dim)), dtype=wp.float64)
+        maxima_start = maxima_address(maxima)
         flight_memory = FlightMemory()
         flight_memory.ends = ends_start
         flight_memory.forces = forces_start
@@ -256,7 +259,12 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         barrier()
         link = link_on(K, lane)
         next_end = hand_over(ends, place, link)
-        _error, opening, gap, displacement, speed = measure(K, maxima, place, link, next_end, 0)
+        survey(K, maxima_start, place, link, next_end)
+        barrier()
+        around = surveyed(maxima_start)
+        opening = around.opening
+        gap = around.gap
+        speed = around.speed
         status = int(RUNNING)
         pairs = int(0)
         slack = wp.float32(0.5) * wp.float32(control.skin) - opening
@@ -322,7 +330,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if wp.static(has_contacts):
                 if wp.static(has_flight):
                     if flies != 0:
-                        bound = longest_step(K, L, maxima, place, pairs, slack)
+                        bound = longest_step(K, L, maxima_start, place, pairs, slack)
                 h = wp.min(h, bound)
             lands = time + h >= stop_time
             if lands:
@@ -332,32 +340,16 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if wp.static(has_flight):
                 trial = Trial()
                 if flies == 0:
-                    trial = attempt(ends, forces, memory_start, K, place, h, tolerance)
+                    trial = attempt(ends, forces, maxima_start, memory_start, K, place, h, tolerance)
                 else:
                     trial = attempt_flight(flight_memory, K, place, h)
                     tolerance = control.flight_tolerance
             else:
-                trial = attempt(ends, forces, memory_start, K, place, h, tolerance)
+                trial = attempt(ends, forces, maxima_start, memory_start, K, place, h, tolerance)
             own_error = int(0)
             if lane < n:
                 own_error = error_of(trial, tolerance)
-            error = wp.float32(0.0)
-            if wp.static(reuses_last):
-                # the last stage is at the new state: what else is to be known of it comes with the error
-                candidate = Link()
-                candidate.x = trial.x
-                candidate.y = trial.y
-                candidate.u = trial.u
-                candidate.v = trial.v
-                candidate.omega = trial.omega
-                half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
-                candidate.arm_x = half_length * trial.cosine
-                candidate.arm_y = half_length * trial.sine
-                error, new_opening, new_gap, new_displacement, new_speed = measure(
-                    K, maxima, place, candidate, trial.next_end, own_error
-                )
-            else:
-                error = wp.cast(greatest(errors, lane, own_error), wp.float32)
+            error = wp.cast(greatest(errors, lane, own_error), wp.float32)
             tries += 1
             if not (error <= wp.float32(1.0)):
                 if wp.isfinite(error):
@@ -373,7 +365,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 accepted += 1
                 if lane < n:
                     K[BOARD_LOST_FRICTION, lane] = K[BOARD_LOST_FRICTION, lane] + h * trial.friction
-                    K[BOARD_LOST_DAMPING, lane] = K[BOARD_LOST_DAMPING, lane] + h * trial.damping
+                    dissipation = K[BOARD_NOTES, NOTE_DAMPING] * trial.damping
+                    K[BOARD_LOST_DAMPING, lane] = K[BOARD_LOST_DAMPING, lane] + h * dissipation
                     K[X, lane] = trial.x
                     K[Y, lane] = trial.y
                     K[THETA, lane] = trial.theta
@@ -389,15 +382,13 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 # a step that was cut short says nothing against the proposal that it was cut from
                 step = wp.where(h < step, wp.max(step, proposal), proposal)
                 last_error = wp.max(error, wp.float32(1e-4))
-                if wp.static(reuses_last):
-                    opening = new_opening
-                    gap = new_gap
-                    displacement = new_displacement
-                    speed = new_speed
-                else:
+                around = trial.around
+                if wp.static(not reuses_last):
                     link = link_on(K, lane)
                     next_end = hand_over(ends, place, link)
-                    _error, opening, gap, displacement, speed = measure(K, maxima, place, link, next_end, 0)
+                    survey(K, maxima_start, place, link, next_end)
+                    barrier()
+                    around = surveyed(maxima_start)
                 if wp.static(has_flight):
                     are_rigid = bool(True)
                     kinetic = ZERO
@@ -405,7 +396,12 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                         are_rigid, is_stiff, kinetic = follow(flight_memory, K, place)
                         link = link_on(K, lane)
                         next_end = hand_over(ends, place, link)
-                        _error, opening, gap, displacement, speed = measure(K, maxima, place, link, next_end, 0)
+                        survey(K, maxima_start, place, link, next_end)
+                        barrier()
+                        around = surveyed(maxima_start)
+                opening = around.opening
+                gap = around.gap
+                speed = around.speed
                 if lane == 0:
                     K[BOARD_NOTES, NOTE_OPENING] = wp.max(K[BOARD_NOTES, NOTE_OPENING], wp.float64(opening))
                 is_hit = bool(False)
@@ -420,7 +416,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                         if hits > 0:
                             wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
                 if wp.static(has_self):
-                    skin, slack, is_stale = margins(control, flies, slack, opening, displacement)
+                    skin, slack, is_stale = margins(control, flies, slack, opening, around.displacement)
                     if is_stale or pairs > 0:
                         is_near = bool(True)
                         publish(K, place)

@@ -6,6 +6,7 @@ hand.
 """
 
 import functools
+from typing import Any
 
 import warp as wp
 
@@ -51,15 +52,17 @@ it would cost some 10 % (H100 and H200, 1 to 4000 chains).
 
 
 @functools.cache
-def explicit_attempt(name: str, block_dim: int):
+def explicit_attempt(name: str, block_dim: int, survey: Any, surveyed: Any):
     """Warp function that tries a step with a tableau in blocks of this size.
 
     Args:
         name: Key of :data:`TABLEAUS`.
         block_dim: Threads in a block.
+        survey: Warp function that notes what a link knows of the surroundings, see :mod:`block_surroundings`.
+        surveyed: Warp function that says what all of them know.
 
     Returns:
-        ``attempt(ends, forces, S, K, place, h, tolerance)`` → Trial, from the state and first stage on the board;
+        ``attempt(ends, forces, maxima, S, K, place, h, tolerance)`` → Trial, from the state and first stage on the board;
         it needs neither the memory S nor the tolerance.
     """
     tableau = TABLEAUS[name]
@@ -106,6 +109,7 @@ def explicit_attempt(name: str, block_dim: int):
     def attempt(
         ends: wp.tile[vec5d, block_dim],
         forces: wp.tile[vec3d, block_dim],
+        maxima: wp.uint64,
         S: wp.uint64,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
@@ -176,11 +180,14 @@ def explicit_attempt(name: str, block_dim: int):
                 new_cosine, new_sine = cos_sin(trial.theta)
                 trial.cosine = new_cosine
                 trial.sine = new_sine
-                trial.next_end = next_end
+                if wp.static(reuses_last):
+                    survey(K, maxima, place, there, next_end)
             if wp.static(not has_room):
                 inverse_mass = K[INVERSE_MASS, place.column]
                 inverse_inertia = K[INVERSE_INERTIA, place.column]
             rates = stage(forces, K, place, next_end, there, inverse_mass, inverse_inertia)
+            if wp.static(s == last and reuses_last):
+                trial.around = surveyed(maxima)
             ax[s] = rates.x
             ay[s] = rates.y
             at[s] = rates.theta

@@ -12,7 +12,7 @@ import warp as wp
 
 from .approach import FLIGHT_SKIN, LEAST_SLACK
 from .block_board import publish
-from .block_memory import barrier, vec5i
+from .block_memory import barrier
 from .block_rigid import FlightMemory
 from .block_step import Place
 from .block_surroundings import block_approach
@@ -49,7 +49,7 @@ class BlockHandOver:
     Attributes:
         attempt: Tries a step of a flight, see :mod:`block_flight`.
         take_off: ``(M, K, state, world, place, time)``, on springs → whether joints are closed now.
-        longest_step: ``(K, L, maxima, place, pairs, slack)`` → bound [s] of the next step of a flight.
+        longest_step: ``(K, L, memory, place, pairs, slack)`` → bound [s] of the next step of a flight.
         follow: ``(M, K, place)``, after a step of a flight → whether that may go on, whether springs would hold little
             enough energy for it, kinetic energy [J].
         land: ``(M, K, state, world, place, is_stiff, kinetic)``, with what ``follow`` said: opens the joints.
@@ -91,14 +91,14 @@ def block_hand_over(features: Features, block_dim: int) -> BlockHandOver:
     def longest_step(
         K: wp.array2d(dtype=wp.float64),
         L: wp.array(dtype=wp.int32),
-        maxima: wp.tile[vec5i, block_dim],
+        memory: wp.uint64,
         place: Place,
         pairs: int,
         slack: wp.float32,
     ):
         publish(K, place)
         barrier()
-        return wp.max(K[BOARD_NOTES, NOTE_CONTACT_STEP], ONE / approach(K, L, maxima, place, pairs, slack))
+        return wp.max(K[BOARD_NOTES, NOTE_CONTACT_STEP], ONE / approach(K, L, memory, place, pairs, slack))
 
     @wp.func
     def follow(M: FlightMemory, K: wp.array2d(dtype=wp.float64), place: Place):

@@ -173,15 +173,42 @@ def constant_table(rows: tuple[tuple[float, ...], ...]):
     return entry
 
 
-vec5i = wp.types.vector(length=5, dtype=wp.int32)
+vec4i = wp.types.vector(length=4, dtype=wp.int32)
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    reinterpret_cast<int4*>(memory)[index] = make_int4(value[0], value[1], value[2], value[3]);
+#else
+    reinterpret_cast<::wp::vec_t<4, ::wp::int32>*>(memory)[index] = value;
+#endif
+""")
+def write_four(memory: wp.uint64, index: int, value: vec4i):
+    """Four integers side by side into the memory at this address, a multiple of 16."""
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    const int4 value = reinterpret_cast<const int4*>(memory)[index];
+    return ::wp::vec_t<4, ::wp::int32>(value.x, value.y, value.z, value.w);
+#else
+    return reinterpret_cast<const ::wp::vec_t<4, ::wp::int32>*>(memory)[index];
+#endif
+""")
+def read_four(memory: wp.uint64, index: int) -> vec4i:
+    """Four integers from there."""
+    ...
 
 
 @functools.cache
 def block_maxima(block_dim: int):
-    """Warp functions (greatest of an integer, greatest of each of five) over the threads of a block.
+    """Warp functions for the greatest of the threads' numbers in a block.
 
-    Both take a shared tile, the thread's number and its value, and return the same result in all threads. A tile may
-    be used again after any other barrier.
+    Returns:
+        ``greatest(tile, lane, value)`` → the greatest of an integer, in all threads;
+        ``note(memory, lane, values)``, a barrier of the caller's, ``noted(memory)`` → the greatest of each of four.
+        Tile and memory may be used again after any other barrier.
     """
 
     @wp.func
@@ -195,26 +222,22 @@ def block_maxima(block_dim: int):
         return top
 
     @wp.func
-    def greatest_of_five(tile: wp.tile[vec5i, block_dim], lane: int, value: vec5i):
-        tile[lane // warp_width()] = vec5i(
-            warp_greatest(value[0]),
-            warp_greatest(value[1]),
-            warp_greatest(value[2]),
-            warp_greatest(value[3]),
-            warp_greatest(value[4]),
+    def note(memory: wp.uint64, lane: int, values: vec4i):
+        of_warp = vec4i(
+            warp_greatest(values[0]), warp_greatest(values[1]), warp_greatest(values[2]), warp_greatest(values[3])
         )
-        top = tile[0]
+        write_four(memory, lane // warp_width(), of_warp)
+
+    @wp.func
+    def noted(memory: wp.uint64):
+        top = read_four(memory, 0)
         i = int(1)
         while i < wp.static(block_dim) // warp_width():
-            other = tile[i]
-            top = vec5i(
-                wp.max(top[0], other[0]),
-                wp.max(top[1], other[1]),
-                wp.max(top[2], other[2]),
-                wp.max(top[3], other[3]),
-                wp.max(top[4], other[4]),
+            other = read_four(memory, i)
+            top = vec4i(
+                wp.max(top[0], other[0]), wp.max(top[1], other[1]), wp.max(top[2], other[2]), wp.max(top[3], other[3])
             )
             i += 1
         return top
 
-    return greatest, greatest_of_five
+    return greatest, note, noted

@@ -162,7 +162,7 @@ def rosenbrock_attempt(name: str, block_dim: int):
         block_dim: Threads in a block.
 
     Returns:
-        ``attempt(ends, forces, S, K, place, h, tolerance)`` → Trial, from the state and first stage on the board,
+        ``attempt(ends, forces, maxima, S, K, place, h, tolerance)`` → Trial, from the state and first stage on the board,
         with S the block's memory for the linear systems, laid out by :func:`factor_layout`.
     """
     table = ROSENBROCK_TABLES[name]
@@ -205,6 +205,7 @@ def rosenbrock_attempt(name: str, block_dim: int):
     def attempt(
         ends: wp.tile[vec5d, block_dim],
         forces: wp.tile[vec3d, block_dim],
+        maxima: wp.uint64,
         S: wp.uint64,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
@@ -362,7 +363,7 @@ def rosenbrock_attempt(name: str, block_dim: int):
                 force_y = joint_force(constants, opening_y + (next_end[1] - right_y), cv)
                 torque = friction_torque(constants, spin)
                 friction += weight * (torque * spin)
-                damping += weight * (constants.joint_damping * (cu * cu + cv * cv))
+                damping += weight * (cu * cu + cv * cv)
                 torque -= slope * (rt - handed(K, SHIFT_SPIN, after))
                 damper_x = constants.joint_damping * (handed(K, SHIFT_U, after) - shift_u)
                 damper_y = constants.joint_damping * (handed(K, SHIFT_V, after) - shift_v)
@@ -454,7 +455,7 @@ def rosenbrock_attempt(name: str, block_dim: int):
         cu = change[2] - (right_u - swing * link.arm_x)
         cv = change[3] - (right_v - swing * link.arm_y)
         trial.friction = friction + power_slope * (lost_omega - change[4])
-        trial.damping = damping + TWO * chain.joint_damping * (base_cu * cu + base_cv * cv)
+        trial.damping = damping + TWO * (base_cu * cu + base_cv * cv)
         return trial
 
     return attempt

@@ -67,18 +67,28 @@ class Place:
 
 @wp.struct
 class Rates:
-    """A stage: accelerations of the link, and the power [W] lost in its right joint."""
+    """A stage: accelerations of the link, and what its right joint loses."""
 
     x: wp.float64
     y: wp.float64
     theta: wp.float64
-    friction: wp.float64
-    damping: wp.float64
+    friction: wp.float64  # [W]
+    damping: wp.float64  # [W] over the joint's b
+
+
+@wp.struct
+class Surroundings:
+    """What is known of a whole chain in a state; compared in single precision, which keeps signs."""
+
+    opening: wp.float32  # greatest of a joint [m]
+    gap: wp.float32  # least to floor or sprocket [m]
+    displacement: wp.float32  # greatest of a joint since the neighbour list was made [m]
+    speed: wp.float32  # bound on that of any point [m/s]
 
 
 @wp.struct
 class Trial:
-    """A finished try: the link's new state, its last stage, and powers averaged over the step."""
+    """A finished try: the link's new state, its last stage, and losses averaged over the step."""
 
     x: wp.float64
     y: wp.float64
@@ -87,7 +97,7 @@ class Trial:
     v: wp.float64
     omega: wp.float64
     last: Rates
-    next_end: vec5d  # left end of the next link in the last stage
+    around: Surroundings  # of the new state, from methods that reuse the last stage
     cosine: wp.float64  # direction of the new state
     sine: wp.float64
     friction: wp.float64
@@ -278,7 +288,7 @@ def block_stage(block_dim: int):
         force_y = joint_force(chain, next_end[1] - right_y, cv)
         torque = friction_torque(chain, spin)
         friction = torque * spin
-        damping = chain.joint_damping * (cu * cu + cv * cv)
+        damping = cu * cu + cv * cv
         forces[place.lane] = vec3d(force_x, force_y, torque)
         left = forces[place.before]
         chain.gravity = K[BOARD_NOTES, NOTE_GRAVITY]

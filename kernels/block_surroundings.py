@@ -6,8 +6,8 @@ import warp as wp
 
 from .approach import SMALLEST_GAP, falling, meeting_of
 from .block_board import contact_constants, ends_of
-from .block_memory import block_maxima, vec5i
-from .block_step import Link, Place, link_on, vec5d
+from .block_memory import barrier, block_maxima, vec4i
+from .block_step import Link, Place, Surroundings, link_on, vec5d
 from .broadphase import list_layout
 from .contact import meet_floor, meet_sprocket
 from .controller import quick_quotient, quick_root
@@ -46,30 +46,25 @@ def raised(opening: wp.float32):
 
 @functools.cache
 def block_surroundings(features: Features, block_dim: int):
-    """Warp functions (measure, bound of the step, meet floor or sprocket) of a kernel with these features."""
+    """Warp functions (survey, surveyed, bound of the step, meet floor or sprocket) of a kernel with these features."""
     has_floor = features.fixed_body == "floor"
     has_sprocket = features.fixed_body == "sprocket"
     has_fixed = has_floor or has_sprocket
     has_self = features.self_contact
     has_contacts = has_fixed or has_self
-    _greatest, greatest_of_five = block_maxima(block_dim)
+    _greatest, note, noted = block_maxima(block_dim)
 
     @wp.func
-    def measure(
+    def survey(
         K: wp.array2d(dtype=wp.float64),
-        maxima: wp.tile[vec5i, block_dim],
+        memory: wp.uint64,
         place: Place,
         link: Link,
         next_end: vec5d,
-        error: int,
     ):
-        """Greatest opening, least gap, greatest displacement since listing, greatest speed: [m], [m/s].
-
-        Computed in double, compared in single precision, which keeps signs. ``error``: bits of a link's error ratio,
-        of which the greatest comes first.
-        """
+        """Notes what a link knows of its surroundings; computed in double, compared in single precision."""
         left_x, left_y, right_x, right_y = ends_of(link)
-        values = vec5i(0, order_key_single(wp.float32(-wp.inf)), 0, 0, error)
+        values = vec4i(0, order_key_single(wp.float32(-wp.inf)), 0, 0)
         if place.lane < place.links:
             cx = next_end[0] - right_x
             cy = next_end[1] - right_y
@@ -89,14 +84,18 @@ def block_surroundings(features: Features, block_dim: int):
                 turn = K[BOARD_NOTES, NOTE_HALF_LENGTH] * link.omega
                 speed = TWO * (link.u * link.u + link.v * link.v + turn * turn)
                 values[3] = order_bits_single(wp.float32(speed))
-        values = greatest_of_five(maxima, place.lane, values)
-        return (
-            wp.cast(values[4], wp.float32),
-            quick_root(wp.cast(values[0], wp.float32)),
-            -from_order_key_single(values[1]),
-            quick_root(wp.cast(values[2], wp.float32)),
-            quick_root(wp.cast(values[3], wp.float32)),
-        )
+        note(memory, place.lane, values)
+
+    @wp.func
+    def surveyed(memory: wp.uint64) -> Surroundings:
+        """What all links know, after a barrier."""
+        values = noted(memory)
+        around = Surroundings()
+        around.opening = quick_root(wp.cast(values[0], wp.float32))
+        around.gap = -from_order_key_single(values[1])
+        around.displacement = quick_root(wp.cast(values[2], wp.float32))
+        around.speed = quick_root(wp.cast(values[3], wp.float32))
+        return around
 
     @wp.func
     def bound_of(
@@ -175,7 +174,7 @@ def block_surroundings(features: Features, block_dim: int):
         K[BOARD_LOST_FIXED, place.lane] = K[BOARD_LOST_FIXED, place.lane] + lost_left + lost_right
         return int(hits)
 
-    return measure, bound_of, meet_fixed_body
+    return survey, surveyed, bound_of, meet_fixed_body
 
 
 @functools.cache
@@ -184,13 +183,13 @@ def block_approach(features: Features, block_dim: int):
     has_floor = features.fixed_body == "floor"
     has_self = features.self_contact
     lists = list_layout(features.columns)
-    _greatest, greatest_of_five = block_maxima(block_dim)
+    _greatest, note, noted = block_maxima(block_dim)
 
     @wp.func
     def approach(
         K: wp.array2d(dtype=wp.float64),
         L: wp.array(dtype=wp.int32),
-        maxima: wp.tile[vec5i, block_dim],
+        memory: wp.uint64,
         place: Place,
         pairs: int,
         slack: wp.float32,
@@ -200,7 +199,7 @@ def block_approach(features: Features, block_dim: int):
         n = place.links
         chain = contact_constants(K, n)
         chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
-        values = vec5i()
+        values = vec4i()
         if wp.static(has_floor):
             if lane < n:
                 left, right = falling(
@@ -217,7 +216,9 @@ def block_approach(features: Features, block_dim: int):
                 rate = meeting_of(K, chain, L[wp.static(lists.first) + k], L[wp.static(lists.second) + k])
                 values[0] = wp.max(values[0], order_bits_single(wp.float32(rate)))
                 k += wp.static(block_dim)
-        values = greatest_of_five(maxima, lane, values)
+        note(memory, lane, values)
+        barrier()
+        values = noted(memory)
         fastest = wp.cast(values[0], wp.float32)
         if wp.static(has_self):
             room = wp.max(slack, wp.float32(SMALLEST_GAP))

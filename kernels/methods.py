@@ -34,7 +34,7 @@ class Method:
         functions: Warp functions (first stage, attempt, commit) for scratch blocks of so many columns.
         needs_first_power: Whether a try in the block form asks what the joints lose at its start.
         block_memory: Doubles that a block of so many threads keeps for the method.
-        block_attempt: Warp function ``attempt(ends, forces, S, K, place, h, tolerance)`` → Trial for blocks of so many
+        block_attempt: Warp function ``attempt(ends, forces, maxima, S, K, place, h, tolerance)`` → Trial for blocks of so many
             threads, from the state and first stage on the board, S the address of that memory.
         flight: Another method, for flight on rigid joints, if this one has one; see :class:`Flight`.
     """
@@ -49,7 +49,7 @@ class Method:
     functions: Callable[[int], Any]
     needs_first_power: bool
     block_memory: Callable[[int], int]
-    block_attempt: Callable[[int], Any]
+    block_attempt: Callable[[int, Any, Any], Any]
     flight: "Flight | None" = None
 
 
@@ -89,7 +89,7 @@ def _explicit(name: str) -> Method:
         functions=lambda columns: explicit_method(name),
         needs_first_power=tableau.velocity_weights[0] != 0.0,
         block_memory=lambda threads: 0,
-        block_attempt=lambda threads: explicit_attempt(name, threads),
+        block_attempt=lambda threads, survey, surveyed: explicit_attempt(name, threads, survey, surveyed),
     )
 
 
@@ -106,7 +106,7 @@ def _rosenbrock(name: str) -> Method:
         functions=lambda columns: rosenbrock_method(name, columns),
         needs_first_power=True,
         block_memory=lambda threads: factor_layout(threads).size,
-        block_attempt=lambda threads: rosenbrock_attempt(name, threads),
+        block_attempt=lambda threads, _survey, _surveyed: rosenbrock_attempt(name, threads),
     )
 
 

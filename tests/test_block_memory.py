@@ -11,7 +11,7 @@ from warpchain.kernels.elementary import order_bits_single
 
 DEVICE = start_device("cpu")
 THREADS = 24
-GREATEST, _ = block_maxima(THREADS)
+GREATEST, _, _ = block_maxima(THREADS)
 
 
 @wp.kernel(module="unique", enable_backward=False)
