@@ -65,6 +65,7 @@ from .layout import (
     LIST_BUILDS,
     MASS,
     NOTE_CLOSING_TIME,
+    NOTE_CONTACT_STEP,
     NOTE_DAMPING,
     NOTE_DEADLINE,
     NOTE_FIXED_DEPTH,
@@ -144,7 +145,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     hand_over, stage = block_stage(block_dim)
     greatest, _note, _noted = block_maxima(block_dim)
     maxima_address = tile_address(vec4i, block_dim)
-    survey, surveyed, bound_of, meet_fixed_body = block_surroundings(features, block_dim)
+    survey, surveyed, reach_of, meet_fixed_body = block_surroundings(features, block_dim)
     attempt = method.block_attempt(block_dim, survey, surveyed)
     grow, shrink = step_factors(features)
     margins = list_margins(features)
@@ -263,8 +264,6 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         barrier()
         around = surveyed(maxima_start)
         opening = around.opening
-        gap = around.gap
-        speed = around.speed
         status = int(RUNNING)
         pairs = int(0)
         slack = wp.float32(0.5) * wp.float32(control.skin) - opening
@@ -273,9 +272,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 pairs = build_list(K, L, chain, lane, control.skin, raised(opening))
                 if pairs > wp.static(lists.capacity):
                     status = int(LIST_OVERFLOW)
-        else:
+        reach = reach_of(control, pairs, around.gap, slack, around.speed)
+        if not is_fresh:
             # as the last step left them: worked out anew they could round differently
-            gap = wp.float32(state.gap[world])
+            reach = wp.float32(state.reach[world])
             slack = wp.float32(state.slack[world])
             if wp.static(has_self):
                 pairs = L[wp.static(lists.count)]
@@ -288,7 +288,6 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         tries_left = int(wp.min(wp.int64(control.tries), control.step_limit - tries_before))
         if record_is_full(record, world):
             tries_left = 0
-        bound = bound_of(K, control, pairs, gap, slack, speed)
         flies = int(0)
         if wp.static(has_flight):
             flies = state.flies[world]
@@ -310,7 +309,6 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if state.softness[world] != softness and flies == 0:
                         next_end = hand_over(ends, place, link_on(K, lane))
                         begin_step(forces, K, place, next_end)
-                        bound = bound_of(K, control, pairs, gap, slack, speed)
                 if pauses or status != RUNNING:
                     break
             stop_time = K[BOARD_NOTES, NOTE_STOP_TIME]
@@ -328,6 +326,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
 
             h = step
             if wp.static(has_contacts):
+                bound = wp.max(K[BOARD_NOTES, NOTE_CONTACT_STEP], wp.float64(reach))
                 if wp.static(has_flight):
                     if flies != 0:
                         bound = longest_step(K, L, maxima_start, place, pairs, slack)
@@ -401,7 +400,6 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                         around = surveyed(maxima_start)
                 opening = around.opening
                 gap = around.gap
-                speed = around.speed
                 if lane == 0:
                     K[BOARD_NOTES, NOTE_OPENING] = wp.max(K[BOARD_NOTES, NOTE_OPENING], wp.float64(opening))
                 is_hit = bool(False)
@@ -459,7 +457,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                             step = take_turns(K, lane, step)
                         if lane == 0:
                             K[BOARD_NOTES, NOTE_CLOSING_TIME] = time + QUIET_TIME
-                bound = bound_of(K, control, pairs, gap, slack, speed)
+                reach = reach_of(control, pairs, gap, slack, around.speed)
                 if is_hit or wp.static(not reuses_last):
                     if is_hit:
                         next_end = hand_over(ends, place, link_on(K, lane))
@@ -504,8 +502,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 state.other_step[world] = K[BOARD_NOTES, NOTE_OTHER_STEP]
             state.is_fresh[world] = 0
             state.has_first_stage[world] = 1
-            state.gap[world] = wp.float64(gap)
-            state.slack[world] = wp.float64(slack)
+            state.reach[world] = wp.float64(reach)
+            if wp.static(has_flight):
+                state.slack[world] = wp.float64(slack)
             state.time[world] = time
             state.step[world] = step
             state.last_error[world] = wp.float64(last_error)

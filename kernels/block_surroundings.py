@@ -23,7 +23,6 @@ from .layout import (
     INVERSE_MASS,
     LEFT_Y,
     NOTE_CIRCLE_RADIUS,
-    NOTE_CONTACT_STEP,
     NOTE_HALF_LENGTH,
     NOTE_SPROCKET_RADIUS,
     OMEGA,
@@ -46,7 +45,7 @@ def raised(opening: wp.float32):
 
 @functools.cache
 def block_surroundings(features: Features, block_dim: int):
-    """Warp functions (survey, surveyed, bound of the step, meet floor or sprocket) of a kernel with these features."""
+    """Warp functions (survey, surveyed, reach of, meet floor or sprocket) of a kernel with these features."""
     has_floor = features.fixed_body == "floor"
     has_sprocket = features.fixed_body == "sprocket"
     has_fixed = has_floor or has_sprocket
@@ -98,15 +97,8 @@ def block_surroundings(features: Features, block_dim: int):
         return around
 
     @wp.func
-    def bound_of(
-        K: wp.array2d(dtype=wp.float64),
-        control: Control,
-        pairs: int,
-        gap: wp.float32,
-        slack: wp.float32,
-        speed: wp.float32,
-    ):
-        """Longest step [s]: bounded near contacts; far from them nothing may come through the skin unseen."""
+    def reach_of(control: Control, pairs: int, gap: wp.float32, slack: wp.float32, speed: wp.float32):
+        """Time [s] in which nothing comes through the skin unseen; 0 near contacts, where steps have a bound anyway."""
         near = pairs > 0
         room = wp.float32(control.skin)
         if wp.static(has_fixed):
@@ -114,10 +106,7 @@ def block_surroundings(features: Features, block_dim: int):
             room = wp.float32(0.5) * gap
         if wp.static(has_self):
             room = wp.min(room, slack)
-        bound = K[BOARD_NOTES, NOTE_CONTACT_STEP]
-        if not near:
-            bound = wp.max(bound, wp.float64(quick_quotient(room, speed)))
-        return bound
+        return wp.where(near, wp.float32(0.0), quick_quotient(room, speed))
 
     @wp.func
     def meet_fixed_body(
@@ -174,7 +163,7 @@ def block_surroundings(features: Features, block_dim: int):
         K[BOARD_LOST_FIXED, place.lane] = K[BOARD_LOST_FIXED, place.lane] + lost_left + lost_right
         return int(hits)
 
-    return survey, surveyed, bound_of, meet_fixed_body
+    return survey, surveyed, reach_of, meet_fixed_body
 
 
 @functools.cache

@@ -95,7 +95,7 @@ class Batch:
         self.state = State()
         self.state.links = self._array(np.zeros((worlds, 6, longest)))
         for name in (
-            *("time", "stop_time", "gap", "slack", "step", "other_step", "last_error", "closing_time"),
+            *("time", "stop_time", "gap", "reach", "slack", "step", "other_step", "last_error", "closing_time"),
             *("softness", "first_area"),
         ):
             setattr(self.state, name, self._array(np.zeros(worlds)))
@@ -190,6 +190,7 @@ class Batch:
         for array in (
             state.time,
             state.gap,
+            state.reach,
             state.slack,
             state.counts,
             state.extremes,
