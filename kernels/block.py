@@ -188,7 +188,6 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         ends = wp.tile_empty(shape=(wp.static(block_dim),), dtype=vec5d, storage="shared")
         forces = wp.tile_empty(shape=(wp.static(block_dim),), dtype=vec3d, storage="shared")
         errors = wp.tile_empty(shape=(wp.static(block_dim),), dtype=wp.int32, storage="shared")
-        votes = wp.tile_empty(shape=(wp.static(block_dim),), dtype=wp.int32, storage="shared")
         maxima = wp.tile_empty(shape=(wp.static(block_dim),), dtype=vec4i, storage="shared")
         board = wp.tile_empty(shape=(wp.static(board_size),), dtype=wp.float64, storage="shared")
         touches = wp.tile_empty(shape=(wp.static(touch_size),), dtype=wp.int32, storage="shared")
@@ -356,7 +355,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 else:
                     step = h * LEAST_SHRINKAGE
                     broken = wp.where(lane >= n or link_is_finite(K, lane), 0, 1)
-                    if greatest(votes, lane, broken) > 0:
+                    barrier()  # all have read the errors
+                    if greatest(errors, lane, broken) > 0:
                         status = int(NOT_FINITE)
                 if status == RUNNING and step < control.smallest_step:
                     status = int(STEP_TOO_SMALL)

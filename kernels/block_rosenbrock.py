@@ -45,13 +45,12 @@ from .layout import (
     INERTIA,
     INVERSE_INERTIA,
     INVERSE_MASS,
-    LEFT_U,
-    LEFT_V,
     LEFT_X,
     LEFT_Y,
     MASS,
     NOTE_GRAVITY,
     RIGHT_X,
+    RIGHT_Y,
     THETA,
     X,
     Y,
@@ -64,15 +63,14 @@ wp.set_module_options({"enable_backward": False})
 
 mat33d = block_type(3)
 
-# Numbers of a link from which its couplings are made: t, c, g φ/a² of its right joint.
-NORMAL_X, NORMAL_Y, COLUMN_X, COLUMN_Y, SLOPE = 0, 1, 2, 3, 4
-LINK_NUMBERS = 5
+# Numbers of a link from which its couplings are made: t, c, g φ/a² of its right joint; and one more that a link hands
+# to the one before: the spin of the velocities r_q.
+NORMAL_X, NORMAL_Y, COLUMN_X, COLUMN_Y, SLOPE, SHIFT_SPIN = 0, 1, 2, 3, 4, 5
+LINK_NUMBERS = 6
 # Rows of the board that are free between two contact passes. With its left end a link hands to the link before that
-# end's velocity and the spin of the velocities r_q …
-SHIFT_U, SHIFT_V, SHIFT_SPIN = LEFT_X, LEFT_Y, LEFT_U
-# … and with the force of its right joint to the link behind what the damper does with r_q. Before the first stage the
-# joint's g φ/a² lies in place of a spin.
-DAMPER_X, DAMPER_Y, JOINT_SLOPE = LEFT_V, RIGHT_X, SHIFT_SPIN
+# end's velocity by r_q, and with the force of its right joint to the link behind what the damper does with r_q.
+SHIFT_U, SHIFT_V = LEFT_X, LEFT_Y
+DAMPER_X, DAMPER_Y = RIGHT_X, RIGHT_Y
 
 
 @functools.cache
@@ -250,8 +248,8 @@ def rosenbrock_attempt(name: str, block_dim: int):
         own_slope = g * slope * inverse_length * inverse_length
         damper_x = chain.joint_damping * base_cu
         damper_y = chain.joint_damping * base_cv
+        write(S, wp.static(SLOPE * block_dim) + lane, own_slope)
         if lane < n:
-            hand(K, JOINT_SLOPE, lane, own_slope)
             hand(K, DAMPER_X, lane, damper_x)
             hand(K, DAMPER_Y, lane, damper_y)
         forces[lane] = vec3d(force_x, force_y, torque)
@@ -259,12 +257,11 @@ def rosenbrock_attempt(name: str, block_dim: int):
         pull = forces[before]
         tension = start_cosine * (force_x + pull[0]) + start_sine * (force_y + pull[1])
         own_angle = K[INERTIA, column] * inverse_length * inverse_length + TWO * sigma
-        own_angle += own_slope + handed(K, JOINT_SLOPE, before) + g * g * inverse_length * tension
+        own_angle += own_slope + read(S, wp.static(SLOPE * block_dim) + before) + g * g * inverse_length * tension
         write(S, wp.static(NORMAL_X * block_dim) + lane, -start_sine)
         write(S, wp.static(NORMAL_Y * block_dim) + lane, start_cosine)
         write(S, wp.static(COLUMN_X * block_dim) + lane, -sigma * start_sine - turning * start_cosine)
         write(S, wp.static(COLUMN_Y * block_dim) + lane, sigma * start_cosine - turning * start_sine)
-        write(S, wp.static(SLOPE * block_dim) + lane, own_slope)
         own_place = K[MASS, column] + TWO * sigma
         # accelerations less what the dampers do with r_q, which are the velocities in the first stage
         chain.gravity = ZERO
@@ -349,10 +346,10 @@ def rosenbrock_attempt(name: str, block_dim: int):
                 left_x, left_y, right_x, right_y = end_positions(dx, dy, a * turn_x, a * turn_y)
                 left_u, left_v, right_u, right_v = end_velocities(u, v, a * omega, cosine, sine)
                 shift_left_u, shift_left_v, shift_u, shift_v = end_velocities(rx, ry, rt, link.arm_x, link.arm_y)
+                write(S, wp.static(SHIFT_SPIN * block_dim) + lane, rt)
                 if lane < n:
                     hand(K, SHIFT_U, lane, shift_left_u)
                     hand(K, SHIFT_V, lane, shift_left_v)
-                    hand(K, SHIFT_SPIN, lane, rt)
                 after = place.after
                 ends[lane] = vec5d(left_x, left_y, left_u, left_v, omega)
                 next_end = ends[after]
@@ -364,7 +361,7 @@ def rosenbrock_attempt(name: str, block_dim: int):
                 torque = friction_torque(constants, spin)
                 friction += weight * (torque * spin)
                 damping += weight * (cu * cu + cv * cv)
-                torque -= slope * (rt - handed(K, SHIFT_SPIN, after))
+                torque -= slope * (rt - read(S, wp.static(SHIFT_SPIN * block_dim) + after))
                 damper_x = constants.joint_damping * (handed(K, SHIFT_U, after) - shift_u)
                 damper_y = constants.joint_damping * (handed(K, SHIFT_V, after) - shift_v)
                 if lane < n:

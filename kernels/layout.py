@@ -10,8 +10,8 @@ COSINE, SINE = 6, 7
 # Constants of the links.
 MASS, INERTIA, INVERSE_MASS, INVERSE_INERTIA = 8, 9, 10, 11
 # A stage: link ends (left rows are padded: column n repeats column 0), arm, spin (padded).
-LEFT_X, LEFT_Y, LEFT_U, LEFT_V = 12, 13, 14, 15
-RIGHT_X, RIGHT_Y, RIGHT_U, RIGHT_V = 16, 17, 18, 19
+LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y = 12, 13, 14, 15
+LEFT_U, LEFT_V, RIGHT_U, RIGHT_V = 16, 17, 18, 19
 STAGE_ARM_X, STAGE_ARM_Y, STAGE_SPIN = 20, 21, 22
 # A finished try: candidate state and its error ratio.
 NEW_X, NEW_Y, NEW_THETA, NEW_U, NEW_V, NEW_OMEGA = 23, 24, 25, 26, 27, 28
@@ -28,14 +28,15 @@ LISTED_X, LISTED_Y = 36, 37
 STAGES = 38
 STAGE_ROWS = 5
 
-# The block form keeps the first 18 rows above and the following ones on a board that all threads of the block see; the
-# scratch block keeps rows from BOARD_LOST_SELF up to BOARD_NOTES between launches.
-BOARD_LOST_SELF, BOARD_LOST_FRICTION, BOARD_LOST_DAMPING, BOARD_LOST_FIXED = 18, 19, 20, 21
-BOARD_LISTED_X, BOARD_LISTED_Y = 22, 23
+# The block form keeps the first 16 rows above and the following ones on a board that all threads of the block see; the
+# scratch block keeps rows from BOARD_LOST_SELF up to BOARD_NOTES between launches. Every row less leaves a
+# multiprocessor more cache for what does not fit into registers.
+BOARD_LOST_SELF, BOARD_LOST_FRICTION, BOARD_LOST_DAMPING, BOARD_LOST_FIXED = 16, 17, 18, 19
+BOARD_LISTED_X, BOARD_LISTED_Y = 20, 21
 # First stage of the next step: accelerations, then the two powers (see STAGES).
-BOARD_FIRST = 24
+BOARD_FIRST = 22
 # Numbers of the chain rather than of its links, in the first columns of one more row.
-BOARD_NOTES = 29
+BOARD_NOTES = 27
 NOTE_OPENING, NOTE_FIXED_DEPTH, NOTE_LAST_IMPULSE, NOTE_STOP_TIME, NOTE_NEXT_LOOK = 0, 1, 2, 3, 4
 NOTE_STIFFNESS, NOTE_DAMPING, NOTE_VISCOUS, NOTE_COULOMB, NOTE_INVERSE_SMOOTHING = 5, 6, 7, 8, 9
 NOTE_GRAVITY, NOTE_CIRCLE_RADIUS, NOTE_SPROCKET_RADIUS, NOTE_TANGENTIAL = 10, 11, 12, 13
@@ -43,7 +44,7 @@ NOTE_FLOOR_RESTITUTION, NOTE_FLOOR_FRICTION, NOTE_SPROCKET_RESTITUTION, NOTE_SPR
 NOTE_CHAIN_RESTITUTION, NOTE_CHAIN_FRICTION, NOTE_HALF_LENGTH = 18, 19, 20
 NOTE_DEADLINE, NOTE_CONTACT_STEP, NOTE_TOLERANCE, NOTE_CLOSING_TIME, NOTE_OTHER_STEP = 21, 22, 23, 24, 25
 NOTES = 26
-BOARD_ROWS = 30
+BOARD_ROWS = 28
 
 # State.watch
 WINDOW_START, WINDOW_COUNT, SUM_HEIGHT, SUM_WIDTH, SUM_SPEED = 0, 1, 2, 3, 4

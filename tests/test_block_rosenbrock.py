@@ -13,7 +13,7 @@ from warpchain.kernels import block_room, layout
 from warpchain.kernels.block import make_advance_block
 from warpchain.kernels.block_factors import FactorLayout, reductions_for
 from warpchain.kernels.block_room import block_rows
-from warpchain.kernels.block_rosenbrock import coefficients, factor_layout
+from warpchain.kernels.block_rosenbrock import LINK_NUMBERS, coefficients, factor_layout
 from warpchain.kernels.methods import METHODS
 from warpchain.kernels.rosenbrock_tables import RODAS4P
 from warpchain.shapes import ellipse, lay_chain
@@ -97,7 +97,7 @@ def test_solver_on_matrices_of_chains(values: dict[str, float], h: float) -> Non
 def test_last_level_fits_into_a_warp() -> None:
     """The last rounds meet by barriers of a warp alone, whose rows must not be more than its threads."""
     for block_dim in range(4, 1025):
-        memory = FactorLayout(block_dim=block_dim, reductions=reductions_for(block_dim), link_numbers=5)
+        memory = FactorLayout(block_dim=block_dim, reductions=reductions_for(block_dim), link_numbers=LINK_NUMBERS)
         assert memory.last_width <= 32
         rounds = (memory.inverse - memory.rounds) // (18 * memory.last_width)
         assert 2**rounds >= memory.last_width - 1
