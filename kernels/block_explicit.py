@@ -2,7 +2,7 @@
 
 The same stages as in :mod:`explicit`, for the same tableaus. In every stage the threads wait for the friction of their
 joints. Meanwhile they work out where they are in the next one: in the Nyström form that does not depend on the stage in
-hand.
+hand; and in a last stage that is at the new state, what is to be known of that.
 """
 
 import functools
@@ -43,14 +43,6 @@ class Ahead:
     omega: wp.float64  # … they lack the term of the preceding stage
 
 
-FEW_STAGES = 7
-"""Most stages with which the state of a link stays in registers and the next stage is begun ahead.
-
-It saves about 4 % of a try with dp5 and 60 links. With the 13 stages of rkf78 and 150 links, where registers are fewer,
-it would cost some 10 % (H100 and H200, 1 to 4000 chains).
-"""
-
-
 @functools.cache
 def explicit_attempt(name: str, block_dim: int, survey: Any, surveyed: Any):
     """Warp function that tries a step with a tableau in blocks of this size.
@@ -62,12 +54,12 @@ def explicit_attempt(name: str, block_dim: int, survey: Any, surveyed: Any):
         surveyed: Warp function that says what all of them know.
 
     Returns:
-        ``attempt(ends, forces, maxima, S, K, place, h, tolerance)`` → Trial, from the state and first stage on the board;
-        it needs neither the memory S nor the tolerance.
+        ``attempt(ends, forces, maxima, S, K, place, h, tolerance)`` → Trial, from the state and first stage on the
+        board; ``maxima`` is where ``survey`` notes, and neither the memory S nor the tolerance is needed.
     """
     tableau = TABLEAUS[name]
     stages, last = tableau.stages, tableau.stages - 1
-    reuses_last, has_room = tableau.first_same_as_last, tableau.stages <= FEW_STAGES
+    reuses_last = tableau.first_same_as_last
     velocity_weights = tableau.velocity_weights
     velocity_errors, position_errors = tableau.velocity_errors, tableau.position_errors
     # the new state is one more row of the tableau
@@ -138,9 +130,6 @@ def explicit_attempt(name: str, block_dim: int, survey: Any, surveyed: Any):
         ev = ZERO
         ew = ZERO
         for s in range(1, wp.static(stages)):
-            if wp.static(s > 1 and not has_room):
-                link = link_on(K, lane)
-                row = wp.static(rows[s])(link, h, ax, ay, at)
             there = Link()
             there.x = row.x
             there.y = row.y
@@ -156,7 +145,7 @@ def explicit_attempt(name: str, block_dim: int, survey: Any, surveyed: Any):
             there.omega = link.omega + h * row.omega
             next_end = hand_over(ends, place, there)
             # what does not depend on this stage, while its friction is worked out
-            if wp.static((s < last and has_room) or (s == last and not reuses_last)):
+            if wp.static(s < last or not reuses_last):
                 row = wp.static(rows[s + 1])(link, h, ax, ay, at)
             if wp.static(s == last):
                 ex = ZERO
@@ -182,9 +171,6 @@ def explicit_attempt(name: str, block_dim: int, survey: Any, surveyed: Any):
                 trial.sine = new_sine
                 if wp.static(reuses_last):
                     survey(K, maxima, place, there, next_end)
-            if wp.static(not has_room):
-                inverse_mass = K[INVERSE_MASS, place.column]
-                inverse_inertia = K[INVERSE_INERTIA, place.column]
             rates = stage(forces, K, place, next_end, there, inverse_mass, inverse_inertia)
             if wp.static(s == last and reuses_last):
                 trial.around = surveyed(maxima)
@@ -196,7 +182,7 @@ def explicit_attempt(name: str, block_dim: int, survey: Any, surveyed: Any):
                 trial.damping += wp.static(wp.float64(velocity_weights[s])) * rates.damping
             if wp.static(s == last):
                 trial.last = rates
-        link = link_on(K, lane)
+        link = link_on(K, lane)  # read again: meanwhile its registers were free
         if wp.static(not reuses_last and velocity_weights[last] != 0.0):
             row.u += wp.static(wp.float64(velocity_weights[last])) * trial.last.x
             row.v += wp.static(wp.float64(velocity_weights[last])) * trial.last.y

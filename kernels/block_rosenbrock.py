@@ -160,8 +160,8 @@ def rosenbrock_attempt(name: str, block_dim: int):
         block_dim: Threads in a block.
 
     Returns:
-        ``attempt(ends, forces, maxima, S, K, place, h, tolerance)`` → Trial, from the state and first stage on the board,
-        with S the block's memory for the linear systems, laid out by :func:`factor_layout`.
+        ``attempt(ends, forces, maxima, S, K, place, h, tolerance)`` → Trial, from the state and first stage on the
+        board, with S the block's memory for the linear systems, laid out by :func:`factor_layout`.
     """
     table = ROSENBROCK_TABLES[name]
     stages, gamma = table.stages, table.gamma

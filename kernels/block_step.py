@@ -37,6 +37,9 @@ from .types import Chain
 
 wp.set_module_options({"enable_backward": False})
 
+LARGEST_SCALE = wp.constant(wp.float32(1e30))
+"""Where :func:`quick_quotient` would find 0: an error over that is too great in any case."""
+
 vec3d = wp.types.vector(length=3, dtype=wp.float64)
 vec5d = wp.types.vector(length=5, dtype=wp.float64)
 
@@ -174,7 +177,8 @@ def greater(error_a: wp.float64, scale_a: wp.float64, error_b: wp.float64, scale
 @wp.func
 def error_of(trial: Trial, tolerance: wp.float64):
     """Error ratio of a link as ordered bits, a NaN above all numbers; turning too far counts as an error of 2."""
-    ratio = quick_quotient(wp.float32(wp.abs(trial.error)), wp.float32(trial.scale * tolerance))
+    scale = wp.float32(trial.scale * tolerance)
+    ratio = quick_quotient(wp.float32(wp.abs(trial.error)), wp.where(scale > LARGEST_SCALE, LARGEST_SCALE, scale))
     if trial.turns_far and ratio < wp.float32(2.0):
         ratio = wp.float32(2.0)
     return order_bits_single(ratio)

@@ -21,7 +21,7 @@ def error_bits(error: wp.float64, value: wp.float64, rate: wp.float64, h: wp.flo
 
 @wp.func
 def error_scale(value: wp.float64, rate: wp.float64, h: wp.float64):
-    """Divisor 1 + |y| + h |ẏ| of that norm in single precision."""
+    """Divisor 1 + |y| + h |ẏ| of that norm."""
     return ONE + wp.abs(value) + h * wp.abs(rate)
 
 
@@ -45,7 +45,7 @@ def quick_power(x: wp.float32, y: wp.float32) -> wp.float32:
 #endif
 """)
 def quick_quotient(a: wp.float32, b: wp.float32) -> wp.float32:
-    """a / b; to two units in the last place on a GPU."""
+    """a / b; to two units in the last place on a GPU, 0 there for b beyond 2¹²⁶."""
     ...
 
 
@@ -59,7 +59,7 @@ def quick_quotient(a: wp.float32, b: wp.float32) -> wp.float32:
 #endif
 """)
 def quick_root(x: wp.float32) -> wp.float32:
-    """Square root; to a few units in the last place on a GPU."""
+    """Square root, to a few units in the last place on a GPU."""
     ...
 
 

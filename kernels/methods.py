@@ -34,8 +34,9 @@ class Method:
         functions: Warp functions (first stage, attempt, commit) for scratch blocks of so many columns.
         needs_first_power: Whether a try in the block form asks what the joints lose at its start.
         block_memory: Doubles that a block of so many threads keeps for the method.
-        block_attempt: Warp function ``attempt(ends, forces, maxima, S, K, place, h, tolerance)`` → Trial for blocks of so many
-            threads, from the state and first stage on the board, S the address of that memory.
+        block_attempt: Warp function ``attempt(ends, forces, maxima, S, K, place, h, tolerance)`` → Trial for blocks of
+            so many threads and with what :mod:`block_surroundings` finds, from the state and first stage on the board,
+            S the address of that memory.
         flight: Another method, for flight on rigid joints, if this one has one; see :class:`Flight`.
     """
 

@@ -12,7 +12,7 @@ from warpchain import ensemble, runner
 from warpchain.course import Course
 from warpchain.devices import CAPACITY_FRAMES, CAPACITY_SAMPLES, start_device, world_bytes
 from warpchain.engine import Batch
-from warpchain.kernel_choice import block_threads, features_of, kernels_of, registers, shared_threads
+from warpchain.kernel_choice import block_threads, features_of, kernels_of, shared_threads
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features
 from warpchain.mirror import Mirror
@@ -107,14 +107,14 @@ def test_a_block_has_a_thread_for_each_link() -> None:
 
 
 def test_few_walks_of_several_lengths_share_a_kernel() -> None:
-    """The longest chain's block serves all, with the registers that each has in its own; many walks have their own."""
+    """The longest chain's block serves all; many walks, and methods whose sums depend on the block, have their own."""
     assert shared_threads("os32", [60, 90, 180], 504) == 192
     assert shared_threads("os32", [60, 90], 504) == 96
     assert shared_threads("os32", [60, 64], 504) is None
     assert shared_threads("os32", [60, 90, 180], 20_000) is None
     assert shared_threads("os32", [60, 240], 504) is None
-    assert shared_threads("dp5", [60, 90, 180], 504) is None
-    assert {registers("os32", threads) for threads in range(32, 193, 32)} == {168}
+    assert shared_threads("rodas4p", [60, 90, 180], 504) is None
+    assert shared_threads("hybrid", [60, 90, 180], 504) is None
 
 
 def test_kernels_of_a_sweep_are_those_that_its_walks_ask_for(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -95,7 +95,7 @@ def test_a_walk_gives_the_same_bits_in_any_batch(method: str, monkeypatch: pytes
     assert outcomes(setups * 3) == together * 3
 
 
-@pytest.mark.parametrize("method", ["os32", "explicit"])
+@pytest.mark.parametrize("method", ["explicit", "os32", "rkf78", "dp5", "bs32"])
 def test_a_walk_gives_the_same_bits_in_any_block(method: str) -> None:
     """In the block of its own size, or in one that it shares with the longest chain, see `shared_threads`."""
     setups = [brief_setup(links, links=links, device="cuda", method=method) for links in (30, 60, 90, 120, 150, 180)]

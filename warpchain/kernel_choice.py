@@ -8,6 +8,7 @@ import warp as wp
 from warpchain.kernels.block import make_advance_block
 from warpchain.kernels.driver import Features, make_advance
 from warpchain.kernels.rosenbrock_tables import ROSENBROCK_TABLES
+from warpchain.kernels.tableaus import TABLEAUS
 from warpchain.options import Options
 from warpchain.processors import processors
 
@@ -22,11 +23,6 @@ per try and chain, with 128 and 168: 60 links 12.2, 6.4, 3.9 and 9.9, 5.5, 3.3; 
 5.5; 150 links 28.7, 16.4, 10.1 and 32.9, 18.0, 10.7. Without a bound, few chains run up to 15 % faster and many slower;
 one number for all keeps a walk's bits independent of its batch. rodas4p is fastest without one.
 """
-SHARED_METHODS = ("os32",)
-"""Methods whose kernels take as many registers for all chains of up to 192 links, whatever the table says.
-
-Then what a walk gives does not depend, to the bit, on the threads of its block, see :func:`shared_threads`.
-"""
 SHARED_THREADS = 192
 """Most threads of a block that chains of several lengths share."""
 SHARED_WALKS = 2000
@@ -37,8 +33,6 @@ def registers(method: str, threads: int) -> int | None:
     """Registers that a thread of such a block may take; None: as many as it likes."""
     if method in ROSENBROCK_TABLES:
         return None
-    if method in SHARED_METHODS and threads <= SHARED_THREADS:
-        return REGISTERS
     return FEWER_REGISTERS.get(threads, REGISTERS)
 
 
@@ -65,7 +59,7 @@ def shared_threads(method: str, links: Iterable[int], walks: int) -> int | None:
         walks: How many walks there are.
     """
     sizes = {block_threads(n) for n in links}
-    if len(sizes) < 2 or walks > SHARED_WALKS or method not in SHARED_METHODS or max(sizes) > SHARED_THREADS:
+    if len(sizes) < 2 or walks > SHARED_WALKS or method not in TABLEAUS or max(sizes) > SHARED_THREADS:
         return None
     return max(sizes)
 
