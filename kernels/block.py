@@ -236,7 +236,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if wp.static(softens):
                 chain = softened(chain, control, state.softness[world])
             note_constants(K, chain)
-            note_bounds(K, control, state.softness[world], wp.static(features.watch == "steady"))
+            note_bounds(K, program, state, control, world, wp.static(features.watch == "steady"))
             K[BOARD_NOTES, NOTE_OPENING] = state.extremes[world, OPENING]
             K[BOARD_NOTES, NOTE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
             K[BOARD_NOTES, NOTE_LAST_IMPULSE] = state.watch[world, LAST_FLOOR_IMPULSE]
@@ -302,7 +302,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if state.softness[world] != softness and flies == 0:
                         next_end = hand_over(ends, K, place, link_on(K, lane))
                         begin_step(forces, K, place, next_end)
-                        bound = bound_of(K, control, pairs, gap, slack, speed)
+                    bound = bound_of(K, control, pairs, gap, slack, speed)
                 if pauses or status != RUNNING:
                     break
             stop_time = K[BOARD_NOTES, NOTE_STOP_TIME]
