@@ -239,7 +239,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if wp.static(softens):
                 chain = softened(chain, control, state.softness[world])
             note_constants(K, chain)
-            note_bounds(K, control, state.softness[world], wp.static(features.watch == "steady"))
+            note_bounds(K, program, state, control, world, wp.static(features.watch == "steady"))
             K[BOARD_NOTES, NOTE_OPENING] = state.extremes[world, OPENING]
             K[BOARD_NOTES, NOTE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
             K[BOARD_NOTES, NOTE_LAST_IMPULSE] = state.watch[world, LAST_FLOOR_IMPULSE]

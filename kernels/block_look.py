@@ -17,10 +17,12 @@ wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def note_bounds(K: wp.array2d(dtype=wp.float64), control: Control, softness: wp.float64, is_driven: bool):
-    """Puts on the board what bounds steps of the springs while joints have this softness."""
-    K[BOARD_NOTES, NOTE_CONTACT_STEP] = contact_step(control, softness, is_driven)
-    K[BOARD_NOTES, NOTE_TOLERANCE] = spring_tolerance(control, softness)
+def note_bounds(
+    K: wp.array2d(dtype=wp.float64), program: Program, state: State, control: Control, world: int, is_driven: bool
+):
+    """Puts on the board what bounds steps of the springs after the last look."""
+    K[BOARD_NOTES, NOTE_CONTACT_STEP] = contact_step(program, state, control, world, is_driven)
+    K[BOARD_NOTES, NOTE_TOLERANCE] = spring_tolerance(control, state.softness[world])
 
 
 @functools.cache
@@ -54,7 +56,7 @@ def block_look(features: Features, touch: TouchLayout):
         if wp.static(softens):
             if state.softness[world] != softness:
                 note_constants(K, change_joints(chain, model, state, control, world))
-                note_bounds(K, control, state.softness[world], wp.static(is_driven))
+            note_bounds(K, program, state, control, world, wp.static(is_driven))
         K[BOARD_NOTES, NOTE_STOP_TIME] = state.stop_time[world]
         K[BOARD_NOTES, NOTE_NEXT_LOOK] = wp.float64(state.next_sample[world]) * control.sample_interval
         if clock() > K[BOARD_NOTES, NOTE_DEADLINE]:

@@ -224,7 +224,7 @@ def make_advance(features: Features):
         tolerance = control.tolerance
         if wp.static(softens):
             chain = softened(chain, control, state.softness[world])
-            longest = contact_step(control, state.softness[world], wp.static(is_driven))
+            longest = contact_step(program, state, control, world, wp.static(is_driven))
             tolerance = spring_tolerance(control, state.softness[world])
         block = scratch[world]
         K = wp.array(ptr=block.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
@@ -259,9 +259,9 @@ def make_advance(features: Features):
                 softness = state.softness[world]
                 status = look(K, chain, program, state, record, control, world, time)
                 if wp.static(softens):
+                    longest = contact_step(program, state, control, world, wp.static(is_driven))
                     if state.softness[world] != softness:
                         chain = change_joints(chain, model, state, control, world)
-                        longest = contact_step(control, state.softness[world], wp.static(is_driven))
                         tolerance = spring_tolerance(control, state.softness[world])
                         has_first_stage = int(0)
                 if status != RUNNING:

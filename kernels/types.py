@@ -49,6 +49,7 @@ class Program:
     steady_tolerance: wp.array(dtype=wp.float64)  # relative change of its height and width in that time
     release_phase: wp.array(dtype=wp.float64)  # release this fraction of a loop period after steadiness
     hold_softness: wp.array(dtype=wp.float64)  # from the hold to the release, 1 to 2; 0: own values
+    release_step: wp.array(dtype=wp.float64)  # longest step near a contact [s] in the half turn before the release
 
 
 @wp.struct

@@ -42,6 +42,32 @@ def hold_softness(parameters: Parameters, speed: float) -> float:
     return 1.0 + max(0.0, math.log(soft / max(wanted, softest)) / math.log(soft / softest))
 
 
+SINKING = 1.5e-3
+"""Part of its distance from the sprocket's centre by which a joint may sink in before a release, see `release_step`.
+
+Measured with `soft` on 60 and 160 links at 5 to 15 Hz, those on the sprocket have then sunk a quarter to two fifths of
+that in the mean, and the loop, which goes the slower, has 0.1 to 0.2 % less kinetic energy than if none had; from steps
+of 20 µs throughout, in twice the tries, it has hardly more.
+"""
+
+
+def release_step(parameters: Parameters, links: int, speed: float, radius: float) -> float:
+    """Longest step [s] near the sprocket in its half turn before a release.
+
+    Impulses after each step stop circles that have sunk in, so that in each they sink by what an acceleration does in
+    that time: a h²/2. Half of the loop's weight pulls at either end of what lies on the sprocket, a = n ℓ g / 2ρ, for
+    half a turn, π ρ / v: joints sink by up to π n ℓ g h / 4v, slow ones and long loops most.
+
+    Args:
+        parameters: Of the chain.
+        links: Their number n.
+        speed: Of the joints along the loop, v [m/s].
+        radius: Distance ρ from the sprocket's centre at which joints ride [m].
+    """
+    weight = links * parameters.link_length * parameters.gravity  # of the loop, over a link's mass per length
+    return SINKING * radius * 4 * speed / (math.pi * weight) if weight > 0 else math.inf
+
+
 def control_of(options: Options) -> Control:
     """What options say of every launch; how long a launch is and which frames it keeps is still to be said."""
     control = Control()

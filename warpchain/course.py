@@ -11,7 +11,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.control import hold_softness
+from warpchain.control import hold_softness, release_step
 from warpchain.engine import COUNTS, EXTREMES, Batch
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features
@@ -115,6 +115,7 @@ class Course:
             steady_tolerance=scene.steady_tolerance,
             release_phase=scene.phase,
             hold_softness=self._hold_softness,
+            release_step=release_step(parameters, scene.links, speed, joint_radius(scene, parameters)),
         )
         if not from_rest:
             self._start_drive()

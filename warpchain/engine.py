@@ -27,7 +27,8 @@ Array = NDArray[np.float64]
 
 PROGRAM = (
     *("sprocket_speed", "spin_up_start", "spin_up_time", "hold_start"),
-    *("loop_speed", "loop_period", "steady_time", "steady_tolerance", "release_phase", "hold_softness"),
+    *("loop_speed", "loop_period", "steady_time", "steady_tolerance", "release_phase"),
+    *("hold_softness", "release_step"),
 )
 """Fields of :class:`warpchain.kernels.types.Program`."""
 FIRST_STEP = 1e-7  # s; the controller grows it fivefold per step
