@@ -301,7 +301,8 @@ def test_the_merged_file_of_blocks_and_of_a_part(tmp_path: Path) -> None:
 def test_a_merge_with_motions_that_fails_leaves_the_older_file(kept: Path, tmp_path: Path) -> None:
     """In a process that may write small files only, the merged file is refused in one line; what was there stays."""
     path = tmp_path / "merged.h5"
-    path.write_bytes(b"older")
+    merge(kept, path)
+    older = path.read_bytes()
     program = (
         "import resource, signal, sys\n"
         "from warpchain.merged_file import merge\n"
@@ -315,7 +316,7 @@ def test_a_merge_with_motions_that_fails_leaves_the_older_file(kept: Path, tmp_p
     done = subprocess.run([sys.executable, "-c", program, kept, path], capture_output=True, encoding="utf-8")
     assert done.stdout.startswith(f"{path}: cannot be written (File too large); make room"), done.stderr
     assert done.stdout.count("\n") == 1
-    assert path.read_bytes() == b"older" and list(tmp_path.iterdir()) == [path]
+    assert path.read_bytes() == older and list(tmp_path.iterdir()) == [path]
 
 
 def test_figure5_of_a_sweep_shows_the_kept_series(kept: Path) -> None:

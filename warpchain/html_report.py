@@ -22,7 +22,7 @@ from warpchain.planning import load_sweep
 from warpchain.recording import Recording
 from warpchain.results import replacing
 from warpchain.rows import MISSING, field_column
-from warpchain.shards import Folder
+from warpchain.shards import Folder, check_not_own
 from warpchain.status import Status
 from warpchain.sweep_file import SECTIONS
 from warpchain.sweep_result import BlockResult, SweepResult, load
@@ -49,9 +49,11 @@ def write_report(directory: Folder, path: str | os.PathLike[str], *, animation_o
 
     Raises:
         OSError: the folder cannot be read, or the file cannot be written.
-        InputError: there is no sweep in the folder, a shard is damaged or foreign, or there is no such walk.
+        InputError: there is no sweep in the folder, a shard is damaged or foreign, there is no such walk, or the file
+            is one of the sweep's own.
     """
     result = load(directory)
+    check_not_own(directory, Path(path))
     if animation_of is not None and not 0 <= animation_of < result.walk_count:
         raise InputError(f"animation_of: there is no walk {animation_of}; give 0 … {result.walk_count - 1}")
     sections = {

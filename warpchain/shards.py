@@ -39,6 +39,9 @@ NUMERICS_VERSION: Final = 8
 FORMAT: Final = "warpchain sweep"
 FORMAT_VERSION: Final = 2
 
+OWN: Final = ("sweep.json", "sweep.yaml", "shards", "log.txt")
+"""What a sweep has in its folder, beside the lock."""
+
 
 @dataclass(frozen=True)
 class BlockLayout:
@@ -351,6 +354,17 @@ def present_shards(directory: Folder, manifest: Manifest) -> dict[range, Path]:
         more = f" (and {len(strange) - 1} more)" if strange[1:] else ""
         raise InputError(f"{folder / strange[0]}: not a shard of this sweep; move it out of this folder{more}")
     return {walks: folder / name for name, walks in named.items() if name in names}
+
+
+def check_not_own(directory: Folder, path: Path) -> None:
+    """Check that a file or folder to be written is none that a sweep has in its folder.
+
+    Raises:
+        InputError: it is one of them, or lies among the shards.
+    """
+    folder, place = Path(directory).resolve(), path.parent.resolve() / path.name
+    if place.is_relative_to(folder) and place.relative_to(folder).parts[:1] in {(name,) for name in (*OWN, "lock")}:
+        raise InputError(f"{path}: belongs to the sweep itself; give another path")
 
 
 def hdf5_image(fill: "Callable[[h5py.File], None]") -> bytes:

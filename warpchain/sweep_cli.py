@@ -84,12 +84,14 @@ def plot(
 ) -> None:
     """Draw every figure that the sweep has something for: Figures 6 and 5, maps, tolerance, sensitivity, statuses."""
     from warpchain.results import replacing
+    from warpchain.shards import check_not_own
     from warpchain.sweep_plots import figures
     from warpchain.sweep_result import load
     from warpchain.terminal import PICTURE_DPI, try_folder
 
     result = load(directory)
     folder = output or directory
+    check_not_own(directory, folder)
     try_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
     for picture in figures(result):
