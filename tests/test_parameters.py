@@ -91,6 +91,10 @@ def test_parameter_numbers_strict(name: str, value: object) -> None:
     ("name", "accepted", "rejected"),
     [
         *[(name, 1e-9, 0.0) for name in ("inner_mass", "outer_mass", "inner_inertia", "outer_inertia")],
+        *[(name, 1e6, 1.001e6) for name in ("inner_mass", "outer_mass", "gravity", "friction_smoothing")],
+        *[(name, 1e12, 1.001e12) for name in ("inner_inertia", "outer_inertia", "joint_damping")],
+        *[(name, 1e9, 1.001e9) for name in ("viscous_friction", "coulomb_friction")],
+        *[(name, 1e3, 1.001e3) for name in ("link_length", "sprocket_radius")],
         ("circle_radius", 1e-9, 0.0),
         ("circle_radius", 6.339e-3, 6.34e-3),
         ("link_length", 8.41e-3, 8.4e-3),
@@ -110,8 +114,26 @@ def test_parameter_numbers_strict(name: str, value: object) -> None:
 def test_parameter_bounds(name: str, accepted: float, rejected: float) -> None:
     """Each bound of a parameter admits the value at or inside it and refuses the one outside."""
     assert getattr(preset("paper").with_values({name: accepted}), name) == accepted
-    path = "circle_radius" if name == "link_length" else name
+    path = "circle_radius" if (name, rejected) == ("link_length", 8.4e-3) else name
     assert refused("parameters", {name: rejected}).startswith(f"parameters.{path}: ")
+
+
+@pytest.mark.parametrize(
+    ("name", "greatest", "message"),
+    [
+        ("links", 100_000, "scene.links: 100002 is greater than 100000; give 100000 or less"),
+        ("frequency", 1e4, "scene.frequency: 10001.0 is greater than 10000 Hz; give 10000 or less"),
+        ("clearance", 1e6, "scene.clearance: 1000001.0 is greater than 1000000 m; give 1000000 or less"),
+        *[
+            (name, 1e6, f"scene.{name}: 1000001.0 is greater than 1000000 s; give 1000000 or less")
+            for name in ("settle_time", "spin_up_time", "steady_time", "hold_limit", "walk_limit")
+        ],
+    ],
+)
+def test_scene_upper_bounds(name: str, greatest: float, message: str) -> None:
+    """The greatest values of a scene are taken, greater ones refused with the limit in their unit."""
+    assert getattr(Scene.model_validate({name: greatest}), name) == greatest
+    assert refused("scene", {name: greatest + (2 if name == "links" else 1)}) == message
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from typing import Final
 from warpchain.options import Options
 from warpchain.parameters import InputError, Parameters, shown, suggestion, validated
 from warpchain.parameters import preset as parameter_preset
-from warpchain.scene import Scene, check_scene
+from warpchain.scene import Scene, check_links_on_gpu, check_scene
 from warpchain.yaml_files import read_yaml
 
 
@@ -54,6 +54,7 @@ def resolve(
         options=validated(Options, options, "options"),
     )
     check_scene(setup.scene, setup.parameters)
+    check_links_on_gpu(setup.scene.links, setup.options.device, "scene.links")
     return setup
 
 
