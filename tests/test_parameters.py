@@ -11,7 +11,7 @@ from tests.table_1 import TABLE_1
 from warpchain.options import Options
 from warpchain.parameters import PRESETS, InputError, Parameters, preset
 from warpchain.scene import Scene, check_scene, contact_radius, fewest_links, joint_radius
-from warpchain.setups import Setup, load_setup, resolve
+from warpchain.setups import Setup, read_setup, resolve
 
 
 def refused(section: str, values: object) -> str:
@@ -366,7 +366,13 @@ def written(folder: Path, text: str) -> Path:
     return path
 
 
-def test_load_setup(tmp_path: Path) -> None:
+def loaded(path: Path | str) -> Setup:
+    """The setup of a YAML file."""
+    preset, sections = read_setup(path)
+    return resolve(preset, **sections)
+
+
+def test_setup_of_a_file(tmp_path: Path) -> None:
     """A YAML file gives the same setup as the same values given as arguments; 1e7 is a number."""
     text = """
     preset: paper
@@ -380,7 +386,7 @@ def test_load_setup(tmp_path: Path) -> None:
       tangential_restitution: -.5
       gravity: 10
     """
-    assert load_setup(written(tmp_path, text)) == resolve(
+    assert loaded(written(tmp_path, text)) == resolve(
         "paper",
         scene={"links": 80, "frequency": 20.0, "start": "ellipse"},
         options={"tolerance": 1e-7, "step_limit": 1_000_000, "self_contact": False},
@@ -388,11 +394,15 @@ def test_load_setup(tmp_path: Path) -> None:
     )
 
 
-def test_load_setup_with_empty_sections(tmp_path: Path) -> None:
+def test_setup_of_a_file_with_empty_sections(tmp_path: Path) -> None:
     """A section without values, or no section at all, leaves the defaults."""
     expected = resolve("soft", scene={}, options={}, parameters={})
-    assert load_setup(written(tmp_path, "preset: soft")) == expected
-    assert load_setup(str(written(tmp_path, "preset: soft\nscene:\noptions: {}\n"))) == expected
+    assert loaded(written(tmp_path, "preset: soft")) == expected
+    assert loaded(str(written(tmp_path, "preset: soft\nscene:\noptions: {}\n"))) == expected
+    assert read_setup(written(tmp_path, "scene: {links: 8}")) == (
+        None,
+        {"scene": {"links": 8}, "options": {}, "parameters": {}},
+    )
 
 
 @pytest.mark.parametrize(
@@ -411,7 +421,6 @@ def test_load_setup_with_empty_sections(tmp_path: Path) -> None:
         ("preset: paper\nscene: [1]", "scene: [1] is not a mapping"),
         ("preset: papr", "preset: 'papr' is unknown; presets are paper, soft"),
         ("preset: [paper]", "preset: ['paper'] is unknown"),
-        ("scene: {links: 60}", "preset: missing"),
         ("preset: paper\nsceen: {}", "'sceen': unknown key; did you mean scene?"),
         ("preset: paper\n7: {}", "7: unknown key; give one of preset, scene, options, parameters"),
         ("preset: paper\nscene: {links: 60, links: 80}", "{path}, line 2: key 'links' is given twice"),
@@ -429,21 +438,21 @@ def test_load_setup_with_empty_sections(tmp_path: Path) -> None:
         ("- paper", "{path}: no mapping at the top"),
     ],
 )
-def test_load_setup_refusals(tmp_path: Path, text: str, message: str) -> None:
+def test_setup_of_a_file_refusals(tmp_path: Path, text: str, message: str) -> None:
     """A bad file is refused in one line that says where and why."""
     path = written(tmp_path, text)
     with pytest.raises(InputError) as caught:
-        load_setup(path)
+        loaded(path)
     assert str(caught.value).startswith(message.replace("{path}", str(path)))
     assert "\n" not in str(caught.value)
 
 
-def test_load_setup_unreadable(tmp_path: Path) -> None:
+def test_setup_of_a_file_unreadable(tmp_path: Path) -> None:
     """A missing file, a folder and a file that is no text are refused in one line."""
     binary = tmp_path / "binary.yaml"
     binary.write_bytes(b"\xff\xfe\xff")
     for path in (tmp_path / "none.yaml", tmp_path, binary):
         with pytest.raises(InputError) as caught:
-            load_setup(path)
+            loaded(path)
         assert str(caught.value).startswith(f"{path}: ")
         assert "\n" not in str(caught.value)
