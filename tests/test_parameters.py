@@ -426,8 +426,11 @@ def test_setup_of_a_file_with_empty_sections(tmp_path: Path) -> None:
         ("preset: paper\nscene: {links: 60, links: 80}", "{path}, line 2: key 'links' is given twice"),
         ("preset: paper\nscene: {links: 60, 'links': 60}", "{path}, line 2: key 'links' is given twice"),
         ("preset: paper\npreset: soft", "{path}, line 2: key 'preset' is given twice"),
-        ("preset: paper\nscene: {links: 60", "{path}, line 2: "),
-        ("preset: paper\n---\npreset: soft", "{path}, line 2: "),
+        ("preset: paper\nscene: {links: 60", "{path}, line 2: while parsing a flow mapping, expected ',' or '}'"),
+        (
+            "preset: paper\n---\npreset: soft",
+            "{path}, line 2: expected a single document in the stream, but found another document; correct the YAML",
+        ),
         ("preset: paper\nscene: {? [1, 2] : 3}", "{path}, line 2: "),
         ("preset: !!python/object:os.system x", "{path}, line 1: "),
         ("preset: !!map [a]", "{path}, line 1: "),
