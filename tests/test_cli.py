@@ -146,8 +146,8 @@ REFUSED = {
     "--frame-interval 0": "--frame-interval: 0 is not a positive time",
     "--frame-interval soon": "--frame-interval: 'soon' is not a positive time",
     "--animate avi": "'--animate'",
-    "--frobnicate": "No such option: --frobnicate",
-    "extra": "unexpected extra argument",
+    "--frobnicate": "(Possible options: --animate); see warpchain walk --help",
+    "extra": "unexpected extra argument(s) (extra); see warpchain walk --help",
 }
 """Bad arguments of `walk` → how the line of refusal begins, or what it holds."""
 
@@ -160,6 +160,23 @@ def test_bad_input_is_refused_in_one_line(command: Command, tmp_path: Path, argu
     assert answer.err.startswith("error: ") and answer.err.count("\n") == 1 and answer.err.endswith("\n")
     assert REFUSED[arguments] in answer.err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        ("foo", "No such command 'foo'; see warpchain --help"),
+        ("bench foo", "No such command 'foo'; see warpchain bench --help"),
+        ("info", "Missing argument 'DIR'; see warpchain info --help"),
+        ("bench accuracy", "Missing option '-o' / '--output'; see warpchain bench accuracy --help"),
+        ("walk --json=1", "Option '--json' does not take a value; see warpchain --help"),
+    ],
+)
+def test_what_is_no_command_names_the_help(command: Command, arguments: str, line: str) -> None:
+    """A line that is no command, or lacks something, is refused with the help that says what there is."""
+    answer = command(*arguments.split())
+    assert (answer.status, answer.out) == (2, "")
+    assert answer.err == f"error: {line}\n"
 
 
 def test_bad_input_is_refused_by_the_process_too(tmp_path: Path) -> None:

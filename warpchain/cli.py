@@ -43,7 +43,9 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     try:
         status = app(arguments, prog_name="warpchain", standalone_mode=False)
     except typer.TyperException as error:
-        _refuse(error.format_message(), error.exit_code)
+        context = getattr(error, "ctx", None)
+        command = context.command_path if context is not None else "warpchain"
+        _refuse(f"{error.format_message().rstrip('.')}; see {command} --help", error.exit_code)
     except OSError as error:
         _refuse(str(error))
     except ValueError as error:
