@@ -76,7 +76,7 @@ def test_help_is_quick_and_complete(tmp_path: Path) -> None:
     after = os.times()
     computed = after.children_user + after.children_system - before.children_user - before.children_system
     assert answer.status == 0 and answer.err == ""
-    options = "links frequency preset method tol start set seed json output animate config frame-interval"
+    options = "links frequency preset method tol device start set seed json output animate config frame-interval"
     for option in options.split():
         assert f"--{option} " in answer.out
     assert computed < 0.5
@@ -91,6 +91,7 @@ def test_help_tells_the_defaults(command: Command) -> None:
         "frequency": scene.frequency,
         "start": scene.start,
         "preset": "paper",
+        "device": options.device,
         "frame-interval": 2e-3,
     }
     for name, default in named.items():
@@ -141,6 +142,9 @@ REFUSED = {
     "--set self_contact=2": "options.self_contact: 2 is not a truth value",
     "--set device=gpu": "options.device: 'gpu' is no device",
     "--set device=cuda:99": "options.device: there is no cuda:99 on this machine",
+    "--device cuda:98": "options.device: there is no cuda:98 on this machine",
+    "--device gpu": "options.device: 'gpu' is no device",
+    "--device cpu --set device=cpu": "options.device: given twice",
     "--set clearance_of=hanging --start spinning": "scene.clearance_of: 'hanging' needs",
     "--config nowhere.yaml": "nowhere.yaml: No such file",
     "--frame-interval 0": "--frame-interval: 0 is not a positive time",

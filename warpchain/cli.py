@@ -131,6 +131,10 @@ def walk(
             "Default: that of the word, 1e-6 for an integrator, 1e-4 for hybrid.",
         ),
     ] = None,
+    device: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Where it runs: cpu, cuda (the first GPU) or cuda:N. Default: cpu."),
+    ] = None,
     assignments: Annotated[
         list[str] | None,
         typer.Option(
@@ -190,6 +194,7 @@ def walk(
         "start": start,
         "method": method,
         "tolerance": tolerance,
+        "device": device,
     }
     given = _given_values({name: text for name, text in named.items() if text is not None}, assignments or [])
     chosen_seed = None if seed is None else _seed(seed)
