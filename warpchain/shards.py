@@ -400,8 +400,22 @@ def open_new_hdf5(path: Path, most: int) -> "Iterator[h5py.File]":
     import h5py
 
     with path.open("w+b") as content, h5py.File(content, "w", **_FIXED) as file:
-        os.posix_fallocate(content.fileno(), 0, most)
+        _take_room(content.fileno(), most)
         yield file
+
+
+def _take_room(descriptor: int, size: int) -> None:
+    """Take room for a file on the disk, so that a full one is found now; what is in the file stays.
+
+    Raises:
+        OSError: there is not enough room.
+    """
+    if hasattr(os, "posix_fallocate"):
+        os.posix_fallocate(descriptor, 0, size)
+        return
+    zeros, end = bytes(2**20), os.fstat(descriptor).st_size  # macOS
+    while end < size:
+        end += os.pwrite(descriptor, zeros[: size - end], end)
 
 
 _FIXED: Final[dict[str, Any]] = {"libver": ("v108", "v108"), "track_order": True}
