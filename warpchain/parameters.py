@@ -115,7 +115,7 @@ class Parameters(BaseModel):
             `circle_radius` is not smaller than half of `link_length`.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+    model_config = STRICT
 
     link_length: Annotated[
         float,
