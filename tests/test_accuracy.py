@@ -33,9 +33,9 @@ Answer, Command, process = test_cli.Answer, test_cli.Command, test_cli.process
 command = test_cli.command
 
 RUN_ELSEWHERE = {"pile-slow-walk", "sixty-hertz", "standing", "links-1000"}
-"""Slow cases that tests of hard walks and hard chains run with the methods of the three words.
+"""Slow cases that tests of hard walks and hard chains run, as the table has them, with the methods of the three words.
 
-They are as the table has them, but for 100 links instead of 180 with os32.
+All but one: `pile-slow-walk` with os32 has 100 links there instead of 180, which take minutes.
 """
 SLOW_CASES = {"pile-dropped-soft", "pile-dropped-paper"} | RUN_ELSEWHERE
 TINY = "--links 8 --methods rkf78,dp5 --trials flight --tolerances 1e-3,1e-6 --no-scipy --rounds 1 --presets soft"
@@ -274,7 +274,7 @@ def test_walks_are_timed_in_turn_and_compared_with_the_reference() -> None:
 def test_quick_cases_are_sound(method: str) -> None:
     """Every case that takes no longer than a moment ends as it may, with one method of each kind.
 
-    The hard runs of the other tests take every method.
+    Tests of hard starts, chains and walks put most of these difficulties to bs32 and rodas5p as well.
     """
     outcomes = {case.name: case.subject.run(method) for case in HARD_CASES if case.name not in SLOW_CASES}
     assert len(outcomes) == len(HARD_CASES) - len(SLOW_CASES)

@@ -76,7 +76,7 @@ def test_help_is_quick_and_complete(tmp_path: Path) -> None:
     after = os.times()
     computed = after.children_user + after.children_system - before.children_user - before.children_system
     assert answer.status == 0 and answer.err == ""
-    options = "links frequency preset method tol start set seed json output animate config frame-interval"
+    options = "links frequency preset method tol device start set seed json output animate config frame-interval"
     for option in options.split():
         assert f"--{option} " in answer.out
     assert computed < 0.5
@@ -91,6 +91,7 @@ def test_help_tells_the_defaults(command: Command) -> None:
         "frequency": scene.frequency,
         "start": scene.start,
         "preset": "paper",
+        "device": options.device,
         "frame-interval": 2e-3,
     }
     for name, default in named.items():
@@ -141,13 +142,16 @@ REFUSED = {
     "--set self_contact=2": "options.self_contact: 2 is not a truth value",
     "--set device=gpu": "options.device: 'gpu' is no device",
     "--set device=cuda:99": "options.device: there is no cuda:99 on this machine",
+    "--device cuda:98": "options.device: there is no cuda:98 on this machine",
+    "--device gpu": "options.device: 'gpu' is no device",
+    "--device cpu --set device=cpu": "options.device: given twice",
     "--set clearance_of=hanging --start spinning": "scene.clearance_of: 'hanging' needs",
     "--config nowhere.yaml": "nowhere.yaml: No such file",
     "--frame-interval 0": "--frame-interval: 0 is not a positive time",
     "--frame-interval soon": "--frame-interval: 'soon' is not a positive time",
     "--animate avi": "'--animate'",
-    "--frobnicate": "No such option: --frobnicate",
-    "extra": "unexpected extra argument",
+    "--frobnicate": "(Possible options: --animate); see warpchain walk --help",
+    "extra": "unexpected extra argument(s) (extra); see warpchain walk --help",
 }
 """Bad arguments of `walk` → how the line of refusal begins, or what it holds."""
 
@@ -160,6 +164,23 @@ def test_bad_input_is_refused_in_one_line(command: Command, tmp_path: Path, argu
     assert answer.err.startswith("error: ") and answer.err.count("\n") == 1 and answer.err.endswith("\n")
     assert REFUSED[arguments] in answer.err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        ("foo", "No such command 'foo'; see warpchain --help"),
+        ("bench foo", "No such command 'foo'; see warpchain bench --help"),
+        ("info", "Missing argument 'DIR'; see warpchain info --help"),
+        ("bench accuracy", "Missing option '-o' / '--output'; see warpchain bench accuracy --help"),
+        ("walk --json=1", "Option '--json' does not take a value; see warpchain --help"),
+    ],
+)
+def test_what_is_no_command_names_the_help(command: Command, arguments: str, line: str) -> None:
+    """A line that is no command, or lacks something, is refused with the help that says what there is."""
+    answer = command(*arguments.split())
+    assert (answer.status, answer.out) == (2, "")
+    assert answer.err == f"error: {line}\n"
 
 
 def test_bad_input_is_refused_by_the_process_too(tmp_path: Path) -> None:

@@ -14,9 +14,15 @@ from warpchain.options import METHODS_BY_NEED
 
 every_method_walks = pytest.mark.parametrize(
     "method",
-    ["rkf78", "dp5", "rodas4p", "hybrid", *(pytest.param(name, marks=pytest.mark.slow) for name in ("bs32", "os32"))],
+    [
+        "rkf78",
+        "dp5",
+        "rodas4p",
+        "hybrid",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("bs32", "os32", "rodas5p")),
+    ],
 )
-"""Walks need a kernel more than short runs: no other quick test uses those of bs32 and os32."""
+"""Walks need a kernel more than short runs: no other quick test uses those of bs32, os32 and rodas5p."""
 
 
 def walk(method, **settings):

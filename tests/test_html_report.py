@@ -17,6 +17,7 @@ import yaml
 from PIL import Image
 
 from warpchain import html_report
+from warpchain.cli import main
 from warpchain.html_report import write_report
 from warpchain.parameters import InputError
 from warpchain.planning import PlannedWalk, load_sweep
@@ -275,10 +276,28 @@ def test_walk_without_pictures(
     assert not document.frames and not document.images
 
 
+@pytest.mark.usefixtures("no_figures")
+def test_a_walk_is_run_again_on_another_device(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With --device the walk is that of the sweep but for where it runs; without --walk there is nothing to run."""
+    asked = with_walk(monkeypatch, make_walk)
+    monkeypatch.chdir(tmp_path)
+    for arguments in (["--walk", "15"], ["--walk", "15", "--device", "cuda:1"]):
+        with pytest.raises(SystemExit) as end:
+            main(["report", str(folder), "-o", "report.html", *arguments])
+        assert not end.value.code
+    there, here = asked[1], asked[0]
+    assert (here.options.device, there.options.device) == ("cpu", "cuda:1")
+    assert (here.scene, here.parameters) == (there.scene, there.parameters)
+    Path("report.html").unlink()
+    with pytest.raises(SystemExit, match="2"):
+        main(["report", str(folder), "-o", "report.html", "--device", "cpu"])
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("index", [-1, 18])
 def test_unknown_walk_is_refused(folder: Path, tmp_path: Path, index: int) -> None:
     """A walk that does not exist is refused with the numbers that do, and nothing is written."""
-    with pytest.raises(InputError, match=r"^animation_of: there is no walk -?\d+; give 0 … 17$"):
+    with pytest.raises(InputError, match=r"^--walk: there is no walk -?\d+; give 0 … 17$"):
         write_report(folder, tmp_path / "report.html", animation_of=index)
     assert not list(tmp_path.iterdir())
 

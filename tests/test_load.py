@@ -3,6 +3,7 @@
 import copy
 import json
 import math
+import os
 import pickle
 import subprocess
 import sys
@@ -14,6 +15,8 @@ import numpy as np
 import pytest
 import xarray
 
+from warpchain.cli import main
+from warpchain.html_report import write_report
 from warpchain.merged_file import merge
 from warpchain.parameters import InputError
 from warpchain.planning import load_sweep
@@ -318,11 +321,12 @@ def test_merged_files_are_equal(folder: Path, tmp_path: Path) -> None:
 
 
 def test_a_merge_that_fails_leaves_the_older_file(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    folder: Path, single: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A file that cannot be written, or would lie among the shards, is named; what was there stays."""
+    """A file that cannot be written is named; what was there stays."""
     path = tmp_path / "merged.h5"
-    path.write_bytes(b"older")
+    merge(single, path)
+    older = path.read_bytes()
 
     def write_bytes(path: Path, content: bytes) -> int:
         raise OSError(28, "No space left on device")
@@ -331,8 +335,46 @@ def test_a_merge_that_fails_leaves_the_older_file(
         patched.setattr(Path, "write_bytes", write_bytes)
         with pytest.raises(OSError, match=r"merged\.h5: cannot be written \(No space left on device\); make room"):
             merge(folder, path)
-    assert path.read_bytes() == b"older" and len(list(tmp_path.iterdir())) == 1
-    with pytest.raises(InputError, match="among the shards"):
-        merge(folder, folder / "shards" / "all.h5")
+    assert path.read_bytes() == older and len(list(tmp_path.iterdir())) == 1
     with pytest.raises(OSError, match=r"cannot be written \(No such file or directory\); give a folder that is there"):
         merge(folder, tmp_path / "none" / "merged.h5")
+
+
+def test_a_merged_file_replaces_another_only(folder: Path, single: Path, tmp_path: Path) -> None:
+    """An older merged file, of whichever sweep, gives way; any other file, folder or link is refused and stays."""
+    path = tmp_path / "merged.h5"
+    merge(single, path)
+    merge(folder, path)
+    with h5py.File(path) as file:
+        assert file.attrs["digest"] == SWEEP.digest()
+    shard = next((folder / "shards").iterdir()).read_bytes()
+    others = {"my.yaml": b"version: 1\n", "empty.h5": b"", "shard.h5": shard, "cut.h5": path.read_bytes()[:1000]}
+    for name, content in others.items():
+        (tmp_path / name).write_bytes(content)
+    (tmp_path / "directory").mkdir()
+    (tmp_path / "nowhere").symlink_to(tmp_path / "none")
+    os.mkfifo(tmp_path / "pipe")
+    for name in (*others, "directory", "nowhere", "pipe"):
+        with pytest.raises(InputError, match=rf"{name}: is there and is no merged sweep; give another name$"):
+            merge(folder, tmp_path / name)
+    assert {name: (tmp_path / name).read_bytes() for name in others} == others
+    assert (tmp_path / "nowhere").is_symlink()
+
+
+@pytest.mark.parametrize("name", ["sweep.json", "sweep.yaml", "log.txt", "lock", "shards", "shards/all.h5"])
+def test_nothing_is_written_over_the_sweep(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The names of what a sweep has are refused to merged file, page and figures, there or not yet, by any path."""
+    folder = tmp_path / "sweep"
+    run(folder)
+    (folder / "log.txt").unlink(missing_ok=True)
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    monkeypatch.chdir(folder)
+    for target in (Path(name), folder / "shards/.." / name):
+        for write in (merge, write_report):
+            with pytest.raises(InputError, match=rf"{name}: belongs to the sweep itself; give another path$"):
+                write(folder, target)
+    with pytest.raises(SystemExit, match="2"):
+        main(["plot", ".", "-o", name])
+    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+    merge(folder, "all.h5")
+    merge(folder, "all.h5")

@@ -11,7 +11,7 @@ from tests.table_1 import TABLE_1
 from warpchain.options import Options
 from warpchain.parameters import PRESETS, InputError, Parameters, preset
 from warpchain.scene import Scene, check_scene, contact_radius, fewest_links, joint_radius
-from warpchain.setups import Setup, load_setup, resolve
+from warpchain.setups import Setup, read_setup, resolve
 
 
 def refused(section: str, values: object) -> str:
@@ -91,6 +91,10 @@ def test_parameter_numbers_strict(name: str, value: object) -> None:
     ("name", "accepted", "rejected"),
     [
         *[(name, 1e-9, 0.0) for name in ("inner_mass", "outer_mass", "inner_inertia", "outer_inertia")],
+        *[(name, 1e6, 1.001e6) for name in ("inner_mass", "outer_mass", "gravity", "friction_smoothing")],
+        *[(name, 1e12, 1.001e12) for name in ("inner_inertia", "outer_inertia", "joint_damping")],
+        *[(name, 1e9, 1.001e9) for name in ("viscous_friction", "coulomb_friction")],
+        *[(name, 1e3, 1.001e3) for name in ("link_length", "sprocket_radius")],
         ("circle_radius", 1e-9, 0.0),
         ("circle_radius", 6.339e-3, 6.34e-3),
         ("link_length", 8.41e-3, 8.4e-3),
@@ -110,8 +114,26 @@ def test_parameter_numbers_strict(name: str, value: object) -> None:
 def test_parameter_bounds(name: str, accepted: float, rejected: float) -> None:
     """Each bound of a parameter admits the value at or inside it and refuses the one outside."""
     assert getattr(preset("paper").with_values({name: accepted}), name) == accepted
-    path = "circle_radius" if name == "link_length" else name
+    path = "circle_radius" if (name, rejected) == ("link_length", 8.4e-3) else name
     assert refused("parameters", {name: rejected}).startswith(f"parameters.{path}: ")
+
+
+@pytest.mark.parametrize(
+    ("name", "greatest", "message"),
+    [
+        ("links", 100_000, "scene.links: 100002 is greater than 100000; give 100000 or less"),
+        ("frequency", 1e4, "scene.frequency: 10001.0 is greater than 10000 Hz; give 10000 or less"),
+        ("clearance", 1e6, "scene.clearance: 1000001.0 is greater than 1000000 m; give 1000000 or less"),
+        *[
+            (name, 1e6, f"scene.{name}: 1000001.0 is greater than 1000000 s; give 1000000 or less")
+            for name in ("settle_time", "spin_up_time", "steady_time", "hold_limit", "walk_limit")
+        ],
+    ],
+)
+def test_scene_upper_bounds(name: str, greatest: float, message: str) -> None:
+    """The greatest values of a scene are taken, greater ones refused with the limit in their unit."""
+    assert getattr(Scene.model_validate({name: greatest}), name) == greatest
+    assert refused("scene", {name: greatest + (2 if name == "links" else 1)}) == message
 
 
 @pytest.mark.parametrize(
@@ -344,7 +366,13 @@ def written(folder: Path, text: str) -> Path:
     return path
 
 
-def test_load_setup(tmp_path: Path) -> None:
+def loaded(path: Path | str) -> Setup:
+    """The setup of a YAML file."""
+    preset, sections = read_setup(path)
+    return resolve(preset, **sections)
+
+
+def test_setup_of_a_file(tmp_path: Path) -> None:
     """A YAML file gives the same setup as the same values given as arguments; 1e7 is a number."""
     text = """
     preset: paper
@@ -358,7 +386,7 @@ def test_load_setup(tmp_path: Path) -> None:
       tangential_restitution: -.5
       gravity: 10
     """
-    assert load_setup(written(tmp_path, text)) == resolve(
+    assert loaded(written(tmp_path, text)) == resolve(
         "paper",
         scene={"links": 80, "frequency": 20.0, "start": "ellipse"},
         options={"tolerance": 1e-7, "step_limit": 1_000_000, "self_contact": False},
@@ -366,11 +394,15 @@ def test_load_setup(tmp_path: Path) -> None:
     )
 
 
-def test_load_setup_with_empty_sections(tmp_path: Path) -> None:
+def test_setup_of_a_file_with_empty_sections(tmp_path: Path) -> None:
     """A section without values, or no section at all, leaves the defaults."""
     expected = resolve("soft", scene={}, options={}, parameters={})
-    assert load_setup(written(tmp_path, "preset: soft")) == expected
-    assert load_setup(str(written(tmp_path, "preset: soft\nscene:\noptions: {}\n"))) == expected
+    assert loaded(written(tmp_path, "preset: soft")) == expected
+    assert loaded(str(written(tmp_path, "preset: soft\nscene:\noptions: {}\n"))) == expected
+    assert read_setup(written(tmp_path, "scene: {links: 8}")) == (
+        None,
+        {"scene": {"links": 8}, "options": {}, "parameters": {}},
+    )
 
 
 @pytest.mark.parametrize(
@@ -389,14 +421,16 @@ def test_load_setup_with_empty_sections(tmp_path: Path) -> None:
         ("preset: paper\nscene: [1]", "scene: [1] is not a mapping"),
         ("preset: papr", "preset: 'papr' is unknown; presets are paper, soft"),
         ("preset: [paper]", "preset: ['paper'] is unknown"),
-        ("scene: {links: 60}", "preset: missing"),
         ("preset: paper\nsceen: {}", "'sceen': unknown key; did you mean scene?"),
         ("preset: paper\n7: {}", "7: unknown key; give one of preset, scene, options, parameters"),
         ("preset: paper\nscene: {links: 60, links: 80}", "{path}, line 2: key 'links' is given twice"),
         ("preset: paper\nscene: {links: 60, 'links': 60}", "{path}, line 2: key 'links' is given twice"),
         ("preset: paper\npreset: soft", "{path}, line 2: key 'preset' is given twice"),
-        ("preset: paper\nscene: {links: 60", "{path}, line 2: "),
-        ("preset: paper\n---\npreset: soft", "{path}, line 2: "),
+        ("preset: paper\nscene: {links: 60", "{path}, line 2: while parsing a flow mapping, expected ',' or '}'"),
+        (
+            "preset: paper\n---\npreset: soft",
+            "{path}, line 2: expected a single document in the stream, but found another document; correct the YAML",
+        ),
         ("preset: paper\nscene: {? [1, 2] : 3}", "{path}, line 2: "),
         ("preset: !!python/object:os.system x", "{path}, line 1: "),
         ("preset: !!map [a]", "{path}, line 1: "),
@@ -407,21 +441,21 @@ def test_load_setup_with_empty_sections(tmp_path: Path) -> None:
         ("- paper", "{path}: no mapping at the top"),
     ],
 )
-def test_load_setup_refusals(tmp_path: Path, text: str, message: str) -> None:
+def test_setup_of_a_file_refusals(tmp_path: Path, text: str, message: str) -> None:
     """A bad file is refused in one line that says where and why."""
     path = written(tmp_path, text)
     with pytest.raises(InputError) as caught:
-        load_setup(path)
+        loaded(path)
     assert str(caught.value).startswith(message.replace("{path}", str(path)))
     assert "\n" not in str(caught.value)
 
 
-def test_load_setup_unreadable(tmp_path: Path) -> None:
+def test_setup_of_a_file_unreadable(tmp_path: Path) -> None:
     """A missing file, a folder and a file that is no text are refused in one line."""
     binary = tmp_path / "binary.yaml"
     binary.write_bytes(b"\xff\xfe\xff")
     for path in (tmp_path / "none.yaml", tmp_path, binary):
         with pytest.raises(InputError) as caught:
-            load_setup(path)
+            loaded(path)
         assert str(caught.value).startswith(f"{path}: ")
         assert "\n" not in str(caught.value)

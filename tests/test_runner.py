@@ -18,6 +18,7 @@ import warpchain
 import warpchain.runner as runner
 from warpchain.ensemble import run_setups
 from warpchain.planning import load_sweep
+from warpchain.processors import processors
 from warpchain.runner import run_shards, shard_size, sweep
 from warpchain.setups import Setup
 from warpchain.status import Status
@@ -315,3 +316,14 @@ def test_tasks_of_gpus_are_alike(monkeypatch: pytest.MonkeyPatch) -> None:
         assert max(sum(map(len, task)) for task in tasks) <= most + 8
         means = [np.mean([planned.planned(shard.start).setup.scene.links for shard in task]) for task in tasks]
         assert workers > 4 or np.ptp(means) <= 12
+
+
+def test_processors_are_those_of_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Counted are the processors that the process may use; on macOS, which does not tell, all; at least one."""
+    monkeypatch.setattr(os, "cpu_count", lambda: 7)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {1, 5}, raising=False)
+    assert processors() == 2
+    monkeypatch.delattr(os, "sched_getaffinity")
+    assert processors() == 7
+    monkeypatch.setattr(os, "cpu_count", lambda: None)
+    assert processors() == 1

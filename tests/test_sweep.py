@@ -196,6 +196,8 @@ def test_from_a_file(tmp_path: Path) -> None:
         (content(grid={"lniks": [60]}), "sweep.grid.lniks: unknown key; did you mean links?"),
         (content(grid={"links": 60}), "sweep.grid.links: 60 is no list; give a list such as [60], or {from:, to:"),
         (content(grid={"links": []}), "sweep.grid.links: empty; give one item or more"),
+        (content(grid={"frequency": [15, 1e200]}), "sweep.grid.frequency[1]: 1e+200 is greater than 10000 Hz"),
+        (content(grid={"links": [60, 1026]}, options={"device": "cuda"}), "sweep.grid.links[1]: 1026 links are more"),
         (content(grid={"links": [60, 61]}), "sweep.grid.links[1]: 61 is odd; a chain alternates"),
         (content(grid={"links": [60, 90.0]}), "sweep.grid.links[1]: 90.0 is of type float; give a whole number"),
         (content(grid={"preset": ["soft"]}), "sweep.grid.preset: also given in sweep.preset; leave one out"),

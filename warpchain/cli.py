@@ -43,7 +43,9 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     try:
         status = app(arguments, prog_name="warpchain", standalone_mode=False)
     except typer.TyperException as error:
-        _refuse(error.format_message(), error.exit_code)
+        context = getattr(error, "ctx", None)
+        command = context.command_path if context is not None else "warpchain"
+        _refuse(f"{error.format_message().rstrip('.')}; see {command} --help", error.exit_code)
     except OSError as error:
         _refuse(str(error))
     except ValueError as error:
@@ -129,6 +131,10 @@ def walk(
             "Default: that of the word, 1e-6 for an integrator, 1e-4 for hybrid.",
         ),
     ] = None,
+    device: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Where it runs: cpu, cuda (the first GPU) or cuda:N. Default: cpu."),
+    ] = None,
     assignments: Annotated[
         list[str] | None,
         typer.Option(
@@ -188,6 +194,7 @@ def walk(
         "start": start,
         "method": method,
         "tolerance": tolerance,
+        "device": device,
     }
     given = _given_values({name: text for name, text in named.items() if text is not None}, assignments or [])
     chosen_seed = None if seed is None else _seed(seed)
@@ -304,40 +311,19 @@ def _setup(config: Path | None, preset: str | None, given: Sections, seed: int |
         InputError: something is refused; one line with the field's path and the remedy.
     """
     from warpchain.parameters import InputError
-    from warpchain.setups import resolve
+    from warpchain.setups import read_setup, resolve
     from warpchain.walker import setup_walk
 
-    file_preset, sections = _read_config(config) if config is not None else ("paper", {})
+    file_preset, sections = read_setup(config) if config is not None else ("paper", {name: {} for name in given})
     preset = file_preset if preset is None else preset
     if preset is None:
         raise InputError("preset: missing; name the parameters to start from, such as preset: paper")
     for section, values in given.items():
-        # What is no mapping is left for `resolve` to refuse.
-        if isinstance(of_file := sections.get(section, {}), Mapping):
-            sections[section] = {**of_file, **values}
+        if isinstance(sections[section], Mapping):  # what is none is left for `resolve` to refuse
+            sections[section] = {**sections[section], **values}
     resolve(preset, **sections)  # setup_walk knows names only; here a field in the wrong section is refused
     flat = {name: value for values in sections.values() for name, value in values.items()}
     return setup_walk(preset, flat, seed)
-
-
-def _read_config(path: Path) -> tuple[Any, dict[str, Any]]:
-    """Preset and sections of a YAML file, see `warpchain.setups.load_setup`.
-
-    Raises:
-        InputError: the file cannot be read, or has other keys.
-    """
-    from warpchain.parameters import InputError, shown, suggestion
-    from warpchain.yaml_files import read_yaml
-
-    keys = ("preset", "scene", "options", "parameters")
-    content = read_yaml(path)
-    if not isinstance(content, dict):
-        raise InputError(f"{path}: no mapping at the top; give the keys {', '.join(keys)}")
-    for key in content:
-        if key not in keys:
-            raise InputError(f"{shown(key)}: unknown key; {suggestion(key, keys)}")
-    preset = content.pop("preset", None)
-    return preset, {section: values for section, values in content.items() if values is not None}
 
 
 def _frame_interval(output: Path | None, animation: str | None, text: str | None) -> float | None:

@@ -22,7 +22,7 @@ from warpchain.planning import load_sweep
 from warpchain.recording import Recording
 from warpchain.results import replacing
 from warpchain.rows import MISSING, field_column
-from warpchain.shards import Folder
+from warpchain.shards import Folder, check_not_own
 from warpchain.status import Status
 from warpchain.sweep_file import SECTIONS
 from warpchain.sweep_result import BlockResult, SweepResult, load
@@ -38,7 +38,9 @@ _MOST_FAILED: Final = 100
 """Most walks of each status that are listed one by one."""
 
 
-def write_report(directory: Folder, path: str | os.PathLike[str], *, animation_of: int | None = None) -> None:
+def write_report(
+    directory: Folder, path: str | os.PathLike[str], *, animation_of: int | None = None, device: str | None = None
+) -> None:
     """Write the report of a sweep as one HTML page, whole or not at all; an older file is replaced.
 
     Args:
@@ -46,19 +48,22 @@ def write_report(directory: Folder, path: str | os.PathLike[str], *, animation_o
         path: the file to write.
         animation_of: number of a walk to show in motion, with the frames that the sweep kept of it or else run again;
             None for none.
+        device: where that walk is run again; None: where the sweep says.
 
     Raises:
         OSError: the folder cannot be read, or the file cannot be written.
-        InputError: there is no sweep in the folder, a shard is damaged or foreign, or there is no such walk.
+        InputError: there is no sweep in the folder, a shard is damaged or foreign, there is no such walk, or the file
+            is one of the sweep's own.
     """
     result = load(directory)
+    check_not_own(directory, Path(path))
     if animation_of is not None and not 0 <= animation_of < result.walk_count:
-        raise InputError(f"animation_of: there is no walk {animation_of}; give 0 … {result.walk_count - 1}")
+        raise InputError(f"--walk: there is no walk {animation_of}; give 0 … {result.walk_count - 1}")
     sections = {
         "Figures": _figures(result),
         "Cells": _cells(result),
         "Failed walks": _failed(result),
-        "One walk": "" if animation_of is None else _walk(result, animation_of),
+        "One walk": "" if animation_of is None else _walk(result, animation_of, device),
         "Parameters": _parameters(result),
         "Sweep": f"<pre>{escape(_text(result.sweep))}</pre>",
         "Provenance": _provenance(result),
@@ -140,11 +145,13 @@ def _rows_of(result: SweepResult, block: BlockResult, status: Status) -> Iterato
         yield [f"{index}", *name, _cell(block, tuple(place)) or "–", f"{sample}"]
 
 
-def _walk(result: SweepResult, index: int) -> str:
+def _walk(result: SweepResult, index: int, device: str | None) -> str:
     """One walk, as kept or else run again: what it is, a player, and its pictures."""
+    from warpchain.runner import on_device
     from warpchain.walker import run_walk
 
-    planned = load_sweep(result.sweep).planned(index)
+    sweep = load_sweep(result.sweep)
+    planned = (sweep if device is None else on_device(sweep, device)).planned(index)
     block = list(result.blocks.values())[planned.block]
     place = (*planned.cell, planned.sample)
     name = f"block {block.name}, " if len(result.blocks) > 1 else ""

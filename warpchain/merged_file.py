@@ -23,6 +23,7 @@ from warpchain.parameters import InputError
 from warpchain.results import replacing
 from warpchain.shards import (
     Folder,
+    check_not_own,
     hdf5_image,
     open_new_hdf5,
     present_shards,
@@ -31,7 +32,7 @@ from warpchain.shards import (
     read_motions,
     unwritable,
 )
-from warpchain.sweep_result import BlockResult, SweepResult, load
+from warpchain.sweep_result import FORMAT, BlockResult, SweepResult, load
 
 if TYPE_CHECKING:
     import h5py
@@ -44,16 +45,18 @@ _NO_VARIABLE: Final = "This is a netCDF dimension but not a netCDF variable."
 
 
 def merge(directory: Folder, path: str | os.PathLike[str]) -> None:
-    """Write the results of a folder to one HDF5 file, whole or not at all; an older file is replaced.
+    """Write the results of a folder to one HDF5 file, whole or not at all; an older merged file is replaced.
 
     Raises:
         OSError: the folder cannot be read, or the file cannot be written.
-        InputError: there is no sweep in the folder, or a shard is damaged or foreign.
+        InputError: there is no sweep in the folder, a shard is damaged or foreign, or the file is one of the sweep's
+            own or there already and no merged file.
     """
     result = load(directory)
     target = Path(path)
-    if target.resolve().parent == (Path(directory) / "shards").resolve():
-        raise InputError(f"{target}: among the shards of the sweep; give another folder")
+    check_not_own(directory, target)
+    if os.path.lexists(target) and not _is_merged(target):
+        raise InputError(f"{target}: is there and is no merged sweep; give another name")
     if not any(block.kept.any() for block in result.blocks.values()):
         put_file(target, hdf5_image(lambda file: _fill(file, result)))
         return
@@ -64,6 +67,19 @@ def merge(directory: Folder, path: str | os.PathLike[str]) -> None:
             _fill(file, result)
     except OSError as error:
         raise unwritable(target, error) from error
+
+
+def _is_merged(path: Path) -> bool:
+    """Whether this is a file that `merge` has written."""
+    import h5py
+
+    if not path.is_file():  # opening a pipe would wait for ever
+        return False
+    try:
+        with h5py.File(path, "r") as file:
+            return bool(file.attrs.get("format") == FORMAT)
+    except OSError:
+        return False
 
 
 def _fill(file: "h5py.File", result: SweepResult) -> None:

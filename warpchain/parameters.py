@@ -49,11 +49,20 @@ class Bounds:
         return math.isfinite(value) and above and value <= self.upper
 
 
-POSITIVE: Final = Bounds(0.0, lower_included=False)
-NON_NEGATIVE: Final = Bounds(0.0)
 FRACTION: Final = Bounds(0.0, 1.0)
 SIGNED_FRACTION: Final = Bounds(-1.0, 1.0)
+LENGTH: Final = Bounds(1e-9, 1e3)
+"""From a few atoms to a kilometre: like the next ones far beyond any chain, and small enough for squares and ratios."""
+MASS: Final = Bounds(0.0, 1e6, lower_included=False)
+INERTIA: Final = Bounds(0.0, 1e12, lower_included=False)
+"""That of the greatest mass at the greatest length."""
+TORQUE: Final = Bounds(0.0, 1e9)
+GRAVITY: Final = Bounds(0.0, 1e6)
+"""Up to that of a white dwarf."""
 STIFFNESS: Final = Bounds(0.0, 1e12, lower_included=False)
+DAMPING: Final = Bounds(0.0, 1e12)
+TURNING: Final = Bounds(0.0, 1e6, lower_included=False)
+"""Up to what no joint reaches at the highest frequency of a scene."""
 
 
 @dataclass(frozen=True)
@@ -106,36 +115,32 @@ class Parameters(BaseModel):
             `circle_radius` is not smaller than half of `link_length`.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+    model_config = STRICT
 
     link_length: Annotated[
         float,
-        Quantity("ℓ", "m", 1.268e-2, 1e-5, POSITIVE, "measured", "distance between the two joints of a link"),
+        Quantity("ℓ", "m", 1.268e-2, 1e-5, LENGTH, "measured", "distance between the two joints of a link"),
     ]
     sprocket_radius: Annotated[
-        float, Quantity("R", "m", 5.56e-2, 5e-4, POSITIVE, "measured", "sprocket radius, see Scene")
+        float, Quantity("R", "m", 5.56e-2, 5e-4, LENGTH, "measured", "sprocket radius, see Scene")
     ]
-    inner_mass: Annotated[
-        float, Quantity("m_inner", "kg", 3.700e-3, 2e-6, POSITIVE, "measured", "mass of an inner link")
-    ]
-    outer_mass: Annotated[
-        float, Quantity("m_outer", "kg", 3.147e-3, 2e-6, POSITIVE, "measured", "mass of an outer link")
-    ]
+    inner_mass: Annotated[float, Quantity("m_inner", "kg", 3.700e-3, 2e-6, MASS, "measured", "mass of an inner link")]
+    outer_mass: Annotated[float, Quantity("m_outer", "kg", 3.147e-3, 2e-6, MASS, "measured", "mass of an outer link")]
     inner_inertia: Annotated[
         float,
-        Quantity("I_inner", "kg m²", 1.69e-7, 1e-9, POSITIVE, "measured", "moment of inertia of an inner link"),
+        Quantity("I_inner", "kg m²", 1.69e-7, 1e-9, INERTIA, "measured", "moment of inertia of an inner link"),
     ]
     outer_inertia: Annotated[
         float,
-        Quantity("I_outer", "kg m²", 1.292e-7, 9e-10, POSITIVE, "measured", "moment of inertia of an outer link"),
+        Quantity("I_outer", "kg m²", 1.292e-7, 9e-10, INERTIA, "measured", "moment of inertia of an outer link"),
     ]
     viscous_friction: Annotated[
         float,
-        Quantity("β", "N m s", 9e-5, 1e-5, NON_NEGATIVE, "measured", "joint torque per angular velocity"),
+        Quantity("β", "N m s", 9e-5, 1e-5, TORQUE, "measured", "joint torque per angular velocity"),
     ]
     coulomb_friction: Annotated[
         float,
-        Quantity("τ_c", "N m", 1.10e-4, 9e-6, NON_NEGATIVE, "measured", "joint torque at speeds above ω_c"),
+        Quantity("τ_c", "N m", 1.10e-4, 9e-6, TORQUE, "measured", "joint torque at speeds above ω_c"),
     ]
     floor_restitution: Annotated[
         float,
@@ -147,7 +152,7 @@ class Parameters(BaseModel):
     ]
     gravity: Annotated[
         float,
-        Quantity("g", "m/s²", 9.809, 0.0, NON_NEGATIVE, "looked up", "gravitational acceleration, along −y"),
+        Quantity("g", "m/s²", 9.809, 0.0, GRAVITY, "looked up", "gravitational acceleration, along −y"),
     ]
     chain_restitution: Annotated[
         float,
@@ -169,7 +174,7 @@ class Parameters(BaseModel):
         float, Quantity("k", "N/m", 1e9, 0.0, STIFFNESS, "adjusted", "stiffness of a joint's spring")
     ]
     joint_damping: Annotated[
-        float, Quantity("b", "N s/m", 1e3, 0.0, NON_NEGATIVE, "adjusted", "damping of a joint's spring")
+        float, Quantity("b", "N s/m", 1e3, 0.0, DAMPING, "adjusted", "damping of a joint's spring")
     ]
     friction_smoothing: Annotated[
         float,
@@ -178,7 +183,7 @@ class Parameters(BaseModel):
             "rad/s",
             1e-3,
             0.0,
-            POSITIVE,
+            TURNING,
             "adjusted",
             "width of Coulomb friction's sign change, tanh(ω/ω_c)",
         ),
@@ -188,7 +193,7 @@ class Parameters(BaseModel):
         Quantity("e_t", DIMENSIONLESS, 0.0, 0.0, SIGNED_FRACTION, "adjusted", "tangential restitution, all pairs"),
     ]
     circle_radius: Annotated[
-        float, Quantity("r", "m", 4.2e-3, 0.0, POSITIVE, "assumed", "radius of the circle at a link end")
+        float, Quantity("r", "m", 4.2e-3, 0.0, LENGTH, "assumed", "radius of the circle at a link end")
     ]
     """Not in the paper: between the roller (3.9 mm) and the plates (about 5 mm) of a half-inch chain."""
 

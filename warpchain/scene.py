@@ -1,11 +1,24 @@
 """What happens in a walk: how long the chain is, how fast it is spun, from which height it is released."""
 
 import math
-from typing import Literal, Self
+from typing import Final, Literal, Self
 
 from pydantic import BaseModel, Field, field_validator, model_validator
 
 from warpchain.parameters import STRICT, InputError, Parameters, refusal
+
+MOST_LINKS: Final = 100_000
+"""A chain of so many takes 0.4 GB, and each number of links kernels of its own."""
+MOST_LINKS_ON_GPU: Final = 1024
+"""A chain is a block of threads there, one for each link, and CUDA has no larger blocks."""
+HIGHEST_FREQUENCY: Final = 1e4
+"""Where Table 1's chain passes at 3.8 km/s, under a tension that stretches its joints by a third of a link [Hz]."""
+LEAST_SPROCKET: Final = 1e-3
+"""Least distance of the joints from the sprocket's centre, in links; far smaller ones are lost in rounding."""
+HIGHEST: Final = 1e6
+"""Greatest height, where numbers still tell a nanometre [m]."""
+LONGEST: Final = 1e6
+"""Greatest time, in which numbers still tell a nanosecond, a short step [s]."""
 
 
 class Scene(BaseModel):
@@ -21,12 +34,14 @@ class Scene(BaseModel):
     links: int = Field(
         default=60,
         ge=4,
+        le=MOST_LINKS,
         description="number of links around the loop, even: inner and outer links alternate",
         json_schema_extra={"unit": "1"},
     )
     frequency: float = Field(
         default=15.0,
         ge=0,
+        le=HIGHEST_FREQUENCY,
         description="turns of the sprocket per second at the release",
         json_schema_extra={"unit": "Hz"},
     )
@@ -44,6 +59,7 @@ class Scene(BaseModel):
     clearance: float = Field(
         default=0.01,
         ge=0,
+        le=HIGHEST,
         description="height of the lowest circle above the floor, of the chain that clearance_of names",
         json_schema_extra={"unit": "m"},
     )
@@ -65,18 +81,21 @@ class Scene(BaseModel):
     settle_time: float = Field(
         default=0.5,
         ge=0,
+        le=LONGEST,
         description="time for the chain to settle on the sprocket at rest",
         json_schema_extra={"unit": "s"},
     )
     spin_up_time: float = Field(
         default=2.0,
         gt=0,
+        le=LONGEST,
         description="time in which the sprocket reaches its frequency",
         json_schema_extra={"unit": "s"},
     )
     steady_time: float = Field(
         default=0.0,
         ge=0,
+        le=LONGEST,
         description="the loop is steady once it has kept its shape and speed for this long, at least a loop period",
         json_schema_extra={"unit": "s"},
     )
@@ -90,12 +109,14 @@ class Scene(BaseModel):
     hold_limit: float = Field(
         default=30.0,
         gt=0,
+        le=LONGEST,
         description="longest time at full frequency to become steady; then the walk ends as not_steady",
         json_schema_extra={"unit": "s"},
     )
     walk_limit: float = Field(
         default=20.0,
         gt=0,
+        le=LONGEST,
         description="longest time from the release to rest; then the walk ends as time_limit",
         json_schema_extra={"unit": "s"},
     )
@@ -153,17 +174,35 @@ def fewest_links(scene: Scene, parameters: Parameters) -> int:
     return max(4, around + around % 2)
 
 
+def check_links_on_gpu(links: int, device: str, field: str) -> None:
+    """Check that a device can carry a chain of this many links.
+
+    Raises:
+        InputError: it cannot; the message begins with the field that says how many links there are.
+    """
+    if device != "cpu" and links > MOST_LINKS_ON_GPU:
+        raise InputError(
+            f"{field}: {links} links are more than a GPU's block has threads; "
+            f"give {MOST_LINKS_ON_GPU} or less, or device: cpu"
+        )
+
+
 def check_scene(scene: Scene, parameters: Parameters) -> None:
     """Check what a scene and its parameters must fulfil together.
 
     A scene that starts as an ellipse has no sprocket, so nothing is asked of it.
 
     Raises:
-        InputError: the chain is too short for its sprocket, or `contact_radius` finds none.
+        InputError: the chain is too short for its sprocket, or the sprocket too small, or `contact_radius` finds none.
     """
     if scene.start == "ellipse":
         return
     contact_radius(scene, parameters)
+    if joint_radius(scene, parameters) < LEAST_SPROCKET * parameters.link_length:
+        raise InputError(
+            f"parameters.sprocket_radius: {parameters.sprocket_radius} m is nothing beside links of "
+            f"{parameters.link_length} m; give a larger radius, or start: ellipse, which needs none"
+        )
     fewest = fewest_links(scene, parameters)
     if scene.links < fewest:
         raise InputError(

@@ -1,18 +1,18 @@
 """The one door through which a user's values come in: scene, options and parameters of a walk, checked together.
 
-Values from keyword arguments go through `resolve`, those from a YAML file through `load_setup`; both check everything
-once and raise only `InputError`.
+Whether they were given as keyword arguments, on the command line or in a YAML file, which `read_setup` reads, `resolve`
+checks them all. Both raise only `InputError`.
 """
 
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from warpchain.options import Options
 from warpchain.parameters import InputError, Parameters, shown, suggestion, validated
 from warpchain.parameters import preset as parameter_preset
-from warpchain.scene import Scene, check_scene
+from warpchain.scene import Scene, check_links_on_gpu, check_scene
 from warpchain.yaml_files import read_yaml
 
 
@@ -54,20 +54,21 @@ def resolve(
         options=validated(Options, options, "options"),
     )
     check_scene(setup.scene, setup.parameters)
+    check_links_on_gpu(setup.scene.links, setup.options.device, "scene.links")
     return setup
 
 
 _SECTIONS: Final = ("scene", "options", "parameters")
 
 
-def load_setup(path: str | os.PathLike[str]) -> Setup:
-    """Read a setup from a YAML file with the keys `preset` (required), `scene`, `options`, `parameters`.
+def read_setup(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
+    """Preset, None if there is none, and sections of a YAML file, as they are there: `resolve` checks them.
 
     `1e9` is a number, as in YAML 1.2, and so is `1_000`; `060` and `1:30`, which the versions of YAML read
     differently, are text and therefore refused.
 
     Raises:
-        InputError: the file cannot be read, is not YAML, gives a key twice, or holds what `resolve` refuses.
+        InputError: the file cannot be read, is not YAML, gives a key twice, or has other keys.
     """
     content = read_yaml(path)
     if not isinstance(content, dict):
@@ -75,8 +76,5 @@ def load_setup(path: str | os.PathLike[str]) -> Setup:
     for key in content:
         if key != "preset" and key not in _SECTIONS:
             raise InputError(f"{shown(key)}: unknown key; {suggestion(key, ('preset', *_SECTIONS))}")
-    if "preset" not in content:
-        raise InputError("preset: missing; name the parameters to start from, such as preset: paper")
     # A section with nothing under it is read as None; it changes nothing.
-    sections = {name: {} if content.get(name) is None else content[name] for name in _SECTIONS}
-    return resolve(content["preset"], **sections)
+    return content.get("preset"), {name: {} if content.get(name) is None else content[name] for name in _SECTIONS}

@@ -39,6 +39,9 @@ NUMERICS_VERSION: Final = 9
 FORMAT: Final = "warpchain sweep"
 FORMAT_VERSION: Final = 2
 
+OWN: Final = ("sweep.json", "sweep.yaml", "shards", "log.txt")
+"""What a sweep has in its folder, beside the lock."""
+
 
 @dataclass(frozen=True)
 class BlockLayout:
@@ -353,6 +356,17 @@ def present_shards(directory: Folder, manifest: Manifest) -> dict[range, Path]:
     return {walks: folder / name for name, walks in named.items() if name in names}
 
 
+def check_not_own(directory: Folder, path: Path) -> None:
+    """Check that a file or folder to be written is none that a sweep has in its folder.
+
+    Raises:
+        InputError: it is one of them, or lies among the shards.
+    """
+    folder, place = Path(directory).resolve(), path.parent.resolve() / path.name
+    if place.is_relative_to(folder) and place.relative_to(folder).parts[:1] in {(name,) for name in (*OWN, "lock")}:
+        raise InputError(f"{path}: belongs to the sweep itself; give another path")
+
+
 def hdf5_image(fill: "Callable[[h5py.File], None]") -> bytes:
     """The bytes of an HDF5 file.
 
@@ -386,8 +400,22 @@ def open_new_hdf5(path: Path, most: int) -> "Iterator[h5py.File]":
     import h5py
 
     with path.open("w+b") as content, h5py.File(content, "w", **_FIXED) as file:
-        os.posix_fallocate(content.fileno(), 0, most)
+        _take_room(content.fileno(), most)
         yield file
+
+
+def _take_room(descriptor: int, size: int) -> None:
+    """Take room for a file on the disk, so that a full one is found now; what is in the file stays.
+
+    Raises:
+        OSError: there is not enough room.
+    """
+    if hasattr(os, "posix_fallocate"):
+        os.posix_fallocate(descriptor, 0, size)
+        return
+    zeros, end = bytes(2**20), os.fstat(descriptor).st_size  # macOS
+    while end < size:
+        end += os.pwrite(descriptor, zeros[: size - end], end)
 
 
 _FIXED: Final[dict[str, Any]] = {"libver": ("v108", "v108"), "track_order": True}

@@ -51,11 +51,13 @@ def bench(
         return
     from warpchain.options import Options
     from warpchain.parameters import InputError, validated
-    from warpchain.scene import Scene
+    from warpchain.scene import Scene, check_links_on_gpu
     from warpchain.terminal import status_line
 
     where = validated(Options, {"device": device}, "bench").device
     lengths = [validated(Scene, {"links": count}, "bench").links for count in links or ()]
+    for count in lengths:
+        check_links_on_gpu(count, where, "bench.links")
     if where == "cpu":
         for option, value in (("--method", methods), ("--chains", chains), ("--scene", scenes)):
             if value:

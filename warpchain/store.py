@@ -29,6 +29,7 @@ from warpchain.parameters import InputError
 from warpchain.rows import Rows
 from warpchain.shards import (
     NUMERICS_VERSION,
+    OWN,
     Folder,
     Manifest,
     empty_rows,
@@ -55,7 +56,6 @@ SHORT_WALK: Final = 0.5
 SAMPLE_BYTES: Final = 8 * len(SERIES)
 """Bytes of a sample of a series."""
 
-_OWN: Final = ("sweep.json", "sweep.yaml", "shards", "log.txt")
 _PART: Final = re.compile(r"\.(?:sweep|\d{9,}-\d{9,})\.[0-9a-f]{8}\.part\.(?:json|yaml|h5)")
 _DISCARDED: Final = re.compile(r"\.discarded-[0-9a-f]{8}")
 
@@ -226,7 +226,7 @@ def _prepared(folder: Path, manifest: Manifest, fresh: bool) -> Manifest:
     _clear_leftovers(folder)
     named = folder / "sweep.json"
     if not named.exists():
-        for name in _OWN:
+        for name in OWN:
             if (folder / name).exists():
                 raise InputError(f"{folder / name}: in the way of a sweep; give another folder")
         put_file(named, manifest.text().encode())

@@ -84,12 +84,14 @@ def plot(
 ) -> None:
     """Draw every figure that the sweep has something for: Figures 6 and 5, maps, tolerance, sensitivity, statuses."""
     from warpchain.results import replacing
+    from warpchain.shards import check_not_own
     from warpchain.sweep_plots import figures
     from warpchain.sweep_result import load
     from warpchain.terminal import PICTURE_DPI, try_folder
 
     result = load(directory)
     folder = output or directory
+    check_not_own(directory, folder)
     try_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
     for picture in figures(result):
@@ -112,12 +114,22 @@ def report(
             help="Show this walk in motion: its frames if the sweep kept them, or else run again.",
         ),
     ] = None,
+    device: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Where the walk is run again: cpu, cuda (the first GPU) or cuda:N, instead of what the sweep says.",
+        ),
+    ] = None,
 ) -> None:
     """Write one self-contained HTML page: figures, table, parameters, provenance, failed walks, a walk in motion."""
     from warpchain.html_report import write_report
+    from warpchain.parameters import InputError
 
+    if device is not None and walk is None:
+        raise InputError("--device: no walk is run for this page; add --walk INDEX, or leave it out")
     path = output or directory / "report.html"
-    write_report(directory, path, animation_of=walk)
+    write_report(directory, path, animation_of=walk, device=device)
     print(path)
 
 

@@ -9,6 +9,7 @@ from warpchain.engine import Batch
 from warpchain.options import Options
 from warpchain.parameters import InputError, Parameters, preset, shown, validated
 from warpchain.results import Trajectory
+from warpchain.scene import check_links_on_gpu
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
@@ -74,6 +75,7 @@ def simulate(
     if not gravity:
         chain = chain.with_values({"gravity": 0.0})
     start, rates = _checked_state(position, velocity)
+    check_links_on_gpu(len(start), options.device, "position")
     instants = _checked_times(duration, times)
     batch = Batch(1, len(start), options)
     batch.set_chain(0, chain, len(start))

@@ -23,7 +23,8 @@ def read_yaml(path: str | os.PathLike[str]) -> object:
         raise InputError(f"{path}: {error.strerror}; give the path of a readable YAML file") from None
     except yaml.MarkedYAMLError as error:
         line = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
-        raise InputError(f"{path}{line}: {error.problem or error.context}; correct the YAML") from None
+        problem = ", ".join(filter(None, (error.context, error.problem)))
+        raise InputError(f"{path}{line}: {problem}; correct the YAML") from None
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise InputError(f"{path}: {' '.join(str(error).split())}; correct the YAML") from None
 
