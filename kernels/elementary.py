@@ -65,7 +65,6 @@ P8 = wp.constant(wp.float64(0.0002813624154822916))
 
 TWO_LOG2_E = wp.constant(wp.float64(2.88539008177792681472))
 HALF_LN2 = wp.constant(wp.float64(3.46573590279972654709e-01))
-TANH_LIMIT = wp.constant(wp.float64(20.0))
 
 LARGEST_TURN = wp.constant(wp.float64(0.05))
 """Largest turn of a link [rad] within one step for which :func:`small_turn` is exact to rounding."""
@@ -156,7 +155,7 @@ def reciprocal(b: wp.float64) -> wp.float64:
 #endif
 """)
 def capped(x: wp.float64) -> wp.float64:
-    """|x| up to 20."""
+    """|x| up to 20, where tanh is 1; on a GPU, by a minimum of upper halves, up to the last double that shares 20's."""
     ...
 
 

@@ -66,7 +66,7 @@ class State:
     stop_status: wp.array(dtype=wp.int32)  # status it then gets
     is_fresh: wp.array(dtype=wp.int32)  # 1: links were set by the host, the scratch block is void
     has_first_stage: wp.array(dtype=wp.int32)  # 1: the scratch block holds the first stage of the next step
-    gap: wp.array(dtype=wp.float64)  # least distance to floor or sprocket [m]
+    gap: wp.array(dtype=wp.float64)  # of the CPU form: least distance to floor or sprocket [m]
     reach: wp.array(dtype=wp.float64)  # of the block form: time in which nothing comes near unseen [s]
     slack: wp.array(dtype=wp.float64)  # how far joints may yet move before the neighbour list is stale [m]
     step: wp.array(dtype=wp.float64)  # step that the controller proposes [s]

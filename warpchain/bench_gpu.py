@@ -42,7 +42,7 @@ LAUNCHES: Final = 2
 FP64_LANES: Final = {80: 32, 90: 64}
 """Fused operations in double precision per clock and multiprocessor, by compute capability (NVIDIA, data sheets)."""
 
-STAGE_FLOPS: Final = {"direction": 26, "state": 14, "ends": 13, "joint": 52, "power": 9, "acceleration": 14}
+STAGE_FLOPS: Final = {"direction": 26, "state": 14, "ends": 10, "joint": 52, "power": 8, "acceleration": 13}
 """Additions and multiplications in double precision of a link's stage, as the source has them, whatever the tableau.
 
 A reciprocal counts 6: an approximate one made exact by fused operations.

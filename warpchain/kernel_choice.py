@@ -18,10 +18,11 @@ FEWER_REGISTERS = {160: 128, 224: 128, 256: 128}
 """The same, by threads of a block, where fewer let another block onto a multiprocessor.
 
 A multiprocessor has four schedulers with 16384 registers each, so that a block's number of warps of 32 threads and
-the registers decide how many blocks it holds. Measured on an H200, 4000 chains in flight with rkf78, dp5 and bs32, ns
-per try and chain, with 128 and 168: 60 links 12.2, 6.4, 3.9 and 9.9, 5.5, 3.3; 90 links 15.9, 8.9, 5.7 and 16.5, 9.0,
-5.5; 150 links 28.7, 16.4, 10.1 and 32.9, 18.0, 10.7. Without a bound, few chains run up to 15 % faster and many slower;
-one number for all keeps a walk's bits independent of its batch. rodas4p is fastest without one.
+the registers decide how many blocks it holds. Measured on an H200, 4000 chains in flight, ns per try and chain, with
+128 and 168: 60 links 12.0, 6.2, 5.5 and 11.5, 5.5, 4.9 (rkf78, dp5, os32); 150 links 15.5, 13.3 and 16.8, 15.4 (dp5,
+os32). Without a bound, few chains run up to 15 % faster and many slower. No bit of a walk depends on it: the compiler
+fuses the same products and sums (`tests/test_on_gpu.py`, walks in blocks of their own and of 192 threads). rodas4p is
+fastest without one.
 """
 SHARED_THREADS = 192
 """Most threads of a block that chains of several lengths share."""
