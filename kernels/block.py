@@ -5,9 +5,9 @@ of threads is cheap. Stages live in registers, the state on a board in the memor
 and contacts meet. Everything that decides (error, gap, status …) is known to all threads alike, so that all take the
 same branches. What a run gives depends neither on how it is cut into launches nor on the other chains.
 
-A try on springs costs two barriers a stage and one for the error; an accepted one two more unless its last stage is the
-first of the next step. Contacts cost nothing more while the floor or sprocket is out of reach and the neighbour list is
-empty.
+A try on springs costs two barriers a stage and one for the error; an accepted one three more unless its last stage is
+the first of the next step. Contacts cost nothing more while the floor or sprocket is out of reach and the list of
+neighbours empty.
 """
 
 import functools
@@ -275,7 +275,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         if not is_fresh:
             # as the last step left them: worked out anew they could round differently
             reach = wp.float32(state.reach[world])
-            slack = wp.float32(state.slack[world])
+            if wp.static(has_flight):
+                slack = wp.float32(state.slack[world])
             if wp.static(has_self):
                 pairs = L[wp.static(lists.count)]
         if is_fresh or state.has_first_stage[world] == 0:

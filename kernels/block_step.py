@@ -38,7 +38,7 @@ from .types import Chain
 wp.set_module_options({"enable_backward": False})
 
 LARGEST_SCALE = wp.constant(wp.float32(1e30))
-"""Where :func:`quick_quotient` would find 0: an error over that is too great in any case."""
+"""Greatest divisor in use, below where :func:`quick_quotient` finds 0; a smaller one only makes the ratio greater."""
 
 vec3d = wp.types.vector(length=3, dtype=wp.float64)
 vec5d = wp.types.vector(length=5, dtype=wp.float64)

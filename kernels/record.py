@@ -44,7 +44,7 @@ from .layout import (
     X,
     Y,
 )
-from .softening import watch_collapse, watch_spin_up, watch_stiffening
+from .softening import FINISHED, watch_collapse, watch_spin_up, watch_stiffening
 from .types import Chain, Control, Program, Record, State
 
 wp.set_module_options({"enable_backward": False})
@@ -56,7 +56,6 @@ SLOWEST_STEADY = wp.constant(wp.float64(0.02))
 # Codes shared with warpchain.status.
 RUNNING = wp.constant(0)
 AT_REST = wp.constant(1)
-FINISHED = wp.constant(2)
 
 
 @wp.struct

@@ -10,7 +10,7 @@ would else be what keeps steps short.
 while it is to become steady: C = T/k stretches it by m v²/ℓ²k, at 30 Hz on the softest joints by 0.3 %; so much is
 wanted of k that it is a tenth of that. Circles sink deeper into the sprocket, in the spin-up 0.9 mm with 60 links and
 2.2 mm with 180, for in each step a contact gives way by half a step's acceleration; the loop goes the slower, but after
-half a turn no link remembers it. So long chains at low frequencies take shorter steps in the half turn before the
+half a turn no link remembers it. So long or slow loops take shorter steps in the half turn before the
 release, or before each moment at which it may come. With 160 links at 5 Hz circles have then sunk in 0.06 mm instead of
 0.14, and the loop that is released has 0.02 % less kinetic energy than from short steps throughout, else 0.26 %. With
 ten times the ω_c of soft joints 9 of 24 loops of 150 links were released a period earlier, for friction is what holds a
@@ -47,8 +47,9 @@ from .types import Chain, Control, Model, Program, State, read_chain
 
 wp.set_module_options({"enable_backward": False})
 
-FINISHED = wp.constant(2)  # shared with warpchain.status
 PI = wp.constant(wp.float64(math.pi))
+FINISHED = wp.constant(2)
+"""Status of a drive whose end has been set, a code shared with warpchain.status."""
 
 
 @wp.func

@@ -68,7 +68,7 @@ class State:
     has_first_stage: wp.array(dtype=wp.int32)  # 1: the scratch block holds the first stage of the next step
     gap: wp.array(dtype=wp.float64)  # of the CPU form: least distance to floor or sprocket [m]
     reach: wp.array(dtype=wp.float64)  # of the block form: time in which nothing comes near unseen [s]
-    slack: wp.array(dtype=wp.float64)  # how far joints may yet move before the neighbour list is stale [m]
+    slack: wp.array(dtype=wp.float64)  # how far joints may yet move before the list is stale [m]; of blocks that fly
     step: wp.array(dtype=wp.float64)  # step that the controller proposes [s]
     last_error: wp.array(dtype=wp.float64)  # error ratio of the last accepted step (PI controller)
     flies: wp.array(dtype=wp.int32)  # 1: on rigid joints, see hand_over
@@ -121,7 +121,7 @@ class Control:
     soft_smoothing: wp.float64  # ω_c [rad/s]
     softest_stiffness: wp.float64  # the same of the softest, whose ω_c is that of soft ones
     softest_damping: wp.float64
-    soft_contact_step: wp.float64  # longest step near a contact while joints are softer than soft [s]
+    soft_contact_step: wp.float64  # longest near a contact on the softest joints, in the drive on soft ones [s]
     soften_area: wp.float64  # joints soften below this fraction of the first area
     stiffening_time: wp.float64  # from soft joints at the release to the model's own [s]
 

@@ -6,12 +6,13 @@ import warp as wp
 
 from tests.blocks_under_test import fibers
 from warpchain.devices import start_device
-from warpchain.kernels.block_memory import block_maxima
+from warpchain.kernels.block_memory import barrier, block_maxima, tile_address, vec4i
 from warpchain.kernels.elementary import order_bits_single
 
 DEVICE = start_device("cpu")
 THREADS = 24
-GREATEST, _, _ = block_maxima(THREADS)
+GREATEST, NOTE, NOTED = block_maxima(THREADS)
+ADDRESS = tile_address(vec4i, THREADS)
 
 
 @wp.kernel(module="unique", enable_backward=False)
@@ -35,3 +36,25 @@ def test_all_threads_find_the_greatest_number_and_miss_no_nan(odd: float, thread
         given = wp.array(numbers, dtype=wp.float32, device=DEVICE)
         wp.launch_tiled(greatest_of, dim=[1], inputs=[given, found], block_dim=THREADS, device=DEVICE)
     np.testing.assert_array_equal(found.numpy(), np.full(THREADS, expected))
+
+
+@wp.kernel(module="unique", enable_backward=False)
+def greatest_of_four(numbers: wp.array(dtype=vec4i), found: wp.array(dtype=vec4i)):
+    """What each thread finds to be the greatest of each of four."""
+    _block, lane = wp.tid()
+    tile = wp.tile_empty(shape=(wp.static(THREADS),), dtype=vec4i, storage="shared")
+    memory = ADDRESS(tile)
+    NOTE(memory, lane, numbers[lane])
+    barrier()
+    found[lane] = NOTED(memory)
+
+
+def test_all_threads_find_the_greatest_of_each_of_four() -> None:
+    """Negative numbers, as keys of negative gaps are, among them."""
+    numbers = np.random.default_rng(1).integers(-(2**31), 2**31, (THREADS, 4)).astype(np.int32)
+    numbers[:, 1] = -np.abs(numbers[:, 1] // 2) - 1
+    found = wp.zeros(THREADS, dtype=vec4i, device=DEVICE)
+    with fibers():
+        given = wp.array(numbers, dtype=vec4i, device=DEVICE)
+        wp.launch_tiled(greatest_of_four, dim=[1], inputs=[given, found], block_dim=THREADS, device=DEVICE)
+    np.testing.assert_array_equal(found.numpy(), np.tile(numbers.max(axis=0), (THREADS, 1)))

@@ -18,11 +18,11 @@ FEWER_REGISTERS = {160: 128, 224: 128, 256: 128}
 """The same, by threads of a block, where fewer let another block onto a multiprocessor.
 
 A multiprocessor has four schedulers with 16384 registers each, so that a block's number of warps of 32 threads and
-the registers decide how many blocks it holds. Measured on an H200, 4000 chains in flight, ns per try and chain, with
-128 and 168: 60 links 12.0, 6.2, 5.5 and 11.5, 5.5, 4.9 (rkf78, dp5, os32); 150 links 15.5, 13.3 and 16.8, 15.4 (dp5,
-os32). Without a bound, few chains run up to 15 % faster and many slower. No bit of a walk depends on it: the compiler
-fuses the same products and sums (`tests/test_on_gpu.py`, walks in blocks of their own and of 192 threads). rodas4p is
-fastest without one.
+the registers decide how many blocks it holds. Measured on an H200 with slightly older kernels, 4000 chains in flight,
+ns per try and chain, with 128 and 168: 60 links 12.0, 6.2, 5.5 and 11.5, 5.5, 4.9 (rkf78, dp5, os32); 150 links 15.5,
+13.3 and 16.8, 15.4 (dp5, os32). Without a bound, few chains run up to 15 % faster and many slower. No bit of a walk
+depends on it: the compiler fuses the same products and sums (`tests/test_on_gpu.py`, walks in blocks of their own and
+of 192 threads). rodas4p is fastest without one.
 """
 SHARED_THREADS = 192
 """Most threads of a block that chains of several lengths share."""
@@ -50,9 +50,10 @@ def block_threads(links: int) -> int:
 def shared_threads(method: str, links: Iterable[int], walks: int) -> int | None:
     """Threads of every block of walks that should share a kernel; None: each chain has a block of its own size.
 
-    Kernels of blocks of different sizes that run on one multiprocessor take the instruction cache from one another. The
-    504 walks of Figure 6 (60 to 180 links, os32, one H200) take 6.4 s in blocks of five sizes and 5.3 s in blocks of
-    192 threads, although most have idle ones; 1008 walks 10.8 and 8.5 s, 2016 walks 15.8 and 15.5 s.
+    Kernels of blocks of different sizes that run on one multiprocessor take the instruction cache from one another.
+    With older kernels the 504 walks of Figure 6 (60 to 180 links, os32, one H200) took 6.4 s in blocks of five sizes
+    and 5.3 s in blocks of 192 threads, although most have idle ones; 1008 walks 10.8 and 8.5 s, 2016 walks 15.8 and
+    15.5 s.
 
     Args:
         method: Of the walks.

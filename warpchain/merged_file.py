@@ -77,7 +77,8 @@ def _is_merged(path: Path) -> bool:
         return False
     try:
         with h5py.File(path, "r") as file:
-            return bool(file.attrs.get("format") == FORMAT)
+            found = file.attrs.get("format")
+            return isinstance(found, str) and found == FORMAT
     except OSError:
         return False
 

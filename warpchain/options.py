@@ -94,7 +94,7 @@ class Options(BaseModel):
         default=5e-5,
         gt=0,
         description="longest step near a contact where soften_drive makes joints soft, or soften_pile softest, unless "
-        "contact_step is longer; long chains at low frequencies take shorter ones just before the release",
+        "contact_step is longer; long or slow loops take shorter ones just before the release",
         json_schema_extra={"unit": "s"},
     )
     skin: float = Field(

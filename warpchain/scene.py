@@ -8,7 +8,7 @@ from pydantic import BaseModel, Field, field_validator, model_validator
 from warpchain.parameters import STRICT, InputError, Parameters, refusal
 
 MOST_LINKS: Final = 100_000
-"""A chain of so many takes 0.4 GB, and each number of links kernels of its own."""
+"""A chain of so many takes 0.4 GB, and kernels of its own."""
 MOST_LINKS_ON_GPU: Final = 1024
 """A chain is a block of threads there, one for each link, and CUDA has no larger blocks."""
 HIGHEST_FREQUENCY: Final = 1e4

@@ -91,7 +91,7 @@ def plot(
 
     result = load(directory)
     folder = output or directory
-    check_not_own(directory, folder)
+    check_not_own(directory, folder.resolve())
     try_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
     for picture in figures(result):
