@@ -166,6 +166,15 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         )
         note_first(K, place.lane, first, wp.static(needs_first_power))
 
+    @wp.func
+    def look_around(ends: wp.tile[vec5d, block_dim], K: wp.array2d(dtype=wp.float64), maxima: wp.uint64, place: Place):
+        """Left end of the next link and what is known of the whole chain, in the state on the board."""
+        link = link_on(K, place.lane)
+        next_end = hand_over(ends, place, link)
+        survey(K, maxima, place, link, next_end)
+        barrier()
+        return next_end, surveyed(maxima)
+
     @wp.kernel(
         module="unique",
         enable_backward=False,
@@ -257,11 +266,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         barrier()  # the chain's constants are on the board
         publish(K, place)
         barrier()
-        link = link_on(K, lane)
-        next_end = hand_over(ends, place, link)
-        survey(K, maxima_start, place, link, next_end)
-        barrier()
-        around = surveyed(maxima_start)
+        next_end, around = look_around(ends, K, maxima_start, place)
         opening = around.opening
         status = int(RUNNING)
         pairs = int(0)
@@ -384,21 +389,13 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 last_error = wp.max(error, wp.float32(1e-4))
                 around = trial.around
                 if wp.static(not reuses_last):
-                    link = link_on(K, lane)
-                    next_end = hand_over(ends, place, link)
-                    survey(K, maxima_start, place, link, next_end)
-                    barrier()
-                    around = surveyed(maxima_start)
+                    next_end, around = look_around(ends, K, maxima_start, place)
                 if wp.static(has_flight):
                     are_rigid = bool(True)
                     kinetic = ZERO
                     if flies != 0:
                         are_rigid, is_stiff, kinetic = follow(flight_memory, K, place)
-                        link = link_on(K, lane)
-                        next_end = hand_over(ends, place, link)
-                        survey(K, maxima_start, place, link, next_end)
-                        barrier()
-                        around = surveyed(maxima_start)
+                        next_end, around = look_around(ends, K, maxima_start, place)
                 opening = around.opening
                 gap = around.gap
                 if lane == 0:
