@@ -91,8 +91,11 @@ from .layout import (
     Y,
 )
 from .methods import METHODS
-from .record import record_is_full, summarise, write_sample
+from .present_chain import present_chain
+from .record import record_is_full, write_sample
+from .scaled_loads import under_load
 from .softening import softened
+from .summary import summarise
 from .types import Control, Model, Program, Record, State, read_chain
 
 wp.set_module_options({"enable_backward": False})
@@ -155,6 +158,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     take_off, follow, land = (flight.take_off, flight.follow, flight.land) if flight else (None,) * 3
     attempt_flight, longest_step = (flight.attempt, flight.longest_step) if flight else (None,) * 2
     softens = features.softens
+    is_driven = features.watch == "steady"
+    present = present_chain(softens, is_driven)
     look = block_look(features, touch)
 
     @wp.func
@@ -230,6 +235,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         flight_memory.memory = memory_start
 
         chain = read_chain(model, world)
+        if wp.static(is_driven):
+            chain = under_load(chain, state.load_factor[world])
         n = chain.link_count
         place = take_place(chain, lane)
         load_link(K, state, world, lane, n)
@@ -248,7 +255,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if wp.static(softens):
                 chain = softened(chain, control, state.softness[world])
             note_constants(K, chain)
-            note_bounds(K, program, state, control, world, wp.static(features.watch == "steady"))
+            note_bounds(K, program, state, control, world, wp.static(is_driven))
             K[BOARD_NOTES, NOTE_OPENING] = state.extremes[world, OPENING]
             K[BOARD_NOTES, NOTE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
             K[BOARD_NOTES, NOTE_LAST_IMPULSE] = state.watch[world, LAST_FLOOR_IMPULSE]
@@ -302,6 +309,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         while status == RUNNING and tries < tries_left:
             if time >= K[BOARD_NOTES, NOTE_NEXT_LOOK]:
                 softness = state.softness[world]
+                load_factor = state.load_factor[world]
                 publish(K, place)
                 barrier()
                 if lane == 0:
@@ -310,8 +318,11 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 status = T[wp.static(touch.mailbox)]
                 pauses = record_is_full(record, world) or T[wp.static(touch.is_late)] != 0
                 barrier()
-                if wp.static(softens):
-                    if state.softness[world] != softness and flies == 0:
+                if wp.static(softens or is_driven):
+                    changed = state.softness[world] != softness
+                    if wp.static(is_driven):
+                        changed = changed or load_factor > ONE or state.load_factor[world] > ONE
+                    if changed and flies == 0:
                         next_end = hand_over(ends, place, link_on(K, lane))
                         begin_step(forces, K, place, next_end)
                 if pauses or status != RUNNING:
@@ -478,10 +489,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         if lane == 0:
             if is_last:
                 # the series ends with the state in which the run ends
-                seen = read_chain(model, world)
-                if wp.static(softens):
-                    seen = softened(seen, control, state.softness[world])
-                write_sample(state, record, world, time, summarise(K, seen))
+                write_sample(state, record, world, time, summarise(K, present(model, state, control, world)))
             store_losses(K, state, world, n, wp.static(fixed_loss))
             counts = state.counts[world]
             counts[ACCEPTED] = counts[ACCEPTED] + wp.int64(accepted)

@@ -8,10 +8,13 @@ from .block_board import note_constants
 from .block_contact import TouchLayout
 from .block_memory import clock
 from .driver import Features
+from .elementary import ONE
 from .layout import BOARD_NOTES, NOTE_CONTACT_STEP, NOTE_DEADLINE, NOTE_NEXT_LOOK, NOTE_STOP_TIME, NOTE_TOLERANCE
+from .present_chain import present_chain
 from .record import sampling
-from .softening import change_joints, contact_step, softened, spring_tolerance
-from .types import Control, Model, Program, Record, State, read_chain
+from .scaled_loads import lay_inertias
+from .softening import book_softening, contact_step, spring_tolerance
+from .types import Control, Model, Program, Record, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -21,8 +24,8 @@ def note_bounds(
     K: wp.array2d(dtype=wp.float64), program: Program, state: State, control: Control, world: int, is_driven: bool
 ):
     """Puts on the board what bounds steps of the springs after the last look."""
-    K[BOARD_NOTES, NOTE_CONTACT_STEP] = contact_step(program, state, control, world, is_driven)
-    K[BOARD_NOTES, NOTE_TOLERANCE] = spring_tolerance(control, state.softness[world])
+    K[BOARD_NOTES, NOTE_CONTACT_STEP] = contact_step(state, control, world, is_driven)
+    K[BOARD_NOTES, NOTE_TOLERANCE] = spring_tolerance(program, state, control, world, is_driven)
 
 
 @functools.cache
@@ -35,6 +38,7 @@ def block_look(features: Features, touch: TouchLayout):
     softens = features.softens
     is_driven = features.watch == "steady"
     look_at_chain = sampling(features.watch, softens)
+    present = present_chain(softens, is_driven)
 
     @wp.func
     def look(
@@ -49,13 +53,19 @@ def block_look(features: Features, touch: TouchLayout):
         time: wp.float64,
     ):
         softness = state.softness[world]
-        chain = read_chain(model, world)
-        if wp.static(softens):
-            chain = softened(chain, control, softness)
+        load_factor = state.load_factor[world]
+        chain = present(model, state, control, world)
         T[wp.static(touch.mailbox)] = look_at_chain(K, chain, program, state, record, control, world, time)
-        if wp.static(softens):
-            if state.softness[world] != softness:
-                note_constants(K, change_joints(chain, model, state, control, world))
+        changed = state.softness[world] != softness
+        if wp.static(is_driven):
+            changed = changed or load_factor > ONE or state.load_factor[world] > ONE
+        if wp.static(softens or is_driven):
+            if changed:
+                after = present(model, state, control, world)
+                book_softening(chain, after, state, world)
+                note_constants(K, after)
+                if wp.static(is_driven):
+                    lay_inertias(K, after)
             note_bounds(K, program, state, control, world, wp.static(is_driven))
         K[BOARD_NOTES, NOTE_STOP_TIME] = state.stop_time[world]
         K[BOARD_NOTES, NOTE_NEXT_LOOK] = wp.float64(state.next_sample[world]) * control.sample_interval

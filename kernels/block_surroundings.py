@@ -145,6 +145,7 @@ def block_surroundings(features: Features, block_dim: int):
             u, v, omega, lost_left, lost_right, hits = meet_sprocket(
                 chain,
                 sprocket_turning(program, world, time),
+                program.push_rate[world],
                 left_x,
                 left_y,
                 right_x,

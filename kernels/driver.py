@@ -53,10 +53,13 @@ from .layout import (
     TIME,
 )
 from .methods import METHODS
-from .record import record_is_full, sampling, summarise, write_sample
+from .present_chain import present_chain
+from .record import record_is_full, sampling, write_sample
+from .scaled_loads import lay_inertias
 from .self_contact import self_contacts
-from .softening import change_joints, contact_step, softened, spring_tolerance
-from .types import Chain, Control, Model, Program, Record, State, read_chain
+from .softening import book_softening, contact_step, spring_tolerance
+from .summary import summarise
+from .types import Chain, Control, Model, Program, Record, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -193,6 +196,7 @@ def make_advance(features: Features):
     softens = features.softens
     is_driven = features.watch == "steady"
     look = sampling(features.watch, softens)
+    present = present_chain(softens, is_driven)
     first_stage, attempt, commit = method.functions(columns)
     growth, shrinkage = method.controller(wp.float64)
     # on the sprocket impulses never pause
@@ -219,13 +223,12 @@ def make_advance(features: Features):
         world = worlds[wp.tid()]
         if state.status[world] != RUNNING:
             return
-        chain = read_chain(model, world)
+        chain = present(model, state, control, world)
         longest = control.contact_step
         tolerance = control.tolerance
         if wp.static(softens):
-            chain = softened(chain, control, state.softness[world])
-            longest = contact_step(program, state, control, world, wp.static(is_driven))
-            tolerance = spring_tolerance(control, state.softness[world])
+            longest = contact_step(state, control, world, wp.static(is_driven))
+            tolerance = spring_tolerance(program, state, control, world, wp.static(is_driven))
         block = scratch[world]
         K = wp.array(ptr=block.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
         block_list = lists[world]
@@ -257,13 +260,22 @@ def make_advance(features: Features):
         while status == RUNNING and tries < control.tries and not record_is_full(record, world):
             if time >= wp.float64(state.next_sample[world]) * control.sample_interval:
                 softness = state.softness[world]
+                load_factor = state.load_factor[world]
                 status = look(K, chain, program, state, record, control, world, time)
+                changed = bool(False)
                 if wp.static(softens):
-                    longest = contact_step(program, state, control, world, wp.static(is_driven))
-                    if state.softness[world] != softness:
-                        chain = change_joints(chain, model, state, control, world)
-                        tolerance = spring_tolerance(control, state.softness[world])
-                        has_first_stage = int(0)
+                    longest = contact_step(state, control, world, wp.static(is_driven))
+                    tolerance = spring_tolerance(program, state, control, world, wp.static(is_driven))
+                    changed = state.softness[world] != softness
+                if wp.static(is_driven):
+                    changed = changed or load_factor > ONE or state.load_factor[world] > ONE
+                if changed:
+                    after = present(model, state, control, world)
+                    book_softening(chain, after, state, world)
+                    chain = after
+                    if wp.static(is_driven):
+                        lay_inertias(K, chain)
+                    has_first_stage = int(0)
                 if status != RUNNING:
                     break
             stop_time = state.stop_time[world]
@@ -372,7 +384,7 @@ def make_advance(features: Features):
                     gap = sprocket_gap(K, chain)
                     if gap < ZERO:
                         state.extremes[world, SPROCKET_DEPTH] = wp.max(state.extremes[world, SPROCKET_DEPTH], -gap)
-                        hits = resolve_sprocket(K, chain, sprocket_turning(program, world, time))
+                        hits = resolve_sprocket(K, chain, sprocket_turning(program, world, time), program.push_rate[world])
                         state.counts[world, SPROCKET_IMPULSES] = state.counts[world, SPROCKET_IMPULSES] + hits
                         impulses += hits
                 if wp.static(has_self):

@@ -4,129 +4,37 @@ import functools
 
 import warp as wp
 
-from .elementary import HALF, ZERO, from_order_key, order_key
+from .elementary import ZERO
 from .layout import (
     CENTER_U,
     CENTER_V,
     CENTER_X,
     CENTER_Y,
-    COSINE,
     GRAVITATIONAL,
-    GREATEST_HEIGHT,
-    GREATEST_WIDTH,
     HEIGHT,
-    INERTIA,
     KINETIC,
-    LEAST_HEIGHT,
-    LEAST_WIDTH,
-    LEFT_X,
-    LEFT_Y,
     LOOP_SPEED,
     LOWEST,
-    MASS,
-    OMEGA,
     REST_SINCE,
     RIGHT_X,
     RIGHT_Y,
     RMS_SPEED,
-    SINE,
     SPRING,
-    STEADY_SINCE,
-    SUM_HEIGHT,
-    SUM_SPEED,
-    SUM_WIDTH,
     TIME,
     WIDTH,
-    WINDOW_COUNT,
-    WINDOW_START,
-    U,
-    V,
-    X,
-    Y,
 )
-from .softening import FINISHED, watch_collapse, watch_spin_up, watch_stiffening
+from .scaled_loads import drag_shape
+from .softening import watch_collapse, watch_drive, watch_stiffening
+from .steadiness import drag_rate, load_at, watch_steadiness
+from .summary import Summary, summarise
 from .types import Chain, Control, Program, Record, State
 
 wp.set_module_options({"enable_backward": False})
 
 
-ONE_PERCENT = wp.constant(wp.float64(0.01))
-SLOWEST_STEADY = wp.constant(wp.float64(0.02))
-
 # Codes shared with warpchain.status.
 RUNNING = wp.constant(0)
 AT_REST = wp.constant(1)
-
-
-@wp.struct
-class Summary:
-    """Sums over one chain at one moment; see ``Record.samples`` in :mod:`types`."""
-
-    center_x: wp.float64
-    center_y: wp.float64
-    center_u: wp.float64
-    center_v: wp.float64
-    kinetic: wp.float64
-    gravitational: wp.float64
-    spring: wp.float64
-    lowest: wp.float64
-    rms_speed: wp.float64
-    height: wp.float64
-    width: wp.float64
-    loop_speed: wp.float64
-
-
-@wp.func
-def summarise(K: wp.array2d(dtype=wp.float64), chain: Chain) -> Summary:
-    """Sums over the placed links. Loop speed: mean of v·u over links, positive from link i towards link i + 1."""
-    n = chain.link_count
-    mass = ZERO
-    mx = ZERO
-    my = ZERO
-    mu = ZERO
-    mv = ZERO
-    kinetic = ZERO
-    spring = ZERO
-    along = ZERO
-    square = ZERO
-    left = order_key(K[RIGHT_X, 0])
-    right = left
-    bottom = order_key(K[RIGHT_Y, 0])
-    top = bottom
-    i = int(0)
-    while i < n:
-        m = K[MASS, i]
-        speed = K[U, i] * K[U, i] + K[V, i] * K[V, i]
-        mass += m
-        mx += m * K[X, i]
-        my += m * K[Y, i]
-        mu += m * K[U, i]
-        mv += m * K[V, i]
-        kinetic += HALF * (m * speed + K[INERTIA, i] * K[OMEGA, i] * K[OMEGA, i])
-        square += speed
-        along += K[U, i] * K[COSINE, i] + K[V, i] * K[SINE, i]
-        cx = K[LEFT_X, i + 1] - K[RIGHT_X, i]
-        cy = K[LEFT_Y, i + 1] - K[RIGHT_Y, i]
-        spring += HALF * chain.joint_stiffness * (cx * cx + cy * cy)
-        left = wp.min(left, order_key(K[RIGHT_X, i]))
-        right = wp.max(right, order_key(K[RIGHT_X, i]))
-        bottom = wp.min(bottom, wp.min(order_key(K[LEFT_Y, i]), order_key(K[RIGHT_Y, i])))
-        top = wp.max(top, order_key(K[RIGHT_Y, i]))
-        i += 1
-    summary = Summary()
-    summary.center_x = mx / mass
-    summary.center_y = my / mass
-    summary.center_u = mu / mass
-    summary.center_v = mv / mass
-    summary.kinetic = kinetic
-    summary.gravitational = chain.gravity * my
-    summary.spring = spring
-    summary.lowest = from_order_key(bottom) - chain.circle_radius
-    summary.rms_speed = wp.sqrt(square / wp.float64(n))
-    summary.height = from_order_key(top) - from_order_key(bottom)
-    summary.width = from_order_key(right) - from_order_key(left)
-    summary.loop_speed = along / wp.float64(n)
-    return summary
 
 
 @wp.func
@@ -141,59 +49,6 @@ def watch_rest(state: State, control: Control, world: int, time: wp.float64, sum
     else:
         state.watch[world, REST_SINCE] = wp.float64(-1.0)
     return RUNNING
-
-
-@wp.func
-def watch_steadiness(state: State, program: Program, world: int, time: wp.float64, summary: Summary):
-    """Sets the moment of release once the loop runs steadily on its sprocket.
-
-    Steady means: for ``steady_time`` the means over windows of one loop period have stayed together, height and width
-    of the loop to within ``steady_tolerance`` of themselves, and the speed along the loop to within 1 % (or 0.02 m/s)
-    of the sprocket's. Release follows after the drawn fraction of a loop period. Nothing is done once that moment is
-    set.
-    """
-    if state.stop_status[world] == FINISHED or time < program.hold_start[world]:
-        return
-    if state.watch[world, WINDOW_START] < ZERO:
-        state.watch[world, WINDOW_START] = time
-    state.watch[world, WINDOW_COUNT] = state.watch[world, WINDOW_COUNT] + wp.float64(1.0)
-    state.watch[world, SUM_HEIGHT] = state.watch[world, SUM_HEIGHT] + summary.height
-    state.watch[world, SUM_WIDTH] = state.watch[world, SUM_WIDTH] + summary.width
-    state.watch[world, SUM_SPEED] = state.watch[world, SUM_SPEED] + summary.loop_speed
-    if time - state.watch[world, WINDOW_START] < program.loop_period[world]:
-        return
-    count = state.watch[world, WINDOW_COUNT]
-    height = state.watch[world, SUM_HEIGHT] / count
-    width = state.watch[world, SUM_WIDTH] / count
-    speed = state.watch[world, SUM_SPEED] / count
-    target = program.loop_speed[world]
-    fast_enough = wp.abs(speed - target) <= wp.max(ONE_PERCENT * target, SLOWEST_STEADY)
-    least_height = wp.min(state.watch[world, LEAST_HEIGHT], height)
-    greatest_height = wp.max(state.watch[world, GREATEST_HEIGHT], height)
-    least_width = wp.min(state.watch[world, LEAST_WIDTH], width)
-    greatest_width = wp.max(state.watch[world, GREATEST_WIDTH], width)
-    tolerance = program.steady_tolerance[world]
-    height_kept = greatest_height - least_height <= tolerance * height
-    width_kept = greatest_width - least_width <= tolerance * width
-    is_first = state.watch[world, STEADY_SINCE] < ZERO
-    if is_first or not (fast_enough and height_kept and width_kept):
-        state.watch[world, STEADY_SINCE] = time
-        least_height = height
-        greatest_height = height
-        least_width = width
-        greatest_width = width
-    elif time - state.watch[world, STEADY_SINCE] >= program.steady_time[world]:
-        state.stop_time[world] = time + program.release_phase[world] * program.loop_period[world]
-        state.stop_status[world] = FINISHED
-    state.watch[world, LEAST_HEIGHT] = least_height
-    state.watch[world, GREATEST_HEIGHT] = greatest_height
-    state.watch[world, LEAST_WIDTH] = least_width
-    state.watch[world, GREATEST_WIDTH] = greatest_width
-    state.watch[world, WINDOW_START] = time
-    state.watch[world, WINDOW_COUNT] = ZERO
-    state.watch[world, SUM_HEIGHT] = ZERO
-    state.watch[world, SUM_WIDTH] = ZERO
-    state.watch[world, SUM_SPEED] = ZERO
 
 
 @wp.func
@@ -257,6 +112,8 @@ def sampling(watch: str, softens: bool = False):
     Args:
         watch: ``"rest"``, ``"steady"`` or ``"none"``.
         softens: Whether the look may change the softness of the joints, see :mod:`softening`.
+
+    A look at a chain on its sprocket (``"steady"``) may also change its loads and the velocities of its links.
     """
     watches_rest = watch == "rest"
     watches_steadiness = watch == "steady"
@@ -273,7 +130,8 @@ def sampling(watch: str, softens: bool = False):
         time: wp.float64,
     ):
         mark = state.next_sample[world]
-        is_first = state.last_look[world, TIME] < ZERO
+        last_time = state.last_look[world, TIME]
+        is_first = last_time < ZERO
         summary = summarise(K, chain)
         write_sample(state, record, world, time, summary)
         if mark % control.frame_every == wp.int64(0):
@@ -283,12 +141,16 @@ def sampling(watch: str, softens: bool = False):
         if wp.static(softens and watches_rest):
             watch_stiffening(state, program, control, world, time)
             watch_collapse(K, chain, state, control, world, time, is_first)
-        if wp.static(softens and watches_steadiness):
-            watch_spin_up(state, program, control, world, time)
         if wp.static(watches_rest):
             return watch_rest(state, control, world, time, summary)
         if wp.static(watches_steadiness):
-            watch_steadiness(state, program, world, time, summary)
+            if state.load_factor[world] > wp.float64(1.0):
+                rate = drag_rate(chain, state, program, world, summary.height)
+                drag_shape(K, chain, wp.exp(-rate * (time - last_time)))
+            watch_steadiness(chain, state, program, world, time, summary)
+            state.load_factor[world] = load_at(state, program, world, time)
+        if wp.static(softens and watches_steadiness):
+            watch_drive(state, program, control, world, time)
         return RUNNING
 
     return look

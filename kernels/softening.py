@@ -7,14 +7,9 @@ launches. On the softest joints, and on soft ones in the drive, steps near a con
 would else be what keeps steps short.
 
 *Drive.* Joints are softest while the chain settles and the sprocket spins up, and as soft as the loop's tension allows
-while it is to become steady: C = T/k stretches it by m v²/ℓ²k, at 30 Hz on the softest joints by 0.3 %; so much is
-wanted of k that it is a tenth of that. Circles sink deeper into the sprocket, in the spin-up 0.9 mm with 60 links and
-2.2 mm with 180, for in each step a contact gives way by half a step's acceleration; the loop goes the slower, but after
-half a turn no link remembers it. So long or slow loops take shorter steps in the half turn before the
-release, or before each moment at which it may come. With 160 links at 5 Hz circles have then sunk in 0.06 mm instead of
-0.14, and the loop that is released has 0.02 % less kinetic energy than from short steps throughout, else 0.26 %. With
-ten times the ω_c of soft joints 9 of 24 loops of 150 links were released a period earlier, for friction is what holds a
-loop's width; with the same ω_c none were.
+while it is to become stationary: C = T/k stretches it by T/ℓk, at 30 Hz on the softest joints by 0.3 %; so much is
+wanted of k that it is a tenth of that. While its loads are multiplied (:mod:`scaled_loads`) it may be 0.1 %. With
+ten times the ω_c of soft joints another loop becomes stationary, for friction is what holds a loop's width.
 *Release.* Soft joints get their own values back before the chain lands. Earlier was tried and rejected: nobody knows
 beforehand when the loop will be steady, and putting the release off by 0.25 s shifts Δx by 4 %, for the loop's width
 swings slowly. *Pile.* Joints are soft for good once the loop begins to collapse, and softest once it encloses half of
@@ -26,12 +21,11 @@ thousandfold, which a jump would turn into a pull of as many times T; so it take
 before the next.
 """
 
-import math
-
 import warp as wp
 
 from .elementary import HALF, ONE, TWO, ZERO
 from .layout import (
+    HOLD_LOAD,
     LEFT_X,
     LEFT_Y,
     LOSS_SOFTENING,
@@ -39,18 +33,15 @@ from .layout import (
     RIGHT_Y,
     SOFTENED_AT,
     SPRING,
-    STEADY_SINCE,
     TIME,
-    WINDOW_START,
 )
-from .types import Chain, Control, Model, Program, State, read_chain
+from .types import Chain, Control, Program, State
 
 wp.set_module_options({"enable_backward": False})
 
-PI = wp.constant(wp.float64(math.pi))
-FINISHED = wp.constant(2)
-"""Status of a drive whose end has been set, a code shared with warpchain.status."""
-
+TEN = wp.constant(wp.float64(10.0))
+ROUGHEST = wp.constant(wp.float64(0.1))
+"""Greatest tolerance, that of the options."""
 
 @wp.func
 def between(own: wp.float64, soft: wp.float64, softness: wp.float64):
@@ -90,51 +81,36 @@ def is_stiffer(chain: Chain, other: Chain):
 
 
 @wp.func
-def may_end_soon(program: Program, state: State, control: Control, world: int):
-    """Whether at the last look less than half a turn of the sprocket was left of the hold, as far as can be known.
-
-    The release comes at a moment that has been set, or else at the earliest when a window of the steadiness watch ends.
-    """
-    time = state.last_look[world, TIME]
-    if time < program.hold_start[world]:
-        return False
-    end = state.stop_time[world]
-    if state.stop_status[world] != FINISHED:
-        if state.watch[world, STEADY_SINCE] < ZERO:
-            return False
-        end = state.watch[world, WINDOW_START] + program.loop_period[world]
-        # the window ends at the look after that
-        if end + control.sample_interval - state.watch[world, STEADY_SINCE] < program.steady_time[world]:
-            return False
-    return (end - time) * wp.abs(program.sprocket_speed[world]) < PI
-
-
-@wp.func
-def contact_step(program: Program, state: State, control: Control, world: int, is_driven: bool):
+def contact_step(state: State, control: Control, world: int, is_driven: bool):
     """Longest step [s] near a contact after the last look; longer on the softest joints, in the drive on soft ones."""
     softness = state.softness[world]
     if softness < ONE or (softness == ONE and not is_driven):
         return control.contact_step
-    longest = control.soft_contact_step
+    return wp.max(control.contact_step, control.soft_contact_step)
+
+
+@wp.func
+def spring_tolerance(program: Program, state: State, control: Control, world: int, is_driven: bool):
+    """Error allowed in a step of the springs after the last look.
+
+    Ten times as much as on soft joints until a loop that is driven is held under its own loads: it forgets what came
+    before, and steps are twice as long.
+    """
+    if state.softness[world] < ONE:
+        return control.tolerance
+    tolerance = control.soft_tolerance
     if is_driven:
-        if may_end_soon(program, state, control, world):
-            longest = wp.min(longest, program.release_step[world])
-    return wp.max(control.contact_step, longest)
+        is_spun_up = state.last_look[world, TIME] >= program.hold_start[world]
+        if not is_spun_up or state.load_factor[world] > ONE:
+            tolerance = wp.min(TEN * tolerance, ROUGHEST)
+    return tolerance
 
 
 @wp.func
-def spring_tolerance(control: Control, softness: wp.float64):
-    """Error allowed in a step of the springs while joints have this softness."""
-    return wp.where(softness >= ONE, control.soft_tolerance, control.tolerance)
-
-
-@wp.func
-def change_joints(before: Chain, model: Model, state: State, control: Control, world: int) -> Chain:
-    """The chain after a look that has changed its softness; books the energy that this sets free."""
-    after = softened(read_chain(model, world), control, state.softness[world])
+def book_softening(before: Chain, after: Chain, state: State, world: int):
+    """Books the energy that a change of the joints' stiffness at the last look sets free."""
     freed = state.last_look[world, SPRING] * (ONE - after.joint_stiffness / before.joint_stiffness)
     state.losses[world, LOSS_SOFTENING] = state.losses[world, LOSS_SOFTENING] + freed
-    return after
 
 
 @wp.func
@@ -191,8 +167,11 @@ def watch_stiffening(state: State, program: Program, control: Control, world: in
 
 
 @wp.func
-def watch_spin_up(state: State, program: Program, control: Control, world: int, time: wp.float64):
+def watch_drive(state: State, program: Program, control: Control, world: int, time: wp.float64):
     """Makes joints softest until the sprocket has spun up, and as soft as the hold allows by the time it begins."""
     ahead = (program.hold_start[world] - time) / control.stiffening_time
     hold = program.hold_softness[world]
+    if state.load_factor[world] > ONE:
+        share = wp.log(state.load_factor[world]) / wp.log(state.watch[world, HOLD_LOAD])
+        hold += (program.loaded_softness[world] - hold) * share
     state.softness[world] = hold + (TWO - hold) * wp.clamp(ahead, ZERO, ONE)

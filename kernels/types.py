@@ -44,12 +44,16 @@ class Program:
     spin_up_time: wp.array(dtype=wp.float64)  # [s]; 0: at full speed from the start
     hold_start: wp.array(dtype=wp.float64)  # [s]; the steady-state watch begins here
     loop_speed: wp.array(dtype=wp.float64)  # speed along the loop that counts as steady [m/s]
-    loop_period: wp.array(dtype=wp.float64)  # length of a watch window [s]
-    steady_time: wp.array(dtype=wp.float64)  # how long the loop must have been steady [s]
-    steady_tolerance: wp.array(dtype=wp.float64)  # relative change of its height and width in that time
-    release_phase: wp.array(dtype=wp.float64)  # release this fraction of a loop period after steadiness
+    loop_period: wp.array(dtype=wp.float64)  # [s]
+    load_factor: wp.array(dtype=wp.float64)  # of the hold's first part, see scaled_loads
+    steady_window: wp.array(dtype=wp.float64)  # over which means are taken in the hold's second part [s]
+    steady_time: wp.array(dtype=wp.float64)  # for which the loop must then keep its shape [s]; negative: by itself
+    steady_tolerance: wp.array(dtype=wp.float64)  # relative change of its shape that counts as kept
+    further_hold: wp.array(dtype=wp.float64)  # how long a stationary loop is held on [s]
+    release_phase: wp.array(dtype=wp.float64)  # and then for this part of a loop period
     hold_softness: wp.array(dtype=wp.float64)  # from the hold to the release, 1 to 2; 0: own values
-    release_step: wp.array(dtype=wp.float64)  # longest step near a contact [s] in the half turn before the release
+    loaded_softness: wp.array(dtype=wp.float64)  # the same under load
+    push_rate: wp.array(dtype=wp.float64)  # at which the sprocket pushes out circles that have sunk in [1/s]
 
 
 @wp.struct
@@ -78,6 +82,7 @@ class State:
     status: wp.array(dtype=wp.int32)
     watch: wp.array2d(dtype=wp.float64)  # (W, WATCH_ROWS): memory of the watches
     softness: wp.array(dtype=wp.float64)  # of the joints: 0 the model's own, 1 soft, 2 softest; see softening
+    load_factor: wp.array(dtype=wp.float64)  # of gravity, friction and inertia on the sprocket, see scaled_loads
     first_area: wp.array(dtype=wp.float64)  # enclosed by the loop when its run began [m²]
     tries_before: wp.array(dtype=wp.int64)  # tries of the walk's earlier phases, for the limit
     first_look: wp.array2d(dtype=wp.float64)  # (W, SAMPLE_COLUMNS): the chain when its run began …

@@ -11,7 +11,15 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.control import hold_softness, release_step
+from warpchain.control import (
+    HOLD_STRAIN,
+    LOADED_STRAIN,
+    hold_softness,
+    line_density,
+    mean_weight,
+    push_rate,
+    suitable_load,
+)
 from warpchain.engine import COUNTS, EXTREMES, Batch
 from warpchain.kernels import layout
 from warpchain.kernels.driver import Features
@@ -20,15 +28,19 @@ from warpchain.parameters import InputError, Parameters
 from warpchain.recorder import Recorder
 from warpchain.recording import NOTHING, Keep
 from warpchain.results import LOST
-from warpchain.scene import contact_radius, joint_radius
+from warpchain.scene import contact_radius, joint_radius, loop_speed
 from warpchain.setups import Setup
 from warpchain.shapes import ellipse, lay_chain, stadium
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
 
-STILL_WINDOW = 0.25
-"""Length [s] of a window of the steadiness watch when the sprocket stands still."""
+STILL_PERIOD = 0.25
+"""What counts as the loop period [s] when the sprocket stands still."""
+SHORTEST_WINDOW, LONGEST_WINDOW = 0.05, 0.25
+"""Bounds of the time [s] over which means are taken of a loop under its own loads; between them half a loop period."""
+BY_ITSELF = -1.0
+"""A time that the kernel sets, see :mod:`warpchain.kernels.steadiness`."""
 
 
 class Phase(Enum):
@@ -49,6 +61,8 @@ class Course:
         raised: Height [m] by which the chain was raised at the release, where the sprocket's centre was then; NaN
             before the release.
         drive_time: Simulated time [s] before the release.
+        drift: How far the loop moved while it was last watched on its sprocket, relative to its height or width; NaN if
+            it was not watched.
         drive_counts: Counters (:data:`warpchain.engine.COUNTS`) of the time before the release.
         drive_extremes: Greatest opening and depths [m] of the time before the release.
         recorder: What is kept of the motion since the release.
@@ -61,6 +75,7 @@ class Course:
         self.status = Status.RUNNING
         self.raised = math.nan
         self.drive_time = 0.0
+        self.drift = math.nan
         self.drive_counts = dict.fromkeys(COUNTS, 0)
         self.drive_extremes = dict.fromkeys(EXTREMES, 0.0)
         self._batch, self._world = batch, world
@@ -84,13 +99,22 @@ class Course:
             self._settled = self._at_full_speed = self._hold_softness = 0.0
             self._release(position, velocity)
             return
-        self._hold_softness = hold_softness(parameters, speed) if setup.options.soften_drive else 0.0
+        radius = joint_radius(scene, parameters)
+        tension = line_density(parameters) * speed**2
+        weight = mean_weight(parameters, scene.links, radius)
+        load_factor = scene.load_factor or suitable_load(parameters, setup.options, weight)
+        loaded_softness = 0.0
+        self._hold_softness = 0.0
+        if setup.options.soften_drive:
+            self._hold_softness = hold_softness(parameters, tension, HOLD_STRAIN)
+            loaded_softness = hold_softness(parameters, tension + load_factor * weight, LOADED_STRAIN)
+        period = scene.links * parameters.link_length / speed if speed > 0 else STILL_PERIOD
         batch.set_chain(world, parameters, scene.links, contact_radius(scene, parameters))
         self._settled = scene.settle_time if from_rest else 0.0
         spin_up = scene.spin_up_time if from_rest and speed > 0 else 0.0
         self._at_full_speed = self._settled + spin_up
         position, velocity = lay_chain(
-            stadium(joint_radius(scene, parameters)),
+            stadium(radius),
             scene.links,
             parameters.link_length,
             0.0 if from_rest else speed,
@@ -109,13 +133,17 @@ class Course:
             spin_up_start=self._settled,
             spin_up_time=spin_up,
             hold_start=self._at_full_speed,
-            loop_speed=speed,
-            loop_period=scene.links * parameters.link_length / speed if speed > 0 else STILL_WINDOW,
-            steady_time=scene.steady_time,
+            loop_speed=loop_speed(scene, parameters),
+            loop_period=period,
+            load_factor=load_factor,
+            steady_window=min(max(period / 2, SHORTEST_WINDOW), LONGEST_WINDOW),
+            steady_time=BY_ITSELF if scene.steady_time is None else scene.steady_time,
             steady_tolerance=scene.steady_tolerance,
+            further_hold=scene.further_hold,
             release_phase=scene.phase,
             hold_softness=self._hold_softness,
-            release_step=release_step(parameters, scene.links, speed, joint_radius(scene, parameters)),
+            loaded_softness=loaded_softness,
+            push_rate=push_rate(setup.options),
         )
         if not from_rest:
             self._start_drive()
@@ -163,6 +191,14 @@ class Course:
     def walk_time(self) -> float:
         """Time [s] since the release."""
         return self._batch.time(self._world) if self._released else 0.0
+
+    @property
+    def hold_time(self) -> float:
+        """Time [s] for which the loop was held at full frequency; NaN if it was not."""
+        if self.setup.scene.start == "ellipse":
+            return math.nan
+        end = self.drive_time if self._released else self._batch.time(self._world)
+        return max(0.0, end - self._at_full_speed)
 
     @property
     def simulated_time(self) -> float:
@@ -219,6 +255,8 @@ class Course:
     def next_phase(self) -> bool:
         """Take a world that has stopped into its next phase; False if the course is over."""
         status = self._batch.status(self._world)
+        if not self._released:
+            self.drift = self._batch.drift(self._world)
         if self._released or status != Status.FINISHED:
             self.status = status
             return False

@@ -27,14 +27,17 @@ Array = NDArray[np.float64]
 
 PROGRAM = (
     *("sprocket_speed", "spin_up_start", "spin_up_time", "hold_start"),
-    *("loop_speed", "loop_period", "steady_time", "steady_tolerance", "release_phase"),
-    *("hold_softness", "release_step"),
+    *("loop_speed", "loop_period", "load_factor", "steady_window", "steady_time", "steady_tolerance"),
+    *("further_hold", "release_phase", "hold_softness", "loaded_softness", "push_rate"),
 )
 """Fields of :class:`warpchain.kernels.types.Program`."""
 FIRST_STEP = 1e-7  # s; the controller grows it fivefold per step
 LANES = 3  # streams of a batch for kernels side by side: chains of one length do not fill the device
 LAUNCH_SECONDS = 0.1  # how long a launch should take: the grain of progress and of Ctrl-C
-UNSET_WATCHES = (layout.WINDOW_START, layout.STEADY_SINCE, layout.REST_SINCE, layout.SOFTENED_AT)
+UNSET_WATCHES = (
+    *(layout.WINDOW_START, layout.STEADY_SINCE, layout.UNLOADED_SINCE, layout.DRIFT),
+    *(layout.REST_SINCE, layout.SOFTENED_AT),
+)
 """Moments of :attr:`State.watch` that are negative until they come."""
 
 COUNTS = ("accepted", "rejected", "floor", "sprocket", "self", "bounces", "list_builds")
@@ -97,7 +100,7 @@ class Batch:
         self.state.links = self._array(np.zeros((worlds, 6, longest)))
         for name in (
             *("time", "stop_time", "gap", "reach", "slack", "step", "other_step", "last_error", "closing_time"),
-            *("softness", "first_area"),
+            *("softness", "load_factor", "first_area"),
         ):
             setattr(self.state, name, self._array(np.zeros(worlds)))
         for name in ("stop_status", "is_fresh", "has_first_stage", "flies"):
@@ -202,6 +205,7 @@ class Batch:
         self._edit(state.watch)[world] = 0
         self._edit(state.watch)[world, list(UNSET_WATCHES)] = -1.0
         self._edit(state.softness)[world] = softness
+        self._edit(state.load_factor)[world] = 1.0
         self._edit(state.last_look)[world, layout.TIME] = -1.0
         self._edit(state.watch)[world, layout.LAST_FLOOR_IMPULSE] = -np.inf
         self._edit(state.tries_before)[world] = tries_before
@@ -388,6 +392,11 @@ class Batch:
         """Time [s] since loading at which the joints of a collapsed loop were softened; NaN if they were not."""
         moment = float(self._view(self.state.watch)[world, layout.SOFTENED_AT])
         return moment if moment >= 0 else math.nan
+
+    def drift(self, world: int) -> float:
+        """How far a held loop moved in its last watch, relative to its size; NaN if it was not watched for long."""
+        drift = float(self._view(self.state.watch)[world, layout.DRIFT])
+        return drift if drift >= 0 else math.nan
 
     def drain_samples(self, world: int) -> Array:
         """Take the time series kept so far: (t, SAMPLE_COLUMNS), see :mod:`warpchain.kernels.layout`."""

@@ -17,6 +17,8 @@ LEAST_SPROCKET: Final = 1e-3
 """Least distance of the joints from the sprocket's centre, in links; far smaller ones are lost in rounding."""
 HIGHEST: Final = 1e6
 """Greatest height, where numbers still tell a nanometre [m]."""
+HIGHEST_LOAD: Final = 1e4
+"""Greatest factor by which loads are multiplied; more than some hundred make joints stretch and steps short."""
 LONGEST: Final = 1e6
 """Greatest time, in which numbers still tell a nanosecond, a short step [s]."""
 
@@ -92,19 +94,35 @@ class Scene(BaseModel):
         description="time in which the sprocket reaches its frequency",
         json_schema_extra={"unit": "s"},
     )
-    steady_time: float = Field(
-        default=0.0,
+    load_factor: float | None = Field(
+        default=None,
+        ge=1,
+        le=HIGHEST_LOAD,
+        description="by which gravity, joint friction and rotary inertia are multiplied while the loop becomes "
+        "stationary; null: as many times as suits the chain, at most 100; 1: not at all",
+        json_schema_extra={"unit": "1"},
+    )
+    steady_time: float | None = Field(
+        default=None,
         ge=0,
         le=LONGEST,
-        description="the loop is steady once it has kept its shape and speed for this long, at least a loop period",
+        description="the loop is steady once, under its own loads, it has kept its shape and speed for this long; null: "
+        "a loop period or, if its loads were never multiplied, as long as slow waves need to cross it",
         json_schema_extra={"unit": "s"},
     )
     steady_tolerance: float = Field(
         default=0.01,
         gt=0,
         le=1,
-        description="relative change of the loop's height and width that still counts as kept",
+        description="change of the loop's height, width and place, relative to height or width, that counts as kept",
         json_schema_extra={"unit": "1"},
+    )
+    further_hold: float = Field(
+        default=0.0,
+        ge=0,
+        le=LONGEST,
+        description="time for which a loop that is steady is held on before its release",
+        json_schema_extra={"unit": "s"},
     )
     hold_limit: float = Field(
         default=30.0,
@@ -144,6 +162,15 @@ def joint_radius(scene: Scene, parameters: Parameters) -> float:
     if scene.sprocket_radius_is == "pitch":
         return parameters.sprocket_radius
     return parameters.sprocket_radius + parameters.circle_radius
+
+
+def loop_speed(scene: Scene, parameters: Parameters) -> float:
+    """Speed [m/s] along the loop of a chain that does not slip on its sprocket.
+
+    Links on it are chords, each seen from the centre under 2 asin(ℓ / 2ρ), with ρ of `joint_radius`.
+    """
+    half = math.asin(min(1.0, parameters.link_length / (2 * joint_radius(scene, parameters))))
+    return math.pi * scene.frequency * parameters.link_length / half
 
 
 def contact_radius(scene: Scene, parameters: Parameters) -> float:

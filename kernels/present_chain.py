@@ -1,0 +1,32 @@
+"""What a chain is made of at this moment: its own constants, under the present loads, with joints of present softness."""
+
+import functools
+
+import warp as wp
+
+from .scaled_loads import under_load
+from .softening import softened
+from .types import Chain, Control, Model, State, read_chain
+
+wp.set_module_options({"enable_backward": False})
+
+
+@functools.cache
+def present_chain(softens: bool, is_driven: bool):
+    """Warp function ``present(model, state, control, world)`` → Chain.
+
+    Args:
+        softens: Whether the softness of its joints may change, see :mod:`softening`.
+        is_driven: Whether its loads may, see :mod:`scaled_loads`.
+    """
+
+    @wp.func
+    def present(model: Model, state: State, control: Control, world: int) -> Chain:
+        chain = read_chain(model, world)
+        if wp.static(is_driven):
+            chain = under_load(chain, state.load_factor[world])
+        if wp.static(softens):
+            chain = softened(chain, control, state.softness[world])
+        return chain
+
+    return present
