@@ -271,9 +271,7 @@ def meet_sprocket(
 
 
 @wp.func
-def resolve_sprocket(
-    K: wp.array2d(dtype=wp.float64), chain: Chain, surface_speed: wp.float64, push_rate: wp.float64
-):
+def resolve_sprocket(K: wp.array2d(dtype=wp.float64), chain: Chain, surface_speed: wp.float64, push_rate: wp.float64):
     """Impulses between links and the sprocket, see :func:`meet_sprocket`; returns their number."""
     impulses = wp.int64(0)
     i = int(0)

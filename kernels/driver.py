@@ -384,7 +384,9 @@ def make_advance(features: Features):
                     gap = sprocket_gap(K, chain)
                     if gap < ZERO:
                         state.extremes[world, SPROCKET_DEPTH] = wp.max(state.extremes[world, SPROCKET_DEPTH], -gap)
-                        hits = resolve_sprocket(K, chain, sprocket_turning(program, world, time), program.push_rate[world])
+                        hits = resolve_sprocket(
+                            K, chain, sprocket_turning(program, world, time), program.push_rate[world]
+                        )
                         state.counts[world, SPROCKET_IMPULSES] = state.counts[world, SPROCKET_IMPULSES] + hits
                         impulses += hits
                 if wp.static(has_self):

@@ -21,7 +21,7 @@ the swing is over after one. What is left of its bias is smaller by λ. γ follo
 
 import warp as wp
 
-from .elementary import HALF, ONE, TWO, ZERO
+from .elementary import HALF, ONE, TWO
 from .layout import COSINE, INERTIA, INVERSE_INERTIA, SINE, U, V
 from .types import Chain
 

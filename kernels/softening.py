@@ -43,6 +43,7 @@ TEN = wp.constant(wp.float64(10.0))
 ROUGHEST = wp.constant(wp.float64(0.1))
 """Greatest tolerance, that of the options."""
 
+
 @wp.func
 def between(own: wp.float64, soft: wp.float64, softness: wp.float64):
     """From a joint's own value to the lesser of that and a soft one, exact at both ends."""

@@ -51,7 +51,7 @@ STEADY_SLIP = wp.constant(wp.float64(0.02))
 LOADED_SLIP = wp.constant(wp.float64(0.05))
 """… and under load by up to 1 %."""
 SLOWEST_STEADY = wp.constant(wp.float64(0.02))
-LOADING_TIME = wp.constant(wp.float64(0.2))
+LOADING_TIME = wp.constant(wp.float64(0.3))
 """Time [s] in which loads fall to the loop's own."""
 LEAST_LOAD = wp.constant(wp.float64(1.5))
 """A smaller factor gains nothing."""

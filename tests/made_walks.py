@@ -29,6 +29,8 @@ def make_walk(links: int = 30, **changes: Any) -> WalkResult:
         "dx": 0.64 + 1e-17,
         "walk_time": 0.8,
         "simulated_time": 3.3,
+        "hold_time": 0.4,
+        "drift": 0.002,
         "softened_at": 0.4,
         "wall_time": 1.23456789012345678,
         "bounces": 3,

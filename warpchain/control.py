@@ -24,7 +24,7 @@ HOLD_STRAIN = 3e-4
 """Strain that the loop's speed may cause in joints that are softened while it is held …"""
 LOADED_STRAIN = 1e-3
 """… and that speed and mean weight may cause while its loads are multiplied."""
-GREATEST_LOAD = 100.0
+GREATEST_LOAD = 50.0
 """Factor by which loads are multiplied unless the chain bears less.
 
 From 15 to 160 times the loop that is released is the same to 0.3 % of its height and 0.7 % of its width; twice as much

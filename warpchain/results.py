@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 FORMAT: Final = "warpchain walk"
-FORMAT_VERSION: Final = 2
+FORMAT_VERSION: Final = 3
 
 CONTACTS: Final = {
     "floor": "between links and floor",
@@ -99,6 +99,18 @@ class WalkResult:
     walk_time: Annotated[float, Stored("summary/walk_time", "s", "from the release to the end")]
     simulated_time: Annotated[
         float, Stored("summary/simulated_time", "s", "simulated, the phases before the release included")
+    ]
+    hold_time: Annotated[
+        float, Stored("summary/hold_time", "s", "for which the loop was held at full frequency; NaN without a sprocket")
+    ]
+    drift: Annotated[
+        float,
+        Stored(
+            "summary/drift",
+            "1",
+            "greatest change of the held loop's mean height, width or place, relative to height or width, while it was "
+            "last watched; NaN if it never was",
+        ),
     ]
     softened_at: Annotated[
         float,

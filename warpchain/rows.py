@@ -48,6 +48,8 @@ COLUMNS: Final[dict[str, Column]] = {
     "dx": _of_walk("<f8", "dx"),
     "walk_time": _of_walk("<f8", "walk_time"),
     "simulated_time": _of_walk("<f8", "simulated_time"),
+    "hold_time": _of_walk("<f8", "hold_time"),
+    "drift": _of_walk("<f8", "drift"),
     "softened_at": _of_walk("<f8", "softened_at"),
     "bounces": _of_walk("<i4", "bounces"),
     "steps_accepted": _of_walk("<i8", "steps_accepted"),

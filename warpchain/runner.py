@@ -210,6 +210,8 @@ def _fill(row: Any, walk: PlannedWalk, course: Course) -> None:
     row["dx"] = course.dx
     row["walk_time"] = course.walk_time
     row["simulated_time"] = course.simulated_time
+    row["hold_time"] = course.hold_time
+    row["drift"] = course.drift
     row["softened_at"] = course.softened_at
     row["bounces"] = counts["bounces"]
     row["steps_accepted"] = counts["accepted"]

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 Folder = str | os.PathLike[str]
 
-NUMERICS_VERSION: Final = 9
+NUMERICS_VERSION: Final = 10
 """Raised by every change that changes a number of any walk; shards of two versions never mix."""
 
 FORMAT: Final = "warpchain sweep"

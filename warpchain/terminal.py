@@ -82,6 +82,9 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
     status, energy = result.status, result.energy
     yield "Δx", f"{result.dx:.4f} m" if math.isfinite(result.dx) else "unknown"
     yield "status", status.label if status.ok else f"{status.label}: {status.sentence}"
+    if math.isfinite(result.hold_time):
+        moved = f", drift {100 * result.drift:.2g} %" if math.isfinite(result.drift) else ""
+        yield "loop held", f"{result.hold_time:.3f} s at full frequency{moved}"
     yield "walk time", f"{result.walk_time:.3f} s"
     yield "bounces", f"{result.bounces}"
     if math.isfinite(result.softened_at):

@@ -188,6 +188,8 @@ def _result(course: Course, seed: int | None, wall_time: float) -> WalkResult:
         dx=course.dx,
         walk_time=course.walk_time,
         simulated_time=course.simulated_time,
+        hold_time=course.hold_time,
+        drift=course.drift,
         softened_at=course.softened_at,
         wall_time=wall_time,
         bounces=counts["bounces"],
