@@ -228,6 +228,7 @@ def make_advance(features: Features):
         tolerance = control.tolerance
         if wp.static(softens):
             longest = contact_step(state, control, world, wp.static(is_driven))
+        if wp.static(softens or is_driven):
             tolerance = spring_tolerance(program, state, control, world, wp.static(is_driven))
         block = scratch[world]
         K = wp.array(ptr=block.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
@@ -265,10 +266,11 @@ def make_advance(features: Features):
                 changed = bool(False)
                 if wp.static(softens):
                     longest = contact_step(state, control, world, wp.static(is_driven))
-                    tolerance = spring_tolerance(program, state, control, world, wp.static(is_driven))
                     changed = state.softness[world] != softness
                 if wp.static(is_driven):
                     changed = changed or load_factor > ONE or state.load_factor[world] > ONE
+                if wp.static(softens or is_driven):
+                    tolerance = spring_tolerance(program, state, control, world, wp.static(is_driven))
                 if changed:
                     after = present(model, state, control, world)
                     book_softening(chain, after, state, world)

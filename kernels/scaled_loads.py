@@ -31,6 +31,7 @@ SIX = wp.constant(wp.float64(6.0))
 TWELFTH = wp.constant(wp.float64(1.0 / 12.0))
 DRAG_PER_CROSSING = wp.constant(wp.float64(8.0))
 """γ times the time in which slow waves cross the loop: about critical damping of its slowest swing."""
+DRAG_PER_TURN = wp.constant(wp.float64(2.5))
 NEVER = wp.constant(wp.float64(1e9))
 
 

@@ -94,12 +94,10 @@ def contact_step(state: State, control: Control, world: int, is_driven: bool):
 def spring_tolerance(program: Program, state: State, control: Control, world: int, is_driven: bool):
     """Error allowed in a step of the springs after the last look.
 
-    Ten times as much as on soft joints until a loop that is driven is held under its own loads: it forgets what came
-    before, and steps are twice as long.
+    Ten times as much until a loop that is driven is held under its own loads: it forgets what came before, and steps
+    are twice as long.
     """
-    if state.softness[world] < ONE:
-        return control.tolerance
-    tolerance = control.soft_tolerance
+    tolerance = wp.where(state.softness[world] >= ONE, control.soft_tolerance, control.tolerance)
     if is_driven:
         is_spun_up = state.last_look[world, TIME] >= program.hold_start[world]
         if not is_spun_up or state.load_factor[world] > ONE:

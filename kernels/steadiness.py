@@ -20,11 +20,13 @@ from .elementary import HALF, ONE, ZERO
 from .layout import (
     DRIFT,
     GREATEST_HEIGHT,
+    GREATEST_SPEED,
     GREATEST_WIDTH,
     GREATEST_X,
     GREATEST_Y,
     HOLD_LOAD,
     LEAST_HEIGHT,
+    LEAST_SPEED,
     LEAST_WIDTH,
     LEAST_X,
     LEAST_Y,
@@ -38,7 +40,7 @@ from .layout import (
     WINDOW_COUNT,
     WINDOW_START,
 )
-from .scaled_loads import DRAG_PER_CROSSING, crossing_time
+from .scaled_loads import DRAG_PER_CROSSING, DRAG_PER_TURN, crossing_time
 from .summary import Summary
 from .types import Chain, Program, State
 
@@ -46,10 +48,11 @@ wp.set_module_options({"enable_backward": False})
 
 FINISHED = wp.constant(2)
 """Status of a drive whose end has been set, a code shared with warpchain.status."""
-STEADY_SLIP = wp.constant(wp.float64(0.02))
-"""Part of the sprocket's speed by which a stationary loop may be slower; Table 1's is by 0.1 to 0.4 % …"""
-LOADED_SLIP = wp.constant(wp.float64(0.05))
-"""… and under load by up to 1 %."""
+MOST_SLIP = wp.constant(wp.float64(0.02))
+"""Part of the sprocket's speed by which a stationary loop may slip. Loops of Table 1 do by 0.1 to 0.6 % up to 45 Hz;
+short ones at 60 Hz by 5 to 17 %, now more, now less, so that they never become stationary …"""
+MOST_LOADED_SLIP = wp.constant(wp.float64(0.1))
+"""… and the same under load, where loops slip by up to 1 % more."""
 SLOWEST_STEADY = wp.constant(wp.float64(0.02))
 LOADING_TIME = wp.constant(wp.float64(0.3))
 """Time [s] in which loads fall to the loop's own."""
@@ -109,7 +112,8 @@ def drag_rate(chain: Chain, state: State, program: Program, world: int, height: 
     present = state.load_factor[world]
     gravity = chain.gravity * full / present
     crossing = crossing_time(program.loop_speed[world], gravity, chain.sprocket_radius, height)
-    return DRAG_PER_CROSSING / crossing * (present - ONE) / (full - ONE)
+    turns = program.loop_speed[world] / height
+    return (DRAG_PER_CROSSING / crossing + DRAG_PER_TURN * turns) * (present - ONE) / (full - ONE)
 
 
 @wp.func
@@ -157,25 +161,31 @@ def watch_steadiness(chain: Chain, state: State, program: Program, world: int, t
     drift = wp.max(wp.max(tall, up) / height, wp.max(wide, aside) / width)
     state.watch[world, DRIFT] = drift
     target = program.loop_speed[world]
-    slip = wp.where(is_loaded, LOADED_SLIP, STEADY_SLIP)
+    uneven = widen(state, world, LEAST_SPEED, GREATEST_SPEED, speed, is_first)
+    tolerance = program.steady_tolerance[world]
+    slip = wp.where(is_loaded, MOST_LOADED_SLIP, MOST_SLIP)
     is_fast_enough = wp.abs(speed - target) <= wp.max(slip * target, SLOWEST_STEADY)
-    keeps_shape = is_fast_enough and drift <= program.steady_tolerance[world]
-    is_over = keeps_shape and not is_first and time - state.watch[world, STEADY_SINCE] >= wanted
-    if is_first or not keeps_shape or (is_over and is_loaded):
+    keeps_speed = is_fast_enough and uneven <= wp.max(tolerance * target, SLOWEST_STEADY)
+    keeps_shape = drift <= tolerance
+    is_over = keeps_shape and keeps_speed and not is_first and time - state.watch[world, STEADY_SINCE] >= wanted
+    if is_first or not (keeps_shape and keeps_speed) or (is_over and is_loaded):
         # the next watch begins with this window
         state.watch[world, STEADY_SINCE] = time
         widen(state, world, LEAST_HEIGHT, GREATEST_HEIGHT, height, True)
         widen(state, world, LEAST_WIDTH, GREATEST_WIDTH, width, True)
         widen(state, world, LEAST_X, GREATEST_X, x, True)
         widen(state, world, LEAST_Y, GREATEST_Y, y, True)
+        widen(state, world, LEAST_SPEED, GREATEST_SPEED, speed, True)
     if is_over and is_loaded:
+        state.watch[world, LEAST_SPEED] = wp.float64(wp.inf)  # a loaded loop slips more: its speed counts no longer
+        state.watch[world, GREATEST_SPEED] = -wp.float64(wp.inf)
         state.watch[world, UNLOADED_SINCE] = time
         state.watch[world, STEADY_SINCE] = time + LOADING_TIME
     elif is_over:
         wait = program.further_hold[world] + program.release_phase[world] * program.loop_period[world]
         state.stop_time[world] = time + wait
         state.stop_status[world] = FINISHED
-    elif is_free and not keeps_shape and state.watch[world, HOLD_LOAD] > ONE:
+    elif is_free and not is_first and not keeps_shape and state.watch[world, HOLD_LOAD] > ONE:
         root = wp.sqrt(state.watch[world, HOLD_LOAD])
         state.watch[world, HOLD_LOAD] = wp.where(root < LEAST_LOAD, ONE, root)
         state.watch[world, UNLOADED_SINCE] = -ONE
