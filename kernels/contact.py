@@ -186,9 +186,9 @@ def sprocket_circle(
     """One circle against the sprocket about the origin (body A; n̂ points outwards).
 
     ``arm`` leads from the link's centre to the circle's; ``surface_speed`` is the sprocket's angular velocity. The
-    touching point is the circle's nearest to the sprocket's centre. Where the circle has sunk in by d, the surface moves
-    outwards at ``push_rate`` d: impulses after a step alone would let a loop sink by more in each step than they stop,
-    0.06 to 0.14 mm in steps of 50 µs, which makes it slower and narrower.
+    touching point is the circle's nearest to the sprocket's centre. Where the circle has sunk in by d, the surface
+    moves outwards at ``push_rate`` d. Impulses alone stop a circle only after the step in which it has sunk in: loops sank by
+    0.06 to 0.14 mm in steps of 50 µs, and were slower for it.
     """
     # a circle exactly at the centre has no normal: zero instead makes it one that does not approach
     distance = wp.max(wp.sqrt(circle_x * circle_x + circle_y * circle_y), SMALLEST)

@@ -1,4 +1,4 @@
-"""What a chain is made of at this moment: its own constants, under the present loads, with joints of present softness."""
+"""A chain's constants at this moment: its own, under the present loads, with joints as soft as they are now."""
 
 import functools
 

@@ -5,9 +5,9 @@ it there. Then its loads fall to its own within ``LOADING_TIME``, by equal facto
 watched again, for ``steady_time``. Watched are means over windows of time of its height, its width and the place of its
 centre of mass. Stationary means that all windows of a watch agree to within ``steady_tolerance`` of the loop's height
 (vertical quantities) or width (horizontal ones), those of the free watch also with the last one under load, and that
-the loop runs at the sprocket's speed to within 2 % (under load 5 %) or 0.02 m/s. A loop that leaves its shape when it becomes free is
-held under load again, under the square root of the factor, finally under none: then it is watched for as long as slow
-waves need in its own gravity, 5 to 10 s.
+the loop runs as evenly, at the sprocket's speed to within 2 % (under load 10 %) or 0.02 m/s. A loop that leaves its
+shape when it becomes free is held under load again, under the square root of the factor, finally under none: then it is
+watched for as long as slow waves need in its own gravity, 5 to 10 s.
 
 Loads that fall at once stretch the chain by less at once, which throws it off its sprocket: with λ = 80 by 25 mm (180
 links, 30 Hz). In 0.05 s or more nothing of that is seen; in 0.2 s the loop follows the little that the curve under

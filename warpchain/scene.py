@@ -99,15 +99,15 @@ class Scene(BaseModel):
         ge=1,
         le=HIGHEST_LOAD,
         description="by which gravity, joint friction and rotary inertia are multiplied while the loop becomes "
-        "stationary; null: as many times as suits the chain, at most 100; 1: not at all",
+        "stationary; null: as many times as suits the chain, at most 50; 1: not at all",
         json_schema_extra={"unit": "1"},
     )
     steady_time: float | None = Field(
         default=None,
         ge=0,
         le=LONGEST,
-        description="the loop is steady once, under its own loads, it has kept its shape and speed for this long; null: "
-        "a loop period or, if its loads were never multiplied, as long as slow waves need to cross it",
+        description="the loop is steady once it has kept its shape and speed under its own loads for this long; null: a "
+        "loop period or, if its loads were never multiplied, as long as slow waves need to cross it",
         json_schema_extra={"unit": "s"},
     )
     steady_tolerance: float = Field(
