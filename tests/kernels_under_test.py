@@ -196,6 +196,7 @@ def _contact_pass(columns: int) -> wp.Kernel:
         lists: wp.array2d(dtype=wp.int32),
         skin: wp.float64,
         sprocket_speed: wp.float64,
+        push_rate: wp.float64,
         parts: int,
         results: wp.array2d(dtype=wp.float64),
     ):
@@ -223,7 +224,7 @@ def _contact_pass(columns: int) -> wp.Kernel:
         if (parts & 4) != 0:
             results[world, 6] = wp.float64(resolve_floor(block, chain))
         if (parts & 8) != 0:
-            results[world, 7] = wp.float64(resolve_sprocket(block, chain, sprocket_speed))
+            results[world, 7] = wp.float64(resolve_sprocket(block, chain, sprocket_speed, push_rate))
         if (parts & 16) != 0:
             hits, lost, depth = resolve_self_contacts(block, pairs, chain, opening)
             results[world, 8] = wp.float64(hits)
@@ -245,11 +246,13 @@ class Placed:
 class ContactPass:
     """Many chains, one after the other, on which parts of the contact pass are run."""
 
-    def __init__(self, chains: Sequence[Placed], *, skin: float = 2e-3, sprocket_speed: float = 0.0) -> None:
+    def __init__(
+        self, chains: Sequence[Placed], *, skin: float = 2e-3, sprocket_speed: float = 0.0, push_rate: float = 0.0
+    ) -> None:
         """Make room for chains and place them; the sprocket about the origin has their sprocket_radius."""
         self.links = [len(chain.position) for chain in chains]
         self.columns = layout.padded_width(max(self.links))
-        self.skin, self.sprocket_speed = skin, sprocket_speed
+        self.skin, self.sprocket_speed, self.push_rate = skin, sprocket_speed, push_rate
         self.model = Model()
         self.model.link_count = wp.array(self.links, dtype=wp.int32, device=DEVICE)
         for name in Parameters.model_fields:
@@ -270,7 +273,8 @@ class ContactPass:
     def run(self, parts: int) -> list[dict[str, float]]:
         """Run parts of a pass from the states placed last: `RESULTS` of each chain, NaN if not computed."""
         results = _poisoned(len(self.links), len(RESULTS))
-        inputs = [self.model, self.state, self.scratch, self.lists, self.skin, self.sprocket_speed, parts]
+        speeds = [self.sprocket_speed, self.push_rate]
+        inputs = [self.model, self.state, self.scratch, self.lists, self.skin, *speeds, parts]
         kernel = _contact_pass(self.columns)
         wp.launch(kernel, dim=len(self.links), inputs=[*inputs, results], device=DEVICE)
         return [dict(zip(RESULTS, map(float, row), strict=True)) for row in results.numpy()]

@@ -10,14 +10,14 @@ from scipy.special import ellipe
 
 import warpchain
 from warpchain import InputError, Status, ensemble, preset
-from warpchain.control import SOFTEST, STIFFENING_TIME, hold_softness, release_step
+from warpchain.control import HOLD_STRAIN, LOADED_STRAIN, SOFTEST, STIFFENING_TIME, hold_softness
 from warpchain.course import Course, Phase
 from warpchain.devices import start_device
 from warpchain.engine import Batch
 from warpchain.kernels import layout
 from warpchain.kernels.driver import load_state
 from warpchain.kernels.explicit import place_ends
-from warpchain.kernels.softening import contact_step, enclosed_area, softened
+from warpchain.kernels.softening import contact_step, enclosed_area, softened, spring_tolerance
 from warpchain.kernels.types import Chain, Control, Model, Program, State, read_chain
 from warpchain.options import Options
 from warpchain.shapes import ellipse, lay_chain
@@ -104,15 +104,15 @@ def test_softness_goes_geometrically_from_own_over_soft_to_softest() -> None:
 
 
 @pytest.mark.parametrize("own", [1e9, 1e7, 3e6])
-def test_the_loop_is_held_on_joints_that_it_stretches_by_no_more_than_it_may(own: float) -> None:
-    """k = m̄ v²/(3e-4 ℓ²), whatever the joints' own, between the softest and the lesser of that and the soft ones'."""
+@pytest.mark.parametrize("strain", [HOLD_STRAIN, LOADED_STRAIN])
+def test_the_loop_is_held_on_joints_that_it_stretches_by_no_more_than_it_may(own: float, strain: float) -> None:
+    """k = T/(strain ℓ), whatever the joints' own, between the softest and the lesser of that and the soft ones'."""
     parameters = PAPER.with_values({"joint_stiffness": own})
-    mass = (PAPER.inner_mass + PAPER.outer_mass) / 2
-    for speed in (0.0, 2.0, 5.0, 20.0):
-        wanted = mass * speed**2 / (3e-4 * PAPER.link_length**2)
-        held, _, _ = joints_of(own, 1e3, 1e-3, hold_softness(parameters, speed))
+    for tension in (0.0, 5.0, 25.0, 400.0):
+        wanted = tension / (strain * PAPER.link_length)
+        held, _, _ = joints_of(own, 1e3, 1e-3, hold_softness(parameters, tension, strain))
         assert held == pytest.approx(min(max(wanted, 1e6), 1e7, own))
-    assert hold_softness(PAPER.with_values({"joint_stiffness": 1e5}), 5.0) == 2.0
+    assert hold_softness(PAPER.with_values({"joint_stiffness": 1e5}), 25.0, strain) == 2.0
 
 
 def test_no_joint_becomes_stiffer() -> None:
@@ -124,17 +124,18 @@ def test_no_joint_becomes_stiffer() -> None:
 
 
 @wp.kernel(module="unique", enable_backward=False)
-def _contact_step(program: Program, state: State, control: Control, is_driven: bool, steps: wp.array(dtype=wp.float64)):
+def _bounds(program: Program, state: State, control: Control, is_driven: bool, bounds: wp.array2d(dtype=wp.float64)):
     i = wp.tid()
-    steps[i] = contact_step(program, state, control, i, is_driven)
+    bounds[i, 0] = contact_step(state, control, i, is_driven)
+    bounds[i, 1] = spring_tolerance(program, state, control, i, is_driven)
 
 
-def contact_steps(batch: Batch, *, is_driven: bool) -> list[float]:
-    """`contact_step` of each world of a batch."""
-    steps = wp.full(len(batch.links), np.nan, dtype=wp.float64, device=start_device("cpu"))
-    inputs = [batch.program, batch.state, batch.control, is_driven, steps]
-    wp.launch(_contact_step, dim=len(batch.links), inputs=inputs, device="cpu")
-    return steps.numpy().tolist()
+def bounds_of(batch: Batch, *, is_driven: bool) -> np.ndarray:
+    """`contact_step` and `spring_tolerance` (W, 2) of the worlds of a batch."""
+    bounds = wp.full((len(batch.links), 2), np.nan, dtype=wp.float64, device=start_device("cpu"))
+    inputs = [batch.program, batch.state, batch.control, is_driven, bounds]
+    wp.launch(_bounds, dim=len(batch.links), inputs=inputs, device="cpu")
+    return bounds.numpy()
 
 
 @pytest.mark.parametrize(("own", "longest"), [(2e-5, 5e-5), (7e-5, 7e-5)])
@@ -143,59 +144,25 @@ def test_steps_near_contacts_are_longer_on_soft_joints(own: float, longest: floa
     """Below softness 1, and at 1 unless it is driven, the contact step bounds them; beyond, the greater of the two."""
     batch = Batch(5, 4, Options(contact_step=own, soft_contact_step=5e-5))
     batch.state.softness.numpy()[:] = [0.0, 0.99, 1.0, 1.01, 2.0]
-    batch.state.last_look.numpy()[:, layout.TIME] = -1.0
-    steps = contact_steps(batch, is_driven=is_driven)
+    steps = bounds_of(batch, is_driven=is_driven)[:, 0].tolist()
     assert steps == [own, own, longest if is_driven else own, longest, longest]
 
 
-@pytest.mark.parametrize(
-    ("time", "steady_since", "stop", "is_short"),
-    [
-        (4.35, 3.2, None, False),  # the window lasts until 4.5, half a turn 0.1 s
-        (4.41, 3.2, None, True),
-        (4.41, 3.3, None, False),  # it will not have been steady for 1.25 s
-        (4.41, -1.0, None, False),
-        (4.41, 3.2, 4.6, False),
-        (4.51, 3.2, 4.6, True),
-        (0.49, -1.0, 0.5, False),  # the chain has settled
-    ],
-)
-def test_steps_are_short_in_the_half_turn_before_a_release(
-    time: float, steady_since: float, stop: float | None, is_short: bool
-) -> None:
-    """Before the moment that is set or, as long as none is, before the next at which the loop may be found steady."""
-    batch = Batch(1, 4, Options(contact_step=1e-5, soft_contact_step=5e-5))
-    batch.set_program(0, sprocket_speed=-10 * np.pi, hold_start=2.5, loop_period=0.4, steady_time=1.25)
-    batch.set_program(0, release_step=3e-5)
-    state = batch.state
-    state.softness.numpy()[0] = 1.5
-    state.last_look.numpy()[0, layout.TIME] = time
-    state.watch.numpy()[0, [layout.WINDOW_START, layout.STEADY_SINCE]] = 4.1, steady_since
-    state.stop_time.numpy()[0] = 32.5 if stop is None else stop
-    state.stop_status.numpy()[0] = Status.NOT_STEADY if stop is None else Status.FINISHED
-    assert contact_steps(batch, is_driven=True) == [3e-5 if is_short else 5e-5]
-    assert contact_steps(batch, is_driven=False) == [5e-5]
-    batch.set_program(0, release_step=0.0)
-    assert contact_steps(batch, is_driven=True) == [1e-5 if is_short else 5e-5]
-
-
-@pytest.mark.parametrize(("links", "speed"), [(60, 2.0), (160, 8.0)])
-def test_release_step_is_that_in_which_joints_sink_no_more_than_they_may(links: int, speed: float) -> None:
-    """A joint that falls from rest in every step of its half turn, pulled by the loop's tension, sinks 0.15 % of ρ.
-
-    Two joints that pull with T each, at ℓ/ρ to one another, press a link with T ℓ/ρ.
-    """
-    radius, gravity, mass = 0.06, PAPER.gravity, (PAPER.inner_mass + PAPER.outer_mass) / 2
-    step = release_step(PAPER, links, speed, radius)
-    tension = links / 2 * mass * gravity
-    acceleration = tension * PAPER.link_length / radius / mass
-    steps_of_half_a_turn = np.pi * radius / speed / step
-    assert steps_of_half_a_turn * acceleration * step**2 / 2 == pytest.approx(1.5e-3 * radius, rel=1e-12)
-
-
-def test_release_step_without_weight_has_no_bound() -> None:
-    """Nothing presses joints into the sprocket of a chain without weight."""
-    assert release_step(PAPER.with_values({"gravity": 0.0}), 60, 2.0, 0.06) == np.inf
+@pytest.mark.parametrize("softness", [0.0, 1.0])
+@pytest.mark.parametrize("is_driven", [False, True])
+def test_tolerance_of_a_drive_is_tenfold_until_the_loop_is_watched_free(softness: float, is_driven: bool) -> None:
+    """Tenfold up to the watch under its own loads, where it is the options' own; 0.1 at most."""
+    own = 1e-5 if softness < 1 else 2e-4
+    batch = Batch(5, 4, Options(tolerance=1e-5, soft_tolerance=2e-4))
+    batch.state.softness.numpy()[:] = softness
+    for world in range(5):
+        batch.set_program(world, hold_start=2.5)
+    batch.state.last_look.numpy()[:, layout.TIME] = [-1.0, 2.4, 2.5, 2.6, 2.6]
+    batch.state.load_factor.numpy()[:] = [1.0, 1.0, 50.0, 1.001, 1.0]
+    tenfold = 10 * own if is_driven else own
+    assert_allclose(bounds_of(batch, is_driven=is_driven)[:, 1], [tenfold] * 4 + [own], rtol=1e-15)
+    batch.control.tolerance = batch.control.soft_tolerance = 0.05
+    assert_allclose(bounds_of(batch, is_driven=is_driven)[:, 1], [0.1 if is_driven else 0.05] * 4 + [0.05], rtol=1e-15)
 
 
 # --- the pile ---

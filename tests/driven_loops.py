@@ -1,0 +1,120 @@
+"""Loops on their sprocket: driven up to their release, and held on from there."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.course import Course, Phase
+from warpchain.engine import Batch
+from warpchain.kernels import layout
+from warpchain.parameters import Parameters
+from warpchain.scene import contact_radius, loop_speed
+from warpchain.setups import Setup
+from warpchain.status import Status
+from warpchain.walker import setup_walk
+
+Array = NDArray[np.float64]
+
+SHAPE = (layout.HEIGHT, layout.WIDTH, layout.CENTER_X, layout.CENTER_Y)
+"""Columns of a sample that say where a loop is."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A loop as it leaves its sprocket.
+
+    Attributes:
+        setup: Of its walk.
+        position: (n, 3), about the sprocket's centre.
+        velocity: (n, 3).
+        shape: Means over its last period of height, width, and x, y of its centre [m].
+        hold_time: For which it was held [s].
+        drift: How far it moved while it was watched last.
+        tries: Steps tried.
+        is_released: Or whether the hold ended otherwise.
+        status: Of the batch's world when the drive was over.
+    """
+
+    setup: Setup
+    position: Array
+    velocity: Array
+    shape: Array
+    hold_time: float
+    drift: float
+    tries: int
+    is_released: bool
+    status: Status
+
+
+def period_of(setup: Setup) -> float:
+    """Time [s] in which a loop goes round, a quarter of a second if it stands still."""
+    speed = loop_speed(setup.scene, setup.parameters)
+    return setup.scene.links * setup.parameters.link_length / speed if speed > 0 else 0.25
+
+
+def released_loop(preset: str = "soft", program: dict[str, float] | None = None, **settings: Any) -> Loop:
+    """Carry a walk to the end of its drive.
+
+    Args:
+        preset: Its chain.
+        program: What its world's program says otherwise.
+        settings: Of the walk.
+    """
+    setup = setup_walk(preset, {"method": "explicit"} | settings, None)
+    batch = Batch(1, setup.scene.links, setup.options, keeps_samples=True)
+    course = Course(batch, 0, setup)
+    batch.set_program(0, **(program or {}))
+    samples: list[Array] = []
+    while True:
+        batch.run([0], course.features, lambda: samples.append(batch.drain_samples(0)))
+        status = batch.status(0)
+        position, velocity = batch.position(0), batch.velocity(0)
+        goes_on = course.next_phase()
+        if not goes_on or course.phase == Phase.WALK:
+            break
+    rows = np.concatenate(samples)
+    last = rows[rows[:, layout.TIME] > rows[-1, layout.TIME] - period_of(setup)]
+    return Loop(
+        setup=setup,
+        position=position,
+        velocity=velocity,
+        shape=last[:, SHAPE].mean(axis=0),
+        hold_time=course.hold_time,
+        drift=course.drift,
+        tries=course.tries,
+        is_released=goes_on,
+        status=status,
+    )
+
+
+def hold(loop: Loop, parameters: Parameters, duration: float, load_factor: float = 1.0) -> Array:
+    """Hold a loop on for a time [s] with other parameters; `Loop.shape` of the end."""
+    setup = loop.setup
+    scene = setup.scene
+    batch = Batch(1, scene.links, setup.options, keeps_samples=True)
+    batch.set_chain(0, parameters, scene.links, contact_radius(scene, parameters))
+    softness = 1.0 if setup.options.soften_drive else 0.0
+    batch.load(0, loop.position, loop.velocity, stop_time=duration, stop_status=Status.NOT_STEADY, softness=softness)
+    batch.set_program(
+        0,
+        sprocket_speed=-2 * np.pi * scene.frequency,
+        loop_speed=loop_speed(scene, parameters),
+        loop_period=period_of(setup),
+        load_factor=load_factor,
+        steady_window=period_of(setup),
+        steady_tolerance=1e-12,
+        hold_softness=softness,
+        loaded_softness=softness,
+        push_rate=5e3,
+    )
+    samples: list[Array] = []
+    batch.run(
+        [0],
+        batch.features(fixed_body="sprocket", watch="steady"),
+        lambda: samples.append(batch.drain_samples(0)),
+    )
+    assert batch.status(0) == Status.NOT_STEADY
+    rows = np.concatenate(samples)
+    return rows[rows[:, layout.TIME] > duration - period_of(setup)][:, SHAPE].mean(axis=0)
