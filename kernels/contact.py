@@ -187,8 +187,8 @@ def sprocket_circle(
 
     ``arm`` leads from the link's centre to the circle's; ``surface_speed`` is the sprocket's angular velocity. The
     touching point is the circle's nearest to the sprocket's centre. Where the circle has sunk in by d, the surface
-    moves outwards at ``push_rate`` d. Impulses alone stop a circle only after the step in which it has sunk in: loops sank by
-    0.06 to 0.14 mm in steps of 50 µs, and were slower for it.
+    moves outwards at ``push_rate`` d. Impulses alone stop a circle only after a step in which it has sunk in: in steps
+    of 50 µs loops sank by 0.06 to 0.14 mm, and were slower for it.
     """
     # a circle exactly at the centre has no normal: zero instead makes it one that does not approach
     distance = wp.max(wp.sqrt(circle_x * circle_x + circle_y * circle_y), SMALLEST)

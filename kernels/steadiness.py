@@ -5,12 +5,12 @@ it there. Then its loads fall to its own within ``LOADING_TIME``, by equal facto
 watched again, for ``steady_time``. Watched are means over windows of time of its height, its width and the place of its
 centre of mass. Stationary means that all windows of a watch agree to within ``steady_tolerance`` of the loop's height
 (vertical quantities) or width (horizontal ones), those of the free watch also with the last one under load, and that
-the loop runs as evenly, at the sprocket's speed to within 2 % (under load 10 %) or 0.02 m/s. A loop that leaves its
-shape when it becomes free is held under load again, under the square root of the factor, finally under none: then it is
-watched for as long as slow waves need in its own gravity, 5 to 10 s.
+the loop runs as evenly. A loop that leaves its shape when it becomes free, or does not become stationary under load, is
+held under the square root of the factor, finally under its own loads: then, and whenever it slips on its sprocket by
+more than 0.6 %, it is watched free for as long as slow waves need, 5 to 10 s.
 
 Loads that fall at once stretch the chain by less at once, which throws it off its sprocket: with λ = 80 by 25 mm (180
-links, 30 Hz). In 0.05 s or more nothing of that is seen; in 0.2 s the loop follows the little that the curve under
+links, 30 Hz). In 0.05 s or more nothing of that is seen; in 0.25 s the loop follows the little that the curve under
 load differs by.
 """
 
@@ -30,6 +30,7 @@ from .layout import (
     LEAST_WIDTH,
     LEAST_X,
     LEAST_Y,
+    LOADED_SINCE,
     STEADY_SINCE,
     SUM_HEIGHT,
     SUM_SPEED,
@@ -48,16 +49,18 @@ wp.set_module_options({"enable_backward": False})
 
 FINISHED = wp.constant(2)
 """Status of a drive whose end has been set, a code shared with warpchain.status."""
-MOST_SLIP = wp.constant(wp.float64(0.02))
-"""Part of the sprocket's speed by which a stationary loop may slip. Loops of Table 1 do by 0.1 to 0.6 % up to 45 Hz;
-short ones at 60 Hz by 5 to 17 %, now more, now less, so that they never become stationary …"""
-MOST_LOADED_SLIP = wp.constant(wp.float64(0.1))
-"""… and the same under load, where loops slip by up to 1 % more."""
+LITTLE_SLIP = wp.constant(wp.float64(0.006))
+"""Loops of Table 1 slip on their sprocket by 0.1 to 0.6 % up to 45 Hz. One that slips more may do so now more, now
+less, so that it is watched for as long as slow waves need …"""
+MOST_SLIP = wp.constant(wp.float64(0.25))
+"""… and is never found stationary beyond this."""
 SLOWEST_STEADY = wp.constant(wp.float64(0.02))
-LOADING_TIME = wp.constant(wp.float64(0.3))
+LOADING_TIME = wp.constant(wp.float64(0.25))
 """Time [s] in which loads fall to the loop's own."""
-LEAST_LOAD = wp.constant(wp.float64(1.5))
-"""A smaller factor gains nothing."""
+LEAST_LOAD = wp.constant(wp.float64(3.0))
+"""Least factor under which a loop is held again."""
+MOST_CROSSINGS = wp.constant(wp.float64(8.0))
+"""Crossings of slow waves after which a loop that is not stationary under load is held under less; most need three."""
 SHORTEST_WINDOW = wp.constant(wp.float64(0.05))
 """Least time [s] over which means are taken: links that pass make height and width ripple."""
 
@@ -113,7 +116,7 @@ def drag_rate(chain: Chain, state: State, program: Program, world: int, height: 
     gravity = chain.gravity * full / present
     crossing = crossing_time(program.loop_speed[world], gravity, chain.sprocket_radius, height)
     turns = program.loop_speed[world] / height
-    return (DRAG_PER_CROSSING / crossing + DRAG_PER_TURN * turns) * (present - ONE) / (full - ONE)
+    return (DRAG_PER_CROSSING / crossing + DRAG_PER_TURN * turns) * (present - ONE) / full
 
 
 @wp.func
@@ -128,6 +131,8 @@ def watch_steadiness(chain: Chain, state: State, program: Program, world: int, t
         return
     if state.watch[world, WINDOW_START] < ZERO:
         begin_window(state, world, time)
+    if state.watch[world, LOADED_SINCE] < ZERO:
+        state.watch[world, LOADED_SINCE] = time
     state.watch[world, WINDOW_COUNT] = state.watch[world, WINDOW_COUNT] + ONE
     state.watch[world, SUM_HEIGHT] = state.watch[world, SUM_HEIGHT] + summary.height
     state.watch[world, SUM_WIDTH] = state.watch[world, SUM_WIDTH] + summary.width
@@ -142,7 +147,9 @@ def watch_steadiness(chain: Chain, state: State, program: Program, world: int, t
         window = wp.max(SHORTEST_WINDOW, HALF * crossing)
         wanted = crossing
     elif wanted < ZERO:
-        wanted = wp.where(state.watch[world, HOLD_LOAD] > ONE, program.loop_period[world], crossing)
+        slips = program.loop_speed[world] - summary.loop_speed > LITTLE_SLIP * program.loop_speed[world]
+        was_loaded = state.watch[world, HOLD_LOAD] > ONE
+        wanted = wp.where(was_loaded and not slips, program.loop_period[world], crossing)
     if time - state.watch[world, WINDOW_START] < window:
         return
 
@@ -163,8 +170,7 @@ def watch_steadiness(chain: Chain, state: State, program: Program, world: int, t
     target = program.loop_speed[world]
     uneven = widen(state, world, LEAST_SPEED, GREATEST_SPEED, speed, is_first)
     tolerance = program.steady_tolerance[world]
-    slip = wp.where(is_loaded, MOST_LOADED_SLIP, MOST_SLIP)
-    is_fast_enough = wp.abs(speed - target) <= wp.max(slip * target, SLOWEST_STEADY)
+    is_fast_enough = wp.abs(speed - target) <= wp.max(MOST_SLIP * target, SLOWEST_STEADY)
     keeps_speed = is_fast_enough and uneven <= wp.max(tolerance * target, SLOWEST_STEADY)
     keeps_shape = drift <= tolerance
     is_over = keeps_shape and keeps_speed and not is_first and time - state.watch[world, STEADY_SINCE] >= wanted
@@ -185,8 +191,11 @@ def watch_steadiness(chain: Chain, state: State, program: Program, world: int, t
         wait = program.further_hold[world] + program.release_phase[world] * program.loop_period[world]
         state.stop_time[world] = time + wait
         state.stop_status[world] = FINISHED
-    elif is_free and not is_first and not keeps_shape and state.watch[world, HOLD_LOAD] > ONE:
+    leaves_shape = is_free and state.watch[world, HOLD_LOAD] > ONE and not (is_first or keeps_shape)
+    loses_time = is_loaded and not is_over and time - state.watch[world, LOADED_SINCE] > MOST_CROSSINGS * crossing
+    if leaves_shape or loses_time:
         root = wp.sqrt(state.watch[world, HOLD_LOAD])
         state.watch[world, HOLD_LOAD] = wp.where(root < LEAST_LOAD, ONE, root)
         state.watch[world, UNLOADED_SINCE] = -ONE
+        state.watch[world, LOADED_SINCE] = time
         state.watch[world, STEADY_SINCE] = -ONE

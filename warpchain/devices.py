@@ -93,7 +93,7 @@ def world_bytes(longest: int, options: Options, samples: int, frames: int, devic
         device: Where.
     """
     columns = layout.padded_width(longest)
-    few = len(Parameters.model_fields) + 106  # numbers of a world in model, program and state
+    few = len(Parameters.model_fields) + 107  # numbers of a world in model, program and state
     numbers = columns * scratch_rows(options, longest, device) + 6 * longest + few
     numbers += samples * layout.SAMPLE_COLUMNS + frames * (2 * longest + 1)
     return 8 * numbers + 4 * list_layout(columns).size

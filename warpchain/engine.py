@@ -35,7 +35,7 @@ FIRST_STEP = 1e-7  # s; the controller grows it fivefold per step
 LANES = 3  # streams of a batch for kernels side by side: chains of one length do not fill the device
 LAUNCH_SECONDS = 0.1  # how long a launch should take: the grain of progress and of Ctrl-C
 UNSET_WATCHES = (
-    *(layout.WINDOW_START, layout.STEADY_SINCE, layout.UNLOADED_SINCE, layout.DRIFT),
+    *(layout.WINDOW_START, layout.STEADY_SINCE, layout.LOADED_SINCE, layout.UNLOADED_SINCE, layout.DRIFT),
     *(layout.REST_SINCE, layout.SOFTENED_AT),
 )
 """Moments of :attr:`State.watch` that are negative until they come."""

@@ -106,7 +106,7 @@ class Scene(BaseModel):
         default=None,
         ge=0,
         le=LONGEST,
-        description="the loop is steady once it has kept its shape and speed under its own loads for this long; null: a "
+        description="the loop is steady once it has kept shape and speed under its own loads for this long; null: a "
         "loop period or, if its loads were never multiplied, as long as slow waves need to cross it",
         json_schema_extra={"unit": "s"},
     )
