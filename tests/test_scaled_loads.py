@@ -172,8 +172,8 @@ def loaded_otherwise(parameters: Parameters, factor: float, part: float) -> Para
 
 @pytest.fixture(scope="module")
 def loop() -> Loop:
-    """A stationary loop of 120 links at 20 Hz, at its release."""
-    return released_loop(links=120, frequency=20.0, start="spinning")
+    """A stationary loop of 60 links at 20 Hz, at its release."""
+    return released_loop(links=60, frequency=20.0, start="spinning")
 
 
 @pytest.fixture(scope="module")
@@ -188,29 +188,26 @@ def differences(found: Array, own: Array) -> Array:
     return np.abs(found - own) / [height, width, width, height]
 
 
-@pytest.mark.slow
 def test_a_stationary_loop_stays_as_it_is_under_multiplied_loads(loop: Loop, own_loop: Array) -> None:
     """Under loads that are 15 times as great, without a drag on its shape, it keeps height and width."""
     after, _ = loaded(SOFT, 15.0)
     names = ("gravity", "viscous_friction", "coulomb_friction", "inner_inertia", "outer_inertia")
     held = hold(loop, SOFT.with_values({name: after[name] for name in names}), 1.0)
     change = differences(held, own_loop)
-    assert np.all(change < [0.005, 0.01, 0.01, 0.005]), change
+    assert np.all(change < [0.002, 0.005, 0.003, 0.002]), change
 
 
-@pytest.mark.slow
 def test_a_stationary_loop_stays_as_it_is_under_load_with_the_drag(loop: Loop, own_loop: Array) -> None:
     """As the hold does it, loads, drag and all, it keeps height and width, too."""
     change = differences(hold(loop, SOFT, 1.0, load_factor=15.0), own_loop)
-    assert np.all(change < [0.005, 0.01, 0.01, 0.005]), change
+    assert np.all(change < [0.002, 0.005, 0.003, 0.002]), change
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("part", [0.0, 1 / 12])
 def test_another_inertia_moves_the_loop(part: float, loop: Loop, own_loop: Array) -> None:
-    """With λ I, or λ times I − m ℓ²/12 instead, the loop is wider by 2 % or more."""
+    """With λ I, or λ times I − m ℓ²/12 instead, the loop is wider by a tenth or more, and lower by a fiftieth."""
     change = differences(hold(loop, loaded_otherwise(SOFT, 15.0, part), 1.0), own_loop)
-    assert change[1] > 0.02, change
+    assert change[1] > 0.1 and change[0] > 0.02, change
 
 
 # --- drag ---
