@@ -5,6 +5,7 @@ import math
 from warpchain.kernels.types import Control
 from warpchain.options import Options
 from warpchain.parameters import Parameters, preset
+from warpchain.scene import greatest_load
 
 SOFT = preset("soft")
 """Whose joints soft ones have, see :mod:`warpchain.kernels.softening`."""
@@ -30,8 +31,6 @@ GREATEST_LOAD = 50.0
 From 15 to 160 times the loop that is released is the same to 0.3 % of its height and 0.7 % of its width; twice as much
 makes it stationary in two thirds of the time, in steps that are as much shorter.
 """
-LEAST_INERTIA = 0.5
-"""Part of its rotary inertia that a link must keep under multiplied loads; point-like ones lose some."""
 PUSH = 0.25
 """Part of its depth by which the sprocket pushes a circle out in the longest step near a contact …"""
 FASTEST_PUSH = 5e3
@@ -75,19 +74,6 @@ def hold_softness(parameters: Parameters, tension: float, strain: float) -> floa
     return 1.0 + max(0.0, math.log(soft / max(wanted, softest)) / math.log(soft / softest))
 
 
-def inertia_load_limit(parameters: Parameters) -> float:
-    """Greatest factor of the loads that leaves links enough rotary inertia; infinite where I ≥ m ℓ²/6."""
-    limit = math.inf
-    for mass, inertia in (
-        (parameters.inner_mass, parameters.inner_inertia),
-        (parameters.outer_mass, parameters.outer_inertia),
-    ):
-        missing = mass * parameters.link_length**2 / 6 - inertia
-        if missing > 0:
-            limit = min(limit, 1 + (1 - LEAST_INERTIA) * inertia / missing)
-    return limit
-
-
 def suitable_load(parameters: Parameters, options: Options, weight: float) -> float:
     """Factor by which loads are multiplied while a loop becomes stationary, unless the scene says one.
 
@@ -100,7 +86,7 @@ def suitable_load(parameters: Parameters, options: Options, weight: float) -> fl
     if options.soften_drive:
         stiffness = min(stiffness, SOFT.joint_stiffness)
     bearable = LOADED_STRAIN * stiffness * parameters.link_length
-    limit = min(GREATEST_LOAD, inertia_load_limit(parameters))
+    limit = min(GREATEST_LOAD, greatest_load(parameters))
     return max(1.0, min(limit, bearable / weight) if weight > 0 else limit)
 
 

@@ -19,6 +19,8 @@ HIGHEST: Final = 1e6
 """Greatest height, where numbers still tell a nanometre [m]."""
 HIGHEST_LOAD: Final = 1e4
 """Greatest factor by which loads are multiplied; more than some hundred make joints stretch and steps short."""
+LEAST_INERTIA: Final = 0.5
+"""Part of its rotary inertia that a link must keep under multiplied loads."""
 LONGEST: Final = 1e6
 """Greatest time, in which numbers still tell a nanosecond, a short step [s]."""
 
@@ -173,6 +175,22 @@ def loop_speed(scene: Scene, parameters: Parameters) -> float:
     return math.pi * scene.frequency * parameters.link_length / half
 
 
+def greatest_load(parameters: Parameters) -> float:
+    """Greatest `Scene.load_factor` that leaves every link `LEAST_INERTIA` of its rotary inertia.
+
+    It is I − mℓ²/6 that is multiplied: point-like links lose inertia. Infinite where I ≥ mℓ²/6.
+    """
+    limit = math.inf
+    for mass, inertia in (
+        (parameters.inner_mass, parameters.inner_inertia),
+        (parameters.outer_mass, parameters.outer_inertia),
+    ):
+        missing = mass * parameters.link_length**2 / 6 - inertia
+        if missing > 0:
+            limit = min(limit, 1 + (1 - LEAST_INERTIA) * inertia / missing)
+    return limit
+
+
 def contact_radius(scene: Scene, parameters: Parameters) -> float:
     """Radius of the sprocket that the circles of the links touch, in m.
 
@@ -220,7 +238,8 @@ def check_scene(scene: Scene, parameters: Parameters) -> None:
     A scene that starts as an ellipse has no sprocket, so nothing is asked of it.
 
     Raises:
-        InputError: the chain is too short for its sprocket, or the sprocket too small, or `contact_radius` finds none.
+        InputError: the chain is too short for its sprocket, or the sprocket too small, or `contact_radius` finds none,
+            or the links are too point-like for the load factor that is given.
     """
     if scene.start == "ellipse":
         return
@@ -229,6 +248,11 @@ def check_scene(scene: Scene, parameters: Parameters) -> None:
         raise InputError(
             f"parameters.sprocket_radius: {parameters.sprocket_radius} m is nothing beside links of "
             f"{parameters.link_length} m; give a larger radius, or start: ellipse, which needs none"
+        )
+    if scene.load_factor is not None and scene.load_factor > greatest_load(parameters):
+        raise InputError(
+            f"scene.load_factor: {scene.load_factor:g} is too much for links of so little rotary inertia; "
+            f"give at most {greatest_load(parameters):.6g}, or null"
         )
     fewest = fewest_links(scene, parameters)
     if scene.links < fewest:

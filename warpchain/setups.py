@@ -26,6 +26,10 @@ class Setup:
     options: Options
 
 
+LONGEST_STEP_OF_LOADS: Final = 2e-3
+"""Greatest time [s] between two of the small steps in which the loads of a loop that is held fall to its own."""
+
+
 def resolve(
     preset: str,
     *,
@@ -55,6 +59,12 @@ def resolve(
     )
     check_scene(setup.scene, setup.parameters)
     check_links_on_gpu(setup.scene.links, setup.options.device, "scene.links")
+    interval = setup.options.record_interval
+    if interval > LONGEST_STEP_OF_LOADS and setup.scene.start != "ellipse" and setup.scene.load_factor != 1:
+        raise InputError(
+            f"options.record_interval: loads on the sprocket change at each, and {interval} s is too long for that; "
+            f"give at most {LONGEST_STEP_OF_LOADS} s, or scene.load_factor: 1"
+        )
     return setup
 
 
