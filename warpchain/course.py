@@ -231,6 +231,7 @@ class Course:
             self.drive_counts = self._batch.counts(self._world)
             self.drive_extremes = self._batch.extremes(self._world)
             self._release(self._batch.position(self._world), self._batch.velocity(self._world))
+            self.recorder.release(self.drive_time, self.raised)
         return True
 
     def _start_drive(self) -> None:

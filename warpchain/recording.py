@@ -98,10 +98,13 @@ class Keep:
     Attributes:
         series_every: every so many looks at the chain a sample is kept; None: no series.
         frame_every: every so many looks a frame is kept; None: no frames.
+        before: time [s] before the release of which samples and frames are kept as well, with the joints' loads; 0:
+            none.
     """
 
     series_every: int | None = None
     frame_every: int | None = None
+    before: float = 0.0
 
 
 NOTHING: Final = Keep()

@@ -2,7 +2,7 @@
 
 Unit and meaning of every field stand beside it, once; the file repeats them on each dataset. A saved walk
 has the groups `series` (time series), `frames` (joint positions), `summary` (numbers) and `parameters` (the
-chain's quantities with their symbols); its attributes `setup`, `seed` and `versions`, in JSON, say how to
+chain's quantities with their symbols), and `before_release` if that was kept; its attributes `setup`, `seed` and `versions`, in JSON, say how to
 make it again.
 """
 
@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from warpchain.before_release import BeforeRelease, read_before_release, write_before_release
 from warpchain.options import Options
 from warpchain.parameters import Parameters
 from warpchain.scene import Scene
@@ -34,7 +35,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 FORMAT: Final = "warpchain walk"
-FORMAT_VERSION: Final = 2
+FORMAT_VERSION: Final = 3
+
+BEFORE: Final = "before_release"
 
 CONTACTS: Final = {
     "floor": "between links and floor",
@@ -85,7 +88,8 @@ class WalkResult:
 
     Time counts from the release, x from wherever the release put it, y from the floor upwards. The other
     fields say their units and shapes themselves. `setup` is complete; `seed` is that of the parameters'
-    random draw, None if nothing was drawn; `versions` names the software.
+    random draw, None if nothing was drawn; `versions` names the software. `before_release` is the motion on the sprocket
+    just before the release, None if it was not kept.
 
     Raises:
         ValueError: an array has another shape, or a dictionary other keys, than stands beside its field.
@@ -141,6 +145,7 @@ class WalkResult:
         Array,
         Stored("frames/joints", "m", "joints x, y, shape (f, n, 2); joint i ends link i, even links inner"),
     ]
+    before_release: BeforeRelease | None = None
 
     def __post_init__(self) -> None:
         """Check that arrays and dictionaries fit together."""
@@ -151,6 +156,9 @@ class WalkResult:
         shapes["center"] = shapes["center_velocity"] = (instants, 2)
         shapes["frame_time"] = (frames,)
         shapes["frame_joints"] = (frames, self.setup.scene.links, 2)
+        before = self.before_release
+        if before is not None and before.frame_joints.shape[1] != self.setup.scene.links:
+            raise ValueError(f"before_release: its frames are not of {self.setup.scene.links} links; give those of them")
         if self.sprocket_center is not None:
             shapes["sprocket_center"] = (2,)
         for name, shape in shapes.items():
@@ -346,6 +354,8 @@ def _write(walk: WalkResult, file: "h5py.File") -> None:
         value = getattr(walk.setup.parameters, name)
         dataset = _put(file, f"parameters/{name}", value, quantity.unit, quantity.meaning)
         dataset.attrs["symbol"] = quantity.symbol
+    if walk.before_release is not None:
+        write_before_release(walk.before_release, file.create_group(BEFORE))
 
 
 def _put(file: "h5py.File", path: str, value: float | Array, unit: str, meaning: str) -> "h5py.Dataset":
@@ -389,4 +399,6 @@ def _read(file: "h5py.File") -> WalkResult:
         else:
             number = file[stored.path][()]
             values[name] = number if number.shape else number.item()
+    if BEFORE in file:
+        values["before_release"] = read_before_release(file[BEFORE])
     return WalkResult(**values)
