@@ -1,7 +1,7 @@
 """The motion of a chain on its sprocket in the last moments before its release, and the loads of its joints there."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -69,6 +69,11 @@ class BeforeRelease:
                 raise ValueError(f"before_release.{name}: its shape is {given}; give an array of shape {shape}")
         if np.any(self.time >= 0) or np.any(self.frame_time >= 0):
             raise ValueError("before_release: a time is not negative; give times before the release")
+
+    def as_type(self, joints: type[np.floating[Any]]) -> "BeforeRelease":
+        """The same with joints, forces and moments in another precision."""
+        names = ("frame_joints", "frame_forces", "frame_moments")
+        return replace(self, **{name: getattr(self, name).astype(joints) for name in names})
 
     def __repr__(self) -> str:
         """One line."""

@@ -146,6 +146,7 @@ class Recorder:
             frame_time=times,
             frame_joints=joints,
             sprocket_height=sprocket_height,
+            before_release=None if self._before is None else self._before.as_type(np.float32),
         )
 
 

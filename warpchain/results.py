@@ -193,15 +193,18 @@ class WalkResult:
         )
         return plain
 
-    def plot(self, kind: Literal["figure5", "film_strip"] = "figure5", *, figure: "Figure | None" = None) -> "Figure":
+    def plot(
+        self, kind: Literal["figure5", "film_strip", "loop"] = "figure5", *, figure: "Figure | None" = None
+    ) -> "Figure":
         """Draw the walk.
 
         Args:
-            kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself.
+            kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself, `loop` for its
+                loop on the sprocket just before the release.
             figure: an empty matplotlib figure to draw into; by default a new one.
 
         Raises:
-            ValueError: the kind is unknown, or a film strip is asked of a walk without frames.
+            ValueError: the kind is unknown, or the walk does not have what it shows: frames, or `before_release`.
         """
         from warpchain.plots import draw
 

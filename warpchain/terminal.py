@@ -198,6 +198,10 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
         "figure5.png": partial(_draw, "figure5"),
         "film_strip.png": partial(_draw, "film_strip"),
     }
+    if result.before_release is not None:
+        pictures["loop.png"] = partial(_draw, "loop")
+    else:
+        (folder / "loop.png").unlink(missing_ok=True)
     if animation is not None:
         from warpchain.animation import animate
 
@@ -215,7 +219,7 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
             yield path
 
 
-def _draw(kind: Literal["figure5", "film_strip"], result: WalkResult, path: Path) -> None:
+def _draw(kind: Literal["figure5", "film_strip", "loop"], result: WalkResult, path: Path) -> None:
     figure = result.plot(kind)
     with replacing(path) as part:
         figure.savefig(part, dpi=PICTURE_DPI)
