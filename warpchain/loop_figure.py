@@ -48,7 +48,7 @@ def loop_figure(walk: "WalkResult | KeptWalk", *, figure: Figure | None = None) 
     figure = Figure(figsize=(10.0, 6.4), layout="constrained") if figure is None else figure
     height, width = np.ptp(loop.position[:, 1]), np.ptp(loop.position[:, 0])
     share = float(np.clip(5.6 * (width + 0.08) / (height + 0.08), 1.9, 4.2)) / 10.0
-    left, right = figure.subfigures(1, 2, width_ratios=[share, 1 - share])
+    left, right = np.ravel(figure.subfigures(1, 2, width_ratios=[share, 1 - share]))
     shape = left.subplots()
     bend, pull = right.subplots(2, 1)
     scene = walk.setup.scene
@@ -92,9 +92,7 @@ def _draw_shape(
     band = loop.spread[:, None] * normal
     outer, inner = (place - band)[closed], (place + band)[closed]
     axes.add_patch(Circle((0.0, 0.0), walk.sprocket_radius, facecolor=GROUND, edgecolor=FAINT, linewidth=0.8))
-    axes.fill(
-        *np.concatenate([outer, inner[::-1]]).T, color=SIMULATED, alpha=0.25, linewidth=0.0, zorder=2
-    )
+    axes.fill(*np.concatenate([outer, inner[::-1]]).T, color=SIMULATED, alpha=0.25, linewidth=0.0, zorder=2)
     axes.plot(*(hanging.position - loop.center).T, color=HANGING, linewidth=1.0, zorder=2.5)
     axes.plot(*place[closed].T, color=SIMULATED, linewidth=2.2, zorder=3)
     if theory is not None:
@@ -104,8 +102,7 @@ def _draw_shape(
     radius = 0.6 * walk.sprocket_radius
     turn = np.deg2rad(np.linspace(140.0, 40.0, 30))
     axes.plot(radius * np.cos(turn), radius * np.sin(turn), color=FAINT, linewidth=1.0)
-    tip = radius * np.array([np.cos(turn[-1]), np.sin(turn[-1])])
-    back = radius * np.array([np.cos(turn[-3]), np.sin(turn[-3])])
+    tip, back = ((float(radius * np.cos(turn[i])), float(radius * np.sin(turn[i]))) for i in (-1, -3))
     axes.annotate("", tip, back, arrowprops={"arrowstyle": "-|>", "color": FAINT, "shrinkA": 0, "shrinkB": 0})
     axes.set(xlabel="$x$ / m", ylabel="$y$ / m", aspect="equal")
     axes.xaxis.set_major_locator(MaxNLocator(1 if slim else 3, steps=[1, 2, 5, 10]))
@@ -133,10 +130,11 @@ def _draw_curvature(
     _mark(axes, kink.dip_at, kink.dip, f"kink: ${kink.dip:.1f}$ m$^{{-1}}$ at ${100 * kink.dip_at:.1f}$ cm", 0)
     least, greatest = float(loop.curvature[shown].min()), float(loop.curvature[shown].max())
     room = greatest - least
-    axes.set(xlim=(low, high), ylim=(least - 0.2 * room, greatest + 0.18 * room), ylabel="curvature $\\kappa$ / m$^{-1}$")
+    axes.set(xlim=(low, high), ylim=(least - 0.2 * room, greatest + 0.18 * room))
+    axes.set_ylabel("curvature $\\kappa$ / m$^{-1}$")
     top = float(hanging.curvature.max())
     if top > greatest + 0.18 * room:
-        side = {"xy": (0.0, greatest + 0.16 * room), "xytext": (-8, 0), "textcoords": "offset points"}
+        side: dict[str, Any] = {"xy": (0.0, greatest + 0.16 * room), "xytext": (-8, 0), "textcoords": "offset points"}
         axes.annotate(f"{top:.0f} m$^{{-1}}$", ha="right", va="top", color=HANGING, fontsize="small", **side)
     axes.legend(frameon=False, loc="upper left", title=note or None, title_fontsize="small", alignment="left")
 
@@ -172,7 +170,12 @@ def _mark(axes: Axes, x: float, y: float, text: str, offset: float) -> None:
     """A small open circle with a few words so many points right of it, left of it if negative, below it if 0."""
     axes.plot([x], [y], marker="o", markersize=7.0, markerfacecolor="none", markeredgecolor=INK, zorder=5)
     side, height = ("left" if offset > 0 else "right", "center") if offset else ("center", "top")
-    place = {"xytext": (offset, 0 if offset else -8), "textcoords": "offset points", "ha": side, "va": height}
+    place: dict[str, Any] = {
+        "xytext": (offset, 0 if offset else -8),
+        "textcoords": "offset points",
+        "ha": side,
+        "va": height,
+    }
     axes.annotate(text, (x, y), color=INK, fontsize="small", **place)
 
 

@@ -1,4 +1,4 @@
-"""What the free part of a stationary loop should look like: the balances of force and moment as a boundary value problem.
+"""What the free part of a stationary loop should look like: its balances as a boundary value problem.
 
 With the signs and symbols of `warpchain.stationary_loop`, p = κ' and M = f(ℓ v p), where f(w) = β w + τ_c tanh(w/ω_c):
 
@@ -8,8 +8,9 @@ With the signs and symbols of `warpchain.stationary_loop`, p = κ' and M = f(ℓ
 Seven functions, and seven conditions: x, y, φ, κ at the lift-off and x, y, φ at the touch-down, for what the sprocket
 does to the chain there is not a matter of this theory. κ is given at the lift-off because waves that stand still are
 carried along by the motion: they come from there, and not from the touch-down. The length of the free part is given as
-well: it follows from the number of links. (Tried: the length unknown and κ given at both ends. The sides of a loop point
-almost straight up whatever their length, so that this loses all hold of it: 1 % too long with 60 links, 40 % with 120.)
+well: it follows from the number of links. (Tried: the length unknown and κ given at both ends. The sides of a loop
+point almost straight up whatever their length, so that this has no hold of it: 1 % too long with 60 links, 40 % with
+120.)
 Without friction p = N / (j v²), and φ at the touch-down is not given either. Without friction and inertia
 T_e κ = ρ g cos φ: the catenary, which has only its ends and its length given.
 
@@ -49,7 +50,7 @@ class NoSolutionError(ValueError):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TheoreticalLoop:
-    """A free part as theory has it, as functions of the arc length at g points; `warpchain.stationary_loop` has the signs.
+    """A free part as theory has it, as functions of the arc length at g points; signs as of a `StationaryLoop`.
 
     Attributes:
         s: arc length from the lowest point along the motion [m], shape (g,).

@@ -2,8 +2,8 @@
 
 Unit and meaning of every field stand beside it, once; the file repeats them on each dataset. A saved walk
 has the groups `series` (time series), `frames` (joint positions), `summary` (numbers) and `parameters` (the
-chain's quantities with their symbols), and `before_release` if that was kept; its attributes `setup`, `seed` and `versions`, in JSON, say how to
-make it again.
+chain's quantities with their symbols), and `before_release` if that was kept; its attributes `setup`, `seed`
+and `versions`, in JSON, say how to make it again.
 """
 
 import dataclasses
@@ -88,8 +88,8 @@ class WalkResult:
 
     Time counts from the release, x from wherever the release put it, y from the floor upwards. The other
     fields say their units and shapes themselves. `setup` is complete; `seed` is that of the parameters'
-    random draw, None if nothing was drawn; `versions` names the software. `before_release` is the motion on the sprocket
-    just before the release, None if it was not kept.
+    random draw, None if nothing was drawn; `versions` names the software. `before_release` is the motion on the
+    sprocket just before the release, None if it was not kept.
 
     Raises:
         ValueError: an array has another shape, or a dictionary other keys, than stands beside its field.
@@ -158,7 +158,8 @@ class WalkResult:
         shapes["frame_joints"] = (frames, self.setup.scene.links, 2)
         before = self.before_release
         if before is not None and before.frame_joints.shape[1] != self.setup.scene.links:
-            raise ValueError(f"before_release: its frames are not of {self.setup.scene.links} links; give those of them")
+            links = self.setup.scene.links
+            raise ValueError(f"before_release: its frames are not of {links} links; give those of this walk")
         if self.sprocket_center is not None:
             shapes["sprocket_center"] = (2,)
         for name, shape in shapes.items():
@@ -199,8 +200,8 @@ class WalkResult:
         """Draw the walk.
 
         Args:
-            kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself, `loop` for its
-                loop on the sprocket just before the release.
+            kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself, `loop` for
+                its loop on the sprocket just before the release.
             figure: an empty matplotlib figure to draw into; by default a new one.
 
         Raises:

@@ -1,17 +1,17 @@
-"""The loop of a chain that runs stationarily on its sprocket: its mean shape, what it carries, and whether that balances.
+"""The loop of a chain that runs stationarily on its sprocket: its mean shape, what it carries, whether that balances.
 
 In a stationary loop every joint follows the same path at the same speed. Frames of all joints are therefore samples of
 one periodic function of q = i + o(t), where i is the joint's number and o(t), in links, how far the chain has moved on;
 o(t) is read off each frame, from the phase of its first harmonic. Averages over frames at equal q are averages in the
 frame of the room. They are made into functions of the arc length s, measured along the motion from the lowest point.
 
-Signs. The loop runs clockwise: down on the right of the sprocket, along the bottom to the left, up again. The angle φ of
-its tangent is measured from there, clockwise: t = (−cos φ, sin φ), so that it is 0 at the lowest point and grows along
-the motion. n = (sin φ, cos φ) is the normal towards the inside, κ = φ' the curvature, positive where the loop bends
-inwards. Force and moment are those of the part ahead on the part behind, the moment positive where it turns clockwise.
+Signs. The loop runs clockwise: down on the right of the sprocket, along the bottom to the left, up again. The angle φ
+of its tangent is measured from there, clockwise: t = (−cos φ, sin φ), so that it is 0 at the lowest point and grows
+along the motion. n = (sin φ, cos φ) is the normal towards the inside, κ = φ' the curvature, positive where the loop
+bends inwards. Force and moment are those of the part ahead on the part behind, the moment positive where it turns clockwise.
 
-Balances. With the line density ρ = m̄/ℓ and the speed v, tension and shear are counted less what bends the momentum round
-the curve,
+Balances. With the line density ρ = m̄/ℓ and the speed v, tension and shear are counted less what bends the momentum
+round the curve,
 
     T_e t + N n = F − ρ v² (t + ℓ²/12 t''),
 
@@ -170,7 +170,7 @@ def average_loop(walk: "WalkResult | KeptWalk") -> StationaryLoop:
 
 
 def drive_smoothing(setup: Setup) -> float:
-    """Smoothing ω_c [rad/s] of the friction of joints in the last moments on the sprocket, where they may be softened."""
+    """Smoothing ω_c [rad/s] of joint friction in the last moments on the sprocket, where joints may be softened."""
     own = setup.parameters.friction_smoothing
     return max(own, float(control_of(setup.options).soft_smoothing)) if setup.options.soften_drive else own
 
@@ -287,8 +287,8 @@ def imbalances(loop: StationaryLoop) -> dict[str, Imbalance]:
     """How well the balances of the mean loop close on its free part, but for its ends.
 
     Keys: `force` compares (T_e t + N n)(s) with what it is at the lowest point and the weight in between, ρ g ŷ s;
-    `normal` is N' + T_e κ − ρ g cos φ; `moment` is M' + N − j v² κ'; `friction` compares M with f(ℓ v κ'), the moment of
-    joints that all turn as the mean curve does.
+    `normal` is N' + T_e κ − ρ g cos φ; `moment` is M' + N − j v² κ'; `friction` compares M with f(ℓ v κ'), the moment
+    of joints that all turn as the mean curve does.
     """
     p, edge = loop.parameters, EDGE * loop.parameters.link_length
     inside = (loop.s > loop.free[0] + edge) & (loop.s < loop.free[1] - edge)
@@ -329,13 +329,14 @@ def periodic_slope(values: Array, period: float) -> Array:
 def _moved(joints: Array) -> Array:
     """How far the loop has moved on in each frame, o(t) in links, (f,).
 
-    Of X(q) = Σ c_m e^{2πi m q/n}, x + i y taken together, the harmonic m = −1 is what makes the loop go round clockwise;
-    in the joints i of a frame its phase is −2π o/n.
+    Of X(q) = Σ c_m e^{2πi m q/n}, x + i y taken together, the harmonic m = −1 is what makes the loop go round
+    clockwise; in the joints i of a frame its phase is −2π o/n.
     """
     links = joints.shape[1]
     turning = np.exp(2j * np.pi * np.arange(links) / links)
     first = np.mean((joints[..., 0] + 1j * joints[..., 1]) * turning, axis=1)
-    return -np.unwrap(np.angle(first)) * links / (2 * np.pi)
+    moved: Array = -np.unwrap(np.angle(first)) * links / (2 * np.pi)
+    return moved
 
 
 class _Harmonics:
@@ -372,7 +373,8 @@ def _spread(joints: Array, moved: Array, place: Array, normal: Array) -> Array:
 
     across = np.sum((joints - at_joints(place)) * at_joints(normal), axis=-1)
     nearest = np.floor(q).astype(np.int64).ravel() % links
-    mean_square = np.bincount(nearest, across.ravel() ** 2, links) / np.maximum(np.bincount(nearest, minlength=links), 1)
+    counts = np.maximum(np.bincount(nearest, minlength=links), 1)
+    mean_square = np.bincount(nearest, across.ravel() ** 2, links) / counts
     return np.sqrt(np.interp(points, np.arange(links) + 0.5, mean_square, period=links))
 
 
@@ -387,7 +389,7 @@ def _lowest(s: Array, height: Array, length: float) -> float:
 
 def _angle(cosine: Array, sine: Array) -> Array:
     """Angle φ of tangents t = (cosine, sine) along the loop, 0 in the middle of the arrays where s is 0."""
-    angle = np.unwrap(np.arctan2(sine, -cosine))
+    angle: Array = np.unwrap(np.arctan2(sine, -cosine))
     return angle - 2 * np.pi * np.round(angle[len(angle) // 2] / (2 * np.pi))
 
 

@@ -149,9 +149,7 @@ def run_walk(
     options = setup.options
     frame_every = None if frame_interval is None else _samples_per_frame(frame_interval, options)
     before = _time_before(record_before, frame_every) if setup.scene.start != "ellipse" else 0.0
-    batch = Batch(
-        1, setup.scene.links, options, keeps_samples=True, frame_every=frame_every, keeps_loads=before > 0
-    )
+    batch = Batch(1, setup.scene.links, options, keeps_samples=True, frame_every=frame_every, keeps_loads=before > 0)
     course = Course(batch, 0, setup, replace(EVERYTHING, before=before))
     compiled: set[Features] = set()
 
