@@ -48,7 +48,7 @@ def loop_figure(walk: "WalkResult | KeptWalk", *, figure: Figure | None = None) 
     figure = Figure(figsize=(10.0, 6.4), layout="constrained") if figure is None else figure
     height, width = np.ptp(loop.position[:, 1]), np.ptp(loop.position[:, 0])
     share = float(np.clip(5.6 * (width + 0.08) / (height + 0.08), 1.9, 4.2)) / 10.0
-    left, right = np.ravel(figure.subfigures(1, 2, width_ratios=[share, 1 - share]))
+    left, right = np.asarray(figure.subfigures(1, 2, width_ratios=[share, 1 - share]))
     shape = left.subplots()
     bend, pull = right.subplots(2, 1)
     scene = walk.setup.scene

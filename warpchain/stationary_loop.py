@@ -8,7 +8,8 @@ frame of the room. They are made into functions of the arc length s, measured al
 Signs. The loop runs clockwise: down on the right of the sprocket, along the bottom to the left, up again. The angle φ
 of its tangent is measured from there, clockwise: t = (−cos φ, sin φ), so that it is 0 at the lowest point and grows
 along the motion. n = (sin φ, cos φ) is the normal towards the inside, κ = φ' the curvature, positive where the loop
-bends inwards. Force and moment are those of the part ahead on the part behind, the moment positive where it turns clockwise.
+bends inwards. Force and moment are those of the part ahead on the part behind, the moment positive where it turns
+clockwise.
 
 Balances. With the line density ρ = m̄/ℓ and the speed v, tension and shear are counted less what bends the momentum
 round the curve,
@@ -390,7 +391,8 @@ def _lowest(s: Array, height: Array, length: float) -> float:
 def _angle(cosine: Array, sine: Array) -> Array:
     """Angle φ of tangents t = (cosine, sine) along the loop, 0 in the middle of the arrays where s is 0."""
     angle: Array = np.unwrap(np.arctan2(sine, -cosine))
-    return angle - 2 * np.pi * np.round(angle[len(angle) // 2] / (2 * np.pi))
+    angle -= 2 * np.pi * np.round(angle[len(angle) // 2] / (2 * np.pi))
+    return angle
 
 
 def _free_part(s: Array, distance: Array, least: float) -> tuple[float, float]:
