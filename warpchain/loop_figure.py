@@ -43,7 +43,7 @@ def loop_figure(walk: "WalkResult | KeptWalk", *, figure: Figure | None = None) 
     """
     loop = average_loop(walk)
     theory, note = _theory(loop)
-    hanging = catenary(loop)
+    hanging = _hanging(loop)
     kink = find_kink(loop)
     figure = Figure(figsize=(10.0, 6.4), layout="constrained") if figure is None else figure
     height, width = np.ptp(loop.position[:, 1]), np.ptp(loop.position[:, 0])
@@ -76,12 +76,20 @@ def _theory(loop: StationaryLoop) -> tuple[TheoreticalLoop | None, str]:
         return None, "without theory: no solution was found"
 
 
+def _hanging(loop: StationaryLoop) -> TheoreticalLoop | None:
+    """The catenary as long as the loop's free part; None if that is too short for one."""
+    try:
+        return catenary(loop)
+    except NoSolutionError:
+        return None
+
+
 def _draw_shape(
     axes: Axes,
     walk: "WalkResult | KeptWalk",
     loop: StationaryLoop,
     theory: TheoreticalLoop | None,
-    hanging: TheoreticalLoop,
+    hanging: TheoreticalLoop | None,
     kink: Kink,
 ) -> None:
     """The loop to scale, one standard deviation of its joints on either side; the sprocket's centre is the origin."""
@@ -93,7 +101,8 @@ def _draw_shape(
     outer, inner = (place - band)[closed], (place + band)[closed]
     axes.add_patch(Circle((0.0, 0.0), walk.sprocket_radius, facecolor=GROUND, edgecolor=FAINT, linewidth=0.8))
     axes.fill(*np.concatenate([outer, inner[::-1]]).T, color=SIMULATED, alpha=0.25, linewidth=0.0, zorder=2)
-    axes.plot(*(hanging.position - loop.center).T, color=HANGING, linewidth=1.0, zorder=2.5)
+    if hanging is not None:
+        axes.plot(*(hanging.position - loop.center).T, color=HANGING, linewidth=1.0, zorder=2.5)
     axes.plot(*place[closed].T, color=SIMULATED, linewidth=2.2, zorder=3)
     if theory is not None:
         dashes: Any = (0, (4, 3))
@@ -113,7 +122,7 @@ def _draw_curvature(
     axes: Axes,
     loop: StationaryLoop,
     theory: TheoreticalLoop | None,
-    hanging: TheoreticalLoop,
+    hanging: TheoreticalLoop | None,
     kink: Kink,
     note: str,
 ) -> None:
@@ -122,7 +131,8 @@ def _draw_curvature(
     low, high = max(-reach, loop.free[0] - 0.03), min(reach, loop.free[1] + 0.03)
     shown = (loop.s >= low) & (loop.s <= high)
     _mark_sprocket(axes, loop)
-    axes.plot(hanging.s, hanging.curvature, color=HANGING, linewidth=1.2, label="catenary, as long")
+    if hanging is not None:
+        axes.plot(hanging.s, hanging.curvature, color=HANGING, linewidth=1.2, label="catenary, as long")
     axes.plot(loop.s, loop.curvature, color=SIMULATED, linewidth=2.2, label="simulation, mean")
     if theory is not None:
         dashes: Any = (0, (4, 3))
@@ -132,19 +142,22 @@ def _draw_curvature(
     room = greatest - least
     axes.set(xlim=(low, high), ylim=(least - 0.2 * room, greatest + 0.18 * room))
     axes.set_ylabel("curvature $\\kappa$ / m$^{-1}$")
-    top = float(hanging.curvature.max())
+    top = 0.0 if hanging is None else float(hanging.curvature.max())
     if top > greatest + 0.18 * room:
         side: dict[str, Any] = {"xy": (0.0, greatest + 0.16 * room), "xytext": (-8, 0), "textcoords": "offset points"}
         axes.annotate(f"{top:.0f} m$^{{-1}}$", ha="right", va="top", color=HANGING, fontsize="small", **side)
     axes.legend(frameon=False, loc="upper left", title=note or None, title_fontsize="small", alignment="left")
 
 
-def _draw_tension(axes: Axes, loop: StationaryLoop, theory: TheoreticalLoop | None, hanging: TheoreticalLoop) -> None:
+def _draw_tension(
+    axes: Axes, loop: StationaryLoop, theory: TheoreticalLoop | None, hanging: TheoreticalLoop | None
+) -> None:
     """Tension beyond what bends the loop's momentum round, along the free part."""
     inset = IN_LINKS * loop.parameters.link_length
     inside = (loop.s > loop.free[0] + inset) & (loop.s < loop.free[1] - inset)
     _mark_sprocket(axes, loop)
-    axes.plot(hanging.s, hanging.effective_tension, color=HANGING, linewidth=1.2)
+    if hanging is not None:
+        axes.plot(hanging.s, hanging.effective_tension, color=HANGING, linewidth=1.2)
     axes.plot(loop.s[inside], loop.effective_tension[inside], color=SIMULATED, linewidth=2.2)
     if theory is not None:
         dashes: Any = (0, (4, 3))

@@ -227,7 +227,7 @@ def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Ar
         center=np.asarray(center, dtype=np.float64),
         s=grid,
         position=position + center,
-        spread=on_grid(_spread(joints, moved, place, normal)),
+        spread=on_grid(_spread(joints, moved, curve.at(0, 8 * POINTS_PER_LINK), normal)),
         angle=_angle(on_grid(tangent[:, 0]), on_grid(tangent[:, 1])),
         curvature=on_grid(curvature),
         bending=on_grid(bending),
@@ -356,26 +356,27 @@ class _Harmonics:
         kept = np.sin(np.pi / 2 * share) ** 2
         self._spectrum = np.mean(np.fft.rfft(values, axis=1) * back[..., None], axis=0) * kept[:, None]
 
-    def at(self, order: int) -> Array:
-        """A derivative with respect to q at q = 0, 1/POINTS_PER_LINK …, (POINTS_PER_LINK n, c)."""
+    def at(self, order: int, points: int = POINTS_PER_LINK) -> Array:
+        """A derivative with respect to q at so many points in a link, q = 0, 1/points …, (points n, c)."""
         factor = (2j * np.pi * self._waves[:, None]) ** order
-        values: Array = POINTS_PER_LINK * np.fft.irfft(self._spectrum * factor, POINTS_PER_LINK * self._links, axis=0)
+        values: Array = points * np.fft.irfft(self._spectrum * factor, points * self._links, axis=0)
         return values
 
 
 def _spread(joints: Array, moved: Array, place: Array, normal: Array) -> Array:
-    """Standard deviation of joints across the mean curve [m], at the points of that curve, (POINTS_PER_LINK n,)."""
+    """Standard deviation of joints across the mean curve [m], at the points of its normals, (POINTS_PER_LINK n,)."""
     links = joints.shape[1]
-    points = np.arange(len(place)) / POINTS_PER_LINK
     q = (np.arange(links) + moved[:, None]) % links
 
     def at_joints(values: Array) -> Array:
+        points = links * np.arange(len(values)) / len(values)
         return np.stack([np.interp(q, points, values[:, axis], period=links) for axis in (0, 1)], axis=-1)
 
     across = np.sum((joints - at_joints(place)) * at_joints(normal), axis=-1)
     nearest = np.floor(q).astype(np.int64).ravel() % links
     counts = np.maximum(np.bincount(nearest, minlength=links), 1)
     mean_square = np.bincount(nearest, across.ravel() ** 2, links) / counts
+    points = np.arange(len(normal)) / POINTS_PER_LINK
     return np.sqrt(np.interp(points, np.arange(links) + 0.5, mean_square, period=links))
 
 

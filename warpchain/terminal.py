@@ -184,8 +184,8 @@ def print_scaling(scaling: "Scaling") -> None:
 def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iterator[Path]:
     """Write the record, then its pictures, each whole or not at all; yield the path of each.
 
-    A failed walk may have nothing to show in a picture. That picture is left out, and so is one of an earlier
-    walk, which does not belong to this record.
+    A failed walk may have nothing to show in a picture, and a sprocket that stands still no loop that runs. That
+    picture is left out, and so is one of an earlier walk, which does not belong to this record.
 
     Raises:
         OSError: a file cannot be written.
@@ -211,7 +211,7 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
         try:
             draw(result, path)
         except ValueError as error:
-            if result.status.ok:
+            if result.status.ok and name != "loop.png":
                 raise
             path.unlink(missing_ok=True)
             print(f"{path}: not drawn; {error}", file=sys.stderr)
