@@ -47,7 +47,7 @@ def loop_figure(walk: "WalkResult | KeptWalk", *, figure: Figure | None = None) 
     kink = find_kink(loop)
     figure = Figure(figsize=(10.0, 6.4), layout="constrained") if figure is None else figure
     height, width = np.ptp(loop.position[:, 1]), np.ptp(loop.position[:, 0])
-    share = float(np.clip(5.6 * (width + 0.08) / (height + 0.08), 1.9, 4.2)) / 10.0
+    share = float(np.clip(5.6 * (width + 0.08) / (height + 0.08), 2.3, 4.2)) / 10.0
     left, right = np.asarray(figure.subfigures(1, 2, width_ratios=[share, 1 - share]))
     shape = left.subplots()
     bend, pull = right.subplots(2, 1)
@@ -114,8 +114,11 @@ def _draw_shape(
     tip, back = ((float(radius * np.cos(turn[i])), float(radius * np.sin(turn[i]))) for i in (-1, -3))
     axes.annotate("", tip, back, arrowprops={"arrowstyle": "-|>", "color": FAINT, "shrinkA": 0, "shrinkB": 0})
     axes.set(xlabel="$x$ / m", ylabel="$y$ / m", aspect="equal")
-    axes.xaxis.set_major_locator(MaxNLocator(1 if slim else 3, steps=[1, 2, 5, 10]))
-    axes.margins(0.3 if slim else 0.12, 0.03)
+    if slim:
+        axes.set_xticks([-0.05, 0.05])
+    else:
+        axes.xaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10]))
+    axes.margins(0.4 if slim else 0.12, 0.03)
 
 
 def _draw_curvature(

@@ -211,7 +211,7 @@ def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Ar
     step = links / len(per_q)
     length = float(per_q.sum() * step)
     s = np.concatenate([[0.0], np.cumsum((per_q[1:] + per_q[:-1]) * step / 2)])
-    lowest = _lowest(s, place[:, 1], length)
+    lowest, _ = _vertex(s, place[:, 1], int(np.argmin(place[:, 1])), length)
     count = len(s) // 2 * 2
     grid = length * (np.arange(count) - count // 2) / count
 
@@ -264,16 +264,10 @@ def find_kink(loop: StationaryLoop) -> Kink:
     before = np.flatnonzero((loop.s > -reach) & (loop.s < 0))
     after = np.flatnonzero((loop.s > 0) & (loop.s < reach))
     near = np.concatenate([before, after])
-    peak = near[np.argmax(loop.curvature[near])]
-    dips = [side[np.argmin(loop.curvature[side])] for side in (before, after)]
-    dip, opposite = sorted(dips, key=lambda place: float(loop.curvature[place]))
-    return Kink(
-        peak=float(loop.curvature[peak]),
-        peak_at=float(loop.s[peak]),
-        dip=float(loop.curvature[dip]),
-        dip_at=float(loop.s[dip]),
-        opposite_dip=float(loop.curvature[opposite]),
-    )
+    peak_at, peak = _vertex(loop.s, loop.curvature, int(near[np.argmax(loop.curvature[near])]))
+    dips = [_vertex(loop.s, loop.curvature, int(side[np.argmin(loop.curvature[side])])) for side in (before, after)]
+    (dip_at, dip), (_, opposite) = sorted(dips, key=lambda place: place[1])
+    return Kink(peak=peak, peak_at=peak_at, dip=dip, dip_at=dip_at, opposite_dip=opposite)
 
 
 @dataclass(frozen=True)
@@ -380,13 +374,26 @@ def _spread(joints: Array, moved: Array, place: Array, normal: Array) -> Array:
     return np.sqrt(np.interp(points, np.arange(links) + 0.5, mean_square, period=links))
 
 
-def _lowest(s: Array, height: Array, length: float) -> float:
-    """Arc length [m] of the lowest point: the vertex of a parabola through the three lowest points."""
-    middle = int(np.argmin(height))
-    around = np.array([middle - 1, middle, middle + 1]) % len(s)
-    offset = (s[around] - s[middle] + length / 2) % length - length / 2
-    square, slope, _ = np.polyfit(offset, height[around], 2)
-    return float(s[middle] - slope / (2 * square))
+def _vertex(s: Array, values: Array, middle: int, period: float | None = None) -> tuple[float, float]:
+    """Where the parabola through a point and its two neighbours has its vertex, and how high it is.
+
+    Args:
+        s: arc length [m].
+        values: at s.
+        middle: index of an extreme value; if it is at an end, or not extreme, it is taken as it is.
+        period: of s [m], if the values go round.
+    """
+    around = np.arange(middle - 1, middle + 2)
+    if period is None and (around[0] < 0 or around[-1] >= len(s)):
+        return float(s[middle]), float(values[middle])
+    around %= len(s)
+    offset = s[around] - s[middle]
+    if period is not None:
+        offset = (offset + period / 2) % period - period / 2
+    square, slope, height = np.polyfit(offset, values[around], 2)
+    if square == 0 or abs(slope) > 2 * abs(square) * np.abs(offset).max():
+        return float(s[middle]), float(values[middle])
+    return float(s[middle] - slope / (2 * square)), float(height - slope**2 / (4 * square))
 
 
 def _angle(cosine: Array, sine: Array) -> Array:

@@ -47,7 +47,7 @@ def sweep_kink(result: "SweepResult") -> tuple[Figure, str]:
         axes.grid(color="#E6E6E6", linewidth=0.6)
         axes.set_axisbelow(True)
         _tidy(axes)
-    panels[0].legend(frameon=False)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper", frameon=False)
     count = sum(len(found) for cells in kinks.values() for found in cells.values())
     text = f"The kink of the mean loop before the release, {count} walks: greatest curvature near the lowest point, "
     text += "least curvature beside it, negative where the loop bulges, and where that is along the arc, after the "
