@@ -243,7 +243,7 @@ def test_foreign_files_are_refused(tmp_path: Path) -> None:
     make_walk().save(path)
     with h5py.File(path, "a") as file:
         file.attrs["format_version"] = 4
-    assert "format version 3" in _refused(path)
+    assert "format version 4" in _refused(path)
 
 
 def test_setup_of_another_version_is_refused(tmp_path: Path) -> None:
