@@ -129,13 +129,15 @@ def test_an_ellipse_has_its_curvature() -> None:
 
 
 def test_what_makes_no_mean_loop_is_refused() -> None:
-    """Too few frames, a loop that runs backwards, one that is nowhere free, and a walk without frames of the time."""
+    """Too few frames, a loop that stands or runs backwards, one that is nowhere free, and a walk without frames of the time."""
     before, radius, _ = make_ring(30)
     few = frames_of(before.frame_joints[:5])
     with pytest.raises(ValueError, match="5 frames are too few"):
         average(few, radius)
     with pytest.raises(ValueError, match="does not run clockwise"):
         average(frames_of(before.frame_joints[::-1]), radius)
+    with pytest.raises(ValueError, match="hardly moves"):
+        average(frames_of(np.repeat(before.frame_joints[:1], 20, axis=0)), radius)
     with pytest.raises(ValueError, match="no free part"):
         average_frames(before, LoopParameters.of(SOFT), np.zeros(2), radius)
     for kind in (loop_figure, average_loop):

@@ -44,6 +44,8 @@ Array = NDArray[np.float64]
 
 FEWEST_FRAMES: Final = 8
 """Fewer frames make no average."""
+LEAST_WAY: Final = 4.0
+"""Nor do frames in which the loop has moved on by fewer links."""
 POINTS_PER_LINK: Final = 6
 """Points of the mean curve in a link's length."""
 WHOLE_WAVES: Final = 5.0
@@ -194,8 +196,8 @@ def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Ar
         raise ValueError(f"before_release: {frames} frames are too few for an average; keep {FEWEST_FRAMES} or more")
     moved = _moved(joints)
     rate = float(np.polyfit(before.frame_time, moved, 1)[0])  # links a second
-    if rate <= 0:
-        raise ValueError("before_release: the loop does not run clockwise; give one that does")
+    if moved[-1] - moved[0] < LEAST_WAY:
+        raise ValueError("before_release: the loop does not run clockwise, or hardly moves; give one that runs")
     curve = _Harmonics(joints, moved)
     force = _Harmonics(before.frame_forces, moved).at(0)
     moment = -_Harmonics(before.frame_moments[..., None], moved).at(0)[:, 0]
