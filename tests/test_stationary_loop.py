@@ -129,7 +129,7 @@ def test_an_ellipse_has_its_curvature() -> None:
 
 
 def test_what_makes_no_mean_loop_is_refused() -> None:
-    """Too few frames, a loop that stands or runs backwards, one that is nowhere free, and a walk without frames of the time."""
+    """Too few frames, a loop that stands, runs backwards or is nowhere free, and a walk without frames of the time."""
     before, radius, _ = make_ring(30)
     few = frames_of(before.frame_joints[:5])
     with pytest.raises(ValueError, match="5 frames are too few"):
