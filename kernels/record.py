@@ -5,23 +5,31 @@ import functools
 import warp as wp
 
 from .elementary import ZERO
+from .joint import friction_torque, joint_force
 from .layout import (
     CENTER_U,
     CENTER_V,
     CENTER_X,
     CENTER_Y,
+    COSINE,
     GRAVITATIONAL,
     HEIGHT,
     KINETIC,
+    LEFT_X,
+    LEFT_Y,
     LOOP_SPEED,
     LOWEST,
+    OMEGA,
     REST_SINCE,
     RIGHT_X,
     RIGHT_Y,
     RMS_SPEED,
+    SINE,
     SPRING,
     TIME,
     WIDTH,
+    U,
+    V,
 )
 from .scaled_loads import drag_shape
 from .softening import watch_collapse, watch_drive, watch_stiffening
@@ -82,8 +90,23 @@ def write_sample(state: State, record: Record, world: int, time: wp.float64, sum
 
 
 @wp.func
+def write_load(loads: wp.array2d(dtype=wp.float64), row: int, K: wp.array2d(dtype=wp.float64), chain: Chain, i: int):
+    """Writes force F = k C + b Ċ [N] and friction moment [N m] of joint i, both as they act on the link before it."""
+    n = chain.link_count
+    j = i + 1
+    if j == n:
+        j = int(0)
+    a = chain.half_length
+    rate_x = (K[U, j] + a * K[OMEGA, j] * K[SINE, j]) - (K[U, i] - a * K[OMEGA, i] * K[SINE, i])
+    rate_y = (K[V, j] - a * K[OMEGA, j] * K[COSINE, j]) - (K[V, i] + a * K[OMEGA, i] * K[COSINE, i])
+    loads[row, i] = joint_force(chain, K[LEFT_X, i + 1] - K[RIGHT_X, i], rate_x)
+    loads[row, n + i] = joint_force(chain, K[LEFT_Y, i + 1] - K[RIGHT_Y, i], rate_y)
+    loads[row, 2 * n + i] = friction_torque(chain, K[OMEGA, j] - K[OMEGA, i])
+
+
+@wp.func
 def write_frame(record: Record, K: wp.array2d(dtype=wp.float64), chain: Chain, world: int, time: wp.float64):
-    """Appends all joint positions, if frames are kept."""
+    """Appends all joint positions, if frames are kept, and the loads of the joints, if they are."""
     if record.frames.shape[1] == 0:
         return
     n = chain.link_count
@@ -92,6 +115,8 @@ def write_frame(record: Record, K: wp.array2d(dtype=wp.float64), chain: Chain, w
     while i < n:
         record.frames[world, row, i] = K[RIGHT_X, i]
         record.frames[world, row, n + i] = K[RIGHT_Y, i]
+        if record.frame_loads.shape[1] > 0:
+            write_load(record.frame_loads[world], row, K, chain, i)
         i += 1
     record.frame_times[world, row] = time
     record.frame_count[world] = row + 1

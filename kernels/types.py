@@ -101,6 +101,7 @@ class Record:
     samples: wp.array3d(dtype=wp.float64)  # (W, capacity, SAMPLE_COLUMNS); capacity 0: not recorded
     frames: wp.array3d(dtype=wp.float64)  # (W, capacity, 2 N): joint x …, joint y …; capacity 0: not recorded
     frame_times: wp.array2d(dtype=wp.float64)  # (W, capacity) [s]
+    frame_loads: wp.array3d(dtype=wp.float64)  # (W, capacity, 3 N): joint forces x …, y …, moments …; see record
 
 
 @wp.struct

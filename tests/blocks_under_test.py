@@ -67,11 +67,12 @@ def batch_of(
         fixed_step: All steps take FIXED_STEP: the tolerance refuses nothing and no skin lets a step be longer.
         stop_time: In s.
         tolerance: Of adaptive steps.
-        keeps: Keep samples, and a frame at every second one.
+        keeps: Keep samples, and a frame with loads at every second one.
     """
     longest = max(len(position) for position, _ in chains)
     options = Options(method=method, tolerance=0.1 if fixed_step else tolerance, self_contact=self_contact)
-    batch = Batch(len(chains), longest, options, keeps_samples=keeps, frame_every=2 if keeps else None)
+    kept = {"keeps_samples": keeps, "frame_every": 2 if keeps else None, "keeps_loads": keeps}
+    batch = Batch(len(chains), longest, options, **kept)
     batch.control.launch_time = 1e9  # tries alone end a launch, however busy the machine is
     if fixed_step:
         batch.control.skin = 1e-9

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from warpchain.before_release import BeforeRelease
 from warpchain.results import CONTACTS, ENERGIES, STORED, WalkResult
 from warpchain.setups import resolve
 from warpchain.status import Status
@@ -76,9 +77,9 @@ def make_unreleased() -> WalkResult:
     )
 
 
-def assert_same(first: WalkResult, second: WalkResult) -> None:
+def assert_same(first: Any, second: Any) -> None:
     """Every field is equal, numbers to the bit and in type."""
-    for item in dataclasses.fields(WalkResult):
+    for item in dataclasses.fields(type(first)):
         one, other = getattr(first, item.name), getattr(second, item.name)
         assert type(one) is type(other), item.name
         if isinstance(one, np.ndarray):
@@ -86,6 +87,8 @@ def assert_same(first: WalkResult, second: WalkResult) -> None:
             assert one.tobytes() == other.tobytes(), item.name
         elif isinstance(one, float):
             assert one.hex() == other.hex(), item.name
+        elif isinstance(one, BeforeRelease):
+            assert_same(one, other)
         elif item.name == "energy":
             assert {key: number.hex() for key, number in one.items()} == {
                 key: number.hex() for key, number in other.items()

@@ -159,7 +159,7 @@ def run_length(batch: Batch) -> int:
 
 
 def test_samples_frames_and_rest_equal_the_cpu_form() -> None:
-    """Time series, frames, first and last look are those of the CPU form, and rest is seen at the same sample."""
+    """Time series, frames, loads, first and last look are those of the CPU form; rest is seen at the same sample."""
     ours, theirs = bounded_heaps(2), bounded_heaps(2)
     for batch in (ours, theirs):
         batch.control.rest_speed, batch.control.rest_time = 100.0, 20 * FIXED_STEP
@@ -172,11 +172,13 @@ def test_samples_frames_and_rest_equal_the_cpu_form() -> None:
         expected = getattr(theirs.state, name).numpy()
         assert np.array_equal(getattr(ours.state, name).numpy(), expected)
     assert np.array_equal(ours.drain_samples(1), theirs.drain_samples(1))
+    our_loads, their_loads = ours.frame_loads(1), theirs.frame_loads(1)
     our_times, our_frames = ours.drain_frames(1)
     their_times, their_frames = theirs.drain_frames(1)
     assert len(our_times) > 1
     assert np.array_equal(our_times, their_times)
     assert np.array_equal(our_frames, their_frames)
+    assert our_loads.shape == (len(our_times), LINKS, 3) and np.array_equal(our_loads, their_loads)
 
 
 @pytest.mark.parametrize("broad_phase", ["grid", "all_pairs"])

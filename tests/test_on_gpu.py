@@ -233,3 +233,20 @@ def test_a_walk_comes_to_rest_and_its_ledger_closes(method: str) -> None:
     at_release = energy["kinetic_at_release"] + energy["potential_at_release"]
     assert abs(energy["residual"]) < 5e-4 * at_release
     assert found.impulses["floor"] > 1000
+
+
+def test_the_last_moments_on_the_sprocket_are_kept() -> None:
+    """Frames before the release carry the joints' forces: the mean tension is ρ v² and the weight's share, to 3 %."""
+    links = 40
+    found = walk(links=links, preset="soft", start="spinning", walk_limit=0.02, record_before=0.2, device="cuda")
+    before = found.before_release
+    assert before is not None and len(before.frame_time) == pytest.approx(100, abs=2)
+    steps = before.frame_joints - np.roll(before.frame_joints, 1, axis=1)
+    length = np.hypot(steps[..., 0], steps[..., 1])
+    np.testing.assert_allclose(length, SOFT.link_length, rtol=2e-3)
+    tension = float(np.mean(np.sum(before.frame_forces * steps, axis=2) / length))
+    density = (SOFT.inner_mass + SOFT.outer_mass) / 2 / SOFT.link_length
+    speed = 2 * np.pi * 15.0 * (SOFT.sprocket_radius + SOFT.circle_radius)
+    hanging = density * SOFT.gravity * links / 2 * SOFT.link_length / 4
+    assert tension == pytest.approx(density * speed**2 + hanging, rel=0.03)
+    assert np.abs(before.frame_moments).max() > SOFT.coulomb_friction

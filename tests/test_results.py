@@ -158,7 +158,7 @@ def test_provenance(tmp_path: Path) -> None:
     walk = make_walk()
     walk.save(tmp_path / "walk.h5")
     with h5py.File(tmp_path / "walk.h5") as file:
-        assert file.attrs["format"] == "warpchain walk" and file.attrs["format_version"] == 2
+        assert file.attrs["format"] == "warpchain walk" and file.attrs["format_version"] == 3
         assert file.attrs["status"] == "at_rest"
         setup = json.loads(file.attrs["setup"])
         assert json.loads(file.attrs["seed"]) == walk.seed
@@ -242,8 +242,8 @@ def test_foreign_files_are_refused(tmp_path: Path) -> None:
     assert "HDF5, but not a walk" in _refused(path)
     make_walk().save(path)
     with h5py.File(path, "a") as file:
-        file.attrs["format_version"] = 3
-    assert "format version 3" in _refused(path)
+        file.attrs["format_version"] = 4
+    assert "format version 4" in _refused(path)
 
 
 def test_setup_of_another_version_is_refused(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ SWEEPS = Path(__file__).parents[1] / "sweeps"
         ("figure6", {"rest": (5, 6, 12), "ellipse": (2, 6, 12)}),
         ("tolerance", {"main": (2, 2, 2, 12)}),
         ("montecarlo", {"main": (7, 8, 1800)}),
+        ("kink", {"main": (5, 6, 1)}),
         ("steadiness", {"default": (2, 2, 16), "held": (2, 2, 16)}),
         (
             "sensitivity",
@@ -41,7 +42,7 @@ def test_shipped_sweeps(name: str, shapes: dict[str, tuple[int, ...]]) -> None:
 def test_every_shipped_sweep_is_tested() -> None:
     """No other file is in the folder."""
     names = {path.stem for path in SWEEPS.iterdir()}
-    assert names == {"quickstart", "figure6", "tolerance", "montecarlo", "sensitivity", "steadiness"}
+    assert names == {"quickstart", "figure6", "tolerance", "montecarlo", "sensitivity", "steadiness", "kink"}
 
 
 def test_figure6_follows_the_paper() -> None:

@@ -166,7 +166,8 @@ def walk(
             "-o",
             "--output",
             metavar="DIR",
-            help="Write walk.h5, figure5.png and film_strip.png to this folder; files of these names are replaced.",
+            help="Write walk.h5, figure5.png, film_strip.png and, of a chain on a sprocket, loop.png to this folder; "
+            "files of these names are replaced.",
         ),
     ] = None,
     animation: Annotated[

@@ -268,7 +268,9 @@ class Course:
             self.drive_time = self._batch.time(self._world)
             self.drive_counts = self._batch.counts(self._world)
             self.drive_extremes = self._batch.extremes(self._world)
+            free_since = max(self._at_full_speed, self._batch.unloaded_at(self._world))
             self._release(self._batch.position(self._world), self._batch.velocity(self._world))
+            self.recorder.release(self.drive_time, self.raised, free_since)
         return True
 
     def _start_drive(self) -> None:

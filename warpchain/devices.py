@@ -82,7 +82,9 @@ def scratch_rows(options: Options, longest: int, device: wp.Device, threads: int
     return METHODS[options.method].scratch_rows(columns)
 
 
-def world_bytes(longest: int, options: Options, samples: int, frames: int, device: wp.Device) -> int:
+def world_bytes(
+    longest: int, options: Options, samples: int, frames: int, device: wp.Device, keeps_loads: bool = False
+) -> int:
     """Memory [B] that a batch takes on a device for each of its worlds.
 
     Args:
@@ -91,20 +93,23 @@ def world_bytes(longest: int, options: Options, samples: int, frames: int, devic
         samples: Capacity of the time series.
         frames: Capacity of the frames.
         device: Where.
+        keeps_loads: Loads of joints are kept with the frames.
     """
     columns = layout.padded_width(longest)
     few = len(Parameters.model_fields) + 107  # numbers of a world in model, program and state
     numbers = columns * scratch_rows(options, longest, device) + 6 * longest + few
-    numbers += samples * layout.SAMPLE_COLUMNS + frames * (2 * longest + 1)
+    numbers += samples * layout.SAMPLE_COLUMNS + frames * ((2 + 3 * keeps_loads) * longest + 1)
     return 8 * numbers + 4 * list_layout(columns).size
 
 
-def most_worlds(longest: int, options: Options, *, keeps_samples: bool, keeps_frames: bool) -> int:
+def most_worlds(
+    longest: int, options: Options, *, keeps_samples: bool, keeps_frames: bool, keeps_loads: bool = False
+) -> int:
     """Chains that a GPU should carry on together: what could ever reside on it, as far as they fit into free memory.
 
     Half of what is free is left to others, such as batches of other threads.
     """
     device = start_device(options.device)
     samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * keeps_frames
-    fitting = int(device.free_memory) // 2 // world_bytes(longest, options, samples, frames, device)
+    fitting = int(device.free_memory) // 2 // world_bytes(longest, options, samples, frames, device, keeps_loads)
     return max(1, min(BLOCKS_OF_MULTIPROCESSOR * int(device.sm_count), fitting))

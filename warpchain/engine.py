@@ -17,6 +17,7 @@ from warpchain.kernel_choice import block_kernel, block_threads, features_of, ke
 from warpchain.kernels import layout
 from warpchain.kernels.broadphase import list_layout
 from warpchain.kernels.driver import Features, make_advance
+from warpchain.kernels.steadiness import LOADING_TIME
 from warpchain.kernels.types import Model, Program, Record, State
 from warpchain.mirror import Mirror
 from warpchain.options import Options
@@ -62,6 +63,7 @@ class Batch:
         *,
         keeps_samples: bool = False,
         frame_every: int | None = None,
+        keeps_loads: bool = False,
         threads: int | None = None,
     ) -> None:
         """Allocate a batch; all worlds are idle (status FINISHED) until a chain is loaded.
@@ -72,6 +74,7 @@ class Batch:
             options: Shared by all worlds.
             keeps_samples: Keep the time series.
             frame_every: Keep all joint positions at every so many samples; None keeps none.
+            keeps_loads: Keep force and moment of every joint with each frame.
             threads: Of every block on a GPU, at least as many as links; None: as many as a chain needs.
         """
         self.options = options
@@ -122,6 +125,7 @@ class Batch:
         self.record.samples = self._array(np.zeros((worlds, samples, layout.SAMPLE_COLUMNS)))
         self.record.frames = self._array(np.zeros((worlds, frames, 2 * longest)))
         self.record.frame_times = self._array(np.zeros((worlds, frames)))
+        self.record.frame_loads = self._array(np.zeros((worlds, frames * keeps_loads, 3 * longest)))
 
         self.control = control_of(options)
         self.control.launch_time = LAUNCH_SECONDS
@@ -398,11 +402,26 @@ class Batch:
         drift = float(self._view(self.state.watch)[world, layout.DRIFT])
         return drift if drift >= 0 else math.nan
 
+    def unloaded_at(self, world: int) -> float:
+        """Time [s] since loading from which a held loop has borne its own loads; −∞ if they were never multiplied."""
+        since = float(self._view(self.state.watch)[world, layout.UNLOADED_SINCE])
+        return since + float(LOADING_TIME) if since >= 0 else -math.inf
+
     def drain_samples(self, world: int) -> Array:
         """Take the time series kept so far: (t, SAMPLE_COLUMNS), see :mod:`warpchain.kernels.layout`."""
         count = int(self._view(self.record.sample_count)[world])
         self._edit(self.record.sample_count)[world] = 0
         return self._view(self.record.samples)[world, :count].copy()
+
+    def frame_loads(self, world: int) -> Array:
+        """Loads of the joints in the frames that are to be drained, on the link before each: (f, n, 3), N, N and N m.
+
+        No frames, if loads are not kept.
+        """
+        n, kept = self.links[world], self.record.frame_loads.shape[1] > 0
+        count = int(self._view(self.record.frame_count)[world]) if kept else 0
+        rows = self._view(self.record.frame_loads)[world, :count, : 3 * n].reshape(count, 3, n)
+        return rows.transpose(0, 2, 1).copy()
 
     def drain_frames(self, world: int) -> tuple[Array, Array]:
         """Take the frames kept so far: times (f,) [s], joint positions (f, n, 2) [m]."""

@@ -70,10 +70,17 @@ def _batches(
     # Every batch keeps what any walk wants, although most may want nothing: others would wait for two slowest walks.
     keeps_samples = any(keep.series_every for keep in keeps)
     frame_every = next((keep.frame_every for keep in keeps if keep.frame_every), None)
+    keeps_loads = any(keep.before > 0 for keep in keeps)
     on_gpu = options.device.startswith("cuda")
     if slots is None:
         fitting = (
-            most_worlds(longest, options, keeps_samples=keeps_samples, keeps_frames=frame_every is not None)
+            most_worlds(
+                longest,
+                options,
+                keeps_samples=keeps_samples,
+                keeps_frames=frame_every is not None,
+                keeps_loads=keeps_loads,
+            )
             if on_gpu
             else 1
         )
@@ -86,6 +93,7 @@ def _batches(
             options,
             keeps_samples=keeps_samples,
             frame_every=frame_every,
+            keeps_loads=keeps_loads,
             threads=threads,
         )
         for first in range(0, slots, worlds)

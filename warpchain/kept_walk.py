@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.before_release import BeforeRelease
 from warpchain.motion import Motion
 from warpchain.planning import load_sweep
 from warpchain.results import STORED, Stored
@@ -52,6 +53,7 @@ class KeptWalk:
         frame_joints: joints x, y [m], shape (f, n, 2); kept to single precision.
         sprocket_center: centre of the sprocket at the release [m], shape (2,); None without one.
         sprocket_radius: radius of the sprocket that links touch [m]; NaN without one.
+        before_release: its motion just before the release, kept to single precision; None if it was not kept.
     """
 
     index: int
@@ -65,6 +67,7 @@ class KeptWalk:
     frame_joints: Array
     sprocket_center: Array | None
     sprocket_radius: float
+    before_release: BeforeRelease | None = None
 
     def __repr__(self) -> str:
         """One line."""
@@ -87,7 +90,9 @@ class KeptWalk:
         """
         return FIELDS[name].meaning
 
-    def plot(self, kind: Literal["figure5", "film_strip"] = "figure5", *, figure: "Figure | None" = None) -> "Figure":
+    def plot(
+        self, kind: Literal["figure5", "film_strip", "loop"] = "figure5", *, figure: "Figure | None" = None
+    ) -> "Figure":
         """Draw the walk, see `WalkResult.plot`.
 
         Raises:
@@ -141,6 +146,7 @@ class KeptMotions:
             frame_joints=motion.frame_joints.astype(np.float64),
             sprocket_center=np.array([0.0, motion.sprocket_height]) if has_sprocket else None,
             sprocket_radius=contact_radius(setup.scene, setup.parameters) if has_sprocket else math.nan,
+            before_release=None if motion.before_release is None else motion.before_release.as_type(np.float64),
         )
 
 

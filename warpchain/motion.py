@@ -8,6 +8,7 @@ motion/frame_time      times of the frames [s]
 motion/joint_start     likewise of the joints
 motion/joint_x, _y     joints of all frames, frame by frame [m]
 motion/sprocket_height height of the sprocket's centre at the release [m]; NaN without a sprocket
+motion/before_release/ for each walk of which that was kept a group, named by its number, see `before_release`
 motion/checksum        SHA-256 of what is there of each walk
 """
 
@@ -19,6 +20,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
+
+from warpchain.before_release import FIELDS, BeforeRelease, read_before_release, write_before_release
 
 if TYPE_CHECKING:
     import h5py
@@ -42,6 +45,7 @@ FRAMES: Final = {
 """Columns of frames and joints. Joints are in single precision (6e-8 of their distance): they are for pictures."""
 
 GROUP: Final = "motion"
+BEFORE: Final = "before_release"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -53,16 +57,20 @@ class Motion:
         frame_time: times of the frames [s], shape (f,).
         frame_joints: joints x, y [m], shape (f, n, 2).
         sprocket_height: height [m] of the sprocket's centre at the release; NaN without a sprocket or a release.
+        before_release: the motion just before the release, in single precision but for times; None if not kept.
     """
 
     series: Array
     frame_time: Array = field(default_factory=lambda: np.empty(0))
     frame_joints: NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 0, 2), np.float32))
     sprocket_height: float = math.nan
+    before_release: BeforeRelease | None = None
 
     def checksum(self) -> bytes:
         """SHA-256."""
-        parts = (self.series, self.frame_time, self.frame_joints, np.float64(self.sprocket_height))
+        parts = [self.series, self.frame_time, self.frame_joints, np.float64(self.sprocket_height)]
+        if self.before_release is not None:
+            parts += [getattr(self.before_release, name) for name in FIELDS]
         return hashlib.sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in parts)).digest()
 
 
@@ -83,6 +91,9 @@ def write_motions(motions: Mapping[int, Motion], file: "h5py.File") -> None:
     for column, name in enumerate(("joint_x", "joint_y")):
         _put(group, name, joints[:, column])
     group["sprocket_height"] = np.array([motion.sprocket_height for motion in ordered])
+    for walk, motion in zip(walks, ordered, strict=True):
+        if motion.before_release is not None:
+            write_before_release(motion.before_release, group.create_group(f"{BEFORE}/{walk}", track_order=True))
     checksums = b"".join(motion.checksum() for motion in ordered)
     group["checksum"] = np.frombuffer(checksums, np.uint8).reshape(-1, 32)
 
@@ -106,6 +117,7 @@ def read_motion(file: "h5py.File", walk: int) -> Motion:
         frame_time=frame_time,
         frame_joints=flat.reshape(len(frame_time), -1, 2) if len(frame_time) else np.empty((0, 0, 2), np.float32),
         sprocket_height=float(group["sprocket_height"][place]),
+        before_release=read_before_release(group[f"{BEFORE}/{walk}"]) if f"{BEFORE}/{walk}" in group else None,
     )
     if motion.checksum() != group["checksum"][place].tobytes():
         raise ValueError(f"motion of walk {walk}")

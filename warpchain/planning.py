@@ -210,7 +210,9 @@ class Sweep:
             name: choice.steps(walk.setup.options, f"sweep.record.{name}") if choice.includes(walk.sample) else None
             for name, choice in self.recording.choices.items()
         }
-        return Keep(series_every=every.get("series"), frame_every=every.get("frames"))
+        frames = self.recording.frames
+        before = frames.before if frames is not None and frames.includes(walk.sample) else 0.0
+        return Keep(series_every=every.get("series"), frame_every=every.get("frames"), before=before)
 
     def check(self) -> None:
         """Check every cell: its fixed values, its distributions, and that a random sample makes a possible walk.

@@ -43,7 +43,7 @@ _CLOSE_UP_LINKS: Final = 9
 _CLOSE_UP_ASPECT: Final = 1.5
 
 
-def draw(walk: "Walk", kind: Literal["figure5", "film_strip"], *, figure: Figure | None = None) -> Figure:
+def draw(walk: "Walk", kind: Literal["figure5", "film_strip", "loop"], *, figure: Figure | None = None) -> Figure:
     """Draw a walk, see `WalkResult.plot`.
 
     Raises:
@@ -53,7 +53,11 @@ def draw(walk: "Walk", kind: Literal["figure5", "film_strip"], *, figure: Figure
         return figure5([walk], figure=figure)
     if kind == "film_strip":
         return film_strip(walk, figure=figure)
-    raise ValueError(f"kind: {kind!r} is unknown; give 'figure5' or 'film_strip'")
+    if kind == "loop":
+        from warpchain.loop_figure import loop_figure
+
+        return loop_figure(walk, figure=figure)
+    raise ValueError(f"kind: {kind!r} is unknown; give 'figure5', 'film_strip' or 'loop'")
 
 
 def figure5(walks: "Sequence[Walk]", *, labels: Sequence[str] | None = None, figure: Figure | None = None) -> Figure:

@@ -1,11 +1,13 @@
 """Takes the time series and frames of a walk out of its world, between launches."""
 
 import math
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.before_release import BeforeRelease
 from warpchain.engine import Batch
 from warpchain.kernels import layout
 from warpchain.motion import Motion
@@ -18,8 +20,18 @@ SERIES_COLUMNS: Final = [layout.TIME, layout.CENTER_X, layout.CENTER_Y, layout.C
 """Columns of a sample that are those of `warpchain.motion.SERIES`."""
 
 
+@dataclass(frozen=True)
+class _Piece:
+    """What one launch has recorded: samples (t, SAMPLE_COLUMNS), frames (f, n, 2) at times (f,), loads (f, n, 3)."""
+
+    samples: Array
+    frame_times: Array
+    frames: Array
+    loads: Array
+
+
 class Recorder:
-    """Samples and frames of one walk since its release."""
+    """Samples and frames of one walk since its release, and of the last moments before if they are to be kept."""
 
     def __init__(self, batch: Batch, world: int, keep: Keep = EVERYTHING) -> None:
         """Begin with nothing.
@@ -37,9 +49,19 @@ class Recorder:
         self._samples: list[Array] = []
         self._frame_times: list[Array] = []
         self._frames: list[Array] = []
+        self._drive: list[_Piece] = []
+        self._before: BeforeRelease | None = None
+
+    @property
+    def before(self) -> BeforeRelease | None:
+        """What is kept of the time before the release; None: nothing."""
+        return self._before
 
     def drain(self, released: bool) -> None:
-        """Take what the last launch wrote; forget it if that was before the release."""
+        """Take what the last launch wrote; what came before the release is forgotten but for what `release` wants."""
+        if not released and self._keep.before > 0:
+            self._drain_drive()
+            return
         if self._has_samples:
             samples = self._batch.drain_samples(self._world)
             if released and self._keep.series_every is not None and len(samples):
@@ -50,6 +72,47 @@ class Recorder:
             if released and self._keep.frame_every is not None:
                 self._frame_times.append(times)
                 self._frames.append(frames)
+
+    def _drain_drive(self) -> None:
+        """Take what the last launch wrote, and forget what is too old already."""
+        world = self._world
+        samples = self._batch.drain_samples(world) if self._has_samples else np.empty((0, layout.SAMPLE_COLUMNS))
+        loads = self._batch.frame_loads(world)
+        times, frames = self._batch.drain_frames(world)
+        self._drive.append(_Piece(samples, times, frames, loads))
+        oldest = self._batch.time(world) - self._keep.before
+        while self._drive and _ends_before(self._drive[0], oldest):
+            del self._drive[0]
+
+    def release(self, moment: float, raised: float, earliest: float) -> None:
+        """Keep what was recorded in the last moments of the drive, all of which has been drained.
+
+        Args:
+            moment: of the release, by the clock of the drive [s].
+            raised: height [m] by which the chain was raised at the release.
+            earliest: when the loop was last given its own loads [s]; nothing older is kept.
+        """
+        pieces, self._drive = self._drive, []
+        if not pieces:
+            return
+        samples, times, frames, loads = (
+            np.concatenate([getattr(piece, name) for piece in pieces])
+            for name in ("samples", "frame_times", "frames", "loads")
+        )
+        oldest = max(moment - self._keep.before, earliest)
+        is_wanted = (samples[:, layout.TIME] >= oldest) & (samples[:, layout.TIME] < moment)
+        samples = samples[is_wanted][:, SERIES_COLUMNS]
+        wanted = (times >= oldest) & (times < moment)
+        raise_by = np.array([0.0, raised])
+        self._before = BeforeRelease(
+            time=samples[:, 0] - moment,
+            center=samples[:, 1:3] + raise_by,
+            center_velocity=samples[:, 3:5],
+            frame_time=times[wanted] - moment,
+            frame_joints=frames[wanted] + raise_by,
+            frame_forces=loads[wanted, :, :2],
+            frame_moments=loads[wanted, :, 2],
+        )
 
     def _thinned(self, samples: Array) -> Array:
         """The first of the samples in each interval: steps may be longer than the time between two looks."""
@@ -84,4 +147,11 @@ class Recorder:
             frame_time=times,
             frame_joints=joints,
             sprocket_height=sprocket_height,
+            before_release=None if self._before is None else self._before.as_type(np.float32),
         )
+
+
+def _ends_before(piece: _Piece, moment: float) -> bool:
+    """Whether all of a piece is older than a moment [s]."""
+    ends = [times[-1] for times in (piece.samples[:, layout.TIME], piece.frame_times) if len(times)]
+    return all(end < moment for end in ends)

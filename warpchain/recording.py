@@ -20,10 +20,12 @@ class Choice:
     Attributes:
         interval: time [s] between two of them.
         samples: numbers of the samples, sorted, the same in each cell; None: all.
+        before: time [s] before the release in which it is kept as well, with the loads of the joints; 0: none.
     """
 
     interval: float
     samples: tuple[int, ...] | None = None
+    before: float = 0.0
 
     def includes(self, sample: int) -> bool:
         """Whether it is kept of a sample."""
@@ -54,7 +56,8 @@ class Choice:
 
     def canonical(self) -> dict[str, Any]:
         """As in a sweep file."""
-        return {"interval": self.interval, "samples": "all" if self.samples is None else list(self.samples)}
+        before = {"before": self.before} if self.before > 0 else {}
+        return {"interval": self.interval, "samples": "all" if self.samples is None else list(self.samples), **before}
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,11 @@ class Recording:
         """The recording that has a canonical form; for what this package has written, unchecked."""
         return cls(
             **{
-                name: Choice(given["interval"], None if given["samples"] == "all" else tuple(given["samples"]))
+                name: Choice(
+                    given["interval"],
+                    None if given["samples"] == "all" else tuple(given["samples"]),
+                    given.get("before", 0.0),
+                )
                 for name, given in canonical.items()
                 if given is not False
             }
@@ -98,10 +105,13 @@ class Keep:
     Attributes:
         series_every: every so many looks at the chain a sample is kept; None: no series.
         frame_every: every so many looks a frame is kept; None: no frames.
+        before: time [s] before the release of which samples and frames are kept as well, with the joints' loads; 0:
+            none.
     """
 
     series_every: int | None = None
     frame_every: int | None = None
+    before: float = 0.0
 
 
 NOTHING: Final = Keep()

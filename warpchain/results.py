@@ -2,8 +2,8 @@
 
 Unit and meaning of every field stand beside it, once; the file repeats them on each dataset. A saved walk
 has the groups `series` (time series), `frames` (joint positions), `summary` (numbers) and `parameters` (the
-chain's quantities with their symbols); its attributes `setup`, `seed` and `versions`, in JSON, say how to
-make it again.
+chain's quantities with their symbols), and `before_release` if that was kept; its attributes `setup`, `seed`
+and `versions`, in JSON, say how to make it again.
 """
 
 import dataclasses
@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from warpchain.before_release import BeforeRelease, read_before_release, write_before_release
 from warpchain.options import Options
 from warpchain.parameters import Parameters
 from warpchain.scene import Scene
@@ -35,6 +36,8 @@ Array = NDArray[np.float64]
 
 FORMAT: Final = "warpchain walk"
 FORMAT_VERSION: Final = 3
+
+BEFORE: Final = "before_release"
 
 CONTACTS: Final = {
     "floor": "between links and floor",
@@ -85,7 +88,8 @@ class WalkResult:
 
     Time counts from the release, x from wherever the release put it, y from the floor upwards. The other
     fields say their units and shapes themselves. `setup` is complete; `seed` is that of the parameters'
-    random draw, None if nothing was drawn; `versions` names the software.
+    random draw, None if nothing was drawn; `versions` names the software. `before_release` is the motion on the
+    sprocket just before the release, None if it was not kept.
 
     Raises:
         ValueError: an array has another shape, or a dictionary other keys, than stands beside its field.
@@ -153,6 +157,7 @@ class WalkResult:
         Array,
         Stored("frames/joints", "m", "joints x, y, shape (f, n, 2); joint i ends link i, even links inner"),
     ]
+    before_release: BeforeRelease | None = None
 
     def __post_init__(self) -> None:
         """Check that arrays and dictionaries fit together."""
@@ -163,6 +168,10 @@ class WalkResult:
         shapes["center"] = shapes["center_velocity"] = (instants, 2)
         shapes["frame_time"] = (frames,)
         shapes["frame_joints"] = (frames, self.setup.scene.links, 2)
+        before = self.before_release
+        if before is not None and before.frame_joints.shape[1] != self.setup.scene.links:
+            links = self.setup.scene.links
+            raise ValueError(f"before_release: its frames are not of {links} links; give those of this walk")
         if self.sprocket_center is not None:
             shapes["sprocket_center"] = (2,)
         for name, shape in shapes.items():
@@ -197,15 +206,18 @@ class WalkResult:
         )
         return plain
 
-    def plot(self, kind: Literal["figure5", "film_strip"] = "figure5", *, figure: "Figure | None" = None) -> "Figure":
+    def plot(
+        self, kind: Literal["figure5", "film_strip", "loop"] = "figure5", *, figure: "Figure | None" = None
+    ) -> "Figure":
         """Draw the walk.
 
         Args:
-            kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself.
+            kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself, `loop` for
+                its loop on the sprocket just before the release.
             figure: an empty matplotlib figure to draw into; by default a new one.
 
         Raises:
-            ValueError: the kind is unknown, or a film strip is asked of a walk without frames.
+            ValueError: the kind is unknown, or the walk does not have what it shows: frames, or `before_release`.
         """
         from warpchain.plots import draw
 
@@ -358,6 +370,8 @@ def _write(walk: WalkResult, file: "h5py.File") -> None:
         value = getattr(walk.setup.parameters, name)
         dataset = _put(file, f"parameters/{name}", value, quantity.unit, quantity.meaning)
         dataset.attrs["symbol"] = quantity.symbol
+    if walk.before_release is not None:
+        write_before_release(walk.before_release, file.create_group(BEFORE))
 
 
 def _put(file: "h5py.File", path: str, value: float | Array, unit: str, meaning: str) -> "h5py.Dataset":
@@ -401,4 +415,6 @@ def _read(file: "h5py.File") -> WalkResult:
         else:
             number = file[stored.path][()]
             values[name] = number if number.shape else number.item()
+    if BEFORE in file:
+        values["before_release"] = read_before_release(file[BEFORE])
     return WalkResult(**values)

@@ -120,7 +120,7 @@ def _recording(content: object) -> Recording:
     """What is kept of the motion of walks."""
     given = _keys(content, "sweep.record", ("series", "frames"))
     series = _choice(given.get("series", False), "sweep.record.series", SERIES_INTERVAL)
-    frames = _choice(given.get("frames", False), "sweep.record.frames", FRAME_INTERVAL)
+    frames = _choice(given.get("frames", False), "sweep.record.frames", FRAME_INTERVAL, ("before",))
     if frames is not None and (series is None or not series.covers(frames)):
         raise InputError(
             "sweep.record.frames: kept of samples without series; give them in sweep.record.series as well"
@@ -128,13 +128,13 @@ def _recording(content: object) -> Recording:
     return Recording(series, frames)
 
 
-def _choice(content: object, path: str, interval: float) -> Choice | None:
-    """Of which samples something is kept, and how often; None for none."""
+def _choice(content: object, path: str, interval: float, more: tuple[str, ...] = ()) -> Choice | None:
+    """Of which samples something is kept, and how often; None for none. `more` are keys that only some things have."""
     if content is False:
         return None
     if not (content is True or isinstance(content, Mapping)):
         raise InputError(f"{path}: {shown(content)}; give true, false or {{interval: {interval}, samples: [0, 1]}}")
-    keys = {} if content is True else _keys(content, path, ("interval", "samples"))
+    keys = {} if content is True else _keys(content, path, ("interval", "samples", *more))
     chosen = keys.get("samples", "all")
     samples = None
     if chosen != "all":
@@ -143,7 +143,8 @@ def _choice(content: object, path: str, interval: float) -> Choice | None:
         if len(set(samples)) < len(samples):
             raise InputError(f"{path}.samples: a number is given twice; leave one out")
         samples = tuple(sorted(samples))
-    return Choice(float(_positive(keys.get("interval", interval), f"{path}.interval")), samples)
+    before = float(_positive(keys["before"], f"{path}.before")) if "before" in keys else 0.0
+    return Choice(float(_positive(keys.get("interval", interval), f"{path}.interval")), samples, before)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from warpchain.parameters import DIMENSIONLESS, Parameters
 from warpchain.plots import FAINT, GROUND, INK, LINE_COLORS, _tidy
 from warpchain.status import Status
 from warpchain.sweep_figure5 import sweep_figure5
+from warpchain.sweep_kink import sweep_kink
 from warpchain.sweep_series import BLUE, RED, Cell, Series, all_series, lost_note
 from warpchain.sweep_statistics import (
     CONFIDENCE,
@@ -74,6 +75,9 @@ def figures(result: "SweepResult") -> Iterator[Picture]:
     with suppress(NothingToShow):
         figure, text = sweep_figure5(result)
         yield Picture("figure5", text, figure)
+    with suppress(NothingToShow):
+        figure, text = sweep_kink(result)
+        yield Picture("kink", text, figure)
     with suppress(NothingToShow):
         text = "Mean and standard deviation of the distance walked, over the walks at rest in each cell."
         yield Picture("heat_map", text, heat_map(result))

@@ -187,8 +187,8 @@ def print_scaling(scaling: "Scaling") -> None:
 def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iterator[Path]:
     """Write the record, then its pictures, each whole or not at all; yield the path of each.
 
-    A failed walk may have nothing to show in a picture. That picture is left out, and so is one of an earlier
-    walk, which does not belong to this record.
+    A failed walk may have nothing to show in a picture, and a sprocket that stands still no loop that runs. That
+    picture is left out, and so is one of an earlier walk, which does not belong to this record.
 
     Raises:
         OSError: a file cannot be written.
@@ -201,6 +201,10 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
         "figure5.png": partial(_draw, "figure5"),
         "film_strip.png": partial(_draw, "film_strip"),
     }
+    if result.before_release is not None:
+        pictures["loop.png"] = partial(_draw, "loop")
+    else:
+        (folder / "loop.png").unlink(missing_ok=True)
     if animation is not None:
         from warpchain.animation import animate
 
@@ -210,7 +214,7 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
         try:
             draw(result, path)
         except ValueError as error:
-            if result.status.ok:
+            if result.status.ok and name != "loop.png":
                 raise
             path.unlink(missing_ok=True)
             print(f"{path}: not drawn; {error}", file=sys.stderr)
@@ -218,7 +222,7 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
             yield path
 
 
-def _draw(kind: Literal["figure5", "film_strip"], result: WalkResult, path: Path) -> None:
+def _draw(kind: Literal["figure5", "film_strip", "loop"], result: WalkResult, path: Path) -> None:
     figure = result.plot(kind)
     with replacing(path) as part:
         figure.savefig(part, dpi=PICTURE_DPI)

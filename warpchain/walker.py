@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,8 @@ from warpchain.setups import Setup, resolve
 
 Array = NDArray[np.float64]
 
+RECORD_BEFORE = 0.5
+"""Time [s] before the release that is kept if frames are, unless told otherwise."""
 LONGEST_FRAME_INTERVAL = 1000.0
 """Greatest time [s] between frames."""
 
@@ -58,6 +60,7 @@ def walk(
     start: str = "rest",
     seed: int | None = None,
     frame_interval: float | None = 2e-3,
+    record_before: float | None = None,
     on_progress: OnProgress | None = None,
     **settings: object,
 ) -> WalkResult:
@@ -77,6 +80,8 @@ def walk(
         seed: Draw parameters, phase and clearance from their distributions; None: Table 1's means, phase 0.
         frame_interval: Time between kept frames of all joints [s], to whole samples; None keeps none. Neither frames
             nor samples change the walk: they are taken at the first step's end after their time.
+        record_before: Time [s] before the release of which frames and samples are kept as well, as ``before_release``
+            of the result, with the forces in the joints; None: 0.5 s if frames are kept; 0: none.
         on_progress: Called about ten times a second.
         settings: Any other field of :class:`Parameters`, :class:`Scene` or :class:`Options`, by its name.
 
@@ -89,7 +94,9 @@ def walk(
     named = {"links": links, "frequency": frequency, "method": method, "start": start}
     chosen = {} if tolerance is None else {"tolerance": tolerance}
     setup = setup_walk(preset, named | chosen | settings, seed)
-    return run_walk(setup, seed=seed, frame_interval=frame_interval, on_progress=on_progress)
+    return run_walk(
+        setup, seed=seed, frame_interval=frame_interval, record_before=record_before, on_progress=on_progress
+    )
 
 
 def setup_walk(preset: str, settings: Mapping[str, object], seed: int | None) -> Setup:
@@ -125,6 +132,7 @@ def run_walk(
     *,
     seed: int | None = None,
     frame_interval: float | None = 2e-3,
+    record_before: float | None = None,
     on_progress: OnProgress | None = None,
 ) -> WalkResult:
     """Run a walk that is set up completely; arguments and result as of :func:`walk`.
@@ -133,14 +141,16 @@ def run_walk(
         setup: Everything that says what the walk is, samples drawn.
         seed: Only noted in the result.
         frame_interval: See :func:`walk`.
+        record_before: See :func:`walk`.
         on_progress: See :func:`walk`.
     """
     started = time.perf_counter()
     report = on_progress or (lambda progress: None)
     options = setup.options
     frame_every = None if frame_interval is None else _samples_per_frame(frame_interval, options)
-    batch = Batch(1, setup.scene.links, options, keeps_samples=True, frame_every=frame_every)
-    course = Course(batch, 0, setup, EVERYTHING)
+    before = _time_before(record_before, frame_every) if setup.scene.start != "ellipse" else 0.0
+    batch = Batch(1, setup.scene.links, options, keeps_samples=True, frame_every=frame_every, keeps_loads=before > 0)
+    course = Course(batch, 0, setup, replace(EVERYTHING, before=before))
     compiled: set[Features] = set()
 
     def after_launch() -> None:
@@ -164,10 +174,7 @@ def _samples_per_frame(frame_interval: float, options: Options) -> int:
     Raises:
         InputError: The interval is no time, or shorter than that between samples.
     """
-    is_number = isinstance(frame_interval, (int, float, np.integer, np.floating)) and not isinstance(
-        frame_interval, bool
-    )
-    if not (is_number and 0 < frame_interval < math.inf):
+    if not (_is_number(frame_interval) and 0 < frame_interval < math.inf):
         raise InputError(f"frame_interval: {shown(frame_interval)} is not a positive time in s; give one, or None")
     samples = frame_interval / options.record_interval if frame_interval < LONGEST_FRAME_INTERVAL else math.inf
     if not 0.999 < samples < math.inf:
@@ -176,6 +183,25 @@ def _samples_per_frame(frame_interval: float, options: Options) -> int:
             f"{options.record_interval} s and {LONGEST_FRAME_INTERVAL} s; give a time between, or None"
         )
     return round(samples)
+
+
+def _time_before(record_before: float | None, frame_every: int | None) -> float:
+    """Time [s] before the release that is kept.
+
+    Raises:
+        InputError: It is no time, or no frames are kept.
+    """
+    if record_before is None:
+        return RECORD_BEFORE if frame_every is not None else 0.0
+    if not (_is_number(record_before) and 0 <= record_before < math.inf):
+        raise InputError(f"record_before: {shown(record_before)} is not a time in s; give one, 0 for none, or None")
+    if record_before > 0 and frame_every is None:
+        raise InputError("record_before: a time is given, but frame_interval is None; give a frame_interval as well")
+    return float(record_before)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
 
 
 def _result(course: Course, seed: int | None, wall_time: float) -> WalkResult:
@@ -214,4 +240,5 @@ def _result(course: Course, seed: int | None, wall_time: float) -> WalkResult:
         rms_speed=samples[:, layout.RMS_SPEED],
         frame_time=frame_time,
         frame_joints=frames,
+        before_release=course.recorder.before,
     )

@@ -1,0 +1,102 @@
+"""The motion of a chain on its sprocket in the last moments before its release, and the loads of its joints there."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import h5py
+
+Array = NDArray[np.float64]
+
+FIELDS: Final[Mapping[str, tuple[str, str]]] = {
+    "time": ("s", "time since the release, negative, shape (t,)"),
+    "center": ("m", "centre of mass x, y, shape (t, 2)"),
+    "center_velocity": ("m/s", "velocity of the centre of mass x, y, shape (t, 2)"),
+    "frame_time": ("s", "time of a frame since the release, negative, shape (f,)"),
+    "frame_joints": ("m", "joints x, y, shape (f, n, 2); joint i ends link i, even links inner"),
+    "frame_forces": ("N", "force x, y in each joint on the link that it ends, shape (f, n, 2)"),
+    "frame_moments": ("N m", "friction moment in each joint on the link that it ends, shape (f, n)"),
+}
+"""Arrays of a `BeforeRelease`: name → unit and meaning."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class BeforeRelease:
+    """A chain of n links on its sprocket: t instants and f frames of the last moments before its release.
+
+    Coordinates are those of the walk: the chain is shown as high as it hangs at the release. The link after a joint
+    feels the opposite of its force and moment. Forces are those of the joints as they were then, perhaps softened.
+
+    Attributes:
+        time: time since the release [s], negative, shape (t,).
+        center: centre of mass x, y [m], shape (t, 2).
+        center_velocity: its velocity [m/s], shape (t, 2).
+        frame_time: times of the frames [s], negative, shape (f,).
+        frame_joints: joints x, y [m], shape (f, n, 2).
+        frame_forces: force F = k C + b dC/dt in each joint [N], on the link that it ends, shape (f, n, 2).
+        frame_moments: friction moment in each joint [N m], counter-clockwise on the link that it ends, shape (f, n).
+
+    Raises:
+        ValueError: an array has another shape than stands beside it, or a time is not negative.
+    """
+
+    time: Array
+    center: Array
+    center_velocity: Array
+    frame_time: Array
+    frame_joints: Array
+    frame_forces: Array
+    frame_moments: Array
+
+    def __post_init__(self) -> None:
+        """Check that the arrays fit together."""
+        instants, frames = len(self.time), len(self.frame_time)
+        links = self.frame_joints.shape[1]
+        shapes = {
+            "center": (instants, 2),
+            "center_velocity": (instants, 2),
+            "frame_joints": (frames, links, 2),
+            "frame_forces": (frames, links, 2),
+            "frame_moments": (frames, links),
+        }
+        for name, shape in shapes.items():
+            given = np.shape(getattr(self, name))
+            if given != shape:
+                raise ValueError(f"before_release.{name}: its shape is {given}; give an array of shape {shape}")
+        if np.any(self.time >= 0) or np.any(self.frame_time >= 0):
+            raise ValueError("before_release: a time is not negative; give times before the release")
+
+    def as_type(self, joints: type[np.floating[Any]]) -> "BeforeRelease":
+        """The same with joints, forces and moments in another precision."""
+        names = ("frame_joints", "frame_forces", "frame_moments")
+        return replace(self, **{name: getattr(self, name).astype(joints) for name in names})
+
+    def __repr__(self) -> str:
+        """One line."""
+        span = -float(self.frame_time[0]) if len(self.frame_time) else 0.0
+        return f"<BeforeRelease: {span:.3g} s, {len(self.time)} instants, {len(self.frame_time)} frames>"
+
+
+def write_before_release(before: BeforeRelease, group: "h5py.Group") -> None:
+    """Put the arrays into a group, with their units; gzip adds checksums."""
+    for name, (unit, meaning) in FIELDS.items():
+        value = getattr(before, name)
+        filters = {"compression": "gzip", "shuffle": True} if value.size else {}
+        dataset = group.create_dataset(name, data=value, **filters)
+        dataset.attrs["unit"] = unit
+        dataset.attrs["description"] = meaning
+
+
+def read_before_release(group: "h5py.Group") -> BeforeRelease:
+    """What `write_before_release` has put into a group.
+
+    Raises:
+        KeyError: an array is missing.
+        ValueError: the arrays do not fit together.
+    """
+    values: dict[str, Any] = {name: group[name][()] for name in FIELDS}
+    return BeforeRelease(**values)
