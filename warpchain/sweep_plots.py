@@ -22,6 +22,7 @@ from warpchain.plots import FAINT, GROUND, INK, LINE_COLORS, _tidy
 from warpchain.status import Status
 from warpchain.sweep_figure5 import sweep_figure5
 from warpchain.sweep_kink import sweep_kink
+from warpchain.sweep_panels import sweep_panels
 from warpchain.sweep_series import BLUE, RED, Cell, Series, all_series, lost_note
 from warpchain.sweep_statistics import (
     CONFIDENCE,
@@ -34,7 +35,7 @@ from warpchain.sweep_statistics import (
 )
 
 if TYPE_CHECKING:
-    from warpchain.sweep_result import SweepResult
+    from warpchain.sweep_result import BlockResult, SweepResult
 
 Array = NDArray[np.float64]
 
@@ -81,6 +82,11 @@ def figures(result: "SweepResult") -> Iterator[Picture]:
     with suppress(NothingToShow):
         text = "Mean and standard deviation of the distance walked, over the walks at rest in each cell."
         yield Picture("heat_map", text, heat_map(result))
+    with suppress(NothingToShow):
+        labels = {name: _axis_label(block, name) for block in result.blocks.values() for name in block.axes}
+        for quantity, figure in sweep_panels(result, labels):
+            text = f"Distance walked against {quantity.replace('_', ' ')}, by links and frequency: means with two "
+            yield Picture(f"against_{quantity}", text + "standard errors.", figure)
     with suppress(NothingToShow):
         figure, agreement = tolerance(result)
         yield Picture("tolerance", str(agreement), figure)
@@ -315,10 +321,9 @@ def responses(result: "SweepResult") -> Figure:
             texts = [number_text(value) if values.dtype.kind in "if" else str(value) for value in values]
             axes.set_xticks(places, texts)
         axes.margins(x=0.15)
-        unit = "" if block.unit(name) == DIMENSIONLESS else f" / {block.unit(name)}"
         counts = Cell(np.nan, np.nan, *(int(table.sum()) for table in (found.count, found.failed, found.missing)))
         note = lost_note([counts])
-        axes.set_xlabel(_quantity_text(name) + unit + (f"\n{note}" if note else ""), fontsize="small")
+        axes.set_xlabel(_axis_label(block, name) + (f"\n{note}" if note else ""), fontsize="small")
         axes.tick_params(axis="x", labelsize="small")
         axes.grid(axis="y", **_GRID)
         _tidy(axes)
@@ -405,6 +410,12 @@ def _write_numbers(
         axes.text(column, row, text, ha="center", va="bottom" if parts else "center", color=color, fontsize="small")
         if parts:
             axes.text(column, row, "\n".join(parts), ha="center", va="top", color=color, fontsize="xx-small")
+
+
+def _axis_label(block: "BlockResult", name: str) -> str:
+    """Name, symbol and unit of an axis of a grid."""
+    unit = "" if block.unit(name) == DIMENSIONLESS else f" / {block.unit(name)}"
+    return _quantity_text(name) + unit
 
 
 def _quantity_text(name: str) -> str:
