@@ -1,17 +1,21 @@
-"""The block form softens and stiffens joints in the same steps, and to the same bits, as the CPU form does."""
+"""The block form softens, stiffens and loads a chain in the same steps, and to the same bits, as the CPU form does."""
 
 import dataclasses
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
+import warp as wp
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.blocks_under_test import FIXED_STEP, batch_of, heap, launch_blocks, launch_chains
 from warpchain.control import SOFT
 from warpchain.engine import Batch
-from warpchain.kernels import block, driver, layout
+from warpchain.kernels import block, driver, layout, steadiness
 from warpchain.kernels.block import make_advance_block
+from warpchain.kernels.block_look import block_look
 from warpchain.kernels.driver import Features, make_advance
+from warpchain.kernels.record import sampling
 from warpchain.shapes import ellipse, lay_chain
 from warpchain.status import Status
 
@@ -58,18 +62,36 @@ def released() -> Batch:
     return soften_much(batch)
 
 
-def driven() -> Batch:
-    """A heap on a sprocket that begins to turn after 12 steps; the hold begins after 70.
+LOAD_FALLS = 20 * FIXED_STEP  # s in which loads fall
+UNLOADED = 90 * FIXED_STEP  # s when they begin to
 
-    It may be released at the end of the second window of 12 steps; half a turn is longer than that.
+
+@pytest.fixture
+def quick_unloading(monkeypatch: pytest.MonkeyPatch, exact_kernels: None) -> Iterator[None]:
+    """Loads that fall in twenty steps, in kernels made anew."""
+    monkeypatch.setattr(steadiness, "LOADING_TIME", wp.constant(wp.float64(LOAD_FALLS)))
+    for cached in (sampling, block_look):
+        cached.cache_clear()
+    yield
+    for cached in (sampling, block_look):
+        cached.cache_clear()
+
+
+def driven() -> Batch:
+    """A heap on a sprocket that begins to turn after 12 steps; the hold begins after 70, under 15 times the loads.
+
+    These fall from step 90 to 110; it may be released at the end of the second window of 12 steps after that, and is
+    then held on.
     """
     raised = 0.9 * SOFT.sprocket_radius
     batch = batch_of([heap(LINKS, 3, raised=raised)], method="dp5", keeps=True)
     batch.control.sample_interval = 4 * FIXED_STEP
     batch.control.stiffening_time = 30 * FIXED_STEP
     times = {"spin_up_start": 12 * FIXED_STEP, "spin_up_time": 58 * FIXED_STEP, "hold_start": 70 * FIXED_STEP}
-    batch.set_program(0, **times, loop_speed=3.0, loop_period=12 * FIXED_STEP, steady_tolerance=0.01)
-    batch.set_program(0, hold_softness=1.25, release_step=1.5 * FIXED_STEP)
+    batch.set_program(0, **times, loop_speed=3.0, loop_period=12 * FIXED_STEP, load_factor=15.0, push_rate=1e4)
+    batch.set_program(0, steady_window=12 * FIXED_STEP, steady_time=-1.0, steady_tolerance=1.0, further_hold=1.0)
+    batch.set_program(0, hold_softness=1.25, loaded_softness=1.1)
+    batch.state.watch.numpy()[0, layout.UNLOADED_SINCE] = UNLOADED
     batch.state.softness.numpy()[0] = 1.25
     batch.state.stop_status.numpy()[0] = Status.NOT_STEADY
     return soften_much(batch)
@@ -77,7 +99,7 @@ def driven() -> Batch:
 
 def assert_same_bits(ours: Batch, theirs: Batch) -> None:
     """States, moments and samples agree to the bit, losses to the order of their sums."""
-    for name in ("links", "time", "status", "softness", "first_area", "watch", "stop_time"):
+    for name in ("links", "time", "status", "softness", "load_factor", "first_area", "watch", "stop_time"):
         assert_array_equal(getattr(ours.state, name).numpy(), getattr(theirs.state, name).numpy(), err_msg=name)
     assert_allclose(ours.state.losses.numpy(), theirs.state.losses.numpy(), rtol=1e-12)
     for world in range(len(ours.links)):
@@ -89,9 +111,9 @@ def softening_features(batch: Batch, fixed_body: str, watch: str) -> Features:
     return dataclasses.replace(batch.features(fixed_body=fixed_body, watch=watch), softens=True)
 
 
-def launch_both(ours: Batch, theirs: Batch, features: Features, cut: int) -> None:
-    """Sixty tries or a few more: in blocks, so many to a launch, and in the CPU form, all at once."""
-    launches = -(-60 // cut)
+def launch_both(ours: Batch, theirs: Batch, features: Features, cut: int, tries: int = 60) -> None:
+    """So many tries or a few more: in blocks, a part of them to a launch, and in the CPU form, all at once."""
+    launches = -(-tries // cut)
     for _ in range(launches):
         launch_blocks(ours, features, cut, block_dim=LINKS)
     launch_chains(theirs, features, cut * launches)
@@ -122,19 +144,39 @@ def test_blocks_stiffen_as_the_cpu_form_does(cut: int, exact_kernels: None) -> N
     assert_same_bits(ours, theirs)
 
 
-@pytest.mark.parametrize("cut", [60, 7])
-def test_blocks_drive_on_softer_joints_as_the_cpu_form_does(cut: int, exact_kernels: None) -> None:
-    """The block form makes joints softest and soft again in the same steps of the drive, however cut into launches."""
+@pytest.mark.parametrize("cut", [80, 7])
+def test_blocks_drive_under_load_as_the_cpu_form_does(cut: int, quick_unloading: None) -> None:
+    """In the block form loads and softness change in the same steps of the drive, however cut: on, falling, off."""
     ours, theirs = driven(), driven()
     features = softening_features(ours, "sprocket", "steady")
-    launch_both(ours, theirs, features, cut)
+    launch_both(ours, theirs, features, cut, tries=80)
     assert theirs.counts(0)["sprocket"] > 10
-    assert theirs.time(0) > 70 * FIXED_STEP
+    assert theirs.time(0) > UNLOADED + LOAD_FALLS + 12 * FIXED_STEP
+    assert theirs.state.load_factor.numpy()[0] == 1.0
     assert theirs.state.softness.numpy()[0] == 1.25
     assert theirs.counts(0)["accepted"] < theirs.time(0) / (1.1 * FIXED_STEP)
-    assert theirs.state.watch.numpy()[0, layout.STEADY_SINCE] > 82 * FIXED_STEP
-    assert theirs.time(0) < 120 * FIXED_STEP  # steps of 2 FIXED_STEP to the end would take it to 125
+    assert theirs.state.watch.numpy()[0, layout.DRIFT] > 0  # a window of the free loop has ended
     assert_same_bits(ours, theirs)
+
+
+@pytest.mark.parametrize("form", ["block", "cpu"])
+def test_loads_are_on_then_fall_then_are_off(form: str, quick_unloading: None) -> None:
+    """A look after the other they are 1, 15, powers of it that fall with time, and 1 for good; softness follows."""
+    batch = driven()
+    features = softening_features(batch, "sprocket", "steady")
+    seen = []
+    for _ in range(80):
+        advance(batch, form, features, 1)
+        look = batch.last_look(0)[layout.TIME]
+        seen.append((look / FIXED_STEP, batch.state.load_factor.numpy()[0], batch.state.softness.numpy()[0]))
+    fell = False
+    for steps, load, softness in seen:
+        expected = 15.0 ** np.clip(1 - (steps - 90) / 20, 0, 1) if steps >= 70 - 1e-6 else 1.0
+        assert load == pytest.approx(expected, rel=1e-6)
+        fell = fell or 1 < load < 15
+        if steps >= 70:
+            assert softness == pytest.approx(1.25 - 0.15 * np.log(load) / np.log(15), abs=1e-6)
+    assert fell and {1.0, 15.0} <= {load for _, load, _ in seen}
 
 
 def advance(batch: Batch, form: str, features: Features, tries: int) -> None:

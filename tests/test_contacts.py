@@ -118,6 +118,72 @@ def test_each_kind_alone_equals_reference(kind):
     assert sum(result[kind] for result in results) > 100
 
 
+def pushed_out(heap, push_rate):
+    """Velocities (n, 3) and impulses of a pass over a turning sprocket that pushes out what has sunk in."""
+    p, r = heap.parameters, heap.parameters.circle_radius
+    n = len(heap.position)
+    ends = np.stack(reference.link_ends(heap.position, p), axis=1)
+    inverse = np.column_stack([1 / reference.link_masses(n, p), 1 / reference.link_inertias(n, p)])
+    law = (p.sprocket_restitution, p.sprocket_friction, p.tangential_restitution)
+    velocity, count = heap.velocity.copy(), 0
+    for link in range(n):
+        for centre in ends[link]:
+            distance = np.linalg.norm(centre)
+            depth = p.sprocket_radius + r - distance
+            if depth <= 0:
+                continue
+            outwards = centre / distance
+            point = centre - r * outwards
+            arm = point - heap.position[link, :2]
+            surface = TURNING * np.array([-point[1], point[0]]) + push_rate * depth * outwards
+            ours = velocity[link, :2] + velocity[link, 2] * np.array([-arm[1], arm[0]])
+            j = reference_contacts.collision_impulse(
+                surface - ours, outwards, np.zeros(2), arm, 0.0, 0.0, *inverse[link], *law
+            )
+            velocity[link] += [*(j * inverse[link, 0]), (arm[0] * j[1] - arm[1] * j[0]) * inverse[link, 1]]
+            count += bool(j.any())
+    return velocity, count
+
+
+@pytest.mark.parametrize("push_rate", [0.0, 300.0, 5000.0])
+def test_sprocket_pushes_out_what_has_sunk_in(push_rate):
+    """A circle that has sunk in by d meets a surface that comes outwards at push_rate d; else all is as it was."""
+    heaps = [placed_heap(n, n + i, np.pi, with_random_coefficients(i)) for i in range(8) for n in (8, 20)]
+    contact_pass = ContactPass(heaps, sprocket_speed=TURNING, push_rate=push_rate)
+    hits = 0
+    for world, (heap, result) in enumerate(zip(heaps, contact_pass.run(SPROCKET), strict=True)):
+        expected, count = pushed_out(heap, push_rate)
+        assert result["sprocket"] == count
+        assert_same_velocity(contact_pass.velocity(world), expected)
+        hits += count
+    assert hits > 50
+
+
+def test_a_sunken_circle_leaves_at_push_rate_times_its_depth():
+    """Without restitution a resting link's only sunken circle moves outwards at that speed after the pass."""
+    push_rate = 2000.0
+    dull = PAPER.with_values({"sprocket_restitution": 0.0})
+    seen = 0
+    for seed in range(20):
+        position, velocity = folded_chain(20, seed, dull.link_length, tilt=np.pi)
+        position[:, 0] += dull.sprocket_radius + dull.link_length
+        contact_pass = ContactPass([Placed(position, 0 * velocity, dull)], push_rate=push_rate)
+        contact_pass.run(SPROCKET)
+        after = contact_pass.velocity(0)
+        ends = np.stack(reference.link_ends(position, dull), axis=1)
+        depth = dull.sprocket_radius + dull.circle_radius - np.linalg.norm(ends, axis=2)
+        for link in np.flatnonzero((depth > 0).sum(axis=1) == 1):
+            end = int(np.argmax(depth[link]))
+            outwards = ends[link, end] / np.linalg.norm(ends[link, end])
+            arm = ends[link, end] - dull.circle_radius * outwards - position[link, :2]
+            speed = after[link, :2] + after[link, 2] * np.array([-arm[1], arm[0]])
+            assert speed @ outwards == pytest.approx(push_rate * depth[link, end], rel=1e-10)
+            seen += 1
+        untouched = np.all(depth <= 0, axis=1)
+        assert np.all(after[untouched] == 0)
+    assert seen > 10
+
+
 def test_worlds_do_not_meet():
     """A chain's pass gives the same bits alone and among chains of other lengths and parameters."""
     heaps = [placed_heap(n, n, np.pi, with_random_coefficients(n)) for n in (4, 60, 8, 150, 20)]

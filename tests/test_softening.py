@@ -415,7 +415,7 @@ def test_cuts_into_launches_do_not_change_a_softened_walk(monkeypatch: pytest.Mo
     for tries in (20_000, 777):
         monkeypatch.setitem(ensemble.TRIES, "cpu", tries)
         ((_, course),) = ensemble.run_setups([setup])
-        times = course.drive_time, course.walk_time, course.softened_at
+        times = course.drive_time, course.walk_time, course.softened_at, course.drift
         seen.append((course.dx, times, course.counts, course.energy()))
     assert seen[0] == seen[1]
     assert seen[0][1][2] > 0

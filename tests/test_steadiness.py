@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 import warpchain
 from tests.driven_loops import Loop, released_loop
-from warpchain import InputError, Status, load_walk, preset
-from warpchain.control import inertia_load_limit
+from warpchain import InputError, Status, ensemble, load_walk, preset
 from warpchain.devices import start_device
 from warpchain.engine import Batch
 from warpchain.kernels.scaled_loads import under_load
@@ -30,7 +29,7 @@ from warpchain.kernels.steadiness import (
 from warpchain.kernels.summary import Summary
 from warpchain.kernels.types import Model, Program, State, read_chain
 from warpchain.options import Options
-from warpchain.scene import Scene, fewest_links
+from warpchain.scene import Scene, fewest_links, greatest_load
 from warpchain.walker import setup_walk
 
 Array = NDArray[np.float64]
@@ -381,6 +380,33 @@ def test_hold_time_and_drift_are_in_the_result_its_file_and_its_row(tmp_path: Pa
     assert math.isnan(ellipse.hold_time) and math.isnan(ellipse.drift)
 
 
+def test_a_drive_depends_neither_on_its_launches_nor_on_its_neighbours(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Loops driven under several loads are released in the same state to the bit, however cut, in whatever batch."""
+    cases = [
+        {"links": 30, "frequency": 15.0},
+        {"links": 44, "frequency": 10.0, "start": "rest", "settle_time": 0.1, "spin_up_time": 0.2},
+        {"links": 36, "frequency": 20.0, "load_factor": 5.0, "further_hold": 0.05},
+        {"links": 30, "frequency": 12.0, "load_factor": 1.0, "steady_time": 0.2, "steady_tolerance": 0.05},
+    ]
+    setups = [
+        setup_walk("soft", {"method": "explicit", "start": "spinning", "walk_limit": 1e-3} | case, None)
+        for case in cases
+    ]
+
+    def outcomes(tries: int, slots: int) -> dict[int, tuple[Any, ...]]:
+        monkeypatch.setitem(ensemble.TRIES, "cpu", tries)
+        found = {}
+        for place, course in ensemble.run_setups(setups, slots=slots):
+            assert course.status == Status.TIME_LIMIT
+            found[place] = (course.hold_time, course.drift, course.drive_counts, course.energy(), course.raised)
+        return found
+
+    whole = outcomes(20_000, 1)
+    assert all(hold_time > 0.2 for hold_time, *_ in whole.values())
+    assert outcomes(501, 1) == whole
+    assert outcomes(777, 3) == whole
+
+
 # --- hard cases ---
 
 
@@ -427,9 +453,9 @@ def test_point_like_links_bear_less_load() -> None:
         inertia = TENTH[f"{kind}_inertia"]
         missing = getattr(SOFT, f"{kind}_mass") * SOFT.link_length**2 / 6 - inertia
         limits.append(1 + inertia / (2 * missing))
-    found = inertia_load_limit(SOFT.with_values(TENTH))
+    found = greatest_load(SOFT.with_values(TENTH))
     assert found == pytest.approx(min(limits), rel=1e-12) and 1 < found < 2
-    assert inertia_load_limit(SOFT) == math.inf
+    assert greatest_load(SOFT) == math.inf
 
 
 @pytest.mark.parametrize("load_factor", [0.5, 1e5, math.nan, "much"])
