@@ -311,19 +311,20 @@ def test_joints_are_soft_on_the_sprocket_and_stiff_soon_after_the_release() -> N
 
 
 def test_a_soft_drive_takes_fewer_steps_and_as_long() -> None:
-    """The release comes when it would have come, after a drive of far fewer steps."""
+    """The release comes when it would have come, to a few looks 1 ms apart, after a drive of far fewer steps."""
     stiff, soft = (warpchain.walk(**SPINNING, preset="paper", walk_limit=1e-3, soften_drive=on) for on in (False, True))
     assert soft.steps_accepted < 0.3 * stiff.steps_accepted
-    assert soft.simulated_time == pytest.approx(stiff.simulated_time, abs=1e-4)
+    assert soft.simulated_time == pytest.approx(stiff.simulated_time, abs=3e-3)
 
 
 @pytest.mark.parametrize(("frequency", "held"), [(9.0, 1e6), (15.0, 2.25e6), (35.0, 1e7)])
 def test_joints_are_softest_until_the_sprocket_has_spun_up(frequency: float, held: float) -> None:
     """In the spin-up spring energy is n T²/2k of the softest joints, T = m̄ v²/ℓ; in the hold they stretch by 3e-4.
 
-    There k is as great as that needs, within bounds: 2.25e6 N/m at 15 Hz.
+    There k is as great as that needs, within bounds: 2.25e6 N/m at 15 Hz. Loads are their own.
     """
     settings = {"links": 30, "frequency": frequency, "method": "standard", "settle_time": 0.1, "spin_up_time": 0.3}
+    settings |= {"load_factor": 1.0}
     setup = setup_walk("paper", settings, None)
     batch = Batch(1, 30, setup.options)
     course = Course(batch, 0, setup)
@@ -338,6 +339,39 @@ def test_joints_are_softest_until_the_sprocket_has_spun_up(frequency: float, hel
     for (_, spring, speed), stiffness in zip(levels[1:], (SOFTEST.joint_stiffness, held), strict=True):
         tension = mass * speed**2 / PAPER.link_length
         assert spring == pytest.approx(30 * tension**2 / (2 * stiffness), rel=0.8)  # the loop swings, and has weight
+
+
+@pytest.mark.parametrize("load_factor", [5.0, 40.0])
+def test_joints_under_load_are_as_soft_as_it_allows(load_factor: float) -> None:
+    """Under load k is such that speed and mean weight stretch joints by 1e-3; in between softness follows log λ."""
+    frequency, links = 15.0, 60
+    settings = {"links": links, "frequency": frequency, "start": "spinning", "load_factor": load_factor}
+    setup = setup_walk("soft", settings | {"method": "explicit"}, None)
+    batch = Batch(1, links, setup.options)
+    course = Course(batch, 0, setup)
+    radius = PAPER.sprocket_radius + PAPER.circle_radius
+    density = (PAPER.inner_mass + PAPER.outer_mass) / 2 / PAPER.link_length
+    tension = density * (2 * np.pi * frequency * radius) ** 2
+    side = links * PAPER.link_length / 2 - np.pi * radius
+    weight = load_factor * density * PAPER.gravity * side / 2  # in the middle of a side
+
+    def softness_of(wanted: float) -> float:
+        return 1 + np.log10(1e7 / np.clip(wanted / PAPER.link_length, 1e6, 1e7))
+
+    free, loaded = softness_of(tension / 3e-4), softness_of((tension + weight) / 1e-3)
+    assert free != loaded
+    seen = set()
+    while course.phase != Phase.WALK:
+        batch.launch([0], course.features, 500)
+        load, softness = batch.state.load_factor.numpy()[0], batch.state.softness.numpy()[0]
+        expected = free + (loaded - free) * np.log(load) / np.log(load_factor)
+        if batch.time(0) > 1.5e-3:
+            assert softness == pytest.approx(expected, abs=1e-9)
+            seen.add(load)
+        if batch.status(0) != Status.RUNNING:
+            assert course.next_phase()
+            break
+    assert {1.0, load_factor} < seen
 
 
 def test_a_drive_on_softer_joints_ends_as_one_on_stiff_joints() -> None:
