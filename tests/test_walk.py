@@ -122,17 +122,16 @@ def test_other_starts_walk_alike():
     assert spinning.simulated_time > spinning.walk_time
 
 
-@pytest.mark.slow
 def test_release_does_not_depend_on_the_start():
-    """Held until its shape has kept for 2 s, the loop is released the same whether it was spun up or placed turning."""
+    """Whether it was spun up or placed turning, the loop is released in the same shape, and soon."""
     extents = []
     for start in ("rest", "spinning"):
-        walk = soft_walk(
-            frequency=30.0, start=start, steady_time=2.0, steady_tolerance=0.02, walk_limit=1e-3, frame_interval=1e-3
-        )
+        walk = soft_walk(frequency=30.0, start=start, walk_limit=1e-3, frame_interval=1e-3)
         assert walk.status == Status.TIME_LIMIT
+        assert 0.3 < walk.hold_time < 2.0
+        assert 0 < walk.drift < 0.01
         extents.append(np.ptp(walk.frame_joints[0], axis=0))
-    assert_allclose(extents[0], extents[1], rtol=0.05)
+    assert_allclose(extents[0], extents[1], rtol=0.02)
 
 
 @pytest.mark.parametrize("start", ["spinning", "ellipse"])
@@ -167,12 +166,12 @@ def test_sprocket_radius_can_be_that_of_the_joints():
 
 
 def test_faster_sprockets_throw_further():
-    """Δx grows with the frequency, in steps as an independent implementation has them."""
+    """Δx grows with the frequency, in steps as an independent implementation has them of stationary loops."""
     walks = [soft_walk(start="spinning", frequency=frequency) for frequency in (5.0, 10.0, 20.0)]
     assert all(walk.status == Status.AT_REST for walk in walks)
     assert 0 < walks[0].dx < 0.15
     assert walks[1].dx == pytest.approx(0.27, rel=0.25)
-    assert walks[2].dx == pytest.approx(1.3, rel=0.25)
+    assert walks[2].dx == pytest.approx(1.08, rel=0.15)
 
 
 # --- energy ---
