@@ -30,6 +30,7 @@ from warpchain.kernels.summary import Summary
 from warpchain.kernels.types import Model, Program, State, read_chain
 from warpchain.options import Options
 from warpchain.scene import Scene, fewest_links, greatest_load
+from warpchain.setups import LONGEST_STEP_OF_LOADS
 from warpchain.walker import setup_walk
 
 Array = NDArray[np.float64]
@@ -376,6 +377,17 @@ def test_hold_time_and_drift_are_in_the_result_its_file_and_its_row(tmp_path: Pa
     walk.save(tmp_path / "walk.h5")
     again = load_walk(tmp_path / "walk.h5")
     assert (again.hold_time, again.drift) == (walk.hold_time, walk.drift)
+    scene = {name: settings[name] for name in ("start", "walk_limit", *CELL)}
+    content = {
+        "version": 1,
+        "name": "one",
+        "seed": 1,
+        "preset": "soft",
+        "samples": 1,
+        "distributions": {"all": "fixed"},
+    }
+    rows = warpchain.sweep(content | {"scene": scene, "options": {"method": "explicit"}}, tmp_path / "sweep")
+    assert (rows.hold_time.item(), rows.drift.item()) == (walk.hold_time, walk.drift)
     ellipse = warpchain.walk(preset="soft", **settings | {"start": "ellipse"})
     assert math.isnan(ellipse.hold_time) and math.isnan(ellipse.drift)
 
@@ -479,3 +491,26 @@ def test_factors_that_cannot_be_are_refused(load_factor: Any) -> None:
     """Loads are multiplied by 1 to 10 000, or by what suits the chain."""
     with pytest.raises(InputError, match=r"^scene\.load_factor: "):
         setup_walk("soft", {"load_factor": load_factor}, None)
+
+
+def test_factors_that_links_cannot_bear_are_refused() -> None:
+    """Point-like links may be given as much as leaves them half of their inertia; an ellipse is never loaded."""
+    most = greatest_load(SOFT.with_values(TENTH))
+    setup_walk("soft", TENTH | {"load_factor": 0.999 * most}, None)
+    with pytest.raises(
+        InputError, match=r"^scene\.load_factor: 15 is too much for links .*; give at most 1\.\d+, or null$"
+    ):
+        setup_walk("soft", TENTH | {"load_factor": 15.0}, None)
+    setup_walk("soft", TENTH | {"load_factor": 15.0, "start": "ellipse"}, None)
+
+
+def test_looks_too_far_apart_for_loads_to_fall_are_refused() -> None:
+    """Loads change at looks: unless there is nothing to change, these may be 2 ms apart at most."""
+    coarse = {"record_interval": 1.1 * LONGEST_STEP_OF_LOADS, "soften_drive": False}
+    with pytest.raises(
+        InputError, match=r"^options\.record_interval: loads on the sprocket .*or scene\.load_factor: 1$"
+    ):
+        setup_walk("soft", coarse, None)
+    setup_walk("soft", coarse | {"load_factor": 1.0}, None)
+    setup_walk("soft", coarse | {"start": "ellipse"}, None)
+    setup_walk("soft", coarse | {"record_interval": LONGEST_STEP_OF_LOADS}, None)
