@@ -33,6 +33,7 @@ class Loop:
         hold_time: For which it was held [s].
         drift: How far it moved while it was watched last.
         tries: Steps tried.
+        depth: Greatest by which circles sank into the sprocket [m].
         is_released: Or whether the hold ended otherwise.
         status: Of the batch's world when the drive was over.
     """
@@ -44,6 +45,7 @@ class Loop:
     hold_time: float
     drift: float
     tries: int
+    depth: float
     is_released: bool
     status: Status
 
@@ -84,6 +86,7 @@ def released_loop(preset: str = "soft", program: dict[str, float] | None = None,
         hold_time=course.hold_time,
         drift=course.drift,
         tries=course.tries,
+        depth=course.extremes["sprocket"],
         is_released=goes_on,
         status=status,
     )

@@ -24,13 +24,14 @@ BRIEF = {
     "frequency": 12.0,
     "preset": "soft",
     "start": "spinning",
+    "further_hold": 0.5,  # under its own loads, and nothing else is kept of the time before the release
     "walk_limit": 0.05,
 }
 
 
 @cache
 def brief_walk(**settings: Any) -> WalkResult:
-    """The first 50 ms of a walk of 40 links at 12 Hz."""
+    """The first 50 ms of a walk of 40 links at 12 Hz, half a second after its loop has become stationary."""
     return warpchain.walk(**BRIEF, **settings)
 
 
@@ -50,7 +51,8 @@ def test_they_end_with_the_release() -> None:
     np.testing.assert_allclose(np.hypot(*(first - last).T), -speed * before.frame_time[-1], rtol=0.05)
     assert before.frame_joints[..., 1].min() == pytest.approx(0.01 + 0.0042, abs=1e-3)
     np.testing.assert_allclose(before.center[-1], walk.center[0], atol=1e-3)
-    assert repr(before) == f"<BeforeRelease: 0.199 s, {len(before.time)} instants, {len(before.frame_time)} frames>"
+    kept = f"{-before.frame_time[0]:.3g} s, {len(before.time)} instants, {len(before.frame_time)} frames"
+    assert repr(before) == f"<BeforeRelease: {kept}>"
 
 
 def test_forces_carry_the_loop() -> None:
@@ -107,9 +109,18 @@ def test_they_do_not_change_the_walk() -> None:
         walk = brief_walk(**settings)
         assert walk.center.tobytes() == plain.center.tobytes()
         assert (walk.steps_accepted, walk.steps_rejected) == (plain.steps_accepted, plain.steps_rejected)
-    whole = brief_walk(record_before=1e3, frame_interval=1e-3).before_release
-    assert whole is not None
-    assert whole.frame_time[0] == pytest.approx(plain.walk_time - plain.simulated_time, abs=1e-9)
+
+
+def test_nothing_is_kept_of_the_time_under_load() -> None:
+    """A long record begins when the loop has its own loads again; if they were never multiplied, with the hold."""
+    whole = brief_walk(record_before=1e3, frame_interval=1e-3)
+    before = whole.before_release
+    assert before is not None
+    period = 40 * preset("soft").link_length / (2 * np.pi * 12.0 * 0.0598)
+    assert 0.5 + period < -before.frame_time[0] < 0.5 + 3 * period < whole.hold_time
+    own = brief_walk(record_before=1e3, frame_interval=1e-3, load_factor=1.0, steady_time=0.2, steady_tolerance=0.2)
+    assert own.before_release is not None
+    assert own.before_release.frame_time[0] == pytest.approx(-own.hold_time, abs=1e-9)
 
 
 def test_by_default_half_a_second_is_kept_with_frames() -> None:
@@ -169,7 +180,7 @@ def test_a_sweep_keeps_them(tmp_path: Path) -> None:
         "seed": 5,
         "preset": "soft",
         "samples": 2,
-        "scene": {key: BRIEF[key] for key in ("links", "start", "walk_limit")},
+        "scene": {key: BRIEF[key] for key in ("links", "start", "walk_limit", "further_hold")},
         "grid": {"frequency": [12.0, 14.0]},
         "distributions": {"all": "fixed", "clearance": "table"},
         "record": {"series": True, "frames": {"samples": [0], "before": 0.2}},

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 import warpchain
 from tests.driven_loops import Loop, released_loop
 from warpchain import InputError, Status, ensemble, load_walk, preset
+from warpchain.control import push_rate, suitable_load
 from warpchain.devices import start_device
 from warpchain.engine import Batch
 from warpchain.kernels.scaled_loads import under_load
@@ -417,6 +418,41 @@ def test_a_drive_depends_neither_on_its_launches_nor_on_its_neighbours(monkeypat
     assert all(hold_time > 0.2 for hold_time, *_ in whole.values())
     assert outcomes(501, 1) == whole
     assert outcomes(777, 3) == whole
+
+
+@pytest.mark.parametrize(("links", "frequency"), [(60, 15.0), (180, 10.0)])
+def test_loops_do_not_sink_into_a_sprocket_that_pushes(links: int, frequency: float) -> None:
+    """Under fifty times the loads circles sink in by less than 0.1 mm, by a millimetre or more without the push."""
+    depths = []
+    for program in ({}, {"push_rate": 0.0}):
+        loop = released_loop(program=program, links=links, frequency=frequency, start="spinning")
+        depths.append(loop.depth)
+    assert depths[0] < 1e-4 < 1e-3 < depths[1]
+
+
+@pytest.mark.parametrize(
+    ("settings", "rate"),
+    [
+        ({"contact_step": 2e-5, "soft_contact_step": 5e-5, "soften_drive": True}, 5000.0),
+        ({"contact_step": 2e-5, "soft_contact_step": 2e-4, "soften_drive": True}, 1250.0),
+        ({"contact_step": 1e-4, "soft_contact_step": 2e-4, "soften_drive": False}, 2500.0),
+    ],
+)
+def test_a_circle_is_pushed_out_by_a_quarter_of_its_depth_in_a_step(settings: dict[str, Any], rate: float) -> None:
+    """In the longest step near a contact, though by no more than 5000 times its depth in a second."""
+    assert push_rate(Options(**settings)) == pytest.approx(rate)
+
+
+def test_loads_are_what_joints_bear() -> None:
+    """Fifty times the loop's own, or as much as stretches joints by 1e-3; never less than its own."""
+    soft, own = Options(method="explicit"), Options(method="reference")
+    paper = preset("paper")
+    bearable = 1e-3 * 1e7 * SOFT.link_length  # N
+    assert suitable_load(paper, soft, bearable / 100) == suitable_load(paper, soft, 0.0) == 50.0
+    assert suitable_load(paper, soft, bearable / 20) == pytest.approx(20.0)
+    assert suitable_load(paper, own, bearable / 20) == 50.0  # a hundred times as stiff
+    assert suitable_load(paper, soft, 3 * bearable) == 1.0
+    assert suitable_load(paper.with_values(TENTH), soft, bearable / 100) == greatest_load(paper.with_values(TENTH))
 
 
 # --- hard cases ---
