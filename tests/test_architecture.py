@@ -23,6 +23,7 @@ TOP_LEVEL = {
     "CHANGELOG.md",
     "LICENSE",
     "README.md",
+    "docs",
     "kernels",
     "pyproject.toml",
     "sweeps",

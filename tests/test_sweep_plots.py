@@ -408,7 +408,7 @@ def test_figures_are_those_that_a_sweep_has_something_for(
     nothing = make_sweep(tmp_path / "b", one_block(grid={"frequency": [10, 20]}), lambda walk: None)
     for result, names in (
         (sweep6, ["figure6", "heat_map", "status_counts"]),
-        (compared, ["against_tolerance", "tolerance", "status_counts"]),
+        (compared, ["tolerance", "status_counts"]),
         (saltelli, ["figure6", "sensitivity", "status_counts"]),
         (nothing, ["status_counts"]),
     ):

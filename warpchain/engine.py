@@ -403,9 +403,12 @@ class Batch:
         return drift if drift >= 0 else math.nan
 
     def unloaded_at(self, world: int) -> float:
-        """Time [s] since loading from which a held loop has borne its own loads; −∞ if they were never multiplied."""
-        since = float(self._view(self.state.watch)[world, layout.UNLOADED_SINCE])
-        return since + float(LOADING_TIME) if since >= 0 else -math.inf
+        """Time [s] since loading from which a held loop has borne its own loads; −∞ if it was not watched."""
+        watch = self._view(self.state.watch)[world]
+        if watch[layout.UNLOADED_SINCE] >= 0:
+            return float(watch[layout.UNLOADED_SINCE]) + float(LOADING_TIME)
+        since = float(watch[layout.LOADED_SINCE])  # of the last hold, under a factor of 1
+        return since if since >= 0 else -math.inf
 
     def drain_samples(self, world: int) -> Array:
         """Take the time series kept so far: (t, SAMPLE_COLUMNS), see :mod:`warpchain.kernels.layout`."""

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from warpchain.sweep_result import BlockResult, SweepResult
 
 _AXES: Final = {"links", "frequency"}
+_SHOWN_ELSEWHERE: Final = {"tolerance"}
 _STYLES: Final[tuple[Literal["-", "--", ":", "-."], ...]] = ("-", "--", ":", "-.")
 """Of the lines of each block."""
 
@@ -21,7 +22,7 @@ _STYLES: Final[tuple[Literal["-", "--", ":", "-."], ...]] = ("-", "--", ":", "-.
 def third_axis(block: "BlockResult") -> str | None:
     """The numeric axis that a block has beside links and frequency, if it has just one, of several values."""
     others = [name for name in block.axes if name not in _AXES]
-    if len(others) != 1 or not set(block.axes) >= _AXES:
+    if len(others) != 1 or others[0] in _SHOWN_ELSEWHERE or not set(block.axes) >= _AXES:
         return None
     values = block.axes[others[0]]
     return others[0] if values.dtype.kind in "if" and len(values) > 1 else None

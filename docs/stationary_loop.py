@@ -1,0 +1,93 @@
+"""Prints the tables of stationary-loop.md: the mean loop before its release beside theory and the catenary.
+
+Run it as ``python docs/stationary_loop.py``; it takes about a minute and needs warpchain[scipy].
+"""
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+
+import warpchain
+from warpchain.loop_theory import NoSolutionError, TheoreticalLoop, catenary, predict
+from warpchain.results import WalkResult
+from warpchain.stationary_loop import StationaryLoop, average_loop, find_kink, imbalances
+
+CELLS = ((60, 20.0), (120, 20.0), (120, 10.0), (180, 30.0), (60, 30.0))
+OTHERS: tuple[tuple[str, int, float, Mapping[str, float]], ...] = (
+    ("half of the inertia", 120, 20.0, {"inner_inertia": 8.45e-8, "outer_inertia": 6.46e-8}),
+    ("a tenth of the inertia", 120, 20.0, {"inner_inertia": 1.69e-8, "outer_inertia": 1.292e-8}),
+    ("three times the inertia", 120, 20.0, {"inner_inertia": 5.07e-7, "outer_inertia": 3.876e-7}),
+    ("a third of the viscous friction", 120, 20.0, {"viscous_friction": 3e-5}),
+    ("hardly any Coulomb friction", 120, 20.0, {"coulomb_friction": 1e-6}),
+)
+
+
+def held(links: int, frequency: float, values: Mapping[str, float]) -> WalkResult:
+    """A walk of Table 1's chain with softened joints, whose last half second on the sprocket is kept."""
+    return warpchain.walk(
+        links=links,
+        frequency=frequency,
+        preset="soft",
+        start="spinning",
+        further_hold=0.5,
+        hold_limit=60.0,
+        walk_limit=1e-3,
+        **values,
+    )
+
+
+def row(name: str, loop: StationaryLoop, theory: TheoreticalLoop) -> str:
+    """Bottom curvature, peak and dip of a predicted curve, and how far it is from the simulated one."""
+    near = np.abs(theory.s) < 0.35 * (loop.free[1] - loop.free[0])
+    peak = int(np.argmax(np.where(near, theory.curvature, -np.inf)))
+    dip = int(np.argmin(np.where(near, theory.curvature, np.inf)))
+    fine = np.linspace(loop.s[0], loop.s[-1], 20_000)
+    curve = np.stack([np.interp(fine, loop.s, column) for column in loop.position.T], axis=1)
+    apart = np.array([np.hypot(*(curve - point).T).min() for point in theory.position])
+    tension = theory.effective_tension - np.interp(theory.s, loop.s, loop.effective_tension)
+    return (
+        f"  {name:22} bottom {np.interp(0, theory.s, theory.curvature):6.2f} 1/m, "
+        f"greatest {theory.curvature[peak]:6.2f} at {100 * theory.s[peak]:5.1f} cm, "
+        f"least {theory.curvature[dip]:6.2f} at {100 * theory.s[dip]:5.1f} cm; "
+        f"shape {1e3 * np.sqrt(np.mean(apart**2)):.2f} mm rms, {1e3 * apart.max():.2f} at most; "
+        f"tension {np.sqrt(np.mean(tension**2)):.4f} N rms"
+    )
+
+
+def show(name: str, walk: WalkResult) -> None:
+    """Prints what is known of one loop."""
+    if walk.before_release is None:
+        print(f"{name}: {walk.status.label}")
+        return
+    loop = average_loop(walk)
+    kink = find_kink(loop)
+    print(f"{name}: v = {loop.speed:.3f} m/s, held for {walk.hold_time:.2f} s, drift {100 * walk.drift:.2f} %")
+    print(
+        f"  {'simulation':22} bottom {np.interp(0, loop.s, loop.curvature):6.2f} 1/m, "
+        f"greatest {kink.peak:6.2f} at {100 * kink.peak_at:5.1f} cm, "
+        f"least {kink.dip:6.2f} at {100 * kink.dip_at:5.1f} cm; "
+        f"joints within {1e3 * loop.spread.max():.3f} mm"
+    )
+    parameters = loop.parameters
+    for which, given in (
+        ("theory", parameters),
+        ("without Coulomb", dataclasses.replace(parameters, coulomb_friction=0.0)),
+        ("without friction", dataclasses.replace(parameters, coulomb_friction=0.0, viscous_friction=0.0)),
+    ):
+        try:
+            print(row(which, loop, predict(loop, given)))
+        except NoSolutionError as error:
+            print(f"  {which:22} {error}")
+    print(row("catenary", loop, catenary(loop)))
+    balances = (
+        f"{key} {100 * found.rms:.1f} % ({100 * found.greatest:.1f} %)" for key, found in imbalances(loop).items()
+    )
+    print("  balances, rms (greatest):", ", ".join(balances))
+
+
+if __name__ == "__main__":
+    for links, frequency in CELLS:
+        show(f"{links} links, {frequency:g} Hz", held(links, frequency, {}))
+    for text, links, frequency, values in OTHERS:
+        show(f"{links} links, {frequency:g} Hz, {text}", held(links, frequency, values))
