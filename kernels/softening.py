@@ -8,12 +8,10 @@ would else be what keeps steps short.
 
 *Drive.* Joints are softest while the chain settles and the sprocket spins up, and as soft as the loop's tension allows
 while it is to become stationary: C = T/k stretches it by T/ℓk, at 30 Hz on the softest joints by 0.3 %; so much is
-wanted of k that it is a tenth of that. While its loads are multiplied (:mod:`scaled_loads`) it may be 0.1 %. With
-ten times the ω_c of soft joints another loop becomes stationary, for friction is what holds a loop's width.
-*Release.* Soft joints get their own values back before the chain lands. Earlier was tried and rejected: nobody knows
-beforehand when the loop will be steady, and putting the release off by 0.25 s shifts Δx by 4 %, for the loop's width
-swings slowly. *Pile.* Joints are soft for good once the loop begins to collapse, and softest once it encloses half of
-what it did then; softest at once shifts Δx of long chains.
+wanted of k that it is a tenth of that. While its loads are multiplied (:mod:`scaled_loads`) it may be 0.1 %. With ten
+times the ω_c of soft joints another loop becomes stationary, for friction is what holds a loop's width. *Release.*
+Soft joints get their own values back before the chain lands. *Pile.* Joints are soft for good once the loop begins to
+collapse, and softest once it encloses half of what it did then; softest at once shifts Δx of long chains.
 
 A change of k at openings C sets ½ (k_before − k_after) Σ C² of energy free, which is booked. Going soft is one jump: C
 has then grown to T/k_after within a few periods of the soft springs. Going back, C must shrink a hundred- to a

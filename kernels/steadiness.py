@@ -9,9 +9,9 @@ the loop runs as evenly. A loop that leaves its shape when it becomes free, or d
 held under the square root of the factor, finally under its own loads: then, and whenever it slips on its sprocket by
 more than 0.6 %, it is watched free for as long as slow waves need, 5 to 10 s.
 
-Loads that fall at once stretch the chain by less at once, which throws it off its sprocket: with λ = 80 by 25 mm (180
-links, 30 Hz). In 0.05 s or more nothing of that is seen; in 0.25 s the loop follows the little that the curve under
-load differs by.
+Loads that fall at once let the joints contract at once, which throws the loop off its sprocket: with λ = 80 by 25 mm
+(180 links, 30 Hz). Nothing of that is seen if they take 0.05 s; in 0.25 s the loop also follows the little that its
+curve under load differs by. Loads that fall to a smaller multiple do so at once: the loop has time to come back.
 """
 
 import warp as wp
@@ -54,13 +54,14 @@ LITTLE_SLIP = wp.constant(wp.float64(0.006))
 less, so that it is watched for as long as slow waves need …"""
 MOST_SLIP = wp.constant(wp.float64(0.25))
 """… and is never found stationary beyond this."""
-SLOWEST_STEADY = wp.constant(wp.float64(0.02))
 LOADING_TIME = wp.constant(wp.float64(0.25))
 """Time [s] in which loads fall to the loop's own."""
 LEAST_LOAD = wp.constant(wp.float64(3.0))
 """Least factor under which a loop is held again."""
 MOST_CROSSINGS = wp.constant(wp.float64(8.0))
-"""Crossings of slow waves after which a loop that is not stationary under load is held under less; most need three."""
+"""Crossings of slow waves after which a loop that is not stationary under load is held under less; most take three."""
+SLOWEST_STEADY = wp.constant(wp.float64(0.02))
+"""Unevenness [m/s] of the speed that always counts as even: of a sprocket that stands still."""
 SHORTEST_WINDOW = wp.constant(wp.float64(0.05))
 """Least time [s] over which means are taken: links that pass make height and width ripple."""
 
