@@ -93,10 +93,10 @@ def released_loop(preset: str = "soft", program: dict[str, float] | None = None,
 
 
 def hold(loop: Loop, parameters: Parameters, duration: float, load_factor: float = 1.0) -> Array:
-    """Hold a loop on for a time [s] with other parameters; `Loop.shape` of the end."""
+    """Hold a loop on for a time [s] with other parameters; `Loop.shape` of the end and its `bottom_curvature`, (5,)."""
     setup = loop.setup
     scene = setup.scene
-    batch = Batch(1, scene.links, setup.options, keeps_samples=True)
+    batch = Batch(1, scene.links, setup.options, keeps_samples=True, frame_every=1)
     batch.set_chain(0, parameters, scene.links, contact_radius(scene, parameters))
     softness = 1.0 if setup.options.soften_drive else 0.0
     batch.load(0, loop.position, loop.velocity, stop_time=duration, stop_status=Status.NOT_STEADY, softness=softness)
@@ -113,11 +113,32 @@ def hold(loop: Loop, parameters: Parameters, duration: float, load_factor: float
         push_rate=5e3,
     )
     samples: list[Array] = []
-    batch.run(
-        [0],
-        batch.features(fixed_body="sprocket", watch="steady"),
-        lambda: samples.append(batch.drain_samples(0)),
-    )
+    frames: list[tuple[Array, Array]] = []
+
+    def drain() -> None:
+        samples.append(batch.drain_samples(0))
+        frames.append(batch.drain_frames(0))
+
+    batch.run([0], batch.features(fixed_body="sprocket", watch="steady"), drain)
     assert batch.status(0) == Status.NOT_STEADY
-    rows = np.concatenate(samples)
-    return rows[rows[:, layout.TIME] > duration - period_of(setup)][:, SHAPE].mean(axis=0)
+    rows, times, joints = np.concatenate(samples), *(np.concatenate(parts) for parts in zip(*frames, strict=True))
+    since = duration - period_of(setup)
+    shape = rows[rows[:, layout.TIME] > since][:, SHAPE].mean(axis=0)
+    return np.append(shape, bottom_curvature(joints[times > since]))
+
+
+def bottom_curvature(joints: Array, reach: int = 3) -> float:
+    """Mean curvature [1/m] at the lowest joint: the turn from the chord before it to that behind it, by their length.
+
+    Args:
+        joints: (f, n, 2) [m].
+        reach: Links of a chord.
+    """
+    turns = []
+    for frame in joints:
+        lowest = int(np.argmin(frame[:, 1]))
+        before, here, behind = (frame[(lowest + step) % len(frame)] for step in (-reach, 0, reach))
+        first, second = here - before, behind - here
+        turn = np.arctan2(first[0] * second[1] - first[1] * second[0], first @ second)
+        turns.append(abs(turn) / (np.hypot(*first) + np.hypot(*second)) * 2)
+    return float(np.mean(turns))
