@@ -81,7 +81,8 @@ def walk(
         frame_interval: Time between kept frames of all joints [s], to whole samples; None keeps none. Neither frames
             nor samples change the walk: they are taken at the first step's end after their time.
         record_before: Time [s] before the release of which frames and samples are kept as well, as ``before_release``
-            of the result, with the forces in the joints; None: 0.5 s if frames are kept; 0: none.
+            of the result, with the forces in the joints; None: 0.5 s if frames are kept; 0: none. Nothing is kept of
+            a loop under multiplied loads; ``further_hold`` makes room for more.
         on_progress: Called about ten times a second.
         settings: Any other field of :class:`Parameters`, :class:`Scene` or :class:`Options`, by its name.
 
