@@ -359,13 +359,30 @@ def test_further_hold_prolongs_the_hold() -> None:
     assert longer.drift == usual.drift
 
 
-@pytest.mark.parametrize(
-    ("links", "frequency", "most"),
-    [(60, 10.0, 21464), (60, 20.0, 24838), (60, 30.0, 29746), (120, 20.0, 59860)],
-)
-def test_a_drive_takes_fewer_steps_than_without_load(links: int, frequency: float, most: int) -> None:
-    """Steps of the drive from a turning start stay below what the release at once of a swinging loop took."""
-    assert released_loop(links=links, frequency=frequency, start="spinning").tries < most
+TRIES_OF_SWINGING_RELEASES = {
+    (60, 10.0): (21464, 65169),
+    (60, 20.0): (24838, 61795),
+    (60, 30.0): (29746, 59689),
+    (120, 10.0): (74958, 85704),
+    (120, 20.0): (59860, 78146),
+    (120, 30.0): (60770, 74913),
+    (180, 10.0): (101974, 180972),
+    (180, 20.0): (80688, 96609),
+    (180, 30.0): (90101, 92951),
+}
+"""Links, frequency → steps tried on the sprocket, from a turning start and from rest, by version 9 of the numerics.
+
+It released loops once means over a loop period stayed within 1 %.
+"""
+
+
+@pytest.mark.parametrize("cell", TRIES_OF_SWINGING_RELEASES)
+def test_a_drive_takes_no_more_steps_than_when_loops_were_released_swinging(cell: tuple[int, float]) -> None:
+    """From a turning start it takes fewer, from rest at most a fifth more."""
+    links, frequency = cell
+    turning, hanging = TRIES_OF_SWINGING_RELEASES[cell]
+    assert released_loop(links=links, frequency=frequency, start="spinning").tries < turning
+    assert released_loop(links=links, frequency=frequency, start="rest").tries < 1.2 * hanging
 
 
 def test_hold_time_and_drift_are_in_the_result_its_file_and_its_row(tmp_path: Path) -> None:
