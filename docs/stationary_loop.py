@@ -1,6 +1,6 @@
 """Prints the tables of stationary-loop.md: the mean loop before its release beside theory and the catenary.
 
-Run it as ``python docs/stationary_loop.py``; it takes about a minute and needs warpchain[scipy].
+Run it as ``python docs/stationary_loop.py``; it takes a few minutes and needs warpchain[scipy].
 """
 
 import dataclasses
