@@ -91,7 +91,7 @@ from .layout import (
     Y,
 )
 from .methods import METHODS
-from .present_chain import present_chain
+from .present_chain import has_changed, present_chain
 from .record import record_is_full, write_sample
 from .scaled_loads import under_load
 from .softening import softened
@@ -319,10 +319,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 pauses = record_is_full(record, world) or T[wp.static(touch.is_late)] != 0
                 barrier()
                 if wp.static(softens or is_driven):
-                    changed = state.softness[world] != softness
-                    if wp.static(is_driven):
-                        changed = changed or load_factor > ONE or state.load_factor[world] > ONE
-                    if changed and flies == 0:
+                    if has_changed(state, world, softness, load_factor) and flies == 0:
                         next_end = hand_over(ends, place, link_on(K, lane))
                         begin_step(forces, K, place, next_end)
                 if pauses or status != RUNNING:

@@ -8,9 +8,8 @@ from .block_board import note_constants
 from .block_contact import TouchLayout
 from .block_memory import clock
 from .driver import Features
-from .elementary import ONE
 from .layout import BOARD_NOTES, NOTE_CONTACT_STEP, NOTE_DEADLINE, NOTE_NEXT_LOOK, NOTE_STOP_TIME, NOTE_TOLERANCE
-from .present_chain import present_chain
+from .present_chain import has_changed, present_chain
 from .record import sampling
 from .scaled_loads import lay_inertias
 from .softening import book_softening, contact_step, spring_tolerance
@@ -56,11 +55,8 @@ def block_look(features: Features, touch: TouchLayout):
         load_factor = state.load_factor[world]
         chain = present(model, state, control, world)
         T[wp.static(touch.mailbox)] = look_at_chain(K, chain, program, state, record, control, world, time)
-        changed = state.softness[world] != softness
-        if wp.static(is_driven):
-            changed = changed or load_factor > ONE or state.load_factor[world] > ONE
         if wp.static(softens or is_driven):
-            if changed:
+            if has_changed(state, world, softness, load_factor):
                 after = present(model, state, control, world)
                 book_softening(chain, after, state, world)
                 note_constants(K, after)

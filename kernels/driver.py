@@ -53,7 +53,7 @@ from .layout import (
     TIME,
 )
 from .methods import METHODS
-from .present_chain import present_chain
+from .present_chain import has_changed, present_chain
 from .record import record_is_full, sampling, write_sample
 from .scaled_loads import lay_inertias
 from .self_contact import self_contacts
@@ -263,21 +263,17 @@ def make_advance(features: Features):
                 softness = state.softness[world]
                 load_factor = state.load_factor[world]
                 status = look(K, chain, program, state, record, control, world, time)
-                changed = bool(False)
                 if wp.static(softens):
                     longest = contact_step(state, control, world, wp.static(is_driven))
-                    changed = state.softness[world] != softness
-                if wp.static(is_driven):
-                    changed = changed or load_factor > ONE or state.load_factor[world] > ONE
                 if wp.static(softens or is_driven):
                     tolerance = spring_tolerance(program, state, control, world, wp.static(is_driven))
-                if changed:
-                    after = present(model, state, control, world)
-                    book_softening(chain, after, state, world)
-                    chain = after
-                    if wp.static(is_driven):
-                        lay_inertias(K, chain)
-                    has_first_stage = int(0)
+                    if has_changed(state, world, softness, load_factor):
+                        after = present(model, state, control, world)
+                        book_softening(chain, after, state, world)
+                        chain = after
+                        if wp.static(is_driven):
+                            lay_inertias(K, chain)
+                        has_first_stage = int(0)
                 if status != RUNNING:
                     break
             stop_time = state.stop_time[world]

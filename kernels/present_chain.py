@@ -4,11 +4,18 @@ import functools
 
 import warp as wp
 
+from .elementary import ONE
 from .scaled_loads import under_load
 from .softening import softened
 from .types import Chain, Control, Model, State, read_chain
 
 wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def has_changed(state: State, world: int, softness: wp.float64, load_factor: wp.float64):
+    """Whether a look has changed a chain, from these values before it, or dragged its links, as it does under load."""
+    return state.softness[world] != softness or load_factor > ONE or state.load_factor[world] > ONE
 
 
 @functools.cache

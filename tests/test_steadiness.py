@@ -29,9 +29,8 @@ from warpchain.kernels.steadiness import (
 )
 from warpchain.kernels.summary import Summary
 from warpchain.kernels.types import Model, Program, State, read_chain
-from warpchain.options import Options
+from warpchain.options import LONGEST_DRIVE_INTERVAL, Options
 from warpchain.scene import Scene, fewest_links, greatest_load
-from warpchain.setups import LONGEST_STEP_OF_LOADS
 from warpchain.walker import setup_walk
 
 Array = NDArray[np.float64]
@@ -559,11 +558,11 @@ def test_factors_that_links_cannot_bear_are_refused() -> None:
 
 def test_looks_too_far_apart_for_loads_to_fall_are_refused() -> None:
     """Loads change at looks: unless there is nothing to change, these may be 2 ms apart at most."""
-    coarse = {"record_interval": 1.1 * LONGEST_STEP_OF_LOADS, "soften_drive": False}
+    coarse = {"record_interval": 1.1 * LONGEST_DRIVE_INTERVAL, "soften_drive": False}
     with pytest.raises(
         InputError, match=r"^options\.record_interval: loads on the sprocket .*or scene\.load_factor: 1$"
     ):
         setup_walk("soft", coarse, None)
     setup_walk("soft", coarse | {"load_factor": 1.0}, None)
     setup_walk("soft", coarse | {"start": "ellipse"}, None)
-    setup_walk("soft", coarse | {"record_interval": LONGEST_STEP_OF_LOADS}, None)
+    setup_walk("soft", coarse | {"record_interval": LONGEST_DRIVE_INTERVAL}, None)

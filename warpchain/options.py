@@ -9,8 +9,8 @@ from pydantic import BaseModel, Field, field_validator, model_validator
 
 from warpchain.parameters import STRICT, refusal, shown, suggestion
 
-LONGEST_STIFFENING_INTERVAL: Final = 2e-3
-"""Greatest time [s] between two of the small steps in which soft joints on the sprocket become stiff."""
+LONGEST_DRIVE_INTERVAL: Final = 2e-3
+"""Greatest time [s] between two of the small steps in which soft joints become stiff, or multiplied loads fall."""
 
 _LOOSE: Final = {
     "tolerance": 1e-3,
@@ -192,10 +192,10 @@ class Options(BaseModel):
 
     @model_validator(mode="after")
     def _stiffens_in_small_steps(self) -> Self:
-        if self.soften_drive and self.record_interval > LONGEST_STIFFENING_INTERVAL:
+        if self.soften_drive and self.record_interval > LONGEST_DRIVE_INTERVAL:
             raise refusal(
                 "soften_drive",
                 f"joints stiffen at each record_interval, and {self.record_interval} s is too long for that; "
-                f"give a record_interval of at most {LONGEST_STIFFENING_INTERVAL} s, or soften_drive: false",
+                f"give a record_interval of at most {LONGEST_DRIVE_INTERVAL} s, or soften_drive: false",
             )
         return self

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from warpchain.options import Options
+from warpchain.options import LONGEST_DRIVE_INTERVAL, Options
 from warpchain.parameters import InputError, Parameters, shown, suggestion, validated
 from warpchain.parameters import preset as parameter_preset
 from warpchain.scene import Scene, check_links_on_gpu, check_scene
@@ -24,10 +24,6 @@ class Setup:
     parameters: Parameters
     scene: Scene
     options: Options
-
-
-LONGEST_STEP_OF_LOADS: Final = 2e-3
-"""Greatest time [s] between two of the small steps in which the loads of a loop that is held fall to its own."""
 
 
 def resolve(
@@ -60,10 +56,10 @@ def resolve(
     check_scene(setup.scene, setup.parameters)
     check_links_on_gpu(setup.scene.links, setup.options.device, "scene.links")
     interval = setup.options.record_interval
-    if interval > LONGEST_STEP_OF_LOADS and setup.scene.start != "ellipse" and setup.scene.load_factor != 1:
+    if interval > LONGEST_DRIVE_INTERVAL and setup.scene.start != "ellipse" and setup.scene.load_factor != 1:
         raise InputError(
             f"options.record_interval: loads on the sprocket change at each, and {interval} s is too long for that; "
-            f"give at most {LONGEST_STEP_OF_LOADS} s, or scene.load_factor: 1"
+            f"give at most {LONGEST_DRIVE_INTERVAL} s, or scene.load_factor: 1"
         )
     return setup
 
