@@ -9,9 +9,9 @@ from collections.abc import Mapping
 import numpy as np
 
 import warpchain
-from warpchain.loop_theory import NoSolutionError, TheoreticalLoop, catenary, predict
-from warpchain.results import WalkResult
-from warpchain.stationary_loop import StationaryLoop, average_loop, find_kink, imbalances
+from warpchain.loop.stationary_loop import StationaryLoop, average_loop, find_kink, imbalances
+from warpchain.loop.theory import NoSolutionError, TheoreticalLoop, catenary, predict
+from warpchain.walks.walk_result import WalkResult
 
 CELLS = ((60, 20.0), (120, 20.0), (120, 10.0), (180, 30.0), (60, 30.0))
 OTHERS: tuple[tuple[str, int, float, Mapping[str, float]], ...] = (

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from warpchain.processors import processors
+from warpchain.engine.processors import processors
 
 MOST_WORKERS = 16
 """With more, each would mostly compile kernels that another compiles at the same time."""

@@ -10,28 +10,28 @@ Importing the package starts no device and reads no heavy library; the first wal
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from warpchain.parameters import InputError, Parameters
-    from warpchain.parameters import preset as preset
-    from warpchain.results import Trajectory, WalkResult, load_walk
-    from warpchain.runner import sweep
+    from warpchain.inputs.parameters import InputError, Parameters
+    from warpchain.inputs.parameters import preset as preset
+    from warpchain.run.simulation import simulate
+    from warpchain.run.single_walk import walk
+    from warpchain.run.sweep_run import sweep
     from warpchain.status import Status
-    from warpchain.sweep_result import SweepResult, load
-    from warpchain.trajectory import simulate
-    from warpchain.walker import walk
+    from warpchain.store.sweep_result import SweepResult, load
+    from warpchain.walks.walk_result import Trajectory, WalkResult, load_walk
 
 _HOMES = {
-    "InputError": "parameters",
-    "Parameters": "parameters",
+    "InputError": "inputs.parameters",
+    "Parameters": "inputs.parameters",
     "Status": "status",
-    "SweepResult": "sweep_result",
-    "Trajectory": "results",
-    "WalkResult": "results",
-    "load": "sweep_result",
-    "load_walk": "results",
-    "preset": "parameters",
-    "simulate": "trajectory",
-    "sweep": "runner",
-    "walk": "walker",
+    "SweepResult": "store.sweep_result",
+    "Trajectory": "walks.walk_result",
+    "WalkResult": "walks.walk_result",
+    "load": "store.sweep_result",
+    "load_walk": "walks.walk_result",
+    "preset": "inputs.parameters",
+    "simulate": "run.simulation",
+    "sweep": "run.sweep_run",
+    "walk": "run.single_walk",
 }
 
 __all__ = [

@@ -1,5 +1,5 @@
 """`python -m warpchain` is the command `warpchain`."""
 
-from warpchain.cli import main
+from warpchain.cli.main import main
 
 main()

@@ -1,0 +1,1 @@
+"""Contacts, shared by cpu/ and gpu/: the impulse law and what may touch."""

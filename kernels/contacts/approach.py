@@ -1,0 +1,85 @@
+"""How long a flight may go on unseen: a bound of the time to the next touch.
+
+Steps on rigid joints are long, so they are bounded by what is in the way rather than by a margin: each circle's way to
+the floor at the speed with which it sinks, each listed pair's distance at its relative speed. What the chain's
+acceleration adds to that within a step, some hundredths of a millimetre, is what the contact step bounds in the end.
+"""
+
+import functools
+
+import warp as wp
+
+from warpchain.kernels.cpu.contacts.neighbour_list import list_layout
+from warpchain.kernels.layout import COSINE, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, SINE, U, V
+from warpchain.kernels.physics.elementary import TWO, ZERO, order_bits
+from warpchain.kernels.types import Chain
+
+wp.set_module_options({"enable_backward": False})
+
+FLIGHT_SKIN = wp.constant(wp.float64(4.0))
+"""The neighbour list of a flight has this many times the margin: a step may go as far as half of it."""
+
+LEAST_SLACK = wp.constant(wp.float64(0.25))
+"""A list is made anew once less than this part of that margin is left: short steps would cost more than the list."""
+
+SMALLEST_GAP = wp.constant(wp.float64(1e-9))
+"""Distance [m] that stands for all smaller ones and for overlaps."""
+
+
+@wp.func
+def falling(
+    chain: Chain, v: wp.float64, omega: wp.float64, cosine: wp.float64, left_y: wp.float64, right_y: wp.float64
+):
+    """(Speed at which a link's circle sinks) / (its height above the floor) [1/s], left and right; 0 if it rises."""
+    turn = chain.half_length * omega * cosine
+    left = wp.max(turn - v, ZERO) / wp.max(left_y - chain.circle_radius, SMALLEST_GAP)
+    right = wp.max(-turn - v, ZERO) / wp.max(right_y - chain.circle_radius, SMALLEST_GAP)
+    return left, right
+
+
+@wp.func
+def meeting_of(K: wp.array2d(dtype=wp.float64), chain: Chain, p: int, q: int):
+    """(Relative speed) / (distance) [1/s] of the circles of two joints."""
+    a = chain.half_length
+    dx = K[RIGHT_X, q] - K[RIGHT_X, p]
+    dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
+    turn_p = a * K[OMEGA, p]
+    turn_q = a * K[OMEGA, q]
+    du = K[U, q] - turn_q * K[SINE, q] - K[U, p] + turn_p * K[SINE, p]
+    dv = K[V, q] + turn_q * K[COSINE, q] - K[V, p] - turn_p * K[COSINE, p]
+    gap = wp.max(wp.sqrt(dx * dx + dy * dy) - TWO * chain.circle_radius, SMALLEST_GAP)
+    return wp.sqrt(du * du + dv * dv) / gap
+
+
+@wp.func
+def fastest_fall(K: wp.array2d(dtype=wp.float64), chain: Chain):
+    """The greatest of (speed at which a circle sinks) / (its height above the floor) [1/s]; 0 if none sinks.
+
+    A circle that overlaps with the floor and sinks counts as infinitely near.
+    """
+    greatest = wp.int64(0)
+    i = int(0)
+    while i < chain.link_count:
+        left, right = falling(chain, K[V, i], K[OMEGA, i], K[COSINE, i], K[LEFT_Y, i], K[RIGHT_Y, i])
+        greatest = wp.max(greatest, wp.max(order_bits(left), order_bits(right)))
+        i += 1
+    return wp.cast(greatest, wp.float64)
+
+
+@functools.cache
+def fastest_meeting(columns: int):
+    """Warp function: the greatest of (relative speed) / (distance) [1/s] of the pairs in the neighbour list."""
+    lists = list_layout(columns)
+
+    @wp.func
+    def meeting(K: wp.array2d(dtype=wp.float64), L: wp.array(dtype=wp.int32), chain: Chain):
+        greatest = wp.int64(0)
+        total = L[wp.static(lists.count)]
+        k = int(0)
+        while k < total:
+            rate = meeting_of(K, chain, L[wp.static(lists.first) + k], L[wp.static(lists.second) + k])
+            greatest = wp.max(greatest, order_bits(rate))
+            k += 1
+        return wp.cast(greatest, wp.float64)
+
+    return meeting

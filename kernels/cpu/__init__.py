@@ -1,0 +1,1 @@
+"""One thread carries one chain. Never imports gpu/."""

@@ -1,0 +1,287 @@
+"""Which joints of a chain may touch: a uniform grid makes a neighbour list with a skin.
+
+Joints are the centres of the links' circles (to within the joint opening |C|). The list holds all pairs of joints
+closer than 2r + skin + 2|C|; it stays complete until a joint has moved further than skin/2 − |C| from where it was
+listed. Cells are as wide as that reach, hashed into a table, so that the grid needs no bounds and a chain of any
+extent the same memory.
+"""
+
+import functools
+from dataclasses import dataclass
+
+import warp as wp
+
+from warpchain.kernels import layout
+from warpchain.kernels.layout import (
+    LISTED_X,
+    LISTED_Y,
+    RIGHT_X,
+    RIGHT_Y,
+)
+from warpchain.kernels.physics.elementary import HALF, TWO, order_bits
+from warpchain.kernels.types import Chain
+
+wp.set_module_options({"enable_backward": False})
+
+
+@dataclass(frozen=True)
+class ListLayout:
+    """Where the integers of a chain's neighbour list lie: offsets into one row of int32.
+
+    Attributes:
+        capacity: Greatest number of pairs; more is an overflow, which ends the walk with a status.
+        table: Number of hash buckets, a power of two.
+    """
+
+    columns: int
+    capacity: int
+    table: int
+
+    @property
+    def count(self) -> int:
+        """Number of pairs (one integer)."""
+        return 0
+
+    @property
+    def first(self) -> int:
+        """Lower joint of each pair, in the order of contact resolution."""
+        return 1
+
+    @property
+    def second(self) -> int:
+        """Higher joint of each pair."""
+        return self.first + self.capacity
+
+    @property
+    def touching(self) -> int:
+        """Scratch: indices of pairs that touch now."""
+        return self.second + self.capacity
+
+    @property
+    def found_first(self) -> int:
+        """Scratch: pairs as found, ordered by (p, q)."""
+        return self.touching + self.capacity + 1
+
+    @property
+    def found_second(self) -> int:
+        """Scratch: see ``found_first``."""
+        return self.found_first + self.capacity
+
+    @property
+    def bucket(self) -> int:
+        """Scratch: last joint put into each bucket, −1 for none."""
+        return self.found_second + self.capacity
+
+    @property
+    def next_joint(self) -> int:
+        """Scratch: the joint put into the same bucket before this one."""
+        return self.bucket + self.table
+
+    @property
+    def cell_x(self) -> int:
+        """Scratch: cell of each joint."""
+        return self.next_joint + self.columns
+
+    @property
+    def cell_y(self) -> int:
+        """Scratch: cell of each joint."""
+        return self.cell_x + self.columns
+
+    @property
+    def pending(self) -> int:
+        """Scratch of the block form, over parts that serve at other times: which contacts have not gone yet."""
+        return self.found_first
+
+    @property
+    def owners(self) -> int:
+        """Scratch of the block form for chains too long for shared memory, see :mod:`gpu.contacts.self_contacts`."""
+        return max(self.cell_y + self.columns, self.pending + 2 * self.capacity)
+
+    @property
+    def size(self) -> int:
+        """Integers in all."""
+        return self.geometry + 2 * self.geometry_rows * self.geometry_columns
+
+    @property
+    def geometry_rows(self) -> int:
+        """Rows of the CPU's scratch for contacts, see :mod:`cpu.contacts.self_contacts`."""
+        return 34
+
+    @property
+    def geometry_columns(self) -> int:
+        """Pairs of joints whose contacts are worked out together, a multiple of 8."""
+        return 64
+
+    @property
+    def geometry(self) -> int:
+        """That scratch: doubles, on whole cache lines."""
+        return -(-(self.owners + 3 * self.columns + 8) // 16) * 16
+
+
+@functools.cache
+def list_layout(columns: int) -> ListLayout:
+    """Layout for chains in scratch blocks of this width."""
+    table = 1
+    while table < 2 * columns:
+        table *= 2
+    return ListLayout(columns=columns, capacity=layout.PAIRS_PER_LINK * columns, table=table)
+
+
+@wp.func
+def greatest_displacement(K: wp.array2d(dtype=wp.float64), chain: Chain):
+    """Greatest distance [m] of a joint from where it was when the list was built."""
+    greatest = wp.int64(0)
+    i = int(0)
+    while i < chain.link_count:
+        dx = K[RIGHT_X, i] - K[LISTED_X, i]
+        dy = K[RIGHT_Y, i] - K[LISTED_Y, i]
+        greatest = wp.max(greatest, order_bits(dx * dx + dy * dy))
+        i += 1
+    return wp.sqrt(wp.cast(greatest, wp.float64))
+
+
+@wp.func
+def listing_reach(chain: Chain, skin: wp.float64, opening: wp.float64):
+    """Distance [m] below which two joints are listed; ``opening``: greatest |C| [m]."""
+    return TWO * chain.circle_radius + skin + TWO * opening
+
+
+@wp.func
+def bucket_of(cell_x: int, cell_y: int, table: int):
+    """Bucket of a cell in a hash table whose size is a power of two."""
+    mixed = cell_x * 73856093 ^ cell_y * 19349663
+    return (mixed ^ (mixed >> 15)) & (table - 1)
+
+
+@functools.cache
+def neighbour_list(columns: int):
+    """Warp functions (build by grid, build by testing all pairs) for scratch blocks of this width.
+
+    Both fill the list with the same pairs in the same order and return False if they overflow its capacity.
+    """
+    lists = list_layout(columns)
+
+    @wp.func
+    def remember_positions(K: wp.array2d(dtype=wp.float64), chain: Chain):
+        i = int(0)
+        while i < chain.link_count:
+            K[LISTED_X, i] = K[RIGHT_X, i]
+            K[LISTED_Y, i] = K[RIGHT_Y, i]
+            i += 1
+
+    @wp.func
+    def arrange(L: wp.array(dtype=wp.int32), total: int):
+        """Stable sort of the pairs found, (p, q) ascending, into the classes (p mod 2, q mod 2)."""
+        kept = int(0)
+        parity = int(0)
+        while parity < 4:
+            k = int(0)
+            while k < total:
+                p = L[wp.static(lists.found_first) + k]
+                q = L[wp.static(lists.found_second) + k]
+                if (p & 1) * 2 + (q & 1) == parity:
+                    L[wp.static(lists.first) + kept] = p
+                    L[wp.static(lists.second) + kept] = q
+                    kept += 1
+                k += 1
+            parity += 1
+        L[wp.static(lists.count)] = total
+
+    @wp.func
+    def build_by_grid(
+        K: wp.array2d(dtype=wp.float64),
+        L: wp.array(dtype=wp.int32),
+        chain: Chain,
+        skin: wp.float64,
+        opening: wp.float64,
+    ):
+        n = chain.link_count
+        reach = listing_reach(chain, skin, opening)
+        square = reach * reach
+        remember_positions(K, chain)
+        i = int(0)
+        while i < wp.static(lists.table):
+            L[wp.static(lists.bucket) + i] = -1
+            i += 1
+        i = int(0)
+        while i < n:
+            cell_x = int(wp.floor(K[RIGHT_X, i] / reach))
+            cell_y = int(wp.floor(K[RIGHT_Y, i] / reach))
+            bucket = bucket_of(cell_x, cell_y, wp.static(lists.table))
+            L[wp.static(lists.cell_x) + i] = cell_x
+            L[wp.static(lists.cell_y) + i] = cell_y
+            L[wp.static(lists.next_joint) + i] = L[wp.static(lists.bucket) + bucket]
+            L[wp.static(lists.bucket) + bucket] = i
+            i += 1
+        total = int(0)
+        fits = bool(True)
+        p = int(0)
+        while p < n:
+            start = total
+            near = int(0)
+            while near < 9:
+                cell_x = L[wp.static(lists.cell_x) + p] + near % 3 - 1
+                cell_y = L[wp.static(lists.cell_y) + p] + near // 3 - 1
+                q = L[wp.static(lists.bucket) + bucket_of(cell_x, cell_y, wp.static(lists.table))]
+                # joints were put in ascending order, so a bucket is read in descending order
+                while q > p:
+                    if L[wp.static(lists.cell_x) + q] == cell_x and L[wp.static(lists.cell_y) + q] == cell_y:
+                        dx = K[RIGHT_X, q] - K[RIGHT_X, p]
+                        dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
+                        if dx * dx + dy * dy < square:
+                            if total < wp.static(lists.capacity):
+                                # insertion keeps this joint's partners in ascending order
+                                k = total
+                                while k > start and L[wp.static(lists.found_second) + wp.max(k - 1, 0)] > q:
+                                    L[wp.static(lists.found_second) + k] = L[wp.static(lists.found_second) + k - 1]
+                                    k -= 1
+                                L[wp.static(lists.found_second) + k] = q
+                                L[wp.static(lists.found_first) + total] = p
+                                total += 1
+                            else:
+                                fits = bool(False)
+                    q = L[wp.static(lists.next_joint) + q]
+                near += 1
+            p += 1
+        arrange(L, total)
+        return fits
+
+    @wp.func
+    def build_by_all_pairs(
+        K: wp.array2d(dtype=wp.float64),
+        L: wp.array(dtype=wp.int32),
+        chain: Chain,
+        skin: wp.float64,
+        opening: wp.float64,
+    ):
+        n = chain.link_count
+        reach = listing_reach(chain, skin, opening)
+        square = reach * reach
+        remember_positions(K, chain)
+        total = int(0)
+        fits = bool(True)
+        p = int(0)
+        while p < n:
+            q = p + 1
+            while q < n:
+                dx = K[RIGHT_X, q] - K[RIGHT_X, p]
+                dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
+                if dx * dx + dy * dy < square:
+                    if total < wp.static(lists.capacity):
+                        L[wp.static(lists.found_first) + total] = p
+                        L[wp.static(lists.found_second) + total] = q
+                        total += 1
+                    else:
+                        fits = bool(False)
+                q += 1
+            p += 1
+        arrange(L, total)
+        return fits
+
+    return build_by_grid, build_by_all_pairs
+
+
+@wp.func
+def list_slack(K: wp.array2d(dtype=wp.float64), chain: Chain, skin: wp.float64, opening: wp.float64):
+    """How far every joint may yet move [m] before the list may lack a pair; 0 or less: the list is stale."""
+    return HALF * skin - opening - greatest_displacement(K, chain)

@@ -1,0 +1,322 @@
+"""Embedded explicit Runge–Kutta methods: one loop over stages for every tableau.
+
+Written for one CPU thread per chain. The loops over links keep to the form that clang vectorises: ``while`` loops
+with an integer of their own, one scratch block of static shape, no branch and no library call inside.
+"""
+
+import functools
+
+import warp as wp
+
+from warpchain.kernels.layout import (
+    COSINE,
+    ERROR,
+    FORCE_X,
+    FORCE_Y,
+    INVERSE_INERTIA,
+    INVERSE_MASS,
+    LEFT_U,
+    LEFT_V,
+    LEFT_X,
+    LEFT_Y,
+    LOST_DAMPING,
+    LOST_FRICTION,
+    NEW_OMEGA,
+    NEW_THETA,
+    NEW_U,
+    NEW_V,
+    NEW_X,
+    NEW_Y,
+    OMEGA,
+    RIGHT_U,
+    RIGHT_V,
+    RIGHT_X,
+    RIGHT_Y,
+    SINE,
+    STAGE_ARM_X,
+    STAGE_ARM_Y,
+    STAGE_ROWS,
+    STAGE_SPIN,
+    STAGES,
+    THETA,
+    TORQUE,
+    U,
+    V,
+    X,
+    Y,
+)
+from warpchain.kernels.methods.controller import error_bits
+from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
+from warpchain.kernels.physics.elementary import LARGEST_TURN, TWO, ZERO, cos_sin, order_bits
+from warpchain.kernels.physics.geometry import end_positions, end_velocities, turned
+from warpchain.kernels.physics.joint import friction_torque, joint_force, link_acceleration
+from warpchain.kernels.types import Chain
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def place_ends(K: wp.array2d(dtype=wp.float64), chain: Chain):
+    """Directions and end positions of the links, exactly, from the state rows."""
+    n = chain.link_count
+    a = chain.half_length
+    i = int(0)
+    while i < n:
+        c, s = cos_sin(K[THETA, i])
+        K[COSINE, i] = c
+        K[SINE, i] = s
+        left_x, left_y, right_x, right_y = end_positions(K[X, i], K[Y, i], a * c, a * s)
+        K[LEFT_X, i] = left_x
+        K[LEFT_Y, i] = left_y
+        K[RIGHT_X, i] = right_x
+        K[RIGHT_Y, i] = right_y
+        i += 1
+    K[LEFT_X, n] = K[LEFT_X, 0]
+    K[LEFT_Y, n] = K[LEFT_Y, 0]
+
+
+@wp.func
+def begin_stages(K: wp.array2d(dtype=wp.float64), chain: Chain):
+    """First stage's rows from the state: arms and end velocities; ``place_ends`` did the positions."""
+    n = chain.link_count
+    a = chain.half_length
+    i = int(0)
+    while i < n:
+        arm_x = a * K[COSINE, i]
+        arm_y = a * K[SINE, i]
+        w = K[OMEGA, i]
+        K[STAGE_ARM_X, i] = arm_x
+        K[STAGE_ARM_Y, i] = arm_y
+        K[STAGE_SPIN, i] = w
+        left_u, left_v, right_u, right_v = end_velocities(K[U, i], K[V, i], w, arm_x, arm_y)
+        K[LEFT_U, i] = left_u
+        K[LEFT_V, i] = left_v
+        K[RIGHT_U, i] = right_u
+        K[RIGHT_V, i] = right_v
+        i += 1
+    K[LEFT_U, n] = K[LEFT_U, 0]
+    K[LEFT_V, n] = K[LEFT_V, 0]
+    K[STAGE_SPIN, n] = K[STAGE_SPIN, 0]
+
+
+@functools.cache
+def explicit_method(name: str):
+    """Warp functions of one tableau: (evaluate the first stage, try a step, commit it).
+
+    Args:
+        name: Key of :data:`TABLEAUS`.
+
+    Returns:
+        ``first_stage(K, chain)``, ``attempt(K, chain, h, tolerance)`` → bits of the greatest error ratio (see
+        :func:`order_bits`), ``commit(K, chain, h)``.
+    """
+    tableau = TABLEAUS[name]
+    stages = tableau.stages
+    reuses_last = tableau.first_same_as_last
+    velocity, position = tableau.velocity, tableau.position
+    nodes = tableau.nodes
+    velocity_weights, position_weights = tableau.velocity_weights, tableau.position_weights
+    velocity_errors, position_errors = tableau.velocity_errors, tableau.position_errors
+    last_row = STAGES + STAGE_ROWS * (stages - 1)
+    power_needed = tuple(
+        weight != 0.0 or (reuses_last and velocity_weights[0] != 0.0 and stage == stages - 1)
+        for stage, weight in enumerate(velocity_weights)
+    )
+
+    @wp.func
+    def derivatives(K: wp.array2d(dtype=wp.float64), chain: Chain, row: int, needs_power: bool):
+        n = chain.link_count
+        i = int(0)
+        while i < n:
+            cx = K[LEFT_X, i + 1] - K[RIGHT_X, i]
+            cy = K[LEFT_Y, i + 1] - K[RIGHT_Y, i]
+            cu = K[LEFT_U, i + 1] - K[RIGHT_U, i]
+            cv = K[LEFT_V, i + 1] - K[RIGHT_V, i]
+            spin = K[STAGE_SPIN, i] - K[STAGE_SPIN, i + 1]
+            torque = friction_torque(chain, spin)
+            K[FORCE_X, i + 1] = joint_force(chain, cx, cu)
+            K[FORCE_Y, i + 1] = joint_force(chain, cy, cv)
+            K[TORQUE, i + 1] = torque
+            if needs_power:
+                K[row + 3, i] = torque * spin
+                K[row + 4, i] = chain.joint_damping * (cu * cu + cv * cv)
+            i += 1
+        K[FORCE_X, 0] = K[FORCE_X, n]
+        K[FORCE_Y, 0] = K[FORCE_Y, n]
+        K[TORQUE, 0] = K[TORQUE, n]
+        i = int(0)
+        while i < n:
+            ax, ay, spin_rate = link_acceleration(
+                chain,
+                K[INVERSE_MASS, i],
+                K[INVERSE_INERTIA, i],
+                K[STAGE_ARM_X, i],
+                K[STAGE_ARM_Y, i],
+                K[FORCE_X, i],
+                K[FORCE_Y, i],
+                K[FORCE_X, i + 1],
+                K[FORCE_Y, i + 1],
+                K[TORQUE, i],
+                K[TORQUE, i + 1],
+            )
+            K[row, i] = ax
+            K[row + 1, i] = ay
+            K[row + 2, i] = spin_rate
+            i += 1
+
+    @wp.func
+    def first_stage(K: wp.array2d(dtype=wp.float64), chain: Chain):
+        begin_stages(K, chain)
+        derivatives(K, chain, wp.static(STAGES), wp.static(power_needed[0]))
+
+    @wp.func
+    def attempt(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64, tolerance: wp.float64):
+        n = chain.link_count
+        a = chain.half_length
+        hh = h * h
+        for s in range(1, wp.static(stages)):
+            ch = wp.static(wp.float64(nodes[s])) * h
+            i = int(0)
+            while i < n:
+                du = ZERO
+                dv = ZERO
+                dw = ZERO
+                dx = ZERO
+                dy = ZERO
+                turn = ZERO
+                for j in range(wp.static(s)):
+                    if wp.static(velocity[s][j] != 0.0):
+                        du += wp.static(wp.float64(velocity[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
+                        dv += wp.static(wp.float64(velocity[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                        dw += wp.static(wp.float64(velocity[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                    if wp.static(position[s][j] != 0.0):
+                        dx += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
+                        dy += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                        turn += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                turn = ch * K[OMEGA, i] + hh * turn
+                arm_x, arm_y = turned(a * K[COSINE, i], a * K[SINE, i], turn)
+                x = K[X, i] + (ch * K[U, i] + hh * dx)
+                y = K[Y, i] + (ch * K[V, i] + hh * dy)
+                u = K[U, i] + h * du
+                v = K[V, i] + h * dv
+                w = K[OMEGA, i] + h * dw
+                K[STAGE_ARM_X, i] = arm_x
+                K[STAGE_ARM_Y, i] = arm_y
+                K[STAGE_SPIN, i] = w
+                left_x, left_y, right_x, right_y = end_positions(x, y, arm_x, arm_y)
+                left_u, left_v, right_u, right_v = end_velocities(u, v, w, arm_x, arm_y)
+                K[LEFT_X, i] = left_x
+                K[LEFT_Y, i] = left_y
+                K[LEFT_U, i] = left_u
+                K[LEFT_V, i] = left_v
+                K[RIGHT_X, i] = right_x
+                K[RIGHT_Y, i] = right_y
+                K[RIGHT_U, i] = right_u
+                K[RIGHT_V, i] = right_v
+                i += 1
+            K[LEFT_X, n] = K[LEFT_X, 0]
+            K[LEFT_Y, n] = K[LEFT_Y, 0]
+            K[LEFT_U, n] = K[LEFT_U, 0]
+            K[LEFT_V, n] = K[LEFT_V, 0]
+            K[STAGE_SPIN, n] = K[STAGE_SPIN, 0]
+            derivatives(K, chain, wp.static(STAGES + STAGE_ROWS * s), wp.static(power_needed[s]))
+        # new state and error ratio
+        i = int(0)
+        while i < n:
+            du = ZERO
+            dv = ZERO
+            dw = ZERO
+            dx = ZERO
+            dy = ZERO
+            turn = ZERO
+            eu = ZERO
+            ev = ZERO
+            ew = ZERO
+            ex = ZERO
+            ey = ZERO
+            et = ZERO
+            for j in range(wp.static(stages)):
+                if wp.static(velocity_weights[j] != 0.0):
+                    du += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
+                    dv += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                    dw += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                if wp.static(position_weights[j] != 0.0):
+                    dx += wp.static(wp.float64(position_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
+                    dy += wp.static(wp.float64(position_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                    turn += wp.static(wp.float64(position_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                if wp.static(velocity_errors[j] != 0.0):
+                    eu += wp.static(wp.float64(velocity_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
+                    ev += wp.static(wp.float64(velocity_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                    ew += wp.static(wp.float64(velocity_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                if wp.static(position_errors[j] != 0.0):
+                    ex += wp.static(wp.float64(position_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
+                    ey += wp.static(wp.float64(position_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                    et += wp.static(wp.float64(position_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+            u = K[U, i]
+            v = K[V, i]
+            w = K[OMEGA, i]
+            K[NEW_X, i] = K[X, i] + (h * u + hh * dx)
+            K[NEW_Y, i] = K[Y, i] + (h * v + hh * dy)
+            K[NEW_THETA, i] = K[THETA, i] + (h * w + hh * turn)
+            K[NEW_U, i] = u + h * du
+            K[NEW_V, i] = v + h * dv
+            K[NEW_OMEGA, i] = w + h * dw
+            # sums would overestimate, maxima of integers see NaN; below, one reduction over links
+            worst = wp.max(
+                wp.max(
+                    error_bits(hh * ex, K[X, i], u, h),
+                    error_bits(hh * ey, K[Y, i], v, h),
+                ),
+                error_bits(hh * et, K[THETA, i], w, h),
+            )
+            worst = wp.max(
+                worst,
+                wp.max(
+                    wp.max(
+                        error_bits(h * eu, u, K[wp.static(STAGES), i], h),
+                        error_bits(h * ev, v, K[wp.static(STAGES + 1), i], h),
+                    ),
+                    error_bits(h * ew, w, K[wp.static(STAGES + 2), i], h),
+                ),
+            )
+            K[ERROR, i] = wp.cast(worst, wp.float64) / tolerance
+            i += 1
+        furthest = wp.int64(0)
+        greatest = wp.int64(0)
+        i = int(0)
+        while i < n:
+            greatest = wp.max(greatest, order_bits(K[ERROR, i]))
+            furthest = wp.max(furthest, order_bits(K[NEW_THETA, i] - K[THETA, i]))
+            i += 1
+        # a turn beyond the polynomials' range is refused as an error of 2: the step shrinks
+        if wp.cast(furthest, wp.float64) > LARGEST_TURN:
+            greatest = wp.max(greatest, order_bits(TWO))
+        return greatest
+
+    @wp.func
+    def commit(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64):
+        n = chain.link_count
+        i = int(0)
+        while i < n:
+            friction = ZERO
+            damping = ZERO
+            for j in range(wp.static(stages)):
+                if wp.static(velocity_weights[j] != 0.0):
+                    friction += (
+                        wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 3), i]
+                    )
+                    damping += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 4), i]
+            K[LOST_FRICTION, i] = K[LOST_FRICTION, i] + h * friction
+            K[LOST_DAMPING, i] = K[LOST_DAMPING, i] + h * damping
+            K[X, i] = K[NEW_X, i]
+            K[Y, i] = K[NEW_Y, i]
+            K[THETA, i] = K[NEW_THETA, i]
+            K[U, i] = K[NEW_U, i]
+            K[V, i] = K[NEW_V, i]
+            K[OMEGA, i] = K[NEW_OMEGA, i]
+            if wp.static(reuses_last):
+                for row in range(wp.static(STAGE_ROWS)):
+                    K[wp.static(STAGES + row), i] = K[wp.static(last_row + row), i]
+            i += 1
+
+    return first_stage, attempt, commit

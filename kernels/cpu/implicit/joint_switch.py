@@ -1,0 +1,116 @@
+"""Between the two models of a joint: spring and damper, and rigid.
+
+*Closing*: a chain that has seen no impulse for a while, whose springs have come to rest, is projected on C = 0 and
+Ċ = 0 and goes on with rigid joints. What the springs held and what the projection takes is booked. *Opening*: the
+joints are opened by C = F/k, so that the springs begin with the forces that rigid joints have at that moment, and
+nothing rings but what an impulse sets going. A closing and an opening at the same state cancel in the ledger.
+
+Both displace links by forces between neighbours alone, so that momentum, centre of mass and with it the energy of
+gravity stay; the angular momentum does to the order of C.
+"""
+
+import functools
+
+import warp as wp
+
+from warpchain.kernels.cpu.implicit.rigid import GREATEST_RINGING, GREATEST_STRETCHING, rigid_joints
+from warpchain.kernels.cpu.implicit.rigid_flight import flight_memory
+from warpchain.kernels.cpu.implicit.rigid_layout import BASE, FORCE, force_layout, link_at
+from warpchain.kernels.cpu.implicit.solver import place_column, segment_places
+from warpchain.kernels.layout import THETA, X, Y
+from warpchain.kernels.physics.elementary import ONE, TWO, ZERO
+from warpchain.kernels.types import Chain
+
+wp.set_module_options({"enable_backward": False})
+
+QUIET_TIME = wp.constant(wp.float64(5e-5))
+"""A chain may close its joints after no impulse for this long [s].
+
+That is 30 decay times of the paper's springs for neighbours; long waves round the loop take longer, and what is left
+of them is what the projection takes, and that is booked.
+"""
+
+
+@functools.cache
+def hand_over(columns: int, first_row: int):
+    """Warp functions (close joints, open joints) for flights in the rows from ``first_row`` on.
+
+    Returns:
+        ``close_joints(K, chain)`` → whether they are closed now, and the energy [J] that went; if not, nothing has
+        changed. ``open_joints(K, chain)``, right after a step of the flight and its impulses → the energy [J] that
+        went, negative.
+    """
+    rigid = rigid_joints(columns)
+    load, store, solve_joints, displace = rigid.load, rigid.store, rigid.solve_joints, rigid.displace
+    openings, stretching = rigid.openings, rigid.stretching
+    close, begin = rigid.close, rigid.begin
+    kinetic_energy, are_stiff = rigid.kinetic_energy, rigid.are_stiff
+    memory = flight_memory(columns, first_row)
+    flight_rows, force_rows = memory.rows, memory.force_rows
+    right = force_layout(columns).right
+
+    @wp.func
+    def close_joints(K: wp.array2d(dtype=wp.float64), chain: Chain):
+        S = flight_rows(K)
+        R = force_rows(K)
+        places, full, _ = segment_places(chain.link_count)
+        end = place_column(places + 1)
+        load(S, K, chain)
+        openings(S, chain, places, full)
+        held = stretching(S, chain, places)
+        kinetic = kinetic_energy(S, end)
+        closed = bool(False)
+        ringing = ZERO
+        if held <= GREATEST_STRETCHING * kinetic:
+            closed = close(S, R, chain, places, full)
+            ringing = kinetic - kinetic_energy(S, end)
+            closed = closed and wp.abs(ringing) <= GREATEST_RINGING * kinetic
+        if closed:
+            begin(S, R, chain, places, full)
+            closed = are_stiff(S, chain, end)
+        if closed:
+            store(S, K, chain)
+        return closed, held + ringing
+
+    @wp.func
+    def open_joints(K: wp.array2d(dtype=wp.float64), chain: Chain):
+        S = flight_rows(K)
+        R = force_rows(K)
+        n = chain.link_count
+        places, full, _ = segment_places(n)
+        end = place_column(places + 1)
+        # where the links lie on one line, S is singular and neither F nor what opens the joints has a bound: there the
+        # springs shall find their forces by themselves
+        if not are_stiff(S, chain, end):
+            return ZERO
+        openings(S, chain, places, full)
+        before = stretching(S, chain, places)
+        give = ONE / chain.joint_stiffness
+        c = int(8)
+        while c < end:
+            repeats = c < 16 and c >= 8 + full
+            cx = S[wp.static(right), c] - give * S[FORCE, c]
+            cy = S[wp.static(right + 1), c] - give * S[wp.static(FORCE + 1), c]
+            S[wp.static(right), c] = wp.where(repeats, ZERO, cx)
+            S[wp.static(right + 1), c] = wp.where(repeats, ZERO, cy)
+            c += 1
+        solve_joints(S, R, places, full)
+        displace(S, chain, places)
+        openings(S, chain, places, full)
+        after = stretching(S, chain, places)
+        if after > TWO * GREATEST_STRETCHING * kinetic_energy(S, end):
+            return ZERO
+        p = int(0)
+        while p < places:
+            s = int(0)
+            while s < 8:
+                i = link_at(p, s, places, full, n)
+                c = 8 * p + 8 + s
+                K[X, i] = S[BASE, c]
+                K[Y, i] = S[wp.static(BASE + 1), c]
+                K[THETA, i] = S[wp.static(BASE + 2), c]
+                s += 1
+            p += 1
+        return before - after
+
+    return close_joints, open_joints

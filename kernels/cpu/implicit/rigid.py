@@ -1,0 +1,445 @@
+"""Rigid joints: the limit k → ∞, where no spring oscillates and steps are as long as the motion allows.
+
+With rigid joints C = 0 and Ċ = 0 hold always, and the joint forces F follow from C̈ = 0: S F = r with, for joint i
+between link i (l) and link i + 1 (r),
+
+    S_ii = (1/m_l + 1/m_r) 1 + a² (t_l t_lᵀ/I_l + t_r t_rᵀ/I_r),    S_i,i+1 = −1/m_r 1 + a² t_r t_rᵀ/I_r,
+    r_i = a (u_l ω_l² + u_r ω_r²) − a (t_l α_l + t_r α_r),
+
+α_i = (f_i−1 − f_i)/I_i being what joint friction alone does to link i. S is symmetric, positive definite and cyclic
+block-tridiagonal. The same matrix projects: impulses P with S P = Ċ take the opening rates away, displacements by P
+with S P = C the openings, both weighted with the masses and, being forces between two links, without a change of the
+momentum or of the centre of mass.
+
+All is done in the order of :mod:`cpu.implicit.solver`. A joint lies at the column of the link on its left.
+"""
+
+import functools
+from dataclasses import dataclass
+from typing import Any
+
+import warp as wp
+
+from warpchain.kernels.cpu.implicit.rigid_layout import (
+    BASE,
+    BASE_RATE,
+    COSINE,
+    COUNTED,
+    FORCE,
+    FREE,
+    INERTIA,
+    INVERSE_INERTIA,
+    INVERSE_MASS,
+    INVERSE_SMOOTHING,
+    MASS,
+    RATE,
+    ROWS_OF_RIGID,
+    SINE,
+    SPIN,
+    TORQUE,
+    force_layout,
+    link_at,
+    pad_joints,
+)
+from warpchain.kernels.cpu.implicit.rosenbrock_layout import pad_behind
+from warpchain.kernels.cpu.implicit.solver import LANES, cyclic_solver, place_column, row_at, segment_places
+from warpchain.kernels.layout import OMEGA, STAGES, THETA, U, V, X, Y
+from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, cos_sin, order_bits
+from warpchain.kernels.physics.joint import smoothed_torque
+from warpchain.kernels.physics.rigid_joint import inward_pull, opening_of, opening_rate_of, pushed, turning_share
+from warpchain.kernels.types import Chain
+
+wp.set_module_options({"enable_backward": False})
+
+CLOSED = wp.constant(wp.float64(1e-11))
+"""Opening [m] below which a joint counts as closed: 1e-2 N of a spring of 1e9 N/m."""
+MOST_CORRECTIONS = 5
+GREATEST_RINGING = wp.constant(wp.float64(1e-5))
+"""Part of the kinetic energy that the projection may take; more means that springs still oscillate.
+
+What it takes are long waves round the loop, which the dampers would take a little later: in walks at Table 1's values
+the projections take 0.2 (60 links) to 0.4 % (150) of the energy in all, and with the dampers' part that is the same as
+with 1e-6 here, at less than half of the steps before a loop of 150 links collapses. 1e-4 would save a quarter of all
+steps of its walk again, and take 1.2 %.
+"""
+GREATEST_STRETCHING = wp.constant(wp.float64(3e-4))
+"""Part of the kinetic energy that springs may hold and still be taken for rigid.
+
+In a loop turning at a speed v that part is m v²/(k ℓ²), the relative stretch: 7e-5 for k = 1e7 N/m at 5 m/s. Where the
+links of a loop lie on one line, S is singular and forces without bound would go over to the springs.
+"""
+
+
+@dataclass(frozen=True)
+class RigidJoints:
+    """Warp functions on the rows S above and the separators' rows R of :func:`force_layout`.
+
+    Attributes:
+        load: Takes the state from the rows of the scratch block.
+        store: Gives it back.
+        factorise: Makes S of the directions ready to solve with, until the next call.
+        solve_joints: Solves with it: the right-hand side becomes the solution.
+        solve_forces: Joint forces and accelerations for the directions and spins of a stage.
+        displace: Moves the links by the last solution.
+        openings: Makes C of the state the right-hand side.
+        stretching: Energy of springs that are open by the right-hand side.
+        close: Projects the state.
+        begin: Joint forces and accelerations of a projected state.
+        kinetic_energy: Of the state [J].
+        are_stiff: Whether springs would hold so little energy with these forces that they may count as rigid.
+    """
+
+    load: Any
+    store: Any
+    factorise: Any
+    solve_joints: Any
+    solve_forces: Any
+    displace: Any
+    openings: Any
+    stretching: Any
+    close: Any
+    begin: Any
+    kinetic_energy: Any
+    are_stiff: Any
+
+
+@functools.cache
+def rigid_joints(columns: int) -> RigidJoints:
+    """The functions of rigid joints for scratch blocks of this width."""
+    system = force_layout(columns)
+    factor, solve = cyclic_solver(system)
+    lower, diagonal, upper = (system.block(k) for k in range(3))
+    right, width, separator_rows = system.right, system.columns, system.separator_rows
+    pad_constants = pad_behind((INVERSE_MASS, INVERSE_INERTIA))
+    pad_directions = pad_behind((COSINE, SINE, SPIN))
+    pad_free = pad_behind((FREE,))
+    pad_places = pad_behind((BASE, BASE + 1))
+    pad_rates = pad_behind((BASE + 3, BASE + 4, BASE + 5))
+    pad_torques = pad_joints((TORQUE,))
+    pad_solution = pad_joints((right, right + 1))
+
+    @wp.func
+    def load(S: wp.array2d(dtype=wp.float64), K: wp.array2d(dtype=wp.float64), chain: Chain):
+        """The state and the links' constants from the rows of the scratch block."""
+        n = chain.link_count
+        places, full, _ = segment_places(n)
+        p = int(0)
+        while p < places:
+            s = int(0)
+            while s < 8:
+                i = link_at(p, s, places, full, n)
+                c = 8 * p + 8 + s
+                S[BASE, c] = K[X, i]
+                S[wp.static(BASE + 1), c] = K[Y, i]
+                S[wp.static(BASE + 2), c] = K[THETA, i]
+                S[wp.static(BASE + 3), c] = K[U, i]
+                S[wp.static(BASE + 4), c] = K[V, i]
+                S[wp.static(BASE + 5), c] = K[OMEGA, i]
+                inner = i % 2 == 0
+                mass = wp.where(inner, chain.inner_mass, chain.outer_mass)
+                inertia = wp.where(inner, chain.inner_inertia, chain.outer_inertia)
+                S[MASS, c] = mass
+                S[INERTIA, c] = inertia
+                S[INVERSE_MASS, c] = ONE / mass
+                S[INVERSE_INERTIA, c] = ONE / inertia
+                repeats = (p == 0 and s >= full) or row_at(p, s, places, full) >= n
+                S[COUNTED, c] = wp.where(repeats, ZERO, ONE)
+                s += 1
+            p += 1
+        pad_constants(S, places, full)
+
+    @wp.func
+    def store(S: wp.array2d(dtype=wp.float64), K: wp.array2d(dtype=wp.float64), chain: Chain):
+        """The state to the rows of the scratch block, accelerations to where the driver looks for them."""
+        n = chain.link_count
+        places, full, _ = segment_places(n)
+        p = int(0)
+        while p < places:
+            s = int(0)
+            while s < 8:
+                i = link_at(p, s, places, full, n)
+                c = 8 * p + 8 + s
+                K[X, i] = S[BASE, c]
+                K[Y, i] = S[wp.static(BASE + 1), c]
+                K[THETA, i] = S[wp.static(BASE + 2), c]
+                K[U, i] = S[wp.static(BASE + 3), c]
+                K[V, i] = S[wp.static(BASE + 4), c]
+                K[OMEGA, i] = S[wp.static(BASE + 5), c]
+                for k in range(3):
+                    K[wp.static(STAGES + k), i] = S[wp.static(BASE_RATE + k), c]
+                s += 1
+            p += 1
+
+    @wp.func
+    def assemble(S: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int):
+        """S of the directions."""
+        a = chain.half_length
+        pad_directions(S, places, full)
+        end = place_column(places + 1)
+        c = int(8)
+        while c < end:
+            repeats = c < 16 and c >= 8 + full
+            m_left = S[INVERSE_MASS, c]
+            m_right = S[INVERSE_MASS, c + 8]
+            xx, xy, yy = turning_share(a, S[INVERSE_INERTIA, c], S[COSINE, c], S[SINE, c])
+            after_xx, after_xy, after_yy = turning_share(a, S[INVERSE_INERTIA, c + 8], S[COSINE, c + 8], S[SINE, c + 8])
+            S[wp.static(diagonal), c] = wp.where(repeats, ONE, m_left + m_right + xx + after_xx)
+            S[wp.static(diagonal + 1), c] = wp.where(repeats, ZERO, xy + after_xy)
+            S[wp.static(diagonal + 2), c] = wp.where(repeats, ZERO, xy + after_xy)
+            S[wp.static(diagonal + 3), c] = wp.where(repeats, ONE, m_left + m_right + yy + after_yy)
+            S[wp.static(lower), c] = wp.where(repeats, -ONE, xx - m_left)
+            S[wp.static(lower + 1), c] = wp.where(repeats, ZERO, xy)
+            S[wp.static(lower + 2), c] = wp.where(repeats, ZERO, xy)
+            S[wp.static(lower + 3), c] = wp.where(repeats, -ONE, yy - m_left)
+            S[wp.static(upper), c] = wp.where(repeats, ZERO, after_xx - m_right)
+            S[wp.static(upper + 1), c] = wp.where(repeats, ZERO, after_xy)
+            S[wp.static(upper + 2), c] = wp.where(repeats, ZERO, after_xy)
+            S[wp.static(upper + 3), c] = wp.where(repeats, ZERO, after_yy - m_right)
+            c += 1
+
+    @wp.func
+    def factorise(
+        S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int
+    ):
+        """S of the directions, ready to solve with; ``factor`` and ``solve`` keep it until the next call."""
+        assemble(S, chain, places, full)
+        factor(S, R, places, full)
+
+    @wp.func
+    def solve_joints(S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), places: int, full: int):
+        """The right-hand side becomes the solution, also before the first places."""
+        solve(S, R, places)
+        pad_solution(S, places, full)
+
+    @wp.func
+    def pushed_at(S: wp.array2d(dtype=wp.float64), a: wp.float64, c: int):
+        """What the last solution, forces or impulses of the joints, does to the link of a column."""
+        ax, ay, turn = pushed(
+            a,
+            S[INVERSE_MASS, c],
+            S[INVERSE_INERTIA, c],
+            S[COSINE, c],
+            S[SINE, c],
+            S[wp.static(right), c - 8],
+            S[wp.static(right + 1), c - 8],
+            S[wp.static(right), c],
+            S[wp.static(right + 1), c],
+        )
+        return ax, ay, turn
+
+    @wp.func
+    def solve_forces(
+        S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int
+    ):
+        """Joint forces and accelerations for the directions, rates and torques of the stage."""
+        a = chain.half_length
+        end = place_column(places + 1)
+        c = int(8)
+        while c < end:
+            S[TORQUE, c] = smoothed_torque(chain, S[SPIN, c] - S[SPIN, c + 8], S[INVERSE_SMOOTHING, c])
+            c += 1
+        pad_torques(S, places, full)
+        c = int(8)
+        while c < end:
+            S[FREE, c] = (S[TORQUE, c - 8] - S[TORQUE, c]) * S[INVERSE_INERTIA, c]
+            c += 1
+        pad_free(S, places, full)
+        c = int(8)
+        while c < end:
+            repeats = c < 16 and c >= 8 + full
+            rx, ry = inward_pull(S[COSINE, c], S[SINE, c], S[SPIN, c], S[FREE, c])
+            after_x, after_y = inward_pull(S[COSINE, c + 8], S[SINE, c + 8], S[SPIN, c + 8], S[FREE, c + 8])
+            S[wp.static(right), c] = wp.where(repeats, ZERO, a * (rx + after_x))
+            S[wp.static(right + 1), c] = wp.where(repeats, ZERO, a * (ry + after_y))
+            c += 1
+        solve_joints(S, R, places, full)
+        c = int(8)
+        while c < end:
+            ax, ay, turn = pushed_at(S, a, c)
+            S[RATE, c] = ax
+            S[wp.static(RATE + 1), c] = ay - chain.gravity
+            S[wp.static(RATE + 2), c] = S[FREE, c] + turn
+            c += 1
+
+    def pusher(row: int):
+        """The function that adds what the last solution, impulses between the links, does to three rows from this."""
+
+        @wp.func
+        def push(S: wp.array2d(dtype=wp.float64), chain: Chain, places: int):
+            a = chain.half_length
+            end = place_column(places + 1)
+            c = int(8)
+            while c < end:
+                dx, dy, turn = pushed_at(S, a, c)
+                S[wp.static(row), c] = S[wp.static(row), c] + dx
+                S[wp.static(row + 1), c] = S[wp.static(row + 1), c] + dy
+                S[wp.static(row + 2), c] = S[wp.static(row + 2), c] + turn
+                c += 1
+
+        return push
+
+    displace, push = pusher(BASE), pusher(BASE + 3)
+
+    @wp.func
+    def openings(S: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int):
+        """Directions and spins of the state; C becomes the right-hand side; returns the greatest |C| [m]."""
+        a = chain.half_length
+        end = place_column(places + 1)
+        c = int(8)
+        while c < end:
+            cosine, sine = cos_sin(S[wp.static(BASE + 2), c])
+            S[COSINE, c] = cosine
+            S[SINE, c] = sine
+            S[SPIN, c] = S[wp.static(BASE + 5), c]
+            c += 1
+        pad_directions(S, places, full)
+        pad_places(S, places, full)
+        greatest = wp.int64(0)
+        c = int(8)
+        while c < end:
+            repeats = c < 16 and c >= 8 + full
+            cx, cy = opening_of(
+                a,
+                S[BASE, c],
+                S[wp.static(BASE + 1), c],
+                S[COSINE, c],
+                S[SINE, c],
+                S[BASE, c + 8],
+                S[wp.static(BASE + 1), c + 8],
+                S[COSINE, c + 8],
+                S[SINE, c + 8],
+            )
+            S[wp.static(right), c] = wp.where(repeats, ZERO, cx)
+            S[wp.static(right + 1), c] = wp.where(repeats, ZERO, cy)
+            greatest = wp.max(greatest, order_bits(cx * cx + cy * cy))
+            c += 1
+        return wp.sqrt(wp.cast(greatest, wp.float64))
+
+    @wp.func
+    def opening_rates(S: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int):
+        """Ċ becomes the right-hand side."""
+        a = chain.half_length
+        end = place_column(places + 1)
+        pad_rates(S, places, full)
+        c = int(8)
+        while c < end:
+            repeats = c < 16 and c >= 8 + full
+            cu, cv = opening_rate_of(
+                a,
+                S[wp.static(BASE + 3), c],
+                S[wp.static(BASE + 4), c],
+                S[SPIN, c],
+                S[COSINE, c],
+                S[SINE, c],
+                S[wp.static(BASE + 3), c + 8],
+                S[wp.static(BASE + 4), c + 8],
+                S[SPIN, c + 8],
+                S[COSINE, c + 8],
+                S[SINE, c + 8],
+            )
+            S[wp.static(right), c] = wp.where(repeats, ZERO, cu)
+            S[wp.static(right + 1), c] = wp.where(repeats, ZERO, cv)
+            c += 1
+
+    @wp.func
+    def stretching(S: wp.array2d(dtype=wp.float64), chain: Chain, places: int):
+        """Energy [J] in springs that are open by the right-hand side."""
+        total = ZERO
+        c = int(8)
+        while c < place_column(places + 1):
+            cx = S[wp.static(right), c]
+            cy = S[wp.static(right + 1), c]
+            total += S[COUNTED, c] * (cx * cx + cy * cy)
+            c += 1
+        return HALF * chain.joint_stiffness * total
+
+    @wp.func
+    def close(
+        rows: wp.array2d(dtype=wp.float64),
+        separators: wp.array2d(dtype=wp.float64),
+        chain: Chain,
+        places: int,
+        full: int,
+    ):
+        """Projects the state: C = 0 to rounding, then Ċ = 0; leaves the factors of S for it, directions and spins.
+
+        False if the joints could not be closed.
+        """
+        # clang does not inline this: without the static shapes anew its loops would not vectorise
+        S = wp.array(ptr=rows.ptr, shape=(wp.static(ROWS_OF_RIGID), wp.static(width)), dtype=wp.float64)
+        R = wp.array(ptr=separators.ptr, shape=(wp.static(separator_rows), LANES), dtype=wp.float64)
+        corrections = int(0)
+        widest = openings(S, chain, places, full)
+        factorise(S, R, chain, places, full)
+        while widest > CLOSED and corrections < MOST_CORRECTIONS:
+            solve_joints(S, R, places, full)
+            displace(S, chain, places)
+            widest = openings(S, chain, places, full)
+            factorise(S, R, chain, places, full)
+            corrections += 1
+        opening_rates(S, chain, places, full)
+        solve_joints(S, R, places, full)
+        push(S, chain, places)
+        end = place_column(places + 1)
+        c = int(8)
+        while c < end:
+            S[SPIN, c] = S[wp.static(BASE + 5), c]
+            c += 1
+        pad_directions(S, places, full)
+        return widest <= CLOSED
+
+    @wp.func
+    def begin(S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int):
+        """Joint forces and accelerations of a state that :func:`close` has left, friction with its own smoothing."""
+        end = place_column(places + 1)
+        c = int(8)
+        while c < end:
+            S[INVERSE_SMOOTHING, c] = chain.inverse_smoothing
+            c += 1
+        solve_forces(S, R, chain, places, full)
+        c = int(8)
+        while c < end:
+            S[FORCE, c] = S[wp.static(right), c]
+            S[wp.static(FORCE + 1), c] = S[wp.static(right + 1), c]
+            for k in range(3):
+                S[wp.static(BASE_RATE + k), c] = S[wp.static(RATE + k), c]
+            c += 1
+
+    @wp.func
+    def kinetic_energy(S: wp.array2d(dtype=wp.float64), end: int):
+        total = ZERO
+        c = int(8)
+        while c < end:
+            u = S[wp.static(BASE + 3), c]
+            v = S[wp.static(BASE + 4), c]
+            w = S[wp.static(BASE + 5), c]
+            total += S[COUNTED, c] * (S[MASS, c] * (u * u + v * v) + S[INERTIA, c] * w * w)
+            c += 1
+        return HALF * total
+
+    @wp.func
+    def are_stiff(S: wp.array2d(dtype=wp.float64), chain: Chain, end: int):
+        square = ZERO
+        c = int(8)
+        while c < end:
+            fx = S[FORCE, c]
+            fy = S[wp.static(FORCE + 1), c]
+            square += S[COUNTED, c] * (fx * fx + fy * fy)
+            c += 1
+        held = HALF * square / chain.joint_stiffness
+        return held <= GREATEST_STRETCHING * kinetic_energy(S, end)
+
+    return RigidJoints(
+        load,
+        store,
+        factorise,
+        solve_joints,
+        solve_forces,
+        displace,
+        openings,
+        stretching,
+        close,
+        begin,
+        kinetic_energy,
+        are_stiff,
+    )

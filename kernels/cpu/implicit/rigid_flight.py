@@ -1,0 +1,387 @@
+"""Flight on rigid joints: a W-method on the accelerations of :mod:`cpu.implicit.rigid`, and projections after a step.
+
+What stays stiff is joint friction, so the matrix of the method is that of friction alone, seen through the joints:
+A = −P M⁻¹ D with D = −∂Q/∂v (f'(w) of the joints) and P the projection on Ċ = 0. A stage (1 − g A) z = r, g = hγ, then
+asks for (M + g D) z + Gᵀ λ = M r and G z = G r. Freed of the links' places, with y = z_θ − r_θ, this is
+
+    (1/m_l + 1/m_r) λ_i − λ_i−1/m_l − λ_i+1/m_r + a (t_l y_l + t_r y_r) = 0,
+    I_i y_i + g (D y)_i − a t_i·(λ_i + λ_i−1) = −g (D r_θ)_i:
+
+cyclic block-tridiagonal with 3 × 3 blocks for (λ_i, y_i), the symmetric part positive, so that no pivoting is needed.
+
+Coulomb friction switches its sign in a millionth of the time of such a step wherever a joint stops and turns back,
+some thousand times a second in a loop. Seen sharp, each switch makes steps of a few µs. So within one step friction
+is smoothed over a part of the way that the joint's spin w goes in it: tanh(w / max(ω_c, c h |ẇ|)). A passing through
+zero then gives off the same impulse, the two sides being alike; a joint that sticks has no ẇ and keeps ω_c; and with h
+the smoothing goes to nothing. c = 0.2 was best in a prototype: 0.05 was no gain, 1 erred more than it saved.
+"""
+
+import functools
+from dataclasses import dataclass
+from typing import Any
+
+import warp as wp
+
+from warpchain.kernels.cpu.implicit.rigid import rigid_joints
+from warpchain.kernels.cpu.implicit.rigid_layout import (
+    BASE,
+    BASE_RATE,
+    COSINE,
+    COUNTED,
+    INERTIA,
+    INVERSE_MASS,
+    INVERSE_SMOOTHING,
+    RATE,
+    ROWS_OF_RIGID,
+    SINE,
+    SPIN,
+    STAGE_U,
+    STAGE_V,
+    TORQUE,
+    force_layout,
+    link_at,
+    pad_joints,
+)
+from warpchain.kernels.cpu.implicit.rosenbrock import GREATEST_TURN
+from warpchain.kernels.cpu.implicit.rosenbrock_layout import pad_behind
+from warpchain.kernels.cpu.implicit.solver import LANES, SegmentLayout, cyclic_solver, place_column, segment_places
+from warpchain.kernels.layout import LOST_FRICTION
+from warpchain.kernels.methods.controller import error_bits
+from warpchain.kernels.methods.w_tableaus import ROS34PW2
+from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, cos_sin, order_bits
+from warpchain.kernels.physics.rigid_joint import steepness, switch_smoothing
+from warpchain.kernels.types import Chain
+
+wp.set_module_options({"enable_backward": False})
+
+# Rows in segment order, behind those of rigid. Slopes; the θ of r, Σ γ_ij k_j of the rates; power; the candidate.
+SLOPE, TARGET, COUPLED = ROWS_OF_RIGID, ROWS_OF_RIGID + 1, ROWS_OF_RIGID + 2
+POWER, DRAG = ROWS_OF_RIGID + 5, ROWS_OF_RIGID + 6
+NEW = ROWS_OF_RIGID + 7
+FIRST_STAGE_ROW = ROWS_OF_RIGID + 13
+FLIGHT_SYSTEM = FIRST_STAGE_ROW + 6 * ROS34PW2.stages
+
+
+@functools.cache
+def friction_layout(columns: int) -> SegmentLayout:
+    """Where the system of the stages lies, for scratch blocks of this width."""
+    width = force_layout(columns).columns
+    return SegmentLayout(size=3, columns=width, matrix=FLIGHT_SYSTEM, right=FLIGHT_SYSTEM + 45)
+
+
+def flight_rows(columns: int) -> int:
+    """Rows that a flight takes of a chain's scratch block of this width."""
+    forces, friction = force_layout(columns), friction_layout(columns)
+    doubles = (FLIGHT_SYSTEM + 48) * forces.columns + LANES * (forces.separator_rows + friction.separator_rows)
+    return -(-doubles // columns)
+
+
+@dataclass(frozen=True)
+class FlightMemory:
+    """Warp functions that find what a flight remembers in a chain's scratch block.
+
+    Attributes:
+        rows: The rows in segment order.
+        force_rows: The separators' rows of S.
+        friction_rows: Those of the stages' system.
+    """
+
+    rows: Any
+    force_rows: Any
+    friction_rows: Any
+
+
+@functools.cache
+def flight_memory(columns: int, first_row: int) -> FlightMemory:
+    """Memory of flights in the rows of scratch blocks of this width from ``first_row`` on."""
+    forces, friction = force_layout(columns), friction_layout(columns)
+    count, width = FLIGHT_SYSTEM + 48, forces.columns
+    force_count, friction_count = forces.separator_rows, friction.separator_rows
+    offset = 8 * first_row * columns
+    force_offset = offset + 8 * count * width
+    friction_offset = force_offset + 8 * LANES * force_count
+
+    @wp.func
+    def rows(K: wp.array2d(dtype=wp.float64)):
+        return wp.array(
+            ptr=K.ptr + wp.uint64(wp.static(offset)), shape=(wp.static(count), wp.static(width)), dtype=wp.float64
+        )
+
+    @wp.func
+    def force_rows(K: wp.array2d(dtype=wp.float64)):
+        return wp.array(
+            ptr=K.ptr + wp.uint64(wp.static(force_offset)), shape=(wp.static(force_count), LANES), dtype=wp.float64
+        )
+
+    @wp.func
+    def friction_rows(K: wp.array2d(dtype=wp.float64)):
+        return wp.array(
+            ptr=K.ptr + wp.uint64(wp.static(friction_offset)),
+            shape=(wp.static(friction_count), LANES),
+            dtype=wp.float64,
+        )
+
+    return FlightMemory(rows, force_rows, friction_rows)
+
+
+@functools.cache
+def flight_method(columns: int, first_row: int):
+    """Warp functions of rigid flight in the rows of the scratch block from ``first_row`` on.
+
+    Returns:
+        ``attempt(K, chain, h, tolerance)`` → bits of the greatest error ratio (see :func:`order_bits`), and
+        ``commit(K, chain, h)``, which projects → False if the joints should not be taken for rigid any longer.
+    """
+    table = ROS34PW2
+    stages, gamma = table.stages, table.gamma
+    nodes, couplings, weights, errors = table.nodes, table.couplings, table.weights, table.errors
+    friction = friction_layout(columns)
+    rigid = rigid_joints(columns)
+    factorise, solve_forces = rigid.factorise, rigid.solve_forces
+    close, begin, store, are_stiff = rigid.close, rigid.begin, rigid.store, rigid.are_stiff
+    memory = flight_memory(columns, first_row)
+    flight_rows_of, force_rows_of, friction_rows_of = memory.rows, memory.force_rows, memory.friction_rows
+    factor, solve = cyclic_solver(friction)
+    lower, diagonal, upper = (friction.block(k) for k in range(3))
+    right = friction.right
+    pad_stage = pad_behind((COSINE, SINE, SPIN))
+    pad_target = pad_behind((TARGET,))
+    pad_slopes = pad_joints((SLOPE,))
+    pad_drag = pad_joints((DRAG,))
+    pad_solution = pad_joints((right, right + 1))
+    first = FIRST_STAGE_ROW
+
+    @wp.func
+    def prepare(S: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64, places: int, full: int):
+        """Smoothing and slopes of friction for a step h, and the matrix of its stages."""
+        a = chain.half_length
+        g = wp.static(wp.float64(gamma)) * h
+        end = place_column(places + 1)
+        c = int(8)
+        while c < end:
+            cosine, sine = cos_sin(S[wp.static(BASE + 2), c])
+            S[COSINE, c] = cosine
+            S[SINE, c] = sine
+            S[SPIN, c] = S[wp.static(BASE + 5), c]
+            S[TARGET, c] = S[wp.static(BASE_RATE + 2), c]
+            c += 1
+        pad_stage(S, places, full)
+        pad_target(S, places, full)
+        c = int(8)
+        while c < end:
+            inverse = switch_smoothing(chain, h, S[TARGET, c] - S[TARGET, c + 8])
+            S[INVERSE_SMOOTHING, c] = inverse
+            S[SLOPE, c] = g * steepness(chain, S[SPIN, c] - S[SPIN, c + 8], inverse)
+            S[POWER, c] = ZERO
+            c += 1
+        pad_slopes(S, places, full)
+        c = int(8)
+        while c < end:
+            repeats = c < 16 and c >= 8 + full
+            tx = -a * S[SINE, c]
+            ty = a * S[COSINE, c]
+            m_left = S[INVERSE_MASS, c]
+            m_right = S[INVERSE_MASS, c + 8]
+            before = S[SLOPE, c - 8]
+            here = S[SLOPE, c]
+            S[wp.static(diagonal), c] = wp.where(repeats, ONE, m_left + m_right)
+            S[wp.static(diagonal + 1), c] = ZERO
+            S[wp.static(diagonal + 2), c] = wp.where(repeats, ZERO, tx)
+            S[wp.static(diagonal + 3), c] = ZERO
+            S[wp.static(diagonal + 4), c] = wp.where(repeats, ONE, m_left + m_right)
+            S[wp.static(diagonal + 5), c] = wp.where(repeats, ZERO, ty)
+            S[wp.static(diagonal + 6), c] = wp.where(repeats, ZERO, -tx)
+            S[wp.static(diagonal + 7), c] = wp.where(repeats, ZERO, -ty)
+            S[wp.static(diagonal + 8), c] = wp.where(repeats, ONE, S[INERTIA, c] + here + before)
+            S[wp.static(lower), c] = wp.where(repeats, -ONE, -m_left)
+            S[wp.static(lower + 1), c] = ZERO
+            S[wp.static(lower + 2), c] = ZERO
+            S[wp.static(lower + 3), c] = ZERO
+            S[wp.static(lower + 4), c] = wp.where(repeats, -ONE, -m_left)
+            S[wp.static(lower + 5), c] = ZERO
+            S[wp.static(lower + 6), c] = wp.where(repeats, ZERO, -tx)
+            S[wp.static(lower + 7), c] = wp.where(repeats, ZERO, -ty)
+            S[wp.static(lower + 8), c] = wp.where(repeats, -ONE, -before)
+            S[wp.static(upper), c] = wp.where(repeats, ZERO, -m_right)
+            S[wp.static(upper + 1), c] = ZERO
+            S[wp.static(upper + 2), c] = wp.where(repeats, ZERO, -a * S[SINE, c + 8])
+            S[wp.static(upper + 3), c] = ZERO
+            S[wp.static(upper + 4), c] = wp.where(repeats, ZERO, -m_right)
+            S[wp.static(upper + 5), c] = wp.where(repeats, ZERO, a * S[COSINE, c + 8])
+            S[wp.static(upper + 6), c] = ZERO
+            S[wp.static(upper + 7), c] = ZERO
+            S[wp.static(upper + 8), c] = wp.where(repeats, ZERO, -here)
+            c += 1
+
+    @wp.func
+    def place_stage(S: wp.array2d(dtype=wp.float64), stage: int, end: int):
+        """Directions and rates of a stage, and Σ γ_ij k_j of the rates."""
+        for i in range(wp.static(stages)):
+            if stage == i:
+                c = int(8)
+                while c < end:
+                    turn = ZERO
+                    u = S[wp.static(BASE + 3), c]
+                    v = S[wp.static(BASE + 4), c]
+                    w = S[wp.static(BASE + 5), c]
+                    cu = ZERO
+                    cv = ZERO
+                    cw = ZERO
+                    for j in range(wp.static(i)):
+                        ku = S[wp.static(first + 6 * j + 3), c]
+                        kv = S[wp.static(first + 6 * j + 4), c]
+                        kw = S[wp.static(first + 6 * j + 5), c]
+                        turn += wp.static(wp.float64(nodes[i][j])) * S[wp.static(first + 6 * j + 2), c]
+                        u += wp.static(wp.float64(nodes[i][j])) * ku
+                        v += wp.static(wp.float64(nodes[i][j])) * kv
+                        w += wp.static(wp.float64(nodes[i][j])) * kw
+                        cu += wp.static(wp.float64(couplings[i][j])) * ku
+                        cv += wp.static(wp.float64(couplings[i][j])) * kv
+                        cw += wp.static(wp.float64(couplings[i][j])) * kw
+                    S[TARGET, c] = S[wp.static(BASE + 2), c] + turn
+                    S[STAGE_U, c] = u
+                    S[STAGE_V, c] = v
+                    S[SPIN, c] = w
+                    S[COUPLED, c] = cu
+                    S[wp.static(COUPLED + 1), c] = cv
+                    S[wp.static(COUPLED + 2), c] = cw
+                    c += 1
+        c = int(8)
+        while c < end:
+            cosine, sine = cos_sin(S[TARGET, c])
+            S[COSINE, c] = cosine
+            S[SINE, c] = sine
+            c += 1
+
+    @wp.func
+    def damp(
+        S: wp.array2d(dtype=wp.float64),
+        R: wp.array2d(dtype=wp.float64),
+        h: wp.float64,
+        weight: wp.float64,
+        places: int,
+        full: int,
+    ):
+        """(λ, y) of a stage from its accelerations; adds its part of the power that friction takes."""
+        end = place_column(places + 1)
+        c = int(8)
+        while c < end:
+            coupled = S[wp.static(COUPLED + 2), c]
+            S[TARGET, c] = h * S[wp.static(RATE + 2), c] + wp.static(wp.float64(1.0 / gamma)) * coupled
+            c += 1
+        pad_target(S, places, full)
+        c = int(8)
+        while c < end:
+            S[DRAG, c] = S[SLOPE, c] * (S[TARGET, c] - S[TARGET, c + 8])
+            S[POWER, c] = S[POWER, c] + weight * S[TORQUE, c] * (S[SPIN, c] - S[SPIN, c + 8])
+            c += 1
+        pad_drag(S, places, full)
+        c = int(8)
+        while c < end:
+            repeats = c < 16 and c >= 8 + full
+            S[wp.static(right), c] = ZERO
+            S[wp.static(right + 1), c] = ZERO
+            S[wp.static(right + 2), c] = wp.where(repeats, ZERO, S[DRAG, c - 8] - S[DRAG, c])
+            c += 1
+        solve(S, R, places)
+        pad_solution(S, places, full)
+
+    @wp.func
+    def keep_stage(S: wp.array2d(dtype=wp.float64), stage: int, h: wp.float64, end: int):
+        """k of a stage."""
+        for i in range(wp.static(stages)):
+            if stage == i:
+                c = int(8)
+                while c < end:
+                    share = S[INVERSE_MASS, c]
+                    ku = h * S[RATE, c] + share * (S[wp.static(right), c] - S[wp.static(right), c - 8])
+                    kv = h * S[wp.static(RATE + 1), c] + share * (
+                        S[wp.static(right + 1), c] - S[wp.static(right + 1), c - 8]
+                    )
+                    kw = h * S[wp.static(RATE + 2), c] + S[wp.static(right + 2), c]
+                    S[wp.static(first + 6 * i + 3), c] = ku
+                    S[wp.static(first + 6 * i + 4), c] = kv
+                    S[wp.static(first + 6 * i + 5), c] = kw
+                    ku = S[STAGE_U, c] + S[COUPLED, c] + wp.static(wp.float64(gamma)) * ku
+                    kv = S[STAGE_V, c] + S[wp.static(COUPLED + 1), c] + wp.static(wp.float64(gamma)) * kv
+                    kw = S[SPIN, c] + S[wp.static(COUPLED + 2), c] + wp.static(wp.float64(gamma)) * kw
+                    S[wp.static(first + 6 * i), c] = h * ku
+                    S[wp.static(first + 6 * i + 1), c] = h * kv
+                    S[wp.static(first + 6 * i + 2), c] = h * kw
+                    c += 1
+
+    @wp.func
+    def attempt(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64, tolerance: wp.float64):
+        S = flight_rows_of(K)
+        R = force_rows_of(K)
+        Q = friction_rows_of(K)
+        places, full, _ = segment_places(chain.link_count)
+        end = place_column(places + 1)
+        prepare(S, chain, h, places, full)
+        factor(S, Q, places, full)
+        stage = int(0)
+        while stage < wp.static(stages):
+            place_stage(S, stage, end)
+            factorise(S, R, chain, places, full)
+            solve_forces(S, R, chain, places, full)
+            weight = ZERO
+            for i in range(wp.static(stages)):
+                if stage == i:
+                    weight = wp.static(wp.float64(weights[i]))
+            damp(S, Q, h, weight, places, full)
+            keep_stage(S, stage, h, end)
+            stage += 1
+        worst = wp.int64(0)
+        turned = wp.int64(0)
+        c = int(8)
+        while c < end:
+            for k in range(6):
+                value = S[wp.static(BASE + k), c]
+                change = ZERO
+                error = ZERO
+                for j in range(wp.static(stages)):
+                    change += wp.static(wp.float64(weights[j])) * S[wp.static(first + 6 * j + k), c]
+                    error += wp.static(wp.float64(errors[j])) * S[wp.static(first + 6 * j + k), c]
+                S[wp.static(NEW + k), c] = value + change
+                rate = ZERO
+                if wp.static(k < 3):
+                    rate = S[wp.static(BASE + 3 + k), c]
+                else:
+                    rate = S[wp.static(BASE_RATE + k - 3), c]
+                worst = wp.max(worst, error_bits(error, value, rate, h))
+                if wp.static(k == 2):
+                    turned = wp.max(turned, order_bits(change))
+            c += 1
+        greatest = order_bits(wp.cast(worst, wp.float64) / tolerance)
+        # a greater turn is refused as an error of 2: the step shrinks
+        if wp.cast(turned, wp.float64) > GREATEST_TURN:
+            greatest = wp.max(greatest, order_bits(TWO))
+        return greatest
+
+    @wp.func
+    def commit(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64):
+        S = flight_rows_of(K)
+        R = force_rows_of(K)
+        n = chain.link_count
+        places, full, _ = segment_places(n)
+        end = place_column(places + 1)
+        c = int(8)
+        while c < end:
+            for k in range(6):
+                S[wp.static(BASE + k), c] = S[wp.static(NEW + k), c]
+            S[POWER, c] = h * S[COUNTED, c] * S[POWER, c]
+            c += 1
+        p = int(0)
+        while p < places:
+            s = int(0)
+            while s < 8:
+                i = link_at(p, s, places, full, n)
+                K[LOST_FRICTION, i] = K[LOST_FRICTION, i] + S[POWER, 8 * p + 8 + s]
+                s += 1
+            p += 1
+        closed = close(S, R, chain, places, full)
+        begin(S, R, chain, places, full)
+        store(S, K, chain)
+        return closed and are_stiff(S, chain, end)
+
+    return attempt, commit

@@ -1,0 +1,57 @@
+"""Where rigid joints keep a chain: rows of memory in the order of :mod:`cpu.implicit.solver`, and their neighbours.
+
+The next link is the next place, eight columns on. A joint lies at the column of the link on its left.
+"""
+
+import functools
+
+import warp as wp
+
+from warpchain.kernels.cpu.implicit.solver import SegmentLayout, row_at, segment_columns
+
+wp.set_module_options({"enable_backward": False})
+
+# Rows in segment order. The state; constants of the links.
+BASE = 0
+INVERSE_MASS, INVERSE_INERTIA, MASS, INERTIA, COUNTED = 6, 7, 8, 9, 10
+# A stage: rates, directions; joints' inverse smoothing and torques, α; accelerations.
+STAGE_U, STAGE_V, SPIN = 11, 12, 13
+COSINE, SINE = 14, 15
+INVERSE_SMOOTHING, TORQUE, FREE = 16, 17, 18
+RATE = 19
+# Joint forces of the state and the accelerations that belong to it.
+FORCE = 22
+BASE_RATE = 24
+# The system S F = r.
+SYSTEM = 27
+ROWS_OF_RIGID = SYSTEM + 22
+
+
+@functools.cache
+def force_layout(columns: int) -> SegmentLayout:
+    """Where S, r and F lie, for scratch blocks of this width."""
+    return SegmentLayout(size=2, columns=segment_columns(columns), matrix=SYSTEM, right=SYSTEM + 20)
+
+
+@wp.func
+def link_at(place: int, segment: int, places: int, full: int, link_count: int):
+    """Link that lies at this place."""
+    row = row_at(place, segment, places, full)
+    return wp.where(row >= link_count, row - link_count, row)
+
+
+@functools.cache
+def pad_joints(rows: tuple[int, ...]):
+    """Warp function that puts, in these rows, before each segment's first place the joint before it."""
+
+    @wp.func
+    def pad(S: wp.array2d(dtype=wp.float64), places: int, full: int):
+        s = int(0)
+        while s < 8:
+            # a short segment begins with the last joint of the segment before, so its predecessor is wanted
+            source = 8 * places + (s + 7) % 8 - wp.where(s >= full, 8, 0)
+            for k in range(wp.static(len(rows))):
+                S[wp.static(rows[k]), s] = S[wp.static(rows[k]), source]
+            s += 1
+
+    return pad

@@ -1,0 +1,76 @@
+"""Where the implicit step keeps a chain: rows in the order of :mod:`cpu.implicit.solver`, and their neighbours.
+
+The next link is the next place, eight columns on. A joint lies at the column of the link on its left in what the loops
+read, but its rows begin one place further, so that a link finds the joint on its left in its own column.
+"""
+
+import functools
+
+import warp as wp
+
+from warpchain.kernels.cpu.implicit.solver import SegmentLayout, segment_columns
+
+wp.set_module_options({"enable_backward": False})
+
+# Rows in segment order. The state at the start of the step (6), its direction, the links' constants.
+BASE = 0
+BASE_COSINE, BASE_SINE, MASS, INERTIA, COUNTED = 6, 7, 8, 9, 10
+# Accelerations at the start of the step; of joints there: friction's slope and torque, force, spin, opening rate.
+BASE_RATE = 11
+SLOPE, BASE_TORQUE, BASE_FORCE_X, BASE_FORCE_Y, BASE_SPIN, BASE_RATE_X, BASE_RATE_Y = 14, 15, 16, 17, 18, 19, 20
+# A stage: how the direction differs from that at the start, r_q / g, γ Σ C U_v, joint forces and torques of the stage
+# and of the velocities r_q / g.
+COSINE, SINE = 21, 22
+SHIFT, DRIVE = 23, 26
+FORCE_X, FORCE_Y, TORQUE, SHIFT_X, SHIFT_Y, SHIFT_TORQUE = 29, 30, 31, 32, 33, 34
+POWER_FRICTION, POWER_DAMPING = 35, 36
+# How a stage's place differs from that at the start, and its velocities; at last the new state. Of the whole step Σ w U
+# of angle and velocities, in rows that its stages have done with.
+NEW = 37
+CHANGE = SHIFT
+# Of joints at the start: opening, f'(w), how fast the spin changes.
+BASE_OPENING_X, BASE_OPENING_Y, TANGENT, SPIN_RATE = 43, 44, 45, 46
+# The linear system of :mod:`cpu.implicit.solver`, then three rows a stage: W of :class:`SecondOrderTable`.
+SYSTEM = 47
+LOWER, DIAGONAL, UPPER = SYSTEM, SYSTEM + 9, SYSTEM + 18
+RIGHT_SIDE = SYSTEM + 45
+FIRST_STAGE_ROW = RIGHT_SIDE + 3
+
+
+@functools.cache
+def segments_of(columns: int) -> SegmentLayout:
+    """Layout of the linear system for chains whose scratch blocks have so many columns."""
+    return SegmentLayout(size=3, columns=segment_columns(columns), matrix=SYSTEM, right=RIGHT_SIDE)
+
+
+@functools.cache
+def pad_behind(rows: tuple[int, ...]):
+    """Warp function that puts, in these rows, the next segment's first link behind each segment's last."""
+
+    @wp.func
+    def pad(S: wp.array2d(dtype=wp.float64), places: int, full: int):
+        s = int(0)
+        while s < 8:
+            after = (s + 1) % 8
+            source = 8 + after + wp.where(after >= full, 8, 0)
+            for k in range(wp.static(len(rows))):
+                S[wp.static(rows[k]), 8 * places + 8 + s] = S[wp.static(rows[k]), source]
+            s += 1
+
+    return pad
+
+
+@functools.cache
+def pad_before(rows: tuple[int, ...], place: int):
+    """Warp function that puts, before the place that rows begin at, what lies at the end of the segment before."""
+
+    @wp.func
+    def pad(S: wp.array2d(dtype=wp.float64), places: int):
+        s = int(0)
+        while s < 8:
+            for k in range(wp.static(len(rows))):
+                source = 8 * places + wp.static(8 * place) + (s + 7) % 8
+                S[wp.static(rows[k]), wp.static(8 * place) + s] = S[wp.static(rows[k]), source]
+            s += 1
+
+    return pad

@@ -1,0 +1,443 @@
+"""The loop over steps: one CPU thread carries one chain through a bounded number of tries.
+
+A method makes a step and an error estimate; the controller below accepts it and proposes the next; a contact pass
+follows each accepted step; the record looks at the chain every sample interval; a status says how it ended. A try
+that is not accepted leaves no trace but the counter and a smaller step.
+"""
+
+import functools
+from dataclasses import dataclass
+
+import warp as wp
+
+from warpchain.kernels import layout
+from warpchain.kernels.contacts.approach import FLIGHT_SKIN, LEAST_SLACK, SMALLEST_GAP, fastest_fall, fastest_meeting
+from warpchain.kernels.cpu.contacts.fixed_body import (
+    floor_gap,
+    greatest_opening,
+    greatest_speed,
+    resolve_floor,
+    resolve_sprocket,
+    sprocket_gap,
+)
+from warpchain.kernels.cpu.contacts.neighbour_list import list_layout, list_slack, neighbour_list
+from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
+from warpchain.kernels.cpu.explicit import place_ends
+from warpchain.kernels.cpu.implicit.joint_switch import QUIET_TIME
+from warpchain.kernels.events.present_chain import has_changed, present_chain
+from warpchain.kernels.events.record import record_is_full, sampling, write_sample
+from warpchain.kernels.events.softening import book_softening, contact_step, spring_tolerance
+from warpchain.kernels.events.summary import summarise
+from warpchain.kernels.layout import (
+    ACCEPTED,
+    BOUNCES,
+    FLOOR_DEPTH,
+    FLOOR_IMPULSES,
+    INERTIA,
+    INVERSE_INERTIA,
+    INVERSE_MASS,
+    LAST_FLOOR_IMPULSE,
+    LIST_BUILDS,
+    LOSS_DAMPING,
+    LOSS_FRICTION,
+    LOSS_HAND_OVER,
+    LOSS_SELF,
+    LOST_DAMPING,
+    LOST_FIXED,
+    LOST_FRICTION,
+    MASS,
+    OPENING,
+    REJECTED,
+    SELF_DEPTH,
+    SELF_IMPULSES,
+    SPROCKET_DEPTH,
+    SPROCKET_IMPULSES,
+    STAGES,
+    TIME,
+)
+from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, classical_controller
+from warpchain.kernels.methods.method import METHODS
+from warpchain.kernels.physics.elementary import HALF, ONE, TWO, ZERO
+from warpchain.kernels.physics.scaled_loads import lay_inertias
+from warpchain.kernels.types import Chain, Control, Model, Program, Record, State
+
+wp.set_module_options({"enable_backward": False})
+
+COMPILER_FLAGS = (
+    "-march=native -ffp-contract=fast -mllvm=-inline-threshold=9000 -mllvm=-inline-cold-callsite-threshold=3000"
+)
+"""Clang flags of the step kernels. Fusing a product and a sum makes a stage 1.7 times faster."""
+
+# Codes shared with warpchain.status.
+RUNNING = wp.constant(0)
+STEP_LIMIT = wp.constant(4)
+STEP_TOO_SMALL = wp.constant(5)
+NOT_FINITE = wp.constant(6)
+LIST_OVERFLOW = wp.constant(8)
+
+BOUNCE_PAUSE = wp.constant(wp.float64(0.01))
+"""A floor impulse this long [s] after the one before it begins a new bounce."""
+
+
+@dataclass(frozen=True)
+class Features:
+    """What a kernel is compiled for; everything else is left out of it.
+
+    Attributes:
+        method: Key of :data:`METHODS`.
+        columns: Width of the scratch blocks, see :func:`layout.padded_width`.
+        fixed_body: ``"floor"``, ``"sprocket"`` or ``"none"``.
+        self_contact: Contacts between a chain's own links.
+        broad_phase: ``"grid"`` or ``"all_pairs"``; the latter exists to measure the former against.
+        watch: ``"rest"``, ``"steady"`` or ``"none"``: what ends the run before its stop time.
+        softens: The watch also changes the softness of the joints, see :mod:`events.softening`.
+    """
+
+    method: str
+    columns: int
+    fixed_body: str
+    self_contact: bool
+    broad_phase: str
+    watch: str
+    softens: bool = False
+
+
+@wp.func
+def load_state(K: wp.array2d(dtype=wp.float64), state: State, chain: Chain, world: int):
+    """Fills the state rows and the constants of the links; energy rows start at zero."""
+    i = int(0)
+    while i < chain.link_count:
+        row = int(0)
+        while row < 6:
+            K[row, i] = state.links[world, row, i]
+            row += 1
+        inner = i % 2 == 0
+        mass = wp.where(inner, chain.inner_mass, chain.outer_mass)
+        inertia = wp.where(inner, chain.inner_inertia, chain.outer_inertia)
+        K[MASS, i] = mass
+        K[INERTIA, i] = inertia
+        K[INVERSE_MASS, i] = ONE / mass
+        K[INVERSE_INERTIA, i] = ONE / inertia
+        K[LOST_FRICTION, i] = ZERO
+        K[LOST_DAMPING, i] = ZERO
+        K[LOST_FIXED, i] = ZERO
+        i += 1
+
+
+@wp.func
+def store_state(K: wp.array2d(dtype=wp.float64), state: State, chain: Chain, world: int, fixed_loss: int):
+    """Writes the state rows and the losses since loading."""
+    friction = ZERO
+    damping = ZERO
+    fixed = ZERO
+    i = int(0)
+    while i < chain.link_count:
+        row = int(0)
+        while row < 6:
+            state.links[world, row, i] = K[row, i]
+            row += 1
+        friction += K[LOST_FRICTION, i]
+        damping += K[LOST_DAMPING, i]
+        fixed += K[LOST_FIXED, i]
+        i += 1
+    state.losses[world, LOSS_FRICTION] = friction
+    state.losses[world, LOSS_DAMPING] = damping
+    state.losses[world, fixed_loss] = fixed
+
+
+@wp.func
+def state_is_finite(K: wp.array2d(dtype=wp.float64), chain: Chain):
+    """False if the state or its first derivative holds an infinity or a NaN."""
+    finite = bool(True)
+    i = int(0)
+    while i < chain.link_count:
+        row = int(0)
+        while row < 6:
+            finite = finite and wp.isfinite(K[row, i])
+            row += 1
+        row = int(0)
+        while row < 3:
+            finite = finite and wp.isfinite(K[STAGES + row, i])
+            row += 1
+        i += 1
+    return finite
+
+
+@wp.func
+def sprocket_turning(program: Program, world: int, time: wp.float64):
+    """Angular velocity [rad/s] of the sprocket: a smooth step 3s² − 2s³ from 0 to its final value."""
+    ramp = program.spin_up_time[world]
+    since = time - program.spin_up_start[world]
+    s = ONE
+    if ramp > ZERO and since < ramp:
+        s = wp.max(since, ZERO) / ramp
+    return program.sprocket_speed[world] * s * s * (wp.float64(3.0) - TWO * s)
+
+
+@functools.cache
+def make_advance(features: Features):
+    """Kernel ``advance(worlds, model, program, state, record, scratch, lists, control)``, one thread per chain.
+
+    worlds: (launched,) int32, the worlds to carry on; those whose status is not RUNNING are passed over. scratch: (W,
+    rows, columns) float64, lists: (W, size) int32, see :mod:`layout` and :mod:`cpu.contacts.neighbour_list`; both
+    belong to a world until its run ends.
+    """
+    method = METHODS[features.method]
+    columns = features.columns
+    rows = method.scratch_rows(columns)
+    list_size = list_layout(columns).size
+    list_count = list_layout(columns).count
+    has_floor = features.fixed_body == "floor"
+    has_sprocket = features.fixed_body == "sprocket"
+    has_fixed = has_floor or has_sprocket
+    has_self = features.self_contact
+    fixed_loss = layout.LOSS_SPROCKET if has_sprocket else layout.LOSS_FLOOR
+    reuses_last = method.reuses_last
+    softens = features.softens
+    is_driven = features.watch == "steady"
+    look = sampling(features.watch, softens)
+    present = present_chain(softens, is_driven)
+    first_stage, attempt, commit = method.functions(columns)
+    growth, shrinkage = method.controller(wp.float64)
+    # on the sprocket impulses never pause
+    flight = None if has_sprocket else method.flight
+    has_flight = flight is not None
+    attempt_flight, commit_flight, close_joints, open_joints = flight.functions(columns) if flight else (None,) * 4
+    flight_growth, flight_shrinkage = classical_controller(flight.error_order) if flight else (None,) * 2
+    build_by_grid, build_by_all_pairs = neighbour_list(columns)
+    build_list = build_by_grid if features.broad_phase == "grid" else build_by_all_pairs
+    resolve_self_contacts = self_contacts(columns)
+    meeting = fastest_meeting(columns)
+
+    @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS})
+    def advance(
+        worlds: wp.array(dtype=wp.int32),
+        model: Model,
+        program: Program,
+        state: State,
+        record: Record,
+        scratch: wp.array3d(dtype=wp.float64),
+        lists: wp.array2d(dtype=wp.int32),
+        control: Control,
+    ):
+        world = worlds[wp.tid()]
+        if state.status[world] != RUNNING:
+            return
+        chain = present(model, state, control, world)
+        longest = control.contact_step
+        tolerance = control.tolerance
+        if wp.static(softens):
+            longest = contact_step(state, control, world, wp.static(is_driven))
+        if wp.static(softens or is_driven):
+            tolerance = spring_tolerance(program, state, control, world, wp.static(is_driven))
+        block = scratch[world]
+        K = wp.array(ptr=block.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
+        block_list = lists[world]
+        L = wp.array(ptr=block_list.ptr, shape=(wp.static(list_size),), dtype=wp.int32)
+        status = int(RUNNING)
+        if state.is_fresh[world] != 0:
+            load_state(K, state, chain, world)
+            place_ends(K, chain)
+            if wp.static(has_floor):
+                state.gap[world] = floor_gap(K, chain)
+            if wp.static(has_sprocket):
+                state.gap[world] = sprocket_gap(K, chain)
+            if wp.static(has_self):
+                if not build_list(K, L, chain, control.skin, greatest_opening(K, chain)):
+                    status = int(LIST_OVERFLOW)
+                state.slack[world] = list_slack(K, chain, control.skin, greatest_opening(K, chain))
+            state.has_first_stage[world] = 0
+            state.is_fresh[world] = 0
+        gap = state.gap[world]
+        slack = state.slack[world]
+        has_first_stage = state.has_first_stage[world]
+        time = state.time[world]
+        step = state.step[world]
+        last_error = state.last_error[world]
+        flies = state.flies[world]
+        closing_time = state.closing_time[world]
+        other_step = state.other_step[world]
+        tries = int(0)
+        while status == RUNNING and tries < control.tries and not record_is_full(record, world):
+            if time >= wp.float64(state.next_sample[world]) * control.sample_interval:
+                softness = state.softness[world]
+                load_factor = state.load_factor[world]
+                status = look(K, chain, program, state, record, control, world, time)
+                if wp.static(softens):
+                    longest = contact_step(state, control, world, wp.static(is_driven))
+                if wp.static(softens or is_driven):
+                    tolerance = spring_tolerance(program, state, control, world, wp.static(is_driven))
+                    if has_changed(state, world, softness, load_factor):
+                        after = present(model, state, control, world)
+                        book_softening(chain, after, state, world)
+                        chain = after
+                        if wp.static(is_driven):
+                            lay_inertias(K, chain)
+                        has_first_stage = int(0)
+                if status != RUNNING:
+                    break
+            stop_time = state.stop_time[world]
+            if time >= stop_time:
+                status = state.stop_status[world]
+                break
+            if wp.static(has_flight):
+                # flights of soft joints save nothing: their springs ring longer than impulses pause
+                if flies == 0 and time >= closing_time and state.softness[world] == ZERO:
+                    closed, lost = close_joints(K, chain)
+                    closing_time = time + QUIET_TIME
+                    if closed:
+                        flies = int(1)
+                        slack = wp.float64(-1.0)  # the next list has the skin of flights
+                        step, other_step = other_step + ZERO, step + ZERO
+                        last_error = ONE
+                        place_ends(K, chain)
+                        state.losses[world, LOSS_HAND_OVER] = state.losses[world, LOSS_HAND_OVER] + lost
+            if flies == 0 and has_first_stage == 0:
+                first_stage(K, chain)
+                has_first_stage = int(1)
+
+            # near contacts the step is bounded; far from them nothing may come through the skin unseen
+            h = step
+            if wp.static(has_fixed or has_self):
+                if flies == 0:
+                    room = control.skin
+                    near = bool(False)
+                    if wp.static(has_fixed):
+                        near = gap < control.skin
+                        room = HALF * gap
+                    if wp.static(has_self):
+                        near = near or L[wp.static(list_count)] > 0
+                        room = wp.min(room, slack)
+                    if near:
+                        h = wp.min(h, longest)
+                    else:
+                        h = wp.min(h, wp.max(longest, room / greatest_speed(K, chain)))
+                if wp.static(has_flight):
+                    if flies != 0:
+                        approach = ZERO
+                        if wp.static(has_floor):
+                            approach = fastest_fall(K, chain)
+                        if wp.static(has_self):
+                            approach = wp.max(approach, meeting(K, L, chain))
+                            approach = wp.max(approach, greatest_speed(K, chain) / wp.max(slack, SMALLEST_GAP))
+                        h = wp.min(h, wp.max(longest, ONE / approach))
+            lands = time + h >= stop_time
+            if lands:
+                h = stop_time - time
+
+            error_bits = wp.int64(0)
+            if flies == 0:
+                error_bits = attempt(K, chain, h, tolerance)
+            if wp.static(has_flight):
+                if flies != 0:
+                    error_bits = attempt_flight(K, chain, h, control.flight_tolerance)
+            error = wp.cast(error_bits, wp.float64)
+            tries += 1
+            if not (error <= ONE):
+                state.counts[world, REJECTED] = state.counts[world, REJECTED] + wp.int64(1)
+                if wp.isfinite(error):
+                    factor = shrinkage(error)
+                    if wp.static(has_flight):
+                        if flies != 0:
+                            factor = flight_shrinkage(error)
+                    step = h * factor
+                else:
+                    step = h * LEAST_SHRINKAGE
+                    if not state_is_finite(K, chain):
+                        status = int(NOT_FINITE)
+                if status == RUNNING and step < control.smallest_step:
+                    status = int(STEP_TOO_SMALL)
+            else:
+                if flies == 0:
+                    commit(K, chain, h)
+                factor = growth(error, last_error, control.proportional)
+                are_stiff = bool(True)
+                if wp.static(has_flight):
+                    if flies != 0:
+                        are_stiff = commit_flight(K, chain, h)
+                        factor = flight_growth(error, last_error, control.proportional)
+                state.counts[world, ACCEPTED] = state.counts[world, ACCEPTED] + wp.int64(1)
+                time = wp.where(lands, stop_time, time + h)
+                proposal = h * factor
+                # a step that was cut short says nothing against the proposal that it was cut from
+                step = wp.where(h < step, wp.max(step, proposal), proposal)
+                last_error = wp.max(error, wp.float64(1e-4))
+                has_first_stage = int(wp.static(int(reuses_last)))
+                place_ends(K, chain)
+                opening = greatest_opening(K, chain)
+                state.extremes[world, OPENING] = wp.max(state.extremes[world, OPENING], opening)
+                impulses = wp.int64(0)
+                if wp.static(has_floor):
+                    gap = floor_gap(K, chain)
+                    if gap < ZERO:
+                        state.extremes[world, FLOOR_DEPTH] = wp.max(state.extremes[world, FLOOR_DEPTH], -gap)
+                        hits = resolve_floor(K, chain)
+                        if hits > wp.int64(0):
+                            impulses += hits
+                            state.counts[world, FLOOR_IMPULSES] = state.counts[world, FLOOR_IMPULSES] + hits
+                            if time - state.watch[world, LAST_FLOOR_IMPULSE] > BOUNCE_PAUSE:
+                                state.counts[world, BOUNCES] = state.counts[world, BOUNCES] + wp.int64(1)
+                            state.watch[world, LAST_FLOOR_IMPULSE] = time
+                if wp.static(has_sprocket):
+                    gap = sprocket_gap(K, chain)
+                    if gap < ZERO:
+                        state.extremes[world, SPROCKET_DEPTH] = wp.max(state.extremes[world, SPROCKET_DEPTH], -gap)
+                        hits = resolve_sprocket(
+                            K, chain, sprocket_turning(program, world, time), program.push_rate[world]
+                        )
+                        state.counts[world, SPROCKET_IMPULSES] = state.counts[world, SPROCKET_IMPULSES] + hits
+                        impulses += hits
+                if wp.static(has_self):
+                    skin = control.skin
+                    least_slack = ZERO
+                    if wp.static(has_flight):
+                        if flies != 0:
+                            skin = FLIGHT_SKIN * control.skin
+                            least_slack = LEAST_SLACK * skin
+                    if slack > ZERO:
+                        slack = list_slack(K, chain, skin, opening)
+                    if not slack > least_slack:
+                        state.counts[world, LIST_BUILDS] = state.counts[world, LIST_BUILDS] + wp.int64(1)
+                        if not build_list(K, L, chain, skin, opening):
+                            status = int(LIST_OVERFLOW)
+                        slack = list_slack(K, chain, skin, opening)
+                    if L[wp.static(list_count)] > 0:
+                        hits, lost, depth = resolve_self_contacts(K, L, chain, opening)
+                        state.counts[world, SELF_IMPULSES] = state.counts[world, SELF_IMPULSES] + hits
+                        state.extremes[world, SELF_DEPTH] = wp.max(state.extremes[world, SELF_DEPTH], depth)
+                        state.losses[world, LOSS_SELF] = state.losses[world, LOSS_SELF] + lost
+                        impulses += hits
+                if impulses > wp.int64(0):
+                    has_first_stage = int(0)
+                if wp.static(has_flight):
+                    if impulses > wp.int64(0) or not are_stiff:
+                        closing_time = time + QUIET_TIME
+                        has_first_stage = int(0)
+                        if flies != 0:
+                            lost = open_joints(K, chain)
+                            flies = int(0)
+                            step, other_step = other_step + ZERO, step + ZERO
+                            last_error = ONE
+                            place_ends(K, chain)
+                            state.losses[world, LOSS_HAND_OVER] = state.losses[world, LOSS_HAND_OVER] + lost
+            if status == RUNNING:
+                total = state.tries_before[world] + state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
+                if total >= control.step_limit:
+                    status = int(STEP_LIMIT)
+        if status != RUNNING and status != NOT_FINITE and state.last_look[world, TIME] != time:
+            # the series ends with the state in which the run ends
+            place_ends(K, chain)
+            write_sample(state, record, world, time, summarise(K, chain))
+        store_state(K, state, chain, world, wp.static(fixed_loss))
+        state.gap[world] = gap
+        state.slack[world] = slack
+        state.has_first_stage[world] = has_first_stage
+        state.time[world] = time
+        state.step[world] = step
+        state.last_error[world] = last_error
+        state.flies[world] = flies
+        state.closing_time[world] = closing_time
+        state.other_step[world] = other_step
+        state.status[world] = status
+
+    return advance

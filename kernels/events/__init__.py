@@ -1,0 +1,1 @@
+"""What is done at every sample mark: record, release, rest, softening."""

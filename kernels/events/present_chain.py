@@ -1,0 +1,39 @@
+"""A chain's constants at this moment: its own, under the present loads, with joints as soft as they are now."""
+
+import functools
+
+import warp as wp
+
+from warpchain.kernels.events.softening import softened
+from warpchain.kernels.physics.elementary import ONE
+from warpchain.kernels.physics.scaled_loads import under_load
+from warpchain.kernels.types import Chain, Control, Model, State, read_chain
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def has_changed(state: State, world: int, softness: wp.float64, load_factor: wp.float64):
+    """Whether a look has changed a chain, from these values before it, or dragged its links, as it does under load."""
+    return state.softness[world] != softness or load_factor > ONE or state.load_factor[world] > ONE
+
+
+@functools.cache
+def present_chain(softens: bool, is_driven: bool):
+    """Warp function ``present(model, state, control, world)`` → Chain.
+
+    Args:
+        softens: Whether the softness of its joints may change, see :mod:`events.softening`.
+        is_driven: Whether its loads may, see :mod:`physics.scaled_loads`.
+    """
+
+    @wp.func
+    def present(model: Model, state: State, control: Control, world: int) -> Chain:
+        chain = read_chain(model, world)
+        if wp.static(is_driven):
+            chain = under_load(chain, state.load_factor[world])
+        if wp.static(softens):
+            chain = softened(chain, control, state.softness[world])
+        return chain
+
+    return present

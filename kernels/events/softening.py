@@ -1,0 +1,174 @@
+"""Softer joints where nothing fast is left to resolve: on the sprocket, just after the release, in the collapsed loop.
+
+Stiff joints are what makes steps short. Softness s is 0 for the model's own k, b and 1/ω_c, 1 for those of soft joints
+and 2 for the softest, which have less k and b; in between they are interpolated geometrically. No value ever becomes
+stiffer than the model's own. Softness changes at looks only, so that a run does not depend on how it is cut into
+launches. On the softest joints, and on soft ones in the drive, steps near a contact may be longer, too: there they
+would else be what keeps steps short.
+
+*Drive.* Joints are softest while the chain settles and the sprocket spins up, and as soft as the loop's tension allows
+while it is to become stationary: C = T/k stretches it by T/ℓk, at 30 Hz on the softest joints by 0.3 %; so much is
+wanted of k that it is a tenth of that. While its loads are multiplied (:mod:`physics.scaled_loads`) it may be 0.1 %.
+With ten times the ω_c of soft joints another loop becomes stationary, for friction is what holds a loop's width.
+*Release.* Soft joints get their own values back before the chain lands. *Pile.* Joints are soft for good once the loop
+begins to collapse, and softest once it encloses half of what it did then; softest at once shifts Δx of long chains.
+
+A change of k at openings C sets ½ (k_before − k_after) Σ C² of energy free, which is booked. Going soft is one jump: C
+has then grown to T/k_after within a few periods of the soft springs. Going back, C must shrink a hundred- to a
+thousandfold, which a jump would turn into a pull of as many times T; so it takes many small ones, each damped away
+before the next.
+"""
+
+import warp as wp
+
+from warpchain.kernels.layout import (
+    HOLD_LOAD,
+    LEFT_X,
+    LEFT_Y,
+    LOSS_SOFTENING,
+    RIGHT_X,
+    RIGHT_Y,
+    SOFTENED_AT,
+    SPRING,
+    TIME,
+)
+from warpchain.kernels.physics.elementary import HALF, ONE, TWO, ZERO
+from warpchain.kernels.types import Chain, Control, Program, State
+
+wp.set_module_options({"enable_backward": False})
+
+TEN = wp.constant(wp.float64(10.0))
+ROUGHEST = wp.constant(wp.float64(0.1))
+"""Greatest tolerance, that of the options."""
+
+
+@wp.func
+def between(own: wp.float64, soft: wp.float64, softness: wp.float64):
+    """From a joint's own value to the lesser of that and a soft one, exact at both ends."""
+    least = wp.min(own, soft)
+    if softness <= ZERO or least == own:
+        return own
+    if softness >= ONE:
+        return least
+    return own * wp.pow(least / own, softness)
+
+
+@wp.func
+def on_scale(own: wp.float64, soft: wp.float64, softest: wp.float64, softness: wp.float64):
+    """A joint's value from its own at 0 over the soft one at 1 to the softest at 2."""
+    return between(between(own, soft, softness), softest, softness - ONE)
+
+
+@wp.func
+def softened(own: Chain, control: Control, softness: wp.float64) -> Chain:
+    """A chain whose joints have this softness, from one that has its own values."""
+    chain = own
+    chain.joint_stiffness = on_scale(own.joint_stiffness, control.soft_stiffness, control.softest_stiffness, softness)
+    chain.joint_damping = on_scale(own.joint_damping, control.soft_damping, control.softest_damping, softness)
+    chain.inverse_smoothing = between(own.inverse_smoothing, ONE / control.soft_smoothing, softness)
+    return chain
+
+
+@wp.func
+def is_stiffer(chain: Chain, other: Chain):
+    """Whether any value of a chain's joints is above the other's."""
+    return (
+        chain.joint_stiffness > other.joint_stiffness
+        or chain.joint_damping > other.joint_damping
+        or chain.inverse_smoothing > other.inverse_smoothing
+    )
+
+
+@wp.func
+def contact_step(state: State, control: Control, world: int, is_driven: bool):
+    """Longest step [s] near a contact after the last look; longer on the softest joints, in the drive on soft ones."""
+    softness = state.softness[world]
+    if softness < ONE or (softness == ONE and not is_driven):
+        return control.contact_step
+    return wp.max(control.contact_step, control.soft_contact_step)
+
+
+@wp.func
+def spring_tolerance(program: Program, state: State, control: Control, world: int, is_driven: bool):
+    """Error allowed in a step of the springs after the last look.
+
+    Ten times as much until a loop that is driven is held under its own loads: it forgets what came before, and steps
+    are twice as long.
+    """
+    tolerance = wp.where(state.softness[world] >= ONE, control.soft_tolerance, control.tolerance)
+    if is_driven:
+        is_spun_up = state.last_look[world, TIME] >= program.hold_start[world]
+        if not is_spun_up or state.load_factor[world] > ONE:
+            tolerance = wp.min(TEN * tolerance, ROUGHEST)
+    return tolerance
+
+
+@wp.func
+def book_softening(before: Chain, after: Chain, state: State, world: int):
+    """Books the energy that a change of the joints' stiffness at the last look sets free."""
+    freed = state.last_look[world, SPRING] * (ONE - after.joint_stiffness / before.joint_stiffness)
+    state.losses[world, LOSS_SOFTENING] = state.losses[world, LOSS_SOFTENING] + freed
+
+
+@wp.func
+def enclosed_area(K: wp.array2d(dtype=wp.float64), chain: Chain):
+    """Area [m²] inside a placed loop, positive if it runs counter-clockwise: ½ Σ left end × right end."""
+    area = ZERO
+    i = int(0)
+    while i < chain.link_count:
+        area += K[LEFT_X, i] * K[RIGHT_Y, i] - K[RIGHT_X, i] * K[LEFT_Y, i]
+        i += 1
+    return HALF * area
+
+
+@wp.func
+def watch_collapse(
+    K: wp.array2d(dtype=wp.float64),
+    chain: Chain,
+    state: State,
+    control: Control,
+    world: int,
+    time: wp.float64,
+    is_first: bool,
+):
+    """Makes joints soft, for good, once the loop encloses less than a fraction of what it did at the first look.
+
+    Below half of that fraction they become softest. Joints that are as soft already stay as they are, and no moment of
+    softening is noted.
+    """
+    if is_first:
+        state.first_area[world] = enclosed_area(K, chain)
+        return
+    softness = state.softness[world]
+    is_collapsed = state.watch[world, SOFTENED_AT] >= ZERO
+    if softness >= TWO or (softness > ZERO and not is_collapsed):
+        return
+    share = enclosed_area(K, chain) / state.first_area[world]
+    wanted = ZERO
+    if share < control.soften_area:
+        wanted = ONE
+    if share < HALF * control.soften_area:
+        wanted = TWO
+    if wanted > softness and is_stiffer(chain, softened(chain, control, wanted)):
+        state.softness[world] = wanted
+        if not is_collapsed:
+            state.watch[world, SOFTENED_AT] = time
+
+
+@wp.func
+def watch_stiffening(state: State, program: Program, control: Control, world: int, time: wp.float64):
+    """Gives joints that were soft on the sprocket their own values back, in the first moments after the release."""
+    if state.softness[world] > ZERO and state.watch[world, SOFTENED_AT] < ZERO:
+        left = wp.max(ZERO, ONE - time / control.stiffening_time)
+        state.softness[world] = program.hold_softness[world] * left
+
+
+@wp.func
+def watch_drive(state: State, program: Program, control: Control, world: int, time: wp.float64):
+    """Makes joints softest until the sprocket has spun up, and as soft as the hold allows by the time it begins."""
+    ahead = (program.hold_start[world] - time) / control.stiffening_time
+    hold = program.hold_softness[world]
+    if state.load_factor[world] > ONE:
+        share = wp.log(state.load_factor[world]) / wp.log(state.watch[world, HOLD_LOAD])
+        hold += (program.loaded_softness[world] - hold) * share
+    state.softness[world] = hold + (TWO - hold) * wp.clamp(ahead, ZERO, ONE)

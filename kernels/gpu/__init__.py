@@ -1,0 +1,1 @@
+"""One block of threads carries one chain, one thread a link. Never imports cpu/."""

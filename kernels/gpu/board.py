@@ -1,0 +1,197 @@
+"""What a chain's threads see of one another: the board of the block form, and what each thread holds itself."""
+
+import warp as wp
+
+from warpchain.kernels.gpu.stage import Link, Place, link_on
+from warpchain.kernels.layout import (
+    BOARD_FIRST,
+    BOARD_LOST_DAMPING,
+    BOARD_LOST_FIXED,
+    BOARD_LOST_FRICTION,
+    BOARD_LOST_SELF,
+    BOARD_NOTES,
+    COSINE,
+    LEFT_X,
+    LEFT_Y,
+    LOSS_DAMPING,
+    LOSS_FRICTION,
+    LOSS_SELF,
+    MASS,
+    NOTE_CHAIN_FRICTION,
+    NOTE_CHAIN_RESTITUTION,
+    NOTE_CIRCLE_RADIUS,
+    NOTE_COULOMB,
+    NOTE_DAMPING,
+    NOTE_FLOOR_FRICTION,
+    NOTE_FLOOR_RESTITUTION,
+    NOTE_GRAVITY,
+    NOTE_HALF_LENGTH,
+    NOTE_INVERSE_SMOOTHING,
+    NOTE_SPROCKET_FRICTION,
+    NOTE_SPROCKET_RADIUS,
+    NOTE_SPROCKET_RESTITUTION,
+    NOTE_STIFFNESS,
+    NOTE_TANGENTIAL,
+    NOTE_VISCOUS,
+    OMEGA,
+    RIGHT_X,
+    RIGHT_Y,
+    SINE,
+    THETA,
+    U,
+    V,
+    X,
+    Y,
+)
+from warpchain.kernels.physics.elementary import ZERO, cos_sin
+from warpchain.kernels.physics.geometry import end_positions
+from warpchain.kernels.types import Chain, State
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def take_place(chain: Chain, lane: int) -> Place:
+    """Neighbours of a thread's link."""
+    n = chain.link_count
+    place = Place()
+    place.lane = lane
+    place.links = n
+    place.column = wp.min(lane, n - 1)
+    place.before = lane
+    place.after = lane
+    if lane < n:
+        place.before = wp.where(lane == 0, n - 1, lane - 1)
+        place.after = wp.where(lane == n - 1, 0, lane + 1)
+    return place
+
+
+@wp.func
+def note_constants(K: wp.array2d(dtype=wp.float64), chain: Chain):
+    """What stages and contacts need of a chain, onto the board."""
+    K[BOARD_NOTES, NOTE_HALF_LENGTH] = chain.half_length
+    K[BOARD_NOTES, NOTE_STIFFNESS] = chain.joint_stiffness
+    K[BOARD_NOTES, NOTE_DAMPING] = chain.joint_damping
+    K[BOARD_NOTES, NOTE_VISCOUS] = chain.viscous_friction
+    K[BOARD_NOTES, NOTE_COULOMB] = chain.coulomb_friction
+    K[BOARD_NOTES, NOTE_INVERSE_SMOOTHING] = chain.inverse_smoothing
+    K[BOARD_NOTES, NOTE_GRAVITY] = chain.gravity
+    K[BOARD_NOTES, NOTE_CIRCLE_RADIUS] = chain.circle_radius
+    K[BOARD_NOTES, NOTE_SPROCKET_RADIUS] = chain.sprocket_radius
+    K[BOARD_NOTES, NOTE_TANGENTIAL] = chain.tangential_restitution
+    K[BOARD_NOTES, NOTE_FLOOR_RESTITUTION] = chain.floor_restitution
+    K[BOARD_NOTES, NOTE_FLOOR_FRICTION] = chain.floor_friction
+    K[BOARD_NOTES, NOTE_SPROCKET_RESTITUTION] = chain.sprocket_restitution
+    K[BOARD_NOTES, NOTE_SPROCKET_FRICTION] = chain.sprocket_friction
+    K[BOARD_NOTES, NOTE_CHAIN_RESTITUTION] = chain.chain_restitution
+    K[BOARD_NOTES, NOTE_CHAIN_FRICTION] = chain.chain_friction
+
+
+@wp.func
+def contact_constants(K: wp.array2d(dtype=wp.float64), n: int) -> Chain:
+    """What contacts need of a chain, back from the board."""
+    chain = Chain()
+    chain.link_count = n
+    chain.circle_radius = K[BOARD_NOTES, NOTE_CIRCLE_RADIUS]
+    chain.sprocket_radius = K[BOARD_NOTES, NOTE_SPROCKET_RADIUS]
+    chain.tangential_restitution = K[BOARD_NOTES, NOTE_TANGENTIAL]
+    chain.floor_restitution = K[BOARD_NOTES, NOTE_FLOOR_RESTITUTION]
+    chain.floor_friction = K[BOARD_NOTES, NOTE_FLOOR_FRICTION]
+    chain.sprocket_restitution = K[BOARD_NOTES, NOTE_SPROCKET_RESTITUTION]
+    chain.sprocket_friction = K[BOARD_NOTES, NOTE_SPROCKET_FRICTION]
+    chain.chain_restitution = K[BOARD_NOTES, NOTE_CHAIN_RESTITUTION]
+    chain.chain_friction = K[BOARD_NOTES, NOTE_CHAIN_FRICTION]
+    return chain
+
+
+@wp.func
+def load_link(K: wp.array2d(dtype=wp.float64), state: State, world: int, lane: int, n: int):
+    """Puts a thread's link on the board; threads beyond the last get one at the origin that nothing acts upon."""
+    row = int(0)
+    while row < SINE:
+        K[row, lane] = ZERO
+        row += 1
+    if lane < n:
+        K[X, lane] = state.links[world, X, lane]
+        K[Y, lane] = state.links[world, Y, lane]
+        K[THETA, lane] = state.links[world, THETA, lane]
+        K[U, lane] = state.links[world, U, lane]
+        K[V, lane] = state.links[world, V, lane]
+        K[OMEGA, lane] = state.links[world, OMEGA, lane]
+    point(K, lane)
+
+
+@wp.func
+def store_link(K: wp.array2d(dtype=wp.float64), state: State, world: int, lane: int):
+    """Writes the state of a thread's link."""
+    state.links[world, X, lane] = K[X, lane]
+    state.links[world, Y, lane] = K[Y, lane]
+    state.links[world, THETA, lane] = K[THETA, lane]
+    state.links[world, U, lane] = K[U, lane]
+    state.links[world, V, lane] = K[V, lane]
+    state.links[world, OMEGA, lane] = K[OMEGA, lane]
+
+
+@wp.func
+def store_losses(K: wp.array2d(dtype=wp.float64), state: State, world: int, n: int, fixed_loss: int):
+    """Writes the losses since loading, summed over the links in their order; for one thread."""
+    friction = ZERO
+    damping = ZERO
+    fixed = ZERO
+    between = ZERO
+    i = int(0)
+    while i < n:
+        friction += K[BOARD_LOST_FRICTION, i]
+        damping += K[BOARD_LOST_DAMPING, i]
+        fixed += K[BOARD_LOST_FIXED, i]
+        between += K[BOARD_LOST_SELF, i]
+        i += 1
+    state.losses[world, LOSS_FRICTION] = friction
+    state.losses[world, LOSS_DAMPING] = damping
+    state.losses[world, fixed_loss] = fixed
+    state.losses[world, LOSS_SELF] = between
+
+
+@wp.func
+def point(K: wp.array2d(dtype=wp.float64), lane: int):
+    """Direction of a link, exactly, from its angle on the board."""
+    cosine, sine = cos_sin(K[THETA, lane])
+    K[COSINE, lane] = cosine
+    K[SINE, lane] = sine
+
+
+@wp.func
+def ends_of(link: Link):
+    """Left and right end of a link [m]."""
+    return end_positions(link.x, link.y, link.arm_x, link.arm_y)
+
+
+@wp.func
+def publish(K: wp.array2d(dtype=wp.float64), place: Place):
+    """Fills the board's rows of ends from those of the state, with no barrier."""
+    lane = place.lane
+    n = place.links
+    if lane < n:
+        left_x, left_y, right_x, right_y = ends_of(link_on(K, lane))
+        K[LEFT_X, lane] = left_x
+        K[LEFT_Y, lane] = left_y
+        K[RIGHT_X, lane] = right_x
+        K[RIGHT_Y, lane] = right_y
+        if lane == 0:
+            K[LEFT_X, n] = left_x
+            K[LEFT_Y, n] = left_y
+
+
+@wp.func
+def link_is_finite(K: wp.array2d(dtype=wp.float64), lane: int):
+    """False if the state or its first derivative holds an infinity or a NaN."""
+    finite = bool(True)
+    row = int(0)
+    while row < MASS:
+        finite = finite and wp.isfinite(K[row, lane])
+        row += 1
+    row = int(BOARD_FIRST)
+    while row < BOARD_FIRST + 3:
+        finite = finite and wp.isfinite(K[row, lane])
+        row += 1
+    return finite

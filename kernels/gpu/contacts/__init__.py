@@ -1,0 +1,1 @@
+"""The contact pass of a block."""

@@ -1,0 +1,100 @@
+"""The neighbour list on a GPU: the grid of :mod:`cpu.contacts.neighbour_list`, built in parallel, one thread a joint.
+
+It holds the same pairs as the list of the CPU form, in no particular order: what contacts are resolved in is decided by
+keys, see :mod:`gpu.contacts.self_contacts`.
+"""
+
+import functools
+
+import warp as wp
+
+from warpchain.kernels.cpu.contacts.neighbour_list import bucket_of, list_layout, listing_reach
+from warpchain.kernels.gpu.threads import barrier
+from warpchain.kernels.layout import BOARD_LISTED_X, BOARD_LISTED_Y, RIGHT_X, RIGHT_Y
+from warpchain.kernels.types import Chain
+
+wp.set_module_options({"enable_backward": False})
+
+
+@functools.cache
+def block_list(columns: int, block_dim: int, broad_phase: str):
+    """Warp function that builds the list of a chain and returns the number of pairs; above capacity: an overflow.
+
+    Args:
+        columns: Width of the scratch blocks, which sets the layout of the list.
+        block_dim: Threads in a block.
+        broad_phase: ``"grid"`` or ``"all_pairs"``.
+    """
+    lists = list_layout(columns)
+    by_grid = broad_phase == "grid"
+
+    @wp.func
+    def append_if_near(
+        K: wp.array2d(dtype=wp.float64), L: wp.array(dtype=wp.int32), p: int, q: int, square: wp.float64
+    ):
+        dx = K[RIGHT_X, q] - K[RIGHT_X, p]
+        dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
+        if dx * dx + dy * dy < square:
+            slot = wp.atomic_add(L, wp.static(lists.count), 1)
+            if slot < wp.static(lists.capacity):
+                L[wp.static(lists.first) + slot] = p
+                L[wp.static(lists.second) + slot] = q
+
+    @wp.func
+    def search_cells(K: wp.array2d(dtype=wp.float64), L: wp.array(dtype=wp.int32), p: int, square: wp.float64):
+        near = int(0)
+        while near < 9:
+            cell_x = L[wp.static(lists.cell_x) + p] + near % 3 - 1
+            cell_y = L[wp.static(lists.cell_y) + p] + near // 3 - 1
+            q = L[wp.static(lists.bucket) + bucket_of(cell_x, cell_y, wp.static(lists.table))]
+            while q >= 0:
+                # a bucket may serve several cells
+                if q > p and L[wp.static(lists.cell_x) + q] == cell_x and L[wp.static(lists.cell_y) + q] == cell_y:
+                    append_if_near(K, L, p, q, square)
+                q = L[wp.static(lists.next_joint) + q]
+            near += 1
+
+    @wp.func
+    def build(
+        K: wp.array2d(dtype=wp.float64),
+        L: wp.array(dtype=wp.int32),
+        chain: Chain,
+        lane: int,
+        skin: wp.float64,
+        opening: wp.float64,
+    ):
+        """All threads; the board's rows RIGHT_X and RIGHT_Y are filled and a barrier has passed."""
+        n = chain.link_count
+        reach = listing_reach(chain, skin, opening)
+        square = reach * reach
+        if lane == 0:
+            L[wp.static(lists.count)] = 0
+        if wp.static(by_grid):
+            i = lane
+            while i < wp.static(lists.table):
+                L[wp.static(lists.bucket) + i] = -1
+                i += wp.static(block_dim)
+        barrier()
+        if lane < n:
+            K[BOARD_LISTED_X, lane] = K[RIGHT_X, lane]
+            K[BOARD_LISTED_Y, lane] = K[RIGHT_Y, lane]
+            if wp.static(by_grid):
+                cell_x = int(wp.floor(K[RIGHT_X, lane] / reach))
+                cell_y = int(wp.floor(K[RIGHT_Y, lane] / reach))
+                bucket = bucket_of(cell_x, cell_y, wp.static(lists.table))
+                L[wp.static(lists.cell_x) + lane] = cell_x
+                L[wp.static(lists.cell_y) + lane] = cell_y
+                L[wp.static(lists.next_joint) + lane] = wp.atomic_exch(L, wp.static(lists.bucket) + bucket, lane)
+        barrier()
+        if lane < n:
+            if wp.static(by_grid):
+                search_cells(K, L, lane, square)
+            else:
+                q = lane + 1
+                while q < n:
+                    append_if_near(K, L, lane, q, square)
+                    q += 1
+        barrier()
+        return L[wp.static(lists.count)]
+
+    return build

@@ -1,0 +1,203 @@
+"""Embedded explicit Runge–Kutta methods in the block form: one thread per link, stages in registers.
+
+The same stages as in :mod:`cpu.explicit`, for the same tableaus. In every stage the threads wait for the friction of
+their joints. Meanwhile they work out where they are in the next one: in the Nyström form that does not depend on the
+stage in hand; and in a last stage that is at the new state, what is to be known of that.
+"""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from warpchain.kernels.gpu.stage import (
+    Link,
+    Place,
+    Trial,
+    block_stage,
+    first_on,
+    greater,
+    greatest_position_error,
+    greatest_velocity_error,
+    link_on,
+    vec3d,
+    vec5d,
+)
+from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, THETA
+from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
+from warpchain.kernels.physics.elementary import LARGEST_TURN, ONE, ZERO, cos_sin
+from warpchain.kernels.physics.geometry import turned
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.struct
+class Ahead:
+    """What is known of a stage, or of the new state, before the stage that precedes it."""
+
+    x: wp.float64  # [m]
+    y: wp.float64  # [m]
+    turn: wp.float64  # since the step began [rad]
+    u: wp.float64  # sums Σ a_ij k_j so far; …
+    v: wp.float64
+    omega: wp.float64  # … they lack the term of the preceding stage
+
+
+@functools.cache
+def explicit_attempt(name: str, block_dim: int, survey: Any, surveyed: Any):
+    """Warp function that tries a step with a tableau in blocks of this size.
+
+    Args:
+        name: Key of :data:`TABLEAUS`.
+        block_dim: Threads in a block.
+        survey: Warp function that notes what a link knows of the surroundings, see :mod:`gpu.contacts.proximity`.
+        surveyed: Warp function that says what all of them know.
+
+    Returns:
+        ``attempt(ends, forces, maxima, S, K, place, h, tolerance)`` → Trial, from the state and first stage on the
+        board; ``maxima`` is where ``survey`` notes, and neither the memory S nor the tolerance is needed.
+    """
+    tableau = TABLEAUS[name]
+    stages, last = tableau.stages, tableau.stages - 1
+    reuses_last = tableau.first_same_as_last
+    velocity_weights = tableau.velocity_weights
+    velocity_errors, position_errors = tableau.velocity_errors, tableau.position_errors
+    # the new state is one more row of the tableau
+    velocity = (*tableau.velocity, velocity_weights)
+    position = (*tableau.position, tableau.position_weights)
+    nodes = (*tableau.nodes, 1.0)
+    hand_over, stage = block_stage(block_dim)
+    Stages = wp.types.vector(length=stages, dtype=wp.float64)
+
+    def look_ahead(s: int):
+        """Warp function ``ahead(link, h, ax, ay, at)`` → Ahead of row s, from the accelerations before row s − 1."""
+
+        @wp.func
+        def ahead(link: Link, h: wp.float64, ax: Stages, ay: Stages, at: Stages):
+            row = Ahead()
+            dx = ZERO
+            dy = ZERO
+            turn = ZERO
+            for j in range(wp.static(s - 1)):
+                if wp.static(velocity[s][j] != 0.0):
+                    row.u += wp.static(wp.float64(velocity[s][j])) * ax[j]
+                    row.v += wp.static(wp.float64(velocity[s][j])) * ay[j]
+                    row.omega += wp.static(wp.float64(velocity[s][j])) * at[j]
+                if wp.static(position[s][j] != 0.0):
+                    dx += wp.static(wp.float64(position[s][j])) * ax[j]
+                    dy += wp.static(wp.float64(position[s][j])) * ay[j]
+                    turn += wp.static(wp.float64(position[s][j])) * at[j]
+            ch = wp.static(wp.float64(nodes[s])) * h
+            row.x = link.x + (ch * link.u + h * h * dx)
+            row.y = link.y + (ch * link.v + h * h * dy)
+            row.turn = ch * link.omega + h * h * turn
+            return row
+
+        return ahead
+
+    rows = [None, *map(look_ahead, range(1, stages + 1))]
+
+    @wp.func
+    def attempt(
+        ends: wp.tile[vec5d, block_dim],
+        forces: wp.tile[vec3d, block_dim],
+        maxima: wp.uint64,
+        S: wp.uint64,
+        K: wp.array2d(dtype=wp.float64),
+        place: Place,
+        h: wp.float64,
+        tolerance: wp.float64,
+    ):
+        lane = place.lane
+        ax = Stages()
+        ay = Stages()
+        at = Stages()
+        link = link_on(K, lane)
+        inverse_mass = K[INVERSE_MASS, place.column]
+        inverse_inertia = K[INVERSE_INERTIA, place.column]
+        first = first_on(K, lane)
+        ax[0] = first.x
+        ay[0] = first.y
+        at[0] = first.theta
+        trial = Trial()
+        if wp.static(velocity_weights[0] != 0.0):
+            trial.friction = wp.static(wp.float64(velocity_weights[0])) * first.friction
+            trial.damping = wp.static(wp.float64(velocity_weights[0])) * first.damping
+        row = wp.static(rows[1])(link, h, ax, ay, at)
+        error = ZERO
+        scale = ONE
+        eu = ZERO
+        ev = ZERO
+        ew = ZERO
+        for s in range(1, wp.static(stages)):
+            there = Link()
+            there.x = row.x
+            there.y = row.y
+            arm_x, arm_y = turned(link.arm_x, link.arm_y, row.turn)
+            there.arm_x = arm_x
+            there.arm_y = arm_y
+            if wp.static(velocity[s][s - 1] != 0.0):
+                row.u += wp.static(wp.float64(velocity[s][s - 1])) * ax[s - 1]
+                row.v += wp.static(wp.float64(velocity[s][s - 1])) * ay[s - 1]
+                row.omega += wp.static(wp.float64(velocity[s][s - 1])) * at[s - 1]
+            there.u = link.u + h * row.u
+            there.v = link.v + h * row.v
+            there.omega = link.omega + h * row.omega
+            next_end = hand_over(ends, place, there)
+            # what does not depend on this stage, while its friction is worked out
+            if wp.static(s < last or not reuses_last):
+                row = wp.static(rows[s + 1])(link, h, ax, ay, at)
+            if wp.static(s == last):
+                ex = ZERO
+                ey = ZERO
+                et = ZERO
+                for j in range(wp.static(last)):
+                    if wp.static(velocity_errors[j] != 0.0):
+                        eu += wp.static(wp.float64(velocity_errors[j])) * ax[j]
+                        ev += wp.static(wp.float64(velocity_errors[j])) * ay[j]
+                        ew += wp.static(wp.float64(velocity_errors[j])) * at[j]
+                    if wp.static(position_errors[j] != 0.0):
+                        ex += wp.static(wp.float64(position_errors[j])) * ax[j]
+                        ey += wp.static(wp.float64(position_errors[j])) * ay[j]
+                        et += wp.static(wp.float64(position_errors[j])) * at[j]
+                theta = K[THETA, lane]
+                error, scale = greatest_position_error(link, theta, h, h * h * ex, h * h * ey, h * h * et)
+                trial.x = row.x
+                trial.y = row.y
+                trial.theta = theta + row.turn
+                trial.turns_far = wp.abs(row.turn) > LARGEST_TURN
+                new_cosine, new_sine = cos_sin(trial.theta)
+                trial.cosine = new_cosine
+                trial.sine = new_sine
+                if wp.static(reuses_last):
+                    survey(K, maxima, place, there, next_end)
+            rates = stage(forces, K, place, next_end, there, inverse_mass, inverse_inertia)
+            if wp.static(s == last and reuses_last):
+                trial.around = surveyed(maxima)
+            ax[s] = rates.x
+            ay[s] = rates.y
+            at[s] = rates.theta
+            if wp.static(velocity_weights[s] != 0.0):
+                trial.friction += wp.static(wp.float64(velocity_weights[s])) * rates.friction
+                trial.damping += wp.static(wp.float64(velocity_weights[s])) * rates.damping
+            if wp.static(s == last):
+                trial.last = rates
+        link = link_on(K, lane)  # read again: meanwhile its registers were free
+        if wp.static(not reuses_last and velocity_weights[last] != 0.0):
+            row.u += wp.static(wp.float64(velocity_weights[last])) * trial.last.x
+            row.v += wp.static(wp.float64(velocity_weights[last])) * trial.last.y
+            row.omega += wp.static(wp.float64(velocity_weights[last])) * trial.last.theta
+        trial.u = link.u + h * row.u
+        trial.v = link.v + h * row.v
+        trial.omega = link.omega + h * row.omega
+        if wp.static(velocity_errors[last] != 0.0):
+            eu += wp.static(wp.float64(velocity_errors[last])) * trial.last.x
+            ev += wp.static(wp.float64(velocity_errors[last])) * trial.last.y
+            ew += wp.static(wp.float64(velocity_errors[last])) * trial.last.theta
+        error_v, scale_v = greatest_velocity_error(link, first_on(K, lane), h, h * eu, h * ev, h * ew)
+        error, scale = greater(error, scale, error_v, scale_v)
+        trial.error = error
+        trial.scale = scale
+        return trial
+
+    return attempt

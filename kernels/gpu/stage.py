@@ -1,0 +1,320 @@
+"""What methods share in the block form, one thread per link: a link, a try, its error, a stage on the springs.
+
+A thread works out the joint at its link's right end. In each stage it hands its left end to the link before and its
+joint's force to the link after; two barriers a stage cost less than working out every joint twice.
+
+Registers are dear: what does not fit goes to local memory, for which shared memory leaves hardly any cache. So the
+constants of the chain lie on the board and are read where they are needed.
+"""
+
+import functools
+
+import warp as wp
+
+from warpchain.kernels.layout import (
+    BOARD_FIRST,
+    BOARD_NOTES,
+    COSINE,
+    NOTE_COULOMB,
+    NOTE_DAMPING,
+    NOTE_GRAVITY,
+    NOTE_HALF_LENGTH,
+    NOTE_INVERSE_SMOOTHING,
+    NOTE_STIFFNESS,
+    NOTE_VISCOUS,
+    OMEGA,
+    SINE,
+    U,
+    V,
+    X,
+    Y,
+)
+from warpchain.kernels.methods.controller import error_scale, quick_quotient
+from warpchain.kernels.physics.elementary import order_bits_single
+from warpchain.kernels.physics.geometry import end_positions, end_velocities
+from warpchain.kernels.physics.joint import friction_torque, joint_force, link_acceleration
+from warpchain.kernels.types import Chain
+
+wp.set_module_options({"enable_backward": False})
+
+LARGEST_SCALE = wp.constant(wp.float32(1e30))
+"""Greatest divisor in use, below where :func:`quick_quotient` finds 0; a smaller one only makes the ratio greater."""
+
+vec3d = wp.types.vector(length=3, dtype=wp.float64)
+vec5d = wp.types.vector(length=5, dtype=wp.float64)
+
+
+@wp.struct
+class Link:
+    """State of a link with its arm, see :mod:`physics.geometry`, instead of its angle, which no stage needs."""
+
+    x: wp.float64  # [m]
+    y: wp.float64  # [m]
+    u: wp.float64  # ẋ [m/s]
+    v: wp.float64  # ẏ [m/s]
+    omega: wp.float64  # θ̇ [rad/s]
+    arm_x: wp.float64  # [m]
+    arm_y: wp.float64
+
+
+@wp.struct
+class Place:
+    """Where a thread stands in its block."""
+
+    lane: wp.int32  # its link
+    column: wp.int32  # the same, of the last link for threads beyond
+    before: wp.int32  # the link to the left
+    after: wp.int32  # the link to the right
+    links: wp.int32  # how many the chain has
+
+
+@wp.struct
+class Rates:
+    """A stage: accelerations of the link, and what its right joint loses."""
+
+    x: wp.float64
+    y: wp.float64
+    theta: wp.float64
+    friction: wp.float64  # [W]
+    damping: wp.float64  # [W] over the joint's b
+
+
+@wp.struct
+class Surroundings:
+    """What is known of a whole chain in a state; compared in single precision, which keeps signs."""
+
+    opening: wp.float32  # greatest of a joint [m]
+    gap: wp.float32  # least to floor or sprocket [m]
+    displacement: wp.float32  # greatest of a joint since the neighbour list was made [m]
+    speed: wp.float32  # bound on that of any point [m/s]
+
+
+@wp.struct
+class Trial:
+    """A finished try: the link's new state, its last stage, and losses averaged over the step."""
+
+    x: wp.float64
+    y: wp.float64
+    theta: wp.float64
+    u: wp.float64
+    v: wp.float64
+    omega: wp.float64
+    last: Rates
+    around: Surroundings  # of the new state, from methods that reuse the last stage
+    cosine: wp.float64  # direction of the new state
+    sine: wp.float64
+    friction: wp.float64
+    damping: wp.float64
+    error: wp.float64  # greatest error times tolerance, a quotient not yet divided, and …
+    scale: wp.float64  # … its divisor
+    turns_far: bool  # further than the method allows in one step
+
+
+@wp.func
+def link_on(K: wp.array2d(dtype=wp.float64), column: int) -> Link:
+    """A link as it stands on the board."""
+    link = Link()
+    link.x = K[X, column]
+    link.y = K[Y, column]
+    link.u = K[U, column]
+    link.v = K[V, column]
+    link.omega = K[OMEGA, column]
+    half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
+    link.arm_x = half_length * K[COSINE, column]
+    link.arm_y = half_length * K[SINE, column]
+    return link
+
+
+@wp.func
+def direction_on(K: wp.array2d(dtype=wp.float64), column: int):
+    """Cosine and sine of a link as it stands on the board."""
+    return K[COSINE, column], K[SINE, column]
+
+
+@wp.func
+def note_first(K: wp.array2d(dtype=wp.float64), column: int, first: Rates, with_powers: bool):
+    """Puts a link's first stage of the next step on the board."""
+    K[BOARD_FIRST, column] = first.x
+    K[BOARD_FIRST + 1, column] = first.y
+    K[BOARD_FIRST + 2, column] = first.theta
+    if with_powers:
+        K[BOARD_FIRST + 3, column] = first.friction
+        K[BOARD_FIRST + 4, column] = first.damping
+
+
+@wp.func
+def first_on(K: wp.array2d(dtype=wp.float64), column: int) -> Rates:
+    """A link's first stage as it stands on the board, with powers if they were noted."""
+    first = Rates()
+    first.x = K[BOARD_FIRST, column]
+    first.y = K[BOARD_FIRST + 1, column]
+    first.theta = K[BOARD_FIRST + 2, column]
+    first.friction = K[BOARD_FIRST + 3, column]
+    first.damping = K[BOARD_FIRST + 4, column]
+    return first
+
+
+@wp.func
+def joint_constants(K: wp.array2d(dtype=wp.float64)) -> Chain:
+    """What joints need of a chain, but for gravity, from the board."""
+    chain = Chain()
+    chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
+    chain.joint_stiffness = K[BOARD_NOTES, NOTE_STIFFNESS]
+    chain.joint_damping = K[BOARD_NOTES, NOTE_DAMPING]
+    chain.viscous_friction = K[BOARD_NOTES, NOTE_VISCOUS]
+    chain.coulomb_friction = K[BOARD_NOTES, NOTE_COULOMB]
+    chain.inverse_smoothing = K[BOARD_NOTES, NOTE_INVERSE_SMOOTHING]
+    return chain
+
+
+@wp.func
+def greater(error_a: wp.float64, scale_a: wp.float64, error_b: wp.float64, scale_b: wp.float64):
+    """The greater of two quotients |error| / scale with positive scales, a NaN before any number."""
+    keeps_a = wp.abs(error_a) * scale_b >= wp.abs(error_b) * scale_a or error_a != error_a
+    return wp.where(keeps_a, error_a, error_b), wp.where(keeps_a, scale_a, scale_b)
+
+
+@wp.func
+def error_of(trial: Trial, tolerance: wp.float64):
+    """Error ratio of a link as ordered bits, a NaN above all numbers; turning too far counts as an error of 2."""
+    scale = wp.float32(trial.scale * tolerance)
+    ratio = quick_quotient(wp.float32(wp.abs(trial.error)), wp.where(scale > LARGEST_SCALE, LARGEST_SCALE, scale))
+    if trial.turns_far and ratio < wp.float32(2.0):
+        ratio = wp.float32(2.0)
+    return order_bits_single(ratio)
+
+
+@wp.func
+def greatest_of_three(
+    error_a: wp.float64,
+    scale_a: wp.float64,
+    error_b: wp.float64,
+    scale_b: wp.float64,
+    error_c: wp.float64,
+    scale_c: wp.float64,
+):
+    """The greatest of three such quotients."""
+    error, scale = greater(error_a, scale_a, error_b, scale_b)
+    return greater(error, scale, error_c, scale_c)
+
+
+@wp.func
+def greatest_position_error(
+    link: Link, theta: wp.float64, h: wp.float64, ex: wp.float64, ey: wp.float64, et: wp.float64
+):
+    """The greatest error of x, y and θ over its scale, as a quotient not yet divided.
+
+    Found by cross-multiplication, so that only one needs a division.
+    """
+    return greatest_of_three(
+        ex,
+        error_scale(link.x, link.u, h),
+        ey,
+        error_scale(link.y, link.v, h),
+        et,
+        error_scale(theta, link.omega, h),
+    )
+
+
+@wp.func
+def greatest_velocity_error(link: Link, first: Rates, h: wp.float64, eu: wp.float64, ev: wp.float64, ew: wp.float64):
+    """The same of u, v and ω."""
+    return greatest_of_three(
+        eu,
+        error_scale(link.u, first.x, h),
+        ev,
+        error_scale(link.v, first.y, h),
+        ew,
+        error_scale(link.omega, first.theta, h),
+    )
+
+
+@wp.func
+def greatest_error(
+    link: Link,
+    theta: wp.float64,
+    first: Rates,
+    h: wp.float64,
+    ex: wp.float64,
+    ey: wp.float64,
+    et: wp.float64,
+    eu: wp.float64,
+    ev: wp.float64,
+    ew: wp.float64,
+):
+    """The greatest of all six."""
+    error_p, scale_p = greatest_position_error(link, theta, h, ex, ey, et)
+    error_v, scale_v = greatest_velocity_error(link, first, h, eu, ev, ew)
+    return greater(error_p, scale_p, error_v, scale_v)
+
+
+@functools.cache
+def block_stage(block_dim: int):
+    """Warp functions for blocks of this size: (hand over ends, evaluate a stage).
+
+    Args:
+        block_dim: Threads in a block.
+
+    Returns:
+        ``hand_over(ends, place, link)`` → left end of the next link;
+        ``stage(forces, K, place, next_end, link, 1/m, 1/I)`` → Rates.
+    """
+
+    @wp.func
+    def hand_over(
+        ends: wp.tile[vec5d, block_dim],
+        place: Place,
+        link: Link,
+    ):
+        left_x, left_y, _right_x, _right_y = end_positions(link.x, link.y, link.arm_x, link.arm_y)
+        left_u, left_v, _right_u, _right_v = end_velocities(link.u, link.v, link.omega, link.arm_x, link.arm_y)
+        ends[place.lane] = vec5d(left_x, left_y, left_u, left_v, link.omega)
+        return ends[place.after]
+
+    @wp.func
+    def stage(
+        forces: wp.tile[vec3d, block_dim],
+        K: wp.array2d(dtype=wp.float64),
+        place: Place,
+        next_end: vec5d,
+        link: Link,
+        inverse_mass: wp.float64,
+        inverse_inertia: wp.float64,
+    ):
+        # constants are read from the board where they are needed: registers are dearer than such reads
+        chain = joint_constants(K)
+        _left_x, _left_y, right_x, right_y = end_positions(link.x, link.y, link.arm_x, link.arm_y)
+        _left_u, _left_v, right_u, right_v = end_velocities(link.u, link.v, link.omega, link.arm_x, link.arm_y)
+        cu = next_end[2] - right_u
+        cv = next_end[3] - right_v
+        spin = link.omega - next_end[4]
+        force_x = joint_force(chain, next_end[0] - right_x, cu)
+        force_y = joint_force(chain, next_end[1] - right_y, cv)
+        torque = friction_torque(chain, spin)
+        friction = torque * spin
+        damping = cu * cu + cv * cv
+        forces[place.lane] = vec3d(force_x, force_y, torque)
+        left = forces[place.before]
+        chain.gravity = K[BOARD_NOTES, NOTE_GRAVITY]
+        rates = Rates()
+        ax, ay, at = link_acceleration(
+            chain,
+            inverse_mass,
+            inverse_inertia,
+            link.arm_x,
+            link.arm_y,
+            left[0],
+            left[1],
+            force_x,
+            force_y,
+            left[2],
+            torque,
+        )
+        rates.x = ax
+        rates.y = ay
+        rates.theta = at
+        rates.friction = friction
+        rates.damping = damping
+        return rates
+
+    return hand_over, stage

@@ -1,0 +1,1 @@
+"""One link or one joint a call: forces, geometry, energies."""

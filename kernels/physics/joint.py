@@ -1,0 +1,70 @@
+"""The physics of joints and links: spring, damper, friction, and what they do to a link.
+
+Scalar functions, one joint or one link a call.
+"""
+
+import warp as wp
+
+from warpchain.kernels.physics.elementary import ONE, tanh
+from warpchain.kernels.types import Chain
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def joint_force(chain: Chain, opening: wp.float64, opening_rate: wp.float64):
+    """One component of F = k C + b Ċ [N] on the link left of the joint; the link right of it feels −F.
+
+    With C = (X' − a u') − (X + a u) this is −∂V_C/∂q + Q^D of the paper (its section 2.1).
+    """
+    return chain.joint_stiffness * opening + chain.joint_damping * opening_rate
+
+
+@wp.func
+def smoothed_torque(chain: Chain, spin: wp.float64, inverse_smoothing: wp.float64):
+    """f(w) = β w + τ_c tanh(w / ω) [N m] for a relative angular velocity w [rad/s] and a given 1/ω [s/rad]."""
+    return chain.viscous_friction * spin + chain.coulomb_friction * tanh(spin * inverse_smoothing)
+
+
+@wp.func
+def smoothed_slope(chain: Chain, spin: wp.float64, inverse_smoothing: wp.float64):
+    """f'(w) = β + τ_c / ω (1 − tanh²(w / ω)) [N m s]."""
+    switch = tanh(spin * inverse_smoothing)
+    return chain.viscous_friction + chain.coulomb_friction * inverse_smoothing * (ONE - switch * switch)
+
+
+@wp.func
+def friction_torque(chain: Chain, spin: wp.float64):
+    """The torque f(w) of a joint [N m], with the chain's own smoothing ω_c."""
+    return smoothed_torque(chain, spin, chain.inverse_smoothing)
+
+
+@wp.func
+def friction_slope(chain: Chain, spin: wp.float64):
+    """The slope f'(w) of that torque [N m s]."""
+    return smoothed_slope(chain, spin, chain.inverse_smoothing)
+
+
+@wp.func
+def link_acceleration(
+    chain: Chain,
+    inverse_mass: wp.float64,
+    inverse_inertia: wp.float64,
+    arm_x: wp.float64,
+    arm_y: wp.float64,
+    left_x: wp.float64,
+    left_y: wp.float64,
+    right_x: wp.float64,
+    right_y: wp.float64,
+    left_torque: wp.float64,
+    right_torque: wp.float64,
+):
+    """Accelerations (ẍ, ÿ [m/s²], θ̈ [rad/s²]) of a link.
+
+    m Ẍ = F_right − F_left − m g ŷ and I θ̈ = arm × (F_right + F_left) + f_left − f_right, where F_left and F_right are
+    the forces of the joints at its two ends, f_left and f_right their friction torques f(ω_before − ω_after).
+    """
+    ax = (right_x - left_x) * inverse_mass
+    ay = (right_y - left_y) * inverse_mass - chain.gravity
+    lever = arm_x * (right_y + left_y) - arm_y * (right_x + left_x)
+    return ax, ay, (lever + left_torque - right_torque) * inverse_inertia

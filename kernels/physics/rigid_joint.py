@@ -1,0 +1,96 @@
+"""What one link or one joint adds to the equations of rigid joints, see :mod:`cpu.implicit.rigid`: scalar functions."""
+
+import warp as wp
+
+from warpchain.kernels.physics.elementary import ONE
+from warpchain.kernels.types import Chain
+
+wp.set_module_options({"enable_backward": False})
+
+SWITCH_WIDTH = wp.constant(wp.float64(0.2))
+"""c of :mod:`cpu.implicit.rigid_flight`: the part of a joint's change of spin over which friction switches."""
+
+
+@wp.func
+def turning_share(half_length: wp.float64, inverse_inertia: wp.float64, cosine: wp.float64, sine: wp.float64):
+    """What a link's turning adds to S [1/kg]: xx, xy and yy of a² t tᵀ / I with t = (−sin, cos)."""
+    share = half_length * half_length * inverse_inertia
+    return share * sine * sine, -share * sine * cosine, share * cosine * cosine
+
+
+@wp.func
+def inward_pull(cosine: wp.float64, sine: wp.float64, spin: wp.float64, free: wp.float64):
+    """A link's part of the right-hand side r / a [1/s²]: u ω² − t α, α being what friction alone does to it."""
+    square = spin * spin
+    return square * cosine + free * sine, square * sine - free * cosine
+
+
+@wp.func
+def pushed(
+    half_length: wp.float64,
+    inverse_mass: wp.float64,
+    inverse_inertia: wp.float64,
+    cosine: wp.float64,
+    sine: wp.float64,
+    left_x: wp.float64,
+    left_y: wp.float64,
+    right_x: wp.float64,
+    right_y: wp.float64,
+):
+    """M⁻¹ Gᵀ P of a link: what the P of its two joints, forces or impulses or displacements, do to x, y and θ."""
+    lever = half_length * (cosine * (right_y + left_y) - sine * (right_x + left_x))
+    return (right_x - left_x) * inverse_mass, (right_y - left_y) * inverse_mass, lever * inverse_inertia
+
+
+@wp.func
+def opening_of(
+    half_length: wp.float64,
+    x: wp.float64,
+    y: wp.float64,
+    cosine: wp.float64,
+    sine: wp.float64,
+    next_x: wp.float64,
+    next_y: wp.float64,
+    next_cosine: wp.float64,
+    next_sine: wp.float64,
+):
+    """C [m] of the joint between a link and the next."""
+    return (
+        next_x - x - half_length * (cosine + next_cosine),
+        next_y - y - half_length * (sine + next_sine),
+    )
+
+
+@wp.func
+def opening_rate_of(
+    half_length: wp.float64,
+    u: wp.float64,
+    v: wp.float64,
+    spin: wp.float64,
+    cosine: wp.float64,
+    sine: wp.float64,
+    next_u: wp.float64,
+    next_v: wp.float64,
+    next_spin: wp.float64,
+    next_cosine: wp.float64,
+    next_sine: wp.float64,
+):
+    """Ċ [m/s] of that joint."""
+    turn_x = spin * sine + next_spin * next_sine
+    turn_y = spin * cosine + next_spin * next_cosine
+    return next_u - u + half_length * turn_x, next_v - v - half_length * turn_y
+
+
+@wp.func
+def switch_smoothing(chain: Chain, h: wp.float64, relative_acceleration: wp.float64):
+    """1/ω [s/rad] of a joint's friction in a step h, in which its spin changes as fast as given [rad/s²]."""
+    way = SWITCH_WIDTH * h * wp.abs(relative_acceleration)
+    return chain.inverse_smoothing / wp.max(ONE, way * chain.inverse_smoothing)
+
+
+@wp.func
+def steepness(chain: Chain, spin: wp.float64, inverse_smoothing: wp.float64):
+    """About f(w)/w [N m s], which stands for f'(w) in the matrix of the stages."""
+    return chain.viscous_friction + chain.coulomb_friction * inverse_smoothing / (
+        ONE + wp.abs(spin) * inverse_smoothing
+    )

@@ -1,0 +1,110 @@
+"""Loads multiplied by one number λ, in which a loop on its sprocket becomes stationary λ times sooner.
+
+A loop that runs at speed v is under the tension T = ρ v² + T_e. Waves along it move at v ± √(T/ρ) in the room, so one
+family takes a = T_e / 2ρv, 0.3 to 0.5 m/s, and seconds to cross the loop: it swings. Its stationary curve obeys, with
+shear N, moment M, curvature κ and tangent t,
+
+    (T_e t + N n)' + ρ g = 0,    M' + N = j v² κ',    M = β ℓ v κ' + τ_c tanh(ℓ v κ' / ω_c).
+
+ρ v² has dropped out. So g, β, τ_c and j may all be multiplied by λ: T_e, N and M grow by as much, the curve stays, and
+the slow waves run λ times faster. For rigid links j = (I − m ℓ²/6)/ℓ: the exact dispersion of plane waves of phase κ
+per link, ω² [m cos²(κ/2) + (4I/ℓ²) sin²(κ/2)] = (4T/ℓ) sin²(κ/2), gives for waves that stand still in the room,
+ω = κ v/ℓ, to fourth order T_e κ²/ℓ = (m v²/ℓ²) κ⁴ (I/mℓ² − 1/6). So it is I − m ℓ²/6 that is multiplied, with each
+link's own m; λ I, or I − m ℓ²/12, leads to another curve.
+
+*Drag.* Along its path a link of a stationary loop moves along itself. A force −γ m v_n on the velocity v_n across the
+path damps every change of shape and vanishes in the stationary state. A link is a chord of its path: its direction and
+that of the path at its middle differ by (θ_{i+1} − 2θ_i + θ_{i−1})/12. Without drag a loop of 180 links at 10 Hz swings
+for 15 periods, however large λ, and what is left of the swing grows by √λ in amplitude when λ falls at once. With it
+the swing is over after one. What is left of its bias is smaller by λ. γ follows λ − 1, so it is gone with the loads.
+"""
+
+import warp as wp
+
+from warpchain.kernels.layout import COSINE, INERTIA, INVERSE_INERTIA, SINE, U, V
+from warpchain.kernels.physics.elementary import HALF, ONE, TWO
+from warpchain.kernels.types import Chain
+
+wp.set_module_options({"enable_backward": False})
+
+SIX = wp.constant(wp.float64(6.0))
+TWELFTH = wp.constant(wp.float64(1.0 / 12.0))
+DRAG_PER_CROSSING = wp.constant(wp.float64(8.0))
+"""γ times the time in which slow waves cross the loop: about critical damping of its slowest swing."""
+DRAG_PER_TURN = wp.constant(wp.float64(2.5))
+"""γ times the time in which the loop runs its height. It damps loops that bear little load, whose slow waves stay slow:
+they take 8 to 14 s instead of 14 to 30. With 6 fast short loops (60 Hz) leave their shape when it ends."""
+NEVER = wp.constant(wp.float64(1e9))
+
+
+@wp.func
+def scaled_inertia(inertia: wp.float64, mass: wp.float64, length: wp.float64, factor: wp.float64):
+    """Rotary inertia [kg m²] of a link under scaled loads."""
+    return inertia + (factor - ONE) * (inertia - mass * length * length / SIX)
+
+
+@wp.func
+def under_load(own: Chain, factor: wp.float64) -> Chain:
+    """A chain whose loads are multiplied by a factor; exact for a factor of 1."""
+    chain = own
+    length = TWO * own.half_length
+    chain.gravity = factor * own.gravity
+    chain.viscous_friction = factor * own.viscous_friction
+    chain.coulomb_friction = factor * own.coulomb_friction
+    chain.inner_inertia = scaled_inertia(own.inner_inertia, own.inner_mass, length, factor)
+    chain.outer_inertia = scaled_inertia(own.outer_inertia, own.outer_mass, length, factor)
+    return chain
+
+
+@wp.func
+def lay_inertias(K: wp.array2d(dtype=wp.float64), chain: Chain):
+    """Rotary inertia of each link and its inverse, into the rows of constants."""
+    i = int(0)
+    while i < chain.link_count:
+        inertia = wp.where(i % 2 == 0, chain.inner_inertia, chain.outer_inertia)
+        K[INERTIA, i] = inertia
+        K[INVERSE_INERTIA, i] = ONE / inertia
+        i += 1
+
+
+@wp.func
+def crossing_time(speed: wp.float64, gravity: wp.float64, radius: wp.float64, height: wp.float64):
+    """Time [s] in which slow waves cross both sides of a loop.
+
+    At a height y above the lowest point T_e is about ρ g (y + y₀), where y₀, the radius of curvature there, is about
+    half of the sprocket's radius; waves move at √(v² + g (y + y₀)) − v. The integral of dy over that is closed.
+
+    Args:
+        speed: Of the loop, v [m/s].
+        gravity: Multiplied by the load factor, g [m/s²].
+        radius: Of the sprocket [m].
+        height: Of the loop [m].
+    """
+    least = HALF * radius * gravity
+    square = speed * speed
+    if least <= wp.float64(1e-9) * square:
+        return NEVER
+    at_bottom = wp.sqrt(square + least)
+    at_top = wp.sqrt(square + least + height * gravity)
+    logarithm = wp.log((at_top - speed) / (at_bottom - speed))
+    return wp.float64(4.0) / gravity * (at_top - at_bottom + speed * logarithm)
+
+
+@wp.func
+def drag_shape(K: wp.array2d(dtype=wp.float64), chain: Chain, left: wp.float64):
+    """Leaves this part of the velocity of each link across the path of the loop."""
+    n = chain.link_count
+    i = int(0)
+    while i < n:
+        before = wp.where(i == 0, n - 1, i - 1)
+        after = wp.where(i == n - 1, 0, i + 1)
+        # sines of the turns to the neighbours: their sum is the second difference of θ to third order
+        sum_cosine = K[COSINE, before] + K[COSINE, after]
+        sum_sine = K[SINE, before] + K[SINE, after]
+        turn = TWELFTH * (K[COSINE, i] * sum_sine - K[SINE, i] * sum_cosine)
+        cosine = K[COSINE, i] - turn * K[SINE, i]
+        sine = K[SINE, i] + turn * K[COSINE, i]
+        across = (left - ONE) * (K[V, i] * cosine - K[U, i] * sine)
+        K[U, i] = K[U, i] - across * sine
+        K[V, i] = K[V, i] + across * cosine
+        i += 1

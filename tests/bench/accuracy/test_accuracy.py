@@ -1,0 +1,480 @@
+"""`warpchain bench accuracy`: its measures against independent ones, its files, and the command itself."""
+
+import json
+import math
+import re
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import warpchain
+from tests.cli import test_cli
+from tests.reports.test_sweep_page import Document
+from warpchain import InputError
+from warpchain.bench.accuracy.columns import COLUMNS
+from warpchain.bench.accuracy.ensembles import Ensemble, run_ensemble, summary
+from warpchain.bench.accuracy.figures import figures
+from warpchain.bench.accuracy.method_settings import LOOSE, TIGHT, Contestant, default_contestants
+from warpchain.bench.accuracy.plan import FILE, load_document, make_plan, run_accuracy
+from warpchain.bench.accuracy.walk_costs import walk_costs
+from warpchain.bench.trials.hard_cases import HARD_CASES, Flight, Order, Outcome, Walk
+from warpchain.bench.trials.hard_starts import SOFT, dropped
+from warpchain.bench.trials.scipy_solvers import GAVE_UP, scipy_points
+from warpchain.bench.trials.work_precision import (
+    Trial,
+    errors,
+    evaluations,
+    make_reference,
+    make_trial,
+    methods,
+    points,
+)
+from warpchain.inputs.options import METHODS_BY_NEED, Options
+from warpchain.kernels.methods.method import METHODS
+from warpchain.oracle import motion_equations
+from warpchain.status import Status
+
+Answer, Command, process = test_cli.Answer, test_cli.Command, test_cli.process
+command = test_cli.command
+
+RUN_ELSEWHERE = {"pile-slow-walk", "sixty-hertz", "standing", "links-1000"}
+"""Slow cases that tests of hard walks and hard chains run, as the table has them, with the methods of the three words.
+
+All but one: `pile-slow-walk` with os32 has 100 links there instead of 180, which take minutes.
+"""
+SLOW_CASES = {"pile-dropped-soft", "pile-dropped-paper"} | RUN_ELSEWHERE
+TINY = "--links 8 --methods rkf78,dp5 --trials flight --tolerances 1e-3,1e-6 --no-scipy --rounds 1 --presets soft"
+WALKS = "--start ellipse --samples 3"
+
+
+def silent(text: str) -> None:
+    """Progress that nobody looks at."""
+
+
+@pytest.fixture(scope="module")
+def short() -> Trial:
+    """A flight of 8 links for a millisecond."""
+    return replace(make_trial("flight", 8), duration=1e-3)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Answer, Path]:
+    """What a tiny run of all four parts answers, and its folder."""
+    folder = tmp_path_factory.mktemp("accuracy")
+    line = f"bench accuracy -o new/deep {TINY} {WALKS} --cases links-4,refused,hopeless-damping"
+    return process(*line.split(), folder=folder), folder / "new/deep"
+
+
+# --- work and precision ---
+
+
+def test_errors_shrink_with_the_tolerance_and_scipy_agrees(short: Trial) -> None:
+    """Tighter tolerances err less, and SciPy on the NumPy model ends where the reference does."""
+    true = make_reference(short)
+    assert true.trust.position < 1e-12 and true.trust.velocity < 1e-9
+    found = points(short, true, ["dp5"], [1e-3, 1e-6, 1e-9], 2, silent)
+    distances = [point.position_error for point in found]
+    assert distances[0] > 3 * distances[1] > 30 * distances[2] > 0
+    assert all(point.status == "finished" and point.seconds > 0 and point.simulated == 1e-3 for point in found)
+    theirs = scipy_points(short, true, [1e-9], silent)
+    assert [point.method for point in theirs] == ["DOP853 (SciPy)", "Radau (SciPy)"]
+    for point in theirs:
+        assert point.position_error < 1e-9 and point.velocity_error < 1e-6
+        assert point.evaluations is not None and point.evaluations > 100
+
+
+def test_scipy_that_takes_too_long_is_given_up(short: Trial, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run beyond the patience ends with a status of its own and no errors."""
+    monkeypatch.setattr("warpchain.bench.trials.scipy_solvers.PATIENCE", 1e-9)
+    true = make_reference(short)
+    (point, _) = scipy_points(short, true, [1e-3], silent)
+    assert point.status == GAVE_UP and math.isnan(point.position_error)
+
+
+def test_errors_are_distances(short: Trial) -> None:
+    """A link moved by (3, 4) µm is 5 µm off, whatever its angle; so are velocities."""
+    (start,) = short.starts
+    moved = start[0].copy(), start[1].copy()
+    moved[0][3] += [3e-6, 4e-6, 1.0]
+    moved[1][5] += [0.3, -0.4, 9.0]
+    found = errors(short, [moved], [start])
+    assert (found.position, found.velocity) == (pytest.approx(5e-6), pytest.approx(0.5))
+    assert math.isnan(found.momentum)
+
+
+def test_the_impulse_is_what_gravity_does_not_explain() -> None:
+    """A thing in free fall has had no impulse; one that gained a momentum more has had that."""
+    state = dropped(links=8)
+    trial = Trial("impact", 8, SOFT, (state,), 0.01, "floor")
+    falling = state[0], state[1] - [0.0, SOFT.gravity * 0.01, 0.0]
+    impulse = trial.momenta([falling])
+    assert impulse is not None and np.abs(impulse).max() < 1e-15
+    mass = motion_equations.link_masses(8, SOFT).sum()
+    struck = falling[0], falling[1] + [0.2, 0.5, 0.0]
+    assert trial.momenta([struck]) == pytest.approx(np.array([[0.2 * mass, 0.5 * mass]]))
+    harder = falling[0], falling[1] + [0.2, 0.6, 0.0]
+    found = errors(trial, [harder], [struck])
+    assert found.momentum == pytest.approx(0.1 / math.hypot(0.2, 0.5))
+    assert found.bias == pytest.approx(0.2)
+
+
+def test_angular_momentum_of_a_circling_loop() -> None:
+    """A circle of links that turns as a whole has Σ (m r² + I) Ω about its centre."""
+    angle = 2 * np.pi * np.arange(8) / 8
+    circle = np.column_stack([0.1 * np.cos(angle), 0.1 * np.sin(angle), angle])
+    turning = 7.0 * np.column_stack([-circle[:, 1], circle[:, 0], np.ones(8)])
+    trial = Trial("sprocket", 8, SOFT, ((circle, turning),), 0.1, "sprocket", 1.0)
+    inertia = (motion_equations.link_masses(8, SOFT) * 0.01 + motion_equations.link_inertias(8, SOFT)).sum()
+    assert trial.momenta([(circle, turning)]) == pytest.approx(np.array([[7.0 * inertia]]))
+
+
+def test_evaluations_are_counted_by_stages() -> None:
+    """13 a step and 12 a rejected one for Fehlberg's pair; 6 a try for Dormand and Prince's, but after impulses."""
+    assert evaluations("rkf78", 10, 3, 5) == 13 * 10 + 12 * 3
+    assert evaluations("dp5", 10, 3, 0) == 6 * 13 + 1
+    assert evaluations("dp5", 10, 3, 4) == 6 * 13 + 1 + 4
+    assert evaluations("bs32", 10, 3, 99) == 3 * 13 + 1 + 10
+    assert evaluations("rodas4p", 10, 3, 5) == 6 * 10 + 5 * 3
+    for method in methods():
+        assert (evaluations(method, 10, 3, 0) is None) == (METHODS[method].flight is not None)
+
+
+@pytest.mark.slow
+def test_impacts_and_sprocket_converge_to_what_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With contacts, impulse and angular momentum agree to the accuracy that the methods are told apart by."""
+    monkeypatch.setattr(
+        "warpchain.bench.trials.scipy_solvers.PATIENCE", math.inf
+    )  # 30 s of a core alone are more of a shared one
+    for name, links, close in (("impact", 20, 0.03), ("sprocket", 60, 1e-3)):
+        trial = make_trial(name, links)
+        true = make_reference(trial)
+        assert true.trust.momentum < close
+        found = points(trial, true, ["dp5"], [1e-6], 1, silent) + scipy_points(trial, true, [1e-6], silent)
+        assert len(found) == (2 if name == "impact" else 1)
+        for point in found:
+            assert point.status == "finished" and abs(point.momentum_bias) <= point.momentum_error * 1.5 < close
+
+
+# --- ensembles ---
+
+
+def test_an_ensemble_goes_on_and_is_summed_up(tmp_path: Path) -> None:
+    """Methods added later join those that are there, whose walks and costs stay; statistics are those of the walks."""
+    ensemble = Ensemble(links=8, preset="soft", start="ellipse", samples=3)
+    for contestant in (LOOSE, TIGHT):
+        run_ensemble(tmp_path, ensemble, contestant, silent)
+    before = summary(tmp_path, ensemble)
+    shards = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.h5")}
+    assert shards
+    for contestant in (Contestant("dp5", 1e-4), LOOSE, TIGHT):
+        run_ensemble(tmp_path, ensemble, contestant, silent)
+    after = summary(tmp_path, ensemble)
+    assert [(row["method"], row["tolerance"]) for row in after] == [("rkf78", 1e-6), ("rkf78", 1e-9), ("dp5", 1e-4)]
+    assert repr(after[:2]) == repr(before)
+    assert all(path.stat().st_mtime_ns == time for path, time in shards.items())
+    for row in after:
+        distances = np.array(row["dx"])
+        assert row["at_rest"] == 3 and row["failed"] == {} and row["missing"] == 0
+        assert row["mean"] == pytest.approx(distances.mean()) and row["sd"] == pytest.approx(distances.std(ddof=1))
+        assert row["mean_interval"][0] <= row["mean"] <= row["mean_interval"][1]
+        assert 0 < row["seconds_per_walk"] < 100 and math.isnan(row["walks_per_second"])
+        assert row["difference_loose"] == pytest.approx(row["mean"] / after[0]["mean"] - 1)
+        assert 0 < row["p_loose"] <= 1
+        assert 0 < row["ledger"] <= row["greatest_ledger"]
+    loose, tight, coarse = (row["ledger"] for row in after)
+    assert tight < loose < 1e-3 and 10 * loose < coarse < 0.1
+    assert after[0]["difference_loose"] == after[0]["ks_loose"] == 0 and after[0]["passes"]
+
+
+def test_contestants_that_differ_in_the_last_digit_have_different_names() -> None:
+    """Names and titles hold every digit of tolerances and settings, so no two contestants share a folder or a row."""
+    next_tolerance, next_area = math.nextafter(1e-4, 1), math.nextafter(0.7, 1)
+    alike = [
+        Contestant("rkf78", tolerance, (("soften_pile", True), ("soften_area", area)))
+        for tolerance in (1e-4, next_tolerance)
+        for area in (0.7, next_area)
+    ]
+    assert len({one.name for one in alike}) == len({one.title for one in alike}) == len(alike)
+    assert [Contestant.parse(one.name) for one in alike] == alike
+
+
+def test_contestants_are_read_as_they_are_named() -> None:
+    """A name with tolerance and settings, in any order, is read back from itself, which a folder's name needs."""
+    for one in (
+        Contestant("dp5", 1e-6),
+        Contestant("hybrid", 1e-6),
+        Contestant("bs32", 1e-9),
+        Contestant("os32", 1e-3, (("soft_tolerance", 3e-3), ("controller", "pi"))),
+        Contestant("rkf78", 2e-3, (("soften_pile", True), ("soften_area", 0.7), ("soften_drive", True))),
+    ):
+        assert Contestant.parse(one.name) == one
+    assert Contestant.parse("dp5") == Contestant("dp5", 1e-6)
+    assert Contestant.parse("hybrid") == Contestant("hybrid", 1e-4)
+    assert one == Contestant.parse("rkf78@2e-3+soften_drive+soften_area=0.7+soften_pile")
+    assert one.title == "rkf78 at 0.002, soften pile, soften area 0.7, soften drive"
+    content = Ensemble(8, "soft").content(Contestant.parse("dp5@1e-3+soften_pile+soften_area=0.5"))
+    expected = {"method": "dp5", "tolerance": 1e-3, "soften_pile": True, "soften_area": 0.5, "device": "cpu"}
+    assert content["options"] == expected
+
+
+@pytest.mark.parametrize("word", METHODS_BY_NEED)
+def test_words_are_what_the_options_make_of_them(word: str) -> None:
+    """A word means the options that it means in a walk, takes other settings, and is found again in a title."""
+    one = Contestant.parse(word)
+    assert Options.model_validate(one.options) == Options.model_validate({"method": word})
+    assert one.word == word and one.title.startswith(f"{word}: {one.method} at ")
+    changed = Contestant.parse(f"{word}@3e-5+contact_step=1e-5")
+    wanted = {"method": word, "tolerance": 3e-5, "contact_step": 1e-5}
+    assert Options.model_validate(changed.options) == Options.model_validate(wanted)
+    assert changed.word == ""
+
+
+def test_defaults_are_words_and_every_method() -> None:
+    """Each method has its turn, the words among them, no contestant twice."""
+    chosen = default_contestants()
+    assert len(set(chosen)) == len(chosen)
+    assert {one.method for one in chosen} == set(methods())
+    assert {one.word for one in chosen} - {""} == set(METHODS_BY_NEED)
+
+
+def test_the_tight_reference_is_an_extra() -> None:
+    """The dear ensembles of rkf78 at 1e-9 are made on demand only."""
+    assert not make_plan(parts=["ensembles"], contestants=["standard"]).tight
+    assert make_plan(parts=["ensembles"], contestants=["standard"], tight=True).tight
+
+
+# --- whole walks ---
+
+
+def test_walks_are_timed_in_turn_and_compared_with_the_reference() -> None:
+    """Methods take turns with the same samples, the reference among them; rows hold medians of walks at rest."""
+    said: list[str] = []
+    hopeless = Contestant.parse("dp5+smallest_step=1.9e-5")
+    rows = walk_costs(8, [Contestant.parse("dp5@1e-4"), hopeless, LOOSE], 2, said.append)
+    reference, loose, failed = rows
+    assert [row["name"] for row in rows] == [LOOSE.name, "dp5@0.0001", hopeless.name]
+    assert [line.split(", ", 1)[1] for line in said[1:]] == [row["title"] for row in rows] * 2
+    walks = [
+        warpchain.walk(links=8, start="ellipse", method="dp5", tolerance=1e-4, seed=seed, frame_interval=None)
+        for seed in (0, 1)
+    ]
+    released = [walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"] for walk in walks]
+    errors = [abs(walk.energy["residual"]) / energy for walk, energy in zip(walks, released, strict=True)]
+    assert loose["at_rest"] == 2
+    assert (loose["ledger"], loose["greatest_ledger"]) == (np.mean(errors), max(errors))
+    assert loose["walk_time"] == np.mean([walk.walk_time for walk in walks])
+    assert loose["tries"] == np.mean([walk.steps_accepted + walk.steps_rejected for walk in walks])
+    assert reference["ledger"] < loose["ledger"] / 10
+    for row in (reference, loose):
+        assert row["seconds"] == np.mean(row["each"]) and min(row["each"]) > 0
+        assert row["reference_seconds"] == reference["seconds"]
+    assert failed["at_rest"] == 0 and failed["walks"] == 2 and math.isnan(failed["seconds"])
+
+
+# --- hard cases ---
+
+
+@pytest.mark.parametrize(
+    "method",
+    ["rkf78", "dp5", *(pytest.param(name, marks=pytest.mark.slow) for name in ("os32", "rodas4p", "hybrid"))],
+)
+def test_quick_cases_are_sound(method: str) -> None:
+    """Every case that takes no longer than a moment ends as it may, with one method of each kind.
+
+    Tests of hard starts, chains and walks put most of these difficulties to bs32 and rodas5p as well.
+    """
+    outcomes = {case.name: case.subject.run(method) for case in HARD_CASES if case.name not in SLOW_CASES}
+    assert len(outcomes) == len(HARD_CASES) - len(SLOW_CASES)
+    assert not {name: outcome for name, outcome in outcomes.items() if not outcome.sound}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["rkf78", "os32", "hybrid"])
+@pytest.mark.parametrize("name", sorted(SLOW_CASES - RUN_ELSEWHERE))
+def test_slow_cases_are_sound(name: str, method: str) -> None:
+    """The others do with the methods of the three words."""
+    (case,) = (case for case in HARD_CASES if case.name == name)
+    outcome = case.subject.run(method)
+    assert outcome.sound, outcome
+
+
+@pytest.mark.parametrize("method", ["rkf78", "dp5"])
+def test_the_table_shows_the_order(method: str) -> None:
+    """The energy of undamped springs drifts as h^p for an odd order p, as h^(p + 1) for an even one."""
+    order = METHODS[method].order
+    drift = re.fullmatch(r"drift of the energy ∝ h\^([\d.]+)", Order().run(method).result)
+    assert drift is not None
+    assert float(drift[1]) == pytest.approx(order + (order + 1) % 2, abs=0.5)
+
+
+def test_what_is_not_sound_is_found() -> None:
+    """A bound that nothing keeps, a wrong distance, a wrong status: each makes an outcome that is not sound."""
+    flight = Flight(SOFT, dropped, 1e-4)
+    assert flight.run("dp5").sound
+    assert not replace(flight, bound=0.0).run("dp5").sound
+    assert not replace(flight, expected=(Status.TIME_LIMIT,)).run("dp5").sound
+    settings = {"links": 4, "frequency": 4.0, "start": "ellipse", "walk_limit": 0.01}
+    assert Walk("soft", settings, expected=Status.TIME_LIMIT).run("dp5").sound
+    assert not Walk("soft", settings).run("dp5").sound
+    nowhere = Walk("soft", settings | {"walk_limit": 5.0}, distance=(5.0, 6.0)).run("dp5")
+    assert nowhere.status == "at_rest" and not nowhere.sound
+
+
+def test_a_method_that_refuses_a_case_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A refusal is a row of the table in the method's own words, not the end of the run."""
+
+    def refuse(self: Walk, method: str) -> Outcome:
+        raise InputError("options.method: no such joints")
+
+    monkeypatch.setattr(Walk, "run", refuse)
+    plan = make_plan(parts=["hard-cases"], contestants=["dp5"], cases=["links-4", "refused"])
+    rows = run_accuracy(tmp_path, plan, silent)["hard_cases"]
+    assert [(row["case"], row["status"], row["sound"]) for row in rows] == [
+        ("links-4", "refused", False),
+        ("refused", "refused", True),
+    ]
+    assert rows[0]["result"] == "options.method: no such joints"
+
+
+# --- the command and its files ---
+
+
+def test_command_writes_everything(results: tuple[Answer, Path]) -> None:
+    """Paths of the results, a figure for each trial and ensemble and for the table, and of the page are printed."""
+    answer, folder = results
+    assert (answer.status, answer.err) == (0, "")
+    names = [Path(line).name for line in answer.out.splitlines()]
+    pictures = ["work_precision_flight_8.png", "walks_8.png", "ensemble_n8-15Hz-soft-ellipse-cpu-3.png"]
+    assert names == [FILE, *pictures, "hard_cases.png", "accuracy.html"]
+    for name in names[1:-1]:
+        assert (folder / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_json_has_a_unit_for_every_number(results: tuple[Answer, Path]) -> None:
+    """Every column of every table has unit and meaning, all numbers are finite or null, the machine is named."""
+    document = load_document(results[1])
+    tables: dict[str, list[dict[str, Any]]] = {name: document[name] for name in COLUMNS}
+    assert all(tables.values())
+    ensembles = tables.pop("ensembles")
+    tables["ensembles"] = [one for row in ensembles for one in row["methods"]]
+    for name, rows in tables.items():
+        columns = document["columns"][name]
+        assert columns == {key: {"unit": unit, "meaning": text} for key, (unit, text) in COLUMNS[name].items()}
+        for row in rows:
+            assert set(row) - {"method"} <= set(columns)
+    points = {(row["method"], row["tolerance"]): row for row in document["points"]}
+    assert set(points) == {(method, tolerance) for method in ("rkf78", "dp5") for tolerance in (1e-3, 1e-6)}
+    for method in ("rkf78", "dp5"):
+        assert points[method, 1e-6]["position_error"] < 0.5 * points[method, 1e-3]["position_error"]
+        assert points[method, 1e-3]["momentum_error"] is None
+    assert [row["case"] for row in document["hard_cases"]] == ["hopeless-damping"] * 2 + ["links-4"] * 2 + [
+        "refused"
+    ] * 2
+    (machine,) = document["machines"]
+    assert machine["processor"] and machine["warp-lang"] and machine["scipy"]
+
+
+def test_page_says_the_same_and_stands_alone(results: tuple[Answer, Path]) -> None:
+    """The page has the four parts with their figures and tables, the machine, and loads nothing."""
+    text = (results[1] / "accuracy.html").read_text(encoding="utf-8")
+    page = Document(text)
+    assert list(page.texts) == ["", "work-and-precision", "whole-walks", "ensembles", "hard-cases", "machines"]
+    assert len(page.images) == 4 and all(image.startswith("data:image/png;base64,") for image in page.images)
+    assert len(page.rows["work-and-precision"]) == 1 + 4
+    assert [row[:2] for row in page.rows["ensembles"][1:]] == [
+        ["reference: rkf78 at 1e-06", "3"],
+        ["dp5 at 1e-06", "3"],
+    ]
+    assert [row[:4] for row in page.rows["whole-walks"][1:]] == [
+        ["8", "reference: rkf78 at 1e-06", "1", "1"],
+        ["8", "dp5 at 1e-06", "1", "1"],
+    ]
+    assert len(page.rows["hard-cases"]) == 1 + 6
+    assert "warp-lang" in page.texts["machines"]
+    assert not re.findall(r"https?:|@import|url\(|<link|<script", text)
+    assert "nan" not in page.texts["work-and-precision"].lower()
+
+
+def test_other_parts_and_methods_stay(command: Command, tmp_path: Path) -> None:
+    """A part that is run again leaves the other parts and the other methods as they were."""
+    line = "bench accuracy -o new --parts hard-cases --cases links-4,refused --methods"
+    assert command(*line.split(), "dp5").status == 0
+    first = load_document(tmp_path / "new")
+    assert command(*line.split(), "rkf78").status == 0
+    line = f"bench accuracy -o new --parts work-precision {TINY} --json"
+    answer = command(*line.split())
+    document = json.loads(answer.out)
+    assert answer.status == 0 and document == load_document(tmp_path / "new")
+    kept = {(row["case"], row["method"]): row for row in document["hard_cases"]}
+    assert set(kept) == {(case, method) for case in ("links-4", "refused") for method in ("dp5", "rkf78")}
+    for row in first["hard_cases"]:
+        assert kept[row["case"], row["method"]] == row
+    assert len(document["points"]) == 4
+    assert {picture.name for picture in figures(document)} == {"work_precision_flight_8", "hard_cases"}
+
+
+REFUSED = {
+    "--links 61": "--links.links: 61 is odd",
+    "--links many": "--links: 'many' is no whole number",
+    "--links 20": "scene.links: 20 links of",
+    "--methods rk4": "--methods: 'rk4' is unknown",
+    "--methods dp5@soon": "--methods: 'dp5@soon' has no number after the @",
+    "--methods dp5+soft": "--methods: 'soft' is unknown",
+    "--methods quick": "--methods: 'quick' is unknown; give one of standard, explicit, reference, rkf78",
+    "--methods dp5+skin": "--methods: skin in 'dp5+skin' has no value; write skin=NUMBER",
+    "--methods dp5+controller": "--methods: controller in 'dp5+controller' has no value; write controller=WORD",
+    "--methods dp5+controller=p": "--methods.controller: 'p' is unknown",
+    "--methods dp5+skin=thin": "--methods: 'dp5+skin=thin' has no number after skin=",
+    "--methods dp5+skin=-1": "--methods.skin: -1.0 is not greater than 0",
+    "--methods dp5+soften_pile=1": "--methods: soften_pile in 'dp5+soften_pile=1' takes no value",
+    "--methods dp5@1": "--methods.tolerance: 1.0 is greater than 0.1",
+    "--tolerances 0": "--tolerances.tolerance: 0.0 is less than 1e-13",
+    "--tolerances tight": "--tolerances: 'tight' is no number",
+    "--parts all": "--parts: 'all' is unknown",
+    "--trials jump": "--trials: 'jump' is unknown",
+    "--presets hard": "preset: 'hard' is unknown",
+    "--cases pile": "--cases: 'pile' is unknown; give one of pile-slow-walk,",
+    "--device gpu": "options.device: 'gpu' is no device",
+    "--start up": "'--start'",
+    "--samples 0": "'--samples'",
+    "--methods ,": "--methods: nothing in it",
+}
+"""Bad arguments → what the line of refusal holds."""
+
+
+@pytest.mark.parametrize("arguments", REFUSED)
+def test_bad_input_is_refused_in_one_line(command: Command, tmp_path: Path, arguments: str) -> None:
+    """Status 2, one line that names what is wrong, and no folder."""
+    answer = command("bench", "accuracy", "-o", "new", *arguments.split())
+    assert (answer.status, answer.out) == (2, "")
+    assert answer.err.startswith("error: ") and answer.err.count("\n") == 1
+    assert REFUSED[arguments] in answer.err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("content", ["", "[1", "[]", '{"format": "warpchain accuracy", "version": 99}'])
+def test_a_foreign_file_is_not_overwritten(command: Command, tmp_path: Path, content: str) -> None:
+    """A file that is no such document, or of another version, is refused and left as it is."""
+    (tmp_path / FILE).write_text(content)
+    answer = command("bench", "accuracy", "-o", ".", "--parts", "hard-cases", "--cases", "refused")
+    assert (answer.status, answer.out) == (2, "")
+    assert FILE in answer.err and answer.err.count("\n") == 1
+    assert (tmp_path / FILE).read_text() == content
+
+
+def test_bench_itself_still_measures_steps(command: Command) -> None:
+    """`bench` without a sub-command is what it was, and both tell of each other in help."""
+    assert "--rounds" in command("bench", "--help").out and "accuracy" in command("bench", "--help").out
+    assert command("bench", "--links", "61").err.startswith("error: bench.links: 61 is odd")
+    assert "--tolerances" in command("bench", "accuracy", "--help").out
+
+
+def test_outcomes_fit_the_table() -> None:
+    """Names of cases are unique, and an outcome has no column that the table lacks."""
+    names = [case.name for case in HARD_CASES]
+    assert len(set(names)) == len(names)
+    outcome = asdict(Outcome("refused", "", 0.0, 0.0, 0, math.nan, True))
+    assert set(outcome) < set(COLUMNS["hard_cases"])

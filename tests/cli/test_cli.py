@@ -1,0 +1,442 @@
+"""The command line through its real entry points: `main` in this process, and `python -m warpchain`."""
+
+import json
+import os
+import re
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpchain import load_walk
+from warpchain.cli.main import main
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import preset
+from warpchain.inputs.scene import Scene
+
+QUICK = "--links 32 --preset soft --method dp5 --start ellipse --frequency 5".split()
+"""A walk of half a simulated second."""
+
+WALK_MODULE = import_module("warpchain.run.single_walk")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a command did."""
+
+    status: int
+    out: str
+    err: str
+
+
+Command = Callable[..., Answer]
+
+
+@pytest.fixture
+def command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Command:
+    """Runs `warpchain` in this process and in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str) -> Answer:
+        with pytest.raises(SystemExit) as end:
+            main(arguments)
+        out, err = capsys.readouterr()
+        return Answer(end.value.code or 0, out, err)
+
+    return run
+
+
+def process(*arguments: str, folder: Path) -> Answer:
+    """Runs `python -m warpchain` as a shell does, its output not a terminal."""
+    done = subprocess.run(
+        [sys.executable, "-m", "warpchain", *arguments], cwd=folder, capture_output=True, encoding="utf-8"
+    )
+    return Answer(done.returncode, done.stdout, done.stderr)
+
+
+@pytest.fixture(scope="module")
+def quick_walk(tmp_path_factory: pytest.TempPathFactory) -> tuple[Answer, Path]:
+    """The answer to a quick walk with --json, -o and --animate, and the folder it wrote."""
+    folder = tmp_path_factory.mktemp("walk")
+    return process("walk", *QUICK, "--json", "-o", "new/deep", "--animate", "gif", folder=folder), folder
+
+
+def test_help_is_quick_and_complete(tmp_path: Path) -> None:
+    """Help comes from the real entry point in half a second of computing, and names every option.
+
+    Of three times the least counts: on a busy machine one can take twice as long.
+    """
+    computed = []
+    for _ in range(3):
+        before = os.times()
+        answer = process("walk", "--help", folder=tmp_path)
+        after = os.times()
+        computed.append(after.children_user + after.children_system - before.children_user - before.children_system)
+    assert answer.status == 0 and answer.err == ""
+    options = "links frequency preset method tol device start set seed json output animate config frame-interval"
+    for option in options.split():
+        assert f"--{option} " in answer.out
+    assert min(computed) < 0.5
+
+
+def test_help_tells_the_defaults(command: Command) -> None:
+    """The defaults that help names are those of the models."""
+    words = " ".join(re.sub("[│╭╮╰╯─]", " ", command("walk", "--help").out).split())
+    scene, options = Scene(), Options()
+    named = {
+        "links": scene.links,
+        "frequency": scene.frequency,
+        "start": scene.start,
+        "preset": "paper",
+        "device": options.device,
+        "frame-interval": 2e-3,
+    }
+    for name, default in named.items():
+        match = re.search(rf"--{name} .*?Default: (\S+)\.(?: |$)", words)
+        assert match is not None, name
+        assert type(default)(match[1]) == default
+    method = re.search(r"--method .*?Default: (\S+)\.(?: |$)", words)[1]
+    assert options == Options(method=method)
+    assert f"{method}: {options.method} at 1e-3, joints softened on the sprocket and in the pile" in words
+    assert (options.tolerance, options.soften_drive, options.soften_pile) == (1e-3, True, True)
+    assert "Default: that of the word, 1e-6 for an integrator, 1e-4 for hybrid." in words
+    assert Options(method="rkf78") == Options(method="reference")
+    assert Options(method="bs32").tolerance == 1e-6
+
+
+def test_alone_it_prints_help_and_its_version(command: Command) -> None:
+    """Without arguments the command lists its sub-commands; --version prints name and number."""
+    assert "walk" in command().out
+    assert re.fullmatch(r"warpchain \d+\.\d+\.\d+\S*\n", command("--version").out)
+
+
+REFUSED = {
+    "--links 61": "scene.links: 61 is odd",
+    "--links 16": "scene.links: 16 links",
+    "--links 60.5": "scene.links: 60.5 is of type float",
+    "--links many": "scene.links: 'many' is text",
+    "--links 2": "scene.links: 2 is less than 4",
+    "--frequency -5": "scene.frequency: -5 is less than 0 Hz",
+    "--frequency .nan": "scene.frequency: nan is not finite",
+    "--frequency 1e999": "scene.frequency: inf is not finite",
+    "--frequency 15Hz": "scene.frequency: '15Hz' has its unit written with it",
+    "--start up": "scene.start: 'up' is unknown",
+    "--method rk4": "options.method: 'rk4' is unknown",
+    "--tol 0": "options.tolerance: 0 is less than 1e-13",
+    "--preset hard": "preset: 'hard' is unknown",
+    "--seed -1": "seed: -1",
+    "--seed 1.5": "seed: 1.5",
+    "--seed ~": "seed: None",
+    "--set circle_radius=6.34e-3": "parameters.circle_radius: 0.00634 is not smaller than half",
+    "--set inner_mass=-1e-3": "parameters.inner_mass: -0.001 is not greater than 0 kg",
+    "--set parameters.gravity=yes": "parameters.gravity: True is of type bool",
+    "--set clearance=": "scene.clearance: empty",
+    "--set clearance=[1": "scene.clearance: '[1' cannot be read",
+    "--set clearance": "--set: 'clearance' gives no value",
+    "--set clearence=0.01": "--set 'clearence': unknown name; did you mean clearance?",
+    "--set scene.gravity=1": "--set 'scene.gravity': unknown name; did you mean parameters.gravity?",
+    "--set links=62 --links 64": "scene.links: given twice",
+    "--set self_contact=2": "options.self_contact: 2 is not a truth value",
+    "--set device=gpu": "options.device: 'gpu' is no device",
+    "--set device=cuda:99": "options.device: there is no cuda:99 on this machine",
+    "--device cuda:98": "options.device: there is no cuda:98 on this machine",
+    "--device gpu": "options.device: 'gpu' is no device",
+    "--device cpu --set device=cpu": "options.device: given twice",
+    "--set clearance_of=hanging --start spinning": "scene.clearance_of: 'hanging' needs",
+    "--config nowhere.yaml": "nowhere.yaml: No such file",
+    "--frame-interval 0": "--frame-interval: 0 is not a positive time",
+    "--frame-interval soon": "--frame-interval: 'soon' is not a positive time",
+    "--animate avi": "'--animate'",
+    "--frobnicate": "(Possible options: --animate); see warpchain walk --help",
+    "extra": "unexpected extra argument(s) (extra); see warpchain walk --help",
+}
+"""Bad arguments of `walk` → how the line of refusal begins, or what it holds."""
+
+
+@pytest.mark.parametrize("arguments", REFUSED)
+def test_bad_input_is_refused_in_one_line(command: Command, tmp_path: Path, arguments: str) -> None:
+    """Status 2, one line on stderr that names the field, nothing on stdout, no folder."""
+    answer = command("walk", *arguments.split(" "), "-o", "new")
+    assert answer.status == 2 and answer.out == ""
+    assert answer.err.startswith("error: ") and answer.err.count("\n") == 1 and answer.err.endswith("\n")
+    assert REFUSED[arguments] in answer.err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        ("foo", "No such command 'foo'; see warpchain --help"),
+        ("bench foo", "No such command 'foo'; see warpchain bench --help"),
+        ("info", "Missing argument 'DIR'; see warpchain info --help"),
+        ("bench accuracy", "Missing option '-o' / '--output'; see warpchain bench accuracy --help"),
+        ("walk --json=1", "Option '--json' does not take a value; see warpchain --help"),
+    ],
+)
+def test_what_is_no_command_names_the_help(command: Command, arguments: str, line: str) -> None:
+    """A line that is no command, or lacks something, is refused with the help that says what there is."""
+    answer = command(*arguments.split())
+    assert (answer.status, answer.out) == (2, "")
+    assert answer.err == f"error: {line}\n"
+
+
+def test_bad_input_is_refused_by_the_process_too(tmp_path: Path) -> None:
+    """The status of the process is 2 and its only output the line."""
+    answer = process("walk", "--links", "61", "-o", "new", folder=tmp_path)
+    assert (answer.status, answer.out) == (2, "")
+    assert answer.err.startswith("error: scene.links: 61 is odd") and answer.err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        ("preset: soft\nscene: {links: 61}", "scene.links: 61 is odd"),
+        ("preset: soft\nscene: {gravity: 1.0}", "scene.gravity: unknown key"),
+        ("preset: soft\nscene: 3", "scene: 3 is not a mapping"),
+        ("preset: soft\nscenes: {links: 60}", "'scenes': unknown key; did you mean scene?"),
+        ("preset: soft\npreset: paper", "file.yaml, line 2: key 'preset' is given twice"),
+        ("scene: {links: 60}", "preset: missing"),
+        ("- 60", "file.yaml: no mapping"),
+        ("scene: {", "file.yaml, line 1"),
+    ],
+)
+def test_a_bad_file_is_refused_in_one_line(command: Command, tmp_path: Path, content: str, problem: str) -> None:
+    """What is wrong in a file is refused like what is wrong in an option."""
+    Path("file.yaml").write_text(content, encoding="utf-8")
+    answer = command("walk", "--config", "file.yaml", "-o", "new")
+    assert (answer.status, answer.out) == (2, "")
+    assert answer.err.startswith(f"error: {problem}") and answer.err.count("\n") == 1
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize("folder", ["file", "file/below", "/dev/null/below", "x" * 300])
+def test_a_folder_that_cannot_be_is_found_before_the_walk(
+    command: Command, monkeypatch: pytest.MonkeyPatch, folder: str
+) -> None:
+    """A folder that cannot be written is refused, and no walk is run for it."""
+    Path("file").touch()
+    monkeypatch.setattr(WALK_MODULE, "run_walk", None)
+    answer = command("walk", "-o", folder)
+    assert (answer.status, answer.out) == (2, "")
+    assert answer.err.startswith("error: --output: ") and answer.err.count("\n") == 1
+    assert [path.name for path in Path().iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("arguments", [["--animate", "gif"], ["--frame-interval", "0.001"]])
+def test_pictures_need_a_folder(command: Command, arguments: Sequence[str]) -> None:
+    """An option about files without a folder to put them is refused."""
+    answer = command("walk", *arguments)
+    assert (answer.status, answer.out) == (2, "")
+    assert answer.err == f"error: {arguments[0]}: there is no folder to write to; add -o DIR\n"
+
+
+def test_mp4_without_its_extra_is_found_before_the_walk(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without imageio-ffmpeg an MP4 is refused at once, with the command that installs it."""
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    monkeypatch.setattr(WALK_MODULE, "run_walk", None)
+    answer = command("walk", "-o", "new", "--animate", "mp4")
+    assert answer.status == 2 and "pip install 'warpchain[video]'" in answer.err
+    assert not Path("new").exists()
+
+
+def test_json_is_one_object_with_everything(quick_walk: tuple[Answer, Path]) -> None:
+    """Standard output is one JSON object that holds results, ledger and all parameters; stderr is silent."""
+    answer, _ = quick_walk
+    assert answer.status == 0 and answer.err == ""
+    summary = json.loads(answer.out)
+    assert summary["status"] == "at_rest"
+    assert 0.0 < summary["dx"] < 0.2
+    assert 0.1 < summary["walk_time"] <= summary["simulated_time"] < 2.0
+    assert summary["bounces"] >= 1 and summary["wall_time"] > 0
+    assert summary["steps_accepted"] > summary["steps_rejected"] > 0
+    assert summary["parameters"] == preset("soft").model_dump()
+    assert summary["scene"]["links"] == 32 and summary["options"]["method"] == "dp5"
+    assert summary["seed"] is None and summary["versions"]["warp-lang"]
+    energy = summary["energy"]
+    released = energy["kinetic_at_release"] + energy["potential_at_release"]
+    assert abs(energy["residual"]) < 1e-4 * released
+
+
+def test_output_holds_record_and_pictures(quick_walk: tuple[Answer, Path]) -> None:
+    """The folder holds exactly the record, the two figures and the animation, and the record is that walk."""
+    answer, folder = quick_walk
+    assert [path.name for path in folder.iterdir()] == ["new"]
+    files = {path.name: path.read_bytes() for path in (folder / "new/deep").iterdir()}
+    assert set(files) == {"walk.h5", "figure5.png", "film_strip.png", "walk.gif"}
+    assert files["figure5.png"].startswith(b"\x89PNG") and files["film_strip.png"].startswith(b"\x89PNG")
+    assert files["walk.gif"].startswith(b"GIF89a")
+    walk = load_walk(folder / "new/deep/walk.h5")
+    assert walk.to_dict() == json.loads(answer.out)
+    np.testing.assert_allclose(np.diff(walk.frame_time[:-1]), 2e-3, atol=5e-5)
+
+
+def test_table_and_paths(command: Command) -> None:
+    """Without --json a short table says what happened, and the paths of the files follow."""
+    answer = command("walk", *QUICK, "-o", "new", "--frame-interval", "0.01")
+    assert answer.status == 0 and answer.err == ""
+    words = " ".join(answer.out.split())
+    for part in (
+        r"Δx 0\.\d{4} m",
+        "status at_rest",
+        r"walk time 0\.\d{3} s",
+        r"bounces \d",
+        r"steps [\d,]+ accepted, [\d,]+ rejected",
+        r"greatest joint opening [\d.e-]+ mm",
+        r"greatest penetration floor [\d.e-]+ mm, sprocket 0 mm, self [\d.e-]+ mm",
+        r"energy at release 0\.\d{5} J",
+        r"lost to floor 0\.\d{5} J",
+        r"unaccounted for -?[\d.]+e-\d+ J",
+    ):
+        assert re.search(part, words), part
+    assert answer.out.splitlines()[-3:] == ["new/walk.h5", "new/figure5.png", "new/film_strip.png"]
+    frame_time = load_walk("new/walk.h5").frame_time
+    np.testing.assert_allclose(np.diff(frame_time[:-1]), 1e-2, atol=5e-5)
+
+
+def test_values_from_file_line_and_seed(command: Command) -> None:
+    """The file is the base, the line overrides it, and what neither gives is drawn from the seed."""
+    Path("walk.yaml").write_text(
+        "preset: soft\n"
+        "scene: {links: 40, start: ellipse, frequency: 5.0, clearance: 0.004}\n"
+        "options: {method: dp5, self_contact: true}\n"
+        "parameters: {gravity: 9.7, chain_friction: 0.5}\n",
+        encoding="utf-8",
+    )
+    line = "--config walk.yaml --links 32 --set parameters.chain_friction=0.4 --set walk_limit=0.02 --seed 7"
+    drawn = json.loads(command("walk", *line.split(), "--json").out)
+    assert drawn["preset"] == "soft" and drawn["seed"] == 7
+    scene, parameters = drawn["scene"], drawn["parameters"]
+    assert (scene["links"], scene["clearance"], scene["walk_limit"]) == (32, 0.004, 0.02)
+    assert (parameters["gravity"], parameters["chain_friction"]) == (9.7, 0.4)
+    assert scene["phase"] > 0 and parameters["link_length"] != preset("soft").link_length
+    again = json.loads(command("walk", *line.split(), "--json").out)
+    del drawn["wall_time"], again["wall_time"]
+    assert drawn == again
+
+
+def test_a_failed_walk_is_reported_and_kept(command: Command) -> None:
+    """A walk that ends early: status 1, its sentence on stderr, its results printed and written all the same."""
+    answer = command("walk", *QUICK, "--set", "walk_limit=0.06", "--json", "-o", "new")
+    assert answer.status == 1
+    summary = json.loads(answer.out)
+    assert summary["status"] == "time_limit" and summary["dx"] is None
+    assert answer.err == f"time_limit: {summary['status_sentence']}\n"
+    assert load_walk("new/walk.h5").walk_time == pytest.approx(0.06)
+    table = command("walk", *QUICK, "--set", "walk_limit=0.06")
+    assert table.status == 1 and "Δx unknown" in " ".join(table.out.split())
+
+
+def test_a_chain_that_was_never_released_leaves_no_pictures(command: Command) -> None:
+    """A walk without time series leaves its record, and takes an earlier walk's pictures out of the folder."""
+    Path("new").mkdir()
+    Path("new/figure5.png").write_bytes(b"of an earlier walk")
+    options = "--links 32 --preset soft --method dp5 --start spinning --set hold_limit=0.001 -o new"
+    answer = command("walk", *options.split())
+    assert answer.status == 1 and "not_steady" in answer.out
+    assert [path.name for path in Path("new").iterdir()] == ["walk.h5"]
+    lines = answer.err.splitlines()
+    assert [line.partition(":")[0] for line in lines] == ["new/figure5.png", "new/film_strip.png", "not_steady"]
+
+
+def test_a_file_that_cannot_be_written_does_not_lose_the_results(command: Command) -> None:
+    """If writing fails after the walk, the results have been printed, and status and line say what is wrong."""
+    Path("new/walk.h5").mkdir(parents=True)
+    answer = command("walk", *QUICK, "--json", "-o", "new")
+    assert answer.status == 2 and json.loads(answer.out)["status"] == "at_rest"
+    assert answer.err.startswith("error: new/walk.h5: cannot be written") and answer.err.count("\n") == 1
+    assert [path.name for path in Path("new").iterdir()] == ["walk.h5"]
+
+
+def test_a_defect_is_not_disguised_as_bad_input(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A ValueError that is no InputError is a defect of the program and keeps its traceback."""
+
+    def broken(*_: object, **__: object) -> None:
+        raise ValueError("operands could not be broadcast together")
+
+    monkeypatch.setattr(WALK_MODULE, "run_walk", broken)
+    with pytest.raises(ValueError, match="broadcast"):
+        main(["walk"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        ("--links 61", "bench.links: 61 is odd"),
+        ("--links 60 --links 2", "bench.links: 2 is less than 4"),
+        ("--chains 4", "--chains: only measurements on a GPU can be restricted so; add --device cuda"),
+        ("--device gpu", "bench.device: 'gpu' is no device"),
+        ("--device cuda:99", "options.device: there is no cuda:99 on this machine"),
+        ("--device cuda:99 --method euler", "bench.method: 'euler' is unknown"),
+    ],
+)
+def test_bad_input_of_bench_is_refused_in_one_line(command: Command, arguments: str, problem: str) -> None:
+    """Lengths of chains go through the door of the scene, devices through that of the options."""
+    answer = command("bench", *arguments.split())
+    assert (answer.status, answer.out) == (2, "")
+    assert answer.err.startswith(f"error: {problem}") and answer.err.count("\n") == 1
+
+
+@pytest.mark.slow
+def test_bench_measures_every_method(tmp_path: Path) -> None:
+    """The JSON of a bench has finite positive costs for each method and scene, SciPy's, and neighbour lists."""
+    answer = process("bench", "--links", "32", "--rounds", "1", "--json", folder=tmp_path)
+    assert answer.status == 0 and answer.err == ""
+    costs = json.loads(answer.out)
+    methods = {(cost["scene"], cost["method"]) for cost in costs["steps"]}
+    ours = {
+        (scene, method)
+        for scene in ("flight", "pile")
+        for method in ("rkf78", "dp5", "bs32", "os32", "rodas4p", "rodas5p", "hybrid")
+    }
+    assert methods == ours | {("flight", "DOP853 (SciPy)")}
+    for cost in costs["steps"]:
+        assert cost["links"] == 32 and 0 < cost["microseconds"] < 1e5 and cost["wall_per_simulated"] > 0
+    assert [cost["links"] for cost in costs["broad_phase"]] == [60, 180, 1000]
+    assert costs["machine"]["warp-lang"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudoterminals")
+def test_terminal_shows_progress_and_ctrl_c_ends_it(tmp_path: Path) -> None:
+    """On a terminal progress is shown; Ctrl-C ends the walk with status 130 and one line, nothing written."""
+    terminal, theirs = os.openpty()
+    walk = subprocess.Popen(
+        [sys.executable, "-m", "warpchain", "walk", *QUICK, "--set", "rest_time=100", "-o", "new"],
+        cwd=tmp_path,
+        env=os.environ | {"TERM": "xterm", "COLUMNS": "100"},
+        stdout=subprocess.PIPE,
+        stderr=theirs,
+        # A shell may have set it to be ignored in its background jobs, which children inherit.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    os.close(theirs)
+    try:
+        seen = _read_until(terminal, rb"walk +0\.[1-9].* m/s.* steps", seconds=120)
+        walk.send_signal(signal.SIGINT)
+        out, _ = walk.communicate(timeout=30)
+        seen += _read_until(terminal, b"interrupted\r\n", seconds=10)
+    finally:
+        walk.kill()
+        walk.wait()
+        os.close(terminal)
+    assert walk.returncode == 130 and out == b""
+    assert b"Traceback" not in seen
+    assert list(tmp_path.iterdir()) == []
+
+
+def _read_until(terminal: int, pattern: bytes, *, seconds: float) -> bytes:
+    """What a terminal shows, up to the first chunk that completes the pattern."""
+    seen, deadline = b"", time.monotonic() + seconds
+    while re.search(pattern, seen) is None:
+        ready, _, _ = select.select([terminal], [], [], max(0.0, deadline - time.monotonic()))
+        assert ready, f"{pattern!r} not in {seen!r}"
+        seen += os.read(terminal, 65536)
+    return seen

@@ -1,0 +1,157 @@
+"""Batches side by side, their memory, and the copies of their arrays on the host; what of it needs no GPU."""
+
+import threading
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+import pytest
+import warp as wp
+
+from tests.run.test_sweep_run import brief_setup, outcomes
+from warpchain.cli.sweep_commands import _progress_text
+from warpchain.engine.batch import Batch
+from warpchain.engine.devices import CAPACITY_FRAMES, CAPACITY_SAMPLES, start_device, world_bytes
+from warpchain.engine.kernel_choice import block_threads, features_of, kernels_of, shared_threads
+from warpchain.engine.mirror import Mirror
+from warpchain.inputs.options import Options
+from warpchain.inputs.setup import Setup
+from warpchain.kernels import layout
+from warpchain.kernels.cpu.loop import Features
+from warpchain.run import sweep_run
+from warpchain.run.sweep_run import SweepProgress, prepare, run_shards
+from warpchain.sweeps.plan import load_sweep
+from warpchain.walks import scheduler
+from warpchain.walks.walk_phases import Course
+
+FEW = {"version": 1, "name": "few", "seed": 1, "preset": "soft", "samples": 2, "grid": {"links": [60, 150]}}
+"""Content of a sweep of two lengths."""
+
+
+def test_a_mirror_carries_edits_and_changes() -> None:
+    """Edits reach the device with the next upload, and changes made there the host with the next download."""
+    mirror = Mirror(np.arange(4.0), start_device("cpu"), None)
+    mirror.edit()[1] = 7.0
+    assert mirror.array.numpy().tolist() == [0.0, 1.0, 2.0, 3.0]
+    mirror.upload()
+    assert mirror.array.numpy().tolist() == [0.0, 7.0, 2.0, 3.0]
+    mirror.array.fill_(5.0)
+    mirror.upload()
+    assert mirror.array.numpy().tolist() == [5.0] * 4, "nothing was edited since"
+    assert mirror.view().tolist() == [0.0, 7.0, 2.0, 3.0]
+    mirror.download()
+    assert mirror.view().tolist() == [5.0] * 4
+
+
+class SlowBatch(Batch):
+    """A batch whose launches are over only when they have been asked for a while, as on a GPU."""
+
+    asked = 0
+
+    def is_done(self) -> bool:
+        """At the third question."""
+        self.asked += 1
+        return self.asked % 3 == 0
+
+
+def several_batches(options: Options, links: Sequence[int], *_: object) -> list[Batch]:
+    """As many as a GPU gets, one larger than the others."""
+    return [SlowBatch(worlds, max(links), options) for worlds in (1, 3, 1, 1)]
+
+
+def test_walks_do_not_depend_on_the_batches_they_are_spread_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With several batches, which end their launches in any order, every walk is what it is alone, to the bit."""
+    setups = [brief_setup(seed) for seed in range(9)] + [
+        brief_setup(seed, links=44, start="spinning", hold_limit=0.05) for seed in range(2)
+    ]
+    alone = outcomes(setups, slots=1)
+    monkeypatch.setattr(scheduler, "_batches", several_batches)
+    assert outcomes(setups) == alone
+
+
+def test_a_stop_ends_all_batches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once stopped, no further walk is begun, and every launch has been waited for."""
+    made: list[Batch] = []
+    finished: list[Batch] = []
+    monkeypatch.setattr(scheduler, "_batches", lambda *how: made.extend(several_batches(*how)) or made)
+    monkeypatch.setattr(SlowBatch, "finish", lambda batch: finished.append(batch))
+    stop = threading.Event()
+    over = []
+    for place, _ in scheduler.run_setups([brief_setup(seed) for seed in range(30)], stop=stop):
+        over.append(place)
+        stop.set()
+    assert 0 < len(over) < 10
+    assert finished[-4:] == made
+
+
+@pytest.mark.parametrize(("keeps_samples", "frame_every"), [(False, None), (True, 2)])
+def test_memory_of_a_world_is_what_a_batch_takes(keeps_samples: bool, frame_every: int | None) -> None:
+    """What is planned for a world is what the arrays of a batch take for it, and at most 1 % more."""
+    options, device = Options(method="dp5"), start_device("cpu")
+
+    def taken(worlds: int) -> int:
+        batch = Batch(worlds, 60, options, keeps_samples=keeps_samples, frame_every=frame_every)
+        parts = [batch.model, batch.program, batch.state, batch.record]
+        arrays = [getattr(part, name) for part in parts for name in part._cls.vars]
+        return sum(array.capacity for array in [*arrays, batch.scratch, batch.lists] if isinstance(array, wp.array))
+
+    samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * (frame_every is not None)
+    planned = world_bytes(60, options, samples, frames, device)
+    assert 0.99 * planned <= (taken(80) - taken(40)) / 40 <= planned
+
+
+def test_a_block_has_a_thread_for_each_link() -> None:
+    """Threads come in whole warps of 32, and chains of equal blocks share a kernel."""
+    assert [block_threads(n) for n in (4, 32, 60, 64, 66, 180)] == [32, 32, 64, 64, 96, 192]
+    features = features_of(Options(), layout.padded_width(60), fixed_body="floor", watch="rest")
+    ((_, threads),) = kernels_of(start_device("cpu"), features, [64, 192])
+    assert threads == 1
+
+
+def test_few_walks_of_several_lengths_share_a_kernel() -> None:
+    """The longest chain's block serves all; many walks, and methods whose sums depend on the block, have their own."""
+    assert shared_threads("os32", [60, 90, 180], 504) == 192
+    assert shared_threads("os32", [60, 90], 504) == 96
+    assert shared_threads("os32", [60, 64], 504) is None
+    assert shared_threads("os32", [60, 90, 180], 20_000) is None
+    assert shared_threads("os32", [60, 240], 504) is None
+    assert shared_threads("rodas4p", [60, 90, 180], 504) is None
+    assert shared_threads("hybrid", [60, 90, 180], 504) is None
+
+
+def test_kernels_of_a_sweep_are_those_that_its_walks_ask_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is compiled beforehand for few walks on a GPU is one kernel for the drive and one for the walk."""
+    loaded: set[tuple[str, str, int]] = set()
+
+    def note(wanted: Iterable[tuple[wp.Device, Features, int]]) -> None:
+        loaded.update((features.method, features.fixed_body, threads) for _, features, threads in wanted)
+
+    monkeypatch.setattr(scheduler, "load_kernels", note)
+    monkeypatch.setattr(scheduler, "start_device", lambda _: None)
+    prepare(FEW | {"options": {"device": "cuda"}})
+    assert loaded == {("os32", "floor", 160), ("os32", "sprocket", 160)}
+    loaded.clear()
+    prepare(FEW | {"samples": 2000, "options": {"device": "cuda"}})
+    assert loaded == {("os32", body, threads) for body in ("floor", "sprocket") for threads in (64, 160)}
+
+
+def test_every_task_of_a_sweep_runs_in_the_blocks_that_are_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A shard that has chains of one length only runs in blocks of the whole sweep; on a CPU there are none."""
+    asked: list[tuple[set[int], int | None]] = []
+
+    def note(setups: Sequence[Setup], *, threads: int | None, **_: object) -> Iterator[tuple[int, Course]]:
+        asked.append(({setup.scene.links for setup in setups}, threads))
+        return iter(())
+
+    monkeypatch.setattr(sweep_run, "run_setups", note)
+    for device, samples in (("cuda", 2), ("cuda", 2000), ("cpu", 2)):
+        planned = load_sweep(FEW | {"samples": samples, "options": {"device": device, "method": "explicit"}})
+        run_shards(planned.canonical(), "nowhere", [(0, 1)])
+    assert asked == [({60}, 160), ({60}, None), ({60}, None)]
+
+
+def test_progress_says_when_kernels_are_compiled() -> None:
+    """The line on the terminal speaks of compiling, then of walks."""
+    progress = SweepProgress(walks=10, done=0, before=0, compiling=True)
+    assert "compiling" in _progress_text(progress)
+    progress.compiling = False
+    assert "0 of 10 walks" in _progress_text(progress)

@@ -1,0 +1,164 @@
+"""Random samples of parameters and scenes: bounds, distributions, the order of draws."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.support.table_1 import TABLE_1, UNCERTAIN
+from warpchain.inputs.distributions import DRAW_LIMIT, random_generator, sample_parameters, sample_scene
+from warpchain.inputs.parameters import InputError, Parameters, preset
+from warpchain.inputs.scene import Scene
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 2**128 - 1),
+    cell=st.integers(0, 2**32 - 1),
+    restitution=st.floats(0, 1),
+    friction=st.floats(0, 1),
+    mass=st.floats(1e-9, 1e-2),
+    radius=st.floats(6.3e-3, 6.3399e-3),
+)
+def test_samples_are_physical(
+    seed: int, cell: int, restitution: float, friction: float, mass: float, radius: float
+) -> None:
+    """Samples about any physical values stay physical, and what has no uncertainty stays as it is."""
+    base = preset("paper").with_values(
+        {
+            "floor_restitution": restitution,
+            "floor_friction": friction,
+            "inner_mass": mass,
+            "viscous_friction": 0.0,
+            "circle_radius": radius,
+        }
+    )
+    drawn = sample_parameters(base, random_generator(seed, cell))
+    for name, quantity in Parameters.quantities().items():
+        assert quantity.bounds.admit(getattr(drawn, name))
+        assert (getattr(drawn, name) != getattr(base, name)) == (name in UNCERTAIN)
+    assert drawn.circle_radius < drawn.link_length / 2
+
+
+def test_sample_distribution() -> None:
+    """Mean and standard deviation of 4000 draws are those of the table; quantities are independent."""
+    count = 4000
+    base = preset("soft").with_values({"floor_friction": 0.5, "link_length": 0.014})
+    rng = random_generator(1)
+    samples = [sample_parameters(base, rng) for _ in range(count)]
+    draws = np.array([[getattr(sample, name) for name in UNCERTAIN] for sample in samples])
+    for column, name in zip(draws.T, UNCERTAIN, strict=True):
+        _, uncertainty, power = TABLE_1[name]
+        sigma = uncertainty * 10.0**power
+        assert abs(column.mean() - getattr(base, name)) < 4 * sigma / math.sqrt(count), name
+        assert abs(column.std(ddof=1) / sigma - 1) < 4 / math.sqrt(2 * count), name
+    correlation = np.corrcoef(draws.T) - np.eye(len(UNCERTAIN))
+    assert np.abs(correlation).max() < 5 / math.sqrt(count)
+
+
+def test_truncation_redraws_and_never_clips() -> None:
+    """Near a bound the draws follow the half Gaussian: none at the bound, mean and spread as they must be."""
+    count, sigma = 4000, 0.02
+    base = preset("paper").with_values({"floor_friction": 0.0})
+    rng = random_generator(2)
+    friction = np.array([sample_parameters(base, rng).floor_friction for _ in range(count)])
+    assert friction.min() > 0
+    assert len(np.unique(friction)) == count
+    mean, spread = sigma * math.sqrt(2 / math.pi), sigma * math.sqrt(1 - 2 / math.pi)
+    assert abs(friction.mean() - mean) < 4 * spread / math.sqrt(count)
+    assert abs(friction.std() / spread - 1) < 0.06
+
+
+def test_draw_order() -> None:
+    """Quantities are drawn in the order of the table, one Gaussian each while none is out of bounds."""
+    base = preset("paper")
+    drawn = sample_parameters(base, random_generator(3, 1, 2))
+    rng = np.random.default_rng(np.random.SeedSequence(3, spawn_key=(1, 2)))
+    for name, quantity in Parameters.quantities().items():
+        if quantity.sigma:
+            assert getattr(drawn, name) == rng.normal(quantity.value, quantity.sigma), name
+    assert [name for name, quantity in Parameters.quantities().items() if quantity.sigma] == [
+        "link_length",
+        "sprocket_radius",
+        "inner_mass",
+        "outer_mass",
+        "inner_inertia",
+        "outer_inertia",
+        "viscous_friction",
+        "coulomb_friction",
+        "floor_restitution",
+        "floor_friction",
+    ]
+
+
+def test_redraw_takes_the_next_number_of_the_stream() -> None:
+    """A draw out of bounds is followed by the next one of the same stream."""
+    base = preset("paper").with_values({"floor_friction": 0.0})
+    rejections = 0
+    for sample in range(20):
+        drawn = sample_parameters(base, random_generator(5, 0, sample))
+        numbers = iter(random_generator(5, 0, sample).standard_normal(100))
+        for _ in range(9):
+            next(numbers)
+        while (value := 0.02 * float(next(numbers))) < 0:
+            rejections += 1
+        assert drawn.floor_friction == value
+    assert rejections > 5
+
+
+def test_hopeless_draw_is_an_error() -> None:
+    """A mean far outside the bounds ends in a clear error after a limited number of draws."""
+    base = Parameters.model_construct(**{**preset("paper").model_dump(), "inner_mass": -1.0})
+    with pytest.raises(InputError, match=rf"^parameters\.inner_mass: {DRAW_LIMIT} draws about -1\.0 kg"):
+        sample_parameters(base, random_generator(0))
+
+
+def test_samples_depend_on_their_name_only() -> None:
+    """The same (seed, cell, sample) gives the same sample in any order; another name gives another."""
+    base = preset("paper")
+    names = [(seed, cell, sample) for seed in (0, 7) for cell in (0, 1) for sample in (0, 1, 2)]
+    forwards = {name: sample_parameters(base, random_generator(*name)) for name in names}
+    backwards = {name: sample_parameters(base, random_generator(*name)) for name in reversed(names)}
+    assert forwards == backwards
+    assert len({tuple(p.model_dump().values()) for p in forwards.values()}) == len(names)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((-1,), "seed: -1 "),
+        ((2**128,), "seed: "),
+        ((None,), "seed: None "),
+        ((1.0,), "seed: 1.0 "),
+        ((True,), "seed: True "),
+        ((0, -1), "cell: -1 "),
+        ((0, 2**32), "cell: "),
+        ((0, 0, -1), "sample: -1 "),
+        ((0, 0, 2**32), "sample: "),
+    ],
+)
+def test_generator_refusals(arguments: tuple[Any, ...], message: str) -> None:
+    """A seed or index that would not name one stream is refused."""
+    with pytest.raises(InputError) as caught:
+        random_generator(*arguments)
+    assert str(caught.value).startswith(message)
+
+
+def test_sample_scene() -> None:
+    """Phase and clearance are uniform in their intervals; the rest of the scene stays."""
+    count = 4000
+    base = Scene(links=80, frequency=20.0, start="spinning")
+    rng = random_generator(4)
+    samples = [sample_scene(base, rng) for _ in range(count)]
+    kept = base.model_dump(exclude={"phase", "clearance"})
+    assert all(sample.model_dump(exclude={"phase", "clearance"}) == kept for sample in samples)
+    for name, low, high in (("phase", 0.0, 1.0), ("clearance", 0.005, 0.015)):
+        drawn = np.array([getattr(sample, name) for sample in samples])
+        spread = (high - low) / math.sqrt(12)
+        assert low <= drawn.min() < low + 0.01 * (high - low)
+        assert high - 0.01 * (high - low) < drawn.max() < high
+        assert abs(drawn.mean() - (low + high) / 2) < 4 * spread / math.sqrt(count)
+        assert abs(drawn.std() / spread - 1) < 0.05

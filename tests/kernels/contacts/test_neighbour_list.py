@@ -1,0 +1,414 @@
+"""The neighbour list: what it holds, in which order, for how long, and what happens when it is full."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+import warpchain
+from tests.support.folded_chains import accordion, chain_of_angles, folded_chain
+from tests.support.kernels_under_test import ALL_PAIRS, GRID, SELF, ContactPass, Placed
+from warpchain import Status
+from warpchain.engine.batch import Batch
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import preset
+from warpchain.kernels import layout
+from warpchain.kernels.cpu.contacts.neighbour_list import list_layout
+from warpchain.oracle import contact_equations, motion_equations
+
+PAPER = preset("paper")
+SOFT = preset("soft")
+LENGTH = PAPER.link_length
+SKIN = 2e-3
+
+
+def at_rest(position):
+    """A chain without motion, of Table 1's links."""
+    return Placed(position, np.zeros_like(position), PAPER)
+
+
+def pairs_within_reach(position, skin):
+    """Pairs of joints (right ends) closer than 2r + skin + 2|C|, by trying all, in the documented order."""
+    joints = motion_equations.link_ends(position, PAPER)[1]
+    opening = np.linalg.norm(motion_equations.joint_opening(position, PAPER), axis=1).max()
+    gaps = joints[:, None] - joints[None]
+    near = np.linalg.norm(gaps, axis=2) < 2 * PAPER.circle_radius + skin + 2 * opening
+    return sorted(map(tuple, np.argwhere(np.triu(near, 1)).tolist()), key=contact_equations.self_contact_order)
+
+
+def touching_of(pairs, position):
+    """Those of some joint pairs at which circles of two links overlap, sorted."""
+    n = len(position)
+    left, right = motion_equations.link_ends(position, PAPER)
+    circles = [((j, right[j]), ((j + 1) % n, left[(j + 1) % n])) for j in range(n)]
+    touching = [
+        (p, q)
+        for p, q in pairs
+        for a, centre_a in circles[p]
+        for b, centre_b in circles[q]
+        if 2 <= (b - a) % n <= n - 2 and np.hypot(*(centre_b - centre_a)) < 2 * PAPER.circle_radius
+    ]
+    return sorted(set(touching))
+
+
+def doubled_line(n, angle=0.3):
+    """A chain drawn straight: n/2 links out, n/2 back over them."""
+    return chain_of_angles(np.repeat([angle, angle + np.pi], n // 2), LENGTH)
+
+
+def straight_heap(n, angle):
+    """A chain drawn out and back along a line, with every fifth link or so turned round: joints share spots."""
+    generator = np.random.default_rng(n)
+    half = generator.choice([0.0, np.pi], n // 2, p=[0.8, 0.2])
+    return chain_of_angles(np.concatenate([half, generator.permutation(half) + np.pi]) + angle, LENGTH)
+
+
+LENGTHS = (4, 6, 8, 20, 60, 150, 1000)
+STATES = {
+    "loop": lambda n: motion_equations.circular_loop(n, PAPER, 0.0)[0],
+    "crumpled": lambda n: folded_chain(n, n, LENGTH)[0],
+    "flat pile": lambda n: folded_chain(n, n, LENGTH, tilt=0.1 if n <= 60 else 0.6)[0],
+    "doubled line": doubled_line,
+    "collinear": lambda n: straight_heap(n, 0.0),
+    "collinear, upright": lambda n: straight_heap(n, np.pi / 2),
+    "closed joints": lambda n: folded_chain(n, n, LENGTH, opening=0.0)[0],
+}
+PLACES = {"origin": (0.0, 0.0), "negative": (-3.7, -0.9), "mixed": (-120.0, 40.0), "far": (1e5, -2e5)}
+
+
+# --- what the list holds ---
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("state", STATES)
+def test_grid_lists_the_pairs_of_all_pairs(state, place):
+    """The grid lists all pairs within reach and no others, in the documented order, as testing all pairs does."""
+    for lengths in (LENGTHS[:-1], LENGTHS[-1:]):
+        positions = [STATES[state](n) + np.array([*PLACES[place], 0.0]) for n in lengths]
+        contact_pass = ContactPass([at_rest(position) for position in positions], skin=SKIN)
+        for parts in (GRID, ALL_PAIRS):
+            results = contact_pass.run(parts)
+            for world, position in enumerate(positions):
+                assert results[world]["fits"]
+                assert contact_pass.listed_pairs(world) == pairs_within_reach(position, SKIN)
+
+
+def test_chain_in_one_cell():
+    """A chain that fits into one cell of the grid, or into four about the origin, lists every pair that may touch."""
+    skin = 0.1
+    for n in (4, 6, 40):
+        for place in ((0.0, 0.0, 0.0), (0.05, 0.05, 0.0), (-0.05, -0.05, 0.0)):
+            position = folded_chain(n, n, LENGTH, tilt=np.pi)[0] * [0.3, 0.3, 1.0] + place
+            contact_pass = ContactPass([at_rest(position)], skin=skin)
+            expected = [(p, q) for p in range(n) for q in range(p + 1, n)]
+            for parts in (GRID, ALL_PAIRS):
+                (result,) = contact_pass.run(parts)
+                assert result["fits"]
+                assert contact_pass.listed_pairs(0) == sorted(expected, key=contact_equations.self_contact_order)
+
+
+@given(
+    n=st.integers(2, 30).map(lambda half: 2 * half),
+    seed=st.integers(0, 2**32 - 1),
+    tilt=st.floats(0.1, 3.2),
+    skin=st.floats(1e-6, 8e-3),
+    opening=st.sampled_from([0.0, 1e-8, 1e-5, 2e-4]),
+    place=st.tuples(st.floats(-50, 50), st.floats(-50, 50)),
+)
+@settings(max_examples=100, deadline=None, derandomize=True)
+def test_no_heap_has_another_list(n, seed, tilt, skin, opening, place):
+    """Hypothesis finds no heap whose list differs from that of all pairs, or misses a touching pair."""
+    position = folded_chain(n, seed, LENGTH, tilt=tilt, opening=opening)[0] + [*place, 0.0]
+    contact_pass = ContactPass([at_rest(position)], skin=skin)
+    expected = pairs_within_reach(position, skin)
+    (grid,) = contact_pass.run(GRID)
+    fits = len(expected) <= list_layout(contact_pass.columns).capacity
+    assert grid["fits"] == fits
+    if fits:
+        assert contact_pass.listed_pairs(0) == expected
+        assert touching_of(expected, position) == contact_equations.touching_pairs(position, PAPER)
+    (every,) = contact_pass.run(ALL_PAIRS)
+    assert every["fits"] == fits
+    if fits:
+        assert contact_pass.listed_pairs(0) == expected
+
+
+@pytest.mark.parametrize(("n", "tilt"), [(4, np.pi), (8, 0.2), (60, np.pi), (60, 0.2), (150, np.pi)])
+def test_list_holds_every_touching_pair(n, tilt):
+    """The touching pairs of the list are all that the reference finds, whatever the skin."""
+    heaps = [folded_chain(n, seed, LENGTH, tilt=tilt)[0] for seed in range(5)]
+    expected = [contact_equations.touching_pairs(position, PAPER) for position in heaps]
+    assert any(expected)
+    for skin in (1e-6, SKIN, 5e-3):
+        contact_pass = ContactPass([at_rest(position) for position in heaps], skin=skin)
+        for world, result in enumerate(contact_pass.run(GRID)):
+            assert result["fits"]
+            assert touching_of(contact_pass.listed_pairs(world), heaps[world]) == expected[world]
+
+
+# --- how long it lasts ---
+
+
+def moved_heap(n, seed, skin, fraction):
+    """A heap before and after a move whose greatest displacement is `fraction` of skin/2 − |C|.
+
+    Two straight arms of two links each join the halves of the heap, which lie across each other. The arms turn, so
+    that the halves are shifted in opposite directions and every joint of one approaches some joints of the other.
+    """
+    generator = np.random.default_rng(seed)
+    half, arm = generator.uniform(-np.pi, np.pi, n // 2 - 2), generator.uniform(-np.pi, np.pi)
+    noise = generator.normal(size=(n, 3)) * [1e-5, 1e-5, 0.0]
+    other_half = generator.permutation(half) + np.pi
+
+    def heap(turn):
+        arms = np.full(2, arm + turn)
+        position = chain_of_angles(np.concatenate([half, arms, other_half, arms + np.pi]), LENGTH)
+        return position - [*position[:, :2].mean(axis=0), 0.0] + noise
+
+    def excess(turn):
+        after = heap(turn)
+        opening = np.linalg.norm(motion_equations.joint_opening(after, PAPER), axis=1).max()
+        return greatest_move(heap(0.0), after) - fraction * (skin / 2 - opening)
+
+    low, high = 0.0, 1.5
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if excess(middle) < 0 else (low, middle)
+    return heap(0.0), heap(low)
+
+
+def greatest_move(before, after):
+    """Greatest displacement of a joint, in m."""
+    return np.linalg.norm(
+        motion_equations.link_ends(after, PAPER)[1] - motion_equations.link_ends(before, PAPER)[1], axis=1
+    ).max()
+
+
+def test_list_lasts_until_a_joint_has_moved_half_the_skin():
+    """A list's slack is skin/2 − |C| less the greatest displacement since it was made, when it is full again."""
+    skin = 6e-3
+    for fraction in (0.0, 0.5, 0.99, 1.01, 3.0):
+        moves = [moved_heap(n, n, skin, fraction) for n in (8, 60, 150)]
+        contact_pass = ContactPass([at_rest(before) for before, _ in moves], skin=skin)
+        for result in contact_pass.run(GRID):
+            assert result["slack"] == pytest.approx(skin / 2 - result["opening"], rel=1e-12)
+        contact_pass.place([at_rest(after) for _, after in moves])
+        for (before, after), result in zip(moves, contact_pass.run(0), strict=True):
+            move, limit = greatest_move(before, after), skin / 2 - result["opening"]
+            assert_allclose(result["displacement"], move, rtol=1e-9, atol=1e-16)
+            assert_allclose(result["slack"], limit - move, atol=1e-15)
+            assert (result["slack"] > 0) == (fraction < 1)
+        for result in contact_pass.run(GRID):
+            assert result["slack"] == pytest.approx(skin / 2 - result["opening"], rel=1e-12)
+
+
+def test_list_stays_complete_while_it_lasts():
+    """A list that is not stale holds every touching pair, and gives the velocities of a fresh one to the bit."""
+    skin = 6e-3
+    moves = [moved_heap(60, seed, skin, 0.99) for seed in range(40)]
+    velocity = np.random.default_rng(0).normal(size=(60, 3)) * [1.0, 1.0, 2 / LENGTH]
+    contact_pass = ContactPass([at_rest(before) for before, _ in moves], skin=skin)
+    contact_pass.run(GRID)
+    moved = [Placed(after, velocity, PAPER) for _, after in moves]
+    contact_pass.place(moved)
+    old = contact_pass.run(SELF)
+    fresh_pass = ContactPass(moved, skin=skin)
+    fresh = fresh_pass.run(ALL_PAIRS | SELF)
+    far_before = 0
+    for world, (before, after) in enumerate(moves):
+        assert old[world]["slack"] > 0
+        touching = contact_equations.touching_pairs(after, PAPER)
+        assert touching_of(contact_pass.listed_pairs(world), after) == touching
+        assert_array_equal(contact_pass.velocity(world), fresh_pass.velocity(world))
+        for kind in ("self", "self_loss", "self_depth"):
+            assert old[world][kind] == fresh[world][kind]
+        joints = motion_equations.link_ends(before, PAPER)[1]
+        gaps = [np.hypot(*(joints[q] - joints[p])) - 2 * PAPER.circle_radius for p, q in touching]
+        far_before += sum(gap > 0.7 * skin for gap in gaps)
+    assert far_before > 20, "the moves are too harmless to show anything"
+
+
+def test_torn_chain_never_trusts_its_list():
+    """If a joint is open by more than skin/2, the list is stale at once, although it was made just now."""
+    position = folded_chain(20, 1, LENGTH, opening=1e-3)[0]
+    contact_pass = ContactPass([at_rest(position)], skin=2e-3)
+    (result,) = contact_pass.run(GRID)
+    assert result["opening"] > 1e-3
+    assert result["displacement"] == 0
+    assert result["slack"] < 0
+    assert contact_pass.listed_pairs(0) == pairs_within_reach(position, 2e-3)
+
+
+# --- a full list ---
+
+
+def longest_accordion():
+    """Length of the longest accordion whose pairs, (n/2)(n/2 − 1), the list can hold; two more links overflow it."""
+    lists = list_layout(layout.padded_width(80))
+    n = max(n for n in range(4, 199, 2) if (n // 2) * (n // 2 - 1) <= lists.capacity)
+    assert n < 196
+    return n
+
+
+@pytest.mark.parametrize("parts", [GRID, ALL_PAIRS])
+def test_overflow_is_noticed_at_the_last_pair(parts):
+    """A list that is just full holds all pairs; one pair too many is reported, not dropped in silence."""
+    position = folded_chain(190, 1, LENGTH)[0]
+    joints = motion_equations.link_ends(position, PAPER)[1]
+    opening = np.linalg.norm(motion_equations.joint_opening(position, PAPER), axis=1).max()
+    gaps = np.linalg.norm(joints[:, None] - joints[None], axis=2)[np.triu_indices(190, 1)]
+    capacity = list_layout(layout.padded_width(190)).capacity
+    last, first_too_many, following = np.sort(gaps)[capacity - 1 : capacity + 2]
+    full, too_full = (
+        (gap - 2 * PAPER.circle_radius - 2 * opening)
+        for gap in ((last + first_too_many) / 2, (first_too_many + following) / 2)
+    )
+    for skin, fits in ((full, True), (too_full, False), (1.0, False)):
+        contact_pass = ContactPass([at_rest(position)], skin=skin)
+        (result,) = contact_pass.run(parts)
+        assert result["fits"] == fits
+        if fits:
+            assert len(contact_pass.listed_pairs(0)) == capacity
+            assert contact_pass.listed_pairs(0) == pairs_within_reach(position, skin)
+
+
+def test_overflow_at_the_start_ends_the_simulation():
+    """A chain folded onto two spots is simulated if the list can hold its pairs, else ends in list_overflow."""
+    n = longest_accordion()
+    run = {"floor": False, "gravity": False, "method": "bs32", "skin": 1e-4}
+    assert warpchain.simulate("soft", *accordion(n, LENGTH, 1e-6), 1e-6, **run).status == Status.FINISHED
+    start = accordion(n + 2, LENGTH, 1e-6)
+    trajectory = warpchain.simulate("soft", *start, 1e-6, **run)
+    assert trajectory.status == Status.LIST_OVERFLOW
+    assert not trajectory.status.ok
+    assert trajectory.steps_accepted == 0
+    assert_array_equal(trajectory.time, [0.0])
+    assert_array_equal(trajectory.position, start[0][None])
+    assert "skin" in trajectory.status.sentence
+
+
+def test_huge_skin_overflows():
+    """With a skin as wide as the chain the pairs of a long chain overflow; without self-contacts nothing does."""
+    position, velocity = folded_chain(150, 1, SOFT.link_length, opening=1e-6)
+    run = {"floor": False, "method": "bs32", "skin": 1.0}
+    assert warpchain.simulate(SOFT, position, velocity, 1e-6, **run).status == Status.LIST_OVERFLOW
+    trajectory = warpchain.simulate(SOFT, position, velocity, 1e-6, self_contact=False, **run)
+    assert trajectory.status == Status.FINISHED
+
+
+def zigzag(n, slope, rate):
+    """A chain folded to three columns of zigzags, which flatten: links lean by ±slope and turn by `rate`.
+
+    The velocities keep the joints closed.
+    """
+    upwards, downwards = [slope, np.pi - slope], [-slope, np.pi + slope]
+    angle = np.concatenate([np.tile(upwards, n // 4), np.tile(downwards, n // 4)])
+    turn = rate * np.concatenate([np.tile([1.0, -1.0], n // 4), np.tile([-1.0, 1.0], n // 4)])
+    position = chain_of_angles(angle, LENGTH)
+    step = LENGTH * turn[:, None] * np.column_stack([-np.sin(angle), np.cos(angle)])
+    right = np.cumsum(step, axis=0)
+    return position, np.column_stack([right - step / 2, turn])
+
+
+def test_overflow_during_the_simulation_ends_it():
+    """A chain that crowds together while it runs ends in list_overflow, at a finite state before its duration."""
+    skin, capacity = 0.04, list_layout(layout.padded_width(150)).capacity
+    count = {n: [len(pairs_within_reach(zigzag(n, s, 0.0)[0], skin)) for s in (0.5, 0.4)] for n in range(80, 196, 4)}
+    n = next(n for n in count if count[n][0] + 20 < capacity < count[n][1] - 20)
+    position, velocity = zigzag(n, 0.5, -100.0)
+    assert_allclose(motion_equations.joint_opening_rate(position, velocity, SOFT), 0, atol=1e-12)
+    run = {"floor": False, "gravity": False, "method": "bs32", "skin": skin}
+    trajectory = warpchain.simulate("soft", position, velocity, 5e-3, **run)
+    assert trajectory.status == Status.LIST_OVERFLOW
+    assert 2e-4 < trajectory.time[-1] < 2e-3
+    assert np.all(np.isfinite(trajectory.position))
+    assert trajectory.steps_accepted > 10
+
+
+# --- whole runs ---
+
+
+def run_pile(parameters, position, velocity, duration, *, broad_phase="grid", poison=False, **settings):
+    """A run on the floor through `Batch`: final state (n, 6), counts, losses and extremes."""
+    n = len(position)
+    batch = Batch(1, n, Options(method="bs32", **settings))
+    batch.set_chain(0, parameters, n)
+    batch.load(0, position, velocity, stop_time=duration, stop_status=Status.FINISHED)
+    if poison:
+        batch.scratch.fill_(np.nan)
+        batch.lists.fill_(2**30)
+    batch.run([0], batch.features(fixed_body="floor", watch="none", broad_phase=broad_phase))
+    assert batch.status(0) == Status.FINISHED
+    state = np.hstack([batch.position(0), batch.velocity(0)])
+    return state, batch.counts(0), batch.losses(0), batch.extremes(0)
+
+
+def assert_same_run(run, other):
+    """Two runs agree to the bit in all but the number of lists made."""
+    assert_array_equal(run[0], other[0])
+    for mine, others in zip(run[1:], other[1:], strict=True):
+        assert {k: v for k, v in mine.items() if k != "list_builds"} == {
+            k: v for k, v in others.items() if k != "list_builds"
+        }
+
+
+@pytest.mark.parametrize(("n", "seed"), [(8, 1), (60, 2)])
+def test_grid_and_all_pairs_give_the_same_run(n, seed):
+    """A heap that falls together on the floor ends in the same bits with the grid and with all pairs."""
+    position, velocity = folded_chain(n, seed, LENGTH, opening=1e-6)
+    runs = {}
+    for broad_phase in ("grid", "all_pairs"):
+        runs[broad_phase] = run_pile(SOFT, position, velocity, 3e-3, broad_phase=broad_phase)
+    assert runs["grid"][1]["list_builds"] == runs["all_pairs"][1]["list_builds"] > 0
+    assert min(runs["grid"][1][kind] for kind in ("floor", "self")) > 20
+    assert_same_run(runs["grid"], runs["all_pairs"])
+
+
+def test_skin_changes_no_bit():
+    """Where the steps are short anyway, a run does not depend on the skin: no list was ever incomplete."""
+    position, velocity = folded_chain(40, 3, LENGTH, opening=1e-8)
+    runs = [run_pile(PAPER, position, velocity, 1e-3, skin=skin) for skin in (2e-4, 2e-3, 8e-3)]
+    builds = [counts["list_builds"] for _, counts, _, _ in runs]
+    assert builds[0] > builds[1] > builds[2]
+    assert runs[0][1]["self"] > 100
+    for run in runs[1:]:
+        assert_same_run(runs[0], run)
+
+
+def test_run_reads_nothing_it_has_not_written():
+    """A run on poisoned scratch and list memory ends in the same bits."""
+    position, velocity = folded_chain(20, 4, LENGTH, opening=1e-6)
+    clean, poisoned = (run_pile(SOFT, position, velocity, 1e-3, poison=poison) for poison in (False, True))
+    assert clean[1]["self"] > 10
+    assert_same_run(clean, poisoned)
+
+
+def flattening_hexagon(lean, rate):
+    """Six links: top and bottom lie flat, the sides bend outwards and fold, so that top and bottom meet."""
+    angle = np.array([0.0, -lean, np.pi + lean, np.pi, np.pi - lean, lean])
+    turn = -rate * np.array([0.0, -1.0, 1.0, 0.0, -1.0, 1.0])
+    position = chain_of_angles(angle, LENGTH)
+    step = LENGTH * turn[:, None] * np.column_stack([-np.sin(angle), np.cos(angle)])
+    velocity = np.column_stack([np.cumsum(step, axis=0) - step / 2, turn])
+    return position, velocity - [*velocity[:, :2].mean(axis=0), 0.0]
+
+
+@pytest.mark.parametrize("lean", [0.24, 0.26, 0.3, 0.34, 0.38])
+def test_depth_of_self_contacts_is_bounded_by_the_contact_step(lean):
+    """However far a list's skin is used up, two circles sink in by no more than their way in a contact step."""
+    limber = SOFT.with_values(
+        {
+            **{"joint_stiffness": 2e5, "joint_damping": 0.0, "circle_radius": 2e-3},
+            **{"viscous_friction": 0.0, "coulomb_friction": 0.0, "friction_smoothing": 1.0},
+        }
+    )
+    rate = 150.0
+    position, velocity = flattening_hexagon(lean, rate)
+    assert contact_equations.touching_pairs(position, limber) == []
+    run = {"floor": False, "gravity": False, "tolerance": 1e-3, "method": "rkf78", "contact_step": 2e-5}
+    trajectory = warpchain.simulate(limber, position, velocity, 0.42 / rate, times=[0.0], **run)
+    assert trajectory.status == Status.FINISHED
+    assert trajectory.impulses["self"] > 0
+    approach = 2 * LENGTH * rate
+    assert trajectory.greatest_penetration["self"] < 1.5 * approach * 2e-5

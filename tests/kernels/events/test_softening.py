@@ -1,0 +1,489 @@
+"""Softer joints in the pile and on the sprocket: when, how much, and that nothing else changes."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import warp as wp
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.special import ellipe
+
+import warpchain
+from warpchain import InputError, Status, preset
+from warpchain.engine.batch import Batch
+from warpchain.engine.control import HOLD_STRAIN, LOADED_STRAIN, SOFTEST, STIFFENING_TIME, hold_softness
+from warpchain.engine.devices import start_device
+from warpchain.inputs.options import Options
+from warpchain.inputs.start_shapes import ellipse, lay_chain
+from warpchain.kernels import layout
+from warpchain.kernels.cpu.explicit import place_ends
+from warpchain.kernels.cpu.loop import load_state
+from warpchain.kernels.events.softening import contact_step, enclosed_area, softened, spring_tolerance
+from warpchain.kernels.types import Chain, Control, Model, Program, State, read_chain
+from warpchain.run.single_walk import setup_walk
+from warpchain.walks import scheduler
+from warpchain.walks.walk_phases import Course, Phase
+
+PAPER = preset("paper")
+SERIES = ("time", "center", "center_velocity", "kinetic_energy", "spring_energy", "lowest", "rms_speed")
+
+
+# --- area and joints ---
+
+
+@wp.kernel(module="unique", enable_backward=False)
+def _area(model: Model, state: State, scratch: wp.array3d(dtype=wp.float64), areas: wp.array(dtype=wp.float64)):
+    world = wp.tid()
+    chain = read_chain(model, world)
+    load_state(scratch[world], state, chain, world)
+    place_ends(scratch[world], chain)
+    areas[world] = enclosed_area(scratch[world], chain)
+
+
+def area_of(position: np.ndarray) -> float:
+    """`enclosed_area` of a chain (n, 3)."""
+    batch = Batch(1, len(position), setup_walk("paper", {}, None).options)
+    batch.set_chain(0, PAPER, len(position))
+    batch.load(0, position, np.zeros_like(position), stop_time=1.0, stop_status=Status.FINISHED)
+    areas = wp.full(1, np.nan, dtype=wp.float64, device=start_device("cpu"))
+    wp.launch(_area, dim=1, inputs=[batch.model, batch.state, batch.scratch, areas], device="cpu")
+    return float(areas.numpy()[0])
+
+
+@pytest.mark.parametrize("links", [4, 30, 180])
+def test_area_of_a_ring(links: int) -> None:
+    """A ring is a regular polygon of area n ℓ² / (4 tan(π/n)), wherever it lies; run the other way it is negative."""
+    position, _ = lay_chain(ellipse(1.0), links, PAPER.link_length, 0.0)
+    expected = links * PAPER.link_length**2 / (4 * np.tan(np.pi / links))
+    sign = np.sign(area_of(position))
+    assert area_of(position) == pytest.approx(sign * expected, rel=1e-9)
+    moved = position + np.array([3.0, -1.0, 0.0])
+    assert area_of(moved) == pytest.approx(sign * expected, rel=1e-9)
+    mirrored = position * np.array([-1.0, 1.0, -1.0]) + np.array([0.0, 0.0, np.pi])
+    assert area_of(mirrored) == pytest.approx(-sign * expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("aspect", [0.5, 1.5, 4.0])
+def test_area_of_an_ellipse(aspect: float) -> None:
+    """A long chain laid along an ellipse encloses π a b, its length being the ellipse's by the elliptic integral."""
+    links = 600
+    position, _ = lay_chain(ellipse(aspect), links, PAPER.link_length, 0.0)
+    longer = max(aspect, 1 / aspect)
+    short = links * PAPER.link_length / (4 * longer * ellipe(1 - longer**-2))
+    assert abs(area_of(position)) == pytest.approx(np.pi * longer * short**2, rel=1e-3)
+
+
+@wp.kernel(module="unique", enable_backward=False)
+def _soften(chains: wp.array(dtype=Chain), control: Control, softness: wp.array(dtype=wp.float64)):
+    i = wp.tid()
+    chains[i] = softened(chains[i], control, softness[i])
+
+
+def joints_of(stiffness: float, damping: float, smoothing: float, softness: float) -> tuple[float, float, float]:
+    """k, b and 1/ω_c of a joint at a softness."""
+    chain = Chain()
+    chain.joint_stiffness, chain.joint_damping, chain.inverse_smoothing = stiffness, damping, 1 / smoothing
+    control = Control()
+    control.soft_stiffness, control.soft_damping, control.soft_smoothing = 1e7, 100.0, 0.1
+    control.softest_stiffness, control.softest_damping = 1e6, 25.0
+    chains = wp.array([chain], dtype=Chain, device="cpu")
+    inputs = [chains, control, wp.array([softness], dtype=wp.float64, device="cpu")]
+    wp.launch(_soften, dim=1, inputs=inputs, device="cpu")
+    after = chains.numpy()[0]
+    return tuple(float(after[name]) for name in ("joint_stiffness", "joint_damping", "inverse_smoothing"))
+
+
+def test_softness_goes_geometrically_from_own_over_soft_to_softest() -> None:
+    """Exactly the own values at 0, soft at 1, softest at 2; geometric means half-way, within bounds beyond."""
+    for softness in (0.0, -0.1):
+        assert joints_of(1e9, 1e3, 1e-3, softness) == (1e9, 1e3, 1 / 1e-3)
+    assert joints_of(1e9, 1e3, 1e-3, 1.0) == (1e7, 100.0, 1 / 0.1)
+    for softness in (2.0, 2.1):
+        assert joints_of(1e9, 1e3, 1e-3, softness) == (1e6, 25.0, 1 / 0.1)
+    assert_allclose(joints_of(1e9, 1e3, 1e-3, 0.5), [1e8, np.sqrt(1e5), 100.0], rtol=1e-14)
+    assert_allclose(joints_of(1e9, 1e3, 1e-3, 1.5), [np.sqrt(1e13), 50.0, 10.0], rtol=1e-14)
+
+
+@pytest.mark.parametrize("own", [1e9, 1e7, 3e6])
+@pytest.mark.parametrize("strain", [HOLD_STRAIN, LOADED_STRAIN])
+def test_the_loop_is_held_on_joints_that_it_stretches_by_no_more_than_it_may(own: float, strain: float) -> None:
+    """k = T/(strain ℓ), whatever the joints' own, between the softest and the lesser of that and the soft ones'."""
+    parameters = PAPER.with_values({"joint_stiffness": own})
+    for tension in (0.0, 5.0, 25.0, 400.0):
+        wanted = tension / (strain * PAPER.link_length)
+        held, _, _ = joints_of(own, 1e3, 1e-3, hold_softness(parameters, tension, strain))
+        assert held == pytest.approx(min(max(wanted, 1e6), 1e7, own))
+    assert hold_softness(PAPER.with_values({"joint_stiffness": 1e5}), 25.0, strain) == 2.0
+
+
+def test_no_joint_becomes_stiffer() -> None:
+    """What is softer than soft or softest joints stays, undamped joints included; the rest softens."""
+    for softness in (0.0, 0.3, 1.0, 1.7, 2.0):
+        assert joints_of(1e6, 0.0, 2.0, softness) == (1e6, 0.0, 0.5)
+    assert joints_of(1e6, 1e3, 2.0, 1.0) == (1e6, 100.0, 0.5)
+    assert joints_of(3e6, 1e3, 2.0, 2.0) == (1e6, 25.0, 0.5)
+
+
+@wp.kernel(module="unique", enable_backward=False)
+def _bounds(program: Program, state: State, control: Control, is_driven: bool, bounds: wp.array2d(dtype=wp.float64)):
+    i = wp.tid()
+    bounds[i, 0] = contact_step(state, control, i, is_driven)
+    bounds[i, 1] = spring_tolerance(program, state, control, i, is_driven)
+
+
+def bounds_of(batch: Batch, *, is_driven: bool) -> np.ndarray:
+    """`contact_step` and `spring_tolerance` (W, 2) of the worlds of a batch."""
+    bounds = wp.full((len(batch.links), 2), np.nan, dtype=wp.float64, device=start_device("cpu"))
+    inputs = [batch.program, batch.state, batch.control, is_driven, bounds]
+    wp.launch(_bounds, dim=len(batch.links), inputs=inputs, device="cpu")
+    return bounds.numpy()
+
+
+@pytest.mark.parametrize(("own", "longest"), [(2e-5, 5e-5), (7e-5, 7e-5)])
+@pytest.mark.parametrize("is_driven", [False, True])
+def test_steps_near_contacts_are_longer_on_soft_joints(own: float, longest: float, is_driven: bool) -> None:
+    """Below softness 1, and at 1 unless it is driven, the contact step bounds them; beyond, the greater of the two."""
+    batch = Batch(5, 4, Options(contact_step=own, soft_contact_step=5e-5))
+    batch.state.softness.numpy()[:] = [0.0, 0.99, 1.0, 1.01, 2.0]
+    steps = bounds_of(batch, is_driven=is_driven)[:, 0].tolist()
+    assert steps == [own, own, longest if is_driven else own, longest, longest]
+
+
+@pytest.mark.parametrize("softness", [0.0, 1.0])
+@pytest.mark.parametrize("is_driven", [False, True])
+def test_tolerance_of_a_drive_is_tenfold_until_the_loop_is_watched_free(softness: float, is_driven: bool) -> None:
+    """Tenfold up to the watch under its own loads, where it is the options' own; 0.1 at most."""
+    own = 1e-5 if softness < 1 else 2e-4
+    batch = Batch(5, 4, Options(tolerance=1e-5, soft_tolerance=2e-4))
+    batch.state.softness.numpy()[:] = softness
+    for world in range(5):
+        batch.set_program(world, hold_start=2.5)
+    batch.state.last_look.numpy()[:, layout.TIME] = [-1.0, 2.4, 2.5, 2.6, 2.6]
+    batch.state.load_factor.numpy()[:] = [1.0, 1.0, 50.0, 1.001, 1.0]
+    tenfold = 10 * own if is_driven else own
+    assert_allclose(bounds_of(batch, is_driven=is_driven)[:, 1], [tenfold] * 4 + [own], rtol=1e-15)
+    batch.control.tolerance = batch.control.soft_tolerance = 0.05
+    assert_allclose(bounds_of(batch, is_driven=is_driven)[:, 1], [0.1 if is_driven else 0.05] * 4 + [0.05], rtol=1e-15)
+
+
+# --- the pile ---
+
+
+def short_walk(**settings):
+    """A walk of a loop of 20 links with the joints of Table 1."""
+    given = {"links": 20, "frequency": 8.0, "start": "ellipse", "method": "reference"}
+    given |= {"soften_area": 0.3, "frame_interval": 1e-3}
+    return warpchain.walk(**given | settings)
+
+
+@pytest.fixture(scope="module")
+def stiff_walk():
+    """The walk with its own joints throughout."""
+    return short_walk()
+
+
+@pytest.fixture(scope="module")
+def softened_walk():
+    """The same, softened in the pile."""
+    return short_walk(soften_pile=True)
+
+
+@pytest.fixture(scope="module")
+def early_walk():
+    """The same, softened earlier, so that its area then halves."""
+    return short_walk(soften_pile=True, soften_area=0.6)
+
+
+def shoelace(joints: np.ndarray) -> np.ndarray:
+    """Area (f,) inside polygons (f, n, 2)."""
+    x, y = joints[..., 0], joints[..., 1]
+    return 0.5 * np.sum(x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1), axis=1)
+
+
+def test_joints_soften_at_the_first_mark_of_a_small_area(softened_walk) -> None:
+    """The moment is that of the first sample whose loop encloses less than 0.3 of the area at the release."""
+    area = shoelace(softened_walk.frame_joints)
+    first = np.flatnonzero(area / area[0] < 0.3)[0]
+    assert 0 < first < len(area) - 20
+    assert softened_walk.softened_at == softened_walk.frame_time[first]
+
+
+def test_soften_area_sets_the_moment(softened_walk, early_walk) -> None:
+    """A greater fraction is reached earlier, at the mark where the area says so."""
+    area = shoelace(early_walk.frame_joints)
+    assert early_walk.softened_at == early_walk.frame_time[np.flatnonzero(area / area[0] < 0.6)[0]]
+    assert early_walk.softened_at < softened_walk.softened_at
+
+
+def test_nothing_changes_before_the_joints_soften(stiff_walk, softened_walk) -> None:
+    """Up to the switch the series are those of the stiff walk to the bit, afterwards they are not."""
+    switch = int(np.flatnonzero(softened_walk.time == softened_walk.softened_at)[0])
+    for name in SERIES:
+        stiff, soft = getattr(stiff_walk, name), getattr(softened_walk, name)
+        assert_array_equal(stiff[: switch + 1], soft[: switch + 1], err_msg=name)
+        assert not np.array_equal(stiff[switch + 1], soft[switch + 1]), name
+    assert np.isnan(stiff_walk.softened_at)
+
+
+def test_soft_tolerance_changes_a_walk_from_where_its_joints_soften(stiff_walk, softened_walk) -> None:
+    """A walk that never softens has the same bits for any; one that does has them up to there, then fewer steps."""
+    unsoftened = short_walk(soft_tolerance=1e-3)
+    loose = short_walk(soften_pile=True, soft_tolerance=1e-3)
+    switch = int(np.flatnonzero(softened_walk.time == softened_walk.softened_at)[0])
+    for name in SERIES:
+        assert_array_equal(getattr(unsoftened, name), getattr(stiff_walk, name), err_msg=name)
+        tight, after = getattr(softened_walk, name), getattr(loose, name)
+        assert_array_equal(after[: switch + 1], tight[: switch + 1], err_msg=name)
+        assert not np.array_equal(after[switch + 1], tight[switch + 1]), name
+    assert loose.softened_at == softened_walk.softened_at
+    assert loose.steps_accepted < softened_walk.steps_accepted
+    assert loose.dx == pytest.approx(softened_walk.dx, abs=1e-3)
+
+
+def test_softened_walk_ends_alike_with_fewer_steps(stiff_walk, softened_walk) -> None:
+    """The chain comes to rest at the same place to a millimetre, in far fewer steps."""
+    assert softened_walk.status == Status.AT_REST
+    assert softened_walk.dx == pytest.approx(stiff_walk.dx, abs=1e-3)
+    assert softened_walk.steps_accepted < 0.7 * stiff_walk.steps_accepted
+
+
+@pytest.mark.parametrize("method", ["rkf78", "dp5"])
+def test_ledger_of_a_softened_walk_closes(method: str, early_walk) -> None:
+    """What softening frees is ½ (k − k') Σ C² at the two switches; with it the ledger closes as before."""
+    walk = early_walk if method == "rkf78" else short_walk(method=method, soften_pile=True, soften_area=0.6)
+    energy = walk.energy
+    at_release = energy["kinetic_at_release"] + energy["potential_at_release"]
+    assert abs(energy["residual"]) < 1e-5 * at_release
+    area = shoelace(walk.frame_joints)
+    switches = [walk.frame_time[np.flatnonzero(area / area[0] < fraction)[0]] for fraction in (0.6, 0.3)]
+    assert switches[0] == walk.softened_at < switches[1]
+    (to_soft,), (to_softest,) = (walk.spring_energy[walk.time == moment] for moment in switches)
+    assert energy["softening"] == pytest.approx(0.99 * to_soft + 0.9 * to_softest, rel=1e-12)
+
+
+def test_ledger_closes_when_much_is_freed() -> None:
+    """Springs pulled by a ring that turns fast give most of their energy when it counts as collapsed at once."""
+    setup = setup_walk(
+        "paper", {"links": 20, "frequency": 20.0, "start": "ellipse", "method": "reference", "soften_pile": True}, None
+    )
+    setup = dataclasses.replace(setup, parameters=setup.parameters.with_values({"joint_stiffness": 1e8}))
+    setup = dataclasses.replace(setup, scene=setup.scene.model_copy(update={"walk_limit": 4e-3}))
+    batch = Batch(1, 20, setup.options)
+    batch.control.soften_area = 2.0
+    course = Course(batch, 0, setup)
+    batch.run([0], course.features)
+    course.next_phase()
+    energy = course.energy()
+    assert course.softened_at == pytest.approx(1e-3, abs=2e-5)
+    assert energy["softening"] > 1e-5 * energy["kinetic_at_release"]
+    assert abs(energy["residual"]) < 1e-2 * energy["softening"]
+
+
+def test_soft_joints_are_left_alone() -> None:
+    """A walk with the softest joints has nothing to soften: it is the same to the bit and says that it did not."""
+    joints = {name: getattr(SOFTEST, name) for name in ("joint_stiffness", "joint_damping", "friction_smoothing")}
+    walks = [short_walk(preset="soft", soften_pile=on, **joints) for on in (False, True)]
+    for name in SERIES:
+        assert_array_equal(getattr(walks[0], name), getattr(walks[1], name), err_msg=name)
+    assert walks[0].energy == walks[1].energy
+    assert np.isnan(walks[1].softened_at)
+
+
+# --- the sprocket ---
+
+
+SPINNING = {"links": 30, "frequency": 15.0, "start": "spinning", "steady_time": 0.4, "method": "reference"}
+
+
+def test_joints_are_soft_on_the_sprocket_and_stiff_soon_after_the_release() -> None:
+    """Spring energy is n T²/2k' at the release, T = m̄ v²/ℓ, k' such as stretches by 3e-4; as on stiff joints soon."""
+    stiff, soft = (
+        warpchain.walk(**SPINNING, preset="paper", clearance=0.02, walk_limit=0.06, soften_drive=on)
+        for on in (False, True)
+    )
+    speed = 2 * np.pi * 15.0 * (PAPER.sprocket_radius + PAPER.circle_radius)
+    tension = (PAPER.inner_mass + PAPER.outer_mass) / 2 * speed**2 / PAPER.link_length
+    for walk, stiffness in ((stiff, PAPER.joint_stiffness), (soft, tension / (3e-4 * PAPER.link_length))):
+        level = 30 * tension**2 / (2 * stiffness)
+        assert walk.spring_energy[0] == pytest.approx(level, rel=0.5)
+    assert stiff.lowest.min() > 0
+    levels = [np.median(walk.spring_energy[walk.time > STIFFENING_TIME + 2e-3]) for walk in (stiff, soft)]
+    assert levels[1] == pytest.approx(levels[0], rel=0.1)
+
+
+def test_a_soft_drive_takes_fewer_steps_and_as_long() -> None:
+    """The release comes when it would have come, to a few looks 1 ms apart, after a drive of far fewer steps."""
+    stiff, soft = (warpchain.walk(**SPINNING, preset="paper", walk_limit=1e-3, soften_drive=on) for on in (False, True))
+    assert soft.steps_accepted < 0.3 * stiff.steps_accepted
+    assert soft.simulated_time == pytest.approx(stiff.simulated_time, abs=3e-3)
+
+
+@pytest.mark.parametrize(("frequency", "held"), [(9.0, 1e6), (15.0, 2.25e6), (35.0, 1e7)])
+def test_joints_are_softest_until_the_sprocket_has_spun_up(frequency: float, held: float) -> None:
+    """In the spin-up spring energy is n T²/2k of the softest joints, T = m̄ v²/ℓ; in the hold they stretch by 3e-4.
+
+    There k is as great as that needs, within bounds: 2.25e6 N/m at 15 Hz. Loads are their own.
+    """
+    settings = {"links": 30, "frequency": frequency, "method": "standard", "settle_time": 0.1, "spin_up_time": 0.3}
+    settings |= {"load_factor": 1.0}
+    setup = setup_walk("paper", settings, None)
+    batch = Batch(1, 30, setup.options)
+    course = Course(batch, 0, setup)
+    levels = []
+    for moment in (0.09, 0.4 - 1.1 * STIFFENING_TIME, 0.45):
+        batch.resume(0, moment, Status.FINISHED)
+        batch.run([0], course.features)
+        look = batch.last_look(0)
+        levels.append((batch.state.softness.numpy()[0], look[layout.SPRING], look[layout.LOOP_SPEED]))
+    assert_allclose([softness for softness, _, _ in levels], [2.0, 2.0, 1 + np.log10(1e7 / held)], atol=5e-3)
+    mass = (PAPER.inner_mass + PAPER.outer_mass) / 2
+    for (_, spring, speed), stiffness in zip(levels[1:], (SOFTEST.joint_stiffness, held), strict=True):
+        tension = mass * speed**2 / PAPER.link_length
+        assert spring == pytest.approx(30 * tension**2 / (2 * stiffness), rel=0.8)  # the loop swings, and has weight
+
+
+@pytest.mark.parametrize("load_factor", [5.0, 40.0])
+def test_joints_under_load_are_as_soft_as_it_allows(load_factor: float) -> None:
+    """Under load k is such that speed and mean weight stretch joints by 1e-3; in between softness follows log λ."""
+    frequency, links = 15.0, 60
+    settings = {"links": links, "frequency": frequency, "start": "spinning", "load_factor": load_factor}
+    setup = setup_walk("soft", settings | {"method": "explicit"}, None)
+    batch = Batch(1, links, setup.options)
+    course = Course(batch, 0, setup)
+    radius = PAPER.sprocket_radius + PAPER.circle_radius
+    density = (PAPER.inner_mass + PAPER.outer_mass) / 2 / PAPER.link_length
+    tension = density * (2 * np.pi * frequency * radius) ** 2
+    side = links * PAPER.link_length / 2 - np.pi * radius
+    weight = load_factor * density * PAPER.gravity * side / 2  # in the middle of a side
+
+    def softness_of(wanted: float) -> float:
+        return 1 + np.log10(1e7 / np.clip(wanted / PAPER.link_length, 1e6, 1e7))
+
+    free, loaded = softness_of(tension / 3e-4), softness_of((tension + weight) / 1e-3)
+    assert free != loaded
+    seen = set()
+    while course.phase != Phase.WALK:
+        batch.launch([0], course.features, 500)
+        load, softness = batch.state.load_factor.numpy()[0], batch.state.softness.numpy()[0]
+        expected = free + (loaded - free) * np.log(load) / np.log(load_factor)
+        if batch.time(0) > 1.5e-3:
+            assert softness == pytest.approx(expected, abs=1e-9)
+            seen.add(load)
+        if batch.status(0) != Status.RUNNING:
+            assert course.next_phase()
+            break
+    assert {1.0, load_factor} < seen
+
+
+def test_a_drive_on_softer_joints_ends_as_one_on_stiff_joints() -> None:
+    """Released after a drive on softer joints, a loop has the same shape and speed as after one on its own joints."""
+    settings = {"links": 36, "frequency": 15.0, "method": "dp5", "tolerance": 1e-4, "settle_time": 0.2}
+    settings |= {"spin_up_time": 0.5, "steady_time": 0.2, "walk_limit": 1e-3, "frame_interval": 1e-3}
+    stiff, soft = (warpchain.walk(**settings, preset="paper", soften_drive=on) for on in (False, True))
+    assert soft.steps_accepted < 0.15 * stiff.steps_accepted
+    assert soft.simulated_time == pytest.approx(stiff.simulated_time, abs=0.01)
+    assert soft.kinetic_energy[0] == pytest.approx(stiff.kinetic_energy[0], rel=5e-3)
+    for axis in (0, 1):
+        extents = [np.ptp(walk.frame_joints[0, :, axis]) for walk in (stiff, soft)]
+        assert extents[1] == pytest.approx(extents[0], rel=0.01)
+    assert soft.greatest_penetration["sprocket"] < 1e-3
+
+
+def energy_before_release(**settings: float) -> tuple[float, int]:
+    """Mean kinetic energy [J] while the last two links come up to the sprocket, and steps tried before the release."""
+    setup = setup_walk(
+        "soft", {"links": 120, "frequency": 5.0, "start": "spinning", "method": "explicit"} | settings, None
+    )
+    batch = Batch(1, 120, setup.options, keeps_samples=True)
+    course = Course(batch, 0, setup)
+    samples: list[np.ndarray] = []
+    while course.phase != Phase.WALK:
+        batch.run([0], course.features, lambda: samples.append(batch.drain_samples(0)))
+        assert course.next_phase()
+    drive = np.concatenate(samples)
+    passage = 2 * PAPER.link_length / drive[-1, layout.LOOP_SPEED]
+    last = drive[:, layout.TIME] > drive[-1, layout.TIME] - passage
+    return float(drive[last, layout.KINETIC].mean()), course.drive_counts["accepted"]
+
+
+def test_a_long_slow_loop_has_the_energy_that_shorter_steps_give_it() -> None:
+    """At 5 Hz 120 links leave the sprocket as from steps that are short throughout, in half as many.
+
+    Joints that sink into the sprocket slow the loop down: with long steps to the end it had 0.2 % less energy.
+    """
+    energy, steps = energy_before_release()
+    short_energy, short_steps = energy_before_release(soft_contact_step=2e-5)
+    assert energy == pytest.approx(short_energy, rel=7e-4)
+    assert steps < 0.6 * short_steps
+
+
+def test_a_soft_drive_alone_never_softens_the_pile() -> None:
+    """Without soften_pile the joints keep their own values to the end, however small the loop's area gets."""
+    walk = short_walk(start="spinning", links=36, frequency=5.0, soften_drive=True, frame_interval=None)
+    assert walk.status == Status.AT_REST
+    assert np.isnan(walk.softened_at)
+    assert abs(walk.energy["residual"]) < 1e-4 * walk.energy["kinetic_at_release"]
+    assert walk.energy["softening"] < 0
+
+
+def test_a_whole_walk_from_soft_joints() -> None:
+    """Softened on the sprocket and in the pile, a walk ends at rest where it should, and its ledger closes."""
+    walk = warpchain.walk(
+        method="reference", start="spinning", soften_drive=True, soften_pile=True, soften_area=0.7, frame_interval=None
+    )
+    assert walk.status == Status.AT_REST
+    assert 0.5 < walk.dx < 0.8
+    assert 0.3 < walk.softened_at < walk.walk_time
+    at_release = walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"]
+    assert abs(walk.energy["residual"]) < 1e-5 * at_release
+
+
+# --- launches ---
+
+
+def test_cuts_into_launches_do_not_change_a_softened_walk(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A walk softened on the sprocket and in the pile is the same to the bit in launches of 20000 and of 777 tries."""
+    setup = setup_walk(
+        "paper", SPINNING | {"method": "dp5", "soften_drive": True, "soften_pile": True, "soften_area": 0.3}, None
+    )
+    seen = []
+    for tries in (20_000, 777):
+        monkeypatch.setitem(scheduler.TRIES, "cpu", tries)
+        ((_, course),) = scheduler.run_setups([setup])
+        times = course.drive_time, course.walk_time, course.softened_at, course.drift
+        seen.append((course.dx, times, course.counts, course.energy()))
+    assert seen[0] == seen[1]
+    assert seen[0][1][2] > 0
+
+
+# --- refusals ---
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"soften_area": 0.0}, r"options\.soften_area: 0.0 is not greater than 0; .*"),
+        ({"soften_area": 1.0}, r"options\.soften_area: 1.0 is not less than 1; .*"),
+        ({"soften_area": float("nan")}, r"options\.soften_area: nan is not finite; .*"),
+        ({"soft_tolerance": 0.0}, r"options\.soft_tolerance: 0.0 is less than 1e-13; .*"),
+        ({"soft_contact_step": 0.0}, r"options\.soft_contact_step: 0.0 is not greater than 0 s; .*"),
+        ({"soften_pile": 1}, r"options\.soften_pile: 1 is not a truth value; .*"),
+        ({"soften_drive": "yes"}, r"options\.soften_drive: 'yes' is not a truth value; .*"),
+        (
+            {"soften_drive": True, "record_interval": 5e-3},
+            r"options\.soften_drive: joints stiffen at each record_interval, and 0\.005 s .* at most 0\.002 s, or .*",
+        ),
+    ],
+)
+def test_bad_values_are_refused(settings: dict, message: str) -> None:
+    """Options of softening that cannot be are refused in one line."""
+    with pytest.raises(InputError, match=f"^{message}$"):
+        setup_walk("paper", settings, None)
+
+
+@pytest.mark.parametrize("name", ["soften_pile", "soften_drive"])
+def test_simulate_does_not_soften(name: str) -> None:
+    """A given chain has neither release nor pile: asked to soften, `simulate` refuses."""
+    position, velocity = lay_chain(ellipse(1.0), 8, PAPER.link_length, 1.0)
+    with pytest.raises(InputError, match=rf"^options\.{name}: only a walk"):
+        warpchain.simulate("paper", position, velocity, 0.1, **{name: True})

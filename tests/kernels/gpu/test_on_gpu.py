@@ -1,0 +1,253 @@
+"""What can only be seen on a GPU; skipped where there is none, for what is shared with the CPU is tested there.
+
+Nothing here needs a Warp that can compile for the CPU, except the tests that compare with it.
+"""
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import warp as wp
+import yaml
+
+from tests.kernels.methods.test_flight import FLIGHTS, exact_flight, greatest
+from tests.run.test_sweep_run import brief_setup, data_of, outcomes
+from tests.support.blocks_under_test import FIXED_STEP, SOFT, heap
+from tests.support.bouncing_chains import PAPER, bouncing, falling, loop
+from tests.support.rigid_joints import exact_rigid_flight
+from warpchain import simulate, sweep, walk
+from warpchain.engine.batch import Batch
+from warpchain.inputs.options import Options
+from warpchain.status import Status
+from warpchain.walks import scheduler
+
+LINKS, STEPS = 60, 300
+
+
+def fixed_steps(device: str, method: str, fixed_body: str) -> dict[str, np.ndarray]:
+    """State and counters of two heaps in which everything touches everything, after steps of equal length."""
+    batch = Batch(2, LINKS, Options(method=method, tolerance=0.1, device=device))
+    batch.control.skin = 1e-9  # so that no step may be longer than …
+    batch.control.contact_step = FIXED_STEP
+    for world in range(2):
+        position, velocity = heap(LINKS, 3 + world, tilt=0.3 + world)
+        if fixed_body == "sprocket":
+            position[:, 1] += 0.9 * SOFT.sprocket_radius
+        batch.set_chain(world, SOFT, LINKS)
+        batch.load(world, position, velocity, stop_time=STEPS * FIXED_STEP, stop_status=Status.FINISHED)
+        batch.set_program(world, sprocket_speed=-50.0)
+        batch._edit(batch.state.step)[world] = FIXED_STEP
+    batch.run(range(2), batch.features(fixed_body=fixed_body, watch="none"))
+    worlds = range(2)
+    return {
+        "position": np.array([batch.position(world) for world in worlds]),
+        "velocity": np.array([batch.velocity(world) for world in worlds]),
+        "counts": np.array([list(batch.counts(world).values()) for world in worlds]),
+    }
+
+
+def compare(ours: dict[str, np.ndarray], theirs: dict[str, np.ndarray]) -> float:
+    """Greatest difference of positions and velocities, of the greatest value of each."""
+    assert (theirs["counts"][:, 0] == STEPS).all()
+    assert (theirs["counts"][:, 4] > 100).all(), "self-impulses"
+    assert (theirs["counts"][:, 2] + theirs["counts"][:, 3] > 50).all(), "impulses with floor or sprocket"
+    assert np.array_equal(ours["counts"], theirs["counts"])
+    names = ("position", "velocity")
+    return max(np.abs(ours[name] - theirs[name]).max() / np.abs(theirs[name]).max() for name in names)
+
+
+CASES = [("rkf78", "floor"), ("dp5", "sprocket"), ("bs32", "floor"), ("os32", "floor"), ("dp5", "floor")]
+
+
+@pytest.fixture(autouse=True)
+def gpu() -> None:
+    """Skips where there is none."""
+    if not wp.is_cuda_available():
+        pytest.skip("no GPU")
+
+
+@pytest.fixture
+def cpu() -> None:
+    """Skips where Warp came without its CPU compiler, as on machines that have GPUs only."""
+    if not wp.is_cpu_available():
+        pytest.skip("this Warp cannot compile for the CPU, which is compared with")
+
+
+@pytest.mark.usefixtures("cpu")
+@pytest.mark.parametrize(("method", "fixed_body"), CASES)
+def test_fixed_steps_agree_with_the_cpu(method: str, fixed_body: str) -> None:
+    """Three hundred steps with hundreds of impulses end in the same state, to 1e-9."""
+    assert compare(fixed_steps("cuda", method, fixed_body), fixed_steps("cpu", method, fixed_body)) < 1e-9
+
+
+@pytest.mark.parametrize("method", ["dp5", "os32", "hybrid"])
+def test_a_walk_gives_the_same_bits_in_any_batch(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Alone, among others of other lengths, in few or many slots and launches, after whatever ran before."""
+    settings = {"device": "cuda", "method": method}
+    setups = [brief_setup(seed, links=links, **settings) for seed in range(3) for links in (30, 60, 90)]
+    together = outcomes(setups)
+    assert [outcomes([setup])[0] for setup in setups] == together
+    assert outcomes(setups[::-1], slots=2)[::-1] == together
+    monkeypatch.setattr("warpchain.engine.batch.LAUNCH_SECONDS", 0.0)
+    assert outcomes(setups * 3) == together * 3
+
+
+@pytest.mark.parametrize("method", ["explicit", "os32", "rkf78", "dp5", "bs32"])
+def test_a_walk_gives_the_same_bits_in_any_block(method: str) -> None:
+    """In the block of its own size, or in one that it shares with the longest chain, see `shared_threads`."""
+    setups = [brief_setup(links, links=links, device="cuda", method=method) for links in (30, 60, 90, 120, 150, 180)]
+    assert outcomes(setups, threads=192) == outcomes(setups)
+
+
+@pytest.mark.usefixtures("cpu")
+def test_flights_and_landings_agree_with_the_cpu() -> None:
+    """Chains that fly on rigid joints, land, bounce on their springs and fly again, to 1e-6."""
+    batches = []
+    for device in ("cuda", "cpu"):
+        batch, features = bouncing([falling(12, PAPER, 0.3), falling(60, PAPER, 0.6)], device=device)
+        batch.launch(range(2), features, 240)
+        batches.append(batch)
+    ours, theirs = batches
+    for world in range(2):
+        assert theirs.losses(world)["hand_over"] != 0.0
+        assert ours.counts(world) == theirs.counts(world)
+        assert np.abs(ours.position(world) - theirs.position(world)).max() < 1e-6
+        assert np.abs(ours.velocity(world) - theirs.velocity(world)).max() < 1e-6 * np.abs(theirs.velocity(world)).max()
+        for name, loss in theirs.losses(world).items():
+            assert ours.losses(world)[name] == pytest.approx(loss, rel=1e-5, abs=1e-12)
+
+
+def test_memory_that_holds_few_chains_only_takes_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where memory is short, walks wait for one another."""
+    setups = [brief_setup(seed, device="cuda") for seed in range(5)]
+    together = outcomes(setups)
+    monkeypatch.setattr(scheduler, "most_worlds", lambda *_, **__: 2)
+    assert outcomes(setups) == together
+
+
+ON_GPU = {"device": "cuda"}
+BRIEF_AND_LONG = {
+    "version": 1,
+    "name": "brief and long",
+    "seed": 1,
+    "preset": "soft",
+    "samples": 20,
+    "scene": {"links": 30, "frequency": 12.0, "start": "ellipse"},
+    "options": {"method": "dp5", "rest_time": 100.0},
+    "grid": {"walk_limit": [0.02, 1.0]},
+    "record": {"series": {"samples": [0]}},
+}
+"""Half of the walks are over at once; the others take a second or so."""
+
+
+def interrupted_sweep(source: Path, folder: Path, shards: int) -> int:
+    """Run a sweep in a process of its own, press Ctrl-C when so many shards are there; its exit status."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "warpchain", "sweep", str(source), "-o", str(folder), "--workers", "2"],
+        stdout=subprocess.DEVNULL,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    try:
+        until = time.monotonic() + 120
+        while len(list((folder / "shards").glob("[0-9]*.h5"))) < shards:
+            assert process.poll() is None, "it ended by itself"
+            assert time.monotonic() < until, "no shards"
+            time.sleep(0.005)
+        process.send_signal(signal.SIGINT)
+        return process.wait(60)
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_a_sweep_ended_by_ctrl_c_goes_on(tmp_path: Path) -> None:
+    """It leaves whole shards and exit status 130, and ends with the same bytes; its series are those of a walk."""
+    content = BRIEF_AND_LONG | {"options": BRIEF_AND_LONG["options"] | ON_GPU}
+    source = tmp_path / "sweep.yaml"
+    source.write_text(yaml.safe_dump(content, sort_keys=False))
+    whole = sweep(source, tmp_path / "whole")
+    assert whole.summary() == {"time_limit": 40, "at_rest": 0, "missing": 0}
+    expected = data_of(tmp_path / "whole")
+    assert interrupted_sweep(source, tmp_path / "cut", shards=2) == 130
+    kept = data_of(tmp_path / "cut")
+    assert 2 <= len(kept) < len(expected)
+    assert kept.items() <= expected.items()
+    sweep(source, tmp_path / "cut")
+    assert data_of(tmp_path / "cut") == expected
+
+    series = whole.series(walk_limit=0.02, sample=0)
+    values = BRIEF_AND_LONG["scene"] | BRIEF_AND_LONG["options"] | ON_GPU
+    alone = walk(preset="soft", seed=1, walk_limit=0.02, **values)
+    assert len(series.time) == 21
+    assert np.array_equal(series.time, alone.time)
+    assert np.array_equal(series.center, alone.center)
+
+
+@pytest.mark.parametrize(
+    ("method", "within"), [("rkf78", 1e-8), ("dp5", 1e-8), ("bs32", 1e-7), ("os32", 1e-7), ("rodas4p", 1e-8)]
+)
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_flights_agree_with_scipy(name: str, method: str, within: float) -> None:
+    """At tolerance 1e-9 a flight with friction and damping agrees with DOP853 to 1e-8, rates of order 3 to 1e-7."""
+    start, (position, velocity) = exact_flight(name)
+    settings = {"method": method, "tolerance": 1e-9, "device": "cuda"}
+    flight = simulate(name, *start, FLIGHTS[name], times=[FLIGHTS[name]], **settings)
+    assert flight.status == Status.FINISHED
+    assert greatest(flight.position[-1], position) < 1e-8
+    assert greatest(flight.velocity[-1], velocity) < within
+    assert flight.losses["joint_friction"] > 1e-4
+
+
+def test_rigid_flights_agree_with_scipy() -> None:
+    """At a tight tolerance a flight on rigid joints agrees with DOP853 on the dense equations of such joints."""
+    start, duration = loop(12), 4e-3
+    position, velocity = exact_rigid_flight(*start, PAPER, duration)
+    settings = {"method": "hybrid", "flight_tolerance": 1e-7, "device": "cuda"}
+    flight = simulate("paper", *start, duration, times=[duration], **settings)
+    assert flight.losses["joint_damping"] == 0.0
+    assert np.abs(flight.position[-1] - position)[:, :2].max() < 1e-9
+    assert np.abs(flight.velocity[-1] - velocity)[:, :2].max() < 1e-6
+
+
+@pytest.mark.usefixtures("cpu")
+def test_simulations_agree_with_the_cpu() -> None:
+    """The same call with another device: the same statuses, samples at the same times, and nearly the same motion."""
+    position, velocity = heap(12, 3)
+    position[:, 1] += 0.1
+    motions = [simulate("soft", position, velocity, duration=0.01, device=device) for device in ("cuda", "cpu")]
+    assert motions[0].status == motions[1].status
+    assert np.array_equal(motions[0].time, motions[1].time)
+    assert np.allclose(motions[0].position[:4], motions[1].position[:4], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["explicit", "hybrid"])
+def test_a_walk_comes_to_rest_and_its_ledger_closes(method: str) -> None:
+    """Spun up, released, walked and at rest: the distance is that of such chains, no energy is unaccounted for."""
+    found = walk(preset="soft", links=60, frequency=15.0, start="spinning", method=method, device="cuda")
+    assert found.status == Status.AT_REST
+    assert 0.5 < found.dx < 0.85
+    energy = found.energy
+    at_release = energy["kinetic_at_release"] + energy["potential_at_release"]
+    assert abs(energy["residual"]) < 5e-4 * at_release
+    assert found.impulses["floor"] > 1000
+
+
+def test_the_last_moments_on_the_sprocket_are_kept() -> None:
+    """Frames before the release carry the joints' forces: the mean tension is ρ v² and the weight's share, to 3 %."""
+    links = 40
+    found = walk(links=links, preset="soft", start="spinning", walk_limit=0.02, record_before=0.2, device="cuda")
+    before = found.before_release
+    assert before is not None and len(before.frame_time) == pytest.approx(100, abs=2)
+    steps = before.frame_joints - np.roll(before.frame_joints, 1, axis=1)
+    length = np.hypot(steps[..., 0], steps[..., 1])
+    np.testing.assert_allclose(length, SOFT.link_length, rtol=2e-3)
+    tension = float(np.mean(np.sum(before.frame_forces * steps, axis=2) / length))
+    density = (SOFT.inner_mass + SOFT.outer_mass) / 2 / SOFT.link_length
+    speed = 2 * np.pi * 15.0 * (SOFT.sprocket_radius + SOFT.circle_radius)
+    hanging = density * SOFT.gravity * links / 2 * SOFT.link_length / 4
+    assert tension == pytest.approx(density * speed**2 + hanging, rel=0.03)
+    assert np.abs(before.frame_moments).max() > SOFT.coulomb_friction

@@ -1,0 +1,282 @@
+"""The block form equals the CPU form.
+
+It runs on CPU fibers here. Both forms are compiled without fusing products and sums, which compilers do here and there;
+what remains are the same operations on the same numbers, so that steps of the same size must agree to the bit, contacts
+that were resolved in parallel rounds included.
+"""
+
+import itertools
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import warp as wp
+
+from tests.support.blocks_under_test import (
+    FIXED_STEP,
+    SOFT,
+    batch_of,
+    features_of,
+    heap,
+    launch_blocks,
+    launch_chains,
+    listed_pairs,
+)
+from warpchain.engine.batch import Batch
+from warpchain.engine.kernel_choice import block_kernel
+from warpchain.inputs.start_shapes import ellipse, lay_chain
+from warpchain.kernels import layout
+from warpchain.kernels.cpu import loop as cpu_loop
+from warpchain.kernels.cpu.loop import Features, make_advance
+from warpchain.kernels.gpu import functions
+from warpchain.kernels.gpu import loop as gpu_loop
+from warpchain.kernels.gpu.loop import make_advance_block
+from warpchain.status import Status
+
+LINKS = 12
+SINGLE = 1e-6
+"""Relative; what the block form compares in single precision."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def exact_kernels() -> Iterator[None]:
+    """Kernels without fused operations."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (cpu_loop, gpu_loop):
+            patch.setattr(module, "COMPILER_FLAGS", "-ffp-contract=off")
+        for factory in (make_advance, make_advance_block):
+            factory.cache_clear()
+        yield
+    for factory in (make_advance, make_advance_block):
+        factory.cache_clear()
+
+
+def assert_same(ours: Batch, theirs: Batch) -> None:
+    """State, clock, counters and statuses agree to the bit, sums of losses to rounding, extremes as compared."""
+    for name in ("links", "time", "counts", "status"):
+        assert np.array_equal(getattr(ours.state, name).numpy(), getattr(theirs.state, name).numpy()), name
+    losses = theirs.state.losses.numpy()
+    assert np.allclose(ours.state.losses.numpy(), losses, rtol=1e-12, atol=0)
+    assert np.allclose(ours.state.extremes.numpy(), theirs.state.extremes.numpy(), rtol=SINGLE, atol=0)
+
+
+@pytest.mark.parametrize(
+    ("method", "fixed_body", "self_contact", "block_dim"),
+    [
+        ("rkf78", "floor", True, LINKS),
+        ("dp5", "sprocket", True, 5 * LINKS),
+        ("bs32", "floor", False, LINKS),
+        ("os32", "sprocket", True, LINKS),
+    ],
+)
+def test_fixed_steps_equal_the_cpu_form(method: str, fixed_body: str, self_contact: bool, block_dim: int) -> None:
+    """Forty steps with dozens of impulses of every kind end in the same state, to the bit.
+
+    Threads are too few for a contact each, or enough for both halves of the sequence at once.
+    """
+    raised = 0.9 * SOFT.sprocket_radius if fixed_body == "sprocket" else 0.0
+    chains = [heap(LINKS, 3, raised=raised), heap(LINKS, 18, tilt=np.pi, raised=raised)]
+    ours, theirs = (batch_of(chains, method=method, self_contact=self_contact) for _ in range(2))
+    features = features_of(ours, fixed_body=fixed_body)
+    launch_blocks(ours, features, 40, block_dim=block_dim)
+    launch_chains(theirs, features, 40)
+    for counts in map(theirs.counts, range(2)):
+        assert counts["accepted"] == 40
+        assert counts[fixed_body] > 10
+        assert (counts["self"] > 10) == self_contact
+    assert_same(ours, theirs)
+
+
+@pytest.mark.parametrize("block_dim", [LINKS, 224])
+def test_chains_too_long_for_shared_memory_equal_the_cpu_form(block_dim: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Long chains keep their board in the scratch block, with the same result, even with more threads than columns."""
+    monkeypatch.setattr(functions, "LARGEST_SHARED_BLOCK", LINKS - 1)
+    make_advance_block.cache_clear()
+    ours, theirs = (batch_of([heap(LINKS)], method="bs32") for _ in range(2))
+    features = features_of(ours, fixed_body="floor")
+    launch_blocks(ours, features, 20, block_dim=block_dim)
+    make_advance_block.cache_clear()
+    launch_chains(theirs, features, 20)
+    assert theirs.counts(0)["self"] > 10
+    assert theirs.counts(0)["list_builds"] > 10
+    assert_same(ours, theirs)
+
+
+def test_free_flight_equals_the_cpu_form() -> None:
+    """Adaptive steps of a chain that touches nothing: the same number of tries, the same flight to the tolerance."""
+    position, velocity = lay_chain(ellipse(1.5), LINKS, SOFT.link_length, 2.0, 0.1)
+    velocity[:, 2] += np.random.default_rng(1).normal(size=LINKS)
+    ours, theirs = (
+        batch_of([(position, velocity)], method="rkf78", self_contact=False, fixed_step=False) for _ in range(2)
+    )
+    features = features_of(ours, fixed_body="none")
+    launch_blocks(ours, features, 60, block_dim=LINKS)
+    launch_chains(theirs, features, 60)
+    assert ours.counts(0) == theirs.counts(0)
+    assert theirs.counts(0)["rejected"] > 0
+    assert ours.time(0) == pytest.approx(theirs.time(0), rel=1e-5)
+    assert np.allclose(ours.position(0), theirs.position(0), rtol=0, atol=1e-4)
+
+
+def bounded_heaps(count: int) -> Batch:
+    """Heaps on the floor, sampled often, their steps bounded by contacts; the first is not like the others."""
+    chains = [heap(LINKS, 5)] + [heap(LINKS, 6)] * (count - 1)
+    batch = batch_of(chains, method="dp5", fixed_step=False, keeps=True, stop_time=40 * FIXED_STEP)
+    batch.control.contact_step = FIXED_STEP
+    batch.control.sample_interval = 5 * FIXED_STEP
+    batch.state.step.numpy()[:] = FIXED_STEP
+    return batch
+
+
+def test_cuts_and_neighbours_do_not_change_a_bit() -> None:
+    """A chain gives the same bits however its run is cut into launches, in whatever batch, among whatever threads."""
+    runs = []
+    for worlds, tries, block_dim, seconds, expected in (
+        (2, 60, LINKS, 1e9, 1),
+        (2, 7, LINKS, 1e9, 6),
+        (3, 60, LINKS, 1e9, 1),
+        (2, 60, LINKS + 3, 1e9, 1),
+        (2, 60, LINKS, 0.0, 10),
+    ):
+        batch = bounded_heaps(worlds)
+        batch.control.launch_time = seconds
+        features = features_of(batch, fixed_body="floor", watch="rest")
+        launches = 0
+        while batch.status(1) == Status.RUNNING:
+            launch_blocks(batch, features, tries, block_dim=block_dim)
+            launches += 1
+        assert launches == expected
+        runs.append(batch)
+    assert runs[0].counts(1)["self"] > 10
+    for run in runs[1:]:
+        for name in ("links", "time", "step", "last_error", "counts", "losses", "extremes", "last_look", "watch"):
+            assert np.array_equal(getattr(run.state, name).numpy()[1], getattr(runs[0].state, name).numpy()[1]), name
+        assert np.array_equal(run.drain_samples(1), runs[0].record.samples.numpy()[1, : run_length(runs[0])])
+
+
+def run_length(batch: Batch) -> int:
+    """Samples kept of world 1."""
+    return int(batch.record.sample_count.numpy()[1])
+
+
+def test_samples_frames_and_rest_equal_the_cpu_form() -> None:
+    """Time series, frames, loads, first and last look are those of the CPU form; rest is seen at the same sample."""
+    ours, theirs = bounded_heaps(2), bounded_heaps(2)
+    for batch in (ours, theirs):
+        batch.control.rest_speed, batch.control.rest_time = 100.0, 20 * FIXED_STEP
+    features = features_of(ours, fixed_body="floor", watch="rest")
+    launch_blocks(ours, features, 100, block_dim=LINKS)
+    launch_chains(theirs, features, 100)
+    assert theirs.status(0) == Status.AT_REST
+    assert_same(ours, theirs)
+    for name in ("first_look", "last_look"):
+        expected = getattr(theirs.state, name).numpy()
+        assert np.array_equal(getattr(ours.state, name).numpy(), expected)
+    assert np.array_equal(ours.drain_samples(1), theirs.drain_samples(1))
+    our_loads, their_loads = ours.frame_loads(1), theirs.frame_loads(1)
+    our_times, our_frames = ours.drain_frames(1)
+    their_times, their_frames = theirs.drain_frames(1)
+    assert len(our_times) > 1
+    assert np.array_equal(our_times, their_times)
+    assert np.array_equal(our_frames, their_frames)
+    assert our_loads.shape == (len(our_times), LINKS, 3) and np.array_equal(our_loads, their_loads)
+
+
+@pytest.mark.parametrize("broad_phase", ["grid", "all_pairs"])
+def test_neighbour_list_holds_the_same_pairs(broad_phase: str) -> None:
+    """The list built in parallel holds the pairs of the list built by one thread."""
+    ours, theirs = (batch_of([heap(LINKS, 8)], method="dp5", fixed_step=False) for _ in range(2))
+    launch_blocks(
+        ours, features_of(ours, fixed_body="floor", watch="rest", broad_phase=broad_phase), 1, block_dim=LINKS
+    )
+    launch_chains(theirs, features_of(theirs, fixed_body="floor", watch="rest"), 1)
+    assert len(listed_pairs(theirs)) > 10
+    assert listed_pairs(ours) == listed_pairs(theirs)
+
+
+def test_failures_stop_one_chain_and_leave_the_others() -> None:
+    """A chain with a NaN ends as not finite, one that may not shrink its step as too small; the others go on."""
+    good = heap(LINKS, 5)
+    broken = good[0], good[1].copy()
+    broken[1][4, 2] = np.nan
+    batch = batch_of([good, broken, good], method="dp5", fixed_step=False)
+    batch.control.contact_step = FIXED_STEP
+    alone = batch_of([good], method="dp5", fixed_step=False)
+    alone.control.contact_step = FIXED_STEP
+    features = features_of(batch, fixed_body="floor", watch="rest")
+    for each in (batch, alone):
+        launch_blocks(each, features, 10, block_dim=LINKS)
+    assert [batch.status(world) for world in range(3)] == [Status.RUNNING, Status.NOT_FINITE, Status.RUNNING]
+    for world in (0, 2):
+        assert np.array_equal(batch.velocity(world), alone.velocity(0))
+
+    limited = batch_of([good], method="dp5", fixed_step=False)
+    limited.control.step_limit = 4
+    launch_blocks(limited, features, 10, block_dim=LINKS)
+    assert limited.status(0) == Status.STEP_LIMIT
+    assert limited.tries(0) == 4
+
+    stiff = batch_of([good], method="dp5", fixed_step=False, tolerance=1e-13)
+    stiff.control.smallest_step = 1e-8
+    launch_blocks(stiff, features, 50, block_dim=LINKS)
+    assert stiff.status(0) == Status.STEP_TOO_SMALL
+
+
+ALL_METHODS = ("rkf78", "dp5", "bs32")
+ALL_BODIES = (("none", "none"), ("floor", "none"), ("floor", "rest"), ("sprocket", "steady"))
+"""Fixed bodies and watches that the package asks for."""
+
+
+SHARED_MEMORY = 163 * 1024
+"""Bytes that a block can have on a GPU of the older generation."""
+
+
+def compiles_for_gpus(folder: Path, features: Features, block_dim: int) -> None:
+    """Compile a kernel to machine code of two GPU generations, which needs no GPU; the registers are the engine's."""
+    module = block_kernel(features, block_dim).module
+    module.options["block_dim"] = block_dim
+    wp.compile_aot_module(module, arch=[80, 90], module_dir=str(folder), use_ptx=False)
+    assert len(list(folder.glob("*.cubin"))) == 2
+    shared = [size for path in folder.glob("*.meta") for size in json.loads(path.read_text(encoding="utf-8")).values()]
+    assert 0 < max(shared) <= SHARED_MEMORY
+
+
+def test_a_kernel_compiles_for_gpus(tmp_path: Path) -> None:
+    """The walk's kernel compiles for sm_80 and sm_90."""
+    features = Features("dp5", layout.padded_width(60), "floor", True, "grid", "rest")
+    compiles_for_gpus(tmp_path, features, 64)
+
+
+OTHER_KERNELS = (
+    *itertools.product([*ALL_METHODS, "rodas4p", "rodas5p"], ALL_BODIES, [True]),
+    *itertools.product(["bs32"], ALL_BODIES, [False]),
+    ("rkf78", ("floor", "rest"), False),
+    ("dp5", ("sprocket", "steady"), False),
+    ("os32", ("none", "none"), False),
+)
+"""Every method with every body; without self-contacts every body once, and every tableau."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("method", "body_and_watch", "self_contact"),
+    [kernel for kernel in OTHER_KERNELS if kernel != ("dp5", ("floor", "rest"), True)],
+)
+def test_every_kernel_compiles_for_gpus(
+    tmp_path: Path, method: str, body_and_watch: tuple[str, str], self_contact: bool
+) -> None:
+    """Methods with all pairs of the other features compile for sm_80 and sm_90, in larger blocks."""
+    fixed_body, watch = body_and_watch
+    features = Features(method, layout.padded_width(60), fixed_body, self_contact, "grid", watch)
+    compiles_for_gpus(tmp_path, features, 192)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["rkf78", "os32"])
+@pytest.mark.parametrize(("fixed_body", "watch"), [("floor", "rest"), ("sprocket", "steady")])
+def test_kernels_that_soften_compile_for_gpus(tmp_path: Path, fixed_body: str, watch: str, method: str) -> None:
+    """So do those that change the softness of joints."""
+    features = Features(method, layout.padded_width(60), fixed_body, True, "grid", watch, softens=True)
+    compiles_for_gpus(tmp_path, features, 192)

@@ -1,0 +1,212 @@
+"""The block form softens, stiffens and loads a chain in the same steps, and to the same bits, as the CPU form does."""
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+import warp as wp
+from numpy.testing import assert_allclose, assert_array_equal
+
+from tests.support.blocks_under_test import FIXED_STEP, batch_of, heap, launch_blocks, launch_chains
+from warpchain.engine.batch import Batch
+from warpchain.engine.control import SOFT
+from warpchain.inputs.start_shapes import ellipse, lay_chain
+from warpchain.kernels import layout
+from warpchain.kernels.cpu import loop as cpu_loop
+from warpchain.kernels.cpu.loop import Features, make_advance
+from warpchain.kernels.events import steadiness
+from warpchain.kernels.events.record import sampling
+from warpchain.kernels.gpu import loop as gpu_loop
+from warpchain.kernels.gpu.loop import make_advance_block
+from warpchain.kernels.gpu.sample import block_look
+from warpchain.status import Status
+
+LINKS = 12
+
+
+@pytest.fixture
+def exact_kernels(monkeypatch: pytest.MonkeyPatch):
+    """Kernels without fused operations, in which the block form and the CPU form do the same operations."""
+    for module in (cpu_loop, gpu_loop):
+        monkeypatch.setattr(module, "COMPILER_FLAGS", "-ffp-contract=off")
+    for factory in (make_advance, make_advance_block):
+        factory.cache_clear()
+    yield
+    for factory in (make_advance, make_advance_block):
+        factory.cache_clear()
+
+
+def soften_much(batch: Batch) -> Batch:
+    """A batch of soft chains with soft and softest joints that are softer still, and steps to tell them apart by."""
+    control = batch.control
+    control.soft_stiffness, control.soft_damping, control.soft_smoothing = 1e6, 10.0, 1.0
+    control.softest_stiffness, control.softest_damping = 1e5, 3.0
+    control.soft_contact_step = 2 * FIXED_STEP
+    return batch
+
+
+def heaps(area: float) -> Batch:
+    """Heaps on the floor that soften below a fraction of their first area, in fixed steps, looked at often."""
+    batch = batch_of([heap(LINKS, 5, tilt=2.0), heap(LINKS, 10, tilt=2.0)], method="dp5", keeps=True)
+    batch.control.sample_interval = 5 * FIXED_STEP
+    batch.control.soften_area = area
+    return soften_much(batch)
+
+
+def released() -> Batch:
+    """A ring above the floor, just released with soft joints."""
+    batch = batch_of([lay_chain(ellipse(1.0), LINKS, SOFT.link_length, 2.0)], method="dp5", keeps=True)
+    batch.control.sample_interval = 4 * FIXED_STEP
+    batch.control.stiffening_time = 40 * FIXED_STEP
+    batch.control.soften_area = -np.inf
+    batch.set_program(0, hold_softness=1.25)
+    batch.state.softness.numpy()[0] = 1.25
+    return soften_much(batch)
+
+
+LOAD_FALLS = 20 * FIXED_STEP  # s in which loads fall
+UNLOADED = 90 * FIXED_STEP  # s when they begin to
+
+
+@pytest.fixture
+def quick_unloading(monkeypatch: pytest.MonkeyPatch, exact_kernels: None) -> Iterator[None]:
+    """Loads that fall in twenty steps, in kernels made anew."""
+    monkeypatch.setattr(steadiness, "LOADING_TIME", wp.constant(wp.float64(LOAD_FALLS)))
+    for cached in (sampling, block_look):
+        cached.cache_clear()
+    yield
+    for cached in (sampling, block_look):
+        cached.cache_clear()
+
+
+def driven() -> Batch:
+    """A heap on a sprocket that begins to turn after 12 steps; the hold begins after 70, under 15 times the loads.
+
+    These fall from step 90 to 110; it may be released at the end of the second window of 12 steps after that, and is
+    then held on.
+    """
+    raised = 0.9 * SOFT.sprocket_radius
+    batch = batch_of([heap(LINKS, 3, raised=raised)], method="dp5", keeps=True)
+    batch.control.sample_interval = 4 * FIXED_STEP
+    batch.control.stiffening_time = 30 * FIXED_STEP
+    times = {"spin_up_start": 12 * FIXED_STEP, "spin_up_time": 58 * FIXED_STEP, "hold_start": 70 * FIXED_STEP}
+    batch.set_program(0, **times, loop_speed=3.0, loop_period=12 * FIXED_STEP, load_factor=15.0, push_rate=1e4)
+    batch.set_program(0, steady_window=12 * FIXED_STEP, steady_time=-1.0, steady_tolerance=1.0, further_hold=1.0)
+    batch.set_program(0, hold_softness=1.25, loaded_softness=1.1)
+    batch.state.watch.numpy()[0, layout.UNLOADED_SINCE] = UNLOADED
+    batch.state.softness.numpy()[0] = 1.25
+    batch.state.stop_status.numpy()[0] = Status.NOT_STEADY
+    return soften_much(batch)
+
+
+def assert_same_bits(ours: Batch, theirs: Batch) -> None:
+    """States, moments and samples agree to the bit, losses to the order of their sums."""
+    for name in ("links", "time", "status", "softness", "load_factor", "first_area", "watch", "stop_time"):
+        assert_array_equal(getattr(ours.state, name).numpy(), getattr(theirs.state, name).numpy(), err_msg=name)
+    assert_allclose(ours.state.losses.numpy(), theirs.state.losses.numpy(), rtol=1e-12)
+    for world in range(len(ours.links)):
+        assert_array_equal(ours.drain_samples(world), theirs.drain_samples(world))
+
+
+def softening_features(batch: Batch, fixed_body: str, watch: str) -> Features:
+    """What the kernels are compiled for."""
+    return dataclasses.replace(batch.features(fixed_body=fixed_body, watch=watch), softens=True)
+
+
+def launch_both(ours: Batch, theirs: Batch, features: Features, cut: int, tries: int = 60) -> None:
+    """So many tries or a few more: in blocks, a part of them to a launch, and in the CPU form, all at once."""
+    launches = -(-tries // cut)
+    for _ in range(launches):
+        launch_blocks(ours, features, cut, block_dim=LINKS)
+    launch_chains(theirs, features, cut * launches)
+
+
+@pytest.mark.parametrize("cut", [60, 7])
+@pytest.mark.parametrize(("area", "softness"), [(0.9975, 1.0), (1.995, 2.0)])
+def test_blocks_soften_a_pile_as_the_cpu_form_does(area: float, softness: float, cut: int, exact_kernels: None) -> None:
+    """The block form softens at the same looks, frees the same energy, and goes on to the same bits, however cut."""
+    ours, theirs = heaps(area), heaps(area)
+    features = softening_features(ours, "floor", "rest")
+    launch_both(ours, theirs, features, cut)
+    first, second = (theirs.softened_at(world) for world in range(2))
+    assert 0 < first <= second < theirs.time(0)
+    assert theirs.state.softness.numpy().tolist() == [softness, softness]
+    assert np.all(theirs.state.losses.numpy()[:, layout.LOSS_SOFTENING] > 0)
+    assert_same_bits(ours, theirs)
+
+
+@pytest.mark.parametrize("cut", [60, 7])
+def test_blocks_stiffen_as_the_cpu_form_does(cut: int, exact_kernels: None) -> None:
+    """The block form gives the joints their values back in the same steps, however cut into launches."""
+    ours, theirs = released(), released()
+    features = softening_features(ours, "floor", "rest")
+    launch_both(ours, theirs, features, cut)
+    assert theirs.state.softness.numpy()[0] == 0.0
+    assert theirs.state.losses.numpy()[0, layout.LOSS_SOFTENING] < 0
+    assert_same_bits(ours, theirs)
+
+
+@pytest.mark.parametrize("cut", [80, 7])
+def test_blocks_drive_under_load_as_the_cpu_form_does(cut: int, quick_unloading: None) -> None:
+    """In the block form loads and softness change in the same steps of the drive, however cut: on, falling, off."""
+    ours, theirs = driven(), driven()
+    features = softening_features(ours, "sprocket", "steady")
+    launch_both(ours, theirs, features, cut, tries=80)
+    assert theirs.counts(0)["sprocket"] > 10
+    assert theirs.time(0) > UNLOADED + LOAD_FALLS + 12 * FIXED_STEP
+    assert theirs.state.load_factor.numpy()[0] == 1.0
+    assert theirs.state.softness.numpy()[0] == 1.25
+    assert theirs.counts(0)["accepted"] < theirs.time(0) / (1.1 * FIXED_STEP)
+    assert theirs.state.watch.numpy()[0, layout.DRIFT] > 0  # a window of the free loop has ended
+    assert_same_bits(ours, theirs)
+
+
+@pytest.mark.parametrize("form", ["block", "cpu"])
+def test_loads_are_on_then_fall_then_are_off(form: str, quick_unloading: None) -> None:
+    """A look after the other they are 1, 15, powers of it that fall with time, and 1 for good; softness follows."""
+    batch = driven()
+    features = softening_features(batch, "sprocket", "steady")
+    seen = []
+    for _ in range(80):
+        advance(batch, form, features, 1)
+        look = batch.last_look(0)[layout.TIME]
+        seen.append((look / FIXED_STEP, batch.state.load_factor.numpy()[0], batch.state.softness.numpy()[0]))
+    fell = False
+    for steps, load, softness in seen:
+        expected = 15.0 ** np.clip(1 - (steps - 90) / 20, 0, 1) if steps >= 70 - 1e-6 else 1.0
+        assert load == pytest.approx(expected, rel=1e-6)
+        fell = fell or 1 < load < 15
+        if steps >= 70:
+            assert softness == pytest.approx(1.25 - 0.15 * np.log(load) / np.log(15), abs=1e-6)
+    assert fell and {1.0, 15.0} <= {load for _, load, _ in seen}
+
+
+def advance(batch: Batch, form: str, features: Features, tries: int) -> None:
+    """Carry a batch on in the block form or in the CPU form."""
+    if form == "block":
+        launch_blocks(batch, features, tries, block_dim=LINKS)
+    else:
+        launch_chains(batch, features, tries)
+
+
+@pytest.mark.parametrize("form", ["block", "cpu"])
+@pytest.mark.parametrize("made", ["heap", "ring"])
+def test_soft_tolerance_is_that_of_soft_joints_only(made: str, form: str) -> None:
+    """A soft tolerance that no step meets refuses every step of joints at softness 1, and none of stiffer ones."""
+    batch = heaps(0.9975) if made == "heap" else released()
+    features = softening_features(batch, "floor", "rest")
+    if made == "ring":
+        advance(batch, form, features, 8)  # until it has begun to stiffen
+    batch.control.soft_tolerance = 1e-13
+    refused_before = [0] * len(batch.links)
+    seen = set()
+    for _ in range(60):
+        advance(batch, form, features, 1)
+        refused = [batch.counts(world)["rejected"] for world in range(len(batch.links))]
+        softness = batch.state.softness.numpy().tolist()  # a look that changes it comes before the try
+        assert np.subtract(refused, refused_before).tolist() == [soft >= 1.0 for soft in softness]
+        seen.update(soft >= 1.0 for soft in softness)
+        refused_before = refused
+        batch.state.step.numpy()[:] = FIXED_STEP
+    assert seen == ({False, True} if made == "heap" else {False})

@@ -1,0 +1,87 @@
+"""Coefficients of the explicit methods: orders, stability on the chain's own eigenvalues, kernels that differ."""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from warpchain.bench.cpu_steps import flying
+from warpchain.inputs.parameters import preset
+from warpchain.kernels import layout
+from warpchain.kernels.cpu.loop import Features, make_advance
+from warpchain.kernels.gpu.loop import make_advance_block
+from warpchain.kernels.methods.explicit_tableaus import TABLEAUS, Tableau
+from warpchain.oracle.motion_equations import acceleration
+
+EACH = pytest.mark.parametrize("tableau", TABLEAUS.values(), ids=list(TABLEAUS))
+
+
+@EACH
+def test_weights_meet_the_order_conditions_of_bushy_and_tall_trees(tableau: Tableau) -> None:
+    """Σ b c^k = 1/(k+1) and b·A^k·1 = 1/(k+1)! up to the order, for both solutions, in exact fractions."""
+    nodes = [sum(row, Fraction(0)) for row in tableau.matrix]
+    for weights, order in ((tableau.weights, tableau.order), (tableau.embedded, tableau.error_order)):
+        power = [Fraction(1)] * tableau.stages
+        for k in range(order):
+            assert sum(b * c**k for b, c in zip(weights, nodes, strict=True)) == Fraction(1, k + 1)
+            assert sum(b * p for b, p in zip(weights, power, strict=True)) == Fraction(1, math.factorial(k + 1))
+            power = [sum((a * p for a, p in zip(row, power, strict=False)), Fraction(0)) for row in tableau.matrix]
+
+
+def eigenvalues(n: int) -> np.ndarray:
+    """Of the chain's equations in flight with Table 1's joints (NumPy model, central differences), (6n,) 1/s.
+
+    ω_c is so large that sticking friction plays no part.
+    """
+    parameters = preset("paper").with_values({"friction_smoothing": 10.0})
+    start = np.stack(flying(n, parameters))
+
+    def rates(state: np.ndarray) -> np.ndarray:
+        return np.stack([state[1], acceleration(state[0], state[1], parameters)])
+
+    columns = []
+    for index in np.ndindex(start.shape):
+        shift = np.zeros_like(start)
+        shift[index] = 1e-8 if index[0] == 0 else 1e-6
+        columns.append(((rates(start + shift) - rates(start - shift)) / (2 * shift[index])).ravel())
+    return np.linalg.eigvals(np.array(columns).T)
+
+
+def greatest_growth(tableau: Tableau, z: np.ndarray) -> float:
+    """max |P(z)| of the method's stability polynomial P = 1 + Σ b·A^k·1 z^(k+1)."""
+    matrix = np.zeros((tableau.stages, tableau.stages))
+    for stage, row in enumerate(tableau.matrix):
+        matrix[stage, : len(row)] = [float(a) for a in row]
+    growth, power = np.ones_like(z), np.ones(tableau.stages)
+    for k in range(tableau.stages):
+        growth = growth + tableau.velocity_weights @ power * z ** (k + 1)
+        power = matrix @ power
+    return float(np.abs(growth).max())
+
+
+def test_os32_is_stable_for_almost_twice_the_step_of_dp5() -> None:
+    """On the springs of 24 links 6 / max |λ| is stable with os32, 3.2 with dp5 and 2.4 with bs32, and little more."""
+    found = eigenvalues(24)
+    # what rounding makes of the modes that do not decay is not what this is about
+    normal = found[np.abs(found) > 1e-3 * np.abs(found).max()] / np.abs(found).max()
+    assert len(normal) > 90
+    limits = {"os32": (6.0, 6.5), "dp5": (3.2, 3.5), "bs32": (2.4, 2.6)}
+    for name, (stable, unstable) in limits.items():
+        assert greatest_growth(TABLEAUS[name], stable * normal) <= 1.0 + 1e-6, name
+        assert greatest_growth(TABLEAUS[name], unstable * normal) > 1.01, name
+
+
+def test_os32_bears_sticking_friction_as_well() -> None:
+    """On the negative axis 7.3 is stable with os32 and 3.3 with dp5."""
+    axis = -np.linspace(0.01, 1.0, 500) + 0j
+    for name, limit in {"os32": 7.3, "dp5": 3.3}.items():
+        assert greatest_growth(TABLEAUS[name], limit * axis) <= 1.0 + 1e-6
+        assert greatest_growth(TABLEAUS[name], (limit + 0.2) * axis) > 1.01
+
+
+def test_every_tableau_has_kernels_of_its_own() -> None:
+    """Coefficients in an unrolled loop are not in the name that Warp gives a kernel's module: others must differ."""
+    features = [Features(name, layout.padded_width(60), "floor", True, "grid", "rest") for name in TABLEAUS]
+    assert len({make_advance(each).module.name for each in features}) == len(TABLEAUS)
+    assert len({make_advance_block(each, 64, 168).module.name for each in features}) == len(TABLEAUS)

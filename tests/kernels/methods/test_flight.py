@@ -1,0 +1,404 @@
+"""Free flight against SciPy and closed forms, orders of the methods, invariants, and the same bits every time."""
+
+import functools
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import warpchain
+from warpchain import Status, preset
+from warpchain.engine.batch import Batch
+from warpchain.inputs.options import Options
+from warpchain.inputs.start_shapes import ellipse, lay_chain
+from warpchain.oracle import motion_equations
+
+METHODS = ("rkf78", "dp5", "bs32", "os32", "rodas4p", "rodas5p")
+PAPER, SOFT = preset("paper"), preset("soft")
+FRICTIONLESS = {"joint_damping": 0.0, "viscous_friction": 0.0, "coulomb_friction": 0.0}
+LINKS = 12
+HIGH = np.array([0.0, 0.05, 0.0])
+"""Where the loops fly: out of the floor's reach, yet so near to the origin that rounding stays small."""
+
+
+def spinning_ellipse(parameters, links=LINKS, speed=2.0):
+    """An ellipse whose links circulate: a deforming loop high above the floor, its springs unstretched."""
+    position, velocity = lay_chain(ellipse(1.5), links, parameters.link_length, speed, 0.1)
+    return position + HIGH, velocity
+
+
+def greatest(values, expected):
+    """Greatest error over the greatest value, of places and angles (columns 0 and 1, and 2) apart."""
+    columns = (slice(0, 2), slice(2, 3))
+    return max(np.abs(values[..., c] - expected[..., c]).max() / np.abs(expected[..., c]).max() for c in columns)
+
+
+def assert_same_bits(first, second):
+    """Two trajectories agree in every number."""
+    for name in vars(first):
+        assert_array_equal(getattr(first, name), getattr(second, name), err_msg=name)
+
+
+# --- accuracy ---
+
+FLIGHTS = {"paper": 5e-4, "soft": 5e-3}
+"""Duration [s] of the flight of each preset: some 500 periods of the joints' springs."""
+
+
+@functools.cache
+def exact_flight(name):
+    """The flight by SciPy's DOP853 at 1e-12: start and end."""
+    start = spinning_ellipse(preset(name))
+    position, velocity, _ = motion_equations.solve_flight(*start, [0.0, FLIGHTS[name]], preset(name))
+    return start, (position[-1], velocity[-1])
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_flight_agrees_with_scipy(name, method):
+    """At tolerance 1e-9 flights with friction, damping, gravity agree with DOP853 to 1e-8, rates of order 3 to 1e-7.
+
+    bs32 and os32 take their longest accurate steps at the springs' period, so their rates err by some tens of
+    tolerances; a tolerance of 1e-10 brings them below 1e-8 too.
+    """
+    start, (position, velocity) = exact_flight(name)
+    rates_within = {1e-9: 1e-7, 1e-10: 1e-8} if method in ("bs32", "os32") else {1e-9: 1e-8}
+    for tolerance, bound in rates_within.items():
+        flight = warpchain.simulate(
+            name, *start, FLIGHTS[name], times=[FLIGHTS[name]], method=method, tolerance=tolerance
+        )
+        assert flight.status == Status.FINISHED
+        assert flight.time[-1] == FLIGHTS[name]
+        assert flight.impulses == {"floor": 0, "self": 0}
+        assert greatest(flight.position[-1], position) < 1e-8
+        assert greatest(flight.velocity[-1], velocity) < bound
+        assert flight.losses["joint_friction"] > 1e-4
+        assert flight.losses["joint_damping"] > 1e-9
+
+
+def test_both_controllers_reach_the_same_flight():
+    """The proportional-integral controller agrees with DOP853 as the standard one does, by other steps."""
+    start, (position, velocity) = exact_flight("soft")
+    flights = [
+        warpchain.simulate("soft", *start, FLIGHTS["soft"], tolerance=1e-9, controller=controller)
+        for controller in ("standard", "pi")
+    ]
+    for flight in flights:
+        assert greatest(flight.position[-1], position) < 1e-8
+        assert greatest(flight.velocity[-1], velocity) < 1e-8
+    assert flights[0].steps_accepted != flights[1].steps_accepted
+
+
+@pytest.mark.parametrize(("method", "stable"), [("bs32", 2.5), ("os32", 6.2), ("dp5", 3.4)])
+def test_steps_of_a_loose_tolerance_stay_at_the_bound_of_stability(method, stable):
+    """At 1e-3 stability bounds steps, to 1/(1.08e6/s) times what the method bears; `pi` grows back to it for ever."""
+    duration = 2e-3
+    start = spinning_ellipse(PAPER)
+    flight = warpchain.simulate(
+        PAPER, *start, duration, times=[duration], method=method, tolerance=1e-3, controller="pi", step_limit=20_000
+    )
+    assert flight.status == Status.FINISHED
+    assert 0.75 < duration / flight.steps_accepted / (stable / 1.08e6) < 1.05
+
+
+def test_features_left_out_do_not_change_a_flight():
+    """Without floor and self-contacts in the kernel a flight that meets neither is the same to rounding."""
+    start = spinning_ellipse(SOFT)
+    full = warpchain.simulate(SOFT, *start, 2e-3, method="bs32", tolerance=1e-9)
+    bare = warpchain.simulate(SOFT, *start, 2e-3, floor=False, self_contact=False, method="bs32", tolerance=1e-9)
+    assert greatest(bare.position, full.position) < 1e-12
+    assert greatest(bare.velocity, full.velocity) < 1e-10
+
+
+SMOOTH = PAPER.with_values({"joint_stiffness": 1e5, "joint_damping": 0.05, "friction_smoothing": 10.0})
+"""Springs and friction so soft that steps of 10 µs are short against everything."""
+SMOOTHER = PAPER.with_values({"joint_stiffness": 2e4, "joint_damping": 1.0, "friction_smoothing": 30.0})
+"""The same for 20 µs: at a speed of 8 m/s errors of `rodas5p` reach its order before they drown in rounding."""
+
+
+@pytest.mark.parametrize(
+    ("method", "order", "steps", "parameters", "speed"),
+    [
+        ("rkf78", 8, [8e-5, 6e-5, 5e-5, 4e-5], SMOOTH, 2.0),
+        ("dp5", 5, [4e-5, 2e-5, 1e-5, 5e-6], SMOOTH, 2.0),
+        ("bs32", 3, [2e-5, 1e-5, 5e-6, 2.5e-6], SMOOTH, 2.0),
+        ("os32", 3, [2e-5, 1e-5, 5e-6, 2.5e-6], SMOOTH, 2.0),
+        ("rodas4p", 4, [4e-5, 2e-5, 1e-5, 5e-6], SMOOTH, 2.0),
+        ("rodas5p", 5, [4e-5, 3e-5, 2e-5, 1.5e-5], SMOOTHER, 8.0),
+    ],
+    ids=["rkf78", "dp5", "bs32", "os32", "rodas4p", "rodas5p"],
+)
+def test_error_falls_with_the_order_of_the_method(method, order, steps, parameters, speed):
+    """Errors of places and speeds against DOP853 fall as h^order, slope to 0.3, with joints that damp and rub."""
+    duration = 4e-3
+    start = spinning_ellipse(parameters, speed=speed)
+    position, velocity, _ = motion_equations.solve_flight(*start, [0.0, duration], parameters, rtol=1e-13, atol=1e-15)
+    errors = []
+    for step in steps:
+        # a skin beyond the floor makes the whole flight "near a contact", and the loose tolerance leaves the bound
+        flight = warpchain.simulate(
+            parameters,
+            *start,
+            duration,
+            times=[duration],
+            method=method,
+            tolerance=0.1,
+            contact_step=step,
+            skin=5.0,
+        )
+        assert flight.steps_rejected == 0
+        # the first steps grow from 0.1 µs to h, each at most fivefold
+        assert duration / step <= flight.steps_accepted <= duration / step + 6
+        place, speed = flight.position[-1] - position[-1], flight.velocity[-1] - velocity[-1]
+        errors.append([np.sqrt(np.mean(d[:, :2] ** 2)) for d in (place, speed)])
+    slopes = np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert np.abs(slopes - order).max() < 0.3, slopes
+
+
+# --- invariants of a flight ---
+
+
+def flight_without_gravity(parameters, *, method="rkf78", tolerance=1e-12):
+    """Trajectory of the spinning ellipse without gravity: some hundred spring periods."""
+    duration = {1e9: 1e-3, 1e7: 5e-3}[parameters.joint_stiffness]
+    start = spinning_ellipse(parameters)
+    flight = warpchain.simulate(parameters, *start, duration, gravity=False, method=method, tolerance=tolerance)
+    assert flight.status == Status.FINISHED
+    return flight
+
+
+def energies(flight, parameters, *, gravity=False):
+    """Total energy at each instant [J]."""
+    states = zip(flight.position, flight.velocity, strict=True)
+    return np.array([motion_equations.total_energy(x, v, parameters, gravity=gravity) for x, v in states])
+
+
+@pytest.mark.parametrize("method", [*METHODS, "hybrid"])
+def test_linear_momentum_is_kept_to_rounding(method):
+    """Friction and damping are inner forces: without gravity the momentum stays to 1e-14 of Σ m|v|.
+
+    Coefficients of rodas5p are up to 150, and so is its rounding.
+    """
+    flight = flight_without_gravity(PAPER, method=method, tolerance=1e-6)
+    momentum = np.array([motion_equations.linear_momentum(v, PAPER) for v in flight.velocity])
+    speeds = np.linalg.norm(flight.velocity[0][:, :2], axis=1)
+    scale = motion_equations.link_masses(LINKS, PAPER) @ speeds
+    assert np.abs(momentum - momentum[0]).max() < (3e-13 if method == "rodas5p" else 1e-14) * scale
+
+
+def test_centre_of_mass_falls_freely():
+    """Under gravity the centre of mass keeps to v₀ t − g t²/2."""
+    start = spinning_ellipse(SOFT)
+    flight = warpchain.simulate(SOFT, *start, 0.02)
+    mass = motion_equations.link_masses(LINKS, SOFT)
+    centre = mass @ flight.position[:, :, :2] / mass.sum()
+    drift = mass @ start[1][:, :2] / mass.sum()
+    expected = centre[0] + np.outer(flight.time, drift)
+    expected[:, 1] -= SOFT.gravity * flight.time**2 / 2
+    assert np.abs(centre - expected).max() < 1e-14
+    assert expected[0, 1] - expected[-1, 1] > 1e-3
+
+
+@pytest.mark.parametrize("parameters", [PAPER, SOFT], ids=["paper", "soft"])
+@pytest.mark.parametrize("method", METHODS)
+def test_energy_is_kept_without_dissipation(parameters, method):
+    """With β = τ_c = b = 0 the energy stays: to 1e-13 at tolerance 1e-12; order 3 and what rodas rounds allow less."""
+    third = (1e-10, 1e-9)
+    tolerance, bound = {"bs32": third, "os32": third, "rodas4p": (1e-12, 1e-12), "rodas5p": (1e-11, 5e-12)}.get(
+        method, (1e-12, 1e-13)
+    )
+    chain = parameters.with_values(FRICTIONLESS)
+    flight = flight_without_gravity(chain, method=method, tolerance=tolerance)
+    energy = energies(flight, chain)
+    assert np.abs(energy / energy[0] - 1).max() < bound
+    assert not any(flight.losses.values())
+
+
+@pytest.mark.parametrize("parameters", [PAPER, SOFT], ids=["paper", "soft"])
+def test_angular_momentum_is_kept_to_rounding_without_damping(parameters):
+    """Joint friction, Coulomb's included, keeps the angular momentum to 1e-13 as long as b = 0."""
+    chain = parameters.with_values({"joint_damping": 0.0})
+    flight = flight_without_gravity(chain)
+    momentum = [
+        motion_equations.angular_momentum(x, v, chain) for x, v in zip(flight.position, flight.velocity, strict=True)
+    ]
+    assert np.abs(np.array(momentum) / momentum[0] - 1).max() < 1e-13
+    assert flight.losses["joint_friction"] > 1e-4
+
+
+def test_damping_turns_the_angular_momentum_by_its_own_torque():
+    """A damper pulls across its open joint, which at k = 1e9 turns the angular momentum by 1e-13 to 1e-11 of it."""
+    flight = flight_without_gravity(PAPER)
+    states = list(zip(flight.position, flight.velocity, strict=True))
+    momentum = np.array([motion_equations.angular_momentum(x, v, PAPER) for x, v in states])
+    change = np.abs(momentum / momentum[0] - 1).max()
+    assert 1e-13 < change < 1e-11
+
+
+@pytest.mark.parametrize("parameters", [PAPER, SOFT], ids=["paper", "soft"])
+def test_energy_falls_by_what_the_ledger_says(parameters):
+    """In flight the energy never rises, and its fall is the ledger's friction and damping to 1e-13."""
+    flight = flight_without_gravity(parameters)
+    energy = energies(flight, parameters)
+    assert np.diff(energy).max() < 0
+    lost = flight.losses["joint_friction"] + flight.losses["joint_damping"]
+    assert abs(energy[0] - energy[-1] - lost) < 1e-12 * energy[0]
+    assert 0 < flight.losses["joint_damping"] < flight.losses["joint_friction"]
+    assert flight.losses["floor"] == flight.losses["self_contact"] == 0
+
+
+@pytest.mark.parametrize("speed", [2.0, -5.0])
+def test_circular_loop_settles_at_its_tension(speed):
+    """A closed loop stretches until every joint force is the formula's, for alternating masses; C is that over k."""
+    position, velocity = motion_equations.circular_loop(LINKS, PAPER, speed)
+    flight = warpchain.simulate(PAPER, position + HIGH, velocity, 1.5e-3, times=[1.5e-3], gravity=False, tolerance=1e-9)
+    place = flight.position[-1][:, :2] - HIGH[:2]
+    midway = place + np.roll(place, -1, axis=0)
+    outwards = midway / np.linalg.norm(midway, axis=1)[:, None]
+    tangent = np.column_stack([-outwards[:, 1], outwards[:, 0]])
+    pull, across = motion_equations.circular_loop_force(LINKS, PAPER, speed)
+    force = motion_equations.joint_force(flight.position[-1], flight.velocity[-1], PAPER)
+    alternating = across * np.tile([1, -1], LINKS // 2)
+    assert abs(across) > 0.02 * pull
+    assert_allclose(np.sum(force * tangent, axis=1), pull, rtol=1e-5)
+    assert_allclose(np.sum(force * outwards, axis=1), alternating, rtol=0, atol=1e-5 * pull)
+    opening = np.linalg.norm(motion_equations.joint_opening(flight.position[-1], PAPER), axis=1)
+    assert_allclose(PAPER.joint_stiffness * opening, np.hypot(pull, across), rtol=1e-4)
+    # on the way there the springs overshoot, by less than undamped ones would
+    assert np.hypot(pull, across) < PAPER.joint_stiffness * flight.greatest_opening < 2 * pull
+
+
+@pytest.mark.parametrize("parameters", [PAPER, SOFT], ids=["paper", "soft"])
+def test_stretched_circular_loop_stays_circular(parameters):
+    """A loop that starts in its springs' equilibrium turns as a rigid body: shape to rounding, angle by Ω t."""
+    chain = parameters.with_values({"joint_damping": 0.0})
+    position, velocity = motion_equations.circular_loop(LINKS, chain, 3.0, stretched=True)
+    duration = 2e-3
+    position += HIGH
+    flight = warpchain.simulate(chain, position, velocity, duration, gravity=False, tolerance=1e-9)
+    spin = velocity[0, 2]
+    distance = np.linalg.norm(flight.position[:, :, :2] - HIGH[:2], axis=2)
+    assert np.abs(distance - distance[0]).max() < 1e-13
+    turned = flight.position[:, :, 2] - position[:, 2]
+    assert np.abs(turned - spin * flight.time[:, None]).max() < 1e-10
+    pull, across = motion_equations.circular_loop_force(LINKS, chain, 3.0)
+    assert flight.greatest_opening == pytest.approx(np.hypot(pull, across) / chain.joint_stiffness, rel=1e-3)
+
+
+# --- the same bits ---
+
+
+def test_instants_only_cut_steps():
+    """Steps land on the instants asked for, which changes no more than the tolerance; later ones change nothing."""
+    start = spinning_ellipse(SOFT)
+    alone = warpchain.simulate(SOFT, *start, 2e-3, times=[2e-3], tolerance=1e-9)
+    instants = [0.0, 3e-4, 2e-3 / 3, 2e-3]
+    several = warpchain.simulate(SOFT, *start, 2e-3, times=instants, tolerance=1e-9)
+    assert_array_equal(several.time, instants)
+    assert_array_equal(several.position[0], start[0])
+    assert_array_equal(several.velocity[0], start[1])
+    assert greatest(several.position[-1], alone.position[-1]) < 1e-9
+    assert greatest(several.velocity[-1], alone.velocity[-1]) < 1e-8
+    longer = warpchain.simulate(SOFT, *start, 3e-3, times=[2e-3], tolerance=1e-9)
+    assert_array_equal(longer.position, alone.position)
+    assert_array_equal(longer.velocity, alone.velocity)
+    assert longer.steps_accepted > alone.steps_accepted
+
+
+def dropped_batch(links, options, duration):
+    """Batch of spinning ellipses of these lengths, each a hair above the floor and falling."""
+    batch = Batch(len(links), max(links), options)
+    for world, count in enumerate(links):
+        position, velocity = spinning_ellipse(SOFT, count)
+        ends = position[:, 1] - SOFT.link_length / 2 * np.abs(np.sin(position[:, 2]))
+        position[:, 1] -= ends.min() - SOFT.circle_radius - 1e-4
+        velocity[:, 1] -= 2.0
+        batch.set_chain(world, SOFT, count)
+        batch.load(world, position, velocity, stop_time=duration, stop_status=Status.FINISHED)
+    return batch
+
+
+def outcome(batch, world):
+    """Everything that a world's run leaves."""
+    return {
+        "status": batch.status(world),
+        "time": batch.time(world),
+        "position": batch.position(world),
+        "velocity": batch.velocity(world),
+        **{f"count {key}": value for key, value in batch.counts(world).items()},
+        **{f"extreme {key}": value for key, value in batch.extremes(world).items()},
+        **{f"loss {key}": value for key, value in batch.losses(world).items()},
+    }
+
+
+def assert_same_outcome(first, second):
+    """Two outcomes agree to the bit."""
+    assert first.keys() == second.keys()
+    for name, value in first.items():
+        assert_array_equal(value, second[name], err_msg=name)
+
+
+def run_in_launches(batch, tries):
+    """Run all worlds to their ends in launches of this many tries; returns the number of launches."""
+    features = batch.features(fixed_body="floor", watch="none")
+    worlds = range(len(batch.links))
+    launches = 0
+    while any(batch.status(world) == Status.RUNNING for world in worlds):
+        batch.launch(worlds, features, tries)
+        launches += 1
+    return launches
+
+
+@pytest.mark.parametrize("method", [*METHODS, "hybrid"])
+def test_launch_size_does_not_change_a_bit(method):
+    """A chain that drops on the floor ends the same to the bit in launches of 1, 7 or 1000 tries, counters included."""
+    outcomes = {}
+    for tries in (1, 7, 1000):
+        batch = dropped_batch([20], Options(method=method), 0.01)
+        launches = run_in_launches(batch, tries)
+        assert launches >= batch.tries(0) // tries
+        outcomes[tries] = outcome(batch, 0)
+    assert outcomes[1]["status"] == Status.FINISHED
+    assert outcomes[1]["count floor"] > 100
+    assert_same_outcome(outcomes[1], outcomes[7])
+    assert_same_outcome(outcomes[1], outcomes[1000])
+
+
+# 250 links need wider scratch blocks, so all worlds of that batch run in another kernel
+@pytest.mark.parametrize("links", [[8, 20, 60], [60, 8, 20], [20, 250, 8]])
+def test_other_worlds_do_not_change_a_bit(links):
+    """Each chain of a batch ends the same to the bit as alone, whatever the length and order of the others."""
+    options = Options(method="bs32")
+    together = dropped_batch(links, options, 0.01)
+    run_in_launches(together, 1000)
+    for world, count in enumerate(links):
+        alone = dropped_batch([count], options, 0.01)
+        run_in_launches(alone, 1000)
+        assert alone.counts(0)["floor"] > 100
+        assert_same_outcome(outcome(together, world), outcome(alone, 0))
+
+
+def test_broken_world_leaves_the_others_alone():
+    """One chain that stops being finite freezes with its status; the other chains end the same to the bit."""
+    options = Options(method="bs32")
+    links = [8, 20, 8]
+    batch = dropped_batch(links, options, 0.01)
+    position, velocity = batch.position(1), batch.velocity(1)
+    velocity[3] = 1e306
+    batch.load(1, position, velocity, stop_time=0.01, stop_status=Status.FINISHED)
+    run_in_launches(batch, 50)
+    assert batch.status(1) == Status.NOT_FINITE
+    assert_array_equal(batch.position(1), position)
+    assert_array_equal(batch.velocity(1), velocity)
+    sound = dropped_batch(links, options, 0.01)
+    run_in_launches(sound, 50)
+    assert_same_outcome(outcome(batch, 0), outcome(sound, 0))
+    assert_same_outcome(outcome(batch, 2), outcome(sound, 2))
+
+
+def test_repeated_run_gives_the_same_bits():
+    """Two runs of one chain agree in every number."""
+    start = spinning_ellipse(SOFT)
+    runs = [warpchain.simulate(SOFT, *start, 0.1, method="dp5", times=[0.05, 0.1]) for _ in range(2)]
+    assert runs[0].impulses["floor"] > 0
+    assert_same_bits(*runs)

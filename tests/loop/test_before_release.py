@@ -1,0 +1,207 @@
+"""The last moments on the sprocket, kept with a walk: what they are, that they change nothing, files."""
+
+import dataclasses
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import warpchain
+from tests.support.made_walks import assert_same, make_walk
+from warpchain.engine.batch import Batch
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import InputError, preset
+from warpchain.loop.before_release import FIELDS, BeforeRelease
+from warpchain.reports.kink_figure import sweep_kink
+from warpchain.run.single_walk import run_walk
+from warpchain.status import Status
+from warpchain.walks.walk_result import WalkResult
+
+BRIEF = {
+    "links": 40,
+    "frequency": 12.0,
+    "preset": "soft",
+    "start": "spinning",
+    "further_hold": 0.5,  # under its own loads, and nothing else is kept of the time before the release
+    "walk_limit": 0.05,
+}
+
+
+@cache
+def brief_walk(**settings: Any) -> WalkResult:
+    """The first 50 ms of a walk of 40 links at 12 Hz, half a second after its loop has become stationary."""
+    return warpchain.walk(**BRIEF, **settings)
+
+
+def test_they_end_with_the_release() -> None:
+    """Times are negative and as far apart as those of the walk, which goes on where they end, in height as well."""
+    walk = brief_walk(record_before=0.2)
+    before = walk.before_release
+    assert before is not None
+    assert -0.2 <= before.frame_time[0] < -0.197 and -2.1e-3 < before.frame_time[-1] < 0
+    assert -0.2 <= before.time[0] < -0.198 and -1.1e-3 < before.time[-1] < 0
+    np.testing.assert_allclose(np.diff(before.frame_time), 2e-3, atol=6e-5)
+    np.testing.assert_allclose(np.diff(before.time), 1e-3, atol=6e-5)
+    assert before.frame_joints.shape == before.frame_forces.shape == (len(before.frame_time), 40, 2)
+    # in the loop's course a link moves on by its length: (0.2 s) × speed
+    last, first = before.frame_joints[-1], walk.frame_joints[0]
+    speed = 2 * np.pi * 12.0 * 0.0598
+    np.testing.assert_allclose(np.hypot(*(first - last).T), -speed * before.frame_time[-1], rtol=0.05)
+    assert before.frame_joints[..., 1].min() == pytest.approx(0.01 + 0.0042, abs=1e-3)
+    np.testing.assert_allclose(before.center[-1], walk.center[0], atol=1e-3)
+    kept = f"{-before.frame_time[0]:.3g} s, {len(before.time)} instants, {len(before.frame_time)} frames"
+    assert repr(before) == f"<BeforeRelease: {kept}>"
+
+
+def test_forces_carry_the_loop() -> None:
+    """The mean tension is what bends the loop's momentum round, ρ v², and the weight's share, to 3 %."""
+    before = brief_walk(record_before=0.2).before_release
+    assert before is not None
+    step = before.frame_joints - np.roll(before.frame_joints, 1, axis=1)
+    along = step / np.hypot(step[..., :1], step[..., 1:])
+    tension = float(np.mean(np.sum(before.frame_forces * along, axis=2)))
+    parameters = preset("soft")
+    density = (parameters.inner_mass + parameters.outer_mass) / 2 / parameters.link_length
+    speed = 2 * np.pi * 12.0 * 0.0598
+    hanging = density * parameters.gravity * 20 * parameters.link_length / 4
+    assert tension == pytest.approx(density * speed**2 + hanging, rel=0.03)
+
+
+def test_loads_are_those_of_the_state() -> None:
+    """In a frame of a given state: F = k C + b dC/dt and f(ω' − ω) of every joint, by formulas of their own."""
+    links, parameters = 12, preset("soft")
+    rng = np.random.default_rng(3)
+    angle = -2 * np.pi * np.arange(links) / links
+    apothem = parameters.link_length / (2 * np.tan(np.pi / links))
+    position = np.stack([-apothem * np.sin(angle), apothem * np.cos(angle) + 1.0, angle], axis=1)
+    position += 1e-6 * rng.standard_normal(position.shape)
+    velocity = 0.1 * rng.standard_normal(position.shape)
+    batch = Batch(1, links, Options(method="dp5"), frame_every=1, keeps_loads=True)
+    batch.set_chain(0, parameters, links)
+    batch.load(0, position, velocity, stop_time=1.0, stop_status=Status.FINISHED)
+    batch.launch([0], batch.features(fixed_body="none", watch="none"), 1)
+    loads = batch.frame_loads(0)
+    time, joints = batch.drain_frames(0)
+    assert time[0] == 0.0
+    half = parameters.link_length / 2
+    pointing = np.exp(1j * position[:, 2])
+    middle, moving = position[:, 0] + 1j * position[:, 1], velocity[:, 0] + 1j * velocity[:, 1]
+    right, left = middle + half * pointing, middle - half * pointing
+    turning = 1j * half * pointing * velocity[:, 2]
+    opening = np.roll(left, -1) - right
+    rate = np.roll(moving - turning, -1) - (moving + turning)
+    force = parameters.joint_stiffness * opening + parameters.joint_damping * rate
+    np.testing.assert_allclose(joints[0, :, 0] + 1j * joints[0, :, 1], right, rtol=1e-12)
+    np.testing.assert_allclose(loads[0, :, 0] + 1j * loads[0, :, 1], force, rtol=1e-7)
+    spin = np.roll(velocity[:, 2], -1) - velocity[:, 2]
+    slip = np.tanh(spin / parameters.friction_smoothing)
+    moment = parameters.viscous_friction * spin + parameters.coulomb_friction * slip
+    np.testing.assert_allclose(loads[0, :, 2], moment, rtol=1e-9)
+
+
+def test_they_do_not_change_the_walk() -> None:
+    """With 0.2 s, with all that fits, with none and without frames, the walk is the same to the bit."""
+    plain = brief_walk(frame_interval=None)
+    assert plain.before_release is None and brief_walk(record_before=0.0).before_release is None
+    for settings in ({"record_before": 0.2}, {"record_before": 1e3, "frame_interval": 1e-3}, {"record_before": 0.0}):
+        walk = brief_walk(**settings)
+        assert walk.center.tobytes() == plain.center.tobytes()
+        assert (walk.steps_accepted, walk.steps_rejected) == (plain.steps_accepted, plain.steps_rejected)
+
+
+def test_nothing_is_kept_of_the_time_under_load() -> None:
+    """A long record begins when the loop has its own loads again; if they were never multiplied, with the hold."""
+    whole = brief_walk(record_before=1e3, frame_interval=1e-3)
+    before = whole.before_release
+    assert before is not None
+    period = 40 * preset("soft").link_length / (2 * np.pi * 12.0 * 0.0598)
+    assert 0.5 + period < -before.frame_time[0] < 0.5 + 3 * period < whole.hold_time
+    own = brief_walk(record_before=1e3, frame_interval=1e-3, load_factor=1.0, steady_time=0.2, steady_tolerance=0.2)
+    assert own.before_release is not None
+    assert own.before_release.frame_time[0] == pytest.approx(-own.hold_time, abs=1e-9)
+
+
+def test_by_default_half_a_second_is_kept_with_frames() -> None:
+    """Frames bring 0.5 s of the time before; an ellipse has none, and a chain that was never released neither."""
+    before = brief_walk().before_release
+    assert before is not None and -0.5 <= before.frame_time[0] < -0.49
+    shape = warpchain.walk(**BRIEF | {"start": "ellipse", "links": 32})
+    assert shape.before_release is None and len(shape.frame_time)
+    held = warpchain.walk(**BRIEF, hold_limit=0.02)
+    assert held.status.label == "not_steady" and held.before_release is None
+
+
+def test_impossible_times_are_refused() -> None:
+    """Negative, endless and no times, and a time without frames, each with the remedy."""
+    for wrong in (-0.1, float("inf"), float("nan"), True, "long"):
+        with pytest.raises(InputError, match=r"record_before: .* is not a time in s; give one"):
+            warpchain.walk(**BRIEF, record_before=wrong)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="frame_interval is None; give a frame_interval"):
+        warpchain.walk(**BRIEF, record_before=0.1, frame_interval=None)
+
+
+def test_a_file_keeps_them(tmp_path: Path) -> None:
+    """Saved and loaded every number is the same to the bit; datasets say their unit."""
+    import h5py
+
+    walk = brief_walk(record_before=0.05)
+    walk.save(tmp_path / "walk.h5")
+    assert_same(walk, warpchain.load_walk(tmp_path / "walk.h5"))
+    with h5py.File(tmp_path / "walk.h5") as file:
+        assert {name: data.attrs["unit"] for name, data in file["before_release"].items()} == {
+            name: unit for name, (unit, _) in FIELDS.items()
+        }
+    make_walk().save(tmp_path / "none.h5")
+    assert warpchain.load_walk(tmp_path / "none.h5").before_release is None
+
+
+def test_arrays_that_do_not_fit_are_refused() -> None:
+    """Another number of frames or links, and times that are not before the release."""
+    before = brief_walk(record_before=0.05).before_release
+    assert before is not None
+    for change, message in (
+        ({"frame_forces": before.frame_forces[1:]}, r"before_release\.frame_forces: its shape is"),
+        ({"frame_moments": before.frame_moments[:, 1:]}, r"before_release\.frame_moments: its shape is"),
+        ({"time": -before.time}, "a time is not negative"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            dataclasses.replace(before, **change)
+    with pytest.raises(ValueError, match="not of 30 links"):
+        make_walk(before_release=before)
+
+
+def test_a_sweep_keeps_them(tmp_path: Path) -> None:
+    """Of the samples that the file names, those of the walk itself in single precision; their kinks are drawn."""
+    content = {
+        "version": 1,
+        "name": "before",
+        "seed": 5,
+        "preset": "soft",
+        "samples": 2,
+        "scene": {key: BRIEF[key] for key in ("links", "start", "walk_limit", "further_hold")},
+        "grid": {"frequency": [12.0, 14.0]},
+        "distributions": {"all": "fixed", "clearance": "table"},
+        "record": {"series": True, "frames": {"samples": [0], "before": 0.2}},
+    }
+    result = warpchain.sweep(content, tmp_path / "one", workers=1)
+    assert result.sweep["record"]["frames"] == {"interval": 0.002, "samples": [0], "before": 0.2}
+    of_sweep = result.series(frequency=12)
+    kept, expected = of_sweep.before_release, run_walk(of_sweep.setup, record_before=0.2).before_release
+    assert result.series(frequency=12, sample=1).before_release is None
+    assert isinstance(kept, BeforeRelease) and expected is not None
+    for name in FIELDS:
+        ours, theirs = getattr(kept, name), getattr(expected, name)
+        single = name.startswith("frame_") and name != "frame_time"
+        np.testing.assert_array_equal(ours, theirs.astype(np.float32) if single else theirs)
+    warpchain.sweep(content, tmp_path / "two", workers=2)
+    for path in (tmp_path / "one/shards").glob("[0-9]*.h5"):
+        assert path.read_bytes() == (tmp_path / "two/shards" / path.name).read_bytes()
+    figure, text = sweep_kink(result)
+    assert "2 walks" in text
+    assert [line.get_xdata().tolist() for line in figure.axes[1].lines] == [[12.0, 14.0]]
+    with pytest.raises(InputError, match=r"sweep\.record\.series\.before: unknown key"):
+        warpchain.sweep(content | {"record": {"series": {"before": 0.1}}}, tmp_path / "three")
+    with pytest.raises(InputError, match=r"sweep\.record\.frames\.before: -1"):
+        warpchain.sweep(content | {"record": {"series": True, "frames": {"before": -1}}}, tmp_path / "three")

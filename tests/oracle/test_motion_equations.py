@@ -1,0 +1,359 @@
+"""The NumPy reference against hand-worked numbers, derivatives, invariants and closed forms."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from tests.support.impulse_cases import UNIT
+from warpchain.inputs.parameters import Parameters, preset
+from warpchain.oracle import motion_equations
+
+PAPER = preset("paper")
+MILD = PAPER.with_values(
+    {
+        "joint_stiffness": 1e5,
+        "joint_damping": 0.5,
+        "friction_smoothing": 5.0,
+        "viscous_friction": 9e-4,
+        "coulomb_friction": 1e-3,
+    }
+)
+"""Soft and dissipative: every term of the equations matters within milliseconds."""
+SILENT = MILD.with_values({"joint_damping": 0.0, "viscous_friction": 0.0, "coulomb_friction": 0.0})
+"""MILD without dissipation."""
+
+
+def disturbed_loop(n: int, parameters: Parameters, seed: int = 1):
+    """A circular loop at 2 m/s with joints opened by micrometres and links turning at random."""
+    generator = np.random.default_rng(seed)
+    position, velocity = motion_equations.circular_loop(n, parameters, 2.0)
+    position += generator.normal(size=(n, 3)) * [2e-6, 2e-6, 2e-4]
+    velocity += generator.normal(size=(n, 3)) * [0.02, 0.02, 3.0]
+    return position, velocity
+
+
+def complex_gradient(function, point: np.ndarray) -> np.ndarray:
+    """Derivatives of an analytic function by complex steps: exact to rounding."""
+    gradient = np.empty(point.shape)
+    for index in np.ndindex(*point.shape):
+        shifted = point.astype(complex)
+        shifted[index] += 1e-40j
+        gradient[index] = function(shifted).imag / 1e-40
+    return gradient
+
+
+# --- masses and equations of motion ---
+
+
+def test_even_links_are_inner():
+    """Masses and inertias alternate, inner links first, and odd or tiny chains are refused."""
+    assert_array_equal(motion_equations.link_masses(4, PAPER), [3.7e-3, 3.147e-3] * 2)
+    assert_array_equal(motion_equations.link_inertias(4, PAPER), [1.69e-7, 1.292e-7] * 2)
+    for n in (5, 2, 0):
+        with pytest.raises(ValueError, match=f"even number of links, at least 4; got {n}"):
+            motion_equations.link_masses(n, PAPER)
+
+
+def test_acceleration_by_hand():
+    """One joint opened by (0.1, 0.2) m pulls the two links at it, and only them, by k C and its torque."""
+    # A square of side 2 run anticlockwise; link 1 shifted by δ = (0.1, 0.2). C_0 = δ, C_1 = −δ; k = 10, so
+    # F_0 = (1, 2), F_1 = (−1, −2), F_2 = F_3 = 0. t = (0,1), (−1,0), (0,−1), (1,0); a = 1.
+    square = np.array([[0, -1, 0], [1, 0, np.pi / 2], [0, 1, np.pi], [-1, 0, 3 * np.pi / 2]])
+    square[1, :2] += [0.1, 0.2]
+    parameters = UNIT.with_values({"joint_stiffness": 10.0})
+    expected = [[1, 2, 2], [-2, -4, 0], [1, 2, 2], [0, 0, 0]]
+    result = motion_equations.acceleration(square, np.zeros((4, 3)), parameters, gravity=False)
+    assert_allclose(result, expected, atol=1e-14)
+
+
+@pytest.mark.parametrize("parameters", [MILD, PAPER.with_values({"friction_smoothing": 5.0})])
+def test_acceleration_is_gradient_of_potential_and_rayleigh_function(parameters):
+    """M q̈ = −∂V/∂q − ∂R/∂q̇, with V and Rayleigh's R written down here and differentiated by complex steps."""
+    n, p = 6, parameters
+    half, masses, inertias = (
+        p.link_length / 2,
+        [p.inner_mass, p.outer_mass] * 3,
+        [p.inner_inertia, p.outer_inertia] * 3,
+    )
+
+    def potential(q):
+        energy = 0
+        for i in range(n):
+            (x, y, angle), (x_next, y_next, angle_next) = q[i], q[(i + 1) % n]
+            gap_x = x_next - x - half * (np.cos(angle) + np.cos(angle_next))
+            gap_y = y_next - y - half * (np.sin(angle) + np.sin(angle_next))
+            energy += p.joint_stiffness / 2 * (gap_x**2 + gap_y**2) + masses[i] * p.gravity * y
+        return energy
+
+    def rayleigh(q, v):
+        dissipation = 0
+        for i in range(n):
+            (vx, vy, spin), (vx_next, vy_next, spin_next) = v[i], v[(i + 1) % n]
+            angle, angle_next = q[i, 2], q[(i + 1) % n, 2]
+            rate_x = vx_next - vx + half * (np.sin(angle) * spin + np.sin(angle_next) * spin_next)
+            rate_y = vy_next - vy - half * (np.cos(angle) * spin + np.cos(angle_next) * spin_next)
+            relative = spin - spin_next
+            dissipation += p.joint_damping / 2 * (rate_x**2 + rate_y**2) + p.viscous_friction / 2 * relative**2
+            dissipation += p.coulomb_friction * p.friction_smoothing * np.log(np.cosh(relative / p.friction_smoothing))
+        return dissipation
+
+    position, velocity = disturbed_loop(n, p)
+    force = -complex_gradient(potential, position) - complex_gradient(lambda v: rayleigh(position, v), velocity)
+    expected = force / np.column_stack([masses, masses, inertias])
+    result = motion_equations.acceleration(position, velocity, p)
+    assert_allclose(result, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+    gravity = motion_equations.acceleration(position, velocity, p) - motion_equations.acceleration(
+        position, velocity, p, gravity=False
+    )
+    assert_allclose(gravity, np.tile([0, -p.gravity, 0], (n, 1)), atol=1e-9 * np.abs(expected).max())
+
+
+def test_opening_rate_is_derivative_of_opening():
+    """Ċ is the derivative of C along the velocity."""
+    position, velocity = disturbed_loop(8, MILD)
+    step = 1e-6
+    ahead, behind = (motion_equations.joint_opening(position + sign * step * velocity, MILD) for sign in (1, -1))
+    rate = motion_equations.joint_opening_rate(position, velocity, MILD)
+    assert_allclose(rate, (ahead - behind) / (2 * step), atol=1e-7)
+    assert np.abs(rate).max() > 1e-2
+
+
+def test_power_of_all_forces_is_minus_dissipated_power():
+    """The rate of the total energy, Σ v·M a + dV/dt, is minus the power of joint friction and damping."""
+    position, velocity = disturbed_loop(8, MILD)
+    mass = np.column_stack([motion_equations.link_masses(8, MILD)] * 2 + [motion_equations.link_inertias(8, MILD)])
+    force = mass * motion_equations.acceleration(position, velocity, MILD)
+    opening = motion_equations.joint_opening(position, MILD)
+    rate = np.sum(velocity * force) + MILD.gravity * np.sum(mass[:, 1] * velocity[:, 1])
+    rate += MILD.joint_stiffness * np.sum(opening * motion_equations.joint_opening_rate(position, velocity, MILD))
+    friction = motion_equations.friction_power(velocity, MILD)
+    damping = motion_equations.damping_power(position, velocity, MILD)
+    assert friction > 1e-2
+    assert damping > 1e-4
+    assert_allclose(rate, -friction - damping, rtol=1e-10)
+
+
+def test_energies_and_momenta_by_hand():
+    """Energies and momenta of four separate unit links, worked out term by term."""
+    position = np.array([[0, 0, 0], [4, 0, 0], [4, 2, 0], [0, 2, 0.0]])
+    velocity = np.array([[1, 0, 2], [0, 3, 0], [0, 0, 0], [0, 0, -1.0]])
+    parameters = UNIT.with_values({"joint_stiffness": 10.0, "gravity": 10.0})
+    # C = (2,0), (−2,2), (−6,0), (−2,−2): Σ|C|² = 4 + 8 + 36 + 8 = 56.
+    assert motion_equations.spring_energy(position, parameters) == pytest.approx(280)
+    assert motion_equations.gravitational_energy(position, parameters) == pytest.approx(40)
+    assert motion_equations.kinetic_energy(velocity, parameters) == pytest.approx((1 + 9 + 4 + 1) / 2)
+    assert motion_equations.total_energy(position, velocity, parameters) == pytest.approx(327.5)
+    assert motion_equations.total_energy(position, velocity, parameters, gravity=False) == pytest.approx(287.5)
+    assert_allclose(motion_equations.linear_momentum(velocity, parameters), [1, 3])
+    # About (2, 1): (−2,−1)×(1,0) = 1, (2,−1)×(0,3) = 6, spin 2 − 1.
+    assert motion_equations.angular_momentum(position, velocity, parameters) == pytest.approx(8)
+    # Relative spins 2, 0, 1, −3.
+    viscous = parameters.with_values({"viscous_friction": 0.5, "coulomb_friction": 0.0})
+    assert motion_equations.friction_power(velocity, viscous) == pytest.approx(0.5 * (4 + 1 + 9))
+
+
+def test_friction_torque_by_hand():
+    """f is odd, β w + τ_c beyond ω_c, and (β + τ_c/ω_c) w within."""
+    assert_allclose(motion_equations.friction_torque(np.array([10.0, -10.0]), PAPER), [1.01e-3, -1.01e-3], rtol=1e-14)
+    assert_allclose(motion_equations.friction_torque(np.array(1e-9), PAPER), (9e-5 + 0.11) * 1e-9, rtol=1e-10)
+
+
+# --- flight ---
+
+
+def test_flight_counts_its_evaluations(monkeypatch):
+    """The reported number is that of all calls of the equations of motion, over all requested times."""
+    calls = []
+    acceleration = motion_equations.acceleration
+    monkeypatch.setattr(
+        motion_equations, "acceleration", lambda *args, **kwargs: calls.append(1) or acceleration(*args, **kwargs)
+    )
+    position, velocity = disturbed_loop(4, MILD)
+    _, _, evaluations = motion_equations.solve_flight(position, velocity, np.array([0.0, 1e-4, 2e-4]), MILD)
+    assert evaluations == len(calls) > 0
+
+
+def test_flight_keeps_energy_and_momenta():
+    """Without dissipation a flight keeps energy and spin, and linear momentum grows by the weight alone."""
+    position, velocity = disturbed_loop(8, SILENT)
+    times = np.array([0.0, 2e-3, 4e-3])
+    positions, velocities, evaluations = motion_equations.solve_flight(position, velocity, times, SILENT)
+    assert evaluations > 100
+    assert_array_equal(positions[0], position)
+    weight = np.array([0, -SILENT.gravity * motion_equations.link_masses(8, SILENT).sum()])
+    energy = motion_equations.total_energy(position, velocity, SILENT)
+    momentum = motion_equations.linear_momentum(velocity, SILENT)
+    spin = motion_equations.angular_momentum(position, velocity, SILENT)
+    assert np.abs(positions[-1] - positions[0]).max() > 1e-3
+    for time, x, v in zip(times, positions, velocities, strict=True):
+        assert_allclose(motion_equations.total_energy(x, v, SILENT), energy, rtol=1e-9)
+        assert_allclose(motion_equations.linear_momentum(v, SILENT), momentum + weight * time, rtol=1e-9, atol=1e-14)
+        assert_allclose(motion_equations.angular_momentum(x, v, SILENT), spin, rtol=1e-9)
+
+
+def test_joint_friction_keeps_momenta():
+    """Joint friction alone takes energy but neither linear nor angular momentum."""
+    parameters = MILD.with_values({"joint_damping": 0.0})
+    position, velocity = disturbed_loop(8, parameters)
+    positions, velocities, _ = motion_equations.solve_flight(
+        position, velocity, np.array([0.0, 3e-3]), parameters, gravity=False
+    )
+    before, after = (
+        motion_equations.total_energy(positions[t], velocities[t], parameters, gravity=False) for t in (0, 1)
+    )
+    assert after < 0.9999 * before
+    momentum = motion_equations.linear_momentum(velocity, parameters)
+    assert_allclose(motion_equations.linear_momentum(velocities[1], parameters), momentum, rtol=1e-10)
+    spin = motion_equations.angular_momentum(position, velocity, parameters)
+    assert_allclose(motion_equations.angular_momentum(positions[1], velocities[1], parameters), spin, rtol=1e-9)
+
+
+def test_angular_momentum_changes_by_the_dampers_torque():
+    """dL/dt about the centre of mass is −Σ b C × Ċ, and nothing else."""
+    position, velocity = disturbed_loop(8, MILD)
+    opening = motion_equations.joint_opening(position, MILD)
+    rate = motion_equations.joint_opening_rate(position, velocity, MILD)
+    expected = -MILD.joint_damping * np.sum(opening[:, 0] * rate[:, 1] - opening[:, 1] * rate[:, 0])
+    slope = motion_equations.acceleration(position, velocity, MILD)
+    # L is linear in the velocities, and X − X_cm adds (Ẋ − Ẋ_cm) × Ẋ = 0 in sum.
+    assert_allclose(motion_equations.angular_momentum(position, slope, MILD), expected, rtol=1e-6)
+    assert abs(expected) > 1e-9
+
+
+def test_lost_energy_is_integral_of_dissipated_power():
+    """E(0) − E(T) equals the time integral of friction and damping power (Gauss–Legendre quadrature)."""
+    position, velocity = disturbed_loop(6, MILD)
+    end = 1e-3
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    times = np.concatenate([[0.0], end / 2 * (1 + nodes), [end]])
+    positions, velocities, _ = motion_equations.solve_flight(position, velocity, times, MILD, rtol=1e-11, atol=1e-11)
+    power = [
+        motion_equations.friction_power(v, MILD) + motion_equations.damping_power(x, v, MILD)
+        for x, v in zip(positions[1:-1], velocities[1:-1], strict=True)
+    ]
+    energies = [motion_equations.total_energy(positions[t], velocities[t], MILD) for t in (0, -1)]
+    lost = energies[0] - energies[1]
+    assert lost > 1e-6
+    assert_allclose(end / 2 * np.dot(weights, power), lost, rtol=1e-6)
+
+
+def test_flight_refuses_and_reports():
+    """Unordered times are refused, and a solver that fails raises instead of returning numbers."""
+    position, velocity = disturbed_loop(4, MILD)
+    for times in ([0.0, 0.0], [1.0, 0.0], [], [[0.0, 1.0]]):
+        with pytest.raises(ValueError, match="strictly increasing"):
+            motion_equations.solve_flight(position, velocity, np.array(times), MILD)
+    for speed, error in ((np.nan, ValueError), (1e308, RuntimeError)):
+        velocity[0, 0] = speed
+        with pytest.raises(error, match=r"finite|failed between 0\.0 s and 0\.001 s"), np.errstate(all="ignore"):
+            motion_equations.solve_flight(position, velocity, np.array([0.0, 1e-3]), MILD)
+
+
+def test_scipy_is_needed_by_flight_only(monkeypatch):
+    """Importing the reference leaves SciPy alone, and without SciPy a flight names the extra to install."""
+    code = "import sys, warpchain.oracle.motion_equations; sys.exit('scipy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+    monkeypatch.setitem(sys.modules, "scipy.integrate", None)
+    position, velocity = disturbed_loop(4, MILD)
+    with pytest.raises(ImportError, match=r"warpchain\[scipy\]"):
+        motion_equations.solve_flight(position, velocity, np.array([0.0, 1e-3]), MILD)
+
+
+# --- the circular loop ---
+
+
+@pytest.mark.parametrize("n", [4, 6, 60])
+def test_closed_loop_has_closed_joints_of_given_speed(n):
+    """Joints of the circular loop are closed, stay closed, and move at the given speed, anticlockwise."""
+    position, velocity = motion_equations.circular_loop(n, PAPER, 5.0)
+    assert_allclose(motion_equations.joint_opening(position, PAPER), 0, atol=1e-15)
+    assert_allclose(motion_equations.joint_opening_rate(position, velocity, PAPER), 0, atol=1e-13)
+    _, joint = motion_equations.link_ends(position, PAPER)
+    spin = velocity[:, 2]
+    joint_velocity = velocity[:, :2] + spin[:, None] * [-1, 1] * (joint - position[:, :2])[:, ::-1]
+    assert_allclose(np.hypot(*joint_velocity.T), 5.0, rtol=1e-12)
+    assert motion_equations.angular_momentum(position, velocity, PAPER) > 0
+
+
+@pytest.mark.parametrize("n", [4, 6, 60])
+def test_tension_supplies_centripetal_force_and_no_torque(n):
+    """The closed form of the joint force, radial part included, holds alternating links on their circle exactly."""
+    speed = 5.0
+    position, velocity = motion_equations.circular_loop(n, PAPER, speed)
+    tangential, radial = motion_equations.circular_loop_force(n, PAPER, speed)
+    _, joint = motion_equations.link_ends(position, PAPER)
+    outwards = joint / np.linalg.norm(joint, axis=1)[:, None]
+    along = np.column_stack([-outwards[:, 1], outwards[:, 0]])
+    force = tangential * along + radial * np.where(np.arange(n) % 2, -1, 1)[:, None] * outwards
+    before = np.roll(force, 1, axis=0)
+    mass = motion_equations.link_masses(n, PAPER)[:, None]
+    expected = -mass * velocity[:, 2:] ** 2 * position[:, :2]
+    assert_allclose(force - before, expected, atol=1e-12 * tangential)
+    across = np.column_stack([-np.sin(position[:, 2]), np.cos(position[:, 2])])
+    assert_allclose(np.sum(across * (force + before), axis=1), 0, atol=1e-12 * tangential)
+
+
+def test_tension_to_leading_order():
+    """T tends to m̄ v²/ℓ and S/T to zero as n grows, like 1/n² and 1/n."""
+    mean = (PAPER.inner_mass + PAPER.outer_mass) / 2 * 25 / PAPER.link_length
+    for n in (60, 600):
+        tangential, radial = motion_equations.circular_loop_force(n, PAPER, 5.0)
+        assert 1 - tangential / mean == pytest.approx((np.pi / n) ** 2 / 2, rel=1e-2)
+        assert abs(radial / tangential) == pytest.approx(0.553 / 6.847 * np.pi / n, rel=1e-2)
+
+
+@pytest.mark.parametrize("n", [4, 6, 60])
+def test_stretched_loop_is_an_exact_equilibrium(n):
+    """With b = 0 every link of the stretched loop has just its centripetal acceleration; with b > 0 not quite."""
+    parameters = PAPER.with_values({"joint_stiffness": 1e5, "joint_damping": 0.0})
+    position, velocity = motion_equations.circular_loop(n, parameters, 5.0, stretched=True)
+    spin = velocity[0, 2]
+    scale = spin**2 * np.linalg.norm(position[0, :2])
+    result = motion_equations.acceleration(position, velocity, parameters, gravity=False)
+    assert_allclose(result[:, :2], -(spin**2) * position[:, :2], atol=1e-7 * scale)
+    torque_scale = motion_equations.circular_loop_force(n, parameters, 5.0)[0] * parameters.link_length
+    assert_allclose(result[:, 2] * motion_equations.link_inertias(n, parameters), 0, atol=1e-8 * torque_scale)
+    opening = motion_equations.joint_opening(position, parameters)
+    assert np.linalg.norm(opening, axis=1).min() > 1e-5
+    damped = parameters.with_values({"joint_damping": 1.0})
+    loss = spin**2 * np.sum(opening**2)
+    assert motion_equations.damping_power(position, velocity, damped) == pytest.approx(loss, rel=1e-9)
+
+
+def test_springs_open_by_tension_over_stiffness():
+    """k C of the stretched loop tends to the rigid joints' force, T along and ±S outwards, like 1/k."""
+    n, speed = 12, 5.0
+    force = motion_equations.circular_loop_force(n, PAPER, speed)
+    errors = []
+    for stiffness in (1e5, 1e6):
+        parameters = PAPER.with_values({"joint_stiffness": stiffness, "joint_damping": 0.0})
+        position, velocity = motion_equations.circular_loop(n, parameters, speed, stretched=True)
+        joint = motion_equations.joint_force(position, velocity, parameters)
+        middle = (np.arange(n) + 0.5) * 2 * np.pi / n
+        along = joint[:, 1] * np.cos(middle) - joint[:, 0] * np.sin(middle)
+        outwards = (joint[:, 0] * np.cos(middle) + joint[:, 1] * np.sin(middle)) * np.tile([1, -1], n // 2)
+        errors.append([np.ptp(along), np.ptp(outwards), along[0] - force[0], outwards[0] - force[1]])
+    assert_allclose(np.array(errors)[:, :2], 0, atol=1e-6)
+    assert_allclose(np.array(errors)[0, 2:] / np.array(errors)[1, 2:], 10, rtol=0.05)
+
+
+def test_stretched_loop_turns_like_a_rigid_body():
+    """Integrated for a twentieth of a turn, the stretched loop is where rigid rotation takes it."""
+    parameters = PAPER.with_values({"joint_stiffness": 1e5, "joint_damping": 0.0})
+    position, velocity = motion_equations.circular_loop(12, parameters, 5.0, stretched=True)
+    end = 0.05 * 2 * np.pi / velocity[0, 2]
+    positions, _, _ = motion_equations.solve_flight(position, velocity, np.array([0.0, end]), parameters, gravity=False)
+    turn = velocity[0, 2] * end
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    assert_allclose(positions[1, :, :2], position[:, :2] @ rotation.T, atol=1e-11)
+    assert_allclose(positions[1, :, 2], position[:, 2] + turn, atol=1e-9)
+
+
+def test_too_fast_a_loop_is_refused():
+    """A stretched loop that its springs can't hold is refused."""
+    parameters = PAPER.with_values({"joint_stiffness": 10.0, "joint_damping": 0.0})
+    with pytest.raises(ValueError, match="can't hold"):
+        motion_equations.circular_loop(12, parameters, 5.0, stretched=True)

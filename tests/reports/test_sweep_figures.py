@@ -1,0 +1,445 @@
+"""Figures of sweeps, and the numbers that stand on them."""
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+
+from tests.support.made_sweeps import FIGURE_6, SENSITIVITY, TOLERANCE, distance, make_sweep
+from warpchain.reports.statistics import (
+    NothingToShow,
+    cell_text,
+    number_text,
+    sensitivities,
+    tolerance_agreement,
+)
+from warpchain.reports.sweep_figures import (
+    figure6,
+    figures,
+    heat_map,
+    responses,
+    sensitivity,
+    status_counts,
+    tolerance,
+)
+from warpchain.reports.sweep_series import GREEN, RED
+from warpchain.status import Status
+from warpchain.store.sweep_result import SweepResult
+from warpchain.sweeps.plan import PlannedWalk
+
+SMALL: dict[str, Any] = FIGURE_6 | {
+    "samples": 3,
+    "blocks": [
+        {"name": "rest", "grid": {"links": [60, 120], "frequency": [10, 20]}},
+        {"name": "ellipse", "scene": {"start": "ellipse"}, "grid": {"links": [120], "frequency": [10, 20]}},
+    ],
+}
+
+
+def one_block(**keys: Any) -> dict[str, Any]:
+    """A sweep of one block."""
+    return {"version": 1, "name": "one", "seed": 1, "preset": "soft", "samples": 4} | keys
+
+
+def flawed(walk: PlannedWalk) -> float | Status | None:
+    """In the first cell one of three walks fails, in the second all; the last cell has not been run yet."""
+    if walk.index == 0 or walk.index in (3, 4, 5):
+        return Status.NOT_FINITE if walk.index else Status.TIME_LIMIT
+    return distance(walk) if walk.index < 15 else None
+
+
+@pytest.fixture(scope="module")
+def sweep6(tmp_path_factory: pytest.TempPathFactory) -> SweepResult:
+    """The sweep of Figure 6, complete."""
+    return make_sweep(tmp_path_factory.mktemp("sweep6"), FIGURE_6)
+
+
+@pytest.fixture(scope="module")
+def flawed6(tmp_path_factory: pytest.TempPathFactory) -> SweepResult:
+    """A small one with failures, and not yet complete."""
+    return make_sweep(tmp_path_factory.mktemp("flawed6"), SMALL, flawed)
+
+
+@pytest.fixture(scope="module")
+def saltelli(tmp_path_factory: pytest.TempPathFactory) -> SweepResult:
+    """A sweep for Sobol indices, complete."""
+    return make_sweep(tmp_path_factory.mktemp("saltelli"), SENSITIVITY)
+
+
+def panels(figure: Figure) -> list[Axes]:
+    """The axes of a figure that hold data, in order."""
+    return [axes for axes in figure.axes if axes.has_data() and axes.axison]
+
+
+def means(axes: Axes, color: str) -> dict[float, tuple[float, str]]:
+    """Position → mean and marker of the points of one colour in a panel."""
+    lines = [line for line in axes.lines if line.get_color() == color and line.get_marker() != "None"]
+    return {float(line.get_xdata()[0]): (float(line.get_ydata()[0]), str(line.get_marker())) for line in lines}
+
+
+# Figure 6
+
+
+def test_figure6_has_a_panel_for_each_number_of_links(sweep6: SweepResult) -> None:
+    """One panel for each n, with common axes, and nothing else but a legend that explains all signs."""
+    figure = figure6(sweep6)
+    drawn = panels(figure)
+    assert [axes.get_title(loc="left") for axes in drawn] == [f"$n$ = {n}" for n in (60, 90, 120, 150, 180)]
+    assert len({(axes.get_xlim(), axes.get_ylim()) for axes in drawn}) == 1
+    assert drawn[0].get_ylim()[0] == 0.0
+    legend = next(axes.get_legend() for axes in figure.axes if axes.get_legend())
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert texts[:2] == ["started at rest", "started as an ellipse"] and "2 standard" in texts[-1]
+
+
+def test_figure6_shows_means_boxes_and_bars(sweep6: SweepResult) -> None:
+    """The dot is the mean, the box one and the bar two standard deviations of the samples, each way."""
+    axes = panels(figure6(sweep6))[0]
+    expected = sweep6.blocks["rest"].dx[0]
+    mean, sd = expected.mean(axis=-1), expected.std(axis=-1, ddof=1)
+    dots = means(axes, RED)
+    assert list(dots) == [5.0, 10.0, 15.0, 20.0, 25.0, 30.0]
+    np.testing.assert_allclose([value for value, _ in dots.values()], mean)
+    boxes = [patch for patch in axes.patches if isinstance(patch, Rectangle)][1::2]
+    np.testing.assert_allclose([(box.get_y(), box.get_height()) for box in boxes], np.stack([mean - sd, 2 * sd], 1))
+    bars = [line.get_ydata() for line in axes.lines if len(line.get_xdata()) == 2]
+    np.testing.assert_allclose(bars, np.stack([mean - 2 * sd, mean + 2 * sd], 1))
+
+
+def test_figure6_tells_starts_apart(sweep6: SweepResult) -> None:
+    """Rest is red, ellipse green, with different markers, side by side about their common frequency."""
+    axes = panels(figure6(sweep6))[3]
+    rest, ellipse = means(axes, RED), means(axes, GREEN)
+    assert len(rest) == 6 and len(ellipse) == 5
+    assert {marker for _, marker in rest.values()} != {marker for _, marker in ellipse.values()}
+    np.testing.assert_allclose(np.add(list(rest)[1:], list(ellipse)) / 2, [10, 15, 20, 25, 30])
+
+
+def test_figure6_counts_what_is_not_in_the_means(flawed6: SweepResult) -> None:
+    """Failed and missing walks are counted under their panel; means are of the others, and no mean of none."""
+    first, second = panels(figure6(flawed6))
+    assert first.get_xlabel() == "4 of 6 walks failed"
+    assert second.get_xlabel() == "3 of 12 not run yet"
+    dots = means(first, RED)
+    assert list(dots) == [10.0]
+    np.testing.assert_allclose(dots[10.0][0], flawed6.blocks["rest"].dx[0, 0, 1:].mean())
+    assert len(means(second, GREEN)) == 1
+
+
+def test_figure6_of_one_walk_has_no_box(tmp_path: Path) -> None:
+    """One sample has a mean and no spread."""
+    result = make_sweep(tmp_path, one_block(samples=1, grid={"frequency": [10, 20]}))
+    (axes,) = panels(figure6(result))
+    assert len(means(axes, RED)) == 2 and not axes.patches
+
+
+def test_figure6_tells_blocks_of_one_start_apart(tmp_path: Path) -> None:
+    """Starts may be an axis; another block of the same start gets its name, a colour and a marker of its own."""
+    blocks = [
+        {"name": "all", "grid": {"start": ["rest", "ellipse"], "frequency": [10, 20]}},
+        {"name": "paper", "preset": "paper", "grid": {"frequency": [10, 20]}},
+        {"name": "other", "grid": {"frequency": [10, 20], "floor_friction": [0.2, 0.3]}},
+    ]
+    figure = figure6(make_sweep(tmp_path, one_block(blocks=blocks, samples=2)))
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts[:3] == ["started at rest", "started as an ellipse", "paper, started at rest"] and len(texts) == 5
+    handles = [handle for handle in figure.legends[0].legend_handles if isinstance(handle, Line2D)][:3]
+    assert len({handle.get_color() for handle in handles}) == len({handle.get_marker() for handle in handles}) == 3
+
+
+def test_figure6_needs_walks(tmp_path: Path) -> None:
+    """Without walks at rest, or without a fitting block, there is no figure; the reason is one line."""
+    result = make_sweep(tmp_path, one_block(grid={"frequency": [10, 20]}), lambda walk: Status.NOT_STEADY)
+    with pytest.raises(NothingToShow, match=r"^[^\n]+$"):
+        figure6(result)
+    result = make_sweep(tmp_path / "other", one_block(grid={"frequency": [10], "gravity": [1.6, 9.8]}))
+    with pytest.raises(NothingToShow, match="links and frequency"):
+        figure6(result)
+
+
+# Maps
+
+
+def test_heat_map_shows_the_statistics(flawed6: SweepResult) -> None:
+    """Maps hold mean and standard deviation of each cell, holes where there are none, and counts of what is lost."""
+    figure = heat_map(flawed6)
+    mean, sd = (axes for axes in figure.axes if axes.images and axes.get_ylim()[1] == 1.5)
+    found = flawed6.blocks["rest"].statistics()
+    np.testing.assert_array_equal(np.ma.filled(mean.images[0].get_array(), np.nan), found.mean)
+    np.testing.assert_array_equal(np.ma.filled(sd.images[0].get_array(), np.nan), found.sd)
+    assert [text.get_text() for text in mean.get_xticklabels()] == ["10", "20"]
+    texts = [text.get_text() for text in mean.texts]
+    assert "1 failed" in texts and "3 failed" in texts and f"{found.mean[0, 0]:.3g}" in texts
+    assert [axes.get_ylabel() for axes in figure.axes if axes.get_ylabel()] == [
+        "mean $Δx$ / m",
+        "standard deviation of $Δx$ / m",
+    ]
+
+
+def test_heat_map_of_any_quantity(sweep6: SweepResult) -> None:
+    """Any column can be mapped, in its unit; an unknown one is refused."""
+    assert "mean walk time / s" in [axes.get_ylabel() for axes in heat_map(sweep6, "walk_time").axes]
+    assert "mean bounces" in [axes.get_ylabel() for axes in heat_map(sweep6, "bounces").axes]
+    with pytest.raises(KeyError, match="bounces"):
+        heat_map(sweep6, "bouncs")
+
+
+def test_heat_map_of_many_cells(tmp_path: Path) -> None:
+    """A large map has no numbers in it, and no more ticks than there is room for."""
+    grid = {"links": [60, 80, 100, 120, 140], "frequency": {"from": 5, "to": 34, "step": 1}}
+    axes = heat_map(make_sweep(tmp_path, one_block(samples=2, grid=grid))).axes[0]
+    assert not axes.texts and len(axes.get_xticks()) <= 16
+    assert [text.get_text() for text in axes.get_xticklabels()][:2] == ["5", "7"]
+
+
+# Tolerances
+
+
+def test_tolerance_numbers(tmp_path: Path) -> None:
+    """Single walks and means of cells are compared with their partners at the other tolerance."""
+    result = make_sweep(tmp_path, TOLERANCE)
+    figure, agreement = tolerance(result)
+    loose, tight = result.dx[:, :, 0].reshape(4, 12), result.dx[:, :, 1].reshape(4, 12)
+    assert (agreement.loose, agreement.tight, agreement.lost) == (1e-6, 1e-9, 0)
+    np.testing.assert_allclose(agreement.differences, (loose / tight - 1).ravel())
+    assert agreement.greatest == np.abs(loose / tight - 1).max()
+    ratios = loose.mean(axis=1) / tight.mean(axis=1) - 1
+    np.testing.assert_allclose([cell.difference for cell in agreement.cells], ratios)
+    errors = (loose - tight).std(axis=1, ddof=1) / 12**0.5 / tight.mean(axis=1)
+    np.testing.assert_allclose([cell.standard_error for cell in agreement.cells], errors)
+    assert agreement.worst_cell.difference == pytest.approx(ratios[np.abs(ratios).argmax()])
+    left, right = figure.axes
+    np.testing.assert_array_equal(left.collections[1].get_offsets(), np.stack([tight.ravel(), loose.ravel()], 1))
+    assert right.get_yticklabels()[0].get_text() == "n = 60, ν = 10 Hz"
+    assert "48 walks at tolerances 1e-6 and 1e-9" in str(agreement)
+
+
+def test_tolerance_leaves_out_incomplete_pairs(tmp_path: Path) -> None:
+    """A pair counts if both walks came to rest; the others are counted, on the figure as well."""
+    content = one_block(same_samples_along=["tolerance"], grid={"tolerance": [1e-9, 1e-7, 1e-6]})
+
+    def outcome(walk: PlannedWalk) -> float | Status | None:
+        return {1: Status.STEP_LIMIT, 2: None, 5: Status.NOT_FINITE, 8: Status.TIME_LIMIT}.get(
+            walk.index, distance(walk)
+        )
+
+    result = make_sweep(tmp_path, content, outcome)
+    figure, agreement = tolerance(result)
+    assert agreement.lost == 3 and len(agreement.differences) == 1
+    assert agreement.greatest == abs(result.dx[2, 3] / result.dx[0, 3] - 1)
+    assert math.isnan(agreement.cells[0].standard_error) and agreement.cells[0].cell == "main"
+    assert "3 pairs are not complete" in figure.axes[1].get_xlabel() and "3 more pairs" in str(agreement)
+
+
+@pytest.mark.parametrize(
+    ("content", "outcome", "problem"),
+    [
+        (one_block(grid={"frequency": [10]}), distance, "no block has several"),
+        (one_block(grid={"tolerance": [1e-6, 1e-9]}), distance, "same_samples_along"),
+        (one_block(grid={"tolerance": [1e-6, 1e-9]}), lambda walk: Status.NOT_FINITE, "come to rest"),
+        (
+            one_block(
+                same_samples_along=["tolerance"],
+                blocks=[
+                    {"name": "a", "grid": {"tolerance": [1e-6, 1e-9]}},
+                    {"name": "b", "grid": {"tolerance": [1e-6, 1e-8]}},
+                ],
+            ),
+            distance,
+            "different tolerances",
+        ),
+    ],
+)
+def test_tolerance_compares_only_what_can_be_compared(
+    tmp_path: Path, content: dict[str, Any], outcome: Any, problem: str
+) -> None:
+    """Walks of other samples, or none at all, are not compared; the reason names the remedy."""
+    with pytest.raises(NothingToShow, match=problem):
+        tolerance_agreement(make_sweep(tmp_path, content, outcome))
+
+
+# Sensitivity
+
+
+def test_sensitivity_is_scipys(saltelli: SweepResult) -> None:
+    """Indices are those of scipy.stats.sobol_indices and lie inside their intervals, which are as wide as SciPy's."""
+    stats = pytest.importorskip("scipy.stats")
+    count = len(saltelli.drawn)
+    for place, cell in enumerate(sensitivities(saltelli)):
+        table = saltelli.dx[place].reshape(-1, count + 2).T
+        func = {"f_A": table[:1], "f_B": table[1:2], "f_AB": table[2:, None]}
+        expected = stats.sobol_indices(func=func, n=64)
+        spread = expected.bootstrap(n_resamples=500)
+        order = [saltelli.drawn.index(name) for name in cell.names]
+        np.testing.assert_allclose(cell.first_order, expected.first_order[order], atol=1e-12)
+        np.testing.assert_allclose(cell.total_order, expected.total_order[order], atol=1e-12)
+        for values, ends, theirs in (
+            (cell.first_order, cell.first_order_interval, spread.first_order.confidence_interval),
+            (cell.total_order, cell.total_order_interval, spread.total_order.confidence_interval),
+        ):
+            assert ((ends[:, 0] < values) & (values < ends[:, 1])).all()
+            widths = np.ptp(ends, axis=1) / (theirs.high - theirs.low)[order]
+            assert np.median(widths) == pytest.approx(1.0, abs=0.15)
+        assert list(cell.total_order) == sorted(cell.total_order, reverse=True)
+        assert (cell.samples, cell.lost) == (64, 0)
+
+
+def test_sensitivity_finds_what_matters(tmp_path: Path) -> None:
+    """With Δx = g + 2 R the shares of the variance are known, and the intervals hold them; all else has none."""
+    distributions = {
+        "all": "fixed",
+        "gravity": {"uniform": [9.0, 10.0]},
+        "sprocket_radius": {"uniform": [0.05, 0.06]},
+        "floor_friction": "table",
+    }
+    content = one_block(sampler="saltelli", samples=256, distributions=distributions, grid={"frequency": [10]})
+
+    def outcome(walk: PlannedWalk) -> float:
+        parameters = walk.setup.parameters
+        return parameters.gravity + 50 * parameters.sprocket_radius
+
+    (cell,) = sensitivities(make_sweep(tmp_path, content, outcome=outcome))
+    assert cell.names == ("gravity", "sprocket_radius", "floor_friction")
+    exact = np.array([0.8, 0.2, 0.0])
+    for values, ends in ((cell.first_order, cell.first_order_interval), (cell.total_order, cell.total_order_interval)):
+        np.testing.assert_allclose(values, exact, atol=0.12)
+        assert ((ends[:, 0] <= exact) & (exact <= ends[:, 1])).all()
+
+
+def test_sensitivity_figure(saltelli: SweepResult) -> None:
+    """A panel for each cell, quantities in a common order with their symbols, two bars for each; always the same."""
+    figure, cells = sensitivity(saltelli)
+    assert [cell.cell for cell in cells] == ["ν = 10 Hz", "ν = 20 Hz"]
+    drawn = panels(figure)
+    assert [axes.get_title(loc="left") for axes in drawn] == ["ν = 10 Hz", "ν = 20 Hz"]
+    assert drawn[0].get_yticklabels()[0].get_text() == "floor friction $μ_\\mathrm{fc}$"
+    assert len(drawn[0].patches) == 2 * len(saltelli.drawn)
+    place = cells[0].names.index("floor_friction")
+    assert drawn[0].patches[place].get_width() == cells[0].total_order[place]
+    np.testing.assert_array_equal(cells[0].total_order_interval, sensitivities(saltelli)[0].total_order_interval)
+
+
+def test_sensitivity_leaves_out_incomplete_samples(tmp_path: Path) -> None:
+    """A sample with a failed walk is left out as a whole and counted; a block without two samples has no indices."""
+    distributions = {"all": "fixed", "floor_friction": "table", "phase": "table", "clearance": "table"}
+    content = one_block(sampler="saltelli", samples=8, distributions=distributions, grid={"frequency": [10, 20]})
+
+    def outcome(walk: PlannedWalk) -> float | Status:
+        return Status.TIME_LIMIT if walk.index in (3, 5) or walk.cell == (1,) else distance(walk)
+
+    figure, (cell,) = sensitivity(make_sweep(tmp_path, content, outcome))
+    assert (cell.samples, cell.lost, cell.cell) == (6, 2, "ν = 10 Hz")
+    assert panels(figure)[0].get_xlabel() == "2 of 8 samples are not complete"
+    with pytest.raises(NothingToShow, match="complete samples"):
+        sensitivities(make_sweep(tmp_path / "none", content, lambda walk: Status.TIME_LIMIT))
+    with pytest.raises(NothingToShow, match="sampler: saltelli"):
+        sensitivities(make_sweep(tmp_path / "random", one_block(grid={"frequency": [10]})))
+
+
+def test_responses_show_what_a_block_varies(tmp_path: Path) -> None:
+    """A panel for each block that varies one quantity, numbers or names; lost walks are counted."""
+    blocks = [
+        {"name": "friction", "grid": {"floor_friction": [0.135, 0.27, 0.54]}},
+        {"name": "stiffness", "grid": {"joint_stiffness": [1e6, 1e7]}},
+        {"name": "preset", "grid": {"preset": ["soft", "paper"]}},
+        {"name": "figure6", "grid": {"frequency": [10, 20]}},
+    ]
+
+    def outcome(walk: PlannedWalk) -> float | Status:
+        return Status.NOT_FINITE if walk.index == 12 else distance(walk)
+
+    result = make_sweep(tmp_path, one_block(blocks=blocks), outcome)
+    friction, stiffness, presets = panels(responses(result))
+    assert friction.get_xlabel() == "floor friction $μ_\\mathrm{fc}$"
+    assert stiffness.get_xlabel() == "joint stiffness $k$ / N/m\n1 of 8 walks failed"
+    assert [text.get_text() for text in stiffness.get_xticklabels()] == ["1e6", "1e7"]
+    assert [text.get_text() for text in presets.get_xticklabels()] == ["soft", "paper"]
+    np.testing.assert_allclose(friction.lines[0].get_ydata(), result.blocks["friction"].dx.mean(axis=-1))
+    with pytest.raises(NothingToShow, match="varies one quantity"):
+        responses(make_sweep(tmp_path / "none", one_block(grid={"frequency": [10, 20]})))
+
+
+# All of them
+
+
+def test_status_counts(flawed6: SweepResult, sweep6: SweepResult) -> None:
+    """Every end of every block has a bar as long as its count, which stands beside it."""
+    axes = status_counts(flawed6).axes[0]
+    bars = dict(
+        zip(
+            [text.get_text() for text in axes.get_yticklabels()],
+            [patch.get_width() for patch in axes.patches],
+            strict=True,
+        )
+    )
+    assert bars == {
+        "rest: at rest": 8,
+        "rest: time limit": 1,
+        "rest: not finite": 3,
+        "ellipse: at rest": 3,
+        "ellipse: not run yet": 3,
+    }
+    assert " 1 (8.33%)" in [text.get_text() for text in axes.texts]
+    assert [text.get_text() for text in status_counts(sweep6).axes[0].texts] == [" 360", " 120"]
+
+
+def test_status_counts_of_many_blocks(tmp_path: Path) -> None:
+    """Many blocks are counted together."""
+    blocks = [{"name": f"b{number}", "grid": {"frequency": [10]}} for number in range(8)]
+    axes = status_counts(make_sweep(tmp_path, one_block(blocks=blocks))).axes[0]
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["at rest"]
+    assert [patch.get_width() for patch in axes.patches] == [32]
+
+
+def test_figures_are_those_that_a_sweep_has_something_for(
+    tmp_path: Path, sweep6: SweepResult, saltelli: SweepResult
+) -> None:
+    """Each kind of sweep gives its own figures, all of which can be drawn; counts are always among them."""
+    compared = make_sweep(tmp_path / "a", TOLERANCE)
+    nothing = make_sweep(tmp_path / "b", one_block(grid={"frequency": [10, 20]}), lambda walk: None)
+    for result, names in (
+        (sweep6, ["figure6", "heat_map", "status_counts"]),
+        (compared, ["tolerance", "status_counts"]),
+        (saltelli, ["figure6", "sensitivity", "status_counts"]),
+        (nothing, ["status_counts"]),
+    ):
+        pictures = list(figures(result))
+        assert [picture.name for picture in pictures] == names
+        assert all(picture.caption.endswith((".", "%")) and "\n" not in picture.caption for picture in pictures)
+        pictures[0].figure.savefig(tmp_path / "picture.png", dpi=40)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(1e-6, "1e-6"), (3e7, "3e7"), (1e-10, "1e-10"), (0.27, "0.27"), (60, "60"), (1e100, "1e100")]
+)
+def test_number_text(value: float, text: str) -> None:
+    """Numbers are written as people write them."""
+    assert number_text(value) == text
+
+
+def test_cell_text() -> None:
+    """Cells are named by symbols, values and units."""
+    text = cell_text({"links": np.int64(60), "frequency": np.float64(7.5), "start": "rest", "self_contact": np.True_})
+    assert text == "n = 60, ν = 7.5 Hz, start = rest, self contact = True"
+    assert cell_text({"coulomb_friction": 1.1e-4, "tolerance": 1e-9}) == "τ_c = 0.00011 N m, tolerance = 1e-9"
+    assert cell_text({}) == ""
+
+
+def test_light_import() -> None:
+    """Numbers need no matplotlib, and figures no pyplot."""
+    program = (
+        "import sys, warpchain.reports.statistics\n"
+        "print('matplotlib' in sys.modules)\n"
+        "import warpchain.reports.sweep_figures\n"
+        "print('matplotlib.pyplot' in sys.modules)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "False"]

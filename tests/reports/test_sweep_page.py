@@ -1,0 +1,391 @@
+"""The report of a sweep: what it says, that it stands alone, and that a browser shows it."""
+
+import html
+import math
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from PIL import Image
+
+from tests.support.made_sweeps import FIGURE_6, distance, make_sweep
+from tests.support.made_walks import make_unreleased, make_walk
+from warpchain.cli.main import main
+from warpchain.inputs.parameters import InputError
+from warpchain.reports import sweep_page
+from warpchain.reports.sweep_page import write_report
+from warpchain.status import Status
+from warpchain.store.sweep_result import load
+from warpchain.sweeps.plan import PlannedWalk, load_sweep
+from warpchain.walks.walk_result import WalkResult
+
+CONTENT: dict[str, Any] = FIGURE_6 | {
+    "samples": 3,
+    "distributions": {"gravity": {"uniform": [9.0, 10.0]}},
+    "blocks": [
+        {"name": "rest", "grid": {"links": [60, 120], "frequency": [10, 20]}},
+        {"name": "ellipse", "scene": {"start": "ellipse"}, "grid": {"links": [120], "frequency": [10, 20]}},
+    ],
+}
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+
+def flawed(walk: PlannedWalk) -> float | Status | None:
+    """Two failures, and a walk that has not been run yet."""
+    return {3: Status.TIME_LIMIT, 13: Status.NOT_FINITE, 17: None}.get(walk.index, distance(walk))
+
+
+class Document(HTMLParser):
+    """Text of a page by section, rows of its tables, and whether its elements are closed in order."""
+
+    EMPTY = ("meta", "img")
+
+    def __init__(self, page: str) -> None:
+        """Parse a page."""
+        super().__init__()
+        self.open: list[str] = []
+        self.section = ""
+        self.texts: dict[str, str] = {}
+        self.rows: dict[str, list[list[str]]] = {}
+        self.images: list[str] = []
+        self.frames: list[str] = []
+        self.feed(page)
+        self.close()
+        assert not self.open
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Note what begins."""
+        given = {name: value or "" for name, value in attrs}
+        if tag not in self.EMPTY:
+            self.open.append(tag)
+        if tag == "section":
+            self.section = given["id"]
+        elif tag == "tr":
+            self.rows.setdefault(self.section, []).append([])
+        elif tag in ("td", "th"):
+            self.rows[self.section][-1].append("")
+        elif tag == "img":
+            assert given["alt"]
+            self.images.append(given["src"])
+        elif tag == "iframe":
+            self.frames.append(given["srcdoc"])
+
+    def handle_endtag(self, tag: str) -> None:
+        """What ends is what began last."""
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        """Add to the section and the cell."""
+        self.texts[self.section] = self.texts.get(self.section, "") + data
+        if self.open[-1:] in (["td"], ["th"]):
+            self.rows[self.section][-1][-1] += data
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sweep with failures, not yet complete."""
+    path: Path = tmp_path_factory.mktemp("report") / "sweep"
+    make_sweep(path, CONTENT, flawed)
+    return path
+
+
+@pytest.fixture
+def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out the figures, which take most of the time."""
+    monkeypatch.setattr(sweep_page, "_figures", lambda result: "none")
+
+
+@pytest.fixture(scope="module")
+def page(folder: Path) -> str:
+    """Its report, without an animation."""
+    path = folder.parent / "report.html"
+    write_report(folder, path)
+    return path.read_text(encoding="utf-8")
+
+
+def with_walk(monkeypatch: pytest.MonkeyPatch, made: Callable[..., WalkResult], **changes: Any) -> list[Any]:
+    """Let run_walk give a made-up walk; the setups it is asked for."""
+    asked: list[Any] = []
+
+    def run_walk(setup: Any, *, frame_interval: float) -> WalkResult:
+        assert frame_interval > 0
+        asked.append(setup)
+        return made(**changes)
+
+    monkeypatch.setattr("warpchain.run.single_walk.run_walk", run_walk)
+    return asked
+
+
+# What it says
+
+
+def test_cells(folder: Path, page: str) -> None:
+    """Every cell of every block is in a table, with its mean, spread and counts."""
+    rows = Document(page).rows["cells"]
+    assert rows[0] == ["n", "ν / Hz", "mean Δx / m", "s.d. / m", "s.e. / m", "at rest", "failed"]
+    assert len(rows) == 2 + 4 + 2
+    dx = load(folder).blocks["rest"].dx
+    sample = dx[0, 1, 1:]
+    mean, sd = sample.mean(), sample.std(ddof=1)
+    assert rows[2] == ["60", "20", f"{mean:.4f}", f"{sd:.4f}", f"{sd / 2**0.5:.4f}", "2", "1"]
+    assert rows[5][-1] == "not run yet" and rows[7][-3:] == ["2", "0", "1"]
+
+
+def test_failed_walks(page: str) -> None:
+    """Each failed walk is named with its block, cell and sample, under what its status means."""
+    document = Document(page)
+    assert document.rows["failed-walks"] == [
+        ["walk", "block", "cell", "sample"],
+        ["3", "rest", "n = 60, ν = 20 Hz", "0"],
+        ["walk", "block", "cell", "sample"],
+        ["13", "ellipse", "n = 120, ν = 10 Hz", "1"],
+    ]
+    for status in (Status.TIME_LIMIT, Status.NOT_FINITE):
+        assert f"{status.label}: 1" in document.texts["failed-walks"]
+        assert status.sentence in document.texts["failed-walks"]
+    assert Status.NOT_STEADY.sentence not in document.texts["failed-walks"]
+
+
+def test_counts_at_the_top(page: str) -> None:
+    """The first thing to see is the name and how many walks there are, failed and missing ones too."""
+    top = Document(page).texts[""]
+    assert "made <up> & down" in top
+    assert re.search(r"walks18at rest15failed2not run yet1", top)
+
+
+@pytest.mark.usefixtures("no_figures")
+def test_many_failures_are_cut_short(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A long list of failures ends with how many more there are; a sweep without failures says so."""
+    monkeypatch.setattr(sweep_page, "_MOST_FAILED", 2)
+    content = CONTENT | {"blocks": None, "grid": {"frequency": [10]}, "samples": 5}
+    make_sweep(tmp_path / "sweep", content, lambda walk: Status.STEP_LIMIT)
+    write_report(tmp_path / "sweep", tmp_path / "report.html")
+    document = Document((tmp_path / "report.html").read_text())
+    assert len(document.rows["failed-walks"]) == 3 and "… and 3 more." in document.texts["failed-walks"]
+    make_sweep(tmp_path / "good", content)
+    write_report(tmp_path / "good", tmp_path / "report.html")
+    assert "None." in Document((tmp_path / "report.html").read_text()).texts["failed-walks"]
+
+
+def test_parameters_with_units(page: str) -> None:
+    """Every field has its value, spread and unit; where blocks differ, both values stand."""
+    rows = {row[0]: row[1:4] for row in Document(page).rows["parameters"]}
+    assert rows["link_length"] == ["ℓ", "0.01268 ± 1e-5", "m"]
+    assert rows["joint_stiffness"] == ["k", "1e7", "N/m"]
+    assert rows["gravity"] == ["g", "uniform, 9 … 10", "m/s²"]
+    assert rows["frequency"] == ["ν", "10, 20", "Hz"]
+    assert rows["links"] == ["n", "60, 120; ellipse: 120", ""]
+    assert rows["start"] == ["", "rest; ellipse: ellipse", ""]
+    assert rows["preset"] == ["", "soft", ""]
+    assert rows["self_contact"] == ["", "true", ""]
+
+
+def test_sweep_can_be_run_again(folder: Path, page: str) -> None:
+    """The file on the page gives the same sweep, and the digest stands under provenance."""
+    text = re.search(r"<pre>(.*?)</pre>", page, re.DOTALL)
+    assert text
+    again = load_sweep(yaml.safe_load(html.unescape(text[1])))
+    provenance = dict(Document(page).rows["provenance"])
+    assert again.digest() == load(folder).provenance["digest"] == provenance["digest of the sweep (SHA-256)"]
+    assert again.name == CONTENT["name"] and provenance["seed"] == "6"
+    assert "warp-lang 1." in provenance["software that began the sweep"]
+
+
+def test_figures(page: str) -> None:
+    """Every figure of the sweep is in the page."""
+    document = Document(page)
+    assert len(document.images) == 3 and "How the walks ended." in document.texts["figures"]
+
+
+# One walk in motion
+
+
+@pytest.mark.usefixtures("no_figures")
+def test_walk_is_run_again(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The chosen walk is run from its planned setup, shown in a player, and compared with the sweep's."""
+    result = load(folder)
+    dx = float(result.blocks["ellipse"].dx[0, 1, 0])
+    asked = with_walk(monkeypatch, make_walk, dx=dx)
+    write_report(folder, tmp_path / "report.html", animation_of=15)
+    document = Document((tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert asked == [load_sweep(result.sweep).planned(15).setup]
+    text = document.texts["one-walk"]
+    assert f"Walk 15 (block ellipse, n = 120, ν = 20 Hz, sample 0), run again for this page: Δx = {dx:.4f} m" in text
+    assert "The sweep has the same, to the bit." in text
+    assert len(document.images) == 2
+    (player,) = document.frames
+    assert player.startswith("<!DOCTYPE html>") and "getElementById" in player
+    drawn = {row[0]: row[1:] for row in document.rows["one-walk"]}
+    assert drawn["gravity"] == [f"{result.blocks['ellipse'].gravity[0, 1, 0]:g}", "m/s²"]
+
+
+@pytest.mark.parametrize(
+    ("index", "dx", "text"),
+    [
+        (0, 9.0, "another result, Δx = "),
+        (3, 9.0, "another result, time_limit"),
+        (17, 9.0, "has not run it yet"),
+        (0, math.nan, "at_rest. The sweep has the same"),
+    ],
+)
+@pytest.mark.usefixtures("no_figures")
+def test_another_result_is_admitted(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, index: int, dx: float, text: str
+) -> None:
+    """If the walk came out otherwise than in the sweep, or was never run there, the page says so."""
+    with_walk(monkeypatch, make_walk, dx=dx)
+    write_report(folder, tmp_path / "report.html", animation_of=index)
+    assert text in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("made", "changes", "reason"),
+    [
+        (make_unreleased, {}, "it has no frames"),
+        (
+            make_walk,
+            {"status": Status.NOT_FINITE, "dx": math.nan, "frame_joints": np.full((41, 30, 2), np.nan)},
+            "finite",
+        ),
+    ],
+)
+@pytest.mark.usefixtures("no_figures")
+def test_walk_without_pictures(
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    made: Callable[..., WalkResult],
+    changes: dict[str, Any],
+    reason: str,
+) -> None:
+    """A failed walk that can't be shown leaves the reason in its place."""
+    with_walk(monkeypatch, made, **changes)
+    write_report(folder, tmp_path / "report.html", animation_of=13)
+    document = Document((tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert reason in document.texts["one-walk"] and "No moving picture" in document.texts["one-walk"]
+    assert not document.frames and not document.images
+
+
+@pytest.mark.usefixtures("no_figures")
+def test_a_walk_is_run_again_on_another_device(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With --device the walk is that of the sweep but for where it runs; without --walk there is nothing to run."""
+    asked = with_walk(monkeypatch, make_walk)
+    monkeypatch.chdir(tmp_path)
+    for arguments in (["--walk", "15"], ["--walk", "15", "--device", "cuda:1"]):
+        with pytest.raises(SystemExit) as end:
+            main(["report", str(folder), "-o", "report.html", *arguments])
+        assert not end.value.code
+    there, here = asked[1], asked[0]
+    assert (here.options.device, there.options.device) == ("cpu", "cuda:1")
+    assert (here.scene, here.parameters) == (there.scene, there.parameters)
+    Path("report.html").unlink()
+    with pytest.raises(SystemExit, match="2"):
+        main(["report", str(folder), "-o", "report.html", "--device", "cpu"])
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("index", [-1, 18])
+def test_unknown_walk_is_refused(folder: Path, tmp_path: Path, index: int) -> None:
+    """A walk that does not exist is refused with the numbers that do, and nothing is written."""
+    with pytest.raises(InputError, match=r"^--walk: there is no walk -?\d+; give 0 … 17$"):
+        write_report(folder, tmp_path / "report.html", animation_of=index)
+    assert not list(tmp_path.iterdir())
+
+
+# The file
+
+
+@pytest.mark.usefixtures("no_figures")
+def test_report_stands_alone(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No address of anything outside is in the page, the player included, and the browser is told to load nothing."""
+    with_walk(monkeypatch, make_walk)
+    write_report(folder, tmp_path / "report.html", animation_of=0)
+    page = html.unescape((tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert not re.findall(r"https?:|ftp:|@import|url\(|<link|<script[^>]*src|\bfetch\(|XMLHttp|\bimport\(", page)
+    sources = re.findall(r'\b(?:src|href|action|data|poster)="([^"]*)"', page)
+    assert sources and all(source.startswith(("data:image/png;base64,", "#")) for source in sources)
+    assert "default-src 'none'" in page
+
+
+def test_report_is_the_same_each_time(folder: Path, page: str, tmp_path: Path) -> None:
+    """A folder gives the same bytes each time, and an older file is replaced."""
+    (tmp_path / "report.html").write_text("old")
+    write_report(folder, tmp_path / "report.html")
+    assert (tmp_path / "report.html").read_text(encoding="utf-8") == page
+
+
+@pytest.mark.usefixtures("no_figures")
+def test_report_is_written_whole_or_not_at_all(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What goes wrong half-way leaves the old file and no other; the error names the file in one line."""
+    target = tmp_path / "report.html"
+    target.write_text("old")
+
+    def full(*arguments: Any, **settings: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(OSError, match=r"report\.html: cannot be written \(No space left on device\)"):
+        write_report(folder, target)
+    assert [path.name for path in tmp_path.iterdir()] == ["report.html"] and target.read_text() == "old"
+    with pytest.raises(OSError, match=r"nowhere.report\.html: cannot be written"):
+        write_report(folder, tmp_path / "nowhere" / "report.html")
+
+
+def test_folder_without_a_sweep_is_refused(tmp_path: Path) -> None:
+    """A folder that holds no sweep gives a clear error."""
+    with pytest.raises(InputError, match="no sweep in this folder"):
+        write_report(tmp_path, tmp_path / "report.html")
+
+
+def test_light_import() -> None:
+    """The module loads neither matplotlib nor Warp."""
+    program = "import sys, warpchain.reports.sweep_page; print([m for m in ('matplotlib', 'warp') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+# In a browser
+
+
+@pytest.mark.skipif(
+    BROWSER is None, reason="no browser: none of chromium, chromium-browser, google-chrome is installed"
+)
+def test_a_browser_shows_the_report(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A real browser, cut off from any network, draws figures, text and the chain in its player without complaint."""
+    assert BROWSER is not None
+    with_walk(monkeypatch, make_walk)
+    write_report(folder, tmp_path / "report.html", animation_of=0)
+    command = [
+        BROWSER,
+        *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
+        *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+        *("--host-resolver-rules=MAP * ~NOTFOUND", "--enable-logging=stderr", "--hide-scrollbars"),
+        "--force-prefers-reduced-motion",  # the player waits at the first picture
+        *("--window-size=1100,5000", "--virtual-time-budget=2000", f"--user-data-dir={tmp_path / 'profile'}"),
+        f"--screenshot={tmp_path / 'report.png'}",
+        (tmp_path / "report.html").as_uri(),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert not [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+    picture = np.asarray(Image.open(tmp_path / "report.png").convert("RGB")).astype(int)
+    assert picture.shape == (5000, 1100, 3)
+
+    def area(color: str) -> int:
+        """Number of pixels of a colour, as in #0072B2."""
+        wanted = [int(color[place : place + 2], 16) for place in (1, 3, 5)]
+        return int((np.abs(picture - wanted).max(axis=2) <= 2).sum())
+
+    assert area("#9CCBE6") > 50  # inner links, which only the player draws
+    assert area("#D55E00") > 500  # Figure 6 and the counts of failures
+    assert area("#222222") > 500  # text
+    assert area("#FFFFFF") < 0.97 * picture[..., 0].size

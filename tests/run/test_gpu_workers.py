@@ -1,0 +1,86 @@
+"""A worker process for each GPU: what each sees, what is refused; no GPU is needed for that."""
+
+import os
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.run.test_sweep_run import TINY, data_of
+from warpchain.cli.main import main
+from warpchain.inputs.parameters import InputError
+from warpchain.run.gpu_workers import gpu_workers, visible_gpus
+from warpchain.run.sweep_run import sweep
+
+GPU_OF_WORKER = "__import__('time').sleep(0.5) or __import__('os').environ['CUDA_VISIBLE_DEVICES']"
+"""Takes a while, so that other workers have to take the next ones; text, for workers cannot import tests."""
+
+
+def test_each_worker_has_a_gpu_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Workers see one GPU each, those that this process may use, and too many are refused; a sweep runs on them."""
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "5, GPU-abc,2")
+    assert visible_gpus(2) == ["5", "GPU-abc"]
+    with pytest.raises(
+        InputError, match="--gpus: 4 wanted, but CUDA_VISIBLE_DEVICES is '5, GPU-abc,2'; give at most 3"
+    ):
+        visible_gpus(4)
+    with gpu_workers(2) as executor:
+        seen = list(executor.map(eval, [GPU_OF_WORKER] * 4))
+    assert set(seen) == {"5", "GPU-abc"} and os.environ["CUDA_VISIBLE_DEVICES"] == "5, GPU-abc,2"
+    monkeypatch.delenv("CUDA_VISIBLE_DEVICES")
+    assert visible_gpus(3) == ["0", "1", "2"]
+
+
+def test_each_worker_is_asked_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However quickly the first one answers; what fails in one of them reaches the caller, and nothing hangs."""
+    monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
+    with gpu_workers(3) as executor:
+        first, again = executor.in_each(os.getpid), executor.in_each(os.getpid)
+        assert len(set(first)) == 3 and set(first) == set(again)
+    with gpu_workers(2) as executor, pytest.raises(ZeroDivisionError):
+        executor.in_each(eval, "1 // int(__import__('os').environ['CUDA_VISIBLE_DEVICES'])")
+
+
+def test_an_exception_ends_what_workers_are_doing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C does not wait for tasks under way, nor for those that the pool has handed out already."""
+    monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
+    with pytest.raises(KeyboardInterrupt), gpu_workers(1) as executor:
+        executor.in_each(os.getpid)
+        for _ in range(3):
+            executor.submit(time.sleep, 30)
+        began = time.monotonic()
+        raise KeyboardInterrupt
+    assert time.monotonic() - began < 15
+
+
+def test_a_sweep_runs_on_gpu_workers(tmp_path: Path) -> None:
+    """What such workers write are the bytes of one thread; on the CPU here, whatever GPU they were given."""
+    sweep(TINY, tmp_path / "one", workers=1)
+    with gpu_workers(2) as executor:
+        sweep(TINY, tmp_path / "two", executor=executor, workers=2)
+    assert data_of(tmp_path / "two") == data_of(tmp_path / "one")
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (["--gpus", "0"], "Invalid value for '--gpus'"),
+        (["--gpus", "2", "--workers", "3"], "error: --workers: given together with --gpus; leave one out"),
+        (["--gpus", "2", "--scheduler", "tcp://a:1"], "error: --scheduler: given together with --gpus; leave one out"),
+        (["--gpus", "2", "--device", "cpu"], "error: --device: cpu is given together with --gpus; give cuda"),
+        (["--gpus", "2"], "error: --gpus: 2 wanted, but CUDA_VISIBLE_DEVICES is '3'; give at most 1"),
+    ],
+)
+def test_what_contradicts_gpus_is_refused(
+    tmp_path: Path, given: list[str], message: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """One line says which option, and no folder is made."""
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "3")
+    source = tmp_path / "tiny.yaml"
+    source.write_text(yaml.safe_dump(TINY, sort_keys=False))
+    with pytest.raises(SystemExit) as caught:
+        main(["sweep", str(source), "-o", str(tmp_path / "sweep"), *given])
+    assert caught.value.code == 2
+    assert message in capfd.readouterr().err
+    assert not (tmp_path / "sweep").exists()

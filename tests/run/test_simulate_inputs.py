@@ -1,0 +1,302 @@
+"""What `simulate` and `walk` refuse: one line that begins with the field's name, before anything is computed."""
+
+import re
+
+import numpy as np
+import pytest
+
+import warpchain
+from warpchain import InputError, Status
+from warpchain.engine.batch import Batch
+from warpchain.inputs.parameters import preset
+from warpchain.oracle import motion_equations
+
+SOFT = preset("soft")
+POSITION, VELOCITY = motion_equations.circular_loop(8, SOFT, 1.0)
+
+
+class ComputedError(Exception):
+    """A kernel was about to run."""
+
+
+@pytest.fixture(autouse=True)
+def nothing_runs(monkeypatch):
+    """Compiling or launching a kernel ends the test."""
+
+    def refuse(*arguments, **keywords):
+        raise ComputedError
+
+    for name in ("compile", "launch", "run"):
+        monkeypatch.setattr(Batch, name, refuse)
+
+
+def refused(call, *arguments, **keywords):
+    """The message with which a call refuses its arguments: one line, of a `ValueError`."""
+    with pytest.raises(InputError) as caught:
+        call(*arguments, **keywords)
+    message = str(caught.value)
+    assert isinstance(caught.value, ValueError)
+    assert "\n" not in message
+    return message
+
+
+def brief(value):
+    """A short name of a test's argument."""
+    return repr(value)[:30]
+
+
+def with_value(array, value):
+    """A copy of a state with one value replaced."""
+    changed = array.astype(np.result_type(array, type(value)))
+    changed[3, 1] = value
+    return changed
+
+
+# --- simulate ---
+
+
+def test_good_input_is_computed():
+    """Arrays, lists and numbers of NumPy are accepted: the tests below fail for no other reason."""
+    for position in (POSITION, POSITION.tolist(), POSITION.astype(np.float32), np.zeros((4, 3), dtype=int)):
+        velocity = np.zeros_like(position, dtype=float)
+        for duration in (0, 0.0, 1, 1.5, np.float32(1), np.int64(1)):
+            with pytest.raises(ComputedError):
+                warpchain.simulate("soft", position, velocity, duration)
+    for times in ([0.0], [1.0], (0.0, 1.0), np.linspace(0, 1, 5), None):
+        with pytest.raises(ComputedError):
+            warpchain.simulate(SOFT, POSITION, VELOCITY, 1.0, times=times)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (
+            {"method": "rk4"},
+            r"options\.method: 'rk4' is unknown; give one of standard, explicit, reference, rkf78, dp5, bs32, os32, "
+            r"rodas4p, rodas5p, hybrid",
+        ),
+        ({"method": None}, r"options\.method: None is unknown; .*"),
+        ({"tolerance": 0.0}, r"options\.tolerance: 0.0 is less than 1e-13; .*"),
+        ({"tolerance": 1.0}, r"options\.tolerance: 1.0 is greater than 0.1; .*"),
+        ({"tolerance": float("nan")}, r"options\.tolerance: nan is not finite; .*"),
+        ({"tolerance": "1e-6"}, r"options\.tolerance: '1e-6' is text; .*"),
+        ({"device": "gpu"}, r"options\.device: 'gpu' is no device; .*"),
+        ({"device": None}, r"options\.device: None is not text; .*"),
+        ({"self_contact": "yes"}, r"options\.self_contact: 'yes' is not a truth value; .*"),
+        ({"self_contact": 1}, r"options\.self_contact: 1 is not a truth value; .*"),
+        ({"skin": -1.0}, r"options\.skin: -1.0 is not greater than 0 m; .*"),
+        ({"step_limit": 0}, r"options\.step_limit: 0 is less than 1; .*"),
+        ({"contact_step": 0.0}, r"options\.contact_step: 0.0 is not greater than 0 s; .*"),
+        ({"controller": "pid"}, r"options\.controller: 'pid' is unknown; .*"),
+        ({"smallest_step": 1e-3}, r"options\.smallest_step: 0.001 is not smaller than contact_step 2e-05 s; .*"),
+        ({"toleranze": 1e-3}, r"options\.toleranze: unknown key; did you mean tolerance\?"),
+        ({"links": 8}, r"options\.links: unknown key; give one of method, .*"),
+        ({"skin": -1.0, "tolerance": 1.0}, r"options\.\w+: .* \(and 1 more\)"),
+    ],
+    ids=brief,
+)
+def test_simulate_refuses_options(settings, message):
+    """An option that is unknown or out of bounds is refused by its name."""
+    assert re.fullmatch(message, refused(warpchain.simulate, "soft", POSITION, VELOCITY, 1.0, **settings))
+
+
+@pytest.mark.parametrize("parameters", ["hard", None, 3, {"link_length": 1.0}, ["soft"]])
+def test_simulate_refuses_unknown_parameters(parameters):
+    """Parameters are a set of them or the name of a preset, and nothing else."""
+    message = refused(warpchain.simulate, parameters, POSITION, VELOCITY, 1.0)
+    assert re.fullmatch(r"preset: .* is unknown; presets are paper, soft", message)
+
+
+@pytest.mark.parametrize("name", ["position", "velocity"])
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("abc", "not an array of numbers; .*"),
+        ([[0.0, 1.0, 2.0], [0.0, 1.0]], "not an array of numbers; .*"),
+        ({}, "not an array of numbers; .*"),
+        (None, r"its shape is \(\); give \(n, 3\), one row x, y, θ per link"),
+        (POSITION.ravel(), r"its shape is \(24,\); .*"),
+        (POSITION[:, :2], r"its shape is \(8, 2\); .*"),
+        (POSITION[None], r"its shape is \(1, 8, 3\); .*"),
+        (with_value(POSITION, np.nan), "holds a number that is not finite; .*"),
+        (with_value(POSITION, -np.inf), "holds a number that is not finite; .*"),
+        (with_value(POSITION, 1j), ".+; give .*"),
+        (POSITION.astype(str), ".+; give .*"),
+    ],
+    ids=brief,
+)
+def test_simulate_refuses_states(name, given, message):
+    """A state that is no finite real array of shape (n, 3) is refused by its name."""
+    state = {"position": POSITION, "velocity": VELOCITY} | {name: given}
+    told = refused(warpchain.simulate, "soft", state["position"], state["velocity"], 1.0)
+    assert re.fullmatch(f"{name}: {message}", told)
+
+
+@pytest.mark.parametrize("links", [0, 2, 3, 5, 7])
+def test_simulate_refuses_chains_that_cannot_be(links):
+    """A chain has an even number of at least 4 links."""
+    told = refused(warpchain.simulate, "soft", np.zeros((links, 3)), np.zeros((links, 3)), 1.0)
+    assert told == f"position: {links} links; a closed chain has an even number of at least 4"
+
+
+def test_simulate_refuses_states_of_different_length():
+    """Position and velocity have one row per link each."""
+    told = refused(warpchain.simulate, "soft", POSITION, VELOCITY[:6], 1.0)
+    assert told == "velocity: 6 rows, but position has 8; give one row per link each"
+
+
+@pytest.mark.parametrize(
+    ("duration", "message"),
+    [
+        ("1", "'1' is not a number; give seconds"),
+        (None, "None is not a number; give seconds"),
+        (True, "True is not a number; give seconds"),
+        ([1.0], r"\[1\.0\] is not a number; give seconds"),
+        (np.array([1.0]), ".* is not a number; give seconds"),
+        (-1, "-1 is not a time; give a number of seconds, at least 0"),
+        (-1e-300, "-1e-300 is not a time; .*"),
+        (float("nan"), "nan is not a time; .*"),
+        (float("inf"), "inf is not a time; .*"),
+        (1j, ".+; give .*"),
+        (np.complex128(1), ".+; give .*"),
+        (10**400, ".+; give .*"),
+    ],
+    ids=brief,
+)
+def test_simulate_refuses_durations(duration, message):
+    """A duration that is no finite number of seconds from 0 on is refused."""
+    told = refused(warpchain.simulate, "soft", POSITION, VELOCITY, duration)
+    assert re.fullmatch(f"duration: {message}", told)
+
+
+@pytest.mark.parametrize(
+    ("times", "message"),
+    [
+        ("abc", "not an array of numbers; give rising instants in s"),
+        ([1j], "not an array of numbers; .*"),
+        ({}, "not an array of numbers; .*"),
+        (0.5, r"its shape is \(\); give a row of at least one instant"),
+        ([[0.5]], r"its shape is \(1, 1\); .*"),
+        ([], r"its shape is \(0,\); .*"),
+        ([0.0, 1.5], r"give rising instants between 0 and the duration of 1.0 s"),
+        ([-0.1, 0.5], "give rising instants .*"),
+        ([0.5, 0.4], "give rising instants .*"),
+        ([0.5, 0.5], "give rising instants .*"),
+        ([0.1, float("nan")], "give rising instants .*"),
+        ([float("nan")], "give rising instants .*"),
+        ([None], "give rising instants .*"),
+    ],
+    ids=brief,
+)
+def test_simulate_refuses_times(times, message):
+    """Instants that do not rise within the duration are refused."""
+    told = refused(warpchain.simulate, "soft", POSITION, VELOCITY, 1.0, times=times)
+    assert re.fullmatch(f"times: {message}", told)
+
+
+@pytest.mark.parametrize("name", ["floor", "gravity"])
+@pytest.mark.parametrize("value", ["no", None, 0.0, []])
+def test_simulate_refuses_switches_that_are_no_truth_values(name, value):
+    """Like `self_contact`, `floor` and `gravity` are true or false: `floor="no"` does not mean a floor."""
+    assert refused(warpchain.simulate, "soft", POSITION, VELOCITY, 1.0, **{name: value}).startswith(f"{name}: ")
+
+
+# --- walk ---
+
+
+def test_good_walk_is_computed():
+    """Walks of each start are computed: the tests below fail for no other reason."""
+    for settings in ({}, {"start": "spinning"}, {"start": "ellipse"}, {"seed": 3}, {"frame_interval": None}):
+        with pytest.raises(ComputedError):
+            warpchain.walk(**settings)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        # the scene
+        ({"links": 61}, r"scene\.links: 61 is odd; .*"),
+        ({"links": 2}, r"scene\.links: 2 is less than 4; .*"),
+        ({"links": "60"}, r"scene\.links: '60' is text; .*"),
+        ({"links": 60.0}, r"scene\.links: 60.0 is of type float; .*"),
+        ({"links": 28}, r"scene\.links: 28 links of 0.01268 m do not reach round .*; give at least 30"),
+        ({"frequency": -1.0}, r"scene\.frequency: -1.0 is less than 0 Hz; .*"),
+        ({"frequency": "15 Hz"}, r"scene\.frequency: '15 Hz' has its unit written with it; .* Hz: 15"),
+        ({"frequency": float("nan")}, r"scene\.frequency: nan is not finite; .*"),
+        ({"start": "flying"}, r"scene\.start: 'flying' is unknown; .*"),
+        ({"phase": 1.0}, r"scene\.phase: 1.0 is not less than 1; .*"),
+        ({"clearance": -1e-3}, r"scene\.clearance: -0.001 is less than 0 m; .*"),
+        ({"clearance_of": "hanging", "start": "spinning"}, r"scene\.clearance_of: 'hanging' needs .*; give .*"),
+        ({"walk_limit": 0.0}, r"scene\.walk_limit: 0.0 is not greater than 0 s; .*"),
+        # the parameters
+        ({"preset": "hard"}, r"preset: 'hard' is unknown; presets are paper, soft"),
+        ({"preset": None}, r"preset: None is unknown; .*"),
+        ({"inner_mass": -1.0}, r"parameters\.inner_mass: -1.0 is not greater than 0 kg; give a positive mass"),
+        ({"circle_radius": 0.1}, r"parameters\.circle_radius: 0.1 is not smaller than half the link .*; .*"),
+        ({"floor_friction": 1.5}, r"parameters\.floor_friction: 1.5 is greater than 1; .*"),
+        ({"joint_stiffness": float("inf")}, r"parameters\.joint_stiffness: inf is not finite; .*"),
+        (
+            {"sprocket_radius": 3e-3, "sprocket_radius_is": "pitch"},
+            r"parameters\.sprocket_radius: 0.003 is not greater than the circle radius 0.0042, .*; .*",
+        ),
+        # the options
+        ({"method": "rk4"}, r"options\.method: 'rk4' is unknown; .*"),
+        ({"tolerance": 1.0}, r"options\.tolerance: 1.0 is greater than 0.1; .*"),
+        ({"device": "gpu"}, r"options\.device: 'gpu' is no device; .*"),
+        ({"smallest_step": 1.0}, r"options\.smallest_step: 1.0 is not smaller than contact_step .*; .*"),
+        # names and seeds
+        ({"clearence": 0.1}, r"'clearence': unknown name; did you mean clearance\?"),
+        ({"parameters": {}}, r"'parameters': unknown name; give one of .*"),
+        ({"seed": -1}, r"seed: -1 is no whole number from 0 to 2\*\*128 - 1; .*"),
+        ({"seed": 2**128}, r"seed: \d+ is no whole number .*; .*"),
+        ({"seed": 1.5}, r"seed: 1.5 is no whole number .*; .*"),
+        ({"seed": "1"}, r"seed: '1' is no whole number .*; .*"),
+        ({"seed": True}, r"seed: True is no whole number .*; .*"),
+        # frames
+        ({"frame_interval": 0}, r"frame_interval: 0 is not a positive time in s; give one, or None"),
+        ({"frame_interval": -1e-3}, r"frame_interval: -0.001 is not a positive time in s; .*"),
+        ({"frame_interval": float("nan")}, r"frame_interval: nan is not a positive time in s; .*"),
+        ({"frame_interval": float("inf")}, r"frame_interval: inf is not a positive time in s; .*"),
+        ({"frame_interval": "2 ms"}, r"frame_interval: .*"),
+        ({"frame_interval": [2e-3]}, r"frame_interval: .*"),
+        ({"frame_interval": True}, r"frame_interval: .*"),
+        ({"frame_interval": 10**400}, r"frame_interval: .*"),
+        # the number of samples per frame must fit into 64 bits: 2⁶⁴ and its multiples would be 0
+        ({"frame_interval": 1e300}, r"frame_interval: .*"),
+        ({"record_interval": 1e-300}, r"(options\.record_interval|frame_interval): .*"),
+        # frames are kept with samples, at most one per sample
+        ({"frame_interval": 1e-5}, r"frame_interval: .*"),
+    ],
+    ids=brief,
+)
+def test_walk_refuses(settings, message):
+    """What a walk can't use is refused by its name, with a remedy."""
+    assert re.fullmatch(message, refused(warpchain.walk, **settings))
+
+
+@pytest.mark.parametrize(("aspect", "links"), [(1e6, 6), (1e12, 60), (1e-12, 180), (1e300, 60)])
+def test_walk_refuses_ellipses_that_no_chain_can_follow(aspect, links):
+    """An ellipse that is too flat for its links is refused by its aspect."""
+    told = refused(warpchain.walk, start="ellipse", ellipse_aspect=aspect, links=links)
+    assert "ellipse_aspect" in told
+
+
+def test_seed_that_draws_an_impossible_chain_is_refused():
+    """A sample whose sprocket is too large for the chain is refused like any other set of values."""
+    told = set()
+    for seed in range(60):
+        try:
+            warpchain.walk(links=30, seed=seed)
+        except ComputedError:
+            told.add("computed")
+        except InputError as error:
+            told.add("refused")
+            assert re.fullmatch(r"scene\.links: 30 links of .* do not reach round .*; give at least 32", str(error))
+    assert told == {"computed", "refused"}
+
+
+def test_statuses_have_sentences():
+    """Each way to end has a sentence of one line, and each failure says what to try."""
+    for status in Status:
+        assert "\n" not in status.sentence
+        assert status.ok or ";" in status.sentence

@@ -1,0 +1,329 @@
+"""Sweeps as they are run: on slots, threads, processes and a Dask cluster, killed and resumed."""
+
+import concurrent.futures
+import multiprocessing
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import warpchain
+import warpchain.run.sweep_run as runner
+from warpchain.engine.processors import processors
+from warpchain.inputs.setup import Setup
+from warpchain.run.single_walk import setup_walk
+from warpchain.run.sweep_run import run_shards, shard_size, sweep
+from warpchain.status import Status
+from warpchain.sweeps.plan import load_sweep
+from warpchain.walks.scheduler import run_setups
+
+BRIEF = {"start": "ellipse", "walk_limit": 0.01}
+"""Walks of a few milliseconds of one core: they end at their time limit."""
+
+TINY = {
+    "version": 1,
+    "name": "tiny",
+    "seed": 7,
+    "preset": "soft",
+    "samples": 20,
+    "scene": BRIEF,
+    "options": {"method": "dp5"},
+    "grid": {"links": [30, 44], "frequency": [5, 15]},
+}
+
+
+def brief_setup(seed: int, **settings: object) -> Setup:
+    """One brief walk, drawn by its seed."""
+    return setup_walk("soft", {"links": 30, "frequency": 12.0, "method": "dp5"} | BRIEF | settings, seed)
+
+
+def outcome(course) -> tuple:
+    """Everything of a walk that a row keeps."""
+    return course.status, course.walk_time, tuple(course.counts.values()), tuple(course.energy().values())
+
+
+def outcomes(setups, **how) -> list:
+    """What each of the walks gave, in their order."""
+    found = {place: outcome(course) for place, course in run_setups(setups, **how)}
+    return [found[place] for place in range(len(setups))]
+
+
+def data_of(folder: Path) -> dict[str, bytes]:
+    """Name → bytes of all shards."""
+    return {path.name: path.read_bytes() for path in sorted((folder / "shards").glob("[0-9]*.h5"))}
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(tmp_path_factory) -> dict[str, bytes]:
+    """The shards of the tiny sweep, run in one go on one thread."""
+    folder = tmp_path_factory.mktemp("uninterrupted") / "sweep"
+    result = sweep(TINY, folder, workers=1)
+    assert result.summary() == {"time_limit": 80, "at_rest": 0, "missing": 0}
+    return data_of(folder)
+
+
+def test_walks_do_not_depend_on_their_batch():
+    """Number of slots, order and company change no bit of a walk, with different n, methods and starts in one batch."""
+    setups = [brief_setup(seed) for seed in range(5)]
+    setups += [brief_setup(seed, links=44, start="spinning", hold_limit=0.05) for seed in range(2)]
+    setups += [brief_setup(9, method="rkf78"), brief_setup(9, links=240)]
+    alone = [outcomes([setup])[0] for setup in setups]
+    assert outcomes(setups, slots=1) == alone
+    assert outcomes(setups, slots=4) == alone
+    assert outcomes(setups[::-1], slots=3) == alone[::-1]
+    assert len(set(alone)) == len(alone)
+
+
+def test_one_broken_walk_among_a_thousand_changes_no_other():
+    """A chain whose mass is forced to NaN ends as not_finite; the other 999 are what they are without it."""
+    setups = [brief_setup(seed, walk_limit=5e-4) for seed in range(1000)]
+    whole = outcomes(setups, slots=16)
+    values = setups[500].parameters.model_dump() | {"inner_mass": float("nan")}
+    forced = type(setups[500].parameters).model_construct(**values)
+    setups[500] = Setup(setups[500].preset, forced, setups[500].scene, setups[500].options)
+    with_broken = outcomes(setups, slots=16)
+    assert with_broken[500][0] == Status.NOT_FINITE
+    assert [Status.TIME_LIMIT] * 1000 == [row[0] for row in whole]
+    assert with_broken[:500] == whole[:500]
+    assert with_broken[501:] == whole[501:]
+
+
+def test_a_single_walk_is_that_of_a_sweep(tmp_path):
+    """`warpchain walk --seed S` is the first sample of a sweep with seed S, to the bit."""
+    content = TINY | {"samples": 1, "grid": {"links": [30]}, "scene": BRIEF | {"frequency": 12.0}}
+    result = sweep(content, tmp_path / "sweep")
+    values = {"links": 30, "frequency": 12.0, "method": "dp5"} | BRIEF
+    walk = warpchain.walk(preset="soft", seed=7, **values)
+    assert result.status.ravel() == [int(walk.status)]
+    assert result.steps_accepted.ravel() == [walk.steps_accepted]
+    assert result.loss_joint_friction.ravel() == [walk.energy["joint_friction"]]
+
+
+def test_threads_and_processes_write_the_same_bytes(tmp_path, uninterrupted):
+    """However many workers share a sweep, and whether they are threads or processes, its shards are the same."""
+    sweep(TINY, tmp_path / "threads", workers=3, device="cpu")
+    assert data_of(tmp_path / "threads") == uninterrupted
+    context = multiprocessing.get_context("spawn")
+    with concurrent.futures.ProcessPoolExecutor(2, mp_context=context) as processes:
+        sweep(TINY, tmp_path / "processes", executor=processes, workers=2)
+    assert data_of(tmp_path / "processes") == uninterrupted
+
+
+def test_progress_tells_when_the_walks_begin(tmp_path):
+    """First kernels are compiled; then the walks begin, and no time has passed; then shards are done."""
+    seen = []
+    sweep(TINY, tmp_path / "sweep", workers=1, on_progress=lambda p: seen.append((p.compiling, p.done, p.seconds)))
+    assert seen[:2] == [(True, 0, 0.0), (False, 0, 0.0)]
+    assert [compiling for compiling, _, _ in seen].count(True) == 1
+    assert seen[2][1] > 0 and seen[2][2] > 0 and seen[-1][1] == 80
+
+
+def test_progress_shows_the_shards_of_a_task_under_way(tmp_path, monkeypatch, uninterrupted):
+    """With all shards in one task, each is counted once, and most of them before the task is over."""
+    monkeypatch.setattr(runner, "POLL", 0.01)
+    monkeypatch.setattr(runner, "_tasks", lambda planned, missing, workers: iter([list(missing)]))
+    seen = []
+    sweep(TINY, tmp_path / "sweep", workers=1, on_progress=lambda p: seen.append((p.done, sum(p.statuses.values()))))
+    assert all(done == counted for done, counted in seen)
+    assert len({done for done, _ in seen}) > 5 and seen[-1] == (80, 80)
+    assert data_of(tmp_path / "sweep") == uninterrupted
+
+
+def test_walks_are_drawn_when_they_begin(tmp_path, monkeypatch):
+    """A task asks for the draw of a walk when the one before it is over, and for no walk twice."""
+    planned, events = load_sweep(TINY), []
+    draw, write = type(planned).planned, runner.write_shard
+    monkeypatch.setattr(type(planned), "planned", lambda self, index: events.append(index) or draw(self, index))
+    monkeypatch.setattr(runner, "write_shard", lambda *given: events.append("written") or write(*given))
+    monkeypatch.setattr(runner, "_tasks", lambda planned, missing, workers: iter([list(missing)]))
+    monkeypatch.setattr(runner, "prepare", lambda planned: None)
+    sweep(TINY, tmp_path / "sweep", workers=1)
+    drawn = [event for event in events if event != "written"]
+    assert sorted(drawn) == list(range(80))
+    assert events.index("written") < 10
+
+
+def test_a_finished_sweep_is_not_run_again(tmp_path, uninterrupted):
+    """A second run of a complete sweep computes nothing and gives the same result."""
+    folder = tmp_path / "sweep"
+    sweep(TINY, folder)
+    stamps = {path: path.stat().st_mtime_ns for path in (folder / "shards").iterdir()}
+    seen = []
+    sweep(TINY, folder, on_progress=seen.append)
+    assert seen == []
+    assert {path: path.stat().st_mtime_ns for path in (folder / "shards").iterdir()} == stamps
+    assert data_of(folder) == uninterrupted
+
+
+def test_a_failing_walk_stops_the_sweep_and_keeps_what_is_done(tmp_path, monkeypatch, uninterrupted):
+    """An exception in a worker reaches the caller; finished shards stay, and a later run completes the sweep."""
+    calls = 0
+
+    def sometimes(*arguments):
+        nonlocal calls
+        calls += 1
+        if calls == 6:
+            raise RuntimeError("the machine caught fire")
+        return run_shards(*arguments)
+
+    monkeypatch.setattr("warpchain.run.sweep_run.run_shards", sometimes)
+    with pytest.raises(RuntimeError, match="caught fire"):
+        sweep(TINY, tmp_path / "sweep", workers=1)
+    monkeypatch.undo()
+    kept = data_of(tmp_path / "sweep")
+    assert 0 < len(kept) < len(uninterrupted)
+    assert kept.items() <= uninterrupted.items()
+    sweep(TINY, tmp_path / "sweep")
+    assert data_of(tmp_path / "sweep") == uninterrupted
+
+
+def test_memory_does_not_grow_with_the_sweep():
+    """A sweep of 10⁸ walks is planned, and a walk of it drawn, without a table of its walks."""
+    huge = load_sweep(TINY | {"samples": 25_000_000})
+    assert huge.walk_count == 100_000_000
+    assert huge.planned(99_999_999).setup.scene.links == 44
+    assert shard_size(huge.walk_count) == 256
+
+
+@pytest.mark.slow
+def test_killed_at_any_moment_a_sweep_goes_on(tmp_path, uninterrupted):
+    """SIGKILL at 20 random moments, resumed each time: the data are those of a run never interrupted, to the byte."""
+    source, folder = tmp_path / "tiny.yaml", tmp_path / "sweep"
+    source.write_text(yaml.safe_dump(TINY, sort_keys=False))
+    command = [sys.executable, "-m", "warpchain", "sweep", str(source), "-o", str(folder), "--workers", "2"]
+    generator = random.Random(20)
+    began = time.monotonic()
+    first = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    first.wait()
+    whole = time.monotonic() - began
+    assert data_of(folder) == uninterrupted
+    for shard in (folder / "shards").glob("[0-9]*.h5"):
+        shard.unlink()
+    killed = 0
+    while killed < 20:
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(generator.uniform(0.3, 1.0) * whole)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        killed += 1
+        if len(data_of(folder)) == len(uninterrupted):  # it was complete: begin again
+            assert data_of(folder) == uninterrupted
+            for shard in sorted((folder / "shards").glob("[0-9]*.h5"))[::2]:
+                shard.unlink()
+    subprocess.run(command, check=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    assert data_of(folder) == uninterrupted
+
+
+@pytest.mark.slow
+def test_a_dask_worker_may_be_killed(tmp_path, uninterrupted):
+    """With a worker of a Dask cluster killed in the middle, nothing is lost and the bytes are the same."""
+    distributed = pytest.importorskip("distributed")
+    content = TINY | {"samples": 20}
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        pids = list(client.run(os.getpid).values())
+        killed = []
+
+        def kill_once(progress):
+            if not killed and progress.done >= 10:
+                os.kill(pids[0], signal.SIGKILL)
+                killed.append(progress.done)
+
+        result = sweep(content, tmp_path / "sweep", executor=client.get_executor(), workers=2, on_progress=kill_once)
+        after = set(client.run(os.getpid).values())
+    assert killed and killed[0] < 80
+    assert pids[0] not in after
+    assert result.missing_count == 0
+    assert data_of(tmp_path / "sweep") == uninterrupted
+    indices = np.sort(result.index.ravel())
+    np.testing.assert_array_equal(indices, np.arange(80))
+
+
+@pytest.mark.slow
+def test_a_dask_cluster_of_separate_processes(tmp_path, uninterrupted):
+    """`--scheduler` on a scheduler and two workers that were started by themselves: the bytes are the same."""
+    pytest.importorskip("distributed")
+    source, where = tmp_path / "tiny.yaml", tmp_path / "scheduler.json"
+    source.write_text(yaml.safe_dump(TINY, sort_keys=False))
+    dask = [sys.executable, "-m", "dask"]
+    commands = [["scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]]
+    commands += [["worker", "--no-nanny", "--nthreads", "1", "--no-dashboard", "--local-directory", str(tmp_path)]] * 2
+    processes = []
+    with (tmp_path / "dask.log").open("wb") as log:
+        try:
+            for command in commands:
+                command = [*dask, *command, "--scheduler-file", str(where)]
+                processes.append(subprocess.Popen(command, stdout=log, stderr=log))
+            address = wait_for_workers(where, 2)
+            command = [sys.executable, "-m", "warpchain", "sweep", str(source), "-o", str(tmp_path / "sweep")]
+            done = subprocess.run([*command, "--scheduler", address], capture_output=True, encoding="utf-8")
+        finally:
+            for process in reversed(processes):
+                process.kill()
+                process.wait()
+    assert "80 time_limit" in done.stdout, done.stderr
+    assert data_of(tmp_path / "sweep") == uninterrupted
+
+
+def wait_for_workers(where: Path, count: int) -> str:
+    """Address of the scheduler whose file is there, or soon will be, once it has so many workers."""
+    from distributed import Client
+
+    until = time.monotonic() + 60
+    while not (where.exists() and where.read_text()):
+        assert time.monotonic() < until, "no scheduler"
+        time.sleep(0.1)
+    with Client(scheduler_file=str(where)) as client:
+        client.wait_for_workers(count, timeout=60)
+        return str(client.scheduler.address)
+
+
+def test_sweep_refuses_what_it_cannot_do(tmp_path):
+    """Bad arguments are refused in one line, and no folder is made."""
+    for arguments, message in (
+        ((TINY | {"samples": 0}, tmp_path / "a"), "samples"),
+        ((tmp_path / "none.yaml", tmp_path / "a"), "none.yaml"),
+    ):
+        with pytest.raises((warpchain.InputError, OSError), match=message):
+            sweep(*arguments)
+    with pytest.raises(warpchain.InputError, match="workers: 0 is not a number of workers"):
+        sweep(TINY, tmp_path / "a", workers=0)
+    with pytest.raises(warpchain.InputError, match=r"options\.device: 'gpu' is no device"):
+        sweep(TINY, tmp_path / "a", device="gpu")
+    assert not (tmp_path / "a").exists()
+
+
+def test_tasks_of_gpus_are_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every shard is in one task; tasks hold like walks and hardly more of them than a GPU is given."""
+    grid = {"links": [60, 90, 120, 150, 180], "frequency": [5.0, 10.0]}
+    given = {"version": 1, "name": "alike", "seed": 1, "preset": "soft", "samples": 24, "grid": grid}
+    planned = load_sweep(given | {"options": {"device": "cuda"}})
+    missing = [range(first, first + 8) for first in range(0, planned.walk_count, 8)]
+    for most, workers, count in ((1000, 3, 3), (60, 2, 4), (1000, 40, 30)):
+        monkeypatch.setattr(runner, "GPU_TASK_WALKS", most)
+        tasks = list(runner._tasks(planned, missing, workers))
+        assert len(tasks) == count
+        assert sorted((shard for task in tasks for shard in task), key=lambda shard: shard.start) == missing
+        assert max(sum(map(len, task)) for task in tasks) <= most + 8
+        means = [np.mean([planned.planned(shard.start).setup.scene.links for shard in task]) for task in tasks]
+        assert workers > 4 or np.ptp(means) <= 12
+
+
+def test_processors_are_those_of_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Counted are the processors that the process may use; on macOS, which does not tell, all; at least one."""
+    monkeypatch.setattr(os, "cpu_count", lambda: 7)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {1, 5}, raising=False)
+    assert processors() == 2
+    monkeypatch.delattr(os, "sched_getaffinity")
+    assert processors() == 7
+    monkeypatch.setattr(os, "cpu_count", lambda: None)
+    assert processors() == 1

@@ -1,0 +1,443 @@
+"""Folders of sweeps: killed at any moment, gone on with, locked, refused, and full disks."""
+
+import errno
+import json
+import math
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from tests.support import synthetic_sweep
+from tests.support.synthetic_sweep import LONG_SWEEP, SHARD_SIZE, SWEEP, content, run, synthetic_rows
+from warpchain.inputs.parameters import InputError
+from warpchain.status import Status
+from warpchain.store import folder, shards
+from warpchain.store.folder import Store, empty_rows, read_rows, read_shard, write_shard
+from warpchain.store.shards import NUMERICS_VERSION, read_manifest, shard_name
+from warpchain.walks.rows import ROW
+
+FIRST, SECOND = range(20), range(20, 40)
+CHANGED = replace(SWEEP, seed=7, name="changed")
+
+
+def open_store(directory: Path, sweep: Any = SWEEP, **settings: Any) -> Store:
+    """A store of the synthetic sweep."""
+    return Store.open(directory, sweep, **({"shard_size": SHARD_SIZE} | settings))
+
+
+def play(part: str, directory: Path, *, namespace: bool = False) -> Any:
+    """What a part of `synthetic_sweep` prints, played in a process of its own."""
+    command = [sys.executable, synthetic_sweep.__file__, part, str(directory)]
+    if namespace:
+        command = ["unshare", "--mount", "--map-root-user", *command]
+    done = subprocess.run(command, capture_output=True, encoding="utf-8", timeout=100)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@contextmanager
+def refused(error: type[Exception], directory: Path, *words: str) -> Iterator[None]:
+    """The block fails with one line that has the words, and the folder keeps all that it had."""
+    before = content(directory) if directory.exists() else {}
+    with pytest.raises(error) as caught:
+        yield
+    text = str(caught.value)
+    assert "\n" not in text and all(word in text for word in words), text
+    assert (content(directory) if directory.exists() else {}) == before
+
+
+needs_namespace = pytest.mark.skipif(
+    shutil.which("unshare") is None
+    or subprocess.run(
+        ["unshare", "--mount", "--map-root-user", "mount", "-t", "tmpfs", "tmpfs", "/mnt"], capture_output=True
+    ).returncode
+    != 0,
+    reason="needs a mount namespace",
+)
+
+
+# Begin, go on, end
+
+
+def test_a_sweep_is_written_and_read(tmp_path: Path) -> None:
+    """All rows come back to the bit; nothing is missing, and nothing else is in the folder."""
+    with open_store(tmp_path / "new" / "folder") as opened:
+        folder = opened.directory
+        assert opened.missing() == [range(i, i + 20) for i in range(0, 160, 20)] and len(opened.rows()) == 0
+        for walks in reversed(opened.missing()):
+            key = opened.write(walks, synthetic_rows(SWEEP, walks))
+            assert len(key) == 64 and walks not in opened.missing()
+        opened.log("ended")
+        expected = synthetic_rows(SWEEP, range(160))
+        assert opened.rows().dtype == expected.dtype and opened.rows().tobytes() == expected.tobytes()
+    assert sorted(os.listdir(folder)) == ["lock", "log.txt", "shards", "sweep.json", "sweep.yaml"]
+    assert len(os.listdir(folder / "shards")) == 8
+    assert yaml.safe_load((folder / "sweep.yaml").read_text()) == SWEEP.canonical()
+    assert (folder / "log.txt").read_text().endswith("  ended\n")
+
+
+def test_the_last_shard_has_what_is_left(tmp_path: Path) -> None:
+    """A number of walks that is no multiple of the shard size leaves a shorter shard; a folder keeps its size."""
+    with open_store(tmp_path, shard_size=150) as opened:
+        assert opened.missing() == [range(150), range(150, 160)]
+        opened.write(range(150, 160), synthetic_rows(SWEEP, range(150, 160)))
+    with open_store(tmp_path, shard_size=10) as opened:
+        assert opened.manifest.shard_size == 150 and opened.missing() == [range(150)]
+    with pytest.raises(ValueError, match="shard_size: 0 is not positive"):
+        open_store(tmp_path, shard_size=0)
+
+
+def test_equal_sweeps_leave_equal_files(tmp_path: Path) -> None:
+    """The files have no time, place or chance in them, whatever NaNs and order the rows came with."""
+    run(tmp_path / "one")
+    with open_store(tmp_path / "two") as opened:
+        for walks in sorted(opened.missing(), key=lambda walks: walks.start % 7):
+            rows = synthetic_rows(SWEEP, walks)
+            rows["greatest_opening"] = -rows["greatest_opening"]  # the same NaN to a reader, but other bits
+            opened.write(walks, rows)
+    assert content(tmp_path / "one") == content(tmp_path / "two")
+
+
+def test_a_sweep_survives_kills(tmp_path: Path) -> None:
+    """Killed 20 times at random moments, always readable and gone on with: the same bytes as one never killed."""
+    done = play("killed", tmp_path / "killed")
+    assert done["kills"] == 20 and done["states"] >= 8
+    run(tmp_path / "whole", LONG_SWEEP, shard_size=4)
+    assert content(tmp_path / "killed") == content(tmp_path / "whole")
+    assert not [name for name in os.listdir(tmp_path / "killed") if name.startswith(".")]
+
+
+class _Kill(BaseException):
+    """Stands for a kill between two system calls."""
+
+
+@pytest.mark.parametrize("fresh", [False, True])
+def test_every_step_of_opening_may_be_the_last(tmp_path: Path, fresh: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stopped before any change to the folder, opening it again succeeds and leaves the same as one never stopped."""
+    sweep = CHANGED if fresh else SWEEP
+    run(tmp_path / "whole", sweep)
+    expected, stops = content(tmp_path / "whole"), 0
+    while True:
+        folder, left = tmp_path / str(stops), stops
+        if fresh:
+            run(folder)
+
+        def counted(real: Callable[..., Any]) -> Callable[..., Any]:
+            def call(*arguments: Any, **settings: Any) -> Any:
+                nonlocal left
+                left -= 1
+                if left < 0:
+                    raise _Kill
+                return real(*arguments, **settings)
+
+            return call
+
+        with monkeypatch.context() as patched:
+            for place, name in ((os, "replace"), (os, "rename"), (os, "mkdir"), (os, "unlink"), (os, "rmdir")):
+                patched.setattr(place, name, counted(getattr(place, name)))
+            try:
+                open_store(folder, sweep, fresh=fresh).close()
+            except _Kill:
+                pass
+            else:
+                break
+        run(folder, sweep, fresh=fresh and "changed" not in (folder / "sweep.json").read_text())
+        assert content(folder) == expected, stops
+        stops += 1
+    assert stops >= 4
+
+
+def test_unfinished_files_go(tmp_path: Path) -> None:
+    """What a killed process had half written is cleared away; hidden files of others are not."""
+    run(tmp_path)
+    parts = [".sweep.0123abcd.part.json", f"shards/.{shard_name(FIRST)[:-3]}.0123abcd.part.h5"]
+    for name in (*parts, ".nfs0123", "shards/.keep"):
+        (tmp_path / name).write_bytes(b"half")
+    open_store(tmp_path).close()
+    assert [name for name in parts if (tmp_path / name).exists()] == []
+    assert (tmp_path / ".nfs0123").exists() and (tmp_path / "shards/.keep").exists()
+
+
+# One process at a time
+
+
+def test_a_second_process_is_refused(tmp_path: Path) -> None:
+    """A held folder says who holds it; it is free at once when the holder is killed, even if its worker lives on."""
+    command = [sys.executable, synthetic_sweep.__file__, "holder", str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, encoding="utf-8") as holder:
+        assert holder.stdout is not None
+        worker = int(holder.stdout.readline())
+        try:
+            with refused(InputError, tmp_path, str(tmp_path), f"in use by process {holder.pid} on ", "wait"):
+                open_store(tmp_path)
+            holder.kill()
+            holder.wait()
+            os.kill(worker, 0)  # is alive
+            open_store(tmp_path).close()
+        finally:
+            holder.kill()
+            os.kill(worker, signal.SIGKILL)
+
+
+def test_a_second_store_of_one_process_is_refused(tmp_path: Path) -> None:
+    """The lock counts within a process, too; closing twice does no harm, and an error lets go of the lock."""
+    first = open_store(tmp_path)
+    with refused(InputError, tmp_path, "in use by process"):
+        open_store(tmp_path)
+    first.close()
+    first.close()
+    with refused(InputError, tmp_path, "another sweep"):
+        open_store(tmp_path, CHANGED)
+    open_store(tmp_path).close()
+
+
+def test_workers_may_write_the_same_shard(tmp_path: Path) -> None:
+    """Processes, and threads, that write one shard at the same time leave it whole, with the same bytes."""
+    assert play("race", tmp_path / "race") == [0, 0, 0, 0]
+    with open_store(tmp_path / "threads") as opened, ThreadPoolExecutor(4) as threads:
+        shards = opened.missing()[:2] * 20
+        keys = list(threads.map(lambda walks: opened.write(walks, synthetic_rows(SWEEP, walks)), shards))
+    assert len(set(keys)) == 2
+    assert content(tmp_path / "race") == content(tmp_path / "threads")
+    assert read_rows(tmp_path / "race", read_manifest(tmp_path / "race"))["index"].tolist() == list(range(40))
+
+
+# Refusals
+
+
+def test_a_changed_sweep_is_refused(tmp_path: Path) -> None:
+    """Another sweep is refused in a folder unless it may start anew; another name of the same sweep is not."""
+    run(tmp_path)
+    with refused(InputError, tmp_path, str(tmp_path), "holds another sweep (synthetic)", "--fresh"):
+        open_store(tmp_path, CHANGED)
+    open_store(tmp_path, replace(SWEEP, name="renamed")).close()
+    with open_store(tmp_path, CHANGED, fresh=True) as opened:
+        assert len(opened.missing()) == 8
+        opened.log("anew")
+    run(tmp_path, CHANGED)
+    run(tmp_path / "whole", CHANGED)
+    assert content(tmp_path / "whole").items() <= content(tmp_path).items()
+
+
+def test_other_numerics_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Walks of another version of the numerics are not gone on with, but still read."""
+    run(tmp_path)
+    for module in (shards, folder):
+        monkeypatch.setattr(module, "NUMERICS_VERSION", 99)
+    with refused(InputError, tmp_path, f"numerics {NUMERICS_VERSION}, but this warpchain has 99", "--fresh"):
+        open_store(tmp_path)
+    with refused(InputError, tmp_path, "belongs to another sweep now"):
+        write_shard(tmp_path, SWEEP.digest(), FIRST, synthetic_rows(SWEEP, FIRST))
+    assert len(read_rows(tmp_path, read_manifest(tmp_path))) == 160
+
+
+@pytest.mark.parametrize("fresh", [False, True])
+@pytest.mark.parametrize("name", ["sweep.yaml", "shards", "log.txt", "sweep.json", "lock"])
+def test_files_of_others_are_not_touched(tmp_path: Path, name: str, fresh: bool) -> None:
+    """A folder that has such a name for something else is refused, even to start anew."""
+    (tmp_path / name).write_text("mine: true")
+    with refused(InputError, tmp_path, str(tmp_path / name), "give"):
+        open_store(tmp_path, fresh=fresh)
+    assert (tmp_path / name).read_text() == "mine: true"
+
+
+@pytest.mark.parametrize("fresh", [False, True])
+def test_a_foreign_file_among_the_shards_is_refused(tmp_path: Path, fresh: bool) -> None:
+    """A file that is no shard of the sweep is named, however many there are, and starting anew spares it."""
+    run(tmp_path)
+    for name in ("notes.txt", "000000001-000000020.h5", "000000160-000000179.h5"):
+        (tmp_path / "shards" / name).write_text("mine")
+    with refused(InputError, tmp_path, "shards/000000001-000000020.h5: not a shard", "move it", "(and 2 more)"):
+        open_store(tmp_path, fresh=fresh)
+
+
+def test_a_shard_of_another_sweep_is_refused(tmp_path: Path) -> None:
+    """A shard with the right name but another sweep's digest, or other walks, is named."""
+    run(tmp_path / "one")
+    run(tmp_path / "two", CHANGED)
+    first, second = (tmp_path / "one/shards" / shard_name(walks) for walks in (FIRST, SECOND))
+    kept = first.read_bytes()
+    for stranger in (tmp_path / "two/shards" / first.name, second):
+        shutil.copy(stranger, first)
+        with refused(InputError, tmp_path, f"{first}: a shard of another sweep", "move it"):
+            open_store(tmp_path / "one")
+    first.write_bytes(kept)
+    open_store(tmp_path / "one").close()
+
+
+@pytest.mark.parametrize("part", [0.0, 0.1, 0.5, 0.999])
+def test_a_truncated_shard_is_refused(tmp_path: Path, part: float) -> None:
+    """A shard cut short is named with the remedy; deleted, only its walks are computed again."""
+    run(tmp_path)
+    before, path = content(tmp_path), tmp_path / "shards" / shard_name(FIRST)
+    os.truncate(path, int(part * path.stat().st_size))
+    with refused(InputError, tmp_path, f"{path}: damaged or cut short", "delete it"):
+        open_store(tmp_path)
+    path.unlink()
+    with open_store(tmp_path) as opened:
+        assert opened.missing() == [FIRST]
+        opened.write(FIRST, synthetic_rows(SWEEP, FIRST))
+    assert content(tmp_path) == before
+
+
+def test_damage_is_seen(tmp_path: Path) -> None:
+    """No flipped byte of a shard goes unnoticed where it would change a row; several bad shards are counted."""
+    run(tmp_path)
+    path = tmp_path / "shards" / shard_name(FIRST)
+    whole = path.read_bytes()
+    rows = read_shard(tmp_path, SWEEP.digest(), FIRST)
+    start = whole.index(rows.tobytes())
+    for place in (*range(0, len(whole), 97), start, start + rows.nbytes - 1):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 0x10]) + whole[place + 1 :])
+        try:
+            read = read_shard(tmp_path, SWEEP.digest(), FIRST)
+        except InputError:
+            continue
+        assert not start <= place < start + rows.nbytes
+        assert read.dtype == rows.dtype and read.tobytes() == rows.tobytes()
+    path.write_bytes(b"")
+    (tmp_path / "shards" / shard_name(SECOND)).write_bytes(b"no HDF5")
+    with refused(InputError, tmp_path, f"{path}: damaged", "(and 1 more)"):
+        open_store(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "[]", "3", '{"format": "other"}', '{"format": "warpchain sweep", "format_version": 2}', "\xff", "{" * 2000],
+)
+def test_a_damaged_manifest_is_refused(tmp_path: Path, text: str) -> None:
+    """A manifest that is none is named, and nothing is begun over it."""
+    run(tmp_path)
+    (tmp_path / "sweep.json").write_text(text, encoding="latin-1")
+    with refused(InputError, tmp_path, f"{tmp_path / 'sweep.json'}: damaged, or not of warpchain"):
+        open_store(tmp_path)
+
+
+def test_a_later_format_is_refused(tmp_path: Path) -> None:
+    """A folder of another version of the format says so."""
+    run(tmp_path)
+    path = tmp_path / "sweep.json"
+    path.write_text(path.read_text().replace('"format_version": 2', '"format_version": 3'))
+    with refused(InputError, tmp_path, "format version 3, not 2"):
+        read_manifest(tmp_path)
+
+
+def test_workers_need_the_folder(tmp_path: Path) -> None:
+    """A worker that does not see the folder, or finds another sweep in it, writes nothing."""
+    rows = synthetic_rows(SWEEP, FIRST)
+    with refused(InputError, tmp_path, f"{tmp_path / 'elsewhere'}: no sweep", "every worker"):
+        write_shard(tmp_path / "elsewhere", SWEEP.digest(), FIRST, rows)
+    open_store(tmp_path, CHANGED).close()
+    with refused(InputError, tmp_path, "belongs to another sweep now"):
+        write_shard(tmp_path, SWEEP.digest(), FIRST, rows)
+
+
+def test_wrong_rows_are_refused(tmp_path: Path) -> None:
+    """Rows of other walks, of another type or without an end are not written."""
+    good = synthetic_rows(SWEEP, FIRST)
+    with open_store(tmp_path) as opened:
+        for walks, rows, word in (
+            (FIRST, synthetic_rows(SWEEP, SECOND), "not those of walks 0 to 19"),
+            (FIRST, good[::-1], "not those"),
+            (FIRST, good[:3], "not those"),
+            (FIRST, good[[*ROW.names]].copy(), "not those"),
+            (range(1, 21), synthetic_rows(SWEEP, range(1, 21)), "no shard"),
+            (FIRST, empty_rows(SWEEP, FIRST), "no status that ends"),
+        ):
+            with refused(ValueError, tmp_path, word):
+                opened.write(walks, rows)
+        running = good.copy()
+        running["status"][2] = Status.RUNNING
+        with refused(ValueError, tmp_path, "no status that ends"):
+            opened.write(FIRST, running)
+
+
+# What the system refuses
+
+
+def fail_with(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From now on no content of a file gets to the disk."""
+
+    def write_bytes(path: Path, content: bytes) -> int:
+        with path.open("wb") as file:
+            file.write(content[: len(content) // 2])
+        raise OSError(number, os.strerror(number), str(path))
+
+    monkeypatch.setattr(Path, "write_bytes", write_bytes)
+
+
+@pytest.mark.parametrize(
+    ("number", "remedy"),
+    [(errno.ENOSPC, "make room"), (errno.EDQUOT, "make room"), (errno.EROFS, "writable"), (errno.EIO, "disk")],
+)
+def test_a_failed_write_leaves_no_trace(
+    tmp_path: Path, number: int, remedy: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A shard that cannot be written is named with reason and remedy; the folder is as before and can go on."""
+    with open_store(tmp_path) as opened:
+        opened.write(FIRST, synthetic_rows(SWEEP, FIRST))
+        name = f"{shard_name(SECOND)}: cannot be written ({os.strerror(number)})"
+        with monkeypatch.context() as patched, refused(OSError, tmp_path, name, remedy, "kept"):
+            fail_with(number, patched)
+            opened.write(SECOND, synthetic_rows(SWEEP, SECOND))
+        opened.write(SECOND, synthetic_rows(SWEEP, SECOND))
+        assert len(opened.rows()) == 40
+
+
+def test_a_disk_too_small_is_said_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sweep that the disk has no room for does not begin; a complete one needs none."""
+    usage = shutil.disk_usage(tmp_path)._replace(free=50_000)
+    with monkeypatch.context() as patched:
+        patched.setattr(shutil, "disk_usage", lambda path: usage)
+        with pytest.raises(OSError, match=r"takes 0\.\d+ MB, but 0\.05 MB are free; make room"):
+            open_store(tmp_path)
+    run(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: usage)
+    open_store(tmp_path).close()
+
+
+def test_shards_take_no_more_room_than_said(tmp_path: Path) -> None:
+    """The room that is asked for is enough."""
+    with open_store(tmp_path, shard_size=40) as opened:
+        walks = opened.missing()[0]
+        opened.write(walks, synthetic_rows(SWEEP, walks))
+        size = (tmp_path / "shards" / shard_name(walks)).stat().st_size
+        most = 40 * opened.manifest.row_type.itemsize + folder.SHARD_OVERHEAD
+    assert size + 4096 <= most <= 4 * size and math.isfinite(size)
+
+
+@needs_namespace
+def test_a_full_disk(tmp_path: Path) -> None:
+    """A disk that fills up in the middle: a clear line, nothing lost, and the sweep goes on once there is room."""
+    done = play("full_disk", tmp_path / "full", namespace=True)
+    writing, opening = done["messages"]
+    assert "000000040-000000079.h5: cannot be written (No space left on device); make room" in writing
+    assert "make room" in opening and done["missing"] == 0
+
+
+@needs_namespace
+def test_a_read_only_folder(tmp_path: Path) -> None:
+    """A folder that cannot be written is refused for a run, with a clear line, and can be read."""
+    run(tmp_path)
+    done = play("read_only", tmp_path, namespace=True)
+    assert f"{tmp_path}: cannot be written (Read-only file system); make the folder writable" in done["message"]
+    assert done["missing"] == 0
+
+
+def test_a_folder_that_is_a_file(tmp_path: Path) -> None:
+    """A file in the place of the folder is named."""
+    (tmp_path / "file").write_text("mine")
+    for place in (tmp_path / "file", tmp_path / "file" / "below"):
+        with refused(OSError, tmp_path, f"{place}: cannot be written"):
+            open_store(place)

@@ -1,0 +1,377 @@
+"""Series and frames that a sweep keeps of its walks: what they are, that they survive, and who reads them."""
+
+import concurrent.futures
+import multiprocessing
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+import yaml
+
+import warpchain
+from tests.run.test_sweep_run import BRIEF, TINY, brief_setup, data_of
+from warpchain.engine.devices import CAPACITY_SAMPLES
+from warpchain.inputs.parameters import InputError
+from warpchain.reports.figure5 import MOST_CELLS, sweep_figure5
+from warpchain.reports.statistics import NothingToShow
+from warpchain.reports.sweep_page import write_report
+from warpchain.run.sweep_run import sweep
+from warpchain.store.folder import Store
+from warpchain.store.kept_walk import KeptWalk
+from warpchain.store.merged_file import merge
+from warpchain.store.shards import read_manifest, read_shard, write_shard
+from warpchain.store.sweep_result import SweepResult, load
+from warpchain.sweeps.plan import load_sweep
+from warpchain.sweeps.recording import Keep
+from warpchain.walks.motion import SERIES
+from warpchain.walks.scheduler import run_setups
+
+OFTEN = {"method": "dp5", "record_interval": 1e-4}
+RECORD: dict[str, Any] = {
+    "series": {"interval": 1e-4, "samples": [0, 3]},
+    "frames": {"interval": 5e-4, "samples": [3]},
+}
+KEPT: dict[str, Any] = TINY | {"samples": 5, "options": OFTEN, "record": RECORD}
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a sweep that keeps the motion of two of five samples, run on one thread."""
+    folder = tmp_path_factory.mktemp("kept") / "sweep"
+    sweep(KEPT, folder, workers=1)
+    return folder
+
+
+def same(one: KeptWalk, walk: warpchain.WalkResult) -> bool:
+    """Whether a kept walk has the series and frames of a walk, to the bit."""
+    names = ("time", "center", "center_velocity", "frame_time", "sprocket_center")
+    joints = walk.frame_joints.astype(np.float32)
+    return np.array_equal(one.frame_joints, joints) and all(
+        np.array_equal(getattr(one, name), getattr(walk, name)) for name in names
+    )
+
+
+def test_kept_is_what_the_walk_itself_gives(tmp_path: Path) -> None:
+    """Series, frames and sprocket of a sweep's walk are those of `warpchain.walk`, to the bit."""
+    scene = {"start": "spinning", "walk_limit": 0.02, "frequency": 12.0}
+    content = TINY | {"samples": 1, "grid": {"links": [60]}, "scene": scene, "record": {"series": True, "frames": True}}
+    kept = sweep(content, tmp_path / "sweep").series()
+    walk = warpchain.walk(preset="soft", seed=7, links=60, method="dp5", **scene)
+    assert len(kept.time) > 15 and kept.frame_joints.shape[1:] == (60, 2) and len(kept.frame_time) > 8
+    assert kept.time[0] == 0 and kept.sprocket_radius == walk.sprocket_radius and kept.status == walk.status
+    assert same(kept, walk)
+    assert (kept.unit("center_velocity"), kept.unit("time")) == ("m/s", "s") and "mass" in kept.meaning("center")
+
+
+def test_a_coarser_interval_keeps_the_first_of_each_and_the_last() -> None:
+    """Kept are the first look in each interval, so none is farther from its mark than a fine one, and the last look."""
+    setup = brief_setup(3, record_interval=1e-4)
+    ((_, fine),) = run_setups([setup], keeps=[Keep(series_every=1)])
+    ((_, coarse),) = run_setups([setup], keeps=[Keep(series_every=7)])
+    time, thinned = fine.motion.series[:, 0], coarse.motion.series[:, 0]
+    marks = np.arange(0.0, 0.01, 7e-4)
+    expected = [time[time >= mark].min() for mark in marks]
+    assert thinned[: len(marks)] == pytest.approx(expected, abs=0) and len(thinned) == len(marks) + 1
+    assert thinned[-1] == time[-1] == pytest.approx(0.01)
+    assert {row.tobytes() for row in coarse.motion.series} <= {row.tobytes() for row in fine.motion.series}
+
+
+def test_motions_do_not_depend_on_their_batch() -> None:
+    """Slots, order and company change no bit of a motion, and keeping one changes no bit of its walk."""
+    setups = [brief_setup(seed, record_interval=1e-5) for seed in range(5)]  # fills the device's record
+    setups += [brief_setup(9, links=44, start="spinning", hold_limit=0.05)]
+    keeps = [Keep(series_every=1, frame_every=20), Keep(), Keep(series_every=3)] * 2
+
+    def run(order: list[int], slots: int) -> list[tuple[bytes, float]]:
+        found = {}
+        courses = run_setups([setups[i] for i in order], keeps=[keeps[i] for i in order], slots=slots)
+        for place, course in courses:
+            found[order[place]] = (course.motion.checksum(), course.energy()["joint_friction"])
+        return [found[i] for i in range(len(setups))]
+
+    alone = [run([*range(6)], 1), run([*range(6)], 4), run([5, 3, 1, 0, 2, 4], 3)]
+    assert alone[0] == alone[1] == alone[2]
+    assert len(set(alone[0])) == 6
+    bare = {place: course.energy()["joint_friction"] for place, course in run_setups(setups)}
+    np.testing.assert_array_equal([bare[place] for place in range(6)], [friction for _, friction in alone[0]])
+
+
+def test_long_motions_are_drained_between_launches() -> None:
+    """A series longer than the device's record has every look, in order and without a gap."""
+    setup = brief_setup(1, record_interval=1e-6, walk_limit=0.04)  # a look after each step
+    ((_, course),) = run_setups([setup], keeps=[Keep(series_every=1, frame_every=10)])
+    time = course.motion.series[:, 0]
+    skipped = 1 + course.counts["accepted"] - len(time)
+    assert (
+        skipped in range(4) and len(time) > 3 * CAPACITY_SAMPLES and np.all(np.diff(time) > 0)
+    )  # first steps are short
+    frames = course.motion.frame_time
+    assert len(frames) > 100 and set(frames) <= set(time)
+
+
+def test_only_chosen_samples_are_kept(kept: Path) -> None:
+    """The samples that the file names have series and frames, the others are told apart by a clear line."""
+    result = load(kept)
+    assert result.kept.shape == result.dx.shape == (2, 2, 5)
+    assert result.kept.any(axis=(0, 1)).tolist() == [True, False, False, True, False]
+    first, last = result.series(links=44, frequency=5), result.series(links=44, frequency=5, sample=3)
+    assert (len(first.frame_time), last.frame_joints.shape) == (0, (len(last.frame_time), 44, 2))
+    assert len(last.frame_time) == pytest.approx(20, abs=1) and first.sprocket_center is None
+    assert last.index == result.index[1, 0, 3] and last.setup.scene.links == 44
+    for message, at in (
+        (r"walk 11 is not there; give one of the samples 0, 3", {"links": 44, "frequency": 5, "sample": 1}),
+        (r"frequency: 6 is not on the axis; give one of 5\.0, 15\.0", {"links": 44, "frequency": 6}),
+        (r"frequency: missing; give one of 5\.0, 15\.0", {"links": 44}),
+        (r"link: no axis of block main; did you mean links", {"link": 44}),
+        (r"sample: there is no sample 5; give 0 to 4", {"links": 44, "frequency": 5, "sample": 5}),
+        (r"sample: there is no sample True", {"links": 44, "frequency": 5, "sample": True}),
+    ):
+        with pytest.raises(InputError, match=message):
+            result.series(**at)
+
+
+def test_a_sweep_without_series_is_as_ever(kept: Path, tmp_path: Path) -> None:
+    """Its canonical form, its digest and its shards know nothing of motions; the rows are the same with and without."""
+    bare = sweep({name: value for name, value in KEPT.items() if name != "record"}, tmp_path / "bare")
+    said = sweep(KEPT | {"record": {"series": False, "frames": False}}, tmp_path / "said")
+    assert bare.sweep["record"] == said.sweep["record"] == {"series": False}
+    assert data_of(tmp_path / "bare") == data_of(tmp_path / "said")
+    with h5py.File(next((tmp_path / "bare/shards").glob("[0-9]*.h5"))) as file:
+        assert list(file) == ["rows"]
+    result = load(kept)
+    assert result.provenance["digest"] != bare.provenance["digest"]
+    for name, column in bare.columns.items():
+        np.testing.assert_array_equal(column, result.columns[name])
+    with pytest.raises(InputError, match=r"is not there; a sweep with record: \{series: true\} keeps it"):
+        bare.series(links=30, frequency=5)
+
+
+def test_workers_and_interruptions_leave_the_same_bytes(
+    kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Threads, processes, and a run that was stopped by an error and resumed write the same shards."""
+    uninterrupted = data_of(kept)
+    sweep(KEPT, tmp_path / "threads", workers=3)
+    assert data_of(tmp_path / "threads") == uninterrupted
+    context = multiprocessing.get_context("spawn")
+    with concurrent.futures.ProcessPoolExecutor(2, mp_context=context) as processes:
+        sweep(KEPT, tmp_path / "processes", executor=processes, workers=2)
+    assert data_of(tmp_path / "processes") == uninterrupted
+
+    def full(*arguments: object) -> str:
+        if len(data_of(tmp_path / "stopped")) == 7:
+            raise OSError(28, "No space left on device")
+        return write_shard(*arguments)  # type: ignore[arg-type]
+
+    with monkeypatch.context() as patched:
+        patched.setattr("warpchain.run.sweep_run.write_shard", full)
+        with pytest.raises(OSError, match="No space left"):
+            sweep(KEPT, tmp_path / "stopped", workers=1)
+    assert load(tmp_path / "stopped").kept.sum() == 3  # walks 0, 3 and 5
+    sweep(KEPT, tmp_path / "stopped")
+    assert data_of(tmp_path / "stopped") == uninterrupted
+
+
+@pytest.mark.slow
+def test_killed_with_series_a_sweep_goes_on(kept: Path, tmp_path: Path) -> None:
+    """SIGKILL whenever some more shards are there, resumed each time: the bytes are those of one run."""
+    source, folder = tmp_path / "kept.yaml", tmp_path / "sweep"
+    source.write_text(yaml.safe_dump(KEPT, sort_keys=False))
+    command = [sys.executable, "-m", "warpchain", "sweep", str(source), "-o", str(folder), "--workers", "2"]
+    kills = 0
+    for least in (1, 6, 13):
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        while process.poll() is None and len(list(folder.glob("shards/[0-9]*.h5"))) < least:
+            time.sleep(0.002)
+        process.send_signal(signal.SIGKILL)
+        kills += process.wait() == -signal.SIGKILL
+    assert kills >= 2
+    subprocess.run(command, check=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    assert data_of(folder) == data_of(kept)
+
+
+def test_a_walk_that_was_never_released_has_no_motion(tmp_path: Path) -> None:
+    """It is kept with no instants, breaks nothing, and is in no picture."""
+    scene = {"start": "spinning", "hold_limit": 0.02, "frequency": 12.0}
+    result = sweep(TINY | {"samples": 2, "grid": {"links": [60]}, "scene": scene, "record": {"series": True}}, tmp_path)
+    assert result.summary()["not_steady"] == 2
+    walk = result.series(sample=1)
+    assert (walk.time.shape, walk.center.shape, walk.frame_joints.shape[0]) == ((0,), (0, 2), 0)
+    assert walk.sprocket_center is None and np.isnan(walk.dx)
+    with pytest.raises(NothingToShow, match="series were kept"):
+        sweep_figure5(result)
+    with pytest.raises(ValueError, match="no time series"):
+        walk.plot()
+    merge(tmp_path, tmp_path / "merged.h5")
+    with xarray.open_dataset(tmp_path / "merged.h5", engine="h5netcdf") as data:
+        assert "instant" not in data.dims and data.dx.shape == (1, 2)
+
+
+def test_damage_to_a_motion_is_seen(kept: Path, tmp_path: Path) -> None:
+    """A flipped bit in a series is refused with the remedy when the walk is asked for; its rows can still be read."""
+    sweep(KEPT, tmp_path, workers=1)
+    path = tmp_path / "shards" / sorted(data_of(tmp_path))[3]
+    assert path.read_bytes() == (kept / "shards" / path.name).read_bytes()
+    series = load(tmp_path).series(links=30, frequency=5, sample=3)
+    content, wanted = bytearray(path.read_bytes()), series.center[:, 1].tobytes()
+    assert content.count(wanted) == 1
+    content[content.index(wanted) + 11] ^= 4
+    path.write_bytes(content)
+    result = load(tmp_path)
+    assert result.missing_count == 0
+    with pytest.raises(InputError, match=f"{path}: damaged or cut short; delete it and run the sweep again"):
+        result.series(links=30, frequency=5, sample=3)
+    path.unlink()
+    sweep(KEPT, tmp_path)
+    assert data_of(tmp_path) == data_of(kept)
+
+
+def test_a_shard_without_its_motions_is_not_written(kept: Path, tmp_path: Path) -> None:
+    """Rows whose motions should be kept are refused without them, and motions that should not be kept as well."""
+    manifest = read_manifest(kept)
+    assert [manifest.kept(walks) for walks in manifest.shards[:5]] == [[0], [], [], [3], []]
+    with Store.open(tmp_path, load_sweep(KEPT), shard_size=manifest.shard_size) as store:
+        rows = read_shard(kept, manifest.digest, manifest.shards[0])
+        with pytest.raises(ValueError, match="motions are not those that are kept of walks 0 to 0"):
+            store.write(manifest.shards[0], rows)
+        assert store.missing() == manifest.shards
+
+
+def test_a_disk_too_small_for_series_is_said_at_once(tmp_path: Path) -> None:
+    """Series are in the estimate of the room that a sweep takes."""
+    huge = TINY | {"samples": 10**9, "record": {"series": True}}
+    with pytest.raises(OSError, match=r"the rest of the sweep takes .* MB, but .* MB are free"):
+        Store.open(tmp_path, load_sweep(huge), shard_size=10**9)
+
+
+def test_the_merged_file_has_series_by_name(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """xarray finds each walk's series and frames, with units, at the place that the file says; so on any system."""
+    merge(kept, tmp_path / "one.h5")
+    monkeypatch.delattr(os, "posix_fallocate")
+    merge(kept, tmp_path / "two.h5")
+    assert (tmp_path / "one.h5").read_bytes() == (tmp_path / "two.h5").read_bytes()
+    assert len(list(tmp_path.iterdir())) == 2
+    result = load(kept)
+    with xarray.open_dataset(tmp_path / "one.h5", engine="h5netcdf") as data:
+        assert data.series_center_y.dims == ("instant",) and data.joint_x.dims == ("joint",)
+        assert data.series_center_velocity_x.attrs["units"] == "m/s" and data.joint_y.attrs["units"] == "m"
+        assert {f"series_{name}" for name in SERIES} < set(data.variables)
+        np.testing.assert_array_equal(data.series_count.values > 0, result.kept)
+        assert data.series_count.attrs["sample_dimension"] == "instant"
+        for links, frequency, sample in ((30, 5, 0), (44, 15, 3)):
+            walk = result.series(links=links, frequency=frequency, sample=sample)
+            at = data.sel(links=links, frequency=frequency, sample=sample)
+            instants = slice(int(at.series_start), int(at.series_start + at.series_count))
+            np.testing.assert_array_equal(data.series_time[instants], walk.time)
+            np.testing.assert_array_equal(data.series_center_y[instants], walk.center[:, 1])
+            np.testing.assert_array_equal(data.series_center_velocity_x[instants], walk.center_velocity[:, 0])
+            frames = slice(int(at.frame_start), int(at.frame_start + at.frame_count))
+            np.testing.assert_array_equal(data.frame_time[frames], walk.frame_time)
+            joints = slice(int(at.joint_start), int(at.joint_start + at.joint_count))
+            np.testing.assert_array_equal(data.joint_y[joints], walk.frame_joints[..., 1].ravel())
+
+
+def test_the_merged_file_of_blocks_and_of_a_part(tmp_path: Path) -> None:
+    """Several blocks are in groups, with the motions of the walks that are there; shards may span blocks."""
+    blocks = [{"name": "a", "grid": {"links": [30]}}, {"name": "b", "samples": 3, "grid": {"frequency": [5, 15]}}]
+    content = KEPT | {"blocks": blocks, "scene": BRIEF | {"links": 44}, "record": {"series": {"interval": 1e-3}}}
+    del content["grid"]
+    sweep(content, tmp_path / "sweep", workers=1)
+    (tmp_path / "sweep/shards/000000007-000000007.h5").unlink()
+    result = load(tmp_path / "sweep")
+    merge(tmp_path / "sweep", tmp_path / "merged.h5")
+    with xarray.open_dataset(tmp_path / "merged.h5", engine="h5netcdf", group="b") as data:
+        assert (data.series_count.values > 0).tolist() == [[True, True, False], [True, True, True]]
+        walk = result.blocks["b"].series(frequency=15, sample=1)
+        at = data.sel(frequency=15, sample=1)
+        np.testing.assert_array_equal(data.series_time[int(at.series_start) :][: int(at.series_count)], walk.time)
+        assert "joint" not in data.dims
+    with pytest.raises(InputError, match="the motion of walk 7 is not there"):
+        result.blocks["b"].series(frequency=5, sample=2)
+
+
+@pytest.mark.parametrize("line", ["", "del os.posix_fallocate\n"], ids=["fallocate", "as on macOS"])
+def test_a_merge_with_motions_that_fails_leaves_the_older_file(kept: Path, tmp_path: Path, line: str) -> None:
+    """In a process that may write small files only, the merged file is refused in one line; what was there stays."""
+    path = tmp_path / "merged.h5"
+    merge(kept, path)
+    older = path.read_bytes()
+    program = (
+        f"import os, resource, signal, sys\n{line}"
+        "from warpchain.store.merged_file import merge\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (30000, 30000))\n"
+        "try:\n"
+        "    merge(*sys.argv[1:])\n"
+        "except OSError as error:\n"
+        "    print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program, kept, path], capture_output=True, encoding="utf-8")
+    assert done.stdout.startswith(f"{path}: cannot be written (File too large); make room"), done.stderr
+    assert done.stdout.count("\n") == 1
+    assert path.read_bytes() == older and list(tmp_path.iterdir()) == [path]
+
+
+def test_figure5_of_a_sweep_shows_the_kept_series(kept: Path) -> None:
+    """Both panels have a line for each shown walk, with its numbers; a colour is a cell."""
+    result = load(kept)
+    figure, text = sweep_figure5(result)
+    height, speed = figure.axes
+    walks = [
+        result.series(links=links, frequency=frequency, sample=sample)
+        for links in (30, 44)
+        for frequency in (5, 15)
+        for sample in (0, 3)
+    ]
+    for axes, values in (
+        (height, [walk.center[:, 1] for walk in walks]),
+        (speed, [walk.center_velocity[:, 0] for walk in walks]),
+    ):
+        assert len(axes.lines) == len(walks)
+        for line, walk, numbers in zip(axes.lines, walks, values, strict=True):
+            np.testing.assert_array_equal(line.get_xdata(), walk.time)
+            np.testing.assert_array_equal(line.get_ydata(), numbers)
+    assert len({line.get_color() for line in speed.lines}) == 4
+    assert "8 walks in 4 of 4 cells" in text
+    names = [entry.get_text() for entry in height.get_legend().get_texts()]
+    assert names[0] == "n = 30, ν = 5 Hz" and len(names) == 4
+
+
+def test_figure5_of_many_cells_shows_some_from_first_to_last(tmp_path: Path) -> None:
+    """Of many cells as many are shown as there are colours, the first and the last among them."""
+    grid = {"frequency": {"from": 1, "to": 20, "step": 1}}
+    content = KEPT | {"samples": 1, "grid": grid, "scene": BRIEF | {"links": 30}, "record": {"series": True}}
+    figure, text = sweep_figure5(sweep(content, tmp_path))
+    names = [entry.get_text() for entry in figure.axes[0].get_legend().get_texts()]
+    assert len(names) == MOST_CELLS and (names[0], names[-1]) == ("ν = 1 Hz", "ν = 20 Hz")
+    assert f"{MOST_CELLS} of 20 cells" in text
+
+
+def test_report_and_pictures_use_kept_frames(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A walk with frames is shown without running it again; one without is run again, as ever."""
+
+    def refuse(*arguments: object, **settings: object) -> None:
+        raise AssertionError("run again")
+
+    monkeypatch.setattr("warpchain.run.single_walk.run_walk", refuse)
+    write_report(kept, tmp_path / "page.html", animation_of=3)
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "Its frames were kept by the sweep" in page and "run again" not in page
+    assert page.count("<iframe") == 1 and "as in the paper&#x27;s Figure 5" in page
+    with pytest.raises(AssertionError, match="run again"):
+        write_report(kept, tmp_path / "page.html", animation_of=0)
+
+
+def test_results_with_motions_can_be_copied(kept: Path) -> None:
+    """A pickled result still finds its series."""
+    result: SweepResult = pickle.loads(pickle.dumps(load(kept)))
+    assert len(result.series(links=30, frequency=5).time) > 90

@@ -1,0 +1,379 @@
+"""Results of sweeps: arrays with named axes, statistics, xarray, pandas, and the one merged file."""
+
+import copy
+import json
+import math
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+
+from tests.support.synthetic_sweep import SWEEP, SyntheticSweep, run, synthetic_rows
+from warpchain.cli.main import main
+from warpchain.inputs.parameters import InputError
+from warpchain.reports.sweep_page import write_report
+from warpchain.status import Status
+from warpchain.store.folder import Store, empty_rows
+from warpchain.store.merged_file import merge
+from warpchain.store.shards import NUMERICS_VERSION, BlockLayout, shard_name
+from warpchain.store.sweep_result import BlockResult, SweepResult, load
+from warpchain.sweeps.plan import load_sweep
+from warpchain.walks.rows import COLUMNS
+
+SINGLE: Any = SyntheticSweep(
+    blocks=(
+        BlockLayout(
+            "main",
+            {"links": (60, 90), "start": ("rest", "ellipse"), "self_contact": (False, True), "frequency": (5.0, 7.5)},
+            6,
+            0,
+            ("phase",),
+        ),
+    )
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The complete sweep of two blocks."""
+    directory = tmp_path_factory.mktemp("two")
+    run(directory)
+    return directory
+
+
+@pytest.fixture(scope="module")
+def single(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sweep of one block with axes of all types, walks 20 … 39 missing."""
+    directory = tmp_path_factory.mktemp("one")
+    run(directory, SINGLE)
+    (directory / "shards" / shard_name(range(20, 40))).unlink()
+    return directory
+
+
+def test_arrays_have_named_axes(folder: Path) -> None:
+    """Every walk is where block, cell and sample say, every column under its name and to the bit."""
+    result = load(folder)
+    assert result.name == "synthetic" and result.seed == SWEEP.seed and list(result.blocks) == ["rest", "ellipse"]
+    rows = synthetic_rows(SWEEP, range(160))
+    rest, ellipse = result.blocks["rest"], result.blocks["ellipse"]
+    assert rest.dims == ("links", "frequency", "sample") and rest.shape == rest.dx.shape == (3, 2, 20)
+    assert ellipse.dims == ("gravity", "sample") and ellipse.shape == (5, 8)
+    assert rest.axes["links"].tolist() == [60, 90, 120] and rest.axes["links"].dtype == np.int64
+    assert rest.axes["frequency"].tolist() == [5.0, 12.5]
+    assert rest.index[2, 1, 3] == (2 * 2 + 1) * 20 + 3 and ellipse.index[4, 7] == 159
+    for name in (*COLUMNS, *rest.drawn):
+        assert getattr(rest, name).tobytes() == np.ascontiguousarray(rows[name][:120]).tobytes(), name
+        assert getattr(rest, name).dtype == rows.dtype[name]
+    assert set(rest.columns) == {*COLUMNS, "phase", "floor_friction", "clearance"}
+    assert set(ellipse.columns) == {*COLUMNS, "phase", "link_length"}
+    assert result.walk_count == 160 and result.missing_count == 0
+
+
+def test_the_layout_is_that_of_the_sweep(tmp_path: Path) -> None:
+    """A real sweep's walks are found where they were planned, and its copy in the folder is the same sweep."""
+    sweep = load_sweep(
+        {
+            "version": 1,
+            "name": "real",
+            "seed": 3,
+            "preset": "soft",
+            "blocks": [
+                {"name": "rest", "samples": 2, "grid": {"links": [60, 90], "frequency": [5, 10, 15]}},
+                {"name": "methods", "samples": 1, "scene": {"start": "ellipse"}, "distributions": {"all": "fixed"}}
+                | {"grid": {"preset": ["soft", "paper"], "method": ["dp5", "bs32"], "self_contact": [True, False]}},
+            ],
+        }
+    )
+    with Store.open(tmp_path, sweep, shard_size=5) as store:
+        for walks in store.missing():
+            rows = empty_rows(sweep, walks)
+            rows["status"] = Status.TIME_LIMIT
+            for row, index in zip(rows, walks, strict=True):
+                for name, value in sweep.planned(index).drawn.items():
+                    row[name] = value
+            store.write(walks, rows)
+    result = load(tmp_path)
+    for index in range(sweep.walk_count):
+        walk = sweep.planned(index)
+        block = result.blocks[sweep.blocks[walk.block].name]
+        place = (*walk.cell, walk.sample)
+        assert block.index[place] == index
+        assert {name: block.columns[name][place] for name in block.drawn} == walk.drawn
+        fields = {"preset": walk.setup.preset}
+        for part in (walk.setup.parameters, walk.setup.scene, walk.setup.options):
+            fields |= part.model_dump()
+        assert [fields[name] for name in block.axes] == [
+            values[at] for values, at in zip(block.axes.values(), walk.cell, strict=True)
+        ]
+        assert all(block.unit(name) and block.meaning(name) for name in (*block.columns, *block.dims))
+    assert load_sweep(tmp_path / "sweep.yaml").digest() == sweep.digest() == result.provenance["digest"]
+    merge(tmp_path, tmp_path / "merged.h5")
+    with xarray.open_dataset(tmp_path / "merged.h5", engine="h5netcdf", group="methods") as data:
+        assert data.preset.values.tolist() == ["soft", "paper"]
+
+
+def test_units_and_meanings(folder: Path) -> None:
+    """Columns, drawn quantities and axes of any block have units; an unknown name gets a suggestion."""
+    result = load(folder)
+    assert [result.unit(name) for name in ("dx", "links", "frequency", "phase", "link_length", "gravity")] == [
+        *("m", "1", "Hz", "1", "m", "m/s²")
+    ]
+    assert result.unit("sample") == "1" and result.unit("loss_floor") == "J"
+    assert result.blocks["ellipse"].meaning("gravity") == "gravitational acceleration, along −y"
+    with pytest.raises(KeyError, match="did you mean walk_time"):
+        result.unit("walktime")
+
+
+def test_several_blocks_have_no_common_attributes(folder: Path) -> None:
+    """Of several blocks none is guessed; the error names them."""
+    result = load(folder)
+    with pytest.raises(AttributeError, match=r"dx: .* blocks\[…\] with rest, ellipse"):
+        _ = result.dx
+    with pytest.raises(AttributeError, match="dz: no such column; columns are index, status, dx"):
+        _ = result.blocks["rest"].dz
+    assert not hasattr(result, "__array__")
+
+
+def test_missing_walks_are_counted(single: Path) -> None:
+    """Walks that are not there have status −1 and NaN; the attributes of an only block are those of the result."""
+    result = load(single)
+    missing = (result.index >= 20) & (result.index < 40)
+    assert result.shape == (2, 2, 2, 2, 6) and result.index.ravel().tolist() == list(range(96))
+    assert ((result.status == -1) == missing).all() and np.isnan(result.dx[missing]).all()
+    assert (result.steps_accepted[missing] == -1).all() and np.isnan(result.phase[missing]).all()
+    assert np.isfinite(result.phase[~missing]).all()
+    failed = int((result.status == Status.TIME_LIMIT).sum())
+    assert 0 < failed < 30
+    assert result.summary() == {"at_rest": 76 - failed, "time_limit": failed, "missing": 20}
+    assert result.missing_count == 20 and result.unit("self_contact") == "1"
+    assert repr(result).splitlines() == [
+        f"<SweepResult synthetic: 96 walks, {76 - failed} at_rest, {failed} time_limit, 20 missing>",
+        "  <BlockResult main (links: 2, start: 2, self_contact: 2, frequency: 2, sample: 6): "
+        f"{76 - failed} at_rest, {failed} time_limit, 20 missing>",
+    ]
+    assert {"dx", "phase", "statistics", "summary", "blocks"} <= set(dir(result))
+
+
+def test_a_sweep_just_begun_is_all_missing(tmp_path: Path) -> None:
+    """A folder is read while its sweep runs, from the first moment, without the lock."""
+    with Store.open(tmp_path, SWEEP, shard_size=20):
+        assert load(tmp_path).summary() == {"at_rest": 0, "missing": 160}
+        (tmp_path / "shards").rmdir()
+        result = load(tmp_path)
+    assert result.missing_count == 160 and np.isnan(result.blocks["ellipse"].statistics().mean).all()
+
+
+def test_statistics_are_over_walks_at_rest(tmp_path: Path) -> None:
+    """Mean and deviation of known numbers; failed and missing walks are in neither, but counted."""
+    sweep: Any = SyntheticSweep(blocks=(BlockLayout("main", {"links": (10, 20, 30, 40, 50)}, 4, 0, ()),))
+    status = [[1, 1, 1, 1], [1, 3, 6, 1], [1, 3, 3, 3], [3, 3, 3, 3]]
+    with Store.open(tmp_path, sweep, shard_size=4) as store:
+        for cell, walks in enumerate(store.missing()[:4]):
+            rows = synthetic_rows(sweep, walks)
+            rows["status"] = status[cell]
+            rows["dx"] = np.where(rows["status"] == 1, [1.0, 2.0, 4.0, 5.0], np.nan)
+            store.write(walks, rows)
+    found = load(tmp_path).statistics()
+    assert found.unit == "m" and found.axes["links"].tolist() == [10, 20, 30, 40, 50]
+    assert found.count.tolist() == [4, 2, 1, 0, 0]
+    assert found.failed.tolist() == [0, 2, 3, 4, 0] and found.missing.tolist() == [0, 0, 0, 0, 4]
+    np.testing.assert_allclose(found.mean, [3.0, 3.0, 1.0, math.nan, math.nan])
+    np.testing.assert_allclose(found.sd, [math.sqrt(10 / 3), math.sqrt(8), *[math.nan] * 3])
+    np.testing.assert_allclose(found.standard_error[:2], [math.sqrt(10 / 12), 2.0])
+    assert load(tmp_path).statistics("bounces").mean.shape == (5,)
+    with pytest.raises(KeyError, match="did you mean bounces"):
+        load(tmp_path).statistics("bounce")
+
+
+def test_results_can_be_copied(single: Path) -> None:
+    """Copies and pickles are whole."""
+    result = load(single)
+    for copied in (copy.deepcopy(result), pickle.loads(pickle.dumps(result))):
+        assert isinstance(copied, SweepResult) and isinstance(copied.blocks["main"], BlockResult)
+        assert copied.dx.tobytes() == result.dx.tobytes()
+
+
+def test_no_sweep_no_result(tmp_path: Path, single: Path) -> None:
+    """A folder without a sweep, or none at all, is named; a bad shard is no missing one."""
+    for nothing in (tmp_path, tmp_path / "none", single / "sweep.json"):
+        with pytest.raises(InputError, match=f"{nothing}: no sweep in this folder"):
+            load(nothing)
+    run(tmp_path)
+    path = tmp_path / "shards" / shard_name(range(20, 40))
+    path.write_bytes(path.read_bytes()[:-1])
+    with pytest.raises(InputError, match=f"{path}: damaged or cut short; delete it"):
+        load(tmp_path)
+
+
+def test_loading_is_light() -> None:
+    """The module brings neither Warp nor HDF5, xarray or pandas."""
+    program = (
+        "import sys, warpchain.store.sweep_result\n"
+        "print(sorted({'warp', 'h5py', 'xarray', 'pandas', 'scipy', 'matplotlib'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, encoding="utf-8")
+    assert (done.stdout, done.stderr) == ("[]\n", "")
+
+
+def test_one_block_as_a_data_set(single: Path) -> None:
+    """xarray gets names, coordinates, units, and what says how to make it again."""
+    result = load(single)
+    data = result.to_xarray()
+    assert data.dx.dims == ("links", "start", "self_contact", "frequency", "sample")
+    assert (
+        data.dx.sel(links=90, start="ellipse", self_contact=True, frequency=7.5, sample=5) == result.dx[1, 1, 1, 1, 5]
+    )
+    assert data.frequency.attrs["units"] == "Hz" and data.dx.attrs["units"] == "m"
+    assert data.attrs["walks_missing"] == 20 and data.attrs["digest"] == SINGLE.digest()
+    assert json.loads(data.attrs["sweep"]) == SINGLE.canonical() and int(data.attrs["seed"]) == SINGLE.seed
+
+
+def test_several_blocks_as_a_tree(folder: Path) -> None:
+    """Each block is a child of its name."""
+    result = load(folder)
+    tree = result.to_xarray()
+    assert set(tree.children) == {"rest", "ellipse"} and tree.attrs["title"] == "synthetic"
+    assert tree["ellipse"].to_dataset().identical(result.blocks["ellipse"].to_xarray())
+    assert tree["rest"]["floor_friction"].attrs["symbol"] == "μ_fc"
+
+
+def test_walks_as_a_table(folder: Path) -> None:
+    """pandas gets one row for each walk, with block, axes, sample and all that any block draws."""
+    table = load(folder).to_pandas()
+    assert len(table) == 160 and list(table.columns[:4]) == ["block", "links", "frequency", "sample"]
+    assert table["index"].tolist() == list(range(160))
+    row = table[table["index"] == 95].iloc[0]
+    assert (row.block, row.links, row.frequency, row["sample"]) == ("rest", 120, 5.0, 15)
+    assert row.phase == load(folder).blocks["rest"].phase[2, 0, 15] and np.isnan(row.link_length)
+    assert table[table.block == "ellipse"].gravity.tolist() == np.repeat([1.6, 3.7, 9.8, 12.0, 24.8], 8).tolist()
+
+
+@pytest.mark.parametrize(("package", "method"), [("xarray", "to_xarray"), ("pandas", "to_pandas")])
+def test_missing_packages_are_named(single: Path, package: str, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the optional package, one line says how to get it."""
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(ImportError, match=rf"^{package} is not installed; pip install 'warpchain\[xarray\]'$"):
+        getattr(load(single), method)()
+
+
+def test_merged_file_of_one_block(single: Path, tmp_path: Path) -> None:
+    """Plain `xarray.open_dataset` of the merged file gives what the result itself gives."""
+    path = tmp_path / "merged.h5"
+    merge(single, path)
+    expected = load(single).to_xarray()
+    with xarray.open_dataset(path, engine="h5netcdf") as data:
+        assert set(data.coords) == {"links", "start", "self_contact", "frequency", "sample"}
+        xarray.testing.assert_equal(data, expected)
+        assert data.self_contact.dtype == bool and data.start.values.tolist() == ["rest", "ellipse"]
+        assert set(data.attrs) == set(expected.attrs)
+        for name in expected.variables:
+            notes = {key: np.array(value).tolist() for key, value in data[name].attrs.items()}
+            assert notes == {key: np.array(value).tolist() for key, value in expected[name].attrs.items()}, name
+        mean = data.dx.where(data.status == 1).mean("sample")
+        np.testing.assert_allclose(mean, load(single).statistics().mean)
+
+
+def test_merged_file_of_several_blocks(folder: Path, tmp_path: Path) -> None:
+    """Each block is a group of its name."""
+    path = tmp_path / "merged.h5"
+    merge(folder, path)
+    for name, block in load(folder).blocks.items():
+        with xarray.open_dataset(path, engine="h5netcdf", group=name) as data:
+            xarray.testing.assert_equal(data, block.to_xarray())
+    with xarray.open_datatree(path, engine="h5netcdf") as tree:
+        assert set(tree.children) == {"rest", "ellipse"} and tree.attrs["walks"] == 160
+
+
+def test_merged_file_is_plain_hdf5(folder: Path, tmp_path: Path) -> None:
+    """Without xarray, too, every dataset says its axes, unit and meaning; one says what its codes mean."""
+    path = tmp_path / "merged.h5"
+    merge(folder, path)
+    with h5py.File(path) as file:
+        group = file["rest"]
+        assert [dim.label or dim.keys()[0] for dim in group["dx"].dims] == ["links", "frequency", "sample"]
+        assert group["dx"].dims[1][0][()].tolist() == [5.0, 12.5] and group["frequency"].is_scale
+        for dataset in group.values():
+            assert dataset.attrs["units"] and dataset.attrs["description"], dataset.name
+        meanings = group["status"].attrs["flag_meanings"].split()
+        assert dict(zip(group["status"].attrs["flag_values"].tolist(), meanings, strict=True)) == {
+            -1: "missing",
+            **{int(status): status.label for status in Status},
+        }
+        assert json.loads(file.attrs["sweep"]) == SWEEP.canonical()
+        assert json.loads(file.attrs["versions"]).keys() == {"warpchain", "warp-lang", "numpy"}
+        assert file.attrs["numerics_version"] == NUMERICS_VERSION and file.attrs["digest"] == SWEEP.digest()
+
+
+def test_merged_files_are_equal(folder: Path, tmp_path: Path) -> None:
+    """Merging twice gives the same bytes; an older file is replaced."""
+    for name in ("one.h5", "two.h5", "one.h5"):
+        merge(folder, tmp_path / name)
+    assert (tmp_path / "one.h5").read_bytes() == (tmp_path / "two.h5").read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.h5", "two.h5"]
+
+
+def test_a_merge_that_fails_leaves_the_older_file(
+    folder: Path, single: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file that cannot be written is named; what was there stays."""
+    path = tmp_path / "merged.h5"
+    merge(single, path)
+    older = path.read_bytes()
+
+    def write_bytes(path: Path, content: bytes) -> int:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "write_bytes", write_bytes)
+        with pytest.raises(OSError, match=r"merged\.h5: cannot be written \(No space left on device\); make room"):
+            merge(folder, path)
+    assert path.read_bytes() == older and len(list(tmp_path.iterdir())) == 1
+    with pytest.raises(OSError, match=r"cannot be written \(No such file or directory\); give a folder that is there"):
+        merge(folder, tmp_path / "none" / "merged.h5")
+
+
+def test_a_merged_file_replaces_another_only(folder: Path, single: Path, tmp_path: Path) -> None:
+    """An older merged file, of whichever sweep, gives way; any other file, folder or link is refused and stays."""
+    path = tmp_path / "merged.h5"
+    merge(single, path)
+    merge(folder, path)
+    with h5py.File(path) as file:
+        assert file.attrs["digest"] == SWEEP.digest()
+    shard = next((folder / "shards").iterdir()).read_bytes()
+    others = {"my.yaml": b"version: 1\n", "empty.h5": b"", "shard.h5": shard, "cut.h5": path.read_bytes()[:1000]}
+    for name, content in others.items():
+        (tmp_path / name).write_bytes(content)
+    (tmp_path / "directory").mkdir()
+    (tmp_path / "nowhere").symlink_to(tmp_path / "none")
+    os.mkfifo(tmp_path / "pipe")
+    for name in (*others, "directory", "nowhere", "pipe"):
+        with pytest.raises(InputError, match=rf"{name}: is there and is no merged sweep; give another name$"):
+            merge(folder, tmp_path / name)
+    assert {name: (tmp_path / name).read_bytes() for name in others} == others
+    assert (tmp_path / "nowhere").is_symlink()
+
+
+@pytest.mark.parametrize("name", ["sweep.json", "sweep.yaml", "log.txt", "lock", "shards", "shards/all.h5"])
+def test_nothing_is_written_over_the_sweep(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The names of what a sweep has are refused to merged file, page and figures, there or not yet, by any path."""
+    folder = tmp_path / "sweep"
+    run(folder)
+    (folder / "log.txt").unlink(missing_ok=True)
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    monkeypatch.chdir(folder)
+    for target in (Path(name), folder / "shards/.." / name):
+        for write in (merge, write_report):
+            with pytest.raises(InputError, match=rf"{name}: belongs to the sweep itself; give another path$"):
+                write(folder, target)
+    with pytest.raises(SystemExit, match="2"):
+        main(["plot", ".", "-o", name])
+    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+    merge(folder, "all.h5")
+    merge(folder, "all.h5")

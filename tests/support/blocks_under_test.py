@@ -1,0 +1,121 @@
+"""Chains in the block form on CPU fibers, next to the same chains in the CPU form."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from tests.support.folded_chains import folded_chain
+from warpchain.engine.batch import Batch
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import preset
+from warpchain.kernels.cpu.contacts.neighbour_list import list_layout
+from warpchain.kernels.cpu.loop import Features
+from warpchain.kernels.gpu.loop import make_advance_block
+from warpchain.status import Status
+
+Array = NDArray[np.float64]
+
+SOFT = preset("soft")
+FIXED_STEP = 2e-6  # s
+
+
+@contextmanager
+def fibers() -> Iterator[None]:
+    """Blocks of more than one thread run as fibers on the CPU."""
+    before = wp.config.enable_cpu_blocks
+    wp.config.enable_cpu_blocks = True
+    try:
+        yield
+    finally:
+        wp.config.enable_cpu_blocks = before
+
+
+def heap(links: int, seed: int = 3, *, tilt: float = 0.3, raised: float = 0.0) -> tuple[Array, Array]:
+    """A folded chain in which many links touch one another; position and velocity (n, 3).
+
+    Args:
+        links: n.
+        seed: Of the folds.
+        tilt: Greatest angle of a link against the horizontal [rad]. In a flat heap only joints an even number of links
+            apart meet.
+        raised: Height of its centre above the origin [m].
+    """
+    position, velocity = folded_chain(links, seed, SOFT.link_length, tilt=tilt, opening=1e-5)
+    position[:, 1] += raised
+    return position, velocity
+
+
+def batch_of(
+    chains: Sequence[tuple[Array, Array]],
+    *,
+    method: str,
+    self_contact: bool = True,
+    fixed_step: bool = True,
+    stop_time: float = 1.0,
+    tolerance: float = 1e-4,
+    keeps: bool = False,
+) -> Batch:
+    """A batch with these chains (position, velocity) at soft parameters.
+
+    Args:
+        chains: One per world.
+        method: Name of a tableau.
+        self_contact: Contacts between a chain's own links.
+        fixed_step: All steps take FIXED_STEP: the tolerance refuses nothing and no skin lets a step be longer.
+        stop_time: In s.
+        tolerance: Of adaptive steps.
+        keeps: Keep samples, and a frame with loads at every second one.
+    """
+    longest = max(len(position) for position, _ in chains)
+    options = Options(method=method, tolerance=0.1 if fixed_step else tolerance, self_contact=self_contact)
+    kept = {"keeps_samples": keeps, "frame_every": 2 if keeps else None, "keeps_loads": keeps}
+    batch = Batch(len(chains), longest, options, **kept)
+    batch.control.launch_time = 1e9  # tries alone end a launch, however busy the machine is
+    if fixed_step:
+        batch.control.skin = 1e-9
+        batch.control.contact_step = FIXED_STEP
+        batch.control.soft_contact_step = FIXED_STEP
+    for world, (position, velocity) in enumerate(chains):
+        batch.set_chain(world, SOFT, len(position))
+        batch.load(world, position, velocity, stop_time=stop_time, stop_status=Status.FINISHED)
+        batch.set_program(world, sprocket_speed=-50.0)
+        if fixed_step:
+            batch.state.step.numpy()[world] = FIXED_STEP
+    return batch
+
+
+def features_of(batch: Batch, *, fixed_body: str, watch: str = "none", broad_phase: str = "grid") -> Features:
+    """Kernel features for a batch."""
+    return batch.features(fixed_body=fixed_body, watch=watch, broad_phase=broad_phase)
+
+
+def launch_blocks(batch: Batch, features: Features, tries: int, *, block_dim: int) -> None:
+    """Carry all worlds of a batch on by at most this many tries each, in the block form."""
+    batch.control.tries = tries
+    worlds = wp.array(np.arange(len(batch.links), dtype=np.int32), dtype=wp.int32, device="cpu")
+    inputs = [worlds, batch.model, batch.program, batch.state, batch.record, batch.scratch, batch.lists, batch.control]
+    with fibers():
+        wp.launch_tiled(
+            make_advance_block(features, block_dim),
+            dim=[len(batch.links)],
+            inputs=inputs,
+            block_dim=block_dim,
+            device="cpu",
+        )
+
+
+def launch_chains(batch: Batch, features: Features, tries: int) -> None:
+    """The same in the CPU form."""
+    batch.launch(range(len(batch.links)), features, tries)
+
+
+def listed_pairs(batch: Batch, world: int = 0) -> set[tuple[int, int]]:
+    """Pairs of joints in a world's neighbour list."""
+    lists = list_layout(batch.columns)
+    row = batch.lists.numpy()[world]
+    count = int(row[lists.count])
+    first, second = row[lists.first : lists.first + count], row[lists.second : lists.second + count]
+    return set(zip(first.tolist(), second.tolist(), strict=True))

@@ -1,0 +1,29 @@
+"""Short runs that break careless integrators, with any method, and what makes their results sound."""
+
+import numpy as np
+import pytest
+
+import warpchain
+from warpchain import Status
+from warpchain.bench.trials.hard_starts import energy_error, energy_scale
+
+METHODS = ("rkf78", "dp5", "bs32", "os32", "rodas4p", "rodas5p", "hybrid")
+every_method = pytest.mark.parametrize("method", METHODS)
+
+
+def simulate(parameters, state, duration, **settings):
+    """`warpchain.simulate` at 1e-6, recording just the end."""
+    return warpchain.simulate(parameters, *state, duration, times=[duration], **{"tolerance": 1e-6, **settings})
+
+
+def assert_sound(flight, parameters, state, within=1e-5):
+    """Finished, finite, and the ledger closes to a fraction of the energy of motion and springs at the start."""
+    assert flight.status == Status.FINISHED, flight.status.sentence
+    position, velocity = flight.position[-1], flight.velocity[-1]
+    assert np.all(np.isfinite(position)) and np.all(np.isfinite(velocity))
+    # a flight on rigid joints is looser than springs
+    closes_within = max(within, 1e-4) if flight.losses["hand_over"] else within
+    assert energy_error(flight, parameters, state) < closes_within
+    assert abs(flight.losses["hand_over"]) < 1e-3 * energy_scale(parameters, state)
+    losses = [loss for name, loss in flight.losses.items() if name != "hand_over"]
+    assert all(loss > -within * energy_scale(parameters, state) for loss in losses)

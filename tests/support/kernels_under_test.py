@@ -1,0 +1,299 @@
+"""Warp functions of the contact pass, called from NumPy one by one.
+
+What a kernel must fill is poisoned before its first launch: numbers with NaN, list entries with a joint that no
+chain has. Kernels are compiled with the flags of the step kernels.
+"""
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpchain.engine.devices import start_device
+from warpchain.inputs.parameters import Parameters
+from warpchain.kernels import layout
+from warpchain.kernels.contacts.impulse import collision_impulse, fixed_contact, inverse_masses
+from warpchain.kernels.cpu.contacts.fixed_body import (
+    floor_gap,
+    greatest_opening,
+    resolve_floor,
+    resolve_sprocket,
+    sprocket_gap,
+)
+from warpchain.kernels.cpu.contacts.neighbour_list import greatest_displacement, list_layout, list_slack, neighbour_list
+from warpchain.kernels.cpu.contacts.self_contacts import circles_of_links, collide, self_contacts
+from warpchain.kernels.cpu.explicit import place_ends
+from warpchain.kernels.cpu.loop import COMPILER_FLAGS, load_state
+from warpchain.kernels.types import Chain, Model, State, read_chain
+
+Array = NDArray[np.float64]
+
+DEVICE = start_device("cpu")
+POISONED_JOINT = 2**30
+
+_compiled = functools.partial(
+    wp.kernel, module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS}
+)
+
+
+def _poisoned(*shape: int) -> wp.array:
+    return wp.full(shape, np.nan, dtype=wp.float64, device=DEVICE)
+
+
+# --- the impulse law ---
+
+
+@_compiled
+def _law(cases: wp.array2d(dtype=wp.float64), impulses: wp.array2d(dtype=wp.float64)):
+    i = wp.tid()
+    inverse_nn, inverse_determinant = inverse_masses(cases[i, 2], cases[i, 3], cases[i, 4])
+    impulse_n, impulse_t = collision_impulse(
+        cases[i, 0],
+        cases[i, 1],
+        cases[i, 2],
+        cases[i, 3],
+        cases[i, 4],
+        inverse_nn,
+        inverse_determinant,
+        cases[i, 5],
+        cases[i, 6],
+        cases[i, 7],
+    )
+    impulses[i, 0] = impulse_n
+    impulses[i, 1] = impulse_t
+
+
+def impulses_of_law(cases: Array) -> Array:
+    """`collision_impulse` of many collisions: speeds, W, coefficients (N, 8) in its order → J_n, J_t (N, 2)."""
+    return _map_rows(_law, cases, 2)
+
+
+@_compiled
+def _fixed(cases: wp.array2d(dtype=wp.float64), results: wp.array2d(dtype=wp.float64)):
+    i = wp.tid()
+    chain = Chain()
+    chain.tangential_restitution = cases[i, 14]
+    u, v, omega, lost, hits = fixed_contact(
+        chain,
+        cases[i, 0],
+        cases[i, 1],
+        cases[i, 2],
+        cases[i, 3],
+        cases[i, 4],
+        cases[i, 5],
+        cases[i, 6],
+        cases[i, 7],
+        cases[i, 8],
+        cases[i, 9],
+        cases[i, 10],
+        cases[i, 11],
+        cases[i, 12],
+        cases[i, 13],
+    )
+    results[i, 0] = u
+    results[i, 1] = v
+    results[i, 2] = omega
+    results[i, 3] = lost
+    results[i, 4] = wp.float64(hits)
+
+
+def fixed_contacts(cases: Array) -> Array:
+    """`fixed_contact` of many links: (N, 15), its arguments after the chain, then e_t → results (N, 5)."""
+    return _map_rows(_fixed, cases, 5)
+
+
+@_compiled
+def _link_pair(
+    scratch: wp.array3d(dtype=wp.float64),
+    cases: wp.array2d(dtype=wp.float64),
+    results: wp.array2d(dtype=wp.float64),
+):
+    i = wp.tid()
+    chain = Chain()
+    chain.circle_radius = cases[i, 0]
+    chain.chain_restitution = cases[i, 1]
+    chain.chain_friction = cases[i, 2]
+    chain.tangential_restitution = cases[i, 3]
+    depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = circles_of_links(
+        chain.circle_radius,
+        cases[i, 4],
+        cases[i, 5],
+        cases[i, 6],
+        cases[i, 7],
+        scratch[i, layout.X, 0],
+        scratch[i, layout.Y, 0],
+        scratch[i, layout.X, 1],
+        scratch[i, layout.Y, 1],
+        scratch[i, layout.INVERSE_MASS, 0] + scratch[i, layout.INVERSE_MASS, 1],
+        scratch[i, layout.INVERSE_INERTIA, 0],
+        scratch[i, layout.INVERSE_INERTIA, 1],
+    )
+    lost = wp.float64(0.0)
+    hits = wp.int64(0)
+    if depth > wp.float64(0.0):
+        lost, hits = collide(scratch[i], chain, 0, 1, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant)
+    results[i, 0] = depth
+    results[i, 1] = lost
+    results[i, 2] = wp.float64(hits)
+
+
+def link_pairs(position: Array, velocity: Array, inverses: Array, cases: Array) -> tuple[Array, Array]:
+    """`circles_of_links`, then `collide`, of many pairs A, B.
+
+    Args:
+        position: (N, 2, 2), x, y of the centres of mass.
+        velocity: (N, 2, 3), ẋ, ẏ, ω.
+        inverses: (N, 2, 2), 1/m and 1/I.
+        cases: (N, 8), circle radius, e, μ, e_t, centres of A's and B's circle x, y.
+
+    Returns:
+        velocity (N, 2, 3) afterwards, and depth, energy lost and number of impulses (N, 3).
+    """
+    block = np.full((len(cases), layout.INVERSE_INERTIA + 1, 2), np.nan)
+    block[:, [layout.X, layout.Y]] = position.transpose(0, 2, 1)
+    rates = [layout.U, layout.V, layout.OMEGA]
+    block[:, rates] = velocity.transpose(0, 2, 1)
+    block[:, [layout.INVERSE_MASS, layout.INVERSE_INERTIA]] = inverses.transpose(0, 2, 1)
+    scratch = wp.array(block, dtype=wp.float64, device=DEVICE)
+    results = _poisoned(len(cases), 3)
+    inputs = [scratch, wp.array(cases, dtype=wp.float64, device=DEVICE), results]
+    wp.launch(_link_pair, dim=len(cases), inputs=inputs, device=DEVICE)
+    return scratch.numpy()[:, rates].transpose(0, 2, 1), results.numpy()
+
+
+def _map_rows(kernel: wp.Kernel, cases: Array, width: int) -> Array:
+    results = _poisoned(len(cases), width)
+    inputs = [wp.array(cases, dtype=wp.float64, device=DEVICE), results]
+    wp.launch(kernel, dim=len(cases), inputs=inputs, device=DEVICE)
+    return results.numpy()
+
+
+# --- the contact pass ---
+
+GRID, ALL_PAIRS, FLOOR, SPROCKET, SELF = 1, 2, 4, 8, 16
+"""Parts of a pass, to be added up: make the neighbour list by the grid or by all pairs; resolve contacts."""
+
+RESULTS = (
+    *("opening", "floor_gap", "sprocket_gap", "fits", "displacement", "slack"),
+    *("floor", "sprocket", "self", "self_loss", "self_depth"),
+)
+
+
+@functools.cache
+def _contact_pass(columns: int) -> wp.Kernel:
+    build_by_grid, build_by_all_pairs = neighbour_list(columns)
+    resolve_self_contacts = self_contacts(columns)
+    size = list_layout(columns).size
+
+    @_compiled
+    def contact_pass(
+        model: Model,
+        state: State,
+        scratch: wp.array3d(dtype=wp.float64),
+        lists: wp.array2d(dtype=wp.int32),
+        skin: wp.float64,
+        sprocket_speed: wp.float64,
+        push_rate: wp.float64,
+        parts: int,
+        results: wp.array2d(dtype=wp.float64),
+    ):
+        world = wp.tid()
+        chain = read_chain(model, world)
+        block = scratch[world]
+        row = lists[world]
+        pairs = wp.array(ptr=row.ptr, shape=(wp.static(size),), dtype=wp.int32)
+        load_state(block, state, chain, world)
+        place_ends(block, chain)
+        opening = greatest_opening(block, chain)
+        results[world, 0] = opening
+        results[world, 1] = floor_gap(block, chain)
+        results[world, 2] = sprocket_gap(block, chain)
+        if (parts & 1) != 0:
+            results[world, 3] = wp.where(
+                build_by_grid(block, pairs, chain, skin, opening), wp.float64(1.0), wp.float64(0.0)
+            )
+        if (parts & 2) != 0:
+            results[world, 3] = wp.where(
+                build_by_all_pairs(block, pairs, chain, skin, opening), wp.float64(1.0), wp.float64(0.0)
+            )
+        results[world, 4] = greatest_displacement(block, chain)
+        results[world, 5] = list_slack(block, chain, skin, opening)
+        if (parts & 4) != 0:
+            results[world, 6] = wp.float64(resolve_floor(block, chain))
+        if (parts & 8) != 0:
+            results[world, 7] = wp.float64(resolve_sprocket(block, chain, sprocket_speed, push_rate))
+        if (parts & 16) != 0:
+            hits, lost, depth = resolve_self_contacts(block, pairs, chain, opening)
+            results[world, 8] = wp.float64(hits)
+            results[world, 9] = lost
+            results[world, 10] = depth
+
+    return contact_pass
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A chain to run the contact pass on: position (n, 3), velocity (n, 3), parameters."""
+
+    position: Array
+    velocity: Array
+    parameters: Parameters
+
+
+class ContactPass:
+    """Many chains, one after the other, on which parts of the contact pass are run."""
+
+    def __init__(
+        self, chains: Sequence[Placed], *, skin: float = 2e-3, sprocket_speed: float = 0.0, push_rate: float = 0.0
+    ) -> None:
+        """Make room for chains and place them; the sprocket about the origin has their sprocket_radius."""
+        self.links = [len(chain.position) for chain in chains]
+        self.columns = layout.padded_width(max(self.links))
+        self.skin, self.sprocket_speed, self.push_rate = skin, sprocket_speed, push_rate
+        self.model = Model()
+        self.model.link_count = wp.array(self.links, dtype=wp.int32, device=DEVICE)
+        for name in Parameters.model_fields:
+            values = [getattr(chain.parameters, name) for chain in chains]
+            setattr(self.model, name, wp.array(values, dtype=wp.float64, device=DEVICE))
+        worlds, rows, size = len(chains), layout.scratch_rows(0), list_layout(self.columns).size
+        self.state = State()
+        self.state.links = _poisoned(worlds, 6, max(self.links))
+        self.scratch = _poisoned(worlds, rows, self.columns)
+        self.lists = wp.full((worlds, size), POISONED_JOINT, dtype=wp.int32, device=DEVICE)
+        self.place(chains)
+
+    def place(self, chains: Sequence[Placed]) -> None:
+        """Give the chains other positions and velocities; neighbour lists stay."""
+        for world, chain in enumerate(chains):
+            self.state.links.numpy()[world, :, : len(chain.position)] = np.hstack([chain.position, chain.velocity]).T
+
+    def run(self, parts: int) -> list[dict[str, float]]:
+        """Run parts of a pass from the states placed last: `RESULTS` of each chain, NaN if not computed."""
+        results = _poisoned(len(self.links), len(RESULTS))
+        speeds = [self.sprocket_speed, self.push_rate]
+        inputs = [self.model, self.state, self.scratch, self.lists, self.skin, *speeds, parts]
+        kernel = _contact_pass(self.columns)
+        wp.launch(kernel, dim=len(self.links), inputs=[*inputs, results], device=DEVICE)
+        return [dict(zip(RESULTS, map(float, row), strict=True)) for row in results.numpy()]
+
+    def velocity(self, world: int) -> Array:
+        """Velocities (n, 3) that the last pass left."""
+        return self._rows(world, layout.U, layout.V, layout.OMEGA).T
+
+    def fixed_loss(self, world: int) -> float:
+        """Energy lost to floor and sprocket in the last pass."""
+        return float(self._rows(world, layout.LOST_FIXED).sum())
+
+    def listed_pairs(self, world: int) -> list[tuple[int, int]]:
+        """Pairs of joints in the neighbour list, in its order."""
+        lists = list_layout(self.columns)
+        row = self.lists.numpy()[world]
+        count = int(row[lists.count])
+        first, second = (row[start : start + count].tolist() for start in (lists.first, lists.second))
+        return list(zip(first, second, strict=True))
+
+    def _rows(self, world: int, *rows: int) -> Array:
+        return self.scratch.numpy()[world, list(rows), : self.links[world]].copy()

@@ -1,0 +1,99 @@
+"""Sweeps whose walks were never simulated: plausible rows in real folders, for everything that reads one."""
+
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpchain.status import Status
+from warpchain.store.folder import Store
+from warpchain.store.shards import empty_rows
+from warpchain.store.sweep_result import SweepResult, load
+from warpchain.sweeps.plan import PlannedWalk, load_sweep
+from warpchain.walks.rows import Rows
+
+Outcome = Callable[[PlannedWalk], "float | Status | None"]
+"""What a walk gives: its distance [m], how it failed, or None if it has not been run yet."""
+
+FIGURE_6: dict[str, Any] = {
+    "version": 1,
+    "name": "made <up> & down",
+    "seed": 6,
+    "preset": "soft",
+    "samples": 12,
+    "blocks": [
+        {"name": "rest", "grid": {"links": [60, 90, 120, 150, 180], "frequency": [5, 10, 15, 20, 25, 30]}},
+        {
+            "name": "ellipse",
+            "scene": {"start": "ellipse"},
+            "grid": {"links": [150, 180], "frequency": [10, 15, 20, 25, 30]},
+        },
+    ],
+}
+
+TOLERANCE: dict[str, Any] = {
+    "version": 1,
+    "name": "tolerance",
+    "seed": 7,
+    "preset": "soft",
+    "samples": 12,
+    "same_samples_along": ["tolerance"],
+    "grid": {"links": [60, 120], "frequency": [10, 20], "tolerance": [1e-6, 1e-9]},
+}
+
+SENSITIVITY: dict[str, Any] = {
+    "version": 1,
+    "name": "sensitivity",
+    "seed": 8,
+    "preset": "soft",
+    "samples": 64,
+    "sampler": "saltelli",
+    "grid": {"frequency": [10, 20]},
+}
+
+
+def distance(walk: PlannedWalk) -> float:
+    """Roughly what a chain does: farther when fast, short or smooth; tolerances differ by a few per cent [m]."""
+    scene, parameters = walk.setup.scene, walk.setup.parameters
+    scatter = np.random.default_rng(walk.index).normal(0.0, 0.02)
+    same = math.sin(1e5 * parameters.viscous_friction * walk.sample + walk.sample)
+    longer = 1.12 if scene.start == "ellipse" else 1.0
+    friction = (0.27 / parameters.floor_friction) ** 0.5
+    return (
+        1.29
+        * (scene.frequency / 20) ** 1.7
+        * (60 / scene.links) ** 0.8
+        * longer
+        * friction
+        * (1 + 0.05 * same + scatter)
+    )
+
+
+def fill_row(walk: PlannedWalk, outcome: "float | Status", rows: Rows) -> None:
+    """Fill the row of a walk that came to rest at a distance [m], or failed."""
+    failed = isinstance(outcome, Status)
+    rows["status"] = outcome if failed else Status.AT_REST
+    for name in rows.dtype.names or ():
+        if name in walk.drawn:
+            rows[name] = walk.drawn[name]
+        elif name not in ("index", "status", "dx"):
+            rows[name] = 7
+    rows["dx"] = math.nan if failed else outcome
+
+
+def make_sweep(folder: Path, content: Mapping[str, object], outcome: Outcome = distance) -> SweepResult:
+    """A folder in which every walk has its outcome; in shards of one walk each, if some are not to be there."""
+    sweep = load_sweep(content)
+    walks = [sweep.planned(index) for index in range(sweep.walk_count)]
+    outcomes = [outcome(walk) for walk in walks]
+    with Store.open(folder, sweep, shard_size=1 if None in outcomes else len(walks)) as store:
+        for shard in store.missing():
+            rows = empty_rows(sweep, shard)
+            for place, index in enumerate(shard):
+                if (given := outcomes[index]) is not None:
+                    fill_row(walks[index], given, rows[place : place + 1])
+            if outcomes[shard.start] is not None:
+                store.write(shard, rows)
+    return load(folder)

@@ -1,0 +1,97 @@
+"""Results of walks that nobody ran."""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from warpchain.inputs.setup import resolve
+from warpchain.loop.before_release import BeforeRelease
+from warpchain.status import Status
+from warpchain.walks.walk_result import CONTACTS, ENERGIES, STORED, WalkResult
+
+
+def make_walk(links: int = 30, **changes: Any) -> WalkResult:
+    """A chain that rolls to the right as an ellipse, touches the floor and sinks flat: 0.8 s, 41 frames."""
+    time, frame_time = np.linspace(0.0, 0.8, 801), np.linspace(0.0, 0.8, 41)
+
+    def height(moment: np.ndarray) -> np.ndarray:
+        return np.where(moment < 0.5, 0.0642 + 0.01 * np.cos(12 * moment), 0.06 * np.exp(8 * (0.5 - moment)))
+
+    center = np.stack([time**2, height(time)], axis=1)
+    angle = -40 * frame_time[:, None] + 2 * np.pi * np.arange(links) / links
+    half_height = height(frame_time) - 0.0042 - 0.005 * np.maximum(0.0, np.cos(12 * frame_time))
+    offset = np.stack([0.04 * np.cos(angle), half_height[:, None] * np.sin(angle)], axis=2)
+    middle = np.stack([frame_time**2, height(frame_time)], axis=1)
+    rng = np.random.default_rng(5)
+    values: dict[str, Any] = {
+        "status": Status.AT_REST,
+        "dx": 0.64 + 1e-17,
+        "walk_time": 0.8,
+        "simulated_time": 3.3,
+        "hold_time": 0.4,
+        "drift": 0.002,
+        "softened_at": 0.4,
+        "wall_time": 1.23456789012345678,
+        "bounces": 3,
+        "steps_accepted": 123_456_789_012,
+        "steps_rejected": 17,
+        "impulses": dict(zip(CONTACTS, (5, 7, 11), strict=True)),
+        "greatest_opening": 1.1e-5,
+        "greatest_penetration": dict(zip(CONTACTS, (1e-5, 0.0, 2e-5), strict=True)),
+        "energy": {key: 0.1 * number for number, key in enumerate(ENERGIES)},
+        "sprocket_center": np.array([0.0, 0.1]),
+        "sprocket_radius": 0.0556,
+        "setup": resolve("soft", scene={"links": links}, options={"method": "dp5"}, parameters={"floor_friction": 0.3}),
+        "seed": 2**100 + 1,
+        "versions": {"warpchain": "0.1.0", "warp-lang": "1.19.0"},
+        "time": time,
+        "center": center,
+        "center_velocity": np.gradient(center, time, axis=0),
+        "kinetic_energy": rng.random(801),
+        "gravitational_energy": rng.random(801),
+        "spring_energy": rng.random(801),
+        "lowest": rng.random(801),
+        "rms_speed": rng.random(801),
+        "frame_time": frame_time,
+        "frame_joints": offset + middle[:, None],
+    }
+    return WalkResult(**(values | changes))
+
+
+def make_unreleased() -> WalkResult:
+    """A walk that ended on the sprocket: no series, no frames, no distance."""
+    names = [name for name, stored in STORED.items() if stored.path.startswith("series/")]
+    empty: dict[str, Any] = {name: np.empty(0) for name in names}
+    empty |= {"center": np.empty((0, 2)), "center_velocity": np.empty((0, 2)), "frame_time": np.empty(0)}
+    energy = dict.fromkeys(ENERGIES, math.nan)
+    return make_walk(
+        status=Status.NOT_STEADY,
+        dx=math.nan,
+        energy=energy,
+        sprocket_center=None,
+        seed=None,
+        frame_joints=np.empty((0, 30, 2)),
+        **empty,
+    )
+
+
+def assert_same(first: Any, second: Any) -> None:
+    """Every field is equal, numbers to the bit and in type."""
+    for item in dataclasses.fields(type(first)):
+        one, other = getattr(first, item.name), getattr(second, item.name)
+        assert type(one) is type(other), item.name
+        if isinstance(one, np.ndarray):
+            assert one.dtype == other.dtype and one.shape == other.shape, item.name
+            assert one.tobytes() == other.tobytes(), item.name
+        elif isinstance(one, float):
+            assert one.hex() == other.hex(), item.name
+        elif isinstance(one, BeforeRelease):
+            assert_same(one, other)
+        elif item.name == "energy":
+            assert {key: number.hex() for key, number in one.items()} == {
+                key: number.hex() for key, number in other.items()
+            }
+        else:
+            assert one == other, item.name

@@ -1,0 +1,145 @@
+"""Digest and canonical form of a sweep."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+
+from tests.support.sweep_content import UNIFORM, blocks, content
+from warpchain.inputs.parameters import PRESETS, InputError, preset
+from warpchain.run.sweep_run import on_device
+from warpchain.sweeps.plan import load_sweep
+
+
+def digest(given: Mapping[str, Any]) -> str:
+    """Digest of a sweep's content."""
+    return load_sweep(given).digest()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"name": "another"},
+        {"grid": {"links": {"from": 60, "to": 90, "step": 30}, "frequency": [5.0, 10.0]}},
+        {"scene": {"start": "rest", "phase": None}},
+        {"scene": {"start": "rest"}, "options": {}, "distributions": {"all": "table"}},
+        {"options": {"method": "standard"}},
+        {"parameters": {"gravity": 9.809}},
+        {"sampler": "random", "record": {"series": False}, "same_samples_along": []},
+        {"distributions": {"floor_friction": {"gaussian": {"sigma": 0.02}}, "phase": {"uniform": [0, 1]}}},
+        {"blocks": [{"name": "x", "grid": {"links": [60, 90], "frequency": [5, 10]}}], "grid": None},
+    ],
+)
+def test_digest_ignores_what_does_not_matter(change: dict[str, Any]) -> None:
+    """Names and other ways to say the same leave the digest as it is."""
+    scene = change.get("scene", {})
+    change = {**change, **({"scene": {key: value for key, value in scene.items() if value is not None}})}
+    assert digest(content(**change)) == digest(content())
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({}, ("hybrid", "os32")),
+        ({"method": "standard", "tolerance": 1e-4}, ("hybrid", "os32")),
+        ({"method": "hybrid"}, ("hybrid", "hybrid")),
+        ({"method": "reference"}, ("rkf78", "rkf78")),
+    ],
+)
+def test_a_method_by_need_is_that_of_the_device(options: dict[str, Any], expected: tuple[str, str]) -> None:
+    """The same file on another device has the method that its word means there, with the settings given."""
+    planned = load_sweep(content(options=options))
+    here, there = (sweep.planned(0).setup.options for sweep in (planned, on_device(planned, "cuda:1")))
+    assert (here.method, there.method) == expected
+    assert there.device == "cuda:1"
+    assert there.tolerance == options.get("tolerance", here.tolerance)
+    again = load_sweep(on_device(planned, "cuda:1").canonical())
+    assert again.planned(0).setup.options == there
+
+
+def test_a_device_changes_nothing_else_of_methods_on_an_axis() -> None:
+    """Methods named along an axis keep the settings they have without a device, and so do tolerances along one."""
+    for grid in ({"method": ["dp5", "bs32"]}, {"tolerance": [1e-4, 1e-5]}):
+        planned = load_sweep(content(grid=grid, options={}))
+        there = on_device(planned, "cpu")
+        indices = range(planned.walk_count)
+        assert [there.planned(i).setup.options for i in indices] == [planned.planned(i).setup.options for i in indices]
+
+
+def test_a_device_is_refused_beside_devices_on_an_axis() -> None:
+    """One of them would be passed over."""
+    planned = load_sweep(content(grid={"device": ["cuda:0", "cuda:1"]}, options={}))
+    with pytest.raises(InputError, match="device: cpu is given, but the sweep's grid goes over devices; leave one"):
+        on_device(planned, "cpu")
+
+
+def test_a_stored_sweep_keeps_its_method_unless_it_is_given_a_word_again() -> None:
+    """What a folder keeps of a sweep goes on as it was, has its method on any device, and takes a word in its place."""
+    planned = load_sweep(content(options={}))
+    stored = planned.canonical()
+    assert load_sweep(stored).digest() == planned.digest()
+    assert on_device(load_sweep(stored), "cuda").planned(0).setup.options.method == "hybrid"
+    for block in stored["blocks"]:
+        block["options"]["method"] = "standard"
+    assert load_sweep(stored).digest() == planned.digest()
+    assert on_device(load_sweep(stored), "cuda").digest() == on_device(planned, "cuda").digest()
+
+
+def test_digest_tells_apart_what_matters() -> None:
+    """Whatever changes a number or its place changes the digest."""
+    changes: list[dict[str, Any]] = [
+        {},
+        {"seed": 8},
+        {"samples": 4},
+        {"samples": 4, "sampler": "sobol"},
+        {"preset": "paper"},
+        {"scene": {"clearance": 0.01}},
+        {"scene": {"walk_limit": 21.0}},
+        {"options": {"method": "dp5"}},
+        {"parameters": {"gravity": 9.81}},
+        {"grid": {"frequency": [5, 10], "links": [60, 90]}},
+        {"grid": {"links": [60, 90], "frequency": [5, 10.000000000000002]}},
+        {"grid": {"links": [90, 60], "frequency": [5, 10]}},
+        {"same_samples_along": ["links"]},
+        {"record": {"series": True}},
+        {"record": {"series": {"interval": 2e-3}}},
+        {"record": {"series": {"samples": [0]}}},
+        {"record": {"series": True, "frames": True}},
+        {"same_samples_along": ["frequency"]},
+        {"distributions": {"phase": {"uniform": [0, 0.5]}}},
+        {"distributions": {"phase": "fixed"}},
+        {"distributions": {"floor_friction": {"gaussian": {"mean": 0.27, "sigma": 0.021}}}},
+        {"grid": {"preset": ["paper", "soft"]}, "preset": None},
+        {"grid": {"preset": ["paper", "soft"]}, "preset": None, "parameters": {"gravity": 9.81}},
+    ]
+    assert len({digest(content(**change)) for change in changes}) == len(changes)
+
+
+def test_digest_holds_the_presets_of_an_axis(monkeypatch: pytest.MonkeyPatch) -> None:
+    """If the values behind a preset's name change, so does the digest, also where the preset is an axis."""
+    sweeps = [content(), content(grid={"preset": ["paper", "soft"]}, preset=None)]
+    before = [digest(given) for given in sweeps]
+    monkeypatch.setitem(PRESETS, "soft", preset("soft").with_values({"joint_damping": 99}))
+    assert all(digest(given) != old for given, old in zip(sweeps, before, strict=True))
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        content(),
+        content(sampler="saltelli", samples=2, distributions={"floor_friction": UNIFORM}),
+        content(grid={"preset": ["paper", "soft"]}, preset=None, parameters={"gravity": 10, "outer_mass": 3e-3}),
+        content(record={"series": {"samples": [2, 0]}, "frames": {"samples": [2], "interval": 0.01}}),
+        content(scene={"phase": 0.25}, grid={"clearance": [0.01], "floor_friction": [0.2]}),
+        blocks({"scene": {"start": "ellipse"}}, {"samples": 1, "distributions": {"all": "fixed"}}),
+    ],
+)
+def test_canonical_form(given: dict[str, Any]) -> None:
+    """The canonical form is plain JSON, and the sweep of it is the same sweep."""
+    sweep = load_sweep(given)
+    text = json.dumps(sweep.canonical(), allow_nan=False)
+    again = load_sweep(json.loads(text))
+    assert again.canonical() == sweep.canonical()
+    assert again.digest() == sweep.digest()
+    assert [again.planned(i) for i in range(again.walk_count)] == [sweep.planned(i) for i in range(again.walk_count)]

@@ -1,0 +1,337 @@
+"""What the walks of a sweep draw: random numbers, distributions, designed samples."""
+
+import itertools
+import math
+import time
+import tracemalloc
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content, drawn
+from warpchain.inputs.distributions import Gaussian, Uniform, random_generator, sample_parameters, sample_scene
+from warpchain.inputs.parameters import Bounds, InputError
+from warpchain.inputs.scene import check_scene, fewest_links
+from warpchain.inputs.setup import resolve
+from warpchain.run.single_walk import setup_walk
+from warpchain.sweeps.designs import design_points, saltelli_outputs, sobol_indices
+from warpchain.sweeps.plan import Sweep, load_sweep
+
+# Random numbers
+
+
+@pytest.mark.parametrize("sampler", ["random", "sobol", "latin_hypercube", "saltelli"])
+def test_walks_depend_on_their_index_only(sampler: str) -> None:
+    """A planned walk is the same whatever was planned before it, and all walks differ."""
+    given = content(sampler=sampler, samples=4)
+    sweep = load_sweep(given)
+    walks = [sweep.planned(index) for index in range(sweep.walk_count)]
+    order = np.random.default_rng(1).permutation(sweep.walk_count).tolist()
+    design_points.cache_clear()
+    other = load_sweep(given)
+    assert {index: other.planned(index) for index in order} == dict(enumerate(walks))
+    assert len({tuple(walk.drawn.values()) for walk in walks}) == len(walks)
+
+
+def test_more_samples_and_more_blocks_change_nothing_before() -> None:
+    """A sample stays what it is when its cell gets more samples and when blocks are added behind."""
+    few, many = load_sweep(blocks({})), load_sweep(blocks({"samples": 50}, {}))
+    assert [few.planned(index).drawn for index in range(3)] == [many.planned(index).drawn for index in range(3)]
+
+
+def test_undrawn_walks_are_those_drawn_but_for_what_is_drawn() -> None:
+    """Place, links and options are those of the walk, in any order of asking; nothing is drawn."""
+    sweep = load_sweep(blocks({"grid": {"links": [60, 90], "tolerance": [1e-5, 1e-6]}}, {"samples": 2}))
+    indices = [*range(sweep.walk_count), *reversed(range(sweep.walk_count))]
+    for index, undrawn in zip(indices, sweep.undrawn(indices), strict=True):
+        walk = sweep.planned(index)
+        assert undrawn.drawn == {} != walk.drawn
+        assert (undrawn.index, undrawn.block, undrawn.cell, undrawn.sample) == (
+            walk.index,
+            walk.block,
+            walk.cell,
+            walk.sample,
+        )
+        assert (undrawn.setup.options, undrawn.setup.scene.links) == (walk.setup.options, walk.setup.scene.links)
+    with pytest.raises(IndexError):
+        list(sweep.undrawn([sweep.walk_count]))
+
+
+def test_first_sample_is_that_of_a_single_walk() -> None:
+    """Sample 0 of cell 0 is what a single walk draws from the same seed; the others follow the same rule."""
+    settings = {"links": 90, "frequency": 12.0, "floor_friction": 0.1}
+    for seed in (0, 7, 2**127):
+        sweep = load_sweep(
+            content(
+                seed=seed,
+                scene={"links": 90, "frequency": 12.0},
+                parameters={"floor_friction": 0.1},
+                grid={"tolerance": [1e-3, 1e-7]},
+            )
+        )
+        assert sweep.planned(0).setup == setup_walk("soft", settings | {"tolerance": 1e-3}, seed)
+        base = resolve(
+            "soft",
+            scene={"links": 90, "frequency": 12.0},
+            options={"tolerance": 1e-7},
+            parameters={"floor_friction": 0.1},
+        )
+        rng = random_generator(seed, 1, 2)
+        walk = sweep.planned(5)
+        assert walk.setup.parameters == sample_parameters(base.parameters, rng)
+        assert walk.setup.scene == sample_scene(base.scene, rng)
+        assert walk.setup.options == base.options
+
+
+def test_large_sweeps_cost_nothing() -> None:
+    """A sweep of 10¹¹ walks is loaded and its walks are planned in little time and memory, wherever they are."""
+    load_sweep(content()).planned(0)
+    tracemalloc.start()
+    try:
+        sweep = load_sweep(content(samples=2**30, grid={"frequency": {"from": 1, "to": 100, "step": 1}}))
+        assert sweep.walk_count == 100 * 2**30
+        for index in (0, 10**6, sweep.walk_count - 1):
+            assert sweep.planned(index).sample == index % 2**30
+        assert tracemalloc.get_traced_memory()[1] < 2e6
+    finally:
+        tracemalloc.stop()
+    began = time.process_time()
+    for index in range(0, sweep.walk_count, sweep.walk_count // 200):
+        sweep.planned(index)
+    assert (time.process_time() - began) / 200 < 1e-3
+
+
+def test_same_samples_along_axes() -> None:
+    """Along the named axes samples are the same, along the others and between blocks they are not."""
+    grid = {"tolerance": [1e-6, 1e-9], "frequency": [5, 10]}
+    sweep = load_sweep(blocks({"grid": grid}, {"grid": grid}, same_samples_along=["tolerance"]))
+    values = drawn(sweep, 24).reshape(2, 2, 2, 3, -1)
+    assert (values[:, 0] == values[:, 1]).all()
+    distinct = values[:, 0].reshape(12, -1)
+    assert all(len(set(column)) == 12 for column in distinct.T)
+    apart = drawn(load_sweep(blocks({"grid": grid}, {"grid": grid})), 24)
+    assert all(len(set(column)) == 24 for column in apart.T)
+
+
+def test_same_samples_about_different_means() -> None:
+    """Along an axis of means, the same standard normal numbers are drawn about each."""
+    sweep = load_sweep(content(grid={"floor_friction": [0.3, 0.5]}, same_samples_along=["floor_friction"]))
+    values = drawn(sweep, 6).reshape(2, 3, -1)
+    friction = sweep.blocks[0].drawn.index("floor_friction")
+    assert values[1, :, friction] - values[0, :, friction] == pytest.approx(np.full(3, 0.2), rel=1e-12)
+    assert (np.delete(values[0], friction, axis=1) == np.delete(values[1], friction, axis=1)).all()
+
+
+# Distributions
+
+
+@pytest.mark.parametrize(
+    ("changes", "names"),
+    [
+        ({}, [*TABLE_1, "phase", "clearance"]),
+        ({"distributions": {"all": "table"}}, [*TABLE_1, "phase", "clearance"]),
+        ({"scene": {"phase": 0.5}}, [*TABLE_1, "clearance"]),
+        ({"grid": {"clearance": [0.01]}}, [*TABLE_1, "phase"]),
+        ({"grid": {"link_length": [0.013]}}, [*TABLE_1, "phase", "clearance"]),
+        ({"distributions": {"all": "fixed", "phase": "table"}}, ["phase"]),
+        ({"distributions": {"all": "fixed"}, "samples": 1}, []),
+        (
+            {
+                "distributions": {
+                    "all": "fixed",
+                    "clearance": {"gaussian": {"sigma": 0.001}},
+                    "frequency": {"uniform": [10, 20]},
+                    "gravity": UNIFORM,
+                    "link_length": "table",
+                },
+                "grid": {"links": [60]},
+            },
+            ["link_length", "gravity", "frequency", "clearance"],
+        ),
+        (
+            {"distributions": {name: "fixed" for name in TABLE_1}, "parameters": {"floor_friction": 0.3}},
+            ["phase", "clearance"],
+        ),
+    ],
+)
+def test_what_is_drawn(changes: dict[str, Any], names: list[str]) -> None:
+    """Table 1, phase and clearance unless said otherwise; a set phase or clearance stays, a set parameter is a mean."""
+    sweep = load_sweep(content(**changes))
+    assert list(sweep.blocks[0].drawn) == names == list(sweep.planned(0).drawn)
+    setup = sweep.planned(0).setup
+    if "phase" not in names:
+        assert setup.scene.phase == changes.get("scene", {}).get("phase", 0.0)
+    if "floor_friction" not in names:
+        assert setup.parameters.floor_friction == changes.get("parameters", {}).get("floor_friction", 0.27)
+
+
+CASES = {
+    "viscous_friction": ({"gaussian": {"mean": 1e-4, "sigma": 2e-5}}, stats.norm(1e-4, 2e-5), 0.0, math.inf),
+    "floor_restitution": ({"gaussian": {"mean": 0.005, "sigma": 0.01}}, stats.norm(0.005, 0.01), 0.0, 1.0),
+    "chain_restitution": ({"gaussian": {"sigma": 0.3}}, stats.norm(0.8, 0.3), 0.0, 1.0),
+    "floor_friction": ({"uniform": [0.2, 0.3]}, stats.uniform(0.2, 0.1), 0.0, 1.0),
+    "gravity": ({"uniform": [0, 20]}, stats.uniform(0, 20), 0.0, math.inf),
+    "inner_mass": ("table", stats.norm(3.7e-3, 2e-6), 0.0, math.inf),
+    "frequency": ({"gaussian": {"mean": 15, "sigma": 1}}, stats.norm(15, 1), 0.0, math.inf),
+    "phase": ({"uniform": [0, 1]}, stats.uniform(0, 1), 0.0, 1.0),
+    "clearance": ("table", stats.uniform(0.005, 0.01), 0.0, math.inf),
+}
+
+
+@pytest.mark.parametrize(("sampler", "samples"), [("random", 2000), ("sobol", 1024), ("latin_hypercube", 1000)])
+def test_distributions(sampler: str, samples: int) -> None:
+    """Every quantity follows its own truncated distribution (Kolmogorov–Smirnov), whatever the sampler."""
+    given = {name: form for name, (form, *_) in CASES.items()}
+    sweep = load_sweep(content(sampler=sampler, samples=samples, grid=None, distributions={"all": "fixed", **given}))
+    values = dict(zip(sweep.blocks[0].drawn, drawn(sweep, samples).T, strict=True))
+    assert set(values) == set(CASES)
+    for name, (_, whole, lower, upper) in CASES.items():
+        low, high = whole.cdf(lower), whole.cdf(upper)
+        result = stats.kstest(values[name], lambda x, w=whole, a=low, b=high: (w.cdf(x) - a) / (b - a))
+        assert result.pvalue > 1e-3, name
+        assert lower < values[name].min() and values[name].max() < upper, name
+        # Designed points fill every quantity far more evenly than random ones, whose distance is about 0.87/√N.
+        assert sampler == "random" or result.statistic < 2.5 / samples, name
+    correlation = np.corrcoef(np.array(list(values.values()))) - np.eye(len(values))
+    assert np.abs(correlation).max() < 5 / math.sqrt(samples)
+
+
+@pytest.mark.parametrize("ends", [(0.0, 1.0), (-math.inf, 0.5), (0.3, math.inf), (6.0, 7.0), (-40.0, -7.0), (9.0, 9.1)])
+def test_quantiles_of_truncated_gaussians(ends: tuple[float, float]) -> None:
+    """Quantiles agree with SciPy's truncated Gaussian, far in both tails too."""
+    gaussian = Gaussian(0.25, 0.5, Bounds(*(0.25 + 0.5 * end for end in ends)))
+    for fraction in (1e-12, 1e-3, 0.3, 0.5, 0.9, 1 - 1e-9):
+        expected = stats.truncnorm(*ends, loc=0.25, scale=0.5).ppf(fraction)
+        assert gaussian.quantile(fraction) == pytest.approx(expected, rel=1e-8, abs=1e-12)
+
+
+def test_shares_and_quantiles_stay_inside() -> None:
+    """The share of physical draws is that of the interval; quantiles never leave it."""
+    assert Gaussian(0.0, 2.0, Bounds(0.0)).share() == pytest.approx(0.5)
+    assert Gaussian(0.0, 1.0, Bounds(-1.0, 1.0)).share() == pytest.approx(0.6826894921)
+    half = Uniform(0.0, 1.0, Bounds(0.5))
+    assert (half.share(), half.quantile(0.0), half.quantile(0.5)) == (0.5, 0.5, 0.75)
+    with pytest.raises(ValueError, match="no mean"):
+        Gaussian(None, 1.0, Bounds(0.0)).quantile(0.5)
+
+
+@pytest.mark.parametrize("sampler", ["random", "sobol", "latin_hypercube", "saltelli"])
+def test_every_planned_walk_is_possible(sampler: str) -> None:
+    """A sample whose chain does not reach round its sprocket is drawn again as a whole, the d + 2 walks together."""
+    radius = 0.0602  # 32 links reach round 64.68 mm, where the joints ride if the radius is 60.48 mm
+    base = resolve("soft", scene={"links": 32}, options={}, parameters={"sprocket_radius": radius})
+    assert fewest_links(base.scene, base.parameters) == 32
+    with pytest.raises(InputError):
+        resolve("soft", scene={"links": 32}, options={}, parameters={"sprocket_radius": radius + 0.0005})
+    names = ["sprocket_radius", "phase"]
+    sweep = load_sweep(
+        content(
+            sampler=sampler,
+            samples=64,
+            grid={"links": [32, 60]},
+            parameters={"sprocket_radius": radius},
+            distributions={"all": "fixed", **{name: "table" for name in names}},
+            same_samples_along=["links"],
+        )
+    )
+    walks = [sweep.planned(index) for index in range(sweep.walk_count)]
+    for walk in walks:
+        check_scene(walk.setup.scene, walk.setup.parameters)
+    per_sample = 4 if sampler == "saltelli" else 1
+    values = drawn(sweep, sweep.walk_count).reshape(2, 64, per_sample, 2)
+    redrawn = (values[0] != values[1]).any(axis=(1, 2))
+    assert 5 < redrawn.sum() < 60
+    longest = max(walk.setup.parameters.sprocket_radius for walk in walks[: len(walks) // 2])
+    impossible = (values[1, :, :, 0] > longest).any(axis=1)
+    assert (redrawn == impossible).all()
+    if sampler == "random":
+        for sample in range(64):
+            rng = random_generator(7, 0, sample)
+            pair = rng.normal(radius, 5e-4), rng.random()
+            while pair[0] > longest:
+                pair = rng.normal(radius, 5e-4), rng.random()
+            assert tuple(values[0, sample, 0]) == pair
+    if sampler == "saltelli":
+        first, second, *crossed = values[0].transpose(1, 0, 2)
+        for number, points in enumerate(crossed):
+            assert (points[:, number] == second[:, number]).all()
+            assert (points[:, 1 - number] == first[:, 1 - number]).all()
+
+
+# Designed samples
+
+
+def unit_cube(names: list[str], sampler: str, samples: int, seed: int = 7) -> Sweep:
+    """A sweep of one cell that draws fractions, uniform from 0 to 1."""
+    return load_sweep(
+        content(
+            seed=seed,
+            sampler=sampler,
+            samples=samples,
+            grid=None,
+            distributions={"all": "fixed", **{name: {"uniform": [0, 1]} for name in names}},
+        )
+    )
+
+
+FRACTIONS = ["floor_restitution", "floor_friction", "chain_restitution", "chain_friction"]
+
+
+def test_sobol_points_are_even() -> None:
+    """Scrambled Sobol points have a discrepancy far below that of random ones, and another for each cell and seed."""
+    discrepancy = {
+        sampler: stats.qmc.discrepancy(drawn(unit_cube(FRACTIONS, sampler, 256), 256))
+        for sampler in ("random", "sobol")
+    }
+    assert discrepancy["sobol"] < 0.1 * discrepancy["random"]
+    others = [unit_cube(FRACTIONS, "sobol", 8, seed) for seed in (7, 8)]
+    assert (drawn(others[0], 8) != drawn(others[1], 8)).all()
+    cells = drawn(load_sweep(content(sampler="sobol", samples=8)), 32).reshape(4, 8, -1)
+    assert all((a != b).all() for a, b in itertools.combinations(cells, 2))
+
+
+def test_latin_hypercube_has_one_point_in_each_stratum() -> None:
+    """Each of N equal parts of every quantity holds exactly one of N samples."""
+    points = drawn(unit_cube(FRACTIONS, "latin_hypercube", 50), 50)
+    assert (np.sort((points * 50).astype(int), axis=0) == np.arange(50)[:, None]).all()
+
+
+def ishigami(points: np.ndarray) -> np.ndarray:
+    """The function of Ishigami and Homma (1990), a = 7, b = 0.1, of points in the unit cube, shape (N, 3)."""
+    x, y, z = math.pi * (2 * points.T - 1)
+    return np.sin(x) + 7 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
+
+
+def test_saltelli_gives_known_sobol_indices() -> None:
+    """From the walks of a `saltelli` cell, SciPy and this package find the indices of the Ishigami function."""
+    sweep = unit_cube(FRACTIONS[:3], "saltelli", 1024)
+    assert sweep.blocks[0].shape == (1024 * 5,)
+    values = ishigami(drawn(sweep, sweep.walk_count))
+    outputs = saltelli_outputs(values, 3)
+    assert [outputs[key].shape for key in ("f_A", "f_B", "f_AB")] == [(1, 1024), (1, 1024), (3, 1, 1024)]
+    scipy = stats.sobol_indices(func=outputs, n=1024)
+    first, total = sobol_indices(outputs)
+    assert first == pytest.approx(scipy.first_order, rel=1e-10, abs=1e-12)
+    assert total == pytest.approx(scipy.total_order, rel=1e-10)
+    assert first == pytest.approx([0.3139, 0.4424, 0.0], abs=0.1)
+    assert total == pytest.approx([0.5576, 0.4424, 0.2437], abs=0.1)
+
+
+def test_failed_walks_cost_their_sample_only() -> None:
+    """A walk without result takes its sample out of the indices and changes the others little."""
+    sweep = unit_cube(FRACTIONS[:3], "saltelli", 512)
+    values = ishigami(drawn(sweep, sweep.walk_count))
+    whole = saltelli_outputs(values, 3)
+    values[[0, 4, 1234]] = math.nan
+    outputs = saltelli_outputs(values, 3)
+    for key, result in outputs.items():
+        assert (result == np.delete(whole[key], [0, 1234 // 5], axis=-1)).all()
+    for index, all_of_them in zip(sobol_indices(outputs), sobol_indices(whole), strict=True):
+        assert index == pytest.approx(all_of_them, abs=0.03)
+    nothing = sobol_indices(saltelli_outputs(np.full(10, math.nan), 3))
+    constant = sobol_indices(saltelli_outputs(np.ones(10), 3))
+    assert np.isnan([*nothing, *constant]).all()
+    with pytest.raises(ValueError, match="reshape"):
+        saltelli_outputs(values[1:], 3)

@@ -1,0 +1,54 @@
+"""Rows of a shard: their columns, and what rows that are still to be filled in claim."""
+
+import numpy as np
+import pytest
+
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.scene import Scene
+from warpchain.store.sweep_result import BlockResult, SweepResult
+from warpchain.walks.rows import COLUMNS, MISSING, ROW, field_column, missing_rows, row_type
+from warpchain.walks.walk_result import STORED
+
+
+def test_names_of_columns_mean_one_thing() -> None:
+    """No column has the name of a quantity that may be drawn, or of an attribute of a result."""
+    fields = {*Parameters.model_fields, *Scene.model_fields, *Options.model_fields}
+    assert not fields & COLUMNS.keys()
+    taken = {*dir(BlockResult), *dir(SweepResult), *BlockResult.__annotations__, *SweepResult.__annotations__}
+    assert not taken & (fields | COLUMNS.keys())
+
+
+def test_columns_of_a_row() -> None:
+    """A row has the agreed columns, without padding, and the drawn quantities in the order of the table."""
+    assert ROW.names == (
+        *("index", "status", "dx", "walk_time", "simulated_time", "hold_time", "drift", "softened_at"),
+        *("bounces", "steps_accepted", "steps_rejected"),
+        *("impulses_floor", "impulses_sprocket", "impulses_self", "greatest_opening"),
+        *("penetration_floor", "penetration_sprocket", "penetration_self", "energy_at_release"),
+        *("loss_joint_friction", "loss_joint_damping", "loss_floor", "loss_self_contact", "loss_softening"),
+        "loss_hand_over",
+        "energy_residual",
+    )
+    assert ROW.itemsize == sum(ROW[name].itemsize for name in ROW.names)
+    one, other = row_type(["clearance", "phase", "link_length"]), row_type(["link_length", "clearance", "phase"])
+    assert one == other and one.names == (*ROW.names, "link_length", "phase", "clearance")
+    assert COLUMNS["dx"].meaning == STORED["dx"].meaning and COLUMNS["loss_floor"].unit == "J"
+
+
+def test_fields_have_units() -> None:
+    """Every field of a setup has a unit and a meaning, an unknown name none."""
+    assert field_column("gravity").unit == "m/s²" and field_column("frequency").unit == "Hz"
+    assert field_column("method").unit == field_column("preset").unit == "1"
+    for name in (*Parameters.model_fields, *Scene.model_fields, *Options.model_fields):
+        assert field_column(name).unit and len(field_column(name).meaning) > 5, name
+    with pytest.raises(KeyError):
+        field_column("lenght")
+
+
+def test_missing_rows_claim_nothing() -> None:
+    """Rows to fill in have their indices; all else is NaN or −1."""
+    rows = missing_rows(row_type(["phase"]), range(5, 8))
+    assert rows["index"].tolist() == [5, 6, 7] and set(rows["status"]) == {MISSING}
+    for name in set(rows.dtype.names or ()) - {"index"}:
+        assert np.isnan(rows[name]).all() if rows[name].dtype.kind == "f" else (rows[name] == -1).all(), name

@@ -1,0 +1,301 @@
+"""Results of walks: what they hold, and the file that keeps them."""
+
+import json
+import math
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from tests.support.made_walks import assert_same, make_unreleased, make_walk
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.setup import resolve
+from warpchain.status import Status
+from warpchain.walks import walk_result
+from warpchain.walks.walk_result import ENERGIES, STORED, WalkResult, load_walk
+
+# Status
+
+
+def test_status_codes_are_fixed() -> None:
+    """Codes keep their numbers, because kernels hold them."""
+    assert {status.label: int(status) for status in Status} == {
+        "running": 0,
+        "at_rest": 1,
+        "finished": 2,
+        "time_limit": 3,
+        "step_limit": 4,
+        "step_too_small": 5,
+        "not_finite": 6,
+        "not_steady": 7,
+        "list_overflow": 8,
+    }
+
+
+def test_status_says_what_to_try() -> None:
+    """Only rest and a finished simulation are good ends; every failure names a remedy, in one line."""
+    assert [status for status in Status if status.ok] == [Status.AT_REST, Status.FINISHED]
+    for status in Status:
+        assert re.fullmatch(r"[A-Z][^\n]*\.", status.sentence), status
+        assert ("; " in status.sentence) == (not status.ok), status
+
+
+def test_statuses_name_fields_that_exist() -> None:
+    """The remedies speak of fields that scene and options have."""
+    setup = make_walk().setup
+    named = re.findall(r"(scene|options)\.(\w+)", " ".join(status.sentence for status in Status))
+    assert len(named) >= 6
+    assert all(hasattr(getattr(setup, model), field) for model, field in named)
+
+
+# The record itself
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("lowest", np.zeros(800)),
+        ("center", np.zeros((801, 3))),
+        ("frame_joints", np.zeros((41, 32, 2))),
+        ("sprocket_center", np.zeros(3)),
+        ("impulses", {"floor": 1}),
+        ("energy", dict.fromkeys([*ENERGIES, "heat"], 0.0)),
+    ],
+)
+def test_misshapen_fields_are_refused(field: str, value: Any) -> None:
+    """A walk whose arrays or dictionaries don't fit together can't be made, and the error names the field."""
+    with pytest.raises(ValueError, match=rf"^{field}: .*; give|^{field}: .*give") as caught:
+        make_walk(**{field: value})
+    assert "\n" not in str(caught.value)
+
+
+def test_to_dict_is_json() -> None:
+    """The dictionary is strict JSON, with None for what is not finite, and comes back equal."""
+    walk = make_walk(dx=math.nan, greatest_opening=math.inf)
+    described = walk.to_dict()
+    assert json.loads(json.dumps(described, allow_nan=False)) == described
+    assert described["dx"] is None and described["greatest_opening"] is None
+    assert described["status"] == "at_rest" and described["status_sentence"] == Status.AT_REST.sentence
+    assert described["seed"] == 2**100 + 1 and described["preset"] == "soft"
+    assert described["parameters"]["floor_friction"] == 0.3 and described["options"]["method"] == "dp5"
+    assert described["scene"]["links"] == 30 and described["impulses"]["self"] == 11
+    assert {"walk_time", "simulated_time", "wall_time", "bounces", "steps_accepted", "steps_rejected"} < set(described)
+    assert not {"time", "center", "frame_joints"} & set(described)
+
+
+def test_to_dict_takes_numpy_numbers() -> None:
+    """NumPy's numbers, which engines hand over, become plain ones."""
+    described = make_walk(bounces=np.int64(4), dx=np.float64(0.5), seed=np.int64(3)).to_dict()
+    assert (described["bounces"], described["dx"], described["seed"]) == (4, 0.5, 3)
+    json.dumps(described, allow_nan=False)
+
+
+def test_repr_is_short() -> None:
+    """A walk prints as one short line, not as its arrays."""
+    assert repr(make_walk()) == ("<WalkResult at_rest: dx 0.64 m in 0.8 s, 3 bounces, 30 links at 15 Hz, soft>")
+
+
+def test_light_import() -> None:
+    """Results can be imported without h5py, matplotlib and Pillow."""
+    code = (
+        "import sys, warpchain.walks.walk_result; print([m for m in ('h5py', 'matplotlib', 'PIL') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+# The file
+
+
+@pytest.mark.parametrize("make", [make_walk, make_unreleased])
+def test_round_trip(make: Callable[[], WalkResult], tmp_path: Path) -> None:
+    """A walk read back equals the one saved to the bit, NaN and absent parts included."""
+    walk = make()
+    walk.save(tmp_path / "walk.h5")
+    assert_same(load_walk(tmp_path / "walk.h5"), walk)
+    assert [path.name for path in tmp_path.iterdir()] == ["walk.h5"]
+
+
+def test_extreme_numbers_survive(tmp_path: Path) -> None:
+    """Signed zeros, infinities and denormal numbers come back to the bit, also from strided arrays."""
+    odd = np.resize([-0.0, math.inf, -math.inf, 5e-324, math.nan, 0.1], 801)
+    table = np.random.default_rng(1).random((801, 4))
+    walk = make_walk(spring_energy=odd, lowest=table[:, 2], center=table[:, 1:3])
+    walk.save(tmp_path / "walk.h5")
+    assert_same(load_walk(tmp_path / "walk.h5"), walk)
+
+
+def test_units_everywhere(tmp_path: Path) -> None:
+    """Each dataset carries a unit and a description; parameters carry Table 1's unit and symbol."""
+    walk = make_walk()
+    walk.save(tmp_path / "walk.h5")
+    found: dict[str, tuple[str, str]] = {}
+
+    def note(name: str, node: Any) -> None:
+        if isinstance(node, h5py.Dataset):
+            found[name] = node.attrs["unit"], node.attrs["description"]
+
+    with h5py.File(tmp_path / "walk.h5") as file:
+        file.visititems(note)
+        assert file["parameters/joint_stiffness"][()] == 1e7
+        for name, quantity in Parameters.quantities().items():
+            assert found[f"parameters/{name}"] == (quantity.unit, quantity.meaning)
+            assert file[f"parameters/{name}"].attrs["symbol"] == quantity.symbol
+    assert all(unit and meaning for unit, meaning in found.values())
+    assert found["series/center_velocity"][0] == "m/s" and found["frames/joints"][0] == "m"
+    assert found["summary/energy/floor"][0] == "J" and found["summary/impulses/floor"][0] == "1"
+    expected = sum(max(1, len(stored.keys)) for stored in STORED.values()) + len(Parameters.quantities())
+    assert len(found) == expected
+
+
+def test_provenance(tmp_path: Path) -> None:
+    """The file says in JSON how to make the walk again."""
+    walk = make_walk()
+    walk.save(tmp_path / "walk.h5")
+    with h5py.File(tmp_path / "walk.h5") as file:
+        assert file.attrs["format"] == "warpchain walk" and file.attrs["format_version"] == 3
+        assert file.attrs["status"] == "at_rest"
+        setup = json.loads(file.attrs["setup"])
+        assert json.loads(file.attrs["seed"]) == walk.seed
+        assert json.loads(file.attrs["versions"]) == walk.versions
+    sections = {name: setup[name] for name in ("scene", "options", "parameters")}
+    assert resolve(setup["preset"], **sections) == walk.setup
+
+
+def _fail_half_way(walk: WalkResult, file: h5py.File) -> None:
+    file["half"] = np.zeros(1000)
+    file.flush()
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("culprit", ["write", "fsync", "replace"])
+def test_interrupted_save_keeps_old_file(culprit: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever fails while a walk is saved, the older file stays whole and nothing else is left."""
+    path = tmp_path / "walk.h5"
+    make_walk().save(path)
+    before = path.read_bytes()
+
+    def disk_full(*_: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    if culprit == "write":
+        monkeypatch.setattr(walk_result, "_write", _fail_half_way)
+    else:
+        monkeypatch.setattr(os, culprit, disk_full)
+    with pytest.raises((KeyboardInterrupt, OSError)) as caught:
+        make_walk(dx=0.1).save(path)
+    monkeypatch.undo()
+    if culprit != "write":
+        assert str(caught.value).startswith(f"{path}: cannot be written (No space left on device); ")
+    assert path.read_bytes() == before
+    assert [entry.name for entry in tmp_path.iterdir()] == ["walk.h5"]
+
+
+def test_killed_save_keeps_old_file(tmp_path: Path) -> None:
+    """A process that dies in the middle of saving leaves the older file whole."""
+    path = tmp_path / "walk.h5"
+    make_walk().save(path)
+    before = path.read_bytes()
+    code = (
+        "import os, sys; from warpchain.walks import walk_result as results\n"
+        "def die(walk, file): file['half'] = [1.0]; file.flush(); os._exit(9)\n"
+        "results._write = die; results.load_walk(sys.argv[1]).save(sys.argv[1])"
+    )
+    assert subprocess.run([sys.executable, "-c", code, str(path)], check=False).returncode == 9
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("place", ["missing/walk.h5", "file/walk.h5", "folder"])
+def test_unwritable_place(place: str, tmp_path: Path) -> None:
+    """A place that can't take the file is refused in one line that names it."""
+    (tmp_path / "file").touch()
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(OSError) as caught:
+        make_walk().save(tmp_path / place)
+    assert str(caught.value).startswith(f"{tmp_path / place}: cannot be written (")
+    assert "; give" in str(caught.value) and "\n" not in str(caught.value)
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["file", "folder"]
+
+
+def _refused(path: Path) -> str:
+    with pytest.raises(ValueError) as caught:
+        load_walk(path)
+    text = str(caught.value)
+    assert text.startswith(f"{path}: ") and "; " in text and "\n" not in text
+    return text
+
+
+def test_foreign_files_are_refused(tmp_path: Path) -> None:
+    """Text, an empty file, other HDF5, and walks of another format version are told apart."""
+    path = tmp_path / "walk.h5"
+    path.write_text("dx = 0.6\n")
+    assert "not an HDF5 file" in _refused(path)
+    path.write_bytes(b"")
+    assert "not an HDF5 file" in _refused(path)
+    with h5py.File(path, "w") as file:
+        file["x"] = 1.0
+    assert "HDF5, but not a walk" in _refused(path)
+    make_walk().save(path)
+    with h5py.File(path, "a") as file:
+        file.attrs["format_version"] = 4
+    assert "format version 4" in _refused(path)
+
+
+def test_setup_of_another_version_is_refused(tmp_path: Path) -> None:
+    """A setup with a field that this version doesn't know is refused by name."""
+    path = tmp_path / "walk.h5"
+    make_walk().save(path)
+    with h5py.File(path, "a") as file:
+        setup = json.loads(file.attrs["setup"])
+        setup["options"]["warp_factor"] = 9
+        file.attrs["setup"] = json.dumps(setup)
+    assert "(warp_factor)" in _refused(path)
+
+
+@pytest.mark.parametrize("name", ["series/time", "summary/dx", "parameters", "frames/joints"])
+def test_missing_part_is_refused(name: str, tmp_path: Path) -> None:
+    """A file that lacks a dataset is damaged, unless the dataset only repeats the setup."""
+    path = tmp_path / "walk.h5"
+    make_walk().save(path)
+    with h5py.File(path, "a") as file:
+        del file[name]
+    if name == "parameters":
+        assert_same(load_walk(path), make_walk())
+    else:
+        assert "damaged or cut short" in _refused(path)
+
+
+@pytest.mark.parametrize("kept", [0.999, 0.7, 0.3, 0.02])
+def test_truncated_file_is_refused(kept: float, tmp_path: Path) -> None:
+    """A file that was cut short is never read as a walk."""
+    path = tmp_path / "walk.h5"
+    make_walk().save(path)
+    content = path.read_bytes()
+    path.write_bytes(content[: int(kept * len(content))])
+    assert "damaged or cut short" in _refused(path)
+
+
+def test_flipped_bit_is_noticed(tmp_path: Path) -> None:
+    """Checksums reveal a single wrong bit in an array."""
+    path = tmp_path / "walk.h5"
+    make_walk().save(path)
+    with h5py.File(path) as file:
+        offset = file["frames/joints"].id.get_chunk_info(0).byte_offset
+    content = bytearray(path.read_bytes())
+    content[offset + 100] ^= 1
+    path.write_bytes(content)
+    assert "damaged or cut short" in _refused(path)
+
+
+def test_absent_file_is_named(tmp_path: Path) -> None:
+    """A file that isn't there is an OSError with its path and a remedy."""
+    with pytest.raises(OSError, match=r"none\.h5: No such file or directory; give") as caught:
+        load_walk(tmp_path / "none.h5")
+    assert "\n" not in str(caught.value)

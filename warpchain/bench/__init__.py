@@ -1,0 +1,1 @@
+"""Speed and accuracy, measured. Only the command line imports this."""

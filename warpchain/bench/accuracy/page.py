@@ -1,0 +1,239 @@
+"""The page of ``warpchain bench accuracy``: figures, tables and machines in one HTML file that loads nothing."""
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+from typing import Any, Final
+
+from warpchain.bench.accuracy.figures import figures
+from warpchain.cli.terminal import PICTURE_DPI
+from warpchain.reports.html_page import page, picture, table
+from warpchain.reports.sweep_figures import Picture
+from warpchain.walks.walk_result import replacing
+
+PAGE: Final = "accuracy.html"
+
+Row = dict[str, Any]
+
+
+def write_pictures_and_page(folder: Path, document: dict[str, Any]) -> list[Path]:
+    """Write every figure and the page; older files of these names are replaced.
+
+    Returns:
+        Paths of the files, the page last.
+
+    Raises:
+        OSError: A file cannot be written.
+    """
+    pictures = list(figures(document))
+    paths = []
+    for drawn in pictures:
+        paths.append(folder / f"{drawn.name}.png")
+        with replacing(paths[-1]) as part:
+            drawn.figure.savefig(part, dpi=PICTURE_DPI)
+    paths.append(folder / PAGE)
+    with replacing(paths[-1]) as part:
+        part.write_text(_page(document, pictures), encoding="utf-8")
+    return paths
+
+
+def _page(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
+    """The whole page."""
+    methods = {row["method"] for row in (*document["points"], *document["hard_cases"])}
+    walks = [*document["walks"], *(one for row in document["ensembles"] for one in row["methods"])]
+    methods |= {one["method"] for one in walks}
+    bad = sum(not row["sound"] for row in document["hard_cases"])
+    tiles = {
+        "methods": (len({name for name in methods if "SciPy" not in name}), ""),
+        "measured points": (len(document["points"]), ""),
+        "walks": (sum(one["at_rest"] for one in walks), ""),
+        "hard cases": (len(document["hard_cases"]), ""),
+        "not sound": (bad, "bad" if bad else ""),
+    }
+    sections = {
+        "Work and precision": _work_precision(document, pictures),
+        "Whole walks": _walks(document, pictures),
+        "Ensembles": _ensembles(document, pictures),
+        "Hard cases": _hard_cases(document, pictures),
+        "Machines": _machines(document["machines"]),
+    }
+    return page("Speed against error", tiles, {title: text for title, text in sections.items() if text})
+
+
+def _work_precision(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
+    if not document["points"]:
+        return ""
+    parts = [f"<p>{escape(note)}</p>" for note in document["notes"].values()]
+    parts += [picture(drawn.figure, drawn.caption) for drawn in pictures if drawn.name.startswith("work_precision")]
+    points = _together(document["points"], "trial", "links", "method")
+    head = ["trial", "n", "method", "tolerance", "position / m", "velocity / (m/s)", "momentum", "bias"]
+    head += ["s / s", "speed", "evaluations / s", "rejected", "status"]
+    rows = [
+        [
+            *(row["trial"], f"{row['links']}", row["method"], f"{row['tolerance']:g}"),
+            *(_number(row[name], ".1e") for name in ("position_error", "velocity_error", "momentum_error")),
+            _number(row["momentum_bias"], "+.1e"),
+            _number(_per_second(row, "seconds"), ".3g"),
+            _number(_speed(row, points), ".3g"),
+            _number(_per_second(row, "evaluations"), ".2e"),
+            "–" if row["rejected"] is None else f"{row['rejected'] / (row['accepted'] + row['rejected']):.0%}",
+            row["status"],
+        ]
+        for row in points
+    ]
+    marked = [row["status"] != "finished" for row in points]
+    text = (
+        "<h3>All points</h3><p>Errors as in the figures; momentum: relative error of the floor's impulse (rms) or of "
+    )
+    text += "the angular momentum about the sprocket, bias: its mean with sign. Processor time and evaluations are per "
+    text += "simulated second; speed: how many times faster than rkf78 at 1e-6.</p>"
+    return "\n".join([*parts, text, table(head, rows, numbers_from=3, marked=marked)])
+
+
+def _walks(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
+    rows = _together(document["walks"], "links")
+    if not rows:
+        return ""
+    text = (
+        "<p>Table 1's values, chains that start as an ellipse, the same drawn samples for every method and the methods "
+        "in turn. Medians over the walks that came to rest: processor time of one core from the release to rest, "
+        "time per simulated second, and what the energy ledger leaves open, as a fraction of the energy at release "
+        "(and the greatest of that). Speed is how many times cheaper than rkf78 at 1e-6 in the same run.</p>"
+    )
+    parts = [text, *(picture(drawn.figure, drawn.caption) for drawn in pictures if drawn.name.startswith("walks_"))]
+    head = ["n", "method", "walks", "at rest", "s", "s / s", "speed", "tries", "ledger", "greatest"]
+    lines = [
+        [
+            *(f"{row['links']}", row["title"], f"{row['walks']}", f"{row['at_rest']}"),
+            _number(row["seconds"], ".3g"),
+            _number(_ratio(row["seconds"], row["walk_time"]), ".3g"),
+            _number(_ratio(row["reference_seconds"], row["seconds"]), ".3g"),
+            _number(row["tries"], ",.0f"),
+            *(_number(row[name], ".1e") for name in ("ledger", "greatest_ledger")),
+        ]
+        for row in rows
+    ]
+    marked = [row["at_rest"] < row["walks"] for row in rows]
+    return "\n".join([*parts, table(head, lines, numbers_from=2, marked=marked)])
+
+
+def _ensembles(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
+    if not document["ensembles"]:
+        return ""
+    parts = [
+        "<p>All methods walk from the same drawn samples; the tests treat their ensembles as independent. Intervals "
+        "are 95 % bootstrap intervals, p is the exact two-sample Kolmogorov–Smirnov probability, Δ the difference of "
+        "the means relative to the reference, in brackets in units of its standard error. A method passes when its "
+        "mean is within 1 % of that of rkf78 at 1e-6 or in its interval, and no more walks failed. Ledger: what the "
+        "energy ledger of a walk leaves open, of the energy at release, median. Cost is processor "
+        "time of one core, time on the sprocket included; on a GPU walks per second. Speed is how many times cheaper "
+        "than rkf78 at 1e-6 that is.</p>"
+    ]
+    with_tight = any(one["p_tight"] is not None for row in document["ensembles"] for one in row["methods"])
+    suffixes = ("loose", "tight") if with_tight else ("loose",)
+    by_name = {drawn.name: drawn for drawn in pictures}
+    head = ["method", "at rest", "failed", "mean Δx / m", "s.d. / m"]
+    head += ["Δ to 1e-6", "p to 1e-6", *(["Δ to 1e-9", "p to 1e-9"] if with_tight else [])]
+    head += ["ledger", "cost", "speed", "passes"]
+    for row in document["ensembles"]:
+        drawn = by_name[f"ensemble_{row['name']}"]
+        parts += [f"<h3>{escape(row['title'])}, {escape(row['device'])}</h3>", picture(drawn.figure, drawn.caption)]
+        rows = [
+            [
+                *(one["title"], f"{one['at_rest']}", _failures(one)),
+                _with_interval(one["mean"], one["mean_interval"]),
+                _number(one["sd"], ".4f"),
+                *(text for suffix in suffixes for text in _agreement(one, suffix)),
+                _number(one["ledger"], ".1e"),
+                f"{one['seconds_per_walk']:.3g} s"
+                if one["seconds_per_walk"] is not None
+                else f"{_number(one['walks_per_second'], '.3g')} 1/s",
+                _number(_walk_speed(one, row["methods"][0]), ".3g"),
+                "yes" if one["passes"] else "no",
+            ]
+            for one in row["methods"]
+        ]
+        marked = [not one["passes"] for one in row["methods"]]
+        parts.append(table(head, rows, numbers_from=1, marked=marked))
+    return "\n".join(parts)
+
+
+def _hard_cases(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
+    rows = _together(document["hard_cases"], "case")
+    if not rows:
+        return ""
+    parts = [picture(drawn.figure, drawn.caption) for drawn in pictures if drawn.name == "hard_cases"]
+    head = ["kind", "case", "method", "status", "result", "s", "simulated s", "tries", "energy error", "sound"]
+    lines = [
+        [
+            *(row["group"], row["what"], row["method"], row["status"], row["result"]),
+            *(f"{row['seconds']:.3g}", f"{row['simulated']:.3g}", f"{row['tries']:,}"),
+            *(_number(row["energy_error"], ".1e"), "yes" if row["sound"] else "no"),
+        ]
+        for row in rows
+    ]
+    return "\n".join([*parts, table(head, lines, numbers_from=5, marked=[not row["sound"] for row in rows])])
+
+
+def _machines(machines: Sequence[dict[str, str]]) -> str:
+    names = list(dict.fromkeys(name for machine in machines for name in machine))
+    rows = [[name, *(machine.get(name, "–") for machine in machines)] for name in names]
+    return table(["", *(f"machine {number}" for number in range(len(machines)))], rows, numbers_from=len(machines) + 1)
+
+
+def _together(rows: Sequence[Row], *keys: str) -> list[Row]:
+    """Rows with those that agree in some columns side by side, in the order in which each value first came."""
+    first = {key: list(dict.fromkeys(row[key] for row in rows)) for key in keys}
+    return sorted(rows, key=lambda row: [first[key].index(row[key]) for key in keys])
+
+
+def _per_second(row: Row, cost: str) -> float | None:
+    """Cost of a point per simulated second; None if it has not come to its end, or does not count this."""
+    return row[cost] / row["simulated"] if row["status"] == "finished" and row[cost] is not None else None
+
+
+def _speed(row: Row, points: Sequence[Row]) -> float | None:
+    """How many times faster a point is than rkf78 at 1e-6 in the same trial; None if that was not measured."""
+    for true in points:
+        if true["method"] == "rkf78" and true["tolerance"] == 1e-6:
+            seconds, own = _per_second(true, "seconds"), _per_second(row, "seconds")
+            if all(true[key] == row[key] for key in ("trial", "links")) and seconds and own:
+                return seconds / own
+    return None
+
+
+def _ratio(value: float | None, by: float | None) -> float | None:
+    """Of two numbers; None if one is missing."""
+    return value / by if value is not None and by else None
+
+
+def _walk_speed(row: Row, true: Row) -> float | None:
+    """How many times cheaper a walk is than one of the reference; None if one of the costs is not known."""
+    if row["seconds_per_walk"] and true["seconds_per_walk"]:
+        return float(true["seconds_per_walk"] / row["seconds_per_walk"])
+    if row["walks_per_second"] and true["walks_per_second"]:
+        return float(row["walks_per_second"] / true["walks_per_second"])
+    return None
+
+
+def _failures(row: Row) -> str:
+    return ", ".join(f"{count} {label}" for label, count in row["failed"].items()) or "0"
+
+
+def _with_interval(value: float | None, interval: Sequence[float | None]) -> str:
+    lower, upper = interval
+    if value is None or lower is None or upper is None:
+        return _number(value, ".4f")
+    return f"{value:.4f} ({lower:.4f} … {upper:.4f})"
+
+
+def _agreement(row: Row, suffix: str) -> tuple[str, str]:
+    """Difference of the means with its standard errors, and the probability of the test."""
+    difference, errors = row[f"difference_{suffix}"], row[f"errors_{suffix}"]
+    text = "–" if difference is None else f"{difference:+.2%}" + ("" if errors is None else f" ({errors:+.1f})")
+    return text, _number(row[f"p_{suffix}"], ".2g")
+
+
+def _number(value: float | None, form: str) -> str:
+    """A number in a form, a dash for none."""
+    return "–" if value is None else f"{value:{form}}"

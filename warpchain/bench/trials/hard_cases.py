@@ -1,0 +1,403 @@
+"""Cases that break careless integrators, defined once for the tests and for the table of ``warpchain bench accuracy``.
+
+Whatever the method, each must end with a sound result or a clear status: never with a silent NaN, a hang or a wrong
+number.
+"""
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.bench.trials.hard_starts import (
+    ELASTIC,
+    PAPER,
+    SOFT,
+    UNDISSIPATIVE,
+    State,
+    dropped,
+    dropped_circle,
+    energy_error,
+    folded,
+    overlapping,
+    pulled_apart,
+    turning_joints,
+)
+from warpchain.engine.batch import Batch
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import InputError, Parameters, validated
+from warpchain.oracle import motion_equations
+from warpchain.run.simulation import simulate
+from warpchain.run.single_walk import run_walk, setup_walk
+from warpchain.status import Status
+from warpchain.walks.scheduler import compile_kernels
+
+Array = NDArray[np.float64]
+
+STEP_LIMIT: Final = 20_000_000
+"""Tries after which a case counts as hanging."""
+LIMITS: Final = {"step_limit": STEP_LIMIT, "tolerance": 1e-6, "flight_tolerance": 1e-4}
+"""Of every case that says nothing else; the energy error of `hybrid` follows the tolerance of its flights, too."""
+
+IMPOSSIBLE: Final[tuple[tuple[str, Mapping[str, object]], ...]] = (
+    ("scene.links", {"links": 61}),
+    ("scene.links", {"links": 20}),  # too short for the sprocket
+    ("parameters.circle_radius", {"circle_radius": 6.34e-3}),
+    ("parameters.inner_mass", {"inner_mass": -1e-3}),
+    ("parameters.gravity", {"gravity": math.nan}),
+)
+"""Values of a walk that cannot be, each after the field that the refusal names."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a case ended with a method.
+
+    Attributes:
+        status: Label of the status; ``"refused"`` if nothing was run.
+        result: What came out, for people.
+        seconds: Processor time [s], compilation apart.
+        simulated: Simulated time [s].
+        tries: Steps tried.
+        energy_error: What the energy ledger leaves open, as a fraction of the energy; NaN if there is no ledger.
+        sound: Whether status and result are such as the case may have.
+    """
+
+    status: str
+    result: str
+    seconds: float
+    simulated: float
+    tries: int
+    energy_error: float
+    sound: bool
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A chain from a given state, with the floor."""
+
+    parameters: Parameters
+    start: Callable[[], State]
+    duration: float
+    expected: tuple[Status, ...] = (Status.FINISHED,)
+    bound: float = 1e-4
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    def run(self, method: str) -> Outcome:
+        """Simulate; the energy error must be below the bound."""
+        start = self.start()
+        settings: dict[str, Any] = {"method": method, **LIMITS, **self.settings}
+        simulate(self.parameters, *start, 0.0, times=[0.0], **settings)  # compiles
+        began = time.process_time()
+        flight = simulate(self.parameters, *start, self.duration, times=[self.duration], **settings)
+        seconds = time.process_time() - began
+        with np.errstate(all="ignore"):
+            error = energy_error(flight, self.parameters, start)
+        finite = bool(np.all(np.isfinite(flight.position)) and np.all(np.isfinite(flight.velocity)))
+        return Outcome(
+            status=flight.status.label,
+            result=f"{flight.impulses['floor']} floor and {flight.impulses['self']} self-impulses",
+            seconds=seconds,
+            simulated=float(flight.time[-1]),
+            tries=flight.steps_accepted + flight.steps_rejected,
+            energy_error=error,
+            sound=flight.status in self.expected and finite and error < self.bound,
+        )
+
+
+@dataclass(frozen=True)
+class Walk:
+    """A whole walk, to rest unless said otherwise."""
+
+    preset: str
+    settings: Mapping[str, Any]
+    distance: tuple[float, float] = (-math.inf, math.inf)
+    expected: Status = Status.AT_REST
+    bound: float = 5e-4  # the losses of a method of third order at 1e-6 are that good after half a million impulses
+
+    def run(self, method: str) -> Outcome:
+        """Walk; Δx must lie within the distances [m], the energy error below the bound."""
+        setup = setup_walk(self.preset, {"method": method, **LIMITS, **self.settings}, None)
+        compile_kernels([setup])
+        began = time.process_time()
+        walk = run_walk(setup, frame_interval=None)
+        seconds = time.process_time() - began
+        released = walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"]
+        error = abs(walk.energy["residual"]) / released  # NaN if it was not released
+        within = self.expected != Status.AT_REST or self.distance[0] < walk.dx < self.distance[1]
+        return Outcome(
+            status=walk.status.label,
+            result=f"Δx = {walk.dx:.3f} m" if math.isfinite(walk.dx) else f"moving after {walk.walk_time:.3g} s",
+            seconds=seconds,
+            simulated=walk.simulated_time,
+            tries=walk.steps_accepted + walk.steps_rejected,
+            energy_error=error,
+            sound=walk.status == self.expected and within and error < self.bound,
+        )
+
+
+@dataclass(frozen=True)
+class Order:
+    """Undamped springs that bounce with ever shorter fixed steps: the energy's drift falls as a power of the step."""
+
+    steps: tuple[float, ...] = (8e-5, 6e-5, 4e-5, 2e-5, 1e-5, 5e-6, 2.5e-6, 1.25e-6)
+
+    def run(self, method: str) -> Outcome:
+        """Fit the power over the steps that are neither unstable nor at rounding."""
+        start = dropped(links=6, fall=0.0, gap=0.02)
+        energy = motion_equations.total_energy(*start, ELASTIC)
+        settings: dict[str, Any] = {"method": method, "tolerance": 0.1, "skin": 3.0, "step_limit": STEP_LIMIT}
+        drifts, statuses, tries, seconds = [], [], 0, 0.0
+        simulate(ELASTIC, *start, 0.0, times=[0.0], **settings)
+        for step in self.steps:
+            began = time.process_time()
+            # a skin beyond the height of the fall makes contact_step, not the loose tolerance, set the step
+            flight = simulate(ELASTIC, *start, 0.3, times=[0.3], contact_step=step, **settings)
+            seconds += time.process_time() - began
+            tries += flight.steps_accepted + flight.steps_rejected
+            statuses.append(flight.status)
+            end = motion_equations.total_energy(flight.position[-1], flight.velocity[-1], ELASTIC)
+            drifts.append(abs(energy - end) / energy)
+        seen = [(step, drift) for step, drift in zip(self.steps, drifts, strict=True) if 1e-10 < drift < 1e-2]
+        power = math.nan
+        if len(seen) > 1:
+            power = _slope(np.log(np.array(seen)))
+        finished = all(status == Status.FINISHED for status in statuses)
+        return Outcome(
+            status=next((status for status in statuses if not status.ok), Status.FINISHED).label,
+            result=f"drift of the energy ∝ h^{power:.1f}" if seen and power == power else "too few steps for a slope",
+            seconds=seconds,
+            simulated=0.3 * len(self.steps),
+            tries=tries,
+            energy_error=drifts[-1],
+            sound=finished and drifts[-1] < 1e-2 and (len(seen) < 2 or power > 2),
+        )
+
+
+@dataclass(frozen=True)
+class Refusals:
+    """Parameters that cannot be: refused before any kernel runs, in a line that begins with the field."""
+
+    def run(self, method: str) -> Outcome:
+        """Ask for each."""
+        named = 0
+        began = time.process_time()
+        for path, values in IMPOSSIBLE:
+            try:
+                setup_walk("soft", {"method": method, **values}, None)
+            except InputError as error:
+                named += str(error).startswith(f"{path}: ")
+        return Outcome(
+            status="refused",
+            result=f"{named} of {len(IMPOSSIBLE)} refused, naming the field",
+            seconds=time.process_time() - began,
+            simulated=0.0,
+            tries=0,
+            energy_error=math.nan,
+            sound=named == len(IMPOSSIBLE),
+        )
+
+
+@dataclass(frozen=True)
+class OneBroken:
+    """A thousand chains in one batch, with and without a NaN in one of them."""
+
+    worlds: int = 1000
+    duration: float = 1e-3
+
+    def run(self, method: str) -> Outcome:
+        """The broken one gets its status, the others the same bits as without it."""
+        broken = self.worlds // 2
+        whole, _, _ = self._ends(method, None)
+        ends, statuses, (seconds, tries) = self._ends(method, broken)
+        others = [world for world in range(self.worlds) if world != broken]
+        same = sum(bool(np.array_equal(whole[world], ends[world])) for world in others)
+        finished = all(statuses[world] == Status.FINISHED for world in others)
+        return Outcome(
+            status=statuses[broken].label,
+            result=f"{same} of {len(others)} others unchanged to the bit",
+            seconds=seconds,
+            simulated=self.duration * self.worlds,
+            tries=tries,
+            energy_error=math.nan,
+            sound=finished and same == len(others) and not statuses[broken].ok,
+        )
+
+    def _ends(self, method: str, broken: int | None) -> tuple[list[Array], list[Status], tuple[float, int]]:
+        """State (2n, 3) and status of every chain, and what it cost: seconds and tries."""
+        options = validated(Options, {"method": method, "step_limit": 1_000_000}, "options")
+        batch = Batch(self.worlds, 8, options)
+        for world in range(self.worlds):
+            position, velocity = dropped(fall=0.5 + world / self.worlds)
+            if world == broken:
+                velocity[3, 2] = np.nan
+            batch.set_chain(world, SOFT, 8)
+            batch.load(world, position, velocity, stop_time=self.duration, stop_status=Status.FINISHED)
+        features = batch.features(fixed_body="floor", watch="none")
+        batch.compile(features, [8])
+        began = time.process_time()
+        batch.run(range(self.worlds), features)
+        seconds = time.process_time() - began
+        tries = sum(batch.tries(world) for world in range(self.worlds))
+        ends = [np.concatenate([batch.position(world), batch.velocity(world)]) for world in range(self.worlds)]
+        return ends, [batch.status(world) for world in range(self.worlds)], (seconds, tries)
+
+
+@dataclass(frozen=True)
+class HardCase:
+    """A case of the table.
+
+    Attributes:
+        group: The kind of difficulty.
+        name: Short and unique, good for a file.
+        what: What happens, for people.
+        subject: What is run.
+    """
+
+    group: str
+    name: str
+    what: str
+    subject: Flight | Walk | Order | Refusals | OneBroken
+
+
+def _drop(name: str, links: int) -> Walk:
+    """An upright ellipse at rest that is let go."""
+    settings = {"links": links, "frequency": 0.0, "start": "ellipse", "ellipse_aspect": 2.0}
+    return Walk(name, settings, distance=(-0.03, 0.03))
+
+
+def _stiff(
+    name: str, what: str, parameters: Parameters, values: Mapping[str, object], duration: float, bound: float = 1e-5
+) -> HardCase:
+    """An impact with other values of the joints."""
+    start = partial(dropped, gap=5e-5)
+    return HardCase("stiffness", name, what, Flight(parameters.with_values(values), start, duration, bound=bound))
+
+
+def _law(friction: float) -> dict[str, Any]:
+    """A walk of 20 links with elastic collisions and this coefficient of friction."""
+    return {
+        **{"links": 20, "frequency": 10.0, "start": "ellipse"},
+        **{"floor_restitution": 1.0, "chain_restitution": 1.0},
+        **{"floor_friction": friction, "chain_friction": friction},
+    }
+
+
+HARD_CASES: Final = (
+    HardCase(
+        "the pile",
+        "pile-slow-walk",
+        "180 links released at 5 Hz fall into a pile beside the sprocket (soft)",
+        Walk("soft", {"links": 180, "frequency": 5.0, "start": "spinning"}, distance=(0.0, 0.3)),
+    ),
+    HardCase("the pile", "pile-dropped-soft", "180 links dropped without spin, to rest (soft)", _drop("soft", 180)),
+    HardCase("the pile", "pile-dropped-paper", "60 links dropped without spin, to rest (paper)", _drop("paper", 60)),
+    _stiff("softest-springs", "impact with k = 1e5 N/m", PAPER, {"joint_stiffness": 1e5}, 1e-2),
+    _stiff("stiffest-springs", "impact with k = 1e11 N/m", PAPER, {"joint_stiffness": 1e11}, 1e-3),
+    _stiff("no-damping", "impact with b = 0 (soft)", SOFT, {"joint_damping": 0.0}, 1e-2, bound=3e-4),
+    _stiff("stiff-damping", "impact with b = 1e6 N s/m (soft)", SOFT, {"joint_damping": 1e6}, 1e-4),
+    HardCase(
+        "stiffness",
+        "hopeless-damping",
+        "impact with b = 1e9 N s/m and 20,000 steps at most: finished, or a limit that says so",
+        Flight(
+            SOFT.with_values({"joint_damping": 1e9}),
+            dropped,
+            1e-2,
+            expected=(Status.FINISHED, Status.STEP_LIMIT, Status.STEP_TOO_SMALL),
+            settings={"step_limit": 20_000},
+        ),
+    ),
+    HardCase(
+        "stiffness",
+        "sharp-friction",
+        "joints stop turning with ω_c = 1e-6 rad/s",
+        Flight(PAPER.with_values({"friction_smoothing": 1e-6, "gravity": 0.0}), turning_joints, 1e-4),
+    ),
+    HardCase(
+        "no dissipation",
+        "elastic-second",
+        "bouncing for 1 s without any dissipation keeps the energy (tolerance 1e-8)",
+        Flight(ELASTIC, partial(dropped, links=6, fall=0.0, gap=0.02), 1.0, bound=1e-2, settings={"tolerance": 1e-8}),
+    ),
+    HardCase("no dissipation", "elastic-order", "the same for 0.3 s with fixed steps: order of convergence", Order()),
+    *(
+        HardCase(
+            "short and long",
+            f"links-{links}",
+            f"a walk of {links} links at 4 Hz from an ellipse (soft)",
+            Walk("soft", {"links": links, "frequency": 4.0, "start": "ellipse"}, distance=(0.0, 0.5)),
+        )
+        for links in (4, 6, 8)
+    ),
+    HardCase(
+        "short and long",
+        "links-1000",
+        "1000 links hit the floor (soft)",
+        Flight(SOFT, partial(dropped_circle, 1000), 5e-3),
+    ),
+    HardCase(
+        "fast and slow",
+        "sixty-hertz",
+        "a walk of 60 links at 60 Hz, where the loop slips on its sprocket and is never stationary to 1 % (soft)",
+        Walk(
+            "soft",
+            {"links": 60, "frequency": 60.0, "start": "spinning", "steady_time": 0.1, "steady_tolerance": 0.03},
+            distance=(10.0, 40.0),
+        ),
+    ),
+    HardCase(
+        "fast and slow",
+        "standing",
+        "60 links hang on a sprocket at rest and are let go (soft)",
+        Walk("soft", {"links": 60, "frequency": 0.0, "start": "rest"}, distance=(-0.03, 0.03)),
+    ),
+    HardCase("bad starts", "pulled-apart", "joints open by 0.1 mm: 40 J", Flight(PAPER, pulled_apart, 2e-3)),
+    HardCase("bad starts", "overlapping", "links start inside each other (soft)", Flight(SOFT, overlapping, 5e-3)),
+    HardCase(
+        "bad starts",
+        "in-the-floor",
+        "starts 0.3 m below the floor (soft)",
+        Flight(SOFT, partial(dropped, gap=-0.3), 5e-3, bound=1e-5),
+    ),
+    HardCase(
+        "folded",
+        "folded",
+        "20 links folded back by 180° at both ends, strands exactly on each other (paper)",
+        Flight(PAPER, partial(folded, 20, PAPER.circle_radius + 2e-5), 5e-3),
+    ),
+    HardCase(
+        "collision law",
+        "endless-bouncing",
+        "a walk that nothing brings to rest: the time limit",
+        Walk(
+            "soft",
+            {"links": 6, "frequency": 2.0, "start": "ellipse", "walk_limit": 0.3, **UNDISSIPATIVE},
+            expected=Status.TIME_LIMIT,
+            bound=1e-2,
+        ),
+    ),
+    *(
+        HardCase(
+            "collision law",
+            f"elastic-floor-friction-{friction:g}",
+            f"a walk of 20 links with e = 1 and μ = {friction:g} (soft)",
+            Walk("soft", _law(friction), distance=(-1e-9, 1e-9) if friction == 0 else (0.1, 1.0)),
+        )
+        for friction in (0.0, 1.0)
+    ),
+    HardCase("what cannot be", "refused", "odd n, too short a chain, r ≥ ℓ/2, negative mass, NaN", Refusals()),
+    HardCase("one broken", "one-broken", "a NaN in one of 1000 chains of a batch", OneBroken()),
+)
+"""All cases, the ten kinds of difficulty in order."""
+
+
+def _slope(points: Array) -> float:
+    """Slope of the straight line that fits points (p, 2) best."""
+    x, y = (points - points.mean(axis=0)).T
+    return float(x @ y / (x @ x))

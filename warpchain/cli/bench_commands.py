@@ -1,0 +1,187 @@
+"""The commands `warpchain bench accuracy` and `warpchain bench sweep`."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from warpchain.cli.sweep_commands import SweepFile
+
+bench_app = typer.Typer()
+
+
+@bench_app.command()
+def accuracy(
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="DIR", help="Folder of the results; those of other parts are kept."),
+    ],
+    parts: Annotated[
+        str, typer.Option(metavar="NAME,…", help="Parts to run.")
+    ] = "work-precision,walks,ensembles,hard-cases",
+    chosen: Annotated[
+        str | None,
+        typer.Option(
+            "--methods",
+            metavar="NAME[@TOL][+SETTING],…",
+            help="standard, explicit, reference or integrators. In walks and ensembles @TOL sets the tolerance, by "
+            "default 1e-6 (hybrid 1e-4) or that of the word, +NAME an option that is off by default and +NAME=NUMBER "
+            "another, as in rkf78+soften_pile+soften_area=0.7. rkf78 at 1e-6, the reference, runs beside them in any "
+            "case. Default: the three words, and every integrator with the settings of explicit.",
+        ),
+    ] = None,
+    tolerances: Annotated[
+        str | None, typer.Option(metavar="TOL,…", help="Of the work–precision diagrams. Default: 1e-3 … 1e-9.")
+    ] = None,
+    links: Annotated[str, typer.Option(metavar="N,…", help="Links, in all parts but the hard cases.")] = "60,150",
+    trials: Annotated[
+        str, typer.Option(metavar="NAME,…", help="What the diagrams are about.")
+    ] = "flight,impact,sprocket",
+    presets: Annotated[str, typer.Option(metavar="NAME,…", help="Of the ensembles.")] = "soft,paper",
+    start: Annotated[
+        Literal["rest", "spinning", "ellipse"], typer.Option(help="How the chains of the ensembles start.")
+    ] = "spinning",
+    samples: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, help="Walks of each ensemble. Default: 200, and 60 from 100 links on."),
+    ] = None,
+    device: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="Where the ensembles run: cpu, cuda or cuda:N; the other parts are measured on one core.",
+        ),
+    ] = "cpu",
+    tight: Annotated[
+        bool,
+        typer.Option(
+            "--tight", help="Make ensembles of rkf78 at 1e-9 as well, which take longer still than the reference."
+        ),
+    ] = False,
+    cases: Annotated[str | None, typer.Option(metavar="NAME,…", help="Hard cases. Default: all.")] = None,
+    rounds: Annotated[
+        int,
+        typer.Option(
+            metavar="N", min=1, help="Measurements of each run in the diagrams; walks of each that are timed."
+        ),
+    ] = 5,
+    scipy: Annotated[bool, typer.Option(help="Run SciPy's DOP853 and Radau as well, which takes minutes.")] = True,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the results as one JSON object instead of the paths of the files.")
+    ] = False,
+) -> None:
+    """Measure error against cost of every method; time walks; compare ensembles of them; run the hard cases.
+
+    Results go to accuracy.json, figures and a page beside it; what is run again replaces just its own rows. Ensembles
+    are sweeps: killed ones go on. At release, chains below 100 links turn at 15 Hz, longer ones at 20 Hz. The walks
+    that are timed start as an ellipse at Table 1's values.
+    """
+    from warpchain.bench.accuracy.page import write_pictures_and_page
+    from warpchain.bench.accuracy.plan import make_plan, run_accuracy
+    from warpchain.cli.terminal import status_line, try_folder
+
+    lists = {"parts": _words("--parts", parts), "trials": _words("--trials", trials)}
+    lists["presets"] = _words("--presets", presets)
+    if chosen is not None:
+        lists["contestants"] = _words("--methods", chosen)
+    if cases is not None:
+        lists["cases"] = _words("--cases", cases)
+    numbers = {"tolerances": _numbers("--tolerances", tolerances)} if tolerances is not None else {}
+    plan = make_plan(
+        **lists,  # type: ignore[arg-type]
+        **numbers,  # type: ignore[arg-type]
+        links=[int(number) for number in _numbers("--links", links, whole=True)],
+        start=start,
+        samples=samples,
+        device=device,
+        tight=tight,
+        rounds=rounds,
+        scipy=scipy,
+    )
+    try_folder(output)
+    with status_line() as show:
+        document = run_accuracy(output, plan, show)
+        show("drawing")
+        paths = write_pictures_and_page(output, document)
+    if as_json:
+        print((output / "accuracy.json").read_text(encoding="utf-8"))
+        return
+    for path in (output / "accuracy.json", *paths):
+        print(path)
+
+
+@bench_app.command("sweep")
+def sweep(
+    source: SweepFile,
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="DIR", help="Folder of the results, with a folder for each place."),
+    ],
+    devices: Annotated[
+        str,
+        typer.Option(
+            metavar="[Kx]NAME[@N],…",
+            help="Places to run on: cpu, one core; Kxcpu, K cores; cuda or cuda:N, a GPU; Kxcuda, K GPUs, a process "
+            "for each, as --gpus K. @N takes N samples per cell there. Ratios are to the first place.",
+        ),
+    ],
+    samples: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, help="Samples per cell where @N does not say. Default: as the sweep says."),
+    ] = None,
+    rounds: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Runs on each place, in turn; medians are printed.")
+    ] = 1,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Discard what an earlier measurement left in DIR.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print DIR/scaling.json, which is written in any case, instead of a table.")
+    ] = False,
+) -> None:
+    """Run a sweep on several places: walks a second on one core, many, a GPU, several; whether their bits are equal.
+
+    The clock runs from when every worker has its kernels loaded until the last walk is on disk.
+    """
+    from warpchain.bench.places import places_of
+    from warpchain.bench.scaling import FILE, measure
+    from warpchain.cli.terminal import print_scaling, status_line, try_folder
+
+    places = places_of(_words("--devices", devices), samples)
+    try_folder(output)
+    with status_line() as show:
+        scaling = measure(source, output, places, rounds=rounds, fresh=fresh, report=show)
+    if as_json:
+        print((output / FILE).read_text(encoding="utf-8"), end="")
+    else:
+        print_scaling(scaling)
+
+
+def _words(option: str, text: str) -> list[str]:
+    """The words of a list with commas.
+
+    Raises:
+        InputError: there are none.
+    """
+    from warpchain.inputs.parameters import InputError
+
+    words = [word.strip() for word in text.split(",") if word.strip()]
+    if not words:
+        raise InputError(f"{option}: nothing in it; give names with commas between them, or leave it out")
+    return words
+
+
+def _numbers(option: str, text: str, *, whole: bool = False) -> list[float]:
+    """The numbers of a list with commas.
+
+    Raises:
+        InputError: one is no number.
+    """
+    from warpchain.inputs.parameters import InputError, shown
+
+    numbers = []
+    for word in _words(option, text):
+        try:
+            numbers.append(int(word) if whole else float(word))
+        except ValueError:
+            kind = "whole number" if whole else "number"
+            raise InputError(f"{option}: {shown(word)} is no {kind}; give numbers with commas between them") from None
+    return numbers

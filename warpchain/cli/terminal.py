@@ -1,0 +1,228 @@
+"""What the command line shows and writes: progress, tables, and a folder with record and pictures."""
+
+import math
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, Literal
+
+from warpchain.inputs.parameters import InputError
+from warpchain.walks.walk_result import LOST, WalkResult, replacing
+
+if TYPE_CHECKING:
+    from warpchain.bench.cpu_steps import BroadPhaseCost, StepCost
+    from warpchain.bench.gpu_steps import GpuCost
+    from warpchain.bench.scaling import Scaling
+    from warpchain.run.single_walk import Progress
+
+PICTURE_DPI: Final = 200
+WIDE: Final = 110
+"""Columns of a wide table where there is no terminal to ask."""
+
+
+def try_folder(folder: Path) -> None:
+    """Find out, before a long run, whether a folder can be written to; nothing is left there.
+
+    Raises:
+        InputError: it cannot.
+    """
+    nearest = folder.absolute()
+    try:
+        while True:
+            try:
+                nearest.lstat()
+                break
+            except FileNotFoundError:
+                nearest = nearest.parent
+        with tempfile.TemporaryDirectory(prefix=".warpchain-", dir=nearest):
+            pass
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"--output: {folder}: {reason}; give a folder that can be written to") from None
+
+
+@contextmanager
+def status_line() -> Iterator[Callable[[str], None]]:
+    """Yield what shows a changing line on a terminal; where there is none, nothing is shown."""
+    if not sys.stderr.isatty():
+        yield lambda text: None
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status("starting") as line:
+        yield line.update
+
+
+def progress_text(progress: "Progress") -> str:
+    """Where a walk is, in columns."""
+    if progress.phase == "compile":
+        return "compiling kernels; later runs find them ready"
+    where, speed = f"{progress.phase:8}{progress.time:8.3f} s", f"{progress.speed:9.3f} m/s"
+    return f"{where}{speed}{progress.tries:14,} steps"
+
+
+def print_walk(result: WalkResult) -> None:
+    """Print on standard output what one wants to know of a walk."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column()
+    for row in _walk_rows(result):
+        table.add_row(*row)
+    Console(highlight=False, markup=False).print(table)
+
+
+def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
+    """Names and values."""
+    status, energy = result.status, result.energy
+    yield "Δx", f"{result.dx:.4f} m" if math.isfinite(result.dx) else "unknown"
+    yield "status", status.label if status.ok else f"{status.label}: {status.sentence}"
+    if math.isfinite(result.hold_time):
+        moved = f", drift {100 * result.drift:.2g} %" if math.isfinite(result.drift) else ""
+        yield "loop held", f"{result.hold_time:.3f} s at full frequency{moved}"
+    yield "walk time", f"{result.walk_time:.3f} s"
+    yield "bounces", f"{result.bounces}"
+    if math.isfinite(result.softened_at):
+        yield "joints softened", f"{result.softened_at:.3f} s after the release"
+    yield "steps", f"{result.steps_accepted:,} accepted, {result.steps_rejected:,} rejected"
+    yield "simulated", f"{result.simulated_time:.3f} s in {result.wall_time:.1f} s"
+    yield "greatest joint opening", f"{1e3 * result.greatest_opening:.3g} mm"
+    depths = (f"{kind} {1e3 * depth:.3g} mm" for kind, depth in result.greatest_penetration.items())
+    yield "greatest penetration", ", ".join(depths)
+    released = energy["kinetic_at_release"] + energy["potential_at_release"]
+    if math.isnan(released):
+        return  # the chain never got so far
+    yield "energy at release", f"{released:.5f} J, kinetic {energy['kinetic_at_release']:.5f} J"
+    for cause in LOST:
+        if energy[cause] or cause not in ("softening", "hand_over"):
+            yield f"  lost to {cause.replace('_', ' ')}", f"{energy[cause]:.5f} J"
+    left = energy["kinetic_at_end"] + energy["potential_at_end"]
+    yield "energy at the end", f"{left:.5f} J, kinetic {energy['kinetic_at_end']:.5f} J"
+    yield "unaccounted for", f"{energy['residual']:.1e} J"
+
+
+def print_costs(
+    machine: Mapping[str, str], steps: "Sequence[StepCost]", broad_phase: "Sequence[BroadPhaseCost]"
+) -> None:
+    """Print on standard output what a bench measured; s/s is wall time per simulated time."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False, markup=False)
+    console.print(", ".join(f"{name} {value}" for name, value in machine.items()), "\n")
+    table = Table(box=None, pad_edge=False)
+    for heading in ("scene", "links", "method"):
+        table.add_column(heading)
+    for heading in ("µs/try", "ns/link/stage", "step µs", "rejected", "s/s"):
+        table.add_column(heading, justify="right")
+    for cost in sorted(steps, key=lambda cost: (cost.scene, cost.links)):
+        rejected = "" if math.isnan(cost.rejected) else f"{cost.rejected:.1%}"
+        per_stage = "" if math.isnan(cost.per_link_stage) else f"{cost.per_link_stage:.2f}"
+        times = f"{cost.microseconds:.2f}", per_stage, f"{1e6 * cost.step:.3g}"
+        last = rejected, f"{cost.wall_per_simulated:.3g}"
+        table.add_row(cost.scene, str(cost.links), cost.method, *times, *last)
+    console.print(table, "\n")
+    table = Table(box=None, pad_edge=False)
+    for heading in ("neighbour list: links", "pairs", "grid µs", "all pairs µs"):
+        table.add_column(heading, justify="right")
+    for list_cost in broad_phase:
+        builds = f"{list_cost.grid_microseconds:.1f}", f"{list_cost.all_pairs_microseconds:.1f}"
+        table.add_row(str(list_cost.links), str(list_cost.pairs), *builds)
+    console.print(table)
+
+
+def print_gpu_costs(machine: Mapping[str, str], costs: "Sequence[GpuCost]") -> None:
+    """Print on standard output what a bench of a GPU measured; /s is per second of wall time."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else WIDE)
+    console.print(", ".join(f"{name} {value}" for name, value in machine.items()), "\n")
+    table = Table(box=None, pad_edge=False)
+    for heading in ("scene", "links", "method"):
+        table.add_column(heading)
+    for heading in ("chains", "µs/try", "link stages/s", "chain·s/s", "rejected"):
+        table.add_column(heading, justify="right")
+    for heading in ("registers", "spilled B", "blocks", "of peak"):
+        table.add_column(heading, justify="right")
+    for cost in costs:
+        stages = "" if math.isnan(cost.link_stages) else f"{cost.link_stages:.2e}"
+        rates = f"{cost.microseconds:.2f}", stages, f"{cost.chain_seconds:.3g}", f"{cost.rejected:.1%}"
+        needs = str(cost.registers), str(cost.spilled), f"{cost.blocks} ({cost.occupancy:.0%})"
+        peak = "" if math.isnan(cost.peak) else f"{cost.peak:.0%}"
+        table.add_row(cost.scene, str(cost.links), cost.method, str(cost.chains), *rates, *needs, peak)
+    console.print(table)
+
+
+def print_scaling(scaling: "Scaling") -> None:
+    """Print on standard output what a sweep cost on several places; /s is per second of wall time."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else WIDE)
+    console.print(", ".join(f"{name} {value}" for name, value in scaling.machine.items()), "\n")
+    console.print(f"{scaling.sweep}, medians of {scaling.rounds}, kernels loaded before")
+    table = Table(box=None, pad_edge=False)
+    for heading in ("place", "methods"):
+        table.add_column(heading)
+    for heading in ("walks", "not at rest", "s", "walks/s", "simulated s/s", "processor s", "ratio", "loading s"):
+        table.add_column(heading, justify="right")
+    for cost in scaling.costs:
+        walks = f"{cost.walks:,}", f"{cost.walks - cost.statuses.get('at_rest', 0):,}"
+        rates = f"{cost.seconds:.1f}", f"{cost.walks_per_second:.3g}", f"{cost.simulated_per_second:.3g}"
+        others = f"{cost.processor_seconds:.1f}", f"{cost.ratio:.2f}", f"{cost.loading_seconds:.1f}"
+        table.add_row(cost.name, cost.methods, *walks, *rates, *others)
+    console.print(table, "\n")
+    for one in scaling.comparisons:
+        who = f"{one.first} and {one.second}" if one.first != one.second else f"{one.first}, one round and another"
+        equal = f"all {one.walks:,} walks equal, bit by bit" if not one.different else ""
+        console.print(f"{who}: {equal or f'{one.different:,} of {one.walks:,} walks differ'}")
+
+
+def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iterator[Path]:
+    """Write the record, then its pictures, each whole or not at all; yield the path of each.
+
+    A failed walk may have nothing to show in a picture, and a sprocket that stands still no loop that runs. That
+    picture is left out, and so is one of an earlier walk, which does not belong to this record.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    record = folder / "walk.h5"
+    result.save(record)
+    yield record
+    pictures: dict[str, Callable[[WalkResult, Path], None]] = {
+        "figure5.png": partial(_draw, "figure5"),
+        "film_strip.png": partial(_draw, "film_strip"),
+    }
+    if result.before_release is not None:
+        pictures["loop.png"] = partial(_draw, "loop")
+    else:
+        (folder / "loop.png").unlink(missing_ok=True)
+    if animation is not None:
+        from warpchain.pictures.animation import animate
+
+        pictures[f"walk.{animation}"] = animate
+    for name, draw in pictures.items():
+        path = folder / name
+        try:
+            draw(result, path)
+        except ValueError as error:
+            if result.status.ok and name != "loop.png":
+                raise
+            path.unlink(missing_ok=True)
+            print(f"{path}: not drawn; {error}", file=sys.stderr)
+        else:
+            yield path
+
+
+def _draw(kind: Literal["figure5", "film_strip", "loop"], result: WalkResult, path: Path) -> None:
+    figure = result.plot(kind)
+    with replacing(path) as part:
+        figure.savefig(part, dpi=PICTURE_DPI)

@@ -1,0 +1,1 @@
+"""Chains on a device. Nothing else launches kernels."""

@@ -1,0 +1,435 @@
+"""The one module that launches kernels: a batch of chains in arrays on a device, carried on in bounded launches."""
+
+import itertools
+import math
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpchain.engine.control import control_of
+from warpchain.engine.devices import CAPACITY_FRAMES, CAPACITY_SAMPLES, scratch_rows, start_device
+from warpchain.engine.kernel_choice import block_kernel, block_threads, features_of, kernels_of
+from warpchain.engine.mirror import Mirror
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import Parameters
+from warpchain.kernels import layout
+from warpchain.kernels.cpu.contacts.neighbour_list import list_layout
+from warpchain.kernels.cpu.loop import Features, make_advance
+from warpchain.kernels.events.steadiness import LOADING_TIME
+from warpchain.kernels.types import Model, Program, Record, State
+from warpchain.status import Status
+
+Array = NDArray[np.float64]
+
+PROGRAM = (
+    *("sprocket_speed", "spin_up_start", "spin_up_time", "hold_start"),
+    *("loop_speed", "loop_period", "load_factor", "steady_window", "steady_time", "steady_tolerance"),
+    *("further_hold", "release_phase", "hold_softness", "loaded_softness", "push_rate"),
+)
+"""Fields of :class:`warpchain.kernels.types.Program`."""
+FIRST_STEP = 1e-7  # s; the controller grows it fivefold per step
+LANES = 3  # streams of a batch for kernels side by side: chains of one length do not fill the device
+LAUNCH_SECONDS = 0.1  # how long a launch should take: the grain of progress and of Ctrl-C
+UNSET_WATCHES = (
+    *(layout.WINDOW_START, layout.STEADY_SINCE, layout.LOADED_SINCE, layout.UNLOADED_SINCE, layout.DRIFT),
+    *(layout.REST_SINCE, layout.SOFTENED_AT),
+)
+"""Moments of :attr:`State.watch` that are negative until they come."""
+
+COUNTS = ("accepted", "rejected", "floor", "sprocket", "self", "bounces", "list_builds")
+"""Counters of a world, in the order of :mod:`warpchain.kernels.layout`."""
+EXTREMES = ("opening", "floor", "sprocket", "self")
+"""Greatest joint opening and depths of a world, likewise."""
+LOSSES = ("joint_friction", "joint_damping", "floor", "sprocket", "self_contact", "softening", "hand_over")
+"""Losses of energy of a world, likewise."""
+
+
+class Batch:
+    """W chains on one device, each with parameters, state and statistics of its own.
+
+    Arrays are filled and read through the methods; between launches the host may look at any world.
+    """
+
+    def __init__(
+        self,
+        worlds: int,
+        longest: int,
+        options: Options,
+        *,
+        keeps_samples: bool = False,
+        frame_every: int | None = None,
+        keeps_loads: bool = False,
+        threads: int | None = None,
+    ) -> None:
+        """Allocate a batch; all worlds are idle (status FINISHED) until a chain is loaded.
+
+        Args:
+            worlds: Number of chains W that are carried on together.
+            longest: Greatest number of links of a chain that will be loaded.
+            options: Shared by all worlds.
+            keeps_samples: Keep the time series.
+            frame_every: Keep all joint positions at every so many samples; None keeps none.
+            keeps_loads: Keep force and moment of every joint with each frame.
+            threads: Of every block on a GPU, at least as many as links; None: as many as a chain needs.
+        """
+        self.options = options
+        self._threads = threads
+        self.device = start_device(options.device)
+        self.links = [0] * worlds
+        self._mirrors: dict[int, Mirror] = {}
+        self._stream = wp.Stream(self.device) if self.device.is_cuda else None
+        self._done: wp.Event | None = None
+        self._lanes = [wp.Stream(self.device) for _ in range(LANES)] if self.device.is_cuda else []
+        self.columns = layout.padded_width(longest)
+        rows = scratch_rows(options, longest, self.device, threads)
+
+        self.model = Model()
+        self.model.link_count = self._array(np.zeros(worlds, dtype=np.int32))
+        for name in Parameters.model_fields:
+            setattr(self.model, name, self._array(np.ones(worlds)))
+
+        self.program = Program()
+        for name in PROGRAM:
+            setattr(self.program, name, self._array(np.zeros(worlds)))
+
+        self._constant = set(self._mirrors)
+        self._order = Mirror(np.zeros(worlds, dtype=np.int32), self.device, self._stream)
+        self.state = State()
+        self.state.links = self._array(np.zeros((worlds, 6, longest)))
+        for name in (
+            *("time", "stop_time", "gap", "reach", "slack", "step", "other_step", "last_error", "closing_time"),
+            *("softness", "load_factor", "first_area"),
+        ):
+            setattr(self.state, name, self._array(np.zeros(worlds)))
+        for name in ("stop_status", "is_fresh", "has_first_stage", "flies"):
+            setattr(self.state, name, self._array(np.zeros(worlds, dtype=np.int32)))
+        self.state.status = self._array(np.full(worlds, int(Status.FINISHED), dtype=np.int32))
+        self.state.tries_before = self._array(np.zeros(worlds, dtype=np.int64))
+        self.state.next_sample = self._array(np.zeros(worlds, dtype=np.int64))
+        self.state.watch = self._array(np.zeros((worlds, layout.WATCH_ROWS)))
+        for name in ("first_look", "last_look"):
+            setattr(self.state, name, self._array(np.zeros((worlds, layout.SAMPLE_COLUMNS))))
+        self.state.counts = self._array(np.zeros((worlds, layout.COUNT_ROWS), dtype=np.int64))
+        self.state.extremes = self._array(np.zeros((worlds, layout.EXTREME_ROWS)))
+        self.state.losses = self._array(np.zeros((worlds, layout.LOSS_ROWS)))
+
+        samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * (frame_every is not None)
+        self.record = Record()
+        self.record.sample_count = self._array(np.zeros(worlds, dtype=np.int32))
+        self.record.frame_count = self._array(np.zeros(worlds, dtype=np.int32))
+        self.record.samples = self._array(np.zeros((worlds, samples, layout.SAMPLE_COLUMNS)))
+        self.record.frames = self._array(np.zeros((worlds, frames, 2 * longest)))
+        self.record.frame_times = self._array(np.zeros((worlds, frames)))
+        self.record.frame_loads = self._array(np.zeros((worlds, frames * keeps_loads, 3 * longest)))
+
+        self.control = control_of(options)
+        self.control.launch_time = LAUNCH_SECONDS
+        self.control.frame_every = frame_every or 1
+
+        self._tries = 500
+        self.scratch = wp.zeros((worlds, rows, self.columns), dtype=wp.float64, device=self.device)
+        self.lists = wp.zeros((worlds, list_layout(self.columns).size), dtype=wp.int32, device=self.device)
+
+    def _array(self, values: NDArray[np.generic]) -> wp.array:
+        """An array on the device that the host will read or write."""
+        if not self.device.is_cuda or values.size == 0:
+            return wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device=self.device)
+        mirror = Mirror(values, self.device, self._stream)
+        self._mirrors[mirror.array.ptr] = mirror
+        return mirror.array
+
+    def _view(self, array: wp.array) -> NDArray[Any]:
+        """The elements of an array, to be read between launches."""
+        values: NDArray[Any] = self._mirrors[array.ptr].view() if array.ptr in self._mirrors else array.numpy()
+        return values
+
+    def _edit(self, array: wp.array) -> NDArray[Any]:
+        """The elements of an array, to be changed between launches."""
+        values: NDArray[Any] = self._mirrors[array.ptr].edit() if array.ptr in self._mirrors else array.numpy()
+        return values
+
+    def set_chain(self, world: int, parameters: Parameters, links: int, sprocket_radius: float | None = None) -> None:
+        """Say what a world's chain is made of.
+
+        Args:
+            world: Index.
+            parameters: Of the chain.
+            links: Number of links.
+            sprocket_radius: Radius [m] at which circles touch the sprocket; None: the parameter's.
+        """
+        self.links[world] = links
+        self._edit(self.model.link_count)[world] = links
+        for name, value in parameters:
+            self._edit(getattr(self.model, name))[world] = value
+        if sprocket_radius is not None:
+            self._edit(self.model.sprocket_radius)[world] = sprocket_radius
+
+    def load(
+        self,
+        world: int,
+        position: Array,
+        velocity: Array,
+        *,
+        stop_time: float,
+        stop_status: Status,
+        tries_before: int = 0,
+        softness: float = 0.0,
+    ) -> None:
+        """Set the state of a world's chain and start its clock at zero; its statistics and watches start anew.
+
+        Args:
+            world: Index.
+            position: (n, 3): x, y [m], θ [rad].
+            velocity: (n, 3), their rates.
+            stop_time: The run lands on this time [s] and ends.
+            stop_status: Status it then has.
+            tries_before: Tries of earlier phases, which the limit of the options counts as well.
+            softness: Of the joints, see :mod:`warpchain.kernels.events.softening`.
+        """
+        state = self.state
+        n = self.links[world]
+        self._edit(state.links)[world, :3, :n] = position.T
+        self._edit(state.links)[world, 3:, :n] = velocity.T
+        for array in (
+            state.time,
+            state.gap,
+            state.reach,
+            state.slack,
+            state.counts,
+            state.extremes,
+            state.losses,
+            state.next_sample,
+        ):
+            self._edit(array)[world] = 0
+        self._edit(state.watch)[world] = 0
+        self._edit(state.watch)[world, list(UNSET_WATCHES)] = -1.0
+        self._edit(state.softness)[world] = softness
+        self._edit(state.load_factor)[world] = 1.0
+        self._edit(state.last_look)[world, layout.TIME] = -1.0
+        self._edit(state.watch)[world, layout.LAST_FLOOR_IMPULSE] = -np.inf
+        self._edit(state.tries_before)[world] = tries_before
+        self._edit(state.has_first_stage)[world] = 0
+        self._edit(state.is_fresh)[world] = 1
+        self._edit(state.step)[world] = FIRST_STEP
+        self._edit(state.other_step)[world] = FIRST_STEP
+        self._edit(state.flies)[world] = 0
+        self._edit(state.closing_time)[world] = 0.0
+        self._edit(state.last_error)[world] = 1.0
+        self._edit(self.record.sample_count)[world] = 0
+        self._edit(self.record.frame_count)[world] = 0
+        self.resume(world, stop_time, stop_status)
+
+    def resume(self, world: int, stop_time: float, stop_status: Status) -> None:
+        """Let a world that has stopped run on to a later time, as if it had not stopped there."""
+        self._edit(self.state.stop_time)[world] = stop_time
+        self._edit(self.state.stop_status)[world] = int(stop_status)
+        self._edit(self.state.status)[world] = int(Status.RUNNING)
+
+    def set_program(self, world: int, **values: float) -> None:
+        """Set fields of :class:`Program` of a world."""
+        for name, value in values.items():
+            self._edit(getattr(self.program, name))[world] = value
+
+    def features(self, *, fixed_body: str, watch: str, broad_phase: str = "grid") -> Features:
+        """Kernel features for these worlds."""
+        return features_of(self.options, self.columns, fixed_body=fixed_body, watch=watch, broad_phase=broad_phase)
+
+    def run(self, worlds: Sequence[int], features: Features, after_launch: Callable[[], None] | None = None) -> None:
+        """Carry worlds on until none of them is running.
+
+        Args:
+            worlds: Indices.
+            features: What the kernel is compiled for.
+            after_launch: Called after each launch; it drains the record. Results do not depend on how a run is cut
+                into launches.
+        """
+        self.compile(features, [self.links[world] for world in worlds])
+        while True:
+            status = self.statuses()
+            active = [world for world in worlds if status[world] == Status.RUNNING]
+            if not active:
+                return
+            seconds = self.launch(active, features, self._tries)
+            if seconds < LAUNCH_SECONDS / 2:
+                self._tries = min(2 * self._tries, 1_000_000)
+            elif seconds > 2 * LAUNCH_SECONDS:
+                self._tries = max(self._tries // 2, 1)
+            if after_launch is not None:
+                after_launch()
+
+    def compile(self, features: Features, links: Iterable[int] = ()) -> None:
+        """Make sure that the kernels for these features are ready; takes seconds the first time on a machine.
+
+        Args:
+            features: What they are compiled for.
+            links: On a GPU, numbers of links, each of which may need a kernel of its own.
+        """
+        for kernel, threads in kernels_of(self.device, features, map(self.block_size, links)):
+            wp.load_module(kernel.module, device=self.device, block_dim=threads)
+
+    def block_size(self, links: int) -> int:
+        """Threads of the block that carries a chain of so many links on a GPU."""
+        return self._threads or block_threads(links)
+
+    def launch(self, worlds: Sequence[int], features: Features, tries: int) -> float:
+        """Carry worlds on by at most this many tries each; returns the wall time [s]."""
+        return self.launch_together({features: worlds}, tries)
+
+    def launch_together(self, groups: Mapping[Features, Sequence[int]], tries: int) -> float:
+        """Carry groups of worlds on, each with features of its own, at the same time if the device can."""
+        before = time.perf_counter()
+        self.start(groups, tries)
+        self.finish()
+        return time.perf_counter() - before
+
+    def start(self, groups: Mapping[Features, Sequence[int]], tries: int) -> None:
+        """Begin a launch as of :meth:`launch_together`; until :meth:`finish` the host may not look at the worlds.
+
+        On a GPU this returns at once, and launches of other batches go on at the same time.
+        """
+        self.control.tries = tries
+        arrays = [self.model, self.program, self.state, self.record, self.scratch, self.lists, self.control]
+        if self._stream is None:
+            for features, worlds in groups.items():
+                inputs = [wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device), *arrays]
+                wp.launch(make_advance(features), dim=len(worlds), inputs=inputs, device=self.device)
+            return
+        blocks: dict[tuple[Features, int], list[int]] = defaultdict(list)
+        for features, worlds in groups.items():
+            for world in worlds:
+                blocks[features, self.block_size(self.links[world])].append(world)
+        order = np.array([world for worlds in blocks.values() for world in worlds], dtype=np.int32)
+        if not np.array_equal(self._order.view()[: len(order)], order):
+            self._order.edit()[: len(order)] = order
+        self._stream.wait_stream(self.device.stream)  # where new arrays are filled
+        for mirror in (self._order, *self._mirrors.values()):
+            mirror.upload()
+        ready = self._stream.record_event()
+        for lane in self._lanes:
+            lane.wait_event(ready)
+        first = 0
+        for ((features, threads), worlds), lane in zip(blocks.items(), itertools.cycle(self._lanes), strict=False):
+            wp.launch_tiled(
+                block_kernel(features, threads),
+                dim=[len(worlds)],
+                inputs=[self._order.array[first : first + len(worlds)], *arrays],
+                block_dim=threads,
+                device=self.device,
+                stream=lane,
+            )
+            first += len(worlds)
+        for lane in self._lanes:
+            self._stream.wait_event(lane.record_event())
+        for mirror in self._mirrors.values():
+            if mirror.array.ptr not in self._constant:
+                mirror.download()
+        self._done = self._stream.record_event()
+
+    def is_done(self) -> bool:
+        """Whether :meth:`finish` would return at once."""
+        return self._done is None or bool(self._done.is_complete)
+
+    def finish(self) -> None:
+        """Wait for the launch that was begun, if there is one."""
+        if self._done is not None:
+            wp.synchronize_event(self._done)
+            self._done = None
+
+    def listed_pairs(self, world: int) -> int:
+        """Pairs of joints in a world's neighbour list."""
+        return int(self._view(self.lists)[world, list_layout(self.columns).count])
+
+    def position(self, world: int) -> Array:
+        """(n, 3): x, y [m], θ [rad]."""
+        return self._view(self.state.links)[world, :3, : self.links[world]].T.copy()
+
+    def velocity(self, world: int) -> Array:
+        """(n, 3): their rates."""
+        return self._view(self.state.links)[world, 3:, : self.links[world]].T.copy()
+
+    def status(self, world: int) -> Status:
+        """How the world stands."""
+        return Status(int(self._view(self.state.status)[world]))
+
+    def statuses(self) -> NDArray[np.int32]:
+        """Of all worlds, as numbers; not to be changed."""
+        return self._view(self.state.status)
+
+    def time(self, world: int) -> float:
+        """Time [s] since loading."""
+        return float(self._view(self.state.time)[world])
+
+    def counts(self, world: int) -> dict[str, int]:
+        """Counters since loading."""
+        row = self._view(self.state.counts)[world]
+        return {name: int(value) for name, value in zip(COUNTS, row, strict=True)}
+
+    def tries(self, world: int) -> int:
+        """Steps tried since loading, accepted or not."""
+        counts = self.counts(world)
+        return counts["accepted"] + counts["rejected"]
+
+    def extremes(self, world: int) -> dict[str, float]:
+        """Greatest joint opening and depths [m] since loading."""
+        row = self._view(self.state.extremes)[world]
+        return {name: float(value) for name, value in zip(EXTREMES, row, strict=True)}
+
+    def losses(self, world: int) -> dict[str, float]:
+        """Energy [J] lost since loading, by cause."""
+        row = self._view(self.state.losses)[world]
+        return {name: float(value) for name, value in zip(LOSSES, row, strict=True)}
+
+    def first_look(self, world: int) -> Array:
+        """Sums over the chain when its run began: (SAMPLE_COLUMNS,), see :mod:`warpchain.kernels.layout`."""
+        return np.array(self._view(self.state.first_look)[world])
+
+    def last_look(self, world: int) -> Array:
+        """The same when the chain was last looked at; at the end of the run if that has ended."""
+        return np.array(self._view(self.state.last_look)[world])
+
+    def softened_at(self, world: int) -> float:
+        """Time [s] since loading at which the joints of a collapsed loop were softened; NaN if they were not."""
+        moment = float(self._view(self.state.watch)[world, layout.SOFTENED_AT])
+        return moment if moment >= 0 else math.nan
+
+    def drift(self, world: int) -> float:
+        """How far a held loop moved in its last watch, relative to its size; NaN if it was not watched for long."""
+        drift = float(self._view(self.state.watch)[world, layout.DRIFT])
+        return drift if drift >= 0 else math.nan
+
+    def unloaded_at(self, world: int) -> float:
+        """Time [s] since loading from which a held loop has borne its own loads; −∞ if it was not watched."""
+        watch = self._view(self.state.watch)[world]
+        if watch[layout.UNLOADED_SINCE] >= 0:
+            return float(watch[layout.UNLOADED_SINCE]) + float(LOADING_TIME)
+        since = float(watch[layout.LOADED_SINCE])  # of the last hold, under a factor of 1
+        return since if since >= 0 else -math.inf
+
+    def drain_samples(self, world: int) -> Array:
+        """Take the time series kept so far: (t, SAMPLE_COLUMNS), see :mod:`warpchain.kernels.layout`."""
+        count = int(self._view(self.record.sample_count)[world])
+        self._edit(self.record.sample_count)[world] = 0
+        return self._view(self.record.samples)[world, :count].copy()
+
+    def frame_loads(self, world: int) -> Array:
+        """Loads of the joints in the frames that are to be drained, on the link before each: (f, n, 3), N, N and N m.
+
+        No frames, if loads are not kept.
+        """
+        n, kept = self.links[world], self.record.frame_loads.shape[1] > 0
+        count = int(self._view(self.record.frame_count)[world]) if kept else 0
+        rows = self._view(self.record.frame_loads)[world, :count, : 3 * n].reshape(count, 3, n)
+        return rows.transpose(0, 2, 1).copy()
+
+    def drain_frames(self, world: int) -> tuple[Array, Array]:
+        """Take the frames kept so far: times (f,) [s], joint positions (f, n, 2) [m]."""
+        count = int(self._view(self.record.frame_count)[world])
+        self._edit(self.record.frame_count)[world] = 0
+        n = self.links[world]
+        rows = self._view(self.record.frames)[world, :count, : 2 * n].reshape(count, 2, n)
+        return self._view(self.record.frame_times)[world, :count].copy(), rows.transpose(0, 2, 1).copy()

@@ -1,0 +1,123 @@
+"""Numerical settings of a launch, as options say them and as soft joints are."""
+
+import math
+
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import Parameters, preset
+from warpchain.inputs.scene import greatest_load
+from warpchain.kernels.types import Control
+
+SOFT = preset("soft")
+"""Whose joints soft ones have, see :mod:`warpchain.kernels.events.softening`."""
+SOFTEST = SOFT.with_values({"joint_stiffness": 1e6, "joint_damping": 30.0})
+"""Whose joints the softest have.
+
+Measured with `paper` and dp5 at 1e-4 on walks that are the same until the loop encloses half of its first area: Δx then
+shifts by 0.01 ± 0.04 mm (24 walks of 60 links at 15 Hz) and 1.5 ± 1.5 mm (16 of 150 at 20 Hz; 0.01 ± 0.08 mm from 0.3
+of the area), in 2.7 times fewer tries. That was with ω_c = 1 rad/s, which takes 5 % fewer tries than the ω_c of soft
+joints but lets circles sink in half as deep again. k = 3e5 N/m takes 1.6 times fewer again, but circles sink 2 mm into
+the floor. From 0.9 of the area 1e6 N/m may shift Δx: by 8 ± 4 mm of 1 m (12 walks of 150 links).
+"""
+STIFFENING_TIME = 0.03
+"""Time [s] in which joints that were soft on the sprocket get their own values back after the release."""
+
+HOLD_STRAIN = 3e-4
+"""Strain that the loop's speed may cause in joints that are softened while it is held …"""
+LOADED_STRAIN = 1e-3
+"""… and that speed and mean weight may cause while its loads are multiplied."""
+GREATEST_LOAD = 50.0
+"""Factor by which loads are multiplied unless the chain bears less.
+
+With 15, 30 and 60 the loop that is released is the same to 0.2 % of its height and 0.4 % of its width (60 to 180
+links, 5 to 30 Hz), and within 0.8 % of the width of one that was held for 40 s under its own loads. Twice as much
+makes it stationary in two thirds of the time, in steps that are as much shorter.
+"""
+PUSH = 0.25
+"""Part of its depth by which the sprocket pushes a circle out in the longest step near a contact …"""
+FASTEST_PUSH = 5e3
+"""… though not at more than this rate [1/s].
+
+Circles of 60 to 180 links at 5 to 30 Hz then sink in by 0.1 mm at most under load, without it by 0.3 mm to several.
+"""
+
+
+def line_density(parameters: Parameters) -> float:
+    """Mass of the chain per length [kg/m]."""
+    return (parameters.inner_mass + parameters.outer_mass) / 2 / parameters.link_length
+
+
+def mean_weight(parameters: Parameters, links: int, radius: float) -> float:
+    """Tension [N] that the weight of a loop causes in the middle of its sides.
+
+    Args:
+        parameters: Of the chain.
+        links: Their number.
+        radius: Distance from the sprocket's centre at which joints ride [m].
+    """
+    side = max(0.0, links * parameters.link_length / 2 - math.pi * radius)
+    return line_density(parameters) * parameters.gravity * side / 2
+
+
+def hold_softness(parameters: Parameters, tension: float, strain: float) -> float:
+    """Softness of the joints of a loop that is held, from 1 for soft ones to 2 for the softest.
+
+    Args:
+        parameters: Of the chain.
+        tension: T [N] that stretches the joints by T/k.
+        strain: How far that may be, in links.
+    """
+    wanted = tension / (strain * parameters.link_length)
+    soft = min(parameters.joint_stiffness, SOFT.joint_stiffness)  # as no joint becomes stiffer than its own
+    softest = SOFTEST.joint_stiffness
+    if soft <= softest:
+        return 2.0
+    return 1.0 + max(0.0, math.log(soft / max(wanted, softest)) / math.log(soft / softest))
+
+
+def suitable_load(parameters: Parameters, options: Options, weight: float) -> float:
+    """Factor by which loads are multiplied while a loop becomes stationary, unless the scene says one.
+
+    Args:
+        parameters: Of the chain.
+        options: Whether joints are softened on the sprocket.
+        weight: Mean tension by the loop's weight [N].
+    """
+    stiffness = parameters.joint_stiffness
+    if options.soften_drive:
+        stiffness = min(stiffness, SOFT.joint_stiffness)
+    bearable = LOADED_STRAIN * stiffness * parameters.link_length
+    limit = min(GREATEST_LOAD, greatest_load(parameters))
+    return max(1.0, min(limit, bearable / weight) if weight > 0 else limit)
+
+
+def push_rate(options: Options) -> float:
+    """Rate [1/s] at which the sprocket pushes out circles that have sunk in."""
+    longest = options.contact_step
+    if options.soften_drive:
+        longest = max(longest, options.soft_contact_step)
+    return min(FASTEST_PUSH, PUSH / longest)
+
+
+def control_of(options: Options) -> Control:
+    """What options say of every launch; how long a launch is and which frames it keeps is still to be said."""
+    control = Control()
+    control.tolerance = options.tolerance
+    control.soft_tolerance = options.tolerance if options.soft_tolerance is None else options.soft_tolerance
+    control.flight_tolerance = options.flight_tolerance
+    control.proportional = int(options.controller == "pi")
+    control.contact_step = options.contact_step
+    control.skin = options.skin
+    control.smallest_step = options.smallest_step
+    control.step_limit = options.step_limit
+    control.sample_interval = options.record_interval
+    control.rest_speed = options.rest_speed
+    control.rest_time = options.rest_time
+    control.soft_stiffness = SOFT.joint_stiffness
+    control.soft_damping = SOFT.joint_damping
+    control.soft_smoothing = SOFT.friction_smoothing
+    control.softest_stiffness = SOFTEST.joint_stiffness
+    control.softest_damping = SOFTEST.joint_damping
+    control.soft_contact_step = options.soft_contact_step
+    control.soften_area = options.soften_area if options.soften_pile else -math.inf
+    control.stiffening_time = STIFFENING_TIME
+    return control

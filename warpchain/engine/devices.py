@@ -1,0 +1,115 @@
+"""Devices: how one is started, and how many chains fit into its memory."""
+
+import contextlib
+import functools
+import importlib.metadata
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Iterator
+
+import warp as wp
+
+from warpchain.engine.kernel_choice import block_threads
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import InputError, Parameters
+from warpchain.kernels import layout
+from warpchain.kernels.cpu.contacts.neighbour_list import list_layout
+from warpchain.kernels.gpu.functions import block_rows
+from warpchain.kernels.methods.method import METHODS
+
+CONNECTIONS = "32"  # queues between host and GPU; with fewer than streams, streams wait for one another
+BLOCKS_OF_MULTIPROCESSOR = 32  # most that an NVIDIA multiprocessor holds
+CAPACITY_SAMPLES = 512
+"""Samples of a chain's time series, if that is kept, that a device has room for between two launches."""
+CAPACITY_FRAMES = 64
+"""The same of frames."""
+
+
+@functools.cache
+def start_device(device: str) -> wp.Device:
+    """Start Warp and return the device.
+
+    Raises:
+        InputError: This machine has no such device.
+    """
+    wp.config.log_level = wp.LOG_ERROR
+    os.environ.setdefault("CUDA_DEVICE_MAX_CONNECTIONS", CONNECTIONS)  # CUDA reads both when it starts
+    os.environ.setdefault("CUDA_MODULE_LOADING", "EAGER")  # else a kernel's first launch waits for those under way
+    with _without_driver_warning():
+        wp.init()
+    name = "cuda:0" if device == "cuda" else device
+    known = [found.alias for found in wp.get_devices()]
+    if name not in known:
+        raise InputError(f"options.device: there is no {device} on this machine; give one of {', '.join(known)}")
+    return wp.get_device(name)
+
+
+@contextlib.contextmanager
+def _without_driver_warning() -> Iterator[None]:
+    """Pass on what Warp's native code writes to stderr, but for its line about a missing NVIDIA driver.
+
+    That line appears on every machine without a GPU, where it says nothing that the user asked for; whoever asks for
+    a missing GPU gets an error.
+    """
+    sys.stderr.flush()
+    kept = os.dup(2)
+    with tempfile.TemporaryFile() as caught:
+        os.dup2(caught.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+            caught.seek(0)
+            for line in caught:
+                if b"NVIDIA CUDA driver" not in line:
+                    os.write(2, line)
+
+
+def versions() -> dict[str, str]:
+    """Versions of all that may change a number: for the provenance of a result."""
+    packages = ("warpchain", "warp-lang", "numpy")
+    return {name: importlib.metadata.version(name) for name in packages} | {"python": platform.python_version()}
+
+
+def scratch_rows(options: Options, longest: int, device: wp.Device, threads: int | None = None) -> int:
+    """Rows of a chain's scratch block on a device, for chains of up to this many links; threads as for a batch."""
+    columns = layout.padded_width(longest)
+    if device.is_cuda:
+        return block_rows(options.method, threads or block_threads(longest), columns)
+    return METHODS[options.method].scratch_rows(columns)
+
+
+def world_bytes(
+    longest: int, options: Options, samples: int, frames: int, device: wp.Device, keeps_loads: bool = False
+) -> int:
+    """Memory [B] that a batch takes on a device for each of its worlds.
+
+    Args:
+        longest: Greatest number of links.
+        options: Of the batch.
+        samples: Capacity of the time series.
+        frames: Capacity of the frames.
+        device: Where.
+        keeps_loads: Loads of joints are kept with the frames.
+    """
+    columns = layout.padded_width(longest)
+    few = len(Parameters.model_fields) + 107  # numbers of a world in model, program and state
+    numbers = columns * scratch_rows(options, longest, device) + 6 * longest + few
+    numbers += samples * layout.SAMPLE_COLUMNS + frames * ((2 + 3 * keeps_loads) * longest + 1)
+    return 8 * numbers + 4 * list_layout(columns).size
+
+
+def most_worlds(
+    longest: int, options: Options, *, keeps_samples: bool, keeps_frames: bool, keeps_loads: bool = False
+) -> int:
+    """Chains that a GPU should carry on together: what could ever reside on it, as far as they fit into free memory.
+
+    Half of what is free is left to others, such as batches of other threads.
+    """
+    device = start_device(options.device)
+    samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * keeps_frames
+    fitting = int(device.free_memory) // 2 // world_bytes(longest, options, samples, frames, device, keeps_loads)
+    return max(1, min(BLOCKS_OF_MULTIPROCESSOR * int(device.sm_count), fitting))

@@ -1,0 +1,106 @@
+"""Which kernels carry chains on: by device, what happens to the chains, and their numbers of links."""
+
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+
+import warp as wp
+
+from warpchain.engine.processors import processors
+from warpchain.inputs.options import Options
+from warpchain.kernels.cpu.loop import Features, make_advance
+from warpchain.kernels.gpu.loop import make_advance_block
+from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
+from warpchain.kernels.methods.rosenbrock_tableaus import ROSENBROCK_TABLES
+
+REGISTERS = 168
+"""Registers a thread may take."""
+FEWER_REGISTERS = {160: 128, 224: 128, 256: 128}
+"""The same, by threads of a block, where fewer let another block onto a multiprocessor.
+
+A multiprocessor has four schedulers with 16384 registers each, so that a block's number of warps of 32 threads and
+the registers decide how many blocks it holds. Measured on an H200 with slightly older kernels, 4000 chains in flight,
+ns per try and chain, with 128 and 168: 60 links 12.0, 6.2, 5.5 and 11.5, 5.5, 4.9 (rkf78, dp5, os32); 150 links 15.5,
+13.3 and 16.8, 15.4 (dp5, os32). Without a bound, few chains run up to 15 % faster and many slower. No bit of a walk
+depends on it: the compiler fuses the same products and sums (`tests/test_on_gpu.py`, walks in blocks of their own and
+of 192 threads). rodas4p is fastest without one.
+"""
+SHARED_THREADS = 192
+"""Most threads of a block that chains of several lengths share."""
+SHARED_WALKS = 2000
+"""Most walks of a sweep that are carried on in such blocks; with 2016 it made no difference."""
+
+
+def registers(method: str, threads: int) -> int | None:
+    """Registers that a thread of such a block may take; None: as many as it likes."""
+    if method in ROSENBROCK_TABLES:
+        return None
+    return FEWER_REGISTERS.get(threads, REGISTERS)
+
+
+def block_kernel(features: Features, threads: int) -> wp.Kernel:
+    """The kernel of the block form for blocks of this many threads."""
+    return make_advance_block(features, threads, registers(features.method, threads))
+
+
+def block_threads(links: int) -> int:
+    """Threads of a GPU's block that carries a chain: one per link, rounded up to whole warps of 32."""
+    return -(-links // 32) * 32
+
+
+def shared_threads(method: str, links: Iterable[int], walks: int) -> int | None:
+    """Threads of every block of walks that should share a kernel; None: each chain has a block of its own size.
+
+    Kernels of blocks of different sizes that run on one multiprocessor take the instruction cache from one another.
+    With older kernels the 504 walks of Figure 6 (60 to 180 links, os32, one H200) took 6.4 s in blocks of five sizes
+    and 5.3 s in blocks of 192 threads, although most have idle ones; 1008 walks 10.8 and 8.5 s, 2016 walks 15.8 and
+    15.5 s.
+
+    Args:
+        method: Of the walks.
+        links: Numbers of links.
+        walks: How many walks there are.
+    """
+    sizes = {block_threads(n) for n in links}
+    if len(sizes) < 2 or walks > SHARED_WALKS or method not in TABLEAUS or max(sizes) > SHARED_THREADS:
+        return None
+    return max(sizes)
+
+
+def features_of(options: Options, columns: int, *, fixed_body: str, watch: str, broad_phase: str = "grid") -> Features:
+    """Kernel features for chains with these options in scratch blocks of this width."""
+    return Features(
+        method=options.method,
+        columns=columns,
+        fixed_body=fixed_body,
+        self_contact=options.self_contact,
+        broad_phase=broad_phase,
+        watch=watch,
+        softens=(watch == "rest" and options.soften_pile) or (watch in ("rest", "steady") and options.soften_drive),
+    )
+
+
+def kernels_of(device: wp.Device, features: Features, threads: Iterable[int]) -> list[tuple[wp.Kernel, int]]:
+    """Kernels that carry chains on in blocks of these numbers of threads, each with that; on a CPU one for all."""
+    if not device.is_cuda:
+        return [(make_advance(features), 1)]
+    return [(block_kernel(features, size), size) for size in sorted(set(threads))]
+
+
+def load_kernels(wanted: Iterable[tuple[wp.Device, Features, int]]) -> None:
+    """Compile what is not yet in the cache, several kernels at a time.
+
+    Args:
+        wanted: Device, features and threads of a block.
+    """
+    kernels = [
+        (device, kernel, threads)
+        for device, features, size in wanted
+        for kernel, threads in kernels_of(device, features, [size])
+    ]
+
+    def load(item: tuple[wp.Device, wp.Kernel, int]) -> None:
+        device, kernel, threads = item
+        wp.load_module(kernel.module, device=device, block_dim=threads)
+
+    with ThreadPoolExecutor(processors()) as pool:
+        list(pool.map(load, kernels))

@@ -1,0 +1,262 @@
+"""What happens in a walk: how long the chain is, how fast it is spun, from which height it is released."""
+
+import math
+from typing import Final, Literal, Self
+
+from pydantic import BaseModel, Field, field_validator, model_validator
+
+from warpchain.inputs.parameters import STRICT, InputError, Parameters, refusal
+
+MOST_LINKS: Final = 100_000
+"""A chain of so many takes 0.4 GB, and kernels of its own."""
+MOST_LINKS_ON_GPU: Final = 1024
+"""A chain is a block of threads there, one for each link, and CUDA has no larger blocks."""
+HIGHEST_FREQUENCY: Final = 1e4
+"""Where Table 1's chain passes at 3.8 km/s, under a tension that stretches its joints by a third of a link [Hz]."""
+LEAST_SPROCKET: Final = 1e-3
+"""Least distance of the joints from the sprocket's centre, in links; far smaller ones are lost in rounding."""
+HIGHEST: Final = 1e6
+"""Greatest height, where numbers still tell a nanometre [m]."""
+HIGHEST_LOAD: Final = 1e4
+"""Greatest factor by which loads are multiplied; more than some hundred make joints stretch and steps short."""
+LEAST_INERTIA: Final = 0.5
+"""Part of its rotary inertia that a link must keep under multiplied loads."""
+LONGEST: Final = 1e6
+"""Greatest time, in which numbers still tell a nanosecond, a short step [s]."""
+
+
+class Scene(BaseModel):
+    """What one walk does, from hanging on the sprocket to the end.
+
+    Raises:
+        pydantic.ValidationError: a value is unknown or out of bounds, `links` is odd, or the clearance is
+            that of a hanging chain although the chain never hangs.
+    """
+
+    model_config = STRICT
+
+    links: int = Field(
+        default=60,
+        ge=4,
+        le=MOST_LINKS,
+        description="number of links around the loop, even: inner and outer links alternate",
+        json_schema_extra={"unit": "1"},
+    )
+    frequency: float = Field(
+        default=15.0,
+        ge=0,
+        le=HIGHEST_FREQUENCY,
+        description="turns of the sprocket per second at the release",
+        json_schema_extra={"unit": "Hz"},
+    )
+    start: Literal["rest", "spinning", "ellipse"] = Field(
+        default="rest",
+        description="at rest on the sprocket, circulating on it, or a circulating ellipse without sprocket",
+    )
+    phase: float = Field(
+        default=0.0,
+        ge=0,
+        lt=1,
+        description="moment of the release as a fraction of a loop period",
+        json_schema_extra={"unit": "1"},
+    )
+    clearance: float = Field(
+        default=0.01,
+        ge=0,
+        le=HIGHEST,
+        description="height of the lowest circle above the floor, of the chain that clearance_of names",
+        json_schema_extra={"unit": "m"},
+    )
+    clearance_of: Literal["spinning", "hanging"] = Field(
+        default="spinning",
+        description="the chain that clearance is measured at: spinning at the release, or hanging at rest",
+    )
+    sprocket_radius_is: Literal["contact", "pitch"] = Field(
+        default="contact",
+        description="what sprocket_radius measures: where circles touch (contact) or joints ride (pitch)",
+    )
+    ellipse_aspect: float = Field(
+        default=1.5,
+        ge=0.05,
+        le=20,
+        description="height over width of the starting ellipse",
+        json_schema_extra={"unit": "1"},
+    )
+    settle_time: float = Field(
+        default=0.5,
+        ge=0,
+        le=LONGEST,
+        description="time for the chain to settle on the sprocket at rest",
+        json_schema_extra={"unit": "s"},
+    )
+    spin_up_time: float = Field(
+        default=2.0,
+        gt=0,
+        le=LONGEST,
+        description="time in which the sprocket reaches its frequency",
+        json_schema_extra={"unit": "s"},
+    )
+    load_factor: float | None = Field(
+        default=None,
+        ge=1,
+        le=HIGHEST_LOAD,
+        description="by which gravity, joint friction and rotary inertia are multiplied while the loop becomes "
+        "stationary; null: as many times as suits the chain, at most 50; 1: not at all",
+        json_schema_extra={"unit": "1"},
+    )
+    steady_time: float | None = Field(
+        default=None,
+        ge=0,
+        le=LONGEST,
+        description="the loop is steady once it has kept shape and speed under its own loads for this long; null: a "
+        "loop period or, if its loads were never multiplied, as long as slow waves need to cross it",
+        json_schema_extra={"unit": "s"},
+    )
+    steady_tolerance: float = Field(
+        default=0.01,
+        gt=0,
+        le=1,
+        description="change of the loop's height, width and place, relative to height or width, that counts as kept",
+        json_schema_extra={"unit": "1"},
+    )
+    further_hold: float = Field(
+        default=0.0,
+        ge=0,
+        le=LONGEST,
+        description="time for which a loop that is steady is held on before its release",
+        json_schema_extra={"unit": "s"},
+    )
+    hold_limit: float = Field(
+        default=30.0,
+        gt=0,
+        le=LONGEST,
+        description="longest time at full frequency to become steady; then the walk ends as not_steady",
+        json_schema_extra={"unit": "s"},
+    )
+    walk_limit: float = Field(
+        default=20.0,
+        gt=0,
+        le=LONGEST,
+        description="longest time from the release to rest; then the walk ends as time_limit",
+        json_schema_extra={"unit": "s"},
+    )
+
+    @field_validator("links")
+    @classmethod
+    def _links_even(cls, links: int) -> int:
+        if links % 2:
+            raise refusal("links", f"{links} is odd; a chain alternates inner and outer links, so give an even number")
+        return links
+
+    @model_validator(mode="after")
+    def _hanging_needs_rest(self) -> Self:
+        if self.clearance_of == "hanging" and self.start != "rest":
+            raise refusal(
+                "clearance_of",
+                f"'hanging' needs a chain that hangs, but start is {self.start!r}; "
+                "give 'spinning' here, or start: rest",
+            )
+        return self
+
+
+def joint_radius(scene: Scene, parameters: Parameters) -> float:
+    """Distance from the sprocket's centre at which the joints ride, in m."""
+    if scene.sprocket_radius_is == "pitch":
+        return parameters.sprocket_radius
+    return parameters.sprocket_radius + parameters.circle_radius
+
+
+def loop_speed(scene: Scene, parameters: Parameters) -> float:
+    """Speed [m/s] along the loop of a chain that does not slip on its sprocket.
+
+    Links on it are chords, each seen from the centre under 2 asin(ℓ / 2ρ), with ρ of `joint_radius`.
+    """
+    half = math.asin(min(1.0, parameters.link_length / (2 * joint_radius(scene, parameters))))
+    return math.pi * scene.frequency * parameters.link_length / half
+
+
+def greatest_load(parameters: Parameters) -> float:
+    """Greatest `Scene.load_factor` that leaves every link `LEAST_INERTIA` of its rotary inertia.
+
+    It is I − mℓ²/6 that is multiplied: point-like links lose inertia. Infinite where I ≥ mℓ²/6.
+    """
+    limit = math.inf
+    for mass, inertia in (
+        (parameters.inner_mass, parameters.inner_inertia),
+        (parameters.outer_mass, parameters.outer_inertia),
+    ):
+        missing = mass * parameters.link_length**2 / 6 - inertia
+        if missing > 0:
+            limit = min(limit, 1 + (1 - LEAST_INERTIA) * inertia / missing)
+    return limit
+
+
+def contact_radius(scene: Scene, parameters: Parameters) -> float:
+    """Radius of the sprocket that the circles of the links touch, in m.
+
+    Raises:
+        InputError: the sprocket radius is that of the joints and leaves nothing to touch.
+    """
+    if scene.sprocket_radius_is == "contact":
+        return parameters.sprocket_radius
+    if parameters.sprocket_radius <= parameters.circle_radius:
+        raise InputError(
+            f"parameters.sprocket_radius: {parameters.sprocket_radius} is not greater than the circle radius "
+            f"{parameters.circle_radius}, as sprocket_radius_is: pitch needs; give a larger radius"
+        )
+    return parameters.sprocket_radius - parameters.circle_radius
+
+
+def fewest_links(scene: Scene, parameters: Parameters) -> int:
+    """Least even number of links whose loop can hang round the sprocket.
+
+    A link whose joints are both at least ρ from the centre is seen from there under an angle of at most
+    2 asin(ℓ / 2ρ), and a loop round the sprocket needs 2π in all: n ≥ π / asin(ℓ / 2ρ), with ρ of
+    `joint_radius`.
+    """
+    sine = parameters.link_length / (2 * joint_radius(scene, parameters))
+    around = math.ceil(math.pi / math.asin(sine)) if sine < 1 else 2
+    return max(4, around + around % 2)
+
+
+def check_links_on_gpu(links: int, device: str, field: str) -> None:
+    """Check that a device can carry a chain of this many links.
+
+    Raises:
+        InputError: it cannot; the message begins with the field that says how many links there are.
+    """
+    if device != "cpu" and links > MOST_LINKS_ON_GPU:
+        raise InputError(
+            f"{field}: {links} links are more than a GPU's block has threads; "
+            f"give {MOST_LINKS_ON_GPU} or less, or device: cpu"
+        )
+
+
+def check_scene(scene: Scene, parameters: Parameters) -> None:
+    """Check what a scene and its parameters must fulfil together.
+
+    A scene that starts as an ellipse has no sprocket, so nothing is asked of it.
+
+    Raises:
+        InputError: the chain is too short for its sprocket, or the sprocket too small, or `contact_radius` finds none,
+            or the links are too point-like for the load factor that is given.
+    """
+    if scene.start == "ellipse":
+        return
+    contact_radius(scene, parameters)
+    if joint_radius(scene, parameters) < LEAST_SPROCKET * parameters.link_length:
+        raise InputError(
+            f"parameters.sprocket_radius: {parameters.sprocket_radius} m is nothing beside links of "
+            f"{parameters.link_length} m; give a larger radius, or start: ellipse, which needs none"
+        )
+    if scene.load_factor is not None and scene.load_factor > greatest_load(parameters):
+        raise InputError(
+            f"scene.load_factor: {scene.load_factor:g} is too much for links of so little rotary inertia; "
+            f"give at most {greatest_load(parameters):.6g}, or null"
+        )
+    fewest = fewest_links(scene, parameters)
+    if scene.links < fewest:
+        raise InputError(
+            f"scene.links: {scene.links} links of {parameters.link_length} m do not reach round the sprocket "
+            f"whose joints ride at {joint_radius(scene, parameters):g} m; give at least {fewest}"
+        )

@@ -1,0 +1,86 @@
+"""The one door through which a user's values come in: scene, options and parameters of a walk, checked together.
+
+Whether they were given as keyword arguments, on the command line or in a YAML file, which `read_setup` reads, `resolve`
+checks them all. Both raise only `InputError`.
+"""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options
+from warpchain.inputs.parameters import InputError, Parameters, shown, suggestion, validated
+from warpchain.inputs.parameters import preset as parameter_preset
+from warpchain.inputs.scene import Scene, check_links_on_gpu, check_scene
+from warpchain.inputs.yaml_files import read_yaml
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Everything that says what one walk is: checked, complete, and named by the preset it started from."""
+
+    preset: str
+    parameters: Parameters
+    scene: Scene
+    options: Options
+
+
+def resolve(
+    preset: str,
+    *,
+    scene: Mapping[str, object],
+    options: Mapping[str, object],
+    parameters: Mapping[str, object],
+) -> Setup:
+    """Check a user's values and complete them.
+
+    Args:
+        preset: name of the parameter preset to start from.
+        scene: fields of `Scene` that differ from their defaults.
+        options: fields of `Options` that differ from their defaults.
+        parameters: fields of `Parameters` that differ from the preset.
+
+    Raises:
+        InputError: anything is wrong; one line with the field's path and the remedy.
+    """
+    for path, values in (("scene", scene), ("options", options), ("parameters", parameters)):
+        if not isinstance(values, Mapping):
+            raise InputError(f"{path}: {shown(values)} is not a mapping; give names with values")
+    setup = Setup(
+        preset=preset,
+        parameters=parameter_preset(preset).with_values(parameters),
+        scene=validated(Scene, scene, "scene"),
+        options=validated(Options, options, "options"),
+    )
+    check_scene(setup.scene, setup.parameters)
+    check_links_on_gpu(setup.scene.links, setup.options.device, "scene.links")
+    interval = setup.options.record_interval
+    if interval > LONGEST_DRIVE_INTERVAL and setup.scene.start != "ellipse" and setup.scene.load_factor != 1:
+        raise InputError(
+            f"options.record_interval: loads on the sprocket change at each, and {interval} s is too long for that; "
+            f"give at most {LONGEST_DRIVE_INTERVAL} s, or scene.load_factor: 1"
+        )
+    return setup
+
+
+_SECTIONS: Final = ("scene", "options", "parameters")
+
+
+def read_setup(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
+    """Preset, None if there is none, and sections of a YAML file, as they are there: `resolve` checks them.
+
+    `1e9` is a number, as in YAML 1.2, and so is `1_000`; `060` and `1:30`, which the versions of YAML read
+    differently, are text and therefore refused.
+
+    Raises:
+        InputError: the file cannot be read, is not YAML, gives a key twice, or has other keys.
+    """
+    content = read_yaml(path)
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: no mapping at the top; give the keys preset, {', '.join(_SECTIONS)}")
+    for key in content:
+        if key != "preset" and key not in _SECTIONS:
+            raise InputError(f"{shown(key)}: unknown key; {suggestion(key, ('preset', *_SECTIONS))}")
+    # A section with nothing under it is read as None; it changes nothing.
+    return content.get("preset"), {name: {} if content.get(name) is None else content[name] for name in _SECTIONS}

@@ -1,0 +1,1 @@
+"""The model in plain NumPy, which shares nothing with the kernels."""

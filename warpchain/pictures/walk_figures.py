@@ -1,0 +1,327 @@
+"""Figures of walks: the paper's Figure 5, and a film strip of the chain.
+
+Figures are made without pyplot: nothing is global, no display is needed, the caller owns what is returned.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import Colormap, ListedColormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
+
+from warpchain.status import Status
+
+if TYPE_CHECKING:
+    from warpchain.store.kept_walk import KeptWalk
+    from warpchain.walks.walk_result import WalkResult
+
+    Walk: TypeAlias = WalkResult | KeptWalk
+
+Array = NDArray[np.float64]
+
+LINE_COLORS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+"""Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008)."""
+
+# Text and lines, what stands back, the floor.
+INK: Final = "#222222"
+FAINT: Final = "#777777"
+GROUND: Final = "#E3E3E3"
+
+# A film strip: inches, and close-ups so many links wide, this many times wider than high.
+_WIDTH: Final = 10.0
+_TALLEST_STRIP: Final = 4.6
+_CLOSE_UP_LINKS: Final = 9
+_CLOSE_UP_ASPECT: Final = 1.5
+
+
+def draw(walk: "Walk", kind: Literal["figure5", "film_strip", "loop"], *, figure: Figure | None = None) -> Figure:
+    """Draw a walk, see `WalkResult.plot`.
+
+    Raises:
+        ValueError: the kind is unknown, or the walk does not have what it shows.
+    """
+    if kind == "figure5":
+        return figure5([walk], figure=figure)
+    if kind == "film_strip":
+        return film_strip(walk, figure=figure)
+    if kind == "loop":
+        from warpchain.pictures.loop_figure import loop_figure
+
+        return loop_figure(walk, figure=figure)
+    raise ValueError(f"kind: {kind!r} is unknown; give 'figure5', 'film_strip' or 'loop'")
+
+
+def figure5(walks: "Sequence[Walk]", *, labels: Sequence[str] | None = None, figure: Figure | None = None) -> Figure:
+    """Height and horizontal speed of the centre of mass against time since the release, as in Figure 5.
+
+    Args:
+        walks: one line each in both panels.
+        labels: a legend entry for each walk; by default links and frequency, if the walks differ in them.
+        figure: an empty figure to draw into; by default a new one.
+
+    Raises:
+        ValueError: no walk is given, one has no time series, or there are not as many labels as walks.
+    """
+    if not walks:
+        raise ValueError("walks: empty; give at least one walk")
+    if labels is not None and len(labels) != len(walks):
+        raise ValueError(f"labels: {len(labels)} for {len(walks)} walks; give one for each walk")
+    for index, walk in enumerate(walks):
+        if len(walk.time) == 0:
+            raise ValueError(f"walks[{index}]: it has no time series. {walk.status.sentence}")
+    figure = Figure(figsize=(6.4, 5.0), layout="constrained") if figure is None else figure
+    height, speed = figure.subplots(2, 1, sharex=True)
+    settings = [f"n = {walk.setup.scene.links}, ν = {walk.setup.scene.frequency:g} Hz" for walk in walks]
+    groups = list(dict.fromkeys(labels or settings))
+    seen = set()
+    for index, (walk, name) in enumerate(zip(walks, labels or settings, strict=True)):
+        order = index if len(groups) == 1 else groups.index(name)
+        style = {"color": LINE_COLORS[order % len(LINE_COLORS)], "linewidth": 1.4}
+        height.plot(walk.time, walk.center[:, 1], label="_" if name in seen else name, **style)
+        speed.plot(walk.time, walk.center_velocity[:, 0], **style)
+        seen.add(name)
+    height.set_ylabel("height $y^\\mathrm{cm}$ / m")
+    speed.set_ylabel("speed $v_x^\\mathrm{cm}$ / (m/s)")
+    speed.set_xlabel("time since release $t$ / s")
+    height.set_ylim(bottom=0.0)
+    speed.set_xlim(0.0, max(float(walk.time[-1]) for walk in walks))
+    for axes in (height, speed):
+        _tidy(axes)
+        axes.grid(color="#E6E6E6", linewidth=0.6)
+    if len(groups) > 1 or labels is not None:
+        height.legend(frameon=False)
+    else:
+        height.set_title(groups[0], fontsize="medium", loc="left")
+    return figure
+
+
+def film_strip(walk: "Walk", *, count: int | None = None, figure: Figure | None = None) -> Figure:
+    """The chain along its walk, drawn to scale, and close-ups of it at the moments that matter.
+
+    The strip shows the chain at instants between which its centre of mass moves equally far. Colour is time;
+    outer links are darker than inner ones. The close-ups are described at `_close_ups`.
+
+    Args:
+        walk: a walk with frames.
+        count: number of instants in the strip, at least 2; by default 6 to 12, as many as stay legible.
+        figure: an empty figure to draw into; by default a new one that suits the walk.
+
+    Raises:
+        ValueError: the walk has no frames or broken ones, or fewer than 2 instants are asked for.
+    """
+    if len(walk.frame_time) == 0:
+        raise ValueError(f"walk: it has no frames ({walk.status.label}); run it again with a frame_interval")
+    if not np.all(np.isfinite(walk.frame_joints)):
+        raise ValueError(f"walk: its frames are not all finite numbers. {walk.status.sentence}")
+    if count is not None and count < 2:
+        raise ValueError(f"count: {count} is too few; give 2 or more")
+    close_ups = _close_ups(walk)
+    size = np.array([1.0, 1.0 / _CLOSE_UP_ASPECT]) * _CLOSE_UP_LINKS * walk.setup.parameters.link_length
+    corners = [close_up.spot - size / 2 for close_up in close_ups]
+    for corner in corners:
+        corner[1] = max(corner[1], -0.1 * size[1])
+    left, right, top = _extent(walk, [corner[0] for corner in corners], size[0])
+    # The layout is computed in inches: constrained layout clips labels of axes with a fixed aspect.
+    scale = min((_WIDTH - 1.6) / (right - left), _TALLEST_STRIP / top)
+    depth = 0.4 / scale
+    strip_width, strip_height = scale * (right - left), scale * (top + depth)
+    close_up_width = min((_WIDTH - 0.3) / len(close_ups), _WIDTH / 3)
+    close_up_height = (close_up_width - 0.1) / _CLOSE_UP_ASPECT
+    paper = np.array([_WIDTH, strip_height + close_up_height + 1.1])
+    figure = Figure(tuple(paper)) if figure is None else figure
+    ends = float(walk.frame_time[0]), float(walk.frame_time[-1])
+    color_of = ScalarMappable(Normalize(*ends), _time_colors())
+
+    inner_width = _WIDTH - 1.6
+    place = (0.65 + (inner_width - strip_width) / 2, close_up_height + 0.95, strip_width, strip_height)
+    strip = figure.add_axes(tuple(np.array(place) / np.tile(paper, 2)))
+    _draw_ground(strip, left, right, -depth)
+    for frame in _instants(walk, count):
+        _draw_chain(strip, walk, frame, color_of, edge=0.25)
+    _annotate_strip(strip, walk, -0.5 * depth)
+    strip.set(xlim=(left, right), ylim=(-depth, top), aspect="equal", xlabel="$x$ / m", ylabel="$y$ / m")
+    _tidy(strip)
+    bar_axes = strip.inset_axes((1.0 + 0.12 / strip_width, 0.0, 0.14 / strip_width, 1.0))
+    figure.colorbar(color_of, cax=bar_axes, label="time since release / s").outline.set_visible(False)
+
+    for column, (close_up, corner) in enumerate(zip(close_ups, corners, strict=True)):
+        letter = f"$\\mathbf{{{'abcd'[column]}}}$"
+        place = (0.2 + column * close_up_width, 0.1, close_up_width - 0.1, close_up_height)
+        axes = figure.add_axes(tuple(np.array(place) / np.tile(paper, 2)))
+        (x, y), (width, height) = corner, size
+        _draw_ground(axes, x, x + width, min(y, 0.0))
+        _draw_chain(axes, walk, close_up.frame, color_of, edge=0.6)
+        axes.set(xlim=(x, x + width), ylim=(y, y + height), aspect="equal", xticks=[], yticks=[])
+        title = f"{letter}  {close_up.title}, {walk.frame_time[close_up.frame]:.3f} s"
+        axes.set_title(title, fontsize="medium", loc="left")
+        strip.add_patch(Rectangle((x, y), width, height, fill=False, edgecolor=INK, linewidth=0.8, zorder=5))
+        # Neighbouring boxes often overlap: their letters stand at alternate corners.
+        side = {"ha": "right", "x": x + width} if column % 2 else {"ha": "left", "x": x}
+        halo = [withStroke(linewidth=3.0, foreground="white")]
+        strip.text(y=y + height, s=letter, va="bottom", zorder=5, path_effects=halo, **side)
+    return figure
+
+
+def link_outlines(joints: Array, radius: float) -> Array:
+    """Outlines of the links of one chain: two circles and a waist between them.
+
+    Args:
+        joints: joint positions [m], shape (n, 2); link i reaches from joint i − 1 to joint i.
+        radius: radius of the circles at the joints [m].
+
+    Returns:
+        Corners of a polygon for each link [m], shape (n, c, 2).
+    """
+    half = (joints - np.roll(joints, 1, axis=0)) / 2
+    middle = joints - half
+    along = half / np.hypot(half[:, :1], half[:, 1:])
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    # Each corner: half lengths along the link, then radii along and across it.
+    angle, ramp = np.linspace(-np.pi / 2, np.pi / 2, 9), np.linspace(1, -1, 7)[1:-1]
+    cap = np.stack([np.ones_like(angle), np.cos(angle), np.sin(angle)], axis=1)
+    waist = np.stack([ramp, np.zeros_like(ramp), 0.62 + 0.38 * ramp**2], axis=1)
+    corners = np.concatenate([cap, waist, -cap, -waist])
+    outlines: Array = (
+        middle[:, None]
+        + corners[:, :1] * half[:, None]
+        + radius * (corners[:, 1:2] * along[:, None] + corners[:, 2:] * across[:, None])
+    )
+    return outlines
+
+
+@dataclass(frozen=True)
+class _CloseUp:
+    """A moment worth a closer look: frame number, and the place to look at [m], shape (2,)."""
+
+    title: str
+    frame: int
+    spot: Array
+
+
+def _close_ups(walk: "Walk") -> list[_CloseUp]:
+    """At most four moments, in order of time and each frame once.
+
+    First touch of the floor; first self-contact; collapse, when the top of the chain is for the last time
+    half as high as at the release; the end. What never happens is left out.
+    """
+    joints, radius = walk.frame_joints, walk.setup.parameters.circle_radius
+    height, last = joints[:, :, 1].max(axis=1), len(joints) - 1
+    found = []
+    touching = np.flatnonzero(joints[:, :, 1].min(axis=1) < 1.02 * radius)
+    if touching.size:
+        frame = int(touching[0])
+        found.append(_CloseUp("first touch", frame, joints[frame, np.argmin(joints[frame, :, 1])]))
+    meeting = _first_meeting(joints, 2.02 * radius)
+    if meeting is not None:
+        found.append(_CloseUp("first self-contact", *meeting))
+    frame = int(np.flatnonzero(height >= 0.5 * height[0])[-1])
+    found.append(_CloseUp("collapse", frame, joints[frame, _sharpest_bend(joints[frame])]))
+    pile = np.array([np.median(joints[last, :, 0]), 0.0])
+    found.append(_CloseUp("rest" if walk.status is Status.AT_REST else "end", last, pile))
+    by_frame = {close_up.frame: close_up for close_up in found}
+    return [by_frame[frame] for frame in sorted(by_frame)]
+
+
+def _first_meeting(joints: Array, distance: float) -> tuple[int, Array] | None:
+    """First frame in which two joints at least 3 links apart are closer than `distance`, and where."""
+    count = joints.shape[1]
+    apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    excluded = np.minimum(apart, count - apart) < 3
+    for frame, (x, y) in enumerate(joints.transpose(0, 2, 1)):
+        squares = np.subtract.outer(x, x) ** 2 + np.subtract.outer(y, y) ** 2
+        squares[excluded] = np.inf
+        nearest = np.unravel_index(np.argmin(squares), squares.shape)
+        if squares[nearest] < distance**2:
+            return frame, joints[frame, list(nearest)].mean(axis=0)
+    return None
+
+
+def _sharpest_bend(joints: Array) -> int:
+    """The joint about which the chain turns most over three links."""
+    step = joints - np.roll(joints, 1, axis=0)
+    direction = np.arctan2(step[:, 1], step[:, 0])
+    turn = np.angle(np.exp(1j * (np.roll(direction, -2) - np.roll(direction, 1))))
+    return int(np.argmax(np.abs(turn)))
+
+
+def _instants(walk: "Walk", count: int | None) -> list[int]:
+    """Frames between which the centre of mass moves equally far, the first and the last among them."""
+    columns = [np.interp(walk.frame_time, walk.time, walk.center[:, axis]) for axis in (0, 1)]
+    path = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(columns, axis=1)))])
+    if count is None:
+        count = int(np.clip(1 + path[-1] / (0.6 * np.ptp(walk.frame_joints[0, :, 0])), 6, 12))
+    marks = np.linspace(0.0, path[-1], count)[1:-1]
+    return sorted({0, *(int(np.argmin(np.abs(path - mark))) for mark in marks), len(path) - 1})
+
+
+def _extent(walk: "Walk", boxes: list[float], width: float) -> tuple[float, float, float]:
+    """Left and right end and top of all that the strip shows, boxes with their left ends included [m]."""
+    x, y = walk.frame_joints[:, :, 0], walk.frame_joints[:, :, 1]
+    margin = 3 * walk.setup.parameters.circle_radius
+    left, right = min(float(x.min()), *boxes), max(float(x.max()), *(box + width for box in boxes))
+    return left - margin, right + margin, float(y.max()) + margin
+
+
+def _time_colors() -> Colormap:
+    """Viridis less its palest end, which white paper swallows."""
+    return ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)), name="time")
+
+
+def _draw_ground(axes: Axes, left: float, right: float, bottom: float) -> None:
+    axes.add_patch(Rectangle((left, bottom), right - left, -bottom, facecolor=GROUND, zorder=3))
+    axes.plot([left, right], [0.0, 0.0], color=INK, linewidth=1.0, zorder=3)
+
+
+def _draw_chain(axes: Axes, walk: "Walk", frame: int, color_of: ScalarMappable, edge: float) -> None:
+    """One chain: a white halo that parts it from those behind it, inner links, outer links over them."""
+    outlines = link_outlines(walk.frame_joints[frame], walk.setup.parameters.circle_radius)
+    color = np.array(color_of.to_rgba(walk.frame_time[frame])[:3])
+    pale, dark = 1 - 0.45 * (1 - color), 0.6 * color
+    axes.add_collection(
+        PolyCollection(list(outlines), facecolors="white", edgecolors="white", linewidths=4 * edge + 0.8, zorder=2)
+    )
+    for links, fill in ((outlines[0::2], pale), (outlines[1::2], color)):
+        axes.add_collection(
+            PolyCollection(list(links), facecolors=[fill], edgecolors=[dark], linewidths=edge, zorder=2)
+        )
+
+
+def _annotate_strip(axes: Axes, walk: "Walk", depth: float) -> None:
+    """The sprocket, the path of the centre of mass, and the distance walked, at height `depth` [m]."""
+    if walk.sprocket_center is not None:
+        x, y = walk.sprocket_center
+        angle, dashes = np.linspace(0.0, 2 * np.pi, 100), (0, (4, 3))
+        style: dict[str, Any] = {"color": FAINT, "linewidth": 1.0, "linestyle": dashes, "zorder": 1.5}
+        circle = walk.sprocket_radius * np.array([np.cos(angle), np.sin(angle)])
+        axes.plot(x + circle[0], y + circle[1], label="sprocket until release", **style)
+        axes.plot([x, x], [0.0, y], **style)
+    dots = (0, (1, 1.5))
+    axes.plot(*walk.center.T, color=INK, linewidth=1.4, linestyle=dots, label="centre of mass", zorder=4)
+    scene = walk.setup.scene
+    title = f"{scene.links} links, {scene.frequency:g} Hz"
+    axes.legend(loc="upper right", frameon=False, title=title, alignment="left")
+    if not np.isfinite(walk.dx):
+        return
+    end = float(walk.center[-1, 0])
+    start = end - walk.dx
+    arrow = {"arrowstyle": "<|-|>", "color": INK, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", (end, depth), (start, depth), arrowprops=arrow, zorder=4)
+    for x in (start, end):
+        axes.plot([x, x], [0.0, 1.6 * depth], color=INK, linewidth=0.8, zorder=4)
+    box = {"facecolor": GROUND, "edgecolor": "none", "pad": 2.0}
+    text = f"$\\Delta x$ = {walk.dx:.3f} m"
+    axes.text((start + end) / 2, depth, text, ha="center", va="center", bbox=box, zorder=4)
+
+
+def _tidy(axes: Axes) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(color=FAINT)

@@ -1,0 +1,1 @@
+"""The library's three verbs: `walk`, `simulate` and `sweep`."""

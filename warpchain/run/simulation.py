@@ -1,0 +1,173 @@
+"""The motion of any given chain: what tests and analysts use."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.engine.batch import Batch
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import InputError, Parameters, preset, shown, validated
+from warpchain.inputs.scene import check_links_on_gpu
+from warpchain.status import Status
+from warpchain.walks.walk_result import Trajectory
+
+Array = NDArray[np.float64]
+
+LONGEST = 1e9
+"""Durations [s] from here on are refused."""
+
+
+_UNSOFTENED = {"soften_pile": False, "soften_drive": False}
+"""A given chain has no phases in which joints soften."""
+
+
+def simulate(
+    parameters: Parameters | str,
+    position: Array,
+    velocity: Array,
+    duration: float,
+    *,
+    times: Sequence[float] | Array | None = None,
+    floor: bool = True,
+    gravity: bool = True,
+    self_contact: bool = True,
+    method: str = "rkf78",
+    tolerance: float | None = None,
+    device: str = "cpu",
+    **settings: object,
+) -> Trajectory:
+    """Integrate a given chain, without sprocket.
+
+    Args:
+        parameters: Of the chain, or the name of a preset.
+        position: (n, 3): x, y [m] and θ [rad] of each link's centre; n even, at least 4. Link i's right end meets
+            link i + 1's left end, the last link's the first one's. Links 0, 2, … are inner ones.
+        velocity: (n, 3): their rates [m/s, m/s, rad/s].
+        duration: Simulated time [s], from time 0.
+        times: Instants of the trajectory [s], rising, in [0, duration]; steps land on them exactly. Default: 101
+            instants evenly spread.
+        floor: Whether there is a floor at y = 0.
+        gravity: Whether gravity acts.
+        self_contact: Whether links touch one another.
+        method: ``"rkf78"``, ``"dp5"``, ``"bs32"``, ``"os32"``, ``"rodas4p"``, ``"rodas5p"`` or ``"hybrid"``.
+        tolerance: See :func:`walk`.
+        device: ``"cpu"``, ``"cuda"`` (the first GPU) or ``"cuda:N"``.
+        settings: Any other field of :class:`Options` by its name.
+
+    Returns:
+        The trajectory. If ``status`` is not ``FINISHED``, it ends with the state in which the chain stopped.
+
+    Raises:
+        InputError: A value is refused; nothing has been computed. It is a ``ValueError``.
+    """
+    chosen: dict[str, object] = {"method": method, "device": device, "self_contact": self_contact}
+    if tolerance is not None:
+        chosen["tolerance"] = tolerance
+    options = validated(Options, _UNSOFTENED | settings | chosen, "options")
+    for name in _UNSOFTENED:
+        if getattr(options, name):
+            raise InputError(f"options.{name}: only a walk has phases in which joints soften; leave it out")
+    for name, switch in (("floor", floor), ("gravity", gravity)):
+        if not isinstance(switch, bool):
+            raise InputError(f"{name}: {shown(switch)} is not a truth value; give True or False")
+    chain = _chain_parameters(parameters)
+    if not gravity:
+        chain = chain.with_values({"gravity": 0.0})
+    start, rates = _checked_state(position, velocity)
+    check_links_on_gpu(len(start), options.device, "position")
+    instants = _checked_times(duration, times)
+    batch = Batch(1, len(start), options)
+    batch.set_chain(0, chain, len(start))
+    batch.load(0, start, rates, stop_time=instants[0], stop_status=Status.FINISHED)
+    features = batch.features(fixed_body="floor" if floor else "none", watch="none")
+    reached, positions, velocities = [], [], []
+    for instant in instants:
+        batch.resume(0, instant, Status.FINISHED)
+        batch.run([0], features)
+        reached.append(batch.time(0))
+        positions.append(batch.position(0))
+        velocities.append(batch.velocity(0))
+        if batch.status(0) != Status.FINISHED:
+            break
+    if batch.status(0) == Status.FINISHED and instants[-1] < duration:
+        batch.resume(0, duration, Status.FINISHED)
+        batch.run([0], features)
+    counts, extremes, losses = batch.counts(0), batch.extremes(0), batch.losses(0)
+    kinds = ("floor", "self")
+    return Trajectory(
+        status=batch.status(0),
+        time=np.array(reached),
+        position=np.array(positions),
+        velocity=np.array(velocities),
+        steps_accepted=counts["accepted"],
+        steps_rejected=counts["rejected"],
+        impulses={kind: counts[kind] for kind in kinds},
+        losses={name: loss for name, loss in losses.items() if name != "sprocket"},
+        greatest_opening=extremes["opening"],
+        greatest_penetration={kind: extremes[kind] for kind in kinds},
+    )
+
+
+def _chain_parameters(parameters: Parameters | str) -> Parameters:
+    """Parameters, given themselves or by the name of a preset."""
+    if isinstance(parameters, Parameters):
+        return parameters
+    return preset(parameters)
+
+
+def _checked_state(position: Array, velocity: Array) -> tuple[Array, Array]:
+    """The state as float64 arrays of one shape (n, 3).
+
+    Raises:
+        InputError: Shapes, n or values are unusable.
+    """
+    checked = []
+    for name, given in (("position", position), ("velocity", velocity)):
+        array = _real_array(name, given, "shape (n, 3)")
+        if array.ndim != 2 or array.shape[1] != 3:
+            raise InputError(f"{name}: its shape is {array.shape}; give (n, 3), one row x, y, θ per link")
+        if not np.all(np.isfinite(array)):
+            raise InputError(f"{name}: holds a number that is not finite; give finite numbers")
+        checked.append(array)
+    links = len(checked[0])
+    if len(checked[1]) != links:
+        raise InputError(f"velocity: {len(checked[1])} rows, but position has {links}; give one row per link each")
+    if links < 4 or links % 2:
+        raise InputError(f"position: {links} links; a closed chain has an even number of at least 4")
+    return checked[0], checked[1]
+
+
+def _checked_times(duration: float, times: Sequence[float] | Array | None) -> Array:
+    """Instants of a trajectory.
+
+    Raises:
+        InputError: The duration is not a time, or the instants do not rise within it.
+    """
+    if isinstance(duration, bool) or not isinstance(duration, (int, float, np.integer, np.floating)):
+        raise InputError(f"duration: {shown(duration)} is not a number; give seconds")
+    if not 0 <= duration < LONGEST:
+        raise InputError(f"duration: {shown(duration)} is not a time; give a number of seconds, at least 0")
+    if times is None:
+        return np.linspace(0.0, float(duration), 101)
+    instants = _real_array("times", times, "rising instants in s")
+    if instants.ndim != 1 or len(instants) == 0:
+        raise InputError(f"times: its shape is {instants.shape}; give a row of at least one instant")
+    in_range = np.all((instants >= 0) & (instants <= duration))
+    if not in_range or np.any(np.diff(instants) <= 0):
+        raise InputError(f"times: give rising instants between 0 and the duration of {duration} s")
+    return instants
+
+
+def _real_array(name: str, given: object, remedy: str) -> Array:
+    """Anything like an array of real numbers as a new float64 array.
+
+    Raises:
+        InputError: It is not.
+    """
+    try:
+        if np.array(given).dtype.kind in "cSU":  # complex numbers and text would be converted without a word
+            raise TypeError
+        return np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: not an array of numbers; give {remedy}") from None

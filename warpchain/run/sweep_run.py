@@ -1,0 +1,358 @@
+"""Runs a sweep: hands its shards to workers, follows their progress, and survives being killed.
+
+A worker runs the walks of a shard and writes them to an immutable file; what it returns is only the shard's key. So
+any executor in the style of ``concurrent.futures`` will do, on this machine or another that sees the same folder.
+"""
+
+import concurrent.futures
+import os
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+from warpchain.engine.kernel_choice import shared_threads
+from warpchain.engine.processors import processors
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import InputError, validated
+from warpchain.inputs.setup import Setup
+from warpchain.status import Status
+from warpchain.store.folder import Store, empty_rows, read_shard, write_shard
+from warpchain.store.shards import shard_name
+from warpchain.store.sweep_result import SweepResult, load
+from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
+from warpchain.walks.motion import Motion
+from warpchain.walks.scheduler import compile_kernels, run_setups
+from warpchain.walks.walk_phases import Course
+from warpchain.walks.walk_result import LOST
+
+SHARD_WALKS = 256
+"""Most walks in a shard."""
+GPU_TASK_WALKS = 65536
+"""About the most walks that a GPU is given at a time: while the last of them come to rest it runs dry."""
+POLL = 1.0
+"""Time [s] between two looks for shards that tasks under way have written."""
+GPU_WORKERS = 2
+"""Tasks at a time on a GPU: while the last walks of one come to rest, the other fills the device."""
+SHARDS = 128
+"""A sweep has at least about this many shards, as far as it has walks: the grain of progress and of a restart."""
+
+
+class Executor(Protocol):
+    """What is needed of an executor: ``concurrent.futures``, ``mpi4py.futures``, Dask's ``get_executor()``."""
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> "concurrent.futures.Future[Any]":
+        """Run ``function(*arguments)`` somewhere."""
+        ...
+
+
+@dataclass
+class SweepProgress:
+    """How far a sweep is.
+
+    Attributes:
+        walks: Walks of the sweep.
+        done: Walks whose results are on disk, those of earlier runs included.
+        before: Walks that were on disk when this run began.
+        seconds: Wall time [s] of this run so far.
+        statuses: Number of walks of this run by status label.
+        compiling: Kernels are being compiled, which takes seconds to minutes the first time on a machine.
+    """
+
+    walks: int
+    done: int
+    before: int
+    seconds: float = 0.0
+    statuses: Counter[str] = field(default_factory=Counter)
+    compiling: bool = False
+
+    @property
+    def rate(self) -> float:
+        """Walks per second of this run."""
+        return (self.done - self.before) / self.seconds if self.seconds > 0 else 0.0
+
+    @property
+    def time_left(self) -> float | None:
+        """Seconds to go at this rate; None before the first shard."""
+        return (self.walks - self.done) / self.rate if self.rate > 0 else None
+
+
+def sweep(
+    source: str | os.PathLike[str] | Mapping[str, Any] | Sweep,
+    out: str | os.PathLike[str],
+    *,
+    device: str | None = None,
+    executor: Executor | None = None,
+    workers: int | None = None,
+    fresh: bool = False,
+    on_progress: Callable[[SweepProgress], None] | None = None,
+) -> SweepResult:
+    """Run a sweep, or what is left of it, and load its results.
+
+    Args:
+        source: A sweep file (YAML), its content, or a :class:`Sweep`.
+        out: Folder of the results. A sweep that was killed goes on where it was; the data come out the same, to the
+            byte.
+        device: ``"cpu"``, ``"cuda"`` or ``"cuda:N"`` instead of what the sweep says. Method ``standard`` is then what
+            it means there; the ``sweep.yaml`` of a folder names the method that was run, which stays.
+        executor: Where shards are run; it must see ``out``. Default: threads of this process.
+        workers: Tasks in work at the same time; default: processors of this machine, and on a GPU two, each of which
+            keeps thousands of walks going. With an executor, at least the number of its workers.
+        fresh: Discard what another sweep left in the folder.
+        on_progress: Called before kernels are compiled, when the walks begin and after each shard.
+
+    Raises:
+        InputError: The sweep or the folder is refused; one line with the remedy. It is a ``ValueError``.
+        OSError: The folder cannot be read or written.
+    """
+    planned = load_sweep(source)
+    if device is not None:
+        planned = on_device(planned, device)
+    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
+        raise InputError(f"workers: {workers!r} is not a number of workers; give a whole number from 1")
+    at_once = workers or (GPU_WORKERS if _is_on_gpu(planned) else processors())
+    with Store.open(Path(out), planned, fresh=fresh, shard_size=shard_size(planned.walk_count)) as store:
+        missing = store.missing()
+        before = planned.walk_count - sum(len(shard) for shard in missing)
+        progress = SweepProgress(walks=planned.walk_count, done=before, before=before)
+        store.log(f"{len(missing)} shards to do, {before} of {planned.walk_count} walks done")
+        if missing:
+            if executor is None:
+                _run_in_threads(planned, store, missing, at_once, progress, on_progress)
+            else:
+                _run(executor, (), planned, store, missing, at_once, progress, on_progress)
+        store.log(f"complete after {progress.seconds:.1f} s: " + _counts(progress.statuses))
+    return load(out)
+
+
+def on_device(planned: Sweep, device: str) -> Sweep:
+    """The same sweep on another device; a method that was named by need is what this means there.
+
+    The canonical form, in which a folder keeps its sweep, names the method itself: what was run once is run again, on
+    whatever device, and does not change with the meaning of a word.
+
+    Raises:
+        InputError: The sweep's grid goes over devices.
+    """
+    if any("device" in block.axes for block in planned.blocks):
+        raise InputError(f"device: {device} is given, but the sweep's grid goes over devices; leave one of them out")
+    canonical = planned.canonical()
+    for block, content in zip(planned.blocks, canonical["blocks"], strict=True):
+        first = {name: values[0] for name, values in block.axes.items() if name in Options.model_fields}
+        given = {**block.plan.sections["options"], **first, "device": device}
+        options = validated(Options, given, "options").model_dump()
+        content["options"] = {name: options[name] for name in content["options"]}
+    return load_sweep(canonical)
+
+
+def _is_on_gpu(planned: Sweep) -> bool:
+    """Whether all walks go to a GPU."""
+    return all(str(block.plan.sections["options"].get("device", "cpu")).startswith("cuda") for block in planned.blocks)
+
+
+def shard_size(walks: int) -> int:
+    """Walks per shard; it depends on the sweep only, so that the files do not depend on who works on them."""
+    return max(1, min(SHARD_WALKS, walks // SHARDS))
+
+
+def run_shards(
+    sweep: Mapping[str, Any],
+    directory: str,
+    shards: Sequence[tuple[int, int]],
+    stop: threading.Event | None = None,
+) -> list[str]:
+    """Run the walks of some shards and write each shard as soon as its walks are over; what a worker does.
+
+    Args:
+        sweep: Canonical form of the sweep.
+        directory: The sweep's folder.
+        shards: First walk, and the one after the last, of each shard.
+        stop: When set, the work is abandoned: unfinished shards are not written.
+
+    Returns:
+        Keys of the shards written.
+    """
+    planned = load_sweep(sweep)
+    digest = planned.digest()
+    undrawn = list(planned.undrawn(index for first, last in shards for index in range(first, last)))
+    under_way: dict[int, PlannedWalk] = {}
+    shard_of = {index: shard for shard in shards for index in range(*shard)}
+    rows = {shard: empty_rows(planned, range(*shard)) for shard in shards}
+    left = {shard: shard[1] - shard[0] for shard in shards}
+    motions: dict[tuple[int, int], dict[int, Motion]] = {shard: {} for shard in shards}
+    keeps = [planned.keep(walk) for walk in undrawn]
+    keys = []
+
+    def draw(place: int) -> Setup:
+        under_way[place] = planned.planned(undrawn[place].index)
+        return under_way[place].setup
+
+    setups, threads = [walk.setup for walk in undrawn], _shared_threads(planned)
+    for place, course in run_setups(setups, draw=draw, keeps=keeps, threads=threads, stop=stop):
+        walk = under_way.pop(place)
+        shard = shard_of[walk.index]
+        _fill(rows[shard][walk.index - shard[0]], walk, course)
+        if keeps[place].series_every is not None:
+            motions[shard][walk.index] = course.motion
+        left[shard] -= 1
+        if left[shard] == 0:
+            keys.append(write_shard(directory, digest, range(*shard), rows.pop(shard), motions.pop(shard)))
+    return keys
+
+
+def _fill(row: Any, walk: PlannedWalk, course: Course) -> None:
+    """Write what is kept of a walk into its row."""
+    counts, extremes, energy = course.counts, course.extremes, course.energy()
+    row["status"] = int(course.status)
+    row["dx"] = course.dx
+    row["walk_time"] = course.walk_time
+    row["simulated_time"] = course.simulated_time
+    row["hold_time"] = course.hold_time
+    row["drift"] = course.drift
+    row["softened_at"] = course.softened_at
+    row["bounces"] = counts["bounces"]
+    row["steps_accepted"] = counts["accepted"]
+    row["steps_rejected"] = counts["rejected"]
+    row["greatest_opening"] = extremes["opening"]
+    for kind in ("floor", "sprocket", "self"):
+        row[f"impulses_{kind}"] = counts[kind]
+        row[f"penetration_{kind}"] = extremes[kind]
+    row["energy_at_release"] = energy["kinetic_at_release"] + energy["potential_at_release"]
+    for loss in LOST:
+        row[f"loss_{loss}"] = energy[loss]
+    row["energy_residual"] = energy["residual"]
+    for name, value in walk.drawn.items():
+        row[name] = value
+
+
+def _run_in_threads(
+    planned: Sweep,
+    store: Store,
+    missing: Sequence[range],
+    workers: int,
+    progress: SweepProgress,
+    on_progress: Callable[[SweepProgress], None] | None,
+) -> None:
+    """Run shards in threads of this process; launches run outside of Python's lock."""
+    progress.compiling = True
+    if on_progress is not None:
+        on_progress(progress)
+    prepare(planned)
+    progress.compiling = False
+    stop = threading.Event()
+    with concurrent.futures.ThreadPoolExecutor(workers) as threads:
+        try:
+            _run(threads, (stop,), planned, store, missing, workers, progress, on_progress)
+        except BaseException:
+            stop.set()
+            raise
+
+
+def prepare(source: Mapping[str, Any] | Sweep) -> None:
+    """Load every kernel that the walks of a sweep need into this process, compiled if need be.
+
+    Args:
+        source: The sweep, or its canonical form.
+    """
+    planned = load_sweep(source)
+    compile_kernels(one_of_each_cell(planned), _shared_threads(planned))
+
+
+def one_of_each_cell(planned: Sweep) -> list[Setup]:
+    """Options and links of every cell."""
+    firsts = (
+        first for block in planned.blocks for first in range(block.first, block.first + block.walk_count, block.samples)
+    )
+    return [walk.setup for walk in planned.undrawn(firsts)]
+
+
+def _shared_threads(planned: Sweep) -> int | None:
+    """Threads of every block of the walks of a sweep on a GPU, all of one method; None: as many as a chain needs."""
+    if not _is_on_gpu(planned):
+        return None
+    cells = one_of_each_cell(planned)
+    methods = {setup.options.method for setup in cells}
+    if len(methods) > 1:
+        return None
+    return shared_threads(methods.pop(), (setup.scene.links for setup in cells), planned.walk_count)
+
+
+def _run(
+    executor: Executor,
+    more: tuple[Any, ...],
+    planned: Sweep,
+    store: Store,
+    missing: Sequence[range],
+    workers: int,
+    progress: SweepProgress,
+    on_progress: Callable[[SweepProgress], None] | None,
+) -> None:
+    """Keep the workers busy with two tasks each; memory does not grow with the sweep."""
+    if on_progress is not None:
+        on_progress(progress)
+    began = time.perf_counter()
+    canonical, digest = planned.canonical(), planned.digest()
+    waiting = _tasks(planned, missing, workers)
+    folder = store.directory / "shards"
+    pending: dict[concurrent.futures.Future[list[str]], list[range]] = {}  # with the shards still to be counted
+
+    def submit() -> bool:
+        task = next(waiting, None)
+        if task is None:
+            return False
+        shards = [(shard.start, shard.stop) for shard in task]
+        pending[executor.submit(run_shards, canonical, str(store.directory), shards, *more)] = task
+        return True
+
+    def count(shard: range) -> None:
+        statuses = read_shard(store.directory, digest, shard)["status"]
+        progress.statuses.update(Status(int(code)).label for code in statuses)
+        progress.done += len(shard)
+
+    while len(pending) < 2 * workers and submit():
+        pass
+    try:
+        while pending:
+            finished, _ = concurrent.futures.wait(pending, POLL, concurrent.futures.FIRST_COMPLETED)
+            written: list[range] = []
+            for future in finished:
+                written += pending.pop(future)
+                future.result()
+                submit()
+            for task in pending.values():
+                there = [shard for shard in task if (folder / shard_name(shard)).exists()]
+                task[:] = [shard for shard in task if shard not in there]
+                written += there
+            for shard in written:
+                count(shard)
+            progress.seconds = time.perf_counter() - began
+            if written and on_progress is not None:
+                on_progress(progress)
+    finally:
+        for future in pending:
+            future.cancel()
+
+
+def _tasks(planned: Sweep, missing: Sequence[range], workers: int) -> Iterator[list[range]]:
+    """What is handed to a worker at a time: a shard, or for a GPU enough shards to fill it, if there are enough.
+
+    Shards that follow one another are alike and a GPU's tasks are few: each takes every so many-th, so that all tasks
+    take as long.
+    """
+    on_gpu: list[range] = []
+    firsts = planned.undrawn(shard.start for shard in missing)
+    for shard, first in zip(missing, firsts, strict=True):
+        if first.setup.options.device.startswith("cuda"):
+            on_gpu.append(shard)
+        else:
+            yield [shard]
+    count = workers * -(-sum(map(len, on_gpu)) // (workers * GPU_TASK_WALKS))
+    for number in range(min(count, len(on_gpu))):
+        yield on_gpu[number::count]
+
+
+def _counts(statuses: Counter[str]) -> str:
+    return ", ".join(f"{count} {label}" for label, count in sorted(statuses.items())) or "nothing to do"

@@ -1,0 +1,329 @@
+"""The folder of a sweep, as the one process that runs the sweep holds it.
+
+    DIR/sweep.json     what the folder belongs to, see `Manifest`; written first and never changed
+    DIR/sweep.yaml     the resolved sweep, for people and to run again
+    DIR/shards/        000000000-000000063.h5 holds walks 0 … 63, and their series and frames if they are kept
+    DIR/log.txt        what the runs of the sweep did, with times
+    DIR/lock           locked by the process that runs the sweep; the system unlocks it when that ends
+
+Whatever happens between two of these lines, the next `Store.open` goes on from there.
+"""
+
+import datetime
+import fcntl
+import os
+import re
+import secrets
+import shutil
+import socket
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, Self
+
+import numpy as np
+import yaml
+
+from warpchain.inputs.parameters import InputError
+from warpchain.store.shards import (
+    NUMERICS_VERSION,
+    OWN,
+    Folder,
+    Manifest,
+    empty_rows,
+    present_shards,
+    put_file,
+    read_manifest,
+    read_shard,
+    unwritable,
+    write_shard,
+)
+from warpchain.walks.motion import SERIES, Motion
+from warpchain.walks.rows import Rows
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from warpchain.sweeps.plan import Sweep
+
+__all__ = ["Store", "empty_rows", "read_rows", "read_shard", "write_shard"]
+
+SHARD_OVERHEAD: Final = 16 * 1024
+"""Bytes that a shard takes at most beside its rows."""
+
+SHORT_WALK: Final = 0.5
+"""Time [s] that few walks are shorter than."""
+SAMPLE_BYTES: Final = 8 * len(SERIES)
+"""Bytes of a sample of a series."""
+
+_PART: Final = re.compile(r"\.(?:sweep|\d{9,}-\d{9,})\.[0-9a-f]{8}\.part\.(?:json|yaml|h5)")
+_DISCARDED: Final = re.compile(r"\.discarded-[0-9a-f]{8}")
+
+_HOLDER: Final = re.compile(r"process \d+ on \S*")
+
+_YAML_HEAD: Final = """\
+# The sweep of this folder with all its values. A changed copy of it needs another folder.
+# It names the method that was run: for the one that suits another device, give a copy of it method: standard.
+"""
+
+
+class Store:
+    """The folder of a sweep, locked against other processes until `close` or the end of this process.
+
+    Attributes:
+        directory: the folder.
+        manifest: what it belongs to, and how its walks are laid out in shards.
+    """
+
+    def __init__(self, directory: Path, manifest: Manifest, lock: int) -> None:
+        """For `Store.open`, which prepares and checks the folder."""
+        self.directory = directory
+        self.manifest = manifest
+        self._lock = lock
+
+    @classmethod
+    def open(cls, directory: Folder, sweep: "Sweep", *, fresh: bool = False, shard_size: int) -> Self:
+        """Begin a sweep in a folder, or go on with it.
+
+        Args:
+            directory: the folder; made if need be.
+            sweep: the sweep that is to be in it.
+            fresh: throw away what a sweep has left in the folder, and begin.
+            shard_size: number of walks in a shard, for a new folder; a folder that goes on keeps its own, which
+                `manifest.shard_size` says.
+
+        Raises:
+            OSError: the folder cannot be made, locked, read or written, or the disk is too full for the rest of
+                the sweep.
+            InputError: another process holds the folder, it belongs to another sweep or to something else, or a
+                shard is damaged or foreign. Nothing has been deleted.
+            ValueError: the shard size is not positive.
+        """
+        if shard_size < 1:
+            raise ValueError(f"shard_size: {shard_size} is not positive; give 1 or more")
+        folder = Path(directory)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            lock = _locked(folder)
+        except OSError as error:
+            raise unwritable(folder, error) from error
+        try:
+            manifest = _prepared(folder, Manifest.of(sweep, shard_size), fresh)
+            store = cls(folder, manifest, lock)
+            store._check()
+        except BaseException:
+            _unlock(lock)
+            raise
+        return store
+
+    def log(self, text: str) -> None:
+        """Add a line with the time to log.txt.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        path = self.directory / "log.txt"
+        now = datetime.datetime.now().astimezone().isoformat(timespec="seconds")
+        try:
+            with path.open("a", encoding="utf-8") as file:
+                file.write(f"{now}  {text}\n")
+        except OSError as error:
+            raise unwritable(path, error) from error
+
+    def missing(self) -> list[range]:
+        """The walks of each shard that is not there yet, in order.
+
+        Raises:
+            OSError: the folder cannot be read.
+            InputError: a file in it is no shard of this sweep.
+        """
+        present = present_shards(self.directory, self.manifest)
+        return [walks for walks in self.manifest.shards if walks not in present]
+
+    def write(self, walks: range, rows: Rows, motions: Mapping[int, Motion] | None = None) -> str:
+        """Write a shard, see `write_shard`, and return its key."""
+        return write_shard(self.directory, self.manifest.digest, walks, rows, motions)
+
+    def rows(self) -> Rows:
+        """Rows of all walks that are there, in order.
+
+        Raises:
+            OSError: the folder or a shard cannot be read.
+            InputError: a shard is damaged or foreign.
+        """
+        return read_rows(self.directory, self.manifest)
+
+    def close(self) -> None:
+        """Let other processes have the folder."""
+        _unlock(self._lock)
+
+    def __enter__(self) -> Self:
+        """The store itself; closed at the end of the block."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: "TracebackType | None"
+    ) -> None:
+        """Close."""
+        self.close()
+
+    @property
+    def _series_bytes(self) -> float:
+        """What the series of a short walk takes; frames are not in it."""
+        series = self.manifest.recording.series
+        return 0.0 if series is None else SHORT_WALK / series.interval * SAMPLE_BYTES
+
+    def _check(self) -> None:
+        """Refuse what would fail later: bad shards, a folder that cannot be written, a disk too full."""
+        present = present_shards(self.directory, self.manifest)
+        problems = []
+        for walks in present:
+            try:
+                _read(self.directory, self.manifest, walks)
+            except InputError as error:
+                problems.append(str(error))
+        if problems:
+            raise InputError(problems[0] + (f" (and {len(problems) - 1} more)" if problems[1:] else ""))
+        left = [walks for walks in self.manifest.shards if walks not in present]
+        if not left:
+            return
+        shards = self.directory / "shards"
+        probe = shards / f".{'0' * 9}-{'0' * 9}.{secrets.token_hex(4)}.part.h5"
+        try:
+            probe.touch()
+            probe.unlink()
+            free = shutil.disk_usage(shards).free
+        except OSError as error:
+            raise unwritable(shards, error) from error
+        row = self.manifest.row_type.itemsize
+        need = sum(len(walks) * row + SHARD_OVERHEAD for walks in left)
+        need += round(sum(map(len, left)) / self.manifest.walk_count * self.manifest.kept_count * self._series_bytes)
+        if need > free:
+            raise OSError(
+                f"{self.directory}: the rest of the sweep takes {need / 1e6:.3g} MB, but {free / 1e6:.3g} MB are "
+                "free; make room and start again, shards written are kept"
+            )
+
+
+def read_rows(directory: Folder, manifest: Manifest) -> Rows:
+    """Rows of all walks that are in a folder, in order, shape (walks,); needs no lock, at any moment.
+
+    Raises:
+        OSError: the folder or a shard cannot be read.
+        InputError: a shard is damaged or foreign.
+    """
+    shards = present_shards(directory, manifest)
+    parts = [_read(directory, manifest, walks) for walks in shards]
+    return np.concatenate([np.empty(0, manifest.row_type), *parts])
+
+
+def _read(directory: Folder, manifest: Manifest, walks: range) -> Rows:
+    return read_shard(directory, manifest.digest, walks, numerics_version=manifest.numerics_version)
+
+
+def _prepared(folder: Path, manifest: Manifest, fresh: bool) -> Manifest:
+    """Make everything but the shards, in an order that leaves no moment at which a kill does harm."""
+    _clear_leftovers(folder)
+    named = folder / "sweep.json"
+    if not named.exists():
+        for name in OWN:
+            if (folder / name).exists():
+                raise InputError(f"{folder / name}: in the way of a sweep; give another folder")
+        put_file(named, manifest.text().encode())
+    elif fresh:
+        _discard(folder, read_manifest(folder))
+        put_file(named, manifest.text().encode())
+        _clear_leftovers(folder)
+    else:
+        manifest = _continued(folder, manifest)
+    if not (folder / "sweep.yaml").exists():
+        text = yaml.safe_dump(manifest.sweep, sort_keys=False, allow_unicode=True)
+        put_file(folder / "sweep.yaml", (_YAML_HEAD + text).encode())
+    try:
+        (folder / "shards").mkdir(exist_ok=True)
+    except OSError as error:
+        raise unwritable(folder / "shards", error) from error
+    return manifest
+
+
+def _continued(folder: Path, manifest: Manifest) -> Manifest:
+    """The manifest of a folder that is to go on with the sweep of another one."""
+    found = read_manifest(folder)
+    if found.numerics_version != NUMERICS_VERSION:
+        raise InputError(
+            f"{folder}: its walks are of numerics {found.numerics_version}, but this warpchain has "
+            f"{NUMERICS_VERSION}; use the version that began it, give another folder, or start anew with --fresh"
+        )
+    if found.digest != manifest.digest:
+        raise InputError(
+            f"{folder}: holds another sweep ({found.name}), or this one before it was changed; "
+            "give another folder, or start anew with --fresh, which deletes what is there"
+        )
+    return found
+
+
+def _discard(folder: Path, manifest: Manifest) -> None:
+    """Take away what a sweep left, the shards in one step; nothing if there is a file of somebody else."""
+    present_shards(folder, manifest)
+    try:
+        with suppress(FileNotFoundError):
+            os.rename(folder / "shards", folder / f".discarded-{secrets.token_hex(4)}")
+        for name in ("sweep.yaml", "log.txt"):
+            (folder / name).unlink(missing_ok=True)
+    except OSError as error:
+        raise unwritable(folder, error) from error
+
+
+def _clear_leftovers(folder: Path) -> None:
+    """Delete what a killed process had not finished: parts of files, and shards on their way out."""
+    try:
+        for place in (folder, folder / "shards"):
+            for path in place.iterdir() if place.is_dir() else ():
+                if _PART.fullmatch(path.name):
+                    path.unlink(missing_ok=True)
+                elif _DISCARDED.fullmatch(path.name) and place == folder:
+                    shutil.rmtree(path)
+    except OSError as error:
+        raise unwritable(folder, error) from error
+
+
+_held: set[int] = set()
+"""Descriptors of the locks of this process. A forked child shares them, and a worker that outlives a killed
+run would keep its folder locked; so a child gives them up at once."""
+
+
+def _give_up() -> None:
+    while _held:
+        os.close(_held.pop())
+
+
+os.register_at_fork(after_in_child=_give_up)
+
+
+def _locked(folder: Path) -> int:
+    """Lock a folder and say in the lock file who has it; the descriptor of the lock."""
+    path = folder / "lock"
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    try:
+        holder = os.pread(descriptor, 200, 0).decode(errors="replace").strip()
+        if holder and not _HOLDER.fullmatch(holder):
+            raise InputError(f"{path}: in the way of a sweep; give another folder")
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(
+                f"{folder}: in use by {holder or 'another process'}; wait for it to end, or give another folder"
+            ) from None
+        os.ftruncate(descriptor, 0)
+        os.pwrite(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
+    except BaseException:
+        os.close(descriptor)
+        raise
+    _held.add(descriptor)
+    return descriptor
+
+
+def _unlock(descriptor: int) -> None:
+    if descriptor in _held:
+        _held.remove(descriptor)
+        os.close(descriptor)

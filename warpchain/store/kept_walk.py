@@ -1,0 +1,157 @@
+"""A walk of a sweep whose motion was kept, read from the sweep's folder when it is asked for."""
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.inputs.scene import contact_radius
+from warpchain.inputs.setup import Setup
+from warpchain.loop.before_release import BeforeRelease
+from warpchain.status import Status
+from warpchain.store.shards import Manifest, read_motions
+from warpchain.sweeps.plan import load_sweep
+from warpchain.walks.motion import Motion
+from warpchain.walks.walk_result import STORED, Stored
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from warpchain.sweeps.plan import Sweep
+
+Array = NDArray[np.float64]
+
+FIELDS: Final[Mapping[str, Stored]] = {
+    name: STORED[name]
+    for name in ("time", "center", "center_velocity", "frame_time", "frame_joints", "sprocket_center")
+}
+"""Arrays of a kept walk: name → unit and meaning, those of a `WalkResult`."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class KeptWalk:
+    """The motion of one walk of a sweep: t instants and f frames of a chain of n links.
+
+    Time counts from the release, x from wherever the release put it, y from the floor upwards. A walk that was never
+    released has no instants and no frames.
+
+    Attributes:
+        index: number of the walk in its sweep.
+        status: how it ended.
+        dx: distance walked [m]; NaN unless it came to rest.
+        setup: what it is.
+        time: time since the release [s], shape (t,).
+        center: centre of mass x, y [m], shape (t, 2).
+        center_velocity: its velocity [m/s], shape (t, 2).
+        frame_time: times of the frames [s], shape (f,).
+        frame_joints: joints x, y [m], shape (f, n, 2); kept to single precision.
+        sprocket_center: centre of the sprocket at the release [m], shape (2,); None without one.
+        sprocket_radius: radius of the sprocket that links touch [m]; NaN without one.
+        before_release: its motion just before the release, kept to single precision; None if it was not kept.
+    """
+
+    index: int
+    status: Status
+    dx: float
+    setup: Setup
+    time: Array
+    center: Array
+    center_velocity: Array
+    frame_time: Array
+    frame_joints: Array
+    sprocket_center: Array | None
+    sprocket_radius: float
+    before_release: BeforeRelease | None = None
+
+    def __repr__(self) -> str:
+        """One line."""
+        counts = f"{len(self.time)} instants, {len(self.frame_time)} frames"
+        return f"<KeptWalk {self.index} {self.status.label}: dx {self.dx:.4g} m, {counts}>"
+
+    def unit(self, name: str) -> str:
+        """SI unit of an array.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
+        return FIELDS[name].unit
+
+    def meaning(self, name: str) -> str:
+        """One line saying what an array is.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
+        return FIELDS[name].meaning
+
+    def plot(
+        self, kind: Literal["figure5", "film_strip", "loop"] = "figure5", *, figure: "Figure | None" = None
+    ) -> "Figure":
+        """Draw the walk, see `WalkResult.plot`.
+
+        Raises:
+            ValueError: the kind is unknown, or what it shows was not kept.
+        """
+        from warpchain.pictures.walk_figures import draw
+
+        return draw(self, kind, figure=figure)
+
+
+@dataclass(frozen=True)
+class KeptMotions:
+    """Where the motions of a sweep are.
+
+    Attributes:
+        directory: folder of the sweep.
+        manifest: its manifest.
+    """
+
+    directory: str | os.PathLike[str]
+    manifest: Manifest
+
+    @cached_property
+    def sweep(self) -> "Sweep":
+        """The sweep itself, planned."""
+        return load_sweep(self.manifest.sweep)
+
+    def walk(self, index: int, row: Mapping[str, Any]) -> KeptWalk:
+        """A walk whose motion is kept.
+
+        Args:
+            index: its number.
+            row: its status and distance.
+
+        Raises:
+            OSError: its shard cannot be read.
+            InputError: its shard is damaged or foreign.
+        """
+        motion: Motion = read_motions(self.directory, self.manifest, range(index, index + 1))[index]
+        setup = self.sweep.planned(index).setup
+        has_sprocket = not math.isnan(motion.sprocket_height)
+        return KeptWalk(
+            index=index,
+            status=Status(int(row["status"])),
+            dx=float(row["dx"]),
+            setup=setup,
+            time=motion.series[:, 0],
+            center=motion.series[:, 1:3],
+            center_velocity=motion.series[:, 3:5],
+            frame_time=motion.frame_time,
+            frame_joints=motion.frame_joints.astype(np.float64),
+            sprocket_center=np.array([0.0, motion.sprocket_height]) if has_sprocket else None,
+            sprocket_radius=contact_radius(setup.scene, setup.parameters) if has_sprocket else math.nan,
+            before_release=None if motion.before_release is None else motion.before_release.as_type(np.float64),
+        )
+
+
+def kept_motions(directory: str | os.PathLike[str], manifest: Manifest) -> KeptMotions | None:
+    """Where the motions of a sweep are; None if it keeps none."""
+    if manifest.recording.series is None:
+        return None
+    return KeptMotions(Path(directory).absolute(), manifest)

@@ -1,0 +1,194 @@
+"""The one HDF5 file that holds a whole sweep: rows with named axes, and the motions that were kept.
+
+Axes and samples are dimension scales; units and meanings are attributes of every dataset, and the resolved sweep,
+versions and counts by status those of the file. A single block is in the root group, which
+`xarray.open_dataset(path, engine="h5netcdf")` opens; several are in groups of their names (`group=`).
+
+Motions are one behind the other, as the CF conventions have contiguous ragged arrays: of the walk at some place,
+samples `series_start` to `series_start + series_count` along `instant` are in `series_time`, `series_center_y` …;
+likewise its frames along `frame`. The n joints of its frame k are from `joint_start + k n` on along `joint`.
+"""
+
+import os
+from collections.abc import Iterator
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.inputs.parameters import InputError
+from warpchain.store.shards import (
+    Folder,
+    check_not_own,
+    hdf5_image,
+    open_new_hdf5,
+    present_shards,
+    put_file,
+    read_manifest,
+    read_motions,
+    unwritable,
+)
+from warpchain.store.sweep_result import FORMAT, BlockResult, SweepResult, load
+from warpchain.walks.motion import FRAMES, SERIES, Motion
+from warpchain.walks.walk_result import replacing
+
+if TYPE_CHECKING:
+    import h5py
+
+_DIMENSIONS: Final = {"series": "instant", "frame": "frame", "joint": "joint"}
+"""What is counted of a walk → name of the axis that it is along."""
+_ROOM: Final = 2**20
+"""Bytes that a merged file takes at most beyond its shards: their frames, and the tables of axes."""
+_NO_VARIABLE: Final = "This is a netCDF dimension but not a netCDF variable."
+
+
+def merge(directory: Folder, path: str | os.PathLike[str]) -> None:
+    """Write the results of a folder to one HDF5 file, whole or not at all; an older merged file is replaced.
+
+    Raises:
+        OSError: the folder cannot be read, or the file cannot be written.
+        InputError: there is no sweep in the folder, a shard is damaged or foreign, or the file is one of the sweep's
+            own or there already and no merged file.
+    """
+    result = load(directory)
+    target = Path(path)
+    check_not_own(directory, target)
+    if os.path.lexists(target) and not _is_merged(target):
+        raise InputError(f"{target}: is there and is no merged sweep; give another name")
+    if not any(block.kept.any() for block in result.blocks.values()):
+        put_file(target, hdf5_image(lambda file: _fill(file, result)))
+        return
+    # Motions may not fit into memory: this file grows on the disk.
+    most = _ROOM + sum(path.stat().st_size for path in present_shards(directory, read_manifest(directory)).values())
+    try:
+        with replacing(target) as part, open_new_hdf5(part, most) as file:
+            _fill(file, result)
+    except OSError as error:
+        raise unwritable(target, error) from error
+
+
+def _is_merged(path: Path) -> bool:
+    """Whether this is a file that `merge` has written."""
+    import h5py
+
+    if not path.is_file():  # opening a pipe would wait for ever
+        return False
+    try:
+        with h5py.File(path, "r") as file:
+            found = file.attrs.get("format")
+            return isinstance(found, str) and found == FORMAT
+    except OSError:
+        return False
+
+
+def _fill(file: "h5py.File", result: SweepResult) -> None:
+    """Fill the empty file."""
+    file.attrs.update(result.notes())
+    for name, block in result.blocks.items():
+        group = file if len(result.blocks) == 1 else file.create_group(name, track_order=True)
+        group.attrs["block"] = name
+        _write_rows(block, group)
+        if block.kept.any():
+            _write_motions(block, group)
+
+
+def _write_rows(block: BlockResult, group: "h5py.Group") -> None:
+    """Fill the group of a block with its rows."""
+    coordinates, variables = block.variables()
+    for name, (dims, values, notes) in {**coordinates, **variables}.items():
+        if values.dtype.kind == "b":  # NetCDF has no truth values; xarray's way to write them
+            values, notes = values.astype(np.int8), {**notes, "dtype": "bool"}
+        if values.dtype.kind == "U":
+            values = values.astype(object)
+        filters = {} if name in coordinates else {"compression": "gzip", "shuffle": True}
+        dataset = group.create_dataset(name, data=values, **filters)
+        dataset.attrs.update(notes)
+        if name in coordinates:
+            dataset.make_scale(name)
+        else:
+            _attach(dataset, group, dims)
+
+
+def _write_motions(block: BlockResult, group: "h5py.Group") -> None:
+    """Add the motions of a block, one shard in memory at a time."""
+    counts = {kind: np.zeros(block.shape, np.int64) for kind in _DIMENSIONS}
+    for place, motion in _motions(block):
+        for kind, count in zip(counts, _counts(motion), strict=True):
+            counts[kind].ravel()[place] = count
+    starts = {kind: np.cumsum(count).reshape(block.shape) - count for kind, count in counts.items()}
+    totals = {dimension: int(counts[kind].sum()) for kind, dimension in _DIMENSIONS.items()}
+    for kind, dimension in _DIMENSIONS.items():
+        if not totals[dimension]:
+            continue
+        # As netCDF writes a dimension that has no coordinates.
+        scale = group.create_dataset(dimension, (totals[dimension],), ">f4")
+        scale.make_scale(f"{_NO_VARIABLE}{totals[dimension]:10d}")
+        for name, values, notes in (
+            (f"{kind}_start", starts[kind], {"description": f"place of a walk's first one along {dimension}"}),
+            (
+                f"{kind}_count",
+                counts[kind],
+                {"description": f"number of a walk's along {dimension}", "sample_dimension": dimension},
+            ),
+        ):
+            dataset = group.create_dataset(name, data=values, compression="gzip", shuffle=True)
+            dataset.attrs.update({"units": "1", **notes})
+            _attach(dataset, group, block.dims)
+    columns = {name: dimension for name, (dimension, _) in _COLUMNS.items() if totals[dimension]}
+    for name, dimension in columns.items():
+        kind = "f4" if dimension == "joint" else "f8"
+        dataset = group.create_dataset(name, (totals[dimension],), kind)
+        unit, meaning = _COLUMNS[name][1]
+        dataset.attrs.update({"units": unit, "description": meaning})
+        _attach(dataset, group, (dimension,))
+    ends = dict.fromkeys(totals, 0)
+    for _, motion in _motions(block):
+        arrays = _arrays(motion)
+        for name, dimension in columns.items():
+            group[name][ends[dimension] : ends[dimension] + len(arrays[name])] = arrays[name]
+        for dimension, count in zip(ends, _counts(motion), strict=True):
+            ends[dimension] += count
+
+
+_COLUMNS: Final = {
+    **{f"series_{name}": ("instant", note) for name, note in SERIES.items()},
+    **{name: ("frame" if name == "frame_time" else "joint", note) for name, note in FRAMES.items()},
+}
+"""Flat arrays: name → axis; unit and meaning."""
+
+
+def _arrays(motion: Motion) -> dict[str, NDArray[Any]]:
+    """A motion's parts of the flat arrays."""
+    return {
+        **{f"series_{name}": motion.series[:, column] for column, name in enumerate(SERIES)},
+        "frame_time": motion.frame_time,
+        "joint_x": motion.frame_joints[..., 0].ravel(),
+        "joint_y": motion.frame_joints[..., 1].ravel(),
+    }
+
+
+def _counts(motion: Motion) -> tuple[int, int, int]:
+    """Numbers of samples, frames and joints in all frames."""
+    return len(motion.series), len(motion.frame_time), motion.frame_joints[..., 0].size
+
+
+def _motions(block: BlockResult) -> Iterator[tuple[int, Motion]]:
+    """The motions of a block in the order of its walks, each with its place in a flat column."""
+    if block.motions is None:
+        return
+    places = np.flatnonzero(block.kept)
+    walks = block.columns["index"].ravel()[places].tolist()
+    first = walks[0] - int(places[0])
+    manifest = block.motions.manifest
+    for _, group in groupby(walks, manifest.shard_of):
+        members = list(group)
+        found = read_motions(block.motions.directory, manifest, range(members[0], members[-1] + 1))
+        yield from ((walk - first, motion) for walk, motion in found.items())
+
+
+def _attach(dataset: "h5py.Dataset", group: "h5py.Group", dims: tuple[str, ...]) -> None:
+    """Name the axes of a dataset."""
+    for place, dim in enumerate(dims):
+        dataset.dims[place].attach_scale(group[dim])

@@ -1,0 +1,412 @@
+"""Results of a sweep as arrays with named axes.
+
+A folder is read at any moment, also while its sweep runs: what is not there yet is missing and counted.
+"""
+
+import importlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.inputs.parameters import InputError, Parameters, shown, suggestion
+from warpchain.status import Status
+from warpchain.store.folder import read_rows
+from warpchain.store.kept_walk import KeptMotions, KeptWalk, kept_motions
+from warpchain.store.shards import FORMAT_VERSION, Folder, Manifest, read_manifest
+from warpchain.walks.rows import COLUMNS, MISSING, Column, Rows, field_column, missing_rows
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+Array = NDArray[Any]
+
+FORMAT: Final = "warpchain sweep result"
+
+_Variables = dict[str, tuple[tuple[str, ...], Array, dict[str, Any]]]
+"""Name → axes, values and attributes, as xarray takes them."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CellStatistics:
+    """A quantity over the samples of each cell; arrays over the axes of the grid.
+
+    Only walks that came to rest are in the mean and the standard deviation; the others are counted.
+
+    Attributes:
+        axes: name of each axis → its values.
+        unit: unit of `mean` and `sd`.
+        mean: mean; NaN without a walk at rest.
+        sd: standard deviation of a sample (divisor count − 1); NaN with fewer than two walks at rest.
+        count: number of walks at rest.
+        failed: number of walks that ended otherwise.
+        missing: number of walks not computed yet.
+    """
+
+    axes: dict[str, Array]
+    unit: str
+    mean: NDArray[np.float64]
+    sd: NDArray[np.float64]
+    count: NDArray[np.int64]
+    failed: NDArray[np.int64]
+    missing: NDArray[np.int64]
+
+    @property
+    def standard_error(self) -> NDArray[np.float64]:
+        """Standard error of the mean, sd / √count."""
+        return self.sd / np.sqrt(np.maximum(self.count, 1))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class BlockResult:
+    """A block of a sweep. Every column is an attribute, an array of shape `shape`: `block.dx`, `block.status`.
+
+    Columns are those of `warpchain.walks.rows.COLUMNS` and the drawn quantities. A missing walk has the status −1,
+    NaN in columns of floats and −1 in those of integers.
+
+    Attributes:
+        name: name of the block.
+        axes: name of each axis of the grid → its values, in order; the samples are one more axis.
+        drawn: names of the quantities that samples draw.
+        columns: name → values.
+        motions: where the motions of the walks are; None if none was kept.
+    """
+
+    name: str
+    axes: dict[str, Array]
+    drawn: tuple[str, ...]
+    columns: dict[str, Array]
+    motions: KeptMotions | None = None
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Names of the axes of every column."""
+        return (*self.axes, "sample")
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values of each axis, then the number of samples."""
+        return self.columns["index"].shape
+
+    def __getattr__(self, name: str) -> Array:
+        """A column."""
+        columns: dict[str, Array] = self.__dict__.get("columns", {})
+        if name not in columns:
+            raise AttributeError(f"{name}: no such column; columns are {', '.join(columns)}", name=name, obj=self)
+        return columns[name]
+
+    def __dir__(self) -> list[str]:
+        """Attributes, columns among them."""
+        return sorted({*super().__dir__(), *self.columns})
+
+    def __repr__(self) -> str:
+        """One line with axes and counts."""
+        sizes = ", ".join(f"{name}: {size}" for name, size in zip(self.dims, self.shape, strict=True))
+        return f"<BlockResult {self.name} ({sizes}): {_counts(self.summary())}>"
+
+    def unit(self, name: str) -> str:
+        """SI unit of a column or an axis, "1" for pure numbers.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
+        return self._column(name).unit
+
+    def meaning(self, name: str) -> str:
+        """One line saying what a column or an axis is.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
+        return self._column(name).meaning
+
+    def _column(self, name: str) -> Column:
+        if name == "sample":
+            return Column("<i8", "1", "number of the sample in its cell")
+        if name not in self.columns and name not in self.axes:
+            raise KeyError(f"{shown(name)}: {suggestion(name, (*self.columns, *self.axes))}")
+        return COLUMNS[name] if name in COLUMNS else field_column(name)
+
+    @property
+    def kept(self) -> NDArray[np.bool_]:
+        """Whether the motion of a walk was kept and is there, shape `shape`."""
+        recording = None if self.motions is None else self.motions.manifest.recording.series
+        numbers = range(self.shape[-1])
+        chosen = np.array([recording is not None and recording.includes(sample) for sample in numbers])
+        there: NDArray[np.bool_] = chosen & (self.columns["status"] != MISSING)
+        return there
+
+    def series(self, *, sample: int = 0, **at: float | str) -> KeptWalk:
+        """The motion of one walk: `series(links=60, frequency=15, sample=2).time`.
+
+        Args:
+            sample: number of the sample.
+            at: value of each axis; of an axis with just one value it may be left out.
+
+        Raises:
+            InputError: there is no such walk, or its motion was not kept or is not there yet.
+            OSError: its shard cannot be read.
+        """
+        if unknown := [name for name in at if name not in self.axes]:
+            known = f"{suggestion(unknown[0], tuple(self.axes))}" if self.axes else "there are no axes"
+            raise InputError(f"{unknown[0]}: no axis of block {self.name}; {known}")
+        place = []
+        for name, values in self.axes.items():
+            if name not in at and len(values) > 1:
+                raise InputError(f"{name}: missing; give one of {', '.join(map(str, values))}")
+            found = np.flatnonzero(values == at.get(name, values[0]))
+            if not len(found):
+                raise InputError(
+                    f"{name}: {shown(at[name])} is not on the axis; give one of {', '.join(map(str, values))}"
+                )
+            place.append(int(found[0]))
+        is_whole = isinstance(sample, (int, np.integer)) and not isinstance(sample, bool)
+        if not is_whole or not 0 <= sample < self.shape[-1]:
+            raise InputError(f"sample: there is no sample {shown(sample)}; give 0 to {self.shape[-1] - 1}")
+        return self.kept_walk((*place, sample))
+
+    def kept_walk(self, place: tuple[int, ...]) -> KeptWalk:
+        """The motion of the walk at a place along the axes and samples; errors as of `series`."""
+        if self.motions is None or not self.kept[place]:
+            kept = np.flatnonzero(self.kept.any(axis=tuple(range(len(self.axes)))))
+            samples = ", ".join(map(str, kept[:12]))
+            remedy = f"give one of the samples {samples}" if samples else "a sweep with record: {series: true} keeps it"
+            raise InputError(f"the motion of walk {self.columns['index'][place]} is not there; {remedy}")
+        row = {name: self.columns[name][place] for name in ("status", "dx")}
+        return self.motions.walk(int(self.columns["index"][place]), row)
+
+    def summary(self) -> dict[str, int]:
+        """Number of walks by status label; `at_rest` and `missing` always, others if there are any."""
+        return _summary(self.columns["status"])
+
+    def statistics(self, name: str = "dx") -> CellStatistics:
+        """Mean and standard deviation of a column in each cell, over the walks at rest, and what is not in them.
+
+        Raises:
+            KeyError: there is no such column.
+        """
+        self._column(name)
+        status = self.columns["status"]
+        rested = status == Status.AT_REST
+        count = rested.sum(axis=-1)
+        values = np.where(rested, self.columns[name], 0.0)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            mean = values.sum(axis=-1) / count
+            deviation = np.where(rested, values - mean[..., np.newaxis], 0.0)
+            sd = np.sqrt((deviation**2).sum(axis=-1) / (count - 1))
+        return CellStatistics(
+            axes=self.axes,
+            unit=self.unit(name),
+            mean=mean,
+            sd=np.where(count > 1, sd, np.nan),
+            count=count,
+            failed=(~rested & (status != MISSING)).sum(axis=-1),
+            missing=(status == MISSING).sum(axis=-1),
+        )
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """The block as a data set with named coordinates, units and meanings.
+
+        Raises:
+            ImportError: xarray is not installed.
+        """
+        coordinates, variables = self.variables()
+        dataset: xarray.Dataset = _package("xarray").Dataset(variables, coordinates, {"block": self.name})
+        return dataset
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """The block as a table with one row for each walk: values of the axes, sample, columns.
+
+        Raises:
+            ImportError: pandas is not installed.
+        """
+        grid = np.meshgrid(*self.axes.values(), np.arange(self.shape[-1]), indexing="ij")
+        places = dict(zip(self.dims, grid, strict=True))
+        table = {name: values.ravel() for name, values in (places | self.columns).items()}
+        return _package("pandas").DataFrame(table)
+
+    def variables(self) -> tuple[_Variables, _Variables]:
+        """Coordinates and variables."""
+        places = {**self.axes, "sample": np.arange(self.shape[-1])}
+        coordinates: _Variables = {name: ((name,), values, self.notes(name)) for name, values in places.items()}
+        return coordinates, {name: (self.dims, values, self.notes(name)) for name, values in self.columns.items()}
+
+    def notes(self, name: str) -> dict[str, Any]:
+        """Attributes of a variable."""
+        column = self._column(name)
+        notes: dict[str, Any] = {"units": column.unit, "description": column.meaning}
+        if name in Parameters.model_fields:
+            notes["symbol"] = Parameters.quantities()[name].symbol
+        if name == "status":
+            notes["flag_values"] = np.array([MISSING, *Status], np.int8)
+            notes["flag_meanings"] = " ".join(["missing", *(status.label for status in Status)])
+        return notes
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class SweepResult:
+    """What is there of a sweep. If it has just one block, everything of the block is an attribute here, too.
+
+    Attributes:
+        name: name of the sweep.
+        seed: its seed.
+        blocks: name → block.
+        sweep: the resolved sweep, as in sweep.yaml.
+        provenance: digest of the sweep, version of the numerics, and versions of the software that began it.
+    """
+
+    name: str
+    seed: int
+    blocks: dict[str, BlockResult]
+    sweep: dict[str, Any]
+    provenance: dict[str, Any]
+
+    def __getattr__(self, name: str) -> Any:
+        """An attribute of the only block."""
+        blocks: dict[str, BlockResult] = self.__dict__.get("blocks", {})
+        if len(blocks) == 1:
+            return getattr(next(iter(blocks.values())), name)
+        problem = f"{name}: no such attribute; there are several blocks, blocks[…] with {', '.join(blocks)}"
+        raise AttributeError(problem, name=name, obj=self)
+
+    def __dir__(self) -> list[str]:
+        """Attributes, those of the only block among them."""
+        only = dir(next(iter(self.blocks.values()))) if len(self.blocks) == 1 else []
+        return sorted({*super().__dir__(), *only})
+
+    def __repr__(self) -> str:
+        """One line for the sweep and one for each block."""
+        lines = [f"<SweepResult {self.name}: {self.walk_count} walks, {_counts(self.summary())}>"]
+        return "\n  ".join([*lines, *map(repr, self.blocks.values())])
+
+    @property
+    def walk_count(self) -> int:
+        """Number of walks of the sweep, missing ones included."""
+        return sum(block.columns["index"].size for block in self.blocks.values())
+
+    @property
+    def missing_count(self) -> int:
+        """Number of walks not computed yet."""
+        return self.summary()["missing"]
+
+    def summary(self) -> dict[str, int]:
+        """Number of walks by status label; `at_rest` and `missing` always, others if there are any."""
+        return _summary(np.concatenate([block.columns["status"].ravel() for block in self.blocks.values()]))
+
+    def unit(self, name: str) -> str:
+        """SI unit of a column or an axis of any block, "1" for pure numbers.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
+        blocks = self.blocks.values()
+        owner = next((block for block in blocks if name in block.columns or name in block.dims), None)
+        return (owner or next(iter(blocks))).unit(name)
+
+    def to_xarray(self) -> "xarray.Dataset | xarray.DataTree":
+        """The only block as a data set, or several as a tree with one child each.
+
+        Raises:
+            ImportError: xarray is not installed.
+        """
+        package = _package("xarray")
+        sets = {name: block.to_xarray() for name, block in self.blocks.items()}
+        attributes = self.notes()
+        if len(sets) == 1:
+            dataset: xarray.Dataset = next(iter(sets.values())).assign_attrs(attributes)
+            return dataset
+        tree: xarray.DataTree = package.DataTree.from_dict({"/": package.Dataset(attrs=attributes), **sets})
+        return tree
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """All walks as one table, the name of the block in its first column; see `BlockResult.to_pandas`.
+
+        Raises:
+            ImportError: pandas is not installed.
+        """
+        tables = {name: block.to_pandas() for name, block in self.blocks.items()}
+        for name, table in tables.items():
+            table.insert(0, "block", name)
+        return _package("pandas").concat(list(tables.values()), ignore_index=True)
+
+    def notes(self) -> dict[str, Any]:
+        """Attributes of a file: what the result is and how to make it again."""
+        return {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "title": self.name,
+            "seed": str(self.seed),
+            "walks": self.walk_count,
+            **{f"walks_{label}": count for label, count in self.summary().items()},
+            "sweep": json.dumps(self.sweep, ensure_ascii=False),
+            **{
+                name: json.dumps(value) if isinstance(value, Mapping) else value
+                for name, value in self.provenance.items()
+            },
+        }
+
+
+def load(directory: Folder) -> SweepResult:
+    """Read the folder of a sweep, as far as the sweep is.
+
+    Raises:
+        OSError: the folder cannot be read.
+        InputError: there is no sweep in it, or a shard is damaged or foreign.
+    """
+    manifest = read_manifest(directory)
+    rows = missing_rows(manifest.row_type, range(manifest.walk_count))
+    present = read_rows(directory, manifest)
+    rows[present["index"]] = present
+    provenance = {name: getattr(manifest, name) for name in ("digest", "numerics_version", "versions")}
+    return SweepResult(
+        name=manifest.name,
+        seed=manifest.seed,
+        blocks=_blocks(manifest, rows, kept_motions(directory, manifest)),
+        sweep=manifest.sweep,
+        provenance=provenance,
+    )
+
+
+def _blocks(manifest: Manifest, rows: Rows, motions: KeptMotions | None) -> dict[str, BlockResult]:
+    """The blocks of a sweep, from the rows of all of its walks."""
+    blocks = {}
+    for layout in manifest.blocks:
+        size = int(np.prod(layout.shape))
+        part = rows[layout.first : layout.first + size].reshape(layout.shape)
+        names = (*COLUMNS, *(name for name in rows.dtype.names or () if name in layout.drawn))
+        blocks[layout.name] = BlockResult(
+            name=layout.name,
+            axes={name: np.array(values) for name, values in layout.axes.items()},
+            drawn=layout.drawn,
+            columns={name: np.ascontiguousarray(part[name]) for name in names},
+            motions=motions,
+        )
+    return blocks
+
+
+def _summary(status: Array) -> dict[str, int]:
+    """Number of walks by status label, in the order of the codes, missing ones last."""
+    counts = {code.label: int((status == code).sum()) for code in Status}
+    kept = {label: count for label, count in counts.items() if count or label == Status.AT_REST.label}
+    return kept | {"missing": int((status == MISSING).sum())}
+
+
+def _counts(summary: Mapping[str, int]) -> str:
+    return ", ".join(f"{count} {label}" for label, count in summary.items() if count)
+
+
+def _package(name: str) -> ModuleType:
+    """An optional package.
+
+    Raises:
+        ImportError: it is not installed; the message says how to get it.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise ImportError(f"{name} is not installed; pip install 'warpchain[xarray]'", name=name) from None

@@ -1,0 +1,153 @@
+"""Designed samples: points that fill the space of the drawn quantities more evenly than random ones.
+
+A design is a matrix of points in the unit cube, one row for each sample of a cell and one column for each drawn
+quantity; a sample's values are the quantiles of the distributions at its row. `saltelli` rows have twice as many
+columns and give several walks each, which Sobol indices are estimated from.
+
+Sources: I. M. Sobol', USSR Comput. Math. Math. Phys. 7 (1967) 86; A. B. Owen, J. Complexity 14 (1998) 466
+(scrambling); M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239 (latin hypercubes);
+A. Saltelli et al., Comput. Phys. Commun. 181 (2010) 259 (A, B and AB).
+"""
+
+import functools
+from collections.abc import Mapping
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpchain.inputs.parameters import InputError
+
+Array = NDArray[np.float64]
+
+SAMPLERS: Final = ("random", "sobol", "latin_hypercube", "saltelli")
+"""Independent samples; a scrambled Sobol' sequence; a latin hypercube; a Sobol' sequence of twice the dimension, each
+row of which becomes two points and their crossings."""
+
+_END: Final = 2.0**-53
+"""Distance that designed points keep from the ends 0 and 1, where a Gaussian has no quantile."""
+
+
+def walks_per_sample(sampler: str, dimensions: int) -> int:
+    """Walks that one sample of a cell takes: d + 2 for `saltelli` with d drawn quantities, else 1."""
+    return dimensions + 2 if sampler == "saltelli" else 1
+
+
+def check_design(sampler: str, samples: int, dimensions: int, path: str) -> None:
+    """Check that a sampler can make a number of samples.
+
+    Args:
+        sampler: one of `SAMPLERS`.
+        samples: samples per cell, as the sweep states them.
+        dimensions: number of drawn quantities.
+        path: where sampler and samples were given, for errors.
+
+    Raises:
+        InputError: samples would all be equal, break the balance of a Sobol' sequence, or need SciPy.
+    """
+    if dimensions == 0:
+        if sampler == "saltelli":
+            raise InputError(f"{path}.sampler: saltelli has nothing to draw; give distributions")
+        if samples > 1:
+            raise InputError(
+                f"{path}.samples: nothing is drawn, so all {samples} samples would be the same; "
+                "give 1, or distributions"
+            )
+        return
+    if sampler == "random":
+        return
+    if find_spec("scipy") is None:
+        raise InputError(
+            f"{path}.sampler: {sampler} needs SciPy, which is not installed; pip install 'warpchain[scipy]'"
+        )
+    if sampler in ("sobol", "saltelli") and samples & (samples - 1):
+        lower = 1 << (samples.bit_length() - 1)
+        raise InputError(
+            f"{path}.samples: {samples} is not a power of two, which {sampler} needs to be balanced; "
+            f"give {lower} or {2 * lower}"
+        )
+
+
+@functools.lru_cache(maxsize=4)
+def design_points(sampler: str, seed: int, cell: int, samples: int, dimensions: int) -> Array:
+    """The points of a cell, the same for every caller; the last few cells are kept.
+
+    Args:
+        sampler: `sobol`, `latin_hypercube` or `saltelli`.
+        seed: seed of the sweep.
+        cell: number of the cell's stream.
+        samples: number of rows N.
+        dimensions: number of drawn quantities d.
+
+    Returns:
+        Read-only points inside (0, 1), shape (N, d), for `saltelli` (N, 2d).
+    """
+    qmc = import_module("scipy.stats.qmc")
+    # A spawn key of one number names no sample, so a design shares its stream with none.
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(cell,)))
+    if sampler == "latin_hypercube":
+        engine = qmc.LatinHypercube(dimensions, seed=rng)
+    else:
+        engine = qmc.Sobol(dimensions * (2 if sampler == "saltelli" else 1), scramble=True, seed=rng)
+    points: Array = np.clip(engine.random(samples), _END, 1 - _END)
+    points.flags.writeable = False
+    return points
+
+
+def saltelli_points(first: Mapping[str, float], second: Mapping[str, float]) -> list[dict[str, float]]:
+    """The d + 2 points of one `saltelli` sample, in the order of its walks.
+
+    Args:
+        first: row of the matrix A, name → value.
+        second: row of the matrix B, the same names.
+
+    Returns:
+        The row of A, that of B, and for each quantity in turn that of A with this one value taken from B.
+    """
+    return [dict(first), dict(second), *({**first, name: second[name]} for name in first)]
+
+
+def saltelli_outputs(values: ArrayLike, dimensions: int) -> dict[str, Array]:
+    """Results of the walks of a `saltelli` cell, in the form that `scipy.stats.sobol_indices` takes as `func`.
+
+    A sample with a result that is not finite (a failed walk) is left out as a whole, with its d + 2 walks. SciPy
+    refuses a number of samples that is no power of two, which may then be left; `sobol_indices` here does not.
+
+    Args:
+        values: one result for each walk of the cell, in the order of the walks, shape (N (d + 2),).
+        dimensions: number of drawn quantities d.
+
+    Returns:
+        `f_A` and `f_B`, shape (1, N'), and `f_AB`, shape (d, 1, N').
+
+    Raises:
+        ValueError: the number of values is no multiple of d + 2.
+    """
+    table = np.asarray(values, dtype=np.float64).reshape(-1, dimensions + 2)
+    table = table[np.isfinite(table).all(axis=1)]
+    return {"f_A": table[None, :, 0], "f_B": table[None, :, 1], "f_AB": table.T[2:, None, :]}
+
+
+def sobol_indices(outputs: Mapping[str, Array]) -> tuple[Array, Array]:
+    """First-order and total Sobol' indices, by the estimators of Saltelli et al. (2010), table 2 (b) and (f).
+
+    The same numbers as `scipy.stats.sobol_indices`, for any number of samples.
+
+    Args:
+        outputs: see `saltelli_outputs`.
+
+    Returns:
+        First-order and total index of each drawn quantity, shape (d,) each; NaN where all results are equal or
+        none is left.
+    """
+    first, second, crossed = outputs["f_A"][0], outputs["f_B"][0], outputs["f_AB"][:, 0]
+    pooled = np.concatenate([first, second])
+    variance = pooled.var() if len(pooled) else 0.0
+    if not variance > 0:
+        return np.full(len(crossed), np.nan), np.full(len(crossed), np.nan)
+    # Without the mean the products lose fewer digits (Sobol' and Levitan, 1999).
+    main = np.mean((second - pooled.mean()) * (crossed - first), axis=1) / variance
+    total = 0.5 * np.mean((first - crossed) ** 2, axis=1) / variance
+    return main, total

@@ -1,0 +1,117 @@
+"""What a sweep keeps of the motion of its walks, beside their rows: time series, and frames of all joints."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import InputError
+
+SERIES_INTERVAL: Final = 1e-3
+"""Default time [s] between two samples of a series."""
+FRAME_INTERVAL: Final = 2e-3
+"""Default time [s] between two frames."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One thing that is kept, of which samples and how often.
+
+    Attributes:
+        interval: time [s] between two of them.
+        samples: numbers of the samples, sorted, the same in each cell; None: all.
+        before: time [s] before the release in which it is kept as well, with the loads of the joints; 0: none.
+    """
+
+    interval: float
+    samples: tuple[int, ...] | None = None
+    before: float = 0.0
+
+    def includes(self, sample: int) -> bool:
+        """Whether it is kept of a sample."""
+        return self.samples is None or sample in self.samples
+
+    def covers(self, other: "Choice") -> bool:
+        """Whether it is kept of every sample of which another thing is."""
+        return self.samples is None or (other.samples is not None and set(other.samples) <= set(self.samples))
+
+    def steps(self, options: Options, path: str) -> int:
+        """Time between two in units of the time between two looks at a chain.
+
+        Args:
+            options: of the walk.
+            path: where the choice was given, for the error.
+
+        Raises:
+            InputError: the time is no whole number of them.
+        """
+        ratio = self.interval / options.record_interval
+        steps = round(ratio)
+        if steps < 1 or abs(ratio - steps) > 1e-6 * ratio:
+            raise InputError(
+                f"{path}.interval: {self.interval} s is no whole multiple of options.record_interval "
+                f"{options.record_interval} s; give one"
+            )
+        return steps
+
+    def canonical(self) -> dict[str, Any]:
+        """As in a sweep file."""
+        before = {"before": self.before} if self.before > 0 else {}
+        return {"interval": self.interval, "samples": "all" if self.samples is None else list(self.samples), **before}
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What a sweep keeps of the motion of its walks.
+
+    Attributes:
+        series: time series of the centre of mass; None: none.
+        frames: positions of all joints, only of samples whose series are kept; None: none.
+    """
+
+    series: Choice | None = None
+    frames: Choice | None = None
+
+    @property
+    def choices(self) -> dict[str, Choice]:
+        """What is kept, by its key in a sweep file."""
+        given = {"series": self.series, "frames": self.frames}
+        return {name: choice for name, choice in given.items() if choice is not None}
+
+    def canonical(self) -> dict[str, Any]:
+        """As in a sweep file."""
+        return {"series": False} | {name: choice.canonical() for name, choice in self.choices.items()}
+
+    @classmethod
+    def of(cls, canonical: Mapping[str, Any]) -> "Recording":
+        """The recording that has a canonical form; for what this package has written, unchecked."""
+        return cls(
+            **{
+                name: Choice(
+                    given["interval"],
+                    None if given["samples"] == "all" else tuple(given["samples"]),
+                    given.get("before", 0.0),
+                )
+                for name, given in canonical.items()
+                if given is not False
+            }
+        )
+
+
+@dataclass(frozen=True)
+class Keep:
+    """What is kept of one walk.
+
+    Attributes:
+        series_every: every so many looks at the chain a sample is kept; None: no series.
+        frame_every: every so many looks a frame is kept; None: no frames.
+        before: time [s] before the release of which samples and frames are kept as well, with the joints' loads; 0:
+            none.
+    """
+
+    series_every: int | None = None
+    frame_every: int | None = None
+    before: float = 0.0
+
+
+NOTHING: Final = Keep()

@@ -1,0 +1,467 @@
+"""What a sweep file says, checked and completed, before any walk is planned.
+
+`read_sweep` turns the content of a YAML file into a `SweepPlan` of `BlockPlan`s: every value converted by the
+model it belongs to, every range written out, every distribution resolved. An error is one line that begins with
+the path of the offending value, such as `sweep.blocks[0].grid.frequency[3]`.
+"""
+
+import math
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from decimal import Decimal
+from typing import Any, Final
+
+from pydantic import BaseModel, ValidationError
+
+from warpchain.inputs.distributions import TABLE, Distribution, Gaussian, Uniform, physical_values
+from warpchain.inputs.options import METHODS_BY_NEED, Options
+from warpchain.inputs.parameters import InputError, Parameters, preset, shown, suggestion, validated
+from warpchain.inputs.scene import Scene
+from warpchain.inputs.yaml_files import read_yaml
+from warpchain.sweeps.designs import SAMPLERS, check_design
+from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL, Choice, Recording
+
+Value = float | int | str
+"""A value of a field; truth values are integers to Python."""
+
+VERSION: Final = 1
+"""Version of the file format."""
+
+AXIS_LIMIT: Final = 10_000
+"""Most values of one axis."""
+
+SECTIONS: Final[Mapping[str, type[BaseModel]]] = {
+    "scene": Scene,
+    "options": Options,
+    "parameters": Parameters,
+}
+"""Sections of a sweep file and the models whose fields they hold."""
+
+DRAWABLE: Final = (
+    *Parameters.model_fields,
+    *(name for name, field in Scene.model_fields.items() if field.annotation is float),
+)
+"""Quantities that can have a distribution, in the order of drawing."""
+
+_BLOCK_KEYS: Final = ("name", "preset", "samples", "sampler", *SECTIONS, "distributions", "grid")
+_TOP_KEYS: Final = ("version", "seed", "blocks", "same_samples_along", "record", *_BLOCK_KEYS)
+_HOMES: Final = {name: section for section, model in SECTIONS.items() for name in model.model_fields}
+"""Name of a field → the section it belongs to."""
+
+
+@dataclass(frozen=True)
+class BlockPlan:
+    """One block of a sweep: a grid of cells and what is drawn in each.
+
+    Attributes:
+        path: where the block was given, for errors.
+        name: its name.
+        preset: name of the parameter preset; None when the preset is an axis.
+        sections: `scene`, `options` and `parameters` → values that differ from the defaults or the preset, axes
+            apart.
+        axes: name of a field, or `preset` → its values; the last one varies fastest.
+        distributions: name → distribution, in the order of drawing.
+        sampler: one of `warpchain.sweeps.designs.SAMPLERS`.
+        samples: samples per cell.
+    """
+
+    path: str
+    name: str
+    preset: str | None
+    sections: Mapping[str, Mapping[str, Value]]
+    axes: Mapping[str, tuple[Value, ...]]
+    distributions: Mapping[str, Distribution]
+    sampler: str
+    samples: int
+
+
+@dataclass(frozen=True)
+class SweepPlan:
+    """A whole sweep file.
+
+    Attributes:
+        name: name of the sweep.
+        seed: seed of all random numbers.
+        same_samples_along: axes along which the same samples are used, sorted.
+        blocks: at least one.
+        recording: what is kept of the motion of walks.
+    """
+
+    name: str
+    seed: int
+    same_samples_along: tuple[str, ...]
+    blocks: tuple[BlockPlan, ...]
+    recording: Recording
+
+
+def read_sweep(source: str | os.PathLike[str] | Mapping[str, object]) -> SweepPlan:
+    """Read a sweep file, or take its content as a mapping.
+
+    Raises:
+        InputError: the file cannot be read, or something in it is refused.
+    """
+    content = source if isinstance(source, Mapping) else read_yaml(source)
+    if not isinstance(content, Mapping):
+        raise InputError(f"{source}: no mapping at the top; give the keys {', '.join(_TOP_KEYS)}")
+    top = _keys(content, "sweep", _TOP_KEYS)
+    version = _needed(top, "version", "sweep", f"give {VERSION}")
+    if version != VERSION or isinstance(version, bool):
+        raise InputError(f"sweep.version: {shown(version)} is not supported; give {VERSION}")
+    recording = _recording(top.get("record"))
+    name = _text(_needed(top, "name", "sweep", "give the sweep a name"), "sweep.name")
+    seed = _whole(_needed(top, "seed", "sweep", "give a whole number"), "sweep.seed", 0, 2**128 - 1)
+    blocks = tuple(_blocks(top))
+    return SweepPlan(name, seed, _same_samples_along(top.get("same_samples_along"), blocks), blocks, recording)
+
+
+def _recording(content: object) -> Recording:
+    """What is kept of the motion of walks."""
+    given = _keys(content, "sweep.record", ("series", "frames"))
+    series = _choice(given.get("series", False), "sweep.record.series", SERIES_INTERVAL)
+    frames = _choice(given.get("frames", False), "sweep.record.frames", FRAME_INTERVAL, ("before",))
+    if frames is not None and (series is None or not series.covers(frames)):
+        raise InputError(
+            "sweep.record.frames: kept of samples without series; give them in sweep.record.series as well"
+        )
+    return Recording(series, frames)
+
+
+def _choice(content: object, path: str, interval: float, more: tuple[str, ...] = ()) -> Choice | None:
+    """Of which samples something is kept, and how often; None for none. `more` are keys that only some things have."""
+    if content is False:
+        return None
+    if not (content is True or isinstance(content, Mapping)):
+        raise InputError(f"{path}: {shown(content)}; give true, false or {{interval: {interval}, samples: [0, 1]}}")
+    keys = {} if content is True else _keys(content, path, ("interval", "samples", *more))
+    chosen = keys.get("samples", "all")
+    samples = None
+    if chosen != "all":
+        numbers = _sequence(chosen, f"{path}.samples", "give all, or a list such as [0, 1]")
+        samples = tuple(_whole(item, f"{path}.samples[{place}]", 0, 2**30) for place, item in enumerate(numbers))
+        if len(set(samples)) < len(samples):
+            raise InputError(f"{path}.samples: a number is given twice; leave one out")
+        samples = tuple(sorted(samples))
+    before = float(_positive(keys["before"], f"{path}.before")) if "before" in keys else 0.0
+    return Choice(float(_positive(keys.get("interval", interval), f"{path}.interval")), samples, before)
+
+
+@dataclass(frozen=True)
+class _Level:
+    """What one level of the file says, the top or a block, value by value.
+
+    Attributes:
+        path: where it is in the file.
+        keys: its keys as given.
+        sections: section → values by name.
+        distributions: name, or `all` → where it was given, and what: a distribution, `table` or `fixed`.
+    """
+
+    path: str = "sweep"
+    keys: Mapping[str, Any] = field(default_factory=dict)
+    sections: Mapping[str, Mapping[str, Value]] = field(default_factory=lambda: {section: {} for section in SECTIONS})
+    distributions: Mapping[str, tuple[str, Distribution | str]] = field(default_factory=dict)
+
+
+def _blocks(top: Mapping[str, Any]) -> Iterator[BlockPlan]:
+    """The blocks of a file; a file without the key `blocks` is itself one."""
+    if "blocks" not in top:
+        yield _block("main", _Level(), _level(top, "sweep"))
+        return
+    if "grid" in top:
+        raise InputError("sweep.grid: given together with blocks; move it into a block")
+    outer = _level(top, "sweep")
+    names: set[str] = set()
+    for number, content in enumerate(_sequence(top["blocks"], "sweep.blocks", "give a list of blocks")):
+        path = f"sweep.blocks[{number}]"
+        keys = _keys(content, path, _BLOCK_KEYS)
+        name = _text(_needed(keys, "name", path, "give the block a name"), f"{path}.name")
+        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
+            raise InputError(
+                f"{path}.name: {shown(name)} is no plain name; give letters, digits, - and _, "
+                "beginning with a letter or digit"
+            )
+        if name in names:
+            raise InputError(f"{path}.name: {shown(name)} is given twice; give another name")
+        names.add(name)
+        yield _block(name, outer, _level(keys, path))
+
+
+def _level(keys: Mapping[str, Any], path: str) -> _Level:
+    """Check the values of one level, each by itself."""
+    sections: dict[str, dict[str, Value]] = {}
+    for section, model in SECTIONS.items():
+        where = f"{path}.{section}"
+        values = _mapping(keys.get(section), where, tuple(model.model_fields))
+        sections[section] = {name: _checked(name, value, f"{where}.{name}") for name, value in values.items()}
+    where = f"{path}.distributions"
+    given = _mapping(keys.get("distributions"), where, ("all", *DRAWABLE))
+    distributions = {
+        name: (f"{where}.{name}", _distribution(name, value, f"{where}.{name}")) for name, value in given.items()
+    }
+    return _Level(path, keys, sections, distributions)
+
+
+def _block(name: str, outer: _Level, inner: _Level) -> BlockPlan:
+    """A block: what it says, and for the rest what the top level says."""
+    path, keys = inner.path, {**outer.keys, **inner.keys}
+    axes = _axes(inner)
+    sections = {
+        section: {
+            key: value
+            for key, value in {**outer.sections[section], **inner.sections[section]}.items()
+            if key not in axes
+        }
+        for section in SECTIONS
+    }
+    chosen = None
+    if "preset" not in axes:
+        chosen = _needed(keys, "preset", path, "name the parameters to start from, such as preset: paper")
+        chosen = str(_checked("preset", chosen, f"{path}.preset"))
+    sampler = keys.get("sampler", "random")
+    if sampler not in SAMPLERS:
+        raise InputError(f"{path}.sampler: {shown(sampler)} is unknown; {suggestion(sampler, SAMPLERS)}")
+    samples = _needed(keys, "samples", path, "give the number of samples per cell")
+    samples = _whole(samples, f"{path}.samples", 1, 2**30)
+    drawn = _drawn({**outer.distributions, **inner.distributions}, sections, axes)
+    check_design(sampler, samples, len(drawn), path)
+    return BlockPlan(path, name, chosen, sections, axes, drawn, sampler, samples)
+
+
+def _checked(name: str, value: object, path: str) -> Value:
+    """One value, checked by itself and converted as its model does.
+
+    Args:
+        name: `preset`, or a field of one of the `SECTIONS`.
+        value: the value.
+        path: where it was given, for errors.
+
+    Raises:
+        InputError: the field refuses the value, whatever the others are.
+    """
+    try:
+        if name == "preset":
+            preset(value)  # type: ignore[arg-type]
+            return str(value)
+        model = SECTIONS[_HOMES[name]]
+        values = {**(preset("paper").model_dump() if model is Parameters else {}), name: value}
+        try:
+            result: Value = getattr(model.model_validate(values), name)
+            return str(value) if name == "method" and value in METHODS_BY_NEED else result
+        except ValidationError as error:
+            if any(problem["loc"] for problem in error.errors()):
+                validated(model, values, "")
+        # Refused only beside default values, which may be those of no walk: left to the check of the cells.
+        result = float(value) if model.model_fields[name].annotation is float else value  # type: ignore
+        return result
+    except InputError as error:
+        raise InputError(path + str(error).removeprefix(".").removeprefix(name)) from None
+
+
+def _axes(level: _Level) -> dict[str, tuple[Value, ...]]:
+    """The axes of a level's grid, none of whose names is also given a fixed value there."""
+    where = f"{level.path}.grid"
+    axes = {}
+    for name, content in _mapping(level.keys.get("grid"), where, ("preset", *_HOMES)).items():
+        path = f"{where}.{name}"
+        home = _HOMES.get(name, name)
+        if name in level.sections.get(home, level.keys):
+            raise InputError(f"{path}: also given in {level.path}.{home}; leave one out")
+        if isinstance(content, Mapping):
+            content = _range(name, content, path)
+        values: list[Value] = []
+        remedy = f"give a list such as [{shown(content)}], or {{from:, to:, step:}}"
+        for number, item in enumerate(_sequence(content, path, remedy)):
+            value = _checked(name, item, f"{path}[{number}]")
+            if value in values:
+                raise InputError(f"{path}[{number}]: {shown(value)} is given twice; leave one out")
+            values.append(value)
+        axes[name] = tuple(values)
+    return axes
+
+
+def _range(name: str, content: Mapping[object, object], path: str) -> list[Value]:
+    """The values of an axis given as {from, to, step} or {from, to, count}, both ends included.
+
+    They are computed in decimals, so that three steps of 0.1 from 0 lead to 0.3 and to no other number.
+    """
+    kind = None if name == "preset" else SECTIONS[_HOMES[name]].model_fields[name].annotation
+    if kind not in (int, float):
+        raise InputError(f"{path}: {name} is no number and has no range; give a list of values")
+    keys = _keys(content, path, ("from", "to", "step", "count"))
+    ends = [
+        _checked(name, _needed(keys, key, path, f"give the {which} value"), f"{path}.{key}")
+        for key, which in (("from", "first"), ("to", "last"))
+    ]
+    first, last = (Decimal(str(end)) for end in ends)
+    if first >= last:
+        raise InputError(f"{path}.to: {ends[1]} is not greater than from: {ends[0]}; give a greater value")
+    if ("step" in keys) == ("count" in keys):
+        raise InputError(f"{path}: a range needs either step or count; give one of them")
+    if "count" in keys:
+        intervals = _whole(keys["count"], f"{path}.count", 2, AXIS_LIMIT) - 1
+        step = (last - first) / intervals
+    else:
+        step = Decimal(str(_positive(keys["step"], f"{path}.step")))
+        if (last - first) / step >= AXIS_LIMIT:
+            raise InputError(f"{path}.step: gives more than {AXIS_LIMIT} values; give a larger step")
+        intervals = int((last - first) / step)
+        below = first + intervals * step
+        if below != last:
+            raise InputError(
+                f"{path}.to: steps of {step} from {first} miss {last}; give {below} or {below + step}, "
+                "or a count instead of the step"
+            )
+    values = [first + number * step for number in range(intervals)] + [last]
+    if kind is float:
+        return [float(value) for value in values]
+    if any(value != int(value) for value in values):
+        key = "count" if "count" in keys else "step"
+        raise InputError(f"{path}.{key}: {shown(keys[key])} gives values that are not whole; give another")
+    return [int(value) for value in values]
+
+
+def _distribution(name: str, content: object, path: str) -> Distribution | str:
+    """What a level says about one quantity, or about `all`."""
+    if name == "all":
+        if content not in ("table", "fixed"):
+            raise InputError(f"{path}: {shown(content)} is unknown; give table or fixed")
+        return str(content)
+    if content == "fixed":
+        return "fixed"
+    if content == "table":
+        if name not in TABLE:
+            raise InputError(f"{path}: there is no uncertainty of {name} in Table 1; give uniform or gaussian")
+        return "table"
+    forms = _keys(content, path, ("uniform", "gaussian")) if isinstance(content, Mapping) else {}
+    if len(forms) != 1:
+        raise InputError(
+            f"{path}: {shown(content)} is no distribution; "
+            "give table, fixed, {uniform: [lower, upper]} or {gaussian: {mean: …, sigma: …}}"
+        )
+    bounds = physical_values(name)
+    if "uniform" in forms:
+        path += ".uniform"
+        ends = forms["uniform"]
+        if not isinstance(ends, Sequence) or isinstance(ends, str) or len(ends) != 2:
+            raise InputError(f"{path}: {shown(ends)} is no interval; give [lower, upper]")
+        lower, upper = (_end(name, end, f"{path}[{number}]", number == 0) for number, end in enumerate(ends))
+        if lower >= upper:
+            raise InputError(f"{path}[1]: {upper} is not greater than {lower}; give a greater value")
+        return Uniform(lower, upper, bounds)
+    path += ".gaussian"
+    gaussian = _keys(forms["gaussian"], path, ("mean", "sigma"))
+    mean = float(_checked(name, gaussian["mean"], f"{path}.mean")) if "mean" in gaussian else None
+    sigma = _positive(_needed(gaussian, "sigma", path, "give the standard deviation"), f"{path}.sigma")
+    return Gaussian(mean, sigma, bounds)
+
+
+def _end(name: str, value: object, path: str, is_lower: bool) -> float:
+    """An end of an interval; it may be a bound that is itself not physical, as 1 is for a phase."""
+    try:
+        return float(_checked(name, value, path))
+    except InputError:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise
+        if not physical_values(name).admit(math.nextafter(value, math.inf if is_lower else -math.inf)):
+            raise
+        return float(value)
+
+
+def _drawn(
+    given: Mapping[str, tuple[str, Distribution | str]],
+    sections: Mapping[str, Mapping[str, Value]],
+    axes: Mapping[str, tuple[Value, ...]],
+) -> dict[str, Distribution]:
+    """What a block draws, in the order of drawing.
+
+    A parameter with a given value is drawn about it. Phase and clearance with a given value are not drawn, and a
+    distribution with a mean or ends of its own contradicts a given value.
+    """
+    _, default = given.get("all", ("", "table"))
+    drawn: dict[str, Distribution] = {}
+    for name in DRAWABLE:
+        home = "grid" if name in axes else _HOMES[name] if name in sections[_HOMES[name]] else None
+        path, choice = given.get(name, ("", None))
+        if choice is None:
+            is_set = home is not None and name in Scene.model_fields
+            if default == "table" and name in TABLE and not is_set:
+                drawn[name] = TABLE[name]
+        elif choice != "fixed":
+            distribution = TABLE[name] if isinstance(choice, str) else choice
+            if home is not None and not (isinstance(distribution, Gaussian) and distribution.mean is None):
+                raise InputError(f"{path}: {name} also has a value in {home}; leave one out, or give fixed")
+            drawn[name] = distribution
+    return drawn
+
+
+def _same_samples_along(content: object, blocks: Sequence[BlockPlan]) -> tuple[str, ...]:
+    """The axes along which the same samples are used, sorted."""
+    if content is None:
+        return ()
+    path = "sweep.same_samples_along"
+    known = sorted({name for block in blocks for name in block.axes})
+    if not isinstance(content, Sequence) or isinstance(content, str):
+        raise InputError(f"{path}: {shown(content)} is no list; give names of axes, such as [tolerance]")
+    for number, name in enumerate(content):
+        if name not in known:
+            remedy = suggestion(name, known) if known else "leave it out"
+            raise InputError(f"{path}[{number}]: {shown(name)} is no axis of any block; {remedy}")
+        if name in content[:number]:
+            raise InputError(f"{path}[{number}]: {shown(name)} is given twice; leave one out")
+    return tuple(sorted(content))
+
+
+def _mapping(content: object, path: str, known: Sequence[str]) -> dict[str, Any]:
+    """A mapping with known keys; nothing at all is an empty one."""
+    if content is None:
+        return {}
+    if not isinstance(content, Mapping):
+        raise InputError(f"{path}: {shown(content)} is not a mapping; give keys with values")
+    for key in content:
+        if key not in known:
+            where = key if isinstance(key, str) and key.isidentifier() else shown(key)
+            raise InputError(f"{path}.{where}: unknown key; {suggestion(key, known)}")
+    return dict(content)
+
+
+def _keys(content: object, path: str, known: Sequence[str]) -> dict[str, Any]:
+    """A mapping with known keys, without those that have nothing behind them."""
+    return {key: value for key, value in _mapping(content, path, known).items() if value is not None}
+
+
+def _needed(keys: Mapping[str, Any], key: str, path: str, remedy: str) -> Any:
+    if key not in keys:
+        raise InputError(f"{path}.{key}: missing; {remedy}")
+    return keys[key]
+
+
+def _sequence(content: object, path: str, remedy: str) -> Sequence[object]:
+    """A list with at least one item."""
+    if not isinstance(content, Sequence) or isinstance(content, str):
+        raise InputError(f"{path}: {shown(content)} is no list; {remedy}")
+    if not content:
+        raise InputError(f"{path}: empty; give one item or more")
+    if len(content) > AXIS_LIMIT:
+        raise InputError(f"{path}: {len(content)} items; give at most {AXIS_LIMIT}")
+    return content
+
+
+def _whole(value: object, path: str, least: int, most: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        limit = f"2**{most.bit_length()} - 1" if most > 2**64 else str(most)
+        raise InputError(f"{path}: {shown(value)} is no whole number from {least} to {limit}; give one")
+    return value
+
+
+def _positive(value: object, path: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
+        raise InputError(f"{path}: {shown(value)} is no positive number; give one")
+    return value
+
+
+def _text(value: object, path: str) -> str:
+    if not isinstance(value, str) or not value.strip() or not value.isprintable():
+        raise InputError(f"{path}: {shown(value)} is no name; give a line of text")
+    return value

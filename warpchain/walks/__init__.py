@@ -1,0 +1,1 @@
+"""From the chains of a batch to the results of walks."""

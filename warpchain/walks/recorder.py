@@ -1,0 +1,157 @@
+"""Takes the time series and frames of a walk out of its world, between launches."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.engine.batch import Batch
+from warpchain.kernels import layout
+from warpchain.loop.before_release import BeforeRelease
+from warpchain.sweeps.recording import Keep
+from warpchain.walks.motion import Motion
+
+Array = NDArray[np.float64]
+
+EVERYTHING: Final = Keep(series_every=1, frame_every=1)
+SERIES_COLUMNS: Final = [layout.TIME, layout.CENTER_X, layout.CENTER_Y, layout.CENTER_U, layout.CENTER_V]
+"""Columns of a sample that are those of `warpchain.walks.motion.SERIES`."""
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """What one launch has recorded: samples (t, SAMPLE_COLUMNS), frames (f, n, 2) at times (f,), loads (f, n, 3)."""
+
+    samples: Array
+    frame_times: Array
+    frames: Array
+    loads: Array
+
+
+class Recorder:
+    """Samples and frames of one walk since its release, and of the last moments before if they are to be kept."""
+
+    def __init__(self, batch: Batch, world: int, keep: Keep = EVERYTHING) -> None:
+        """Begin with nothing.
+
+        Args:
+            batch: Where the walk runs; whether there are samples and frames, and how often, is up to it.
+            world: Index.
+            keep: Which of the samples are kept, and whether frames are.
+        """
+        self._batch, self._world, self._keep = batch, world, keep
+        self._has_samples, self._has_frames = batch.record.samples.size > 0, batch.record.frames.size > 0
+        self._interval = (keep.series_every or 1) * batch.options.record_interval
+        self._place = -1.0
+        self._last: Array = np.empty((0, layout.SAMPLE_COLUMNS))
+        self._samples: list[Array] = []
+        self._frame_times: list[Array] = []
+        self._frames: list[Array] = []
+        self._drive: list[_Piece] = []
+        self._before: BeforeRelease | None = None
+
+    @property
+    def before(self) -> BeforeRelease | None:
+        """What is kept of the time before the release; None: nothing."""
+        return self._before
+
+    def drain(self, released: bool) -> None:
+        """Take what the last launch wrote; what came before the release is forgotten but for what `release` wants."""
+        if not released and self._keep.before > 0:
+            self._drain_drive()
+            return
+        if self._has_samples:
+            samples = self._batch.drain_samples(self._world)
+            if released and self._keep.series_every is not None and len(samples):
+                self._samples.append(self._thinned(samples))
+                self._last = samples[-1:]
+        if self._has_frames:
+            times, frames = self._batch.drain_frames(self._world)
+            if released and self._keep.frame_every is not None:
+                self._frame_times.append(times)
+                self._frames.append(frames)
+
+    def _drain_drive(self) -> None:
+        """Take what the last launch wrote, and forget what is too old already."""
+        world = self._world
+        samples = self._batch.drain_samples(world) if self._has_samples else np.empty((0, layout.SAMPLE_COLUMNS))
+        loads = self._batch.frame_loads(world)
+        times, frames = self._batch.drain_frames(world)
+        self._drive.append(_Piece(samples, times, frames, loads))
+        oldest = self._batch.time(world) - self._keep.before
+        while self._drive and _ends_before(self._drive[0], oldest):
+            del self._drive[0]
+
+    def release(self, moment: float, raised: float, earliest: float) -> None:
+        """Keep what was recorded in the last moments of the drive, all of which has been drained.
+
+        Args:
+            moment: of the release, by the clock of the drive [s].
+            raised: height [m] by which the chain was raised at the release.
+            earliest: when the loop was last given its own loads [s]; nothing older is kept.
+        """
+        pieces, self._drive = self._drive, []
+        if not pieces:
+            return
+        samples, times, frames, loads = (
+            np.concatenate([getattr(piece, name) for piece in pieces])
+            for name in ("samples", "frame_times", "frames", "loads")
+        )
+        oldest = max(moment - self._keep.before, earliest)
+        is_wanted = (samples[:, layout.TIME] >= oldest) & (samples[:, layout.TIME] < moment)
+        samples = samples[is_wanted][:, SERIES_COLUMNS]
+        wanted = (times >= oldest) & (times < moment)
+        raise_by = np.array([0.0, raised])
+        self._before = BeforeRelease(
+            time=samples[:, 0] - moment,
+            center=samples[:, 1:3] + raise_by,
+            center_velocity=samples[:, 3:5],
+            frame_time=times[wanted] - moment,
+            frame_joints=frames[wanted] + raise_by,
+            frame_forces=loads[wanted, :, :2],
+            frame_moments=loads[wanted, :, 2],
+        )
+
+    def _thinned(self, samples: Array) -> Array:
+        """The first of the samples in each interval: steps may be longer than the time between two looks."""
+        if self._keep.series_every == 1:
+            return samples
+        places = np.floor(samples[:, layout.TIME] / self._interval)
+        is_first = np.diff(places, prepend=self._place) > 0
+        self._place = places[-1]
+        return samples[is_first]
+
+    def samples(self) -> Array:
+        """Samples (t, SAMPLE_COLUMNS), however few are kept the last one among them."""
+        kept = np.concatenate([np.empty((0, layout.SAMPLE_COLUMNS)), *self._samples])
+        is_there = len(kept) == 0 or kept[-1, layout.TIME] == self._last[0, layout.TIME]
+        return kept if is_there else np.concatenate([kept, self._last])
+
+    def frames(self, links: int) -> tuple[Array, Array]:
+        """Times of the frames (f,) [s], joint positions (f, n, 2) [m]."""
+        return (
+            np.concatenate([np.empty(0), *self._frame_times]),
+            np.concatenate([np.empty((0, links, 2)), *self._frames]),
+        )
+
+    def motion(self, links: int, sprocket_height: float = math.nan) -> Motion:
+        """What a sweep keeps of the walk."""
+        times, frames = self.frames(links)
+        series, joints = self.samples()[:, SERIES_COLUMNS], frames.astype(np.float32)
+        for array in (series, joints):  # which NaN a failed walk has may depend on the batch
+            array[np.isnan(array)] = np.nan
+        return Motion(
+            series=series,
+            frame_time=times,
+            frame_joints=joints,
+            sprocket_height=sprocket_height,
+            before_release=None if self._before is None else self._before.as_type(np.float32),
+        )
+
+
+def _ends_before(piece: _Piece, moment: float) -> bool:
+    """Whether all of a piece is older than a moment [s]."""
+    ends = [times[-1] for times in (piece.samples[:, layout.TIME], piece.frame_times) if len(times)]
+    return all(end < moment for end in ends)

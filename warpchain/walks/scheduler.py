@@ -1,0 +1,184 @@
+"""Many walks on the worlds of a batch: finished ones make room for waiting ones."""
+
+import threading
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+from warpchain.engine.batch import Batch
+from warpchain.engine.devices import most_worlds, start_device
+from warpchain.engine.kernel_choice import block_threads, features_of, load_kernels
+from warpchain.inputs.options import Options
+from warpchain.inputs.setup import Setup
+from warpchain.kernels import layout
+from warpchain.kernels.cpu.loop import Features
+from warpchain.status import Status
+from warpchain.sweeps.recording import NOTHING, Keep
+from warpchain.walks.walk_phases import Course
+
+TRIES = {"cpu": 20_000, "cuda": 200_000}
+"""Most tries of each chain per launch, by kind of device; what a walk gives does not depend on it.
+
+On a GPU a launch is cut by its time: tries in a pile take three times as long as in flight, and with equal numbers of
+tries every chain would wait for the slowest of its batch.
+"""
+CREWS = 4
+"""Batches that share a GPU: while the host looks after one of them, the others go on and fill the device."""
+NAP = 5e-4
+"""Pause [s] before looking again whether a batch is done."""
+
+
+def run_setups(
+    setups: Sequence[Setup],
+    *,
+    draw: Callable[[int], Setup] | None = None,
+    keeps: Sequence[Keep] | None = None,
+    slots: int | None = None,
+    threads: int | None = None,
+    stop: threading.Event | None = None,
+) -> Iterator[tuple[int, Course]]:
+    """Run walks and yield each when it is over, as (place in ``setups``, course).
+
+    A course must be read before the next one is asked for: its world is used again. What a walk gives does not depend,
+    to the bit, on the others or on the number of slots.
+
+    Args:
+        setups: The walks, samples drawn; with ``draw``, options and links suffice.
+        draw: Asked for a walk, by its place, when it begins; its options and links are those of ``setups``.
+        keeps: What is kept of the motion of each, for ``course.motion``; None: nothing. Walks of equal options keep
+            frames equally often.
+        slots: Chains that are carried on together in one launch. Default: on a GPU as many as fill it, on a CPU, where
+            a launch is one core's work, one at a time, which stays in the cache.
+        threads: Of every block on a GPU, see `warpchain.engine.kernel_choice.shared_threads`; no bit depends on it.
+        stop: When set, the walks are abandoned after the launch that is under way.
+    """
+    buckets: dict[tuple[Options, int], list[int]] = defaultdict(list)
+    for place, setup in enumerate(setups):
+        buckets[setup.options, layout.padded_width(setup.scene.links)].append(place)
+    for (options, _), places in buckets.items():
+        wanted = {place: keeps[place] if keeps is not None else NOTHING for place in places}
+        links = [setups[place].scene.links for place in places]
+        batches = _batches(options, links, list(wanted.values()), slots, threads)
+        yield from _run_bucket(setups, draw or setups.__getitem__, wanted, batches, stop)
+
+
+def _batches(
+    options: Options, links: Sequence[int], keeps: Sequence[Keep], slots: int | None, threads: int | None
+) -> list[Batch]:
+    """Room for walks: on a CPU one batch, on a GPU several, with as many worlds in all as are of use and fit."""
+    longest = max(links)
+    # Every batch keeps what any walk wants, although most may want nothing: others would wait for two slowest walks.
+    keeps_samples = any(keep.series_every for keep in keeps)
+    frame_every = next((keep.frame_every for keep in keeps if keep.frame_every), None)
+    keeps_loads = any(keep.before > 0 for keep in keeps)
+    on_gpu = options.device.startswith("cuda")
+    if slots is None:
+        fitting = (
+            most_worlds(
+                longest,
+                options,
+                keeps_samples=keeps_samples,
+                keeps_frames=frame_every is not None,
+                keeps_loads=keeps_loads,
+            )
+            if on_gpu
+            else 1
+        )
+        slots = min(fitting, len(links))
+    worlds = -(-slots // CREWS) if on_gpu else slots
+    return [
+        Batch(
+            min(worlds, slots - first),
+            longest,
+            options,
+            keeps_samples=keeps_samples,
+            frame_every=frame_every,
+            keeps_loads=keeps_loads,
+            threads=threads,
+        )
+        for first in range(0, slots, worlds)
+    ]
+
+
+def compile_kernels(setups: Iterable[Setup], threads: int | None = None) -> None:
+    """Make sure that every kernel these walks need is ready, before threads or processes ask for it at once.
+
+    Args:
+        setups: The walks.
+        threads: As for :func:`run_setups`.
+    """
+    wanted: set[tuple[str, Features, int]] = set()
+    for setup in setups:
+        columns = layout.padded_width(setup.scene.links)
+        bodies = [("floor", "rest")] + [("sprocket", "steady")] * (setup.scene.start != "ellipse")
+        for fixed_body, watch in bodies:
+            features = features_of(setup.options, columns, fixed_body=fixed_body, watch=watch)
+            size = (threads or block_threads(setup.scene.links)) if setup.options.device.startswith("cuda") else 1
+            wanted.add((setup.options.device, features, size))
+    load_kernels((start_device(device), features, size) for device, features, size in wanted)
+
+
+class _Crew:
+    """A batch and the walks on its worlds."""
+
+    def __init__(self, batch: Batch, draw: Callable[[int], Setup], wanted: Mapping[int, Keep]) -> None:
+        self.batch = batch
+        self._draw, self._wanted = draw, wanted
+        self._free = list(reversed(range(len(batch.links))))
+        self._running: dict[int, tuple[int, Course]] = {}
+        self._features: dict[int, Features] = {}
+
+    def begin(self, waiting: Iterator[int]) -> bool:
+        """Give waiting walks the free worlds and begin a launch; False if there is nothing to carry on."""
+        while self._free and (place := next(waiting, None)) is not None:
+            world = self._free.pop()
+            course = Course(self.batch, world, self._draw(place), self._wanted[place])
+            self._running[world] = place, course
+            self._features[world] = course.features
+        together: dict[Features, list[int]] = defaultdict(list)
+        for world, features in self._features.items():
+            together[features].append(world)
+        self.batch.start(together, TRIES["cuda" if self.batch.device.is_cuda else "cpu"])
+        return bool(together)
+
+    def end(self) -> Iterator[tuple[int, Course]]:
+        """Wait for the launch, and yield every walk that is over as its world becomes free."""
+        self.batch.finish()
+        running = self.batch.statuses() == Status.RUNNING
+        for world, (place, course) in list(self._running.items()):
+            course.drain()
+            if running[world]:
+                continue
+            if course.next_phase():
+                self._features[world] = course.features
+                continue
+            yield place, course
+            del self._running[world], self._features[world]
+            self._free.append(world)
+
+
+def _run_bucket(
+    setups: Sequence[Setup],
+    draw: Callable[[int], Setup],
+    wanted: Mapping[int, Keep],
+    batches: Sequence[Batch],
+    stop: threading.Event | None,
+) -> Iterator[tuple[int, Course]]:
+    """Run walks, by place, that share options and the width of their arrays."""
+    # long chains take longest: begun first, they are not what is waited for in the end
+    waiting = iter(sorted(wanted, key=lambda place: -setups[place].scene.links))
+    crews = [_Crew(batch, draw, wanted) for batch in batches]
+    try:
+        under_way = [crew for crew in crews if crew.begin(waiting)]
+        while under_way and not (stop is not None and stop.is_set()):
+            ready = next((crew for crew in under_way if crew.batch.is_done()), None)
+            if ready is None:
+                time.sleep(NAP)
+                continue
+            yield from ready.end()
+            under_way.remove(ready)
+            if ready.begin(waiting):
+                under_way.append(ready)
+    finally:
+        for crew in crews:
+            crew.batch.finish()

@@ -1,0 +1,302 @@
+"""The course of one walk on one world of a batch: which phase follows which, and what remains in the end.
+
+The drive (settle, spin-up, hold until steady) needs a sprocket and no floor, the walk a floor and no sprocket. The
+equations do not know where the floor is, so the chain is driven about the origin and raised to its clearance at the
+release.
+"""
+
+import math
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.engine.batch import COUNTS, EXTREMES, Batch
+from warpchain.engine.control import (
+    HOLD_STRAIN,
+    LOADED_STRAIN,
+    hold_softness,
+    line_density,
+    mean_weight,
+    push_rate,
+    suitable_load,
+)
+from warpchain.inputs.parameters import InputError, Parameters
+from warpchain.inputs.scene import contact_radius, joint_radius, loop_speed
+from warpchain.inputs.setup import Setup
+from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
+from warpchain.kernels import layout
+from warpchain.kernels.cpu.loop import Features
+from warpchain.status import Status
+from warpchain.sweeps.recording import NOTHING, Keep
+from warpchain.walks.motion import Motion
+from warpchain.walks.recorder import Recorder
+from warpchain.walks.walk_result import LOST
+
+Array = NDArray[np.float64]
+
+STILL_PERIOD = 0.25
+"""What counts as the loop period [s] when the sprocket stands still."""
+SHORTEST_WINDOW, LONGEST_WINDOW = 0.05, 0.25
+"""Bounds of the time [s] over which means are taken of a loop under its own loads; between them half a loop period."""
+BY_ITSELF = -1.0
+"""A time that the kernel sets, see :mod:`warpchain.kernels.events.steadiness`."""
+
+
+class Phase(Enum):
+    """Phases of a walk; the values are their names for people."""
+
+    SETTLE = "settle"
+    SPIN_UP = "spin up"
+    HOLD = "hold"
+    WALK = "walk"
+
+
+class Course:
+    """One walk: loads a world, and takes it into its next phase whenever it has stopped.
+
+    Attributes:
+        setup: What the walk is.
+        status: RUNNING until the course is over.
+        raised: Height [m] by which the chain was raised at the release, where the sprocket's centre was then; NaN
+            before the release.
+        drive_time: Simulated time [s] before the release.
+        drift: How far the loop moved while it was last watched on its sprocket, relative to its height or width; NaN if
+            it was not watched.
+        drive_counts: Counters (:data:`warpchain.engine.batch.COUNTS`) of the time before the release.
+        drive_extremes: Greatest opening and depths [m] of the time before the release.
+        recorder: What is kept of the motion since the release.
+    """
+
+    def __init__(self, batch: Batch, world: int, setup: Setup, keep: Keep = NOTHING) -> None:
+        """Place the chain of a walk in a world; the batch has the walk's options, and records what is to be kept."""
+        self.setup = setup
+        self.recorder = Recorder(batch, world, keep)
+        self.status = Status.RUNNING
+        self.raised = math.nan
+        self.drive_time = 0.0
+        self.drift = math.nan
+        self.drive_counts = dict.fromkeys(COUNTS, 0)
+        self.drive_extremes = dict.fromkeys(EXTREMES, 0.0)
+        self._batch, self._world = batch, world
+        self._hanging_lowest = math.nan
+        self._released = False
+
+        scene, parameters = setup.scene, setup.parameters
+        from_rest = scene.start == "rest"
+        speed = 2 * math.pi * scene.frequency * joint_radius(scene, parameters)
+        if scene.start == "ellipse":
+            batch.set_chain(world, parameters, scene.links)
+            try:
+                position, velocity = lay_chain(
+                    ellipse(scene.ellipse_aspect), scene.links, parameters.link_length, speed, scene.phase
+                )
+            except ValueError:
+                raise InputError(
+                    f"scene.ellipse_aspect: {scene.links} links cannot follow an ellipse of aspect "
+                    f"{scene.ellipse_aspect}; give one closer to 1, or more links"
+                ) from None
+            self._settled = self._at_full_speed = self._hold_softness = 0.0
+            self._release(position, velocity)
+            return
+        radius = joint_radius(scene, parameters)
+        tension = line_density(parameters) * speed**2
+        weight = mean_weight(parameters, scene.links, radius)
+        load_factor = scene.load_factor or suitable_load(parameters, setup.options, weight)
+        loaded_softness = 0.0
+        self._hold_softness = 0.0
+        if setup.options.soften_drive:
+            self._hold_softness = hold_softness(parameters, tension, HOLD_STRAIN)
+            loaded_softness = hold_softness(parameters, tension + load_factor * weight, LOADED_STRAIN)
+        period = scene.links * parameters.link_length / speed if speed > 0 else STILL_PERIOD
+        batch.set_chain(world, parameters, scene.links, contact_radius(scene, parameters))
+        self._settled = scene.settle_time if from_rest else 0.0
+        spin_up = scene.spin_up_time if from_rest and speed > 0 else 0.0
+        self._at_full_speed = self._settled + spin_up
+        position, velocity = lay_chain(
+            stadium(radius),
+            scene.links,
+            parameters.link_length,
+            0.0 if from_rest else speed,
+        )
+        batch.load(
+            world,
+            position,
+            velocity,
+            stop_time=self._settled,
+            stop_status=Status.FINISHED,
+            softness=self._hold_softness,
+        )
+        batch.set_program(
+            world,
+            sprocket_speed=-2 * math.pi * scene.frequency,  # clockwise, so that the walk goes towards +x
+            spin_up_start=self._settled,
+            spin_up_time=spin_up,
+            hold_start=self._at_full_speed,
+            loop_speed=loop_speed(scene, parameters),
+            loop_period=period,
+            load_factor=load_factor,
+            steady_window=min(max(period / 2, SHORTEST_WINDOW), LONGEST_WINDOW),
+            steady_time=BY_ITSELF if scene.steady_time is None else scene.steady_time,
+            steady_tolerance=scene.steady_tolerance,
+            further_hold=scene.further_hold,
+            release_phase=scene.phase,
+            hold_softness=self._hold_softness,
+            loaded_softness=loaded_softness,
+            push_rate=push_rate(setup.options),
+        )
+        if not from_rest:
+            self._start_drive()
+
+    @property
+    def phase(self) -> Phase:
+        """The phase that the world is in."""
+        if self._released:
+            return Phase.WALK
+        now = self._batch.time(self._world)
+        if now < self._settled:
+            return Phase.SETTLE
+        return Phase.SPIN_UP if now < self._at_full_speed else Phase.HOLD
+
+    @property
+    def features(self) -> Features:
+        """What the kernel that carries the world on must be compiled for."""
+        if self._released:
+            return self._batch.features(fixed_body="floor", watch="rest")
+        return self._batch.features(fixed_body="sprocket", watch="steady")
+
+    @property
+    def tries(self) -> int:
+        """Steps tried so far, accepted or not."""
+        counts = self.counts
+        return counts["accepted"] + counts["rejected"]
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Counters of all phases so far."""
+        if not self._released:
+            return self._batch.counts(self._world)
+        now = self._batch.counts(self._world)
+        return {name: self.drive_counts[name] + now[name] for name in COUNTS}
+
+    @property
+    def extremes(self) -> dict[str, float]:
+        """Greatest opening and depths [m] of all phases so far."""
+        if not self._released:
+            return self._batch.extremes(self._world)
+        now = self._batch.extremes(self._world)
+        return {name: max(self.drive_extremes[name], now[name]) for name in EXTREMES}
+
+    @property
+    def walk_time(self) -> float:
+        """Time [s] since the release."""
+        return self._batch.time(self._world) if self._released else 0.0
+
+    @property
+    def hold_time(self) -> float:
+        """Time [s] for which the loop was held at full frequency; NaN if it was not."""
+        if self.setup.scene.start == "ellipse":
+            return math.nan
+        end = self.drive_time if self._released else self._batch.time(self._world)
+        return max(0.0, end - self._at_full_speed)
+
+    @property
+    def simulated_time(self) -> float:
+        """Time [s] simulated so far."""
+        return self.drive_time + self.walk_time if self._released else self._batch.time(self._world)
+
+    @property
+    def speed(self) -> float:
+        """Speed [m/s] of the centre of mass in the walk, along the loop before."""
+        look = self._batch.last_look(self._world)
+        if self._released:
+            return math.hypot(look[layout.CENTER_U], look[layout.CENTER_V])
+        return float(look[layout.LOOP_SPEED])
+
+    @property
+    def dx(self) -> float:
+        """Δx [m]; NaN unless the chain is at rest."""
+        if self.status != Status.AT_REST:
+            return math.nan
+        return float(self._batch.last_look(self._world)[layout.CENTER_X])
+
+    @property
+    def softened_at(self) -> float:
+        """Time [s] since the release at which the joints were softened in the pile; NaN if they were not."""
+        return self._batch.softened_at(self._world)
+
+    def energy(self) -> dict[str, float]:
+        """Where the energy of the walk went [J]; NaN before the release. Keys: ``results.ENERGIES``."""
+        first, last = self._batch.first_look(self._world), self._batch.last_look(self._world)
+        losses = self._batch.losses(self._world)
+        lost = {name: losses[name] for name in LOST}
+        ledger = {
+            "kinetic_at_release": float(first[layout.KINETIC]),
+            "potential_at_release": float(first[layout.GRAVITATIONAL] + first[layout.SPRING]),
+            "kinetic_at_end": float(last[layout.KINETIC]),
+            "potential_at_end": float(last[layout.GRAVITATIONAL] + last[layout.SPRING]),
+            **lost,
+        }
+        at_release = ledger["kinetic_at_release"] + ledger["potential_at_release"]
+        at_end = ledger["kinetic_at_end"] + ledger["potential_at_end"]
+        ledger["residual"] = at_release - at_end - sum(lost.values())
+        return ledger if self._released else dict.fromkeys(ledger, math.nan)
+
+    @property
+    def motion(self) -> Motion:
+        """What is kept of the motion since the release."""
+        has_sprocket = self._released and self.setup.scene.start != "ellipse"
+        return self.recorder.motion(self.setup.scene.links, self.raised if has_sprocket else math.nan)
+
+    def drain(self) -> None:
+        """Take what a launch has recorded; to be called after each, before the next phase."""
+        self.recorder.drain(self._released)
+
+    def next_phase(self) -> bool:
+        """Take a world that has stopped into its next phase; False if the course is over."""
+        status = self._batch.status(self._world)
+        if not self._released:
+            self.drift = self._batch.drift(self._world)
+        if self._released or status != Status.FINISHED:
+            self.status = status
+            return False
+        if self._batch.time(self._world) <= self._settled and math.isnan(self._hanging_lowest):
+            position = self._batch.position(self._world)
+            self._hanging_lowest = lowest_point(position, self.setup.parameters)
+            self._start_drive()
+        else:
+            self.drive_time = self._batch.time(self._world)
+            self.drive_counts = self._batch.counts(self._world)
+            self.drive_extremes = self._batch.extremes(self._world)
+            free_since = max(self._at_full_speed, self._batch.unloaded_at(self._world))
+            self._release(self._batch.position(self._world), self._batch.velocity(self._world))
+            self.recorder.release(self.drive_time, self.raised, free_since)
+        return True
+
+    def _start_drive(self) -> None:
+        limit = self._at_full_speed + self.setup.scene.hold_limit
+        self._batch.resume(self._world, limit, Status.NOT_STEADY)
+
+    def _release(self, position: Array, velocity: Array) -> None:
+        scene = self.setup.scene
+        lowest = lowest_point(position, self.setup.parameters)
+        measured = self._hanging_lowest if scene.clearance_of == "hanging" else lowest
+        self.raised = scene.clearance - measured
+        position[:, 1] += self.raised
+        self._batch.set_chain(self._world, self.setup.parameters, scene.links)
+        self._batch.load(
+            self._world,
+            position,
+            velocity,
+            stop_time=scene.walk_limit,
+            stop_status=Status.TIME_LIMIT,
+            tries_before=self.drive_counts["accepted"] + self.drive_counts["rejected"],
+            softness=self._hold_softness,
+        )
+        self._released = True
+
+
+def lowest_point(position: Array, parameters: Parameters) -> float:
+    """Height [m] of the lowest point of a chain's circles; position (n, 3)."""
+    ends = position[:, 1] - parameters.link_length / 2 * np.abs(np.sin(position[:, 2]))
+    return float(np.min(ends)) - parameters.circle_radius
