@@ -13,7 +13,7 @@ MASS, INERTIA, INVERSE_MASS, INVERSE_INERTIA = 8, 9, 10, 11
 LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y = 12, 13, 14, 15
 LEFT_U, LEFT_V, RIGHT_U, RIGHT_V = 16, 17, 18, 19
 STAGE_ARM_X, STAGE_ARM_Y, STAGE_SPIN = 20, 21, 22
-# A finished try: candidate state and its error ratio.
+# A finished attempt: candidate state and its error ratio.
 NEW_X, NEW_Y, NEW_THETA, NEW_U, NEW_V, NEW_OMEGA = 23, 24, 25, 26, 27, 28
 ERROR = 29
 # Joint forces and torques, shifted by one: column i + 1 is joint i, column 0 repeats column n. At least three rows
@@ -73,10 +73,18 @@ OPENING, FLOOR_DEPTH, SPROCKET_DEPTH, SELF_DEPTH = 0, 1, 2, 3
 EXTREME_ROWS = 4
 
 # State.losses
-LOSS_FRICTION, LOSS_DAMPING, LOSS_FLOOR, LOSS_SPROCKET, LOSS_SELF, LOSS_SOFTENING, LOSS_HAND_OVER = 0, 1, 2, 3, 4, 5, 6
+LOSS_FRICTION, LOSS_DAMPING, LOSS_FLOOR, LOSS_SPROCKET, LOSS_SELF, LOSS_SOFTENING, LOSS_JOINT_SWITCH = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+)
 LOSS_ROWS = 7
 
-# Record.samples, State.first_look, State.last_look
+# Record.samples, State.first_sample, State.last_sample
 TIME, CENTER_X, CENTER_Y, CENTER_U, CENTER_V = 0, 1, 2, 3, 4
 KINETIC, GRAVITATIONAL, SPRING, LOWEST, RMS_SPEED = 5, 6, 7, 8, 9
 HEIGHT, WIDTH, LOOP_SPEED = 10, 11, 12

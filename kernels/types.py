@@ -36,7 +36,7 @@ class Model:
 
 
 @wp.struct
-class Program:
+class Drive:
     """What happens to a chain and when its run ends. Every array has shape (W,)."""
 
     sprocket_speed: wp.array(dtype=wp.float64)  # final angular velocity Ω [rad/s], counter-clockwise positive
@@ -60,7 +60,7 @@ class Program:
 class State:
     """What evolves. Shapes (W,) unless given.
 
-    A run is bit-identical however it is cut into launches: what the loop over steps remembers between two tries is
+    A run is bit-identical however it is cut into launches: what the loop over steps remembers between two attempts is
     kept here and in the chain's scratch block, which therefore belongs to its world until the run ends.
     """
 
@@ -75,7 +75,7 @@ class State:
     slack: wp.array(dtype=wp.float64)  # how far joints may yet move before the list is stale [m]; of blocks that fly
     step: wp.array(dtype=wp.float64)  # step that the controller proposes [s]
     last_error: wp.array(dtype=wp.float64)  # error ratio of the last accepted step (PI controller)
-    flies: wp.array(dtype=wp.int32)  # 1: on rigid joints, see hand_over
+    is_rigid: wp.array(dtype=wp.int32)  # 1: on rigid joints, see joint_switch
     other_step: wp.array(dtype=wp.float64)  # step that was proposed last on the other model of the joints [s]
     closing_time: wp.array(dtype=wp.float64)  # when joints may next be closed [s]
     next_sample: wp.array(dtype=wp.int64)  # index of the next sample mark
@@ -84,9 +84,9 @@ class State:
     softness: wp.array(dtype=wp.float64)  # of the joints: 0 the model's own, 1 soft, 2 softest; see softening
     load_factor: wp.array(dtype=wp.float64)  # of gravity, friction and inertia on the sprocket, see scaled_loads
     first_area: wp.array(dtype=wp.float64)  # enclosed by the loop when its run began [m²]
-    tries_before: wp.array(dtype=wp.int64)  # tries of the walk's earlier phases, for the limit
-    first_look: wp.array2d(dtype=wp.float64)  # (W, SAMPLE_COLUMNS): the chain when its run began …
-    last_look: wp.array2d(dtype=wp.float64)  # … and when it was last looked at, at the end of the run the last time
+    attempts_before: wp.array(dtype=wp.int64)  # attempts of the walk's earlier phases, for the limit
+    first_sample: wp.array2d(dtype=wp.float64)  # (W, SAMPLE_COLUMNS): the chain when its run began …
+    last_sample: wp.array2d(dtype=wp.float64)  # … and when it was last looked at, at the end of the run the last time
     counts: wp.array2d(dtype=wp.int64)  # (W, COUNT_ROWS)
     extremes: wp.array2d(dtype=wp.float64)  # (W, EXTREME_ROWS) [m]
     losses: wp.array2d(dtype=wp.float64)  # (W, LOSS_ROWS) [J]
@@ -115,8 +115,8 @@ class Control:
     contact_step: wp.float64  # longest step near a contact [s]
     skin: wp.float64  # margin of the neighbour list [m]
     smallest_step: wp.float64  # [s]
-    step_limit: wp.int64  # tries in all
-    tries: wp.int32  # tries in this launch
+    step_limit: wp.int64  # attempts in all
+    attempts: wp.int32  # attempts in this launch
     launch_time: wp.float64  # after which a block stops at its next look [s]
     sample_interval: wp.float64  # [s]
     frame_every: wp.int64  # samples per frame

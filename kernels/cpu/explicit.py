@@ -101,7 +101,7 @@ def begin_stages(K: wp.array2d(dtype=wp.float64), chain: Chain):
 
 @functools.cache
 def explicit_method(name: str):
-    """Warp functions of one tableau: (evaluate the first stage, try a step, commit it).
+    """Warp functions of one tableau: (evaluate the first stage, attempt a step, commit it).
 
     Args:
         name: Key of :data:`TABLEAUS`.

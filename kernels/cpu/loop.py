@@ -1,7 +1,7 @@
-"""The loop over steps: one CPU thread carries one chain through a bounded number of tries.
+"""The loop over steps: one CPU thread carries one chain through a bounded number of attempts.
 
 A method makes a step and an error estimate; the controller below accepts it and proposes the next; a contact pass
-follows each accepted step; the record looks at the chain every sample interval; a status says how it ended. A try
+follows each accepted step; the record looks at the chain every sample interval; a status says how it ended. An attempt
 that is not accepted leaves no trace but the counter and a smaller step.
 """
 
@@ -40,7 +40,7 @@ from warpchain.kernels.layout import (
     LIST_BUILDS,
     LOSS_DAMPING,
     LOSS_FRICTION,
-    LOSS_HAND_OVER,
+    LOSS_JOINT_SWITCH,
     LOSS_SELF,
     LOST_DAMPING,
     LOST_FIXED,
@@ -59,7 +59,7 @@ from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, classical_cont
 from warpchain.kernels.methods.method import METHODS
 from warpchain.kernels.physics.elementary import HALF, ONE, TWO, ZERO
 from warpchain.kernels.physics.scaled_loads import lay_inertias
-from warpchain.kernels.types import Chain, Control, Model, Program, Record, State
+from warpchain.kernels.types import Chain, Control, Drive, Model, Record, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -164,19 +164,19 @@ def state_is_finite(K: wp.array2d(dtype=wp.float64), chain: Chain):
 
 
 @wp.func
-def sprocket_turning(program: Program, world: int, time: wp.float64):
+def sprocket_turning(drive: Drive, world: int, time: wp.float64):
     """Angular velocity [rad/s] of the sprocket: a smooth step 3s² − 2s³ from 0 to its final value."""
-    ramp = program.spin_up_time[world]
-    since = time - program.spin_up_start[world]
+    ramp = drive.spin_up_time[world]
+    since = time - drive.spin_up_start[world]
     s = ONE
     if ramp > ZERO and since < ramp:
         s = wp.max(since, ZERO) / ramp
-    return program.sprocket_speed[world] * s * s * (wp.float64(3.0) - TWO * s)
+    return drive.sprocket_speed[world] * s * s * (wp.float64(3.0) - TWO * s)
 
 
 @functools.cache
 def make_advance(features: Features):
-    """Kernel ``advance(worlds, model, program, state, record, scratch, lists, control)``, one thread per chain.
+    """Kernel ``advance(worlds, model, drive, state, record, scratch, lists, control)``, one thread per chain.
 
     worlds: (launched,) int32, the worlds to carry on; those whose status is not RUNNING are passed over. scratch: (W,
     rows, columns) float64, lists: (W, size) int32, see :mod:`layout` and :mod:`cpu.contacts.neighbour_list`; both
@@ -213,7 +213,7 @@ def make_advance(features: Features):
     def advance(
         worlds: wp.array(dtype=wp.int32),
         model: Model,
-        program: Program,
+        drive: Drive,
         state: State,
         record: Record,
         scratch: wp.array3d(dtype=wp.float64),
@@ -229,7 +229,7 @@ def make_advance(features: Features):
         if wp.static(softens):
             longest = contact_step(state, control, world, wp.static(is_driven))
         if wp.static(softens or is_driven):
-            tolerance = spring_tolerance(program, state, control, world, wp.static(is_driven))
+            tolerance = spring_tolerance(drive, state, control, world, wp.static(is_driven))
         block = scratch[world]
         K = wp.array(ptr=block.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
         block_list = lists[world]
@@ -254,19 +254,19 @@ def make_advance(features: Features):
         time = state.time[world]
         step = state.step[world]
         last_error = state.last_error[world]
-        flies = state.flies[world]
+        is_rigid = state.is_rigid[world]
         closing_time = state.closing_time[world]
         other_step = state.other_step[world]
-        tries = int(0)
-        while status == RUNNING and tries < control.tries and not record_is_full(record, world):
+        attempts = int(0)
+        while status == RUNNING and attempts < control.attempts and not record_is_full(record, world):
             if time >= wp.float64(state.next_sample[world]) * control.sample_interval:
                 softness = state.softness[world]
                 load_factor = state.load_factor[world]
-                status = look(K, chain, program, state, record, control, world, time)
+                status = look(K, chain, drive, state, record, control, world, time)
                 if wp.static(softens):
                     longest = contact_step(state, control, world, wp.static(is_driven))
                 if wp.static(softens or is_driven):
-                    tolerance = spring_tolerance(program, state, control, world, wp.static(is_driven))
+                    tolerance = spring_tolerance(drive, state, control, world, wp.static(is_driven))
                     if has_changed(state, world, softness, load_factor):
                         after = present(model, state, control, world)
                         book_softening(chain, after, state, world)
@@ -282,24 +282,24 @@ def make_advance(features: Features):
                 break
             if wp.static(has_flight):
                 # flights of soft joints save nothing: their springs ring longer than impulses pause
-                if flies == 0 and time >= closing_time and state.softness[world] == ZERO:
+                if is_rigid == 0 and time >= closing_time and state.softness[world] == ZERO:
                     closed, lost = close_joints(K, chain)
                     closing_time = time + QUIET_TIME
                     if closed:
-                        flies = int(1)
+                        is_rigid = int(1)
                         slack = wp.float64(-1.0)  # the next list has the skin of flights
                         step, other_step = other_step + ZERO, step + ZERO
                         last_error = ONE
                         place_ends(K, chain)
-                        state.losses[world, LOSS_HAND_OVER] = state.losses[world, LOSS_HAND_OVER] + lost
-            if flies == 0 and has_first_stage == 0:
+                        state.losses[world, LOSS_JOINT_SWITCH] = state.losses[world, LOSS_JOINT_SWITCH] + lost
+            if is_rigid == 0 and has_first_stage == 0:
                 first_stage(K, chain)
                 has_first_stage = int(1)
 
             # near contacts the step is bounded; far from them nothing may come through the skin unseen
             h = step
             if wp.static(has_fixed or has_self):
-                if flies == 0:
+                if is_rigid == 0:
                     room = control.skin
                     near = bool(False)
                     if wp.static(has_fixed):
@@ -313,7 +313,7 @@ def make_advance(features: Features):
                     else:
                         h = wp.min(h, wp.max(longest, room / greatest_speed(K, chain)))
                 if wp.static(has_flight):
-                    if flies != 0:
+                    if is_rigid != 0:
                         approach = ZERO
                         if wp.static(has_floor):
                             approach = fastest_fall(K, chain)
@@ -326,19 +326,19 @@ def make_advance(features: Features):
                 h = stop_time - time
 
             error_bits = wp.int64(0)
-            if flies == 0:
+            if is_rigid == 0:
                 error_bits = attempt(K, chain, h, tolerance)
             if wp.static(has_flight):
-                if flies != 0:
+                if is_rigid != 0:
                     error_bits = attempt_flight(K, chain, h, control.flight_tolerance)
             error = wp.cast(error_bits, wp.float64)
-            tries += 1
+            attempts += 1
             if not (error <= ONE):
                 state.counts[world, REJECTED] = state.counts[world, REJECTED] + wp.int64(1)
                 if wp.isfinite(error):
                     factor = shrinkage(error)
                     if wp.static(has_flight):
-                        if flies != 0:
+                        if is_rigid != 0:
                             factor = flight_shrinkage(error)
                     step = h * factor
                 else:
@@ -348,12 +348,12 @@ def make_advance(features: Features):
                 if status == RUNNING and step < control.smallest_step:
                     status = int(STEP_TOO_SMALL)
             else:
-                if flies == 0:
+                if is_rigid == 0:
                     commit(K, chain, h)
                 factor = growth(error, last_error, control.proportional)
                 are_stiff = bool(True)
                 if wp.static(has_flight):
-                    if flies != 0:
+                    if is_rigid != 0:
                         are_stiff = commit_flight(K, chain, h)
                         factor = flight_growth(error, last_error, control.proportional)
                 state.counts[world, ACCEPTED] = state.counts[world, ACCEPTED] + wp.int64(1)
@@ -382,16 +382,14 @@ def make_advance(features: Features):
                     gap = sprocket_gap(K, chain)
                     if gap < ZERO:
                         state.extremes[world, SPROCKET_DEPTH] = wp.max(state.extremes[world, SPROCKET_DEPTH], -gap)
-                        hits = resolve_sprocket(
-                            K, chain, sprocket_turning(program, world, time), program.push_rate[world]
-                        )
+                        hits = resolve_sprocket(K, chain, sprocket_turning(drive, world, time), drive.push_rate[world])
                         state.counts[world, SPROCKET_IMPULSES] = state.counts[world, SPROCKET_IMPULSES] + hits
                         impulses += hits
                 if wp.static(has_self):
                     skin = control.skin
                     least_slack = ZERO
                     if wp.static(has_flight):
-                        if flies != 0:
+                        if is_rigid != 0:
                             skin = FLIGHT_SKIN * control.skin
                             least_slack = LEAST_SLACK * skin
                     if slack > ZERO:
@@ -413,18 +411,18 @@ def make_advance(features: Features):
                     if impulses > wp.int64(0) or not are_stiff:
                         closing_time = time + QUIET_TIME
                         has_first_stage = int(0)
-                        if flies != 0:
+                        if is_rigid != 0:
                             lost = open_joints(K, chain)
-                            flies = int(0)
+                            is_rigid = int(0)
                             step, other_step = other_step + ZERO, step + ZERO
                             last_error = ONE
                             place_ends(K, chain)
-                            state.losses[world, LOSS_HAND_OVER] = state.losses[world, LOSS_HAND_OVER] + lost
+                            state.losses[world, LOSS_JOINT_SWITCH] = state.losses[world, LOSS_JOINT_SWITCH] + lost
             if status == RUNNING:
-                total = state.tries_before[world] + state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
+                total = state.attempts_before[world] + state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
                 if total >= control.step_limit:
                     status = int(STEP_LIMIT)
-        if status != RUNNING and status != NOT_FINITE and state.last_look[world, TIME] != time:
+        if status != RUNNING and status != NOT_FINITE and state.last_sample[world, TIME] != time:
             # the series ends with the state in which the run ends
             place_ends(K, chain)
             write_sample(state, record, world, time, summarise(K, chain))
@@ -435,7 +433,7 @@ def make_advance(features: Features):
         state.time[world] = time
         state.step[world] = step
         state.last_error[world] = last_error
-        state.flies[world] = flies
+        state.is_rigid[world] = is_rigid
         state.closing_time[world] = closing_time
         state.other_step[world] = other_step
         state.status[world] = status

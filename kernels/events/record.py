@@ -35,7 +35,7 @@ from warpchain.kernels.layout import (
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.joint import friction_torque, joint_force
 from warpchain.kernels.physics.scaled_loads import drag_shape
-from warpchain.kernels.types import Chain, Control, Program, Record, State
+from warpchain.kernels.types import Chain, Control, Drive, Record, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -80,9 +80,9 @@ def write_row(rows: wp.array2d(dtype=wp.float64), row: int, time: wp.float64, su
 @wp.func
 def write_sample(state: State, record: Record, world: int, time: wp.float64, summary: Summary):
     """Notes the first and the last look at a chain, and appends to the time series if it is kept."""
-    if state.last_look[world, TIME] < ZERO:
-        write_row(state.first_look, world, time, summary)
-    write_row(state.last_look, world, time, summary)
+    if state.last_sample[world, TIME] < ZERO:
+        write_row(state.first_sample, world, time, summary)
+    write_row(state.last_sample, world, time, summary)
     if record.samples.shape[1] > 0:
         row = record.sample_count[world]
         write_row(record.samples[world], row, time, summary)
@@ -147,7 +147,7 @@ def sampling(watch: str, softens: bool = False):
     def look(
         K: wp.array2d(dtype=wp.float64),
         chain: Chain,
-        program: Program,
+        drive: Drive,
         state: State,
         record: Record,
         control: Control,
@@ -155,7 +155,7 @@ def sampling(watch: str, softens: bool = False):
         time: wp.float64,
     ):
         mark = state.next_sample[world]
-        last_time = state.last_look[world, TIME]
+        last_time = state.last_sample[world, TIME]
         is_first = last_time < ZERO
         summary = summarise(K, chain)
         write_sample(state, record, world, time, summary)
@@ -164,18 +164,18 @@ def sampling(watch: str, softens: bool = False):
         passed = wp.int64(wp.floor(time / control.sample_interval))
         state.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
         if wp.static(softens and watches_rest):
-            watch_stiffening(state, program, control, world, time)
+            watch_stiffening(state, drive, control, world, time)
             watch_collapse(K, chain, state, control, world, time, is_first)
         if wp.static(watches_rest):
             return watch_rest(state, control, world, time, summary)
         if wp.static(watches_steadiness):
             if state.load_factor[world] > wp.float64(1.0):
-                rate = drag_rate(chain, state, program, world, summary.height)
+                rate = drag_rate(chain, state, drive, world, summary.height)
                 drag_shape(K, chain, wp.exp(-rate * (time - last_time)))
-            watch_steadiness(chain, state, program, world, time, summary)
-            state.load_factor[world] = load_at(state, program, world, time)
+            watch_steadiness(chain, state, drive, world, time, summary)
+            state.load_factor[world] = load_at(state, drive, world, time)
         if wp.static(softens and watches_steadiness):
-            watch_drive(state, program, control, world, time)
+            watch_drive(state, drive, control, world, time)
         return RUNNING
 
     return look

@@ -33,7 +33,7 @@ from warpchain.kernels.layout import (
     TIME,
 )
 from warpchain.kernels.physics.elementary import HALF, ONE, TWO, ZERO
-from warpchain.kernels.types import Chain, Control, Program, State
+from warpchain.kernels.types import Chain, Control, Drive, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -89,7 +89,7 @@ def contact_step(state: State, control: Control, world: int, is_driven: bool):
 
 
 @wp.func
-def spring_tolerance(program: Program, state: State, control: Control, world: int, is_driven: bool):
+def spring_tolerance(drive: Drive, state: State, control: Control, world: int, is_driven: bool):
     """Error allowed in a step of the springs after the last look.
 
     Ten times as much until a loop that is driven is held under its own loads: it forgets what came before, and steps
@@ -97,7 +97,7 @@ def spring_tolerance(program: Program, state: State, control: Control, world: in
     """
     tolerance = wp.where(state.softness[world] >= ONE, control.soft_tolerance, control.tolerance)
     if is_driven:
-        is_spun_up = state.last_look[world, TIME] >= program.hold_start[world]
+        is_spun_up = state.last_sample[world, TIME] >= drive.hold_start[world]
         if not is_spun_up or state.load_factor[world] > ONE:
             tolerance = wp.min(TEN * tolerance, ROUGHEST)
     return tolerance
@@ -106,7 +106,7 @@ def spring_tolerance(program: Program, state: State, control: Control, world: in
 @wp.func
 def book_softening(before: Chain, after: Chain, state: State, world: int):
     """Books the energy that a change of the joints' stiffness at the last look sets free."""
-    freed = state.last_look[world, SPRING] * (ONE - after.joint_stiffness / before.joint_stiffness)
+    freed = state.last_sample[world, SPRING] * (ONE - after.joint_stiffness / before.joint_stiffness)
     state.losses[world, LOSS_SOFTENING] = state.losses[world, LOSS_SOFTENING] + freed
 
 
@@ -156,19 +156,19 @@ def watch_collapse(
 
 
 @wp.func
-def watch_stiffening(state: State, program: Program, control: Control, world: int, time: wp.float64):
+def watch_stiffening(state: State, drive: Drive, control: Control, world: int, time: wp.float64):
     """Gives joints that were soft on the sprocket their own values back, in the first moments after the release."""
     if state.softness[world] > ZERO and state.watch[world, SOFTENED_AT] < ZERO:
         left = wp.max(ZERO, ONE - time / control.stiffening_time)
-        state.softness[world] = program.hold_softness[world] * left
+        state.softness[world] = drive.hold_softness[world] * left
 
 
 @wp.func
-def watch_drive(state: State, program: Program, control: Control, world: int, time: wp.float64):
+def watch_drive(state: State, drive: Drive, control: Control, world: int, time: wp.float64):
     """Makes joints softest until the sprocket has spun up, and as soft as the hold allows by the time it begins."""
-    ahead = (program.hold_start[world] - time) / control.stiffening_time
-    hold = program.hold_softness[world]
+    ahead = (drive.hold_start[world] - time) / control.stiffening_time
+    hold = drive.hold_softness[world]
     if state.load_factor[world] > ONE:
         share = wp.log(state.load_factor[world]) / wp.log(state.watch[world, HOLD_LOAD])
-        hold += (program.loaded_softness[world] - hold) * share
+        hold += (drive.loaded_softness[world] - hold) * share
     state.softness[world] = hold + (TWO - hold) * wp.clamp(ahead, ZERO, ONE)

@@ -43,7 +43,7 @@ from warpchain.kernels.layout import (
 )
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO
 from warpchain.kernels.physics.scaled_loads import DRAG_PER_CROSSING, DRAG_PER_TURN, crossing_time
-from warpchain.kernels.types import Chain, Program, State
+from warpchain.kernels.types import Chain, Drive, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -67,9 +67,9 @@ SHORTEST_WINDOW = wp.constant(wp.float64(0.05))
 
 
 @wp.func
-def is_watched(state: State, program: Program, world: int, time: wp.float64):
+def is_watched(state: State, drive: Drive, world: int, time: wp.float64):
     """Whether the loop is being held and its release has not been set."""
-    return state.stop_status[world] != FINISHED and time >= program.hold_start[world]
+    return state.stop_status[world] != FINISHED and time >= drive.hold_start[world]
 
 
 @wp.func
@@ -96,11 +96,11 @@ def widen(state: State, world: int, least: int, greatest: int, mean: wp.float64,
 
 
 @wp.func
-def load_at(state: State, program: Program, world: int, time: wp.float64):
+def load_at(state: State, drive: Drive, world: int, time: wp.float64):
     """Factor of the loads at this moment of the drive."""
     if state.watch[world, HOLD_LOAD] < ONE:
-        state.watch[world, HOLD_LOAD] = wp.max(program.load_factor[world], ONE)
-    if time < program.hold_start[world]:
+        state.watch[world, HOLD_LOAD] = wp.max(drive.load_factor[world], ONE)
+    if time < drive.hold_start[world]:
         return ONE
     load = state.watch[world, HOLD_LOAD]
     since = state.watch[world, UNLOADED_SINCE]
@@ -110,20 +110,20 @@ def load_at(state: State, program: Program, world: int, time: wp.float64):
 
 
 @wp.func
-def drag_rate(chain: Chain, state: State, program: Program, world: int, height: wp.float64):
+def drag_rate(chain: Chain, state: State, drive: Drive, world: int, height: wp.float64):
     """Rate γ [1/s] of the drag on the shape of a chain under its present loads."""
     full = state.watch[world, HOLD_LOAD]
     present = state.load_factor[world]
     gravity = chain.gravity * full / present
-    crossing = crossing_time(program.loop_speed[world], gravity, chain.sprocket_radius, height)
-    turns = program.loop_speed[world] / height
+    crossing = crossing_time(drive.loop_speed[world], gravity, chain.sprocket_radius, height)
+    turns = drive.loop_speed[world] / height
     return (DRAG_PER_CROSSING / crossing + DRAG_PER_TURN * turns) * (present - ONE) / full
 
 
 @wp.func
-def watch_steadiness(chain: Chain, state: State, program: Program, world: int, time: wp.float64, summary: Summary):
+def watch_steadiness(chain: Chain, state: State, drive: Drive, world: int, time: wp.float64, summary: Summary):
     """Ends a window if it is time to, and says what follows: loads fall, or the moment of the release is set."""
-    if not is_watched(state, program, world, time):
+    if not is_watched(state, drive, world, time):
         return
     is_free = state.load_factor[world] == ONE
     is_loaded = not is_free and state.watch[world, UNLOADED_SINCE] < ZERO
@@ -141,16 +141,16 @@ def watch_steadiness(chain: Chain, state: State, program: Program, world: int, t
     state.watch[world, SUM_Y] = state.watch[world, SUM_Y] + summary.center_y
     state.watch[world, SUM_SPEED] = state.watch[world, SUM_SPEED] + summary.loop_speed
 
-    crossing = crossing_time(program.loop_speed[world], chain.gravity, chain.sprocket_radius, summary.height)
-    window = program.steady_window[world]
-    wanted = program.steady_time[world]
+    crossing = crossing_time(drive.loop_speed[world], chain.gravity, chain.sprocket_radius, summary.height)
+    window = drive.steady_window[world]
+    wanted = drive.steady_time[world]
     if is_loaded:
         window = wp.max(SHORTEST_WINDOW, HALF * crossing)
         wanted = crossing
     elif wanted < ZERO:
-        slips = program.loop_speed[world] - summary.loop_speed > LITTLE_SLIP * program.loop_speed[world]
+        slips = drive.loop_speed[world] - summary.loop_speed > LITTLE_SLIP * drive.loop_speed[world]
         was_loaded = state.watch[world, HOLD_LOAD] > ONE
-        wanted = wp.where(was_loaded and not slips, program.loop_period[world], crossing)
+        wanted = wp.where(was_loaded and not slips, drive.loop_period[world], crossing)
     if time - state.watch[world, WINDOW_START] < window:
         return
 
@@ -168,9 +168,9 @@ def watch_steadiness(chain: Chain, state: State, program: Program, world: int, t
     up = widen(state, world, LEAST_Y, GREATEST_Y, y, is_first)
     drift = wp.max(wp.max(tall, up) / height, wp.max(wide, aside) / width)
     state.watch[world, DRIFT] = drift
-    target = program.loop_speed[world]
+    target = drive.loop_speed[world]
     uneven = widen(state, world, LEAST_SPEED, GREATEST_SPEED, speed, is_first)
-    tolerance = program.steady_tolerance[world]
+    tolerance = drive.steady_tolerance[world]
     is_fast_enough = wp.abs(speed - target) <= wp.max(MOST_SLIP * target, SLOWEST_STEADY)
     keeps_speed = is_fast_enough and uneven <= wp.max(tolerance * target, SLOWEST_STEADY)
     keeps_shape = drift <= tolerance
@@ -189,7 +189,7 @@ def watch_steadiness(chain: Chain, state: State, program: Program, world: int, t
         state.watch[world, UNLOADED_SINCE] = time
         state.watch[world, STEADY_SINCE] = time + LOADING_TIME
     elif is_over:
-        wait = program.further_hold[world] + program.release_phase[world] * program.loop_period[world]
+        wait = drive.further_hold[world] + drive.release_phase[world] * drive.loop_period[world]
         state.stop_time[world] = time + wait
         state.stop_status[world] = FINISHED
     leaves_shape = is_free and state.watch[world, HOLD_LOAD] > ONE and not (is_first or keeps_shape)

@@ -45,7 +45,7 @@ class Ahead:
 
 @functools.cache
 def explicit_attempt(name: str, block_dim: int, survey: Any, surveyed: Any):
-    """Warp function that tries a step with a tableau in blocks of this size.
+    """Warp function that attempts a step with a tableau in blocks of this size.
 
     Args:
         name: Key of :data:`TABLEAUS`.
@@ -66,7 +66,7 @@ def explicit_attempt(name: str, block_dim: int, survey: Any, surveyed: Any):
     velocity = (*tableau.velocity, velocity_weights)
     position = (*tableau.position, tableau.position_weights)
     nodes = (*tableau.nodes, 1.0)
-    hand_over, stage = block_stage(block_dim)
+    exchange_ends, stage = block_stage(block_dim)
     Stages = wp.types.vector(length=stages, dtype=wp.float64)
 
     def look_ahead(s: int):
@@ -143,7 +143,7 @@ def explicit_attempt(name: str, block_dim: int, survey: Any, surveyed: Any):
             there.u = link.u + h * row.u
             there.v = link.v + h * row.v
             there.omega = link.omega + h * row.omega
-            next_end = hand_over(ends, place, there)
+            next_end = exchange_ends(ends, place, there)
             # what does not depend on this stage, while its friction is worked out
             if wp.static(s < last or not reuses_last):
                 row = wp.static(rows[s + 1])(link, h, ax, ay, at)

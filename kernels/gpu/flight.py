@@ -37,7 +37,7 @@ COEFFICIENTS = (*_padded(ROS34PW2.nodes), *_padded(ROS34PW2.couplings), ROS34PW2
 
 @functools.cache
 def flight_attempt(block_dim: int):
-    """Warp function that tries a step on rigid joints in blocks of this size.
+    """Warp function that attempts a step on rigid joints in blocks of this size.
 
     Returns:
         ``attempt(M, K, place, h)`` → Trial, from the state and the accelerations on the board.

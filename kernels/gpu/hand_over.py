@@ -18,7 +18,13 @@ from warpchain.kernels.gpu.contacts.proximity import block_approach
 from warpchain.kernels.gpu.rigid import FlightMemory
 from warpchain.kernels.gpu.stage import Place
 from warpchain.kernels.gpu.threads import barrier
-from warpchain.kernels.layout import BOARD_NOTES, LOSS_HAND_OVER, NOTE_CLOSING_TIME, NOTE_CONTACT_STEP, NOTE_OTHER_STEP
+from warpchain.kernels.layout import (
+    BOARD_NOTES,
+    LOSS_JOINT_SWITCH,
+    NOTE_CLOSING_TIME,
+    NOTE_CONTACT_STEP,
+    NOTE_OTHER_STEP,
+)
 from warpchain.kernels.methods.controller import classical_controller
 from warpchain.kernels.methods.method import METHODS, Flight
 from warpchain.kernels.physics.elementary import ONE, ZERO
@@ -47,7 +53,7 @@ class BlockHandOver:
     """Warp functions for blocks of one size.
 
     Attributes:
-        attempt: Tries a step of a flight, see :mod:`gpu.flight`.
+        attempt: Attempts a step of a flight, see :mod:`gpu.flight`.
         take_off: ``(M, K, state, world, place, time)``, on springs → whether joints are closed now.
         longest_step: ``(K, L, memory, place, pairs, slack)`` → bound [s] of the next step of a flight.
         follow: ``(M, K, place)``, after a step of a flight → whether that may go on, whether springs would hold little
@@ -84,7 +90,7 @@ def block_hand_over(features: Features, block_dim: int) -> BlockHandOver:
             if place.lane == 0:
                 K[BOARD_NOTES, NOTE_CLOSING_TIME] = time + QUIET_TIME
                 if is_closed:
-                    state.losses[world, LOSS_HAND_OVER] = state.losses[world, LOSS_HAND_OVER] + lost
+                    state.losses[world, LOSS_JOINT_SWITCH] = state.losses[world, LOSS_JOINT_SWITCH] + lost
         return is_closed
 
     @wp.func
@@ -120,7 +126,7 @@ def block_hand_over(features: Features, block_dim: int) -> BlockHandOver:
         if is_stiff:
             lost = open_joints(M, K, place, kinetic)
             if place.lane == 0:
-                state.losses[world, LOSS_HAND_OVER] = state.losses[world, LOSS_HAND_OVER] + lost
+                state.losses[world, LOSS_JOINT_SWITCH] = state.losses[world, LOSS_JOINT_SWITCH] + lost
 
     return BlockHandOver(attempt, take_off, longest_step, follow, land)
 
@@ -129,7 +135,7 @@ def block_hand_over(features: Features, block_dim: int) -> BlockHandOver:
 def step_factors(features: Features):
     """Warp functions (factor after acceptance, factor after rejection) for steps on springs and in flight.
 
-    ``grow(error, last_error, proportional, flies)`` and ``shrink(error, flies)`` → what the next step is multiplied by.
+    ``grow(error, last_error, proportional, is_rigid)`` and ``shrink(error, is_rigid)`` → factors.
     """
     method = METHODS[features.method]
     flight = flight_of(features)
@@ -138,18 +144,18 @@ def step_factors(features: Features):
     has_flight = flight is not None
 
     @wp.func
-    def grow(error: wp.float32, last_error: wp.float32, proportional: int, flies: int):
+    def grow(error: wp.float32, last_error: wp.float32, proportional: int, is_rigid: int):
         factor = wp.float64(growth(error, last_error, proportional))
         if wp.static(has_flight):
-            if flies != 0:
+            if is_rigid != 0:
                 factor = flight_growth(wp.float64(error), wp.float64(last_error), proportional)
         return factor
 
     @wp.func
-    def shrink(error: wp.float32, flies: int):
+    def shrink(error: wp.float32, is_rigid: int):
         factor = wp.float64(shrinkage(error))
         if wp.static(has_flight):
-            if flies != 0:
+            if is_rigid != 0:
                 factor = flight_shrinkage(wp.float64(error))
         return factor
 
@@ -158,19 +164,19 @@ def step_factors(features: Features):
 
 @functools.cache
 def list_margins(features: Features):
-    """Warp function ``margins(control, flies, slack, opening, displacement)`` → skin, slack of the list, is it stale.
+    """Warp function ``margins(control, is_rigid, slack, opening, displacement)`` → skin, slack, is it stale.
 
     ``slack``: as it was, [m]; a flight begins with none, and thus a list of its own.
     """
     has_flight = flight_of(features) is not None
 
     @wp.func
-    def margins(control: Control, flies: int, slack: wp.float32, opening: wp.float32, displacement: wp.float32):
+    def margins(control: Control, is_rigid: int, slack: wp.float32, opening: wp.float32, displacement: wp.float32):
         skin = control.skin
         least = wp.float32(0.0)
         left = slack
         if wp.static(has_flight):
-            if flies != 0:
+            if is_rigid != 0:
                 skin = FLIGHT_SKIN * skin
                 least = wp.float32(LEAST_SLACK * skin)
             if slack > wp.float32(0.0):

@@ -5,8 +5,8 @@ block of threads is cheap. Stages live in registers, the state on a board in the
 neighbours and contacts meet. Everything that decides (error, gap, status …) is known to all threads alike, so that all
 take the same branches. What a run gives depends neither on how it is cut into launches nor on the other chains.
 
-A try on springs costs two barriers a stage and one for the error; an accepted one three more unless its last stage is
-the first of the next step. Contacts cost nothing more while the floor or sprocket is out of reach and the list of
+An attempt on springs costs two barriers a stage and one for the error; an accepted one three more unless its last stage
+is the first of the next step. Contacts cost nothing more while the floor or sprocket is out of reach and the list of
 neighbours empty.
 """
 
@@ -96,7 +96,7 @@ from warpchain.kernels.methods.controller import LEAST_SHRINKAGE
 from warpchain.kernels.methods.method import METHODS
 from warpchain.kernels.physics.elementary import ONE, ZERO
 from warpchain.kernels.physics.scaled_loads import under_load
-from warpchain.kernels.types import Control, Model, Program, Record, State, read_chain
+from warpchain.kernels.types import Control, Drive, Model, Record, State, read_chain
 
 wp.set_module_options({"enable_backward": False})
 
@@ -145,7 +145,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     memory_address = tile_address(wp.float64, memory_size)
     ends_address = tile_address(vec5d, block_dim)
     forces_address = tile_address(vec3d, block_dim)
-    hand_over, stage = block_stage(block_dim)
+    exchange_ends, stage = block_stage(block_dim)
     greatest, _note, _noted = block_maxima(block_dim)
     maxima_address = tile_address(vec4i, block_dim)
     survey, surveyed, reach_of, meet_fixed_body = block_surroundings(features, block_dim)
@@ -175,7 +175,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     def look_around(ends: wp.tile[vec5d, block_dim], K: wp.array2d(dtype=wp.float64), maxima: wp.uint64, place: Place):
         """Left end of the next link and what is known of the whole chain, in the state on the board."""
         link = link_on(K, place.lane)
-        next_end = hand_over(ends, place, link)
+        next_end = exchange_ends(ends, place, link)
         survey(K, maxima, place, link, next_end)
         barrier()
         return next_end, surveyed(maxima)
@@ -190,7 +190,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     def advance_block(
         worlds: wp.array(dtype=wp.int32),
         model: Model,
-        program: Program,
+        drive: Drive,
         state: State,
         record: Record,
         scratch: wp.array3d(dtype=wp.float64),
@@ -255,7 +255,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if wp.static(softens):
                 chain = softened(chain, control, state.softness[world])
             note_constants(K, chain)
-            note_bounds(K, program, state, control, world, wp.static(is_driven))
+            note_bounds(K, drive, state, control, world, wp.static(is_driven))
             K[BOARD_NOTES, NOTE_OPENING] = state.extremes[world, OPENING]
             K[BOARD_NOTES, NOTE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
             K[BOARD_NOTES, NOTE_LAST_IMPULSE] = state.watch[world, LAST_FLOOR_IMPULSE]
@@ -296,31 +296,31 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         time = state.time[world]
         step = state.step[world]
         last_error = wp.float32(state.last_error[world])
-        tries_before = state.tries_before[world] + state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
-        tries_left = int(wp.min(wp.int64(control.tries), control.step_limit - tries_before))
+        attempts_before = state.attempts_before[world] + state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
+        attempts_left = int(wp.min(wp.int64(control.attempts), control.step_limit - attempts_before))
         if record_is_full(record, world):
-            tries_left = 0
-        flies = int(0)
+            attempts_left = 0
+        is_rigid = int(0)
         if wp.static(has_flight):
-            flies = state.flies[world]
-        tries = int(0)
+            is_rigid = state.is_rigid[world]
+        attempts = int(0)
         accepted = int(0)
         barrier()
-        while status == RUNNING and tries < tries_left:
+        while status == RUNNING and attempts < attempts_left:
             if time >= K[BOARD_NOTES, NOTE_NEXT_LOOK]:
                 softness = state.softness[world]
                 load_factor = state.load_factor[world]
                 publish(K, place)
                 barrier()
                 if lane == 0:
-                    look(K, T, model, program, state, record, control, world, time)
+                    look(K, T, model, drive, state, record, control, world, time)
                 barrier()
                 status = T[wp.static(touch.mailbox)]
                 pauses = record_is_full(record, world) or T[wp.static(touch.is_late)] != 0
                 barrier()
                 if wp.static(softens or is_driven):
-                    if has_changed(state, world, softness, load_factor) and flies == 0:
-                        next_end = hand_over(ends, place, link_on(K, lane))
+                    if has_changed(state, world, softness, load_factor) and is_rigid == 0:
+                        next_end = exchange_ends(ends, place, link_on(K, lane))
                         begin_step(forces, K, place, next_end)
                 if pauses or status != RUNNING:
                     break
@@ -330,9 +330,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 break
 
             if wp.static(has_flight):
-                if flies == 0:
+                if is_rigid == 0:
                     if take_off(flight_memory, K, state, world, place, time):
-                        flies = int(1)
+                        is_rigid = int(1)
                         slack = wp.float32(-1.0)  # the next list has the skin of flights
                         last_error = wp.float32(1.0)
                         step = take_turns(K, lane, step)
@@ -341,7 +341,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if wp.static(has_contacts):
                 bound = wp.max(K[BOARD_NOTES, NOTE_CONTACT_STEP], wp.float64(reach))
                 if wp.static(has_flight):
-                    if flies != 0:
+                    if is_rigid != 0:
                         bound = longest_step(K, L, maxima_start, place, pairs, slack)
                 h = wp.min(h, bound)
             lands = time + h >= stop_time
@@ -351,7 +351,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             tolerance = K[BOARD_NOTES, NOTE_TOLERANCE]
             if wp.static(has_flight):
                 trial = Trial()
-                if flies == 0:
+                if is_rigid == 0:
                     trial = attempt(ends, forces, maxima_start, memory_start, K, place, h, tolerance)
                 else:
                     trial = attempt_flight(flight_memory, K, place, h)
@@ -362,10 +362,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if lane < n:
                 own_error = error_of(trial, tolerance)
             error = wp.cast(greatest(errors, lane, own_error), wp.float32)
-            tries += 1
+            attempts += 1
             if not (error <= wp.float32(1.0)):
                 if wp.isfinite(error):
-                    step = h * shrink(error, flies)
+                    step = h * shrink(error, is_rigid)
                 else:
                     step = h * LEAST_SHRINKAGE
                     broken = wp.where(lane >= n or link_is_finite(K, lane), 0, 1)
@@ -391,7 +391,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if wp.static(reuses_last):
                         note_first(K, lane, trial.last, wp.static(needs_first_power))
                 time = wp.where(lands, stop_time, time + h)
-                proposal = h * grow(error, last_error, control.proportional, flies)
+                proposal = h * grow(error, last_error, control.proportional, is_rigid)
                 # a step that was cut short says nothing against the proposal that it was cut from
                 step = wp.where(h < step, wp.max(step, proposal), proposal)
                 last_error = wp.max(error, wp.float32(1e-4))
@@ -401,7 +401,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 if wp.static(has_flight):
                     are_rigid = bool(True)
                     kinetic = ZERO
-                    if flies != 0:
+                    if is_rigid != 0:
                         are_rigid, is_stiff, kinetic = follow(flight_memory, K, place)
                         next_end, around = look_around(ends, K, maxima_start, place)
                 opening = around.opening
@@ -416,11 +416,11 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if gap < wp.float32(0.0):
                         is_near = bool(True)
                         if lane < n:
-                            hits = meet_fixed_body(K, place, contact_constants(K, n), program, world, time)
+                            hits = meet_fixed_body(K, place, contact_constants(K, n), drive, world, time)
                         if hits > 0:
                             wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
                 if wp.static(has_self):
-                    skin, slack, is_stale = margins(control, flies, slack, opening, around.displacement)
+                    skin, slack, is_stale = margins(control, is_rigid, slack, opening, around.displacement)
                     if is_stale or pairs > 0:
                         is_near = bool(True)
                         publish(K, place)
@@ -455,9 +455,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                                 is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
                 if wp.static(has_flight):
                     if is_hit or not are_rigid:
-                        if flies != 0:
+                        if is_rigid != 0:
                             land(flight_memory, K, state, world, place, is_stiff, kinetic)
-                            flies = int(0)
+                            is_rigid = int(0)
                             is_hit = bool(True)
                             last_error = wp.float32(1.0)
                             step = take_turns(K, lane, step)
@@ -466,12 +466,12 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 reach = reach_of(control, pairs, gap, slack, around.speed)
                 if is_hit or wp.static(not reuses_last):
                     if is_hit:
-                        next_end = hand_over(ends, place, link_on(K, lane))
+                        next_end = exchange_ends(ends, place, link_on(K, lane))
                     begin_step(forces, K, place, next_end)
-        tries_before = state.tries_before[world] + state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
-        if status == RUNNING and tries_before + wp.int64(tries) >= control.step_limit:
+        attempts_before = state.attempts_before[world] + state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
+        if status == RUNNING and attempts_before + wp.int64(attempts) >= control.step_limit:
             status = int(STEP_LIMIT)
-        is_last = status != RUNNING and status != NOT_FINITE and state.last_look[world, TIME] != time
+        is_last = status != RUNNING and status != NOT_FINITE and state.last_sample[world, TIME] != time
         publish(K, place)
         barrier()
         if lane < n:
@@ -490,7 +490,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             store_losses(K, state, world, n, wp.static(fixed_loss))
             counts = state.counts[world]
             counts[ACCEPTED] = counts[ACCEPTED] + wp.int64(accepted)
-            counts[REJECTED] = counts[REJECTED] + wp.int64(tries - accepted)
+            counts[REJECTED] = counts[REJECTED] + wp.int64(attempts - accepted)
             counts[fixed_count] = counts[fixed_count] + wp.int64(T[wp.static(touch.fixed_hits)])
             counts[SELF_IMPULSES] = counts[SELF_IMPULSES] + wp.int64(T[wp.static(touch.self_hits)])
             state.extremes[world, OPENING] = K[BOARD_NOTES, NOTE_OPENING]
@@ -500,7 +500,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             state.extremes[world, fixed_depth] = K[BOARD_NOTES, NOTE_FIXED_DEPTH]
             state.watch[world, LAST_FLOOR_IMPULSE] = K[BOARD_NOTES, NOTE_LAST_IMPULSE]
             if wp.static(has_flight):
-                state.flies[world] = flies
+                state.is_rigid[world] = is_rigid
                 state.closing_time[world] = K[BOARD_NOTES, NOTE_CLOSING_TIME]
                 state.other_step[world] = K[BOARD_NOTES, NOTE_OTHER_STEP]
             state.is_fresh[world] = 0

@@ -5,8 +5,8 @@ S F = r is solved by :mod:`gpu.solver`. Neighbours meet in two places of memory,
 and then all of the kernel would find that tile by way of local memory. Between two exchanges in one place lies one in
 the other, or a barrier. The state stands on the board.
 
-From one impulse to the next a try takes a hundred times as long as one on springs and goes further still, so what is
-kept here lies in memory rather than in registers, which the tries on springs need.
+From one impulse to the next an attempt takes a hundred times as long as one on springs and goes further still, so what
+is kept here lies in memory rather than in registers, which the attempts on springs need.
 """
 
 import functools

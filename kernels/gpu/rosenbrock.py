@@ -154,7 +154,7 @@ def coupling(
 
 @functools.cache
 def rosenbrock_attempt(name: str, block_dim: int):
-    """Warp function that tries a step with a Rosenbrock method in blocks of this size.
+    """Warp function that attempts a step with a Rosenbrock method in blocks of this size.
 
     Args:
         name: Key of :data:`ROSENBROCK_TABLES`.
@@ -169,7 +169,7 @@ def rosenbrock_attempt(name: str, block_dim: int):
     quadrature = table.quadrature
     coefficient = coefficients(name)
     memory = factor_layout(block_dim)
-    hand_over, _stage = block_stage(block_dim)
+    exchange_ends, _stage = block_stage(block_dim)
     Stages = wp.types.vector(length=stages - 1, dtype=wp.float64)
 
     @wp.func
@@ -221,7 +221,7 @@ def rosenbrock_attempt(name: str, block_dim: int):
         link = link_on(K, lane)
         start_cosine, start_sine = direction_on(K, lane)
         first = first_on(K, lane)
-        next_end = hand_over(ends, place, link)
+        next_end = exchange_ends(ends, place, link)
         _left_x, _left_y, right_x, right_y = end_positions(link.x, link.y, link.arm_x, link.arm_y)
         _left_u, _left_v, right_u, right_v = end_velocities(link.u, link.v, link.omega, link.arm_x, link.arm_y)
         base_cu = next_end[2] - right_u

@@ -20,23 +20,23 @@ from warpchain.kernels.layout import (
     NOTE_TOLERANCE,
 )
 from warpchain.kernels.physics.scaled_loads import lay_inertias
-from warpchain.kernels.types import Control, Model, Program, Record, State
+from warpchain.kernels.types import Control, Drive, Model, Record, State
 
 wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
 def note_bounds(
-    K: wp.array2d(dtype=wp.float64), program: Program, state: State, control: Control, world: int, is_driven: bool
+    K: wp.array2d(dtype=wp.float64), drive: Drive, state: State, control: Control, world: int, is_driven: bool
 ):
     """Puts on the board what bounds steps of the springs after the last look."""
     K[BOARD_NOTES, NOTE_CONTACT_STEP] = contact_step(state, control, world, is_driven)
-    K[BOARD_NOTES, NOTE_TOLERANCE] = spring_tolerance(program, state, control, world, is_driven)
+    K[BOARD_NOTES, NOTE_TOLERANCE] = spring_tolerance(drive, state, control, world, is_driven)
 
 
 @functools.cache
 def block_look(features: Features, touch: TouchLayout):
-    """Warp function ``look(K, T, model, program, state, record, control, world, time)`` for one thread of a block.
+    """Warp function ``look(K, T, model, drive, state, record, control, world, time)`` for one thread of a block.
 
     It is called behind a barrier behind the board's rows of ends, and leaves none; it puts the status into the mailbox
     and says when the launch has lasted long enough.
@@ -51,7 +51,7 @@ def block_look(features: Features, touch: TouchLayout):
         K: wp.array2d(dtype=wp.float64),
         T: wp.array(dtype=wp.int32),
         model: Model,
-        program: Program,
+        drive: Drive,
         state: State,
         record: Record,
         control: Control,
@@ -61,7 +61,7 @@ def block_look(features: Features, touch: TouchLayout):
         softness = state.softness[world]
         load_factor = state.load_factor[world]
         chain = present(model, state, control, world)
-        T[wp.static(touch.mailbox)] = look_at_chain(K, chain, program, state, record, control, world, time)
+        T[wp.static(touch.mailbox)] = look_at_chain(K, chain, drive, state, record, control, world, time)
         if wp.static(softens or is_driven):
             if has_changed(state, world, softness, load_factor):
                 after = present(model, state, control, world)
@@ -69,7 +69,7 @@ def block_look(features: Features, touch: TouchLayout):
                 note_constants(K, after)
                 if wp.static(is_driven):
                     lay_inertias(K, after)
-            note_bounds(K, program, state, control, world, wp.static(is_driven))
+            note_bounds(K, drive, state, control, world, wp.static(is_driven))
         K[BOARD_NOTES, NOTE_STOP_TIME] = state.stop_time[world]
         K[BOARD_NOTES, NOTE_NEXT_LOOK] = wp.float64(state.next_sample[world]) * control.sample_interval
         if clock() > K[BOARD_NOTES, NOTE_DEADLINE]:

@@ -1,4 +1,4 @@
-"""What methods share in the block form, one thread per link: a link, a try, its error, a stage on the springs.
+"""What methods share in the block form, one thread per link: a link, an attempt, its error, a stage on the springs.
 
 A thread works out the joint at its link's right end. In each stage it hands its left end to the link before and its
 joint's force to the link after; two barriers a stage cost less than working out every joint twice.
@@ -91,7 +91,7 @@ class Surroundings:
 
 @wp.struct
 class Trial:
-    """A finished try: the link's new state, its last stage, and losses averaged over the step."""
+    """A finished attempt: the link's new state, its last stage, and losses averaged over the step."""
 
     x: wp.float64
     y: wp.float64
@@ -256,12 +256,12 @@ def block_stage(block_dim: int):
         block_dim: Threads in a block.
 
     Returns:
-        ``hand_over(ends, place, link)`` → left end of the next link;
+        ``exchange_ends(ends, place, link)`` → left end of the next link;
         ``stage(forces, K, place, next_end, link, 1/m, 1/I)`` → Rates.
     """
 
     @wp.func
-    def hand_over(
+    def exchange_ends(
         ends: wp.tile[vec5d, block_dim],
         place: Place,
         link: Link,
@@ -317,4 +317,4 @@ def block_stage(block_dim: int):
         rates.damping = damping
         return rates
 
-    return hand_over, stage
+    return exchange_ends, stage

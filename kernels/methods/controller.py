@@ -1,4 +1,4 @@
-"""How large the next step is: the error ratio of a try and what the controllers make of it."""
+"""How large the next step is: the error ratio of an attempt and what the controllers make of it."""
 
 import functools
 
@@ -107,7 +107,7 @@ def implicit_controller(error_order: int, real: type = wp.float64):
 
     Steps of an implicit method are set by accuracy, and the error jumps where a joint's friction changes its sign:
     odeint's rule shrinks too far there and grows too soon. In flights of 60 and 150 links it took up to a tenth more
-    tries for an error of 1e-7 m/s, and twice as many at a tolerance of 1e-4. An error that stays the same settles at
+    attempts for an error of 1e-7 m/s, and twice as many at a tolerance of 1e-4. An error that stays the same settles at
     safety^(k/0.3) of the tolerance: that is 0.1, which leaves room for jumps. Safeties from 0.8 to 0.95 cost the same
     for the same error; smaller ones shrink steps for rounding's sake at 1e-12.
     """
@@ -137,7 +137,7 @@ def classical_controller(error_order: int):
     """The same two functions for an error that goes as h^(error_order + 1): the step where it would be the safe one.
 
     E. Hairer, S. P. Nørsett, G. Wanner, Solving ODEs I, section II.4. odeint's rule shrinks by a power of the error
-    that with an embedded solution of order 2 is 1; the tries of flights, see :mod:`cpu.implicit.rigid_flight`, are
+    that with an embedded solution of order 2 is 1; the attempts of flights, see :mod:`cpu.implicit.rigid_flight`, are
     dear.
     """
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from warpchain.kernels import layout
 from warpchain.kernels.cpu.explicit import explicit_method
-from warpchain.kernels.cpu.implicit.joint_switch import hand_over
+from warpchain.kernels.cpu.implicit.joint_switch import joint_switch
 from warpchain.kernels.cpu.implicit.rigid_flight import flight_method, flight_rows
 from warpchain.kernels.cpu.implicit.rosenbrock import rosenbrock_method, rosenbrock_rows
 from warpchain.kernels.gpu.explicit import explicit_attempt
@@ -32,7 +32,7 @@ class Method:
         reuses_last: Whether a step leaves the first stage of the next.
         scratch_rows: Rows of a chain's scratch block of so many columns.
         functions: Warp functions (first stage, attempt, commit) for scratch blocks of so many columns.
-        needs_first_power: Whether a try in the block form asks what the joints lose at its start.
+        needs_first_power: Whether an attempt in the block form asks what the joints lose at its start.
         block_memory: Doubles that a block of so many threads keeps for the method.
         block_attempt: Warp function ``attempt(ends, forces, maxima, S, K, place, h, tolerance)`` → Trial for blocks of
             so many threads and with what :mod:`gpu.contacts.proximity` finds, from the state and first stage on the
@@ -118,7 +118,7 @@ def _hybrid(name: str, burst: str) -> Method:
     flight = Flight(
         order=ROS34PW2.order,
         error_order=ROS34PW2.error_order,
-        functions=lambda columns: (*flight_method(columns, first_row), *hand_over(columns, first_row)),
+        functions=lambda columns: (*flight_method(columns, first_row), *joint_switch(columns, first_row)),
         block_functions=_block_flight,
     )
     return replace(

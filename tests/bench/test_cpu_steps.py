@@ -12,9 +12,9 @@ PAPER = preset("paper")
 
 
 def test_a_chain_that_flies_never_lands() -> None:
-    """On rigid joints it flies through half a second in some thousand tries, then begins anew, and never meets springs.
+    """On rigid joints it crosses half a second in some thousand attempts, then begins anew, and never meets springs.
 
-    Its numbers are those of flights: a try carries it on by hundreds of joint periods.
+    Its numbers are those of flights: an attempt carries it on by hundreds of joint periods.
     """
     stepper = _Stepper(PAPER, Options(method="hybrid"), *flying(30, PAPER))
     for _ in range(6):
@@ -29,7 +29,7 @@ def test_a_chain_that_flies_never_lands() -> None:
 
 
 def test_first_steps_are_not_measured() -> None:
-    """Tries of a measurement are counted, those before it are not; the mean step is theirs."""
+    """Attempts of a measurement are counted, those before it are not; the mean step is theirs."""
     stepper = _Stepper(PAPER, Options(method="dp5"), *flying(12, PAPER))
     assert stepper.counts["accepted"] == 0 and stepper.simulated == 0.0
     before = stepper.batch.time(0)

@@ -8,7 +8,7 @@ import pytest
 
 from warpchain.bench import gpu_steps
 from warpchain.bench.cpu_steps import LONGEST_STRETCH, flying
-from warpchain.bench.gpu_steps import STAGE_FLOPS, Crowd, GpuCost, as_json, evaluations, flops_per_try, gpu_costs
+from warpchain.bench.gpu_steps import STAGE_FLOPS, Crowd, GpuCost, as_json, evaluations, flops_per_attempt, gpu_costs
 from warpchain.cli.terminal import print_gpu_costs
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import InputError, preset
@@ -43,17 +43,17 @@ def test_arithmetic_of_a_try_counts_the_coefficients_that_are_not_zero() -> None
     weights = 3 + 2  # b and b·A
     errors = 4 + 3  # b − b̂ and its product with A
     coefficients = stages + products + weights + errors
-    assert flops_per_try("bs32") == 3 * sum(STAGE_FLOPS.values()) + 6 * coefficients + gpu_steps.END_FLOPS
-    assert flops_per_try("bs32") < flops_per_try("dp5") < flops_per_try("rkf78")
+    assert flops_per_attempt("bs32") == 3 * sum(STAGE_FLOPS.values()) + 6 * coefficients + gpu_steps.END_FLOPS
+    assert flops_per_attempt("bs32") < flops_per_attempt("dp5") < flops_per_attempt("rkf78")
 
 
 def test_json_holds_everything_and_no_nan() -> None:
     """What is not known is null."""
     content = as_json({"gpu": "some GPU"}, [COST])
     assert content["machine"] == {"gpu": "some GPU"}
-    assert content["tries"][0]["peak"] is None
-    assert content["tries"][0]["microseconds"] == 6.5
-    assert set(content["flops_per_try"]) == set(TABLEAUS)
+    assert content["attempts"][0]["peak"] is None
+    assert content["attempts"][0]["microseconds"] == 6.5
+    assert set(content["flops_per_attempt"]) == set(TABLEAUS)
 
 
 def test_table_shows_a_row_for_each_measurement(capsys: pytest.CaptureFixture[str]) -> None:
@@ -68,9 +68,9 @@ def test_table_shows_a_row_for_each_measurement(capsys: pytest.CaptureFixture[st
 def test_what_has_no_meaning_for_a_method_is_left_out(capsys: pytest.CaptureFixture[str]) -> None:
     """Methods that solve equations have no stages and no arithmetic of a tableau; the rest is shown."""
     for method in ("hybrid", "rodas4p", "rodas5p"):
-        assert math.isnan(evaluations(method)) and math.isnan(flops_per_try(method))
+        assert math.isnan(evaluations(method)) and math.isnan(flops_per_attempt(method))
     cost = replace(COST, method="hybrid", link_stages=math.nan)
-    assert as_json({}, [cost])["tries"][0]["link_stages"] is None
+    assert as_json({}, [cost])["attempts"][0]["link_stages"] is None
     print_gpu_costs({}, [cost])
     rows = [line.split() for line in capsys.readouterr().out.splitlines() if line.startswith("flight")]
     assert rows == [["flight", "60", "hybrid", "1000", "6.50", "210", "25.0%", "168", "160", "6", "(19%)"]]
@@ -78,7 +78,7 @@ def test_what_has_no_meaning_for_a_method_is_left_out(capsys: pytest.CaptureFixt
 
 @pytest.mark.parametrize("method", ["hybrid", "rodas4p", "dp5"])
 def test_a_crowd_flies_and_never_lands(method: str) -> None:
-    """Stretches are of flight alone, however far a try goes; on the CPU here, where a crowd does the same."""
+    """Stretches are of flight alone, however far an attempt goes; on the CPU here, where a crowd does the same."""
     parameters = preset("paper")
     crowd = Crowd(parameters, Options(method=method), *flying(16, parameters), 5)
     stretches = crowd.measure(5)

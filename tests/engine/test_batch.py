@@ -21,7 +21,7 @@ from warpchain.run import sweep_run
 from warpchain.run.sweep_run import SweepProgress, prepare, run_shards
 from warpchain.sweeps.plan import load_sweep
 from warpchain.walks import scheduler
-from warpchain.walks.walk_phases import Course
+from warpchain.walks.walk_phases import WalkRun
 
 FEW = {"version": 1, "name": "few", "seed": 1, "preset": "soft", "samples": 2, "grid": {"links": [60, 150]}}
 """Content of a sweep of two lengths."""
@@ -90,7 +90,7 @@ def test_memory_of_a_world_is_what_a_batch_takes(keeps_samples: bool, frame_ever
 
     def taken(worlds: int) -> int:
         batch = Batch(worlds, 60, options, keeps_samples=keeps_samples, frame_every=frame_every)
-        parts = [batch.model, batch.program, batch.state, batch.record]
+        parts = [batch.model, batch.drive, batch.state, batch.record]
         arrays = [getattr(part, name) for part in parts for name in part._cls.vars]
         return sum(array.capacity for array in [*arrays, batch.scratch, batch.lists] if isinstance(array, wp.array))
 
@@ -138,7 +138,7 @@ def test_every_task_of_a_sweep_runs_in_the_blocks_that_are_compiled(monkeypatch:
     """A shard that has chains of one length only runs in blocks of the whole sweep; on a CPU there are none."""
     asked: list[tuple[set[int], int | None]] = []
 
-    def note(setups: Sequence[Setup], *, threads: int | None, **_: object) -> Iterator[tuple[int, Course]]:
+    def note(setups: Sequence[Setup], *, threads: int | None, **_: object) -> Iterator[tuple[int, WalkRun]]:
         asked.append(({setup.scene.links for setup in setups}, threads))
         return iter(())
 

@@ -45,7 +45,7 @@ def test_they_end_with_the_release() -> None:
     np.testing.assert_allclose(np.diff(before.frame_time), 2e-3, atol=6e-5)
     np.testing.assert_allclose(np.diff(before.time), 1e-3, atol=6e-5)
     assert before.frame_joints.shape == before.frame_forces.shape == (len(before.frame_time), 40, 2)
-    # in the loop's course a link moves on by its length: (0.2 s) × speed
+    # in the loop's run a link moves on by its length: (0.2 s) × speed
     last, first = before.frame_joints[-1], walk.frame_joints[0]
     speed = 2 * np.pi * 12.0 * 0.0598
     np.testing.assert_allclose(np.hypot(*(first - last).T), -speed * before.frame_time[-1], rtol=0.05)

@@ -44,14 +44,14 @@ def brief_setup(seed: int, **settings: object) -> Setup:
     return setup_walk("soft", {"links": 30, "frequency": 12.0, "method": "dp5"} | BRIEF | settings, seed)
 
 
-def outcome(course) -> tuple:
+def outcome(run) -> tuple:
     """Everything of a walk that a row keeps."""
-    return course.status, course.walk_time, tuple(course.counts.values()), tuple(course.energy().values())
+    return run.status, run.walk_time, tuple(run.counts.values()), tuple(run.energy().values())
 
 
 def outcomes(setups, **how) -> list:
     """What each of the walks gave, in their order."""
-    found = {place: outcome(course) for place, course in run_setups(setups, **how)}
+    found = {place: outcome(run) for place, run in run_setups(setups, **how)}
     return [found[place] for place in range(len(setups))]
 
 

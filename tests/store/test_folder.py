@@ -23,7 +23,7 @@ from tests.support.synthetic_sweep import LONG_SWEEP, SHARD_SIZE, SWEEP, content
 from warpchain.inputs.parameters import InputError
 from warpchain.status import Status
 from warpchain.store import folder, shards
-from warpchain.store.folder import Store, empty_rows, read_rows, read_shard, write_shard
+from warpchain.store.folder import SweepFolder, empty_rows, read_rows, read_shard, write_shard
 from warpchain.store.shards import NUMERICS_VERSION, read_manifest, shard_name
 from warpchain.walks.rows import ROW
 
@@ -31,9 +31,9 @@ FIRST, SECOND = range(20), range(20, 40)
 CHANGED = replace(SWEEP, seed=7, name="changed")
 
 
-def open_store(directory: Path, sweep: Any = SWEEP, **settings: Any) -> Store:
+def open_folder(directory: Path, sweep: Any = SWEEP, **settings: Any) -> SweepFolder:
     """A store of the synthetic sweep."""
-    return Store.open(directory, sweep, **({"shard_size": SHARD_SIZE} | settings))
+    return SweepFolder.open(directory, sweep, **({"shard_size": SHARD_SIZE} | settings))
 
 
 def play(part: str, directory: Path, *, namespace: bool = False) -> Any:
@@ -72,7 +72,7 @@ needs_namespace = pytest.mark.skipif(
 
 def test_a_sweep_is_written_and_read(tmp_path: Path) -> None:
     """All rows come back to the bit; nothing is missing, and nothing else is in the folder."""
-    with open_store(tmp_path / "new" / "folder") as opened:
+    with open_folder(tmp_path / "new" / "folder") as opened:
         folder = opened.directory
         assert opened.missing() == [range(i, i + 20) for i in range(0, 160, 20)] and len(opened.rows()) == 0
         for walks in reversed(opened.missing()):
@@ -89,19 +89,19 @@ def test_a_sweep_is_written_and_read(tmp_path: Path) -> None:
 
 def test_the_last_shard_has_what_is_left(tmp_path: Path) -> None:
     """A number of walks that is no multiple of the shard size leaves a shorter shard; a folder keeps its size."""
-    with open_store(tmp_path, shard_size=150) as opened:
+    with open_folder(tmp_path, shard_size=150) as opened:
         assert opened.missing() == [range(150), range(150, 160)]
         opened.write(range(150, 160), synthetic_rows(SWEEP, range(150, 160)))
-    with open_store(tmp_path, shard_size=10) as opened:
+    with open_folder(tmp_path, shard_size=10) as opened:
         assert opened.manifest.shard_size == 150 and opened.missing() == [range(150)]
     with pytest.raises(ValueError, match="shard_size: 0 is not positive"):
-        open_store(tmp_path, shard_size=0)
+        open_folder(tmp_path, shard_size=0)
 
 
 def test_equal_sweeps_leave_equal_files(tmp_path: Path) -> None:
     """The files have no time, place or chance in them, whatever NaNs and order the rows came with."""
     run(tmp_path / "one")
-    with open_store(tmp_path / "two") as opened:
+    with open_folder(tmp_path / "two") as opened:
         for walks in sorted(opened.missing(), key=lambda walks: walks.start % 7):
             rows = synthetic_rows(SWEEP, walks)
             rows["greatest_opening"] = -rows["greatest_opening"]  # the same NaN to a reader, but other bits
@@ -147,7 +147,7 @@ def test_every_step_of_opening_may_be_the_last(tmp_path: Path, fresh: bool, monk
             for place, name in ((os, "replace"), (os, "rename"), (os, "mkdir"), (os, "unlink"), (os, "rmdir")):
                 patched.setattr(place, name, counted(getattr(place, name)))
             try:
-                open_store(folder, sweep, fresh=fresh).close()
+                open_folder(folder, sweep, fresh=fresh).close()
             except _Kill:
                 pass
             else:
@@ -164,7 +164,7 @@ def test_unfinished_files_go(tmp_path: Path) -> None:
     parts = [".sweep.0123abcd.part.json", f"shards/.{shard_name(FIRST)[:-3]}.0123abcd.part.h5"]
     for name in (*parts, ".nfs0123", "shards/.keep"):
         (tmp_path / name).write_bytes(b"half")
-    open_store(tmp_path).close()
+    open_folder(tmp_path).close()
     assert [name for name in parts if (tmp_path / name).exists()] == []
     assert (tmp_path / ".nfs0123").exists() and (tmp_path / "shards/.keep").exists()
 
@@ -180,11 +180,11 @@ def test_a_second_process_is_refused(tmp_path: Path) -> None:
         worker = int(holder.stdout.readline())
         try:
             with refused(InputError, tmp_path, str(tmp_path), f"in use by process {holder.pid} on ", "wait"):
-                open_store(tmp_path)
+                open_folder(tmp_path)
             holder.kill()
             holder.wait()
             os.kill(worker, 0)  # is alive
-            open_store(tmp_path).close()
+            open_folder(tmp_path).close()
         finally:
             holder.kill()
             os.kill(worker, signal.SIGKILL)
@@ -192,20 +192,20 @@ def test_a_second_process_is_refused(tmp_path: Path) -> None:
 
 def test_a_second_store_of_one_process_is_refused(tmp_path: Path) -> None:
     """The lock counts within a process, too; closing twice does no harm, and an error lets go of the lock."""
-    first = open_store(tmp_path)
+    first = open_folder(tmp_path)
     with refused(InputError, tmp_path, "in use by process"):
-        open_store(tmp_path)
+        open_folder(tmp_path)
     first.close()
     first.close()
     with refused(InputError, tmp_path, "another sweep"):
-        open_store(tmp_path, CHANGED)
-    open_store(tmp_path).close()
+        open_folder(tmp_path, CHANGED)
+    open_folder(tmp_path).close()
 
 
 def test_workers_may_write_the_same_shard(tmp_path: Path) -> None:
     """Processes, and threads, that write one shard at the same time leave it whole, with the same bytes."""
     assert play("race", tmp_path / "race") == [0, 0, 0, 0]
-    with open_store(tmp_path / "threads") as opened, ThreadPoolExecutor(4) as threads:
+    with open_folder(tmp_path / "threads") as opened, ThreadPoolExecutor(4) as threads:
         shards = opened.missing()[:2] * 20
         keys = list(threads.map(lambda walks: opened.write(walks, synthetic_rows(SWEEP, walks)), shards))
     assert len(set(keys)) == 2
@@ -220,9 +220,9 @@ def test_a_changed_sweep_is_refused(tmp_path: Path) -> None:
     """Another sweep is refused in a folder unless it may start anew; another name of the same sweep is not."""
     run(tmp_path)
     with refused(InputError, tmp_path, str(tmp_path), "holds another sweep (synthetic)", "--fresh"):
-        open_store(tmp_path, CHANGED)
-    open_store(tmp_path, replace(SWEEP, name="renamed")).close()
-    with open_store(tmp_path, CHANGED, fresh=True) as opened:
+        open_folder(tmp_path, CHANGED)
+    open_folder(tmp_path, replace(SWEEP, name="renamed")).close()
+    with open_folder(tmp_path, CHANGED, fresh=True) as opened:
         assert len(opened.missing()) == 8
         opened.log("anew")
     run(tmp_path, CHANGED)
@@ -236,7 +236,7 @@ def test_other_numerics_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     for module in (shards, folder):
         monkeypatch.setattr(module, "NUMERICS_VERSION", 99)
     with refused(InputError, tmp_path, f"numerics {NUMERICS_VERSION}, but this warpchain has 99", "--fresh"):
-        open_store(tmp_path)
+        open_folder(tmp_path)
     with refused(InputError, tmp_path, "belongs to another sweep now"):
         write_shard(tmp_path, SWEEP.digest(), FIRST, synthetic_rows(SWEEP, FIRST))
     assert len(read_rows(tmp_path, read_manifest(tmp_path))) == 160
@@ -248,7 +248,7 @@ def test_files_of_others_are_not_touched(tmp_path: Path, name: str, fresh: bool)
     """A folder that has such a name for something else is refused, even to start anew."""
     (tmp_path / name).write_text("mine: true")
     with refused(InputError, tmp_path, str(tmp_path / name), "give"):
-        open_store(tmp_path, fresh=fresh)
+        open_folder(tmp_path, fresh=fresh)
     assert (tmp_path / name).read_text() == "mine: true"
 
 
@@ -259,7 +259,7 @@ def test_a_foreign_file_among_the_shards_is_refused(tmp_path: Path, fresh: bool)
     for name in ("notes.txt", "000000001-000000020.h5", "000000160-000000179.h5"):
         (tmp_path / "shards" / name).write_text("mine")
     with refused(InputError, tmp_path, "shards/000000001-000000020.h5: not a shard", "move it", "(and 2 more)"):
-        open_store(tmp_path, fresh=fresh)
+        open_folder(tmp_path, fresh=fresh)
 
 
 def test_a_shard_of_another_sweep_is_refused(tmp_path: Path) -> None:
@@ -271,9 +271,9 @@ def test_a_shard_of_another_sweep_is_refused(tmp_path: Path) -> None:
     for stranger in (tmp_path / "two/shards" / first.name, second):
         shutil.copy(stranger, first)
         with refused(InputError, tmp_path, f"{first}: a shard of another sweep", "move it"):
-            open_store(tmp_path / "one")
+            open_folder(tmp_path / "one")
     first.write_bytes(kept)
-    open_store(tmp_path / "one").close()
+    open_folder(tmp_path / "one").close()
 
 
 @pytest.mark.parametrize("part", [0.0, 0.1, 0.5, 0.999])
@@ -283,9 +283,9 @@ def test_a_truncated_shard_is_refused(tmp_path: Path, part: float) -> None:
     before, path = content(tmp_path), tmp_path / "shards" / shard_name(FIRST)
     os.truncate(path, int(part * path.stat().st_size))
     with refused(InputError, tmp_path, f"{path}: damaged or cut short", "delete it"):
-        open_store(tmp_path)
+        open_folder(tmp_path)
     path.unlink()
-    with open_store(tmp_path) as opened:
+    with open_folder(tmp_path) as opened:
         assert opened.missing() == [FIRST]
         opened.write(FIRST, synthetic_rows(SWEEP, FIRST))
     assert content(tmp_path) == before
@@ -309,7 +309,7 @@ def test_damage_is_seen(tmp_path: Path) -> None:
     path.write_bytes(b"")
     (tmp_path / "shards" / shard_name(SECOND)).write_bytes(b"no HDF5")
     with refused(InputError, tmp_path, f"{path}: damaged", "(and 1 more)"):
-        open_store(tmp_path)
+        open_folder(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -321,7 +321,7 @@ def test_a_damaged_manifest_is_refused(tmp_path: Path, text: str) -> None:
     run(tmp_path)
     (tmp_path / "sweep.json").write_text(text, encoding="latin-1")
     with refused(InputError, tmp_path, f"{tmp_path / 'sweep.json'}: damaged, or not of warpchain"):
-        open_store(tmp_path)
+        open_folder(tmp_path)
 
 
 def test_a_later_format_is_refused(tmp_path: Path) -> None:
@@ -338,7 +338,7 @@ def test_workers_need_the_folder(tmp_path: Path) -> None:
     rows = synthetic_rows(SWEEP, FIRST)
     with refused(InputError, tmp_path, f"{tmp_path / 'elsewhere'}: no sweep", "every worker"):
         write_shard(tmp_path / "elsewhere", SWEEP.digest(), FIRST, rows)
-    open_store(tmp_path, CHANGED).close()
+    open_folder(tmp_path, CHANGED).close()
     with refused(InputError, tmp_path, "belongs to another sweep now"):
         write_shard(tmp_path, SWEEP.digest(), FIRST, rows)
 
@@ -346,7 +346,7 @@ def test_workers_need_the_folder(tmp_path: Path) -> None:
 def test_wrong_rows_are_refused(tmp_path: Path) -> None:
     """Rows of other walks, of another type or without an end are not written."""
     good = synthetic_rows(SWEEP, FIRST)
-    with open_store(tmp_path) as opened:
+    with open_folder(tmp_path) as opened:
         for walks, rows, word in (
             (FIRST, synthetic_rows(SWEEP, SECOND), "not those of walks 0 to 19"),
             (FIRST, good[::-1], "not those"),
@@ -385,7 +385,7 @@ def test_a_failed_write_leaves_no_trace(
     tmp_path: Path, number: int, remedy: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A shard that cannot be written is named with reason and remedy; the folder is as before and can go on."""
-    with open_store(tmp_path) as opened:
+    with open_folder(tmp_path) as opened:
         opened.write(FIRST, synthetic_rows(SWEEP, FIRST))
         name = f"{shard_name(SECOND)}: cannot be written ({os.strerror(number)})"
         with monkeypatch.context() as patched, refused(OSError, tmp_path, name, remedy, "kept"):
@@ -401,15 +401,15 @@ def test_a_disk_too_small_is_said_at_once(tmp_path: Path, monkeypatch: pytest.Mo
     with monkeypatch.context() as patched:
         patched.setattr(shutil, "disk_usage", lambda path: usage)
         with pytest.raises(OSError, match=r"takes 0\.\d+ MB, but 0\.05 MB are free; make room"):
-            open_store(tmp_path)
+            open_folder(tmp_path)
     run(tmp_path)
     monkeypatch.setattr(shutil, "disk_usage", lambda path: usage)
-    open_store(tmp_path).close()
+    open_folder(tmp_path).close()
 
 
 def test_shards_take_no_more_room_than_said(tmp_path: Path) -> None:
     """The room that is asked for is enough."""
-    with open_store(tmp_path, shard_size=40) as opened:
+    with open_folder(tmp_path, shard_size=40) as opened:
         walks = opened.missing()[0]
         opened.write(walks, synthetic_rows(SWEEP, walks))
         size = (tmp_path / "shards" / shard_name(walks)).stat().st_size
@@ -440,4 +440,4 @@ def test_a_folder_that_is_a_file(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("mine")
     for place in (tmp_path / "file", tmp_path / "file" / "below"):
         with refused(OSError, tmp_path, f"{place}: cannot be written"):
-            open_store(place)
+            open_folder(place)

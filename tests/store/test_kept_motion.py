@@ -25,11 +25,11 @@ from warpchain.reports.figure5 import MOST_CELLS, sweep_figure5
 from warpchain.reports.statistics import NothingToShow
 from warpchain.reports.sweep_page import write_report
 from warpchain.run.sweep_run import sweep
-from warpchain.store.folder import Store
-from warpchain.store.kept_walk import KeptWalk
+from warpchain.store.folder import SweepFolder
 from warpchain.store.merged_file import merge
 from warpchain.store.shards import read_manifest, read_shard, write_shard
 from warpchain.store.sweep_result import SweepResult, load
+from warpchain.store.walk_motion import WalkMotion
 from warpchain.sweeps.plan import load_sweep
 from warpchain.sweeps.recording import Keep
 from warpchain.walks.motion import SERIES
@@ -51,7 +51,7 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def same(one: KeptWalk, walk: warpchain.WalkResult) -> bool:
+def same(one: WalkMotion, walk: warpchain.WalkResult) -> bool:
     """Whether a kept walk has the series and frames of a walk, to the bit."""
     names = ("time", "center", "center_velocity", "frame_time", "sprocket_center")
     joints = walk.frame_joints.astype(np.float32)
@@ -94,27 +94,27 @@ def test_motions_do_not_depend_on_their_batch() -> None:
     def run(order: list[int], slots: int) -> list[tuple[bytes, float]]:
         found = {}
         courses = run_setups([setups[i] for i in order], keeps=[keeps[i] for i in order], slots=slots)
-        for place, course in courses:
-            found[order[place]] = (course.motion.checksum(), course.energy()["joint_friction"])
+        for place, run in courses:
+            found[order[place]] = (run.motion.checksum(), run.energy()["joint_friction"])
         return [found[i] for i in range(len(setups))]
 
     alone = [run([*range(6)], 1), run([*range(6)], 4), run([5, 3, 1, 0, 2, 4], 3)]
     assert alone[0] == alone[1] == alone[2]
     assert len(set(alone[0])) == 6
-    bare = {place: course.energy()["joint_friction"] for place, course in run_setups(setups)}
+    bare = {place: run.energy()["joint_friction"] for place, run in run_setups(setups)}
     np.testing.assert_array_equal([bare[place] for place in range(6)], [friction for _, friction in alone[0]])
 
 
 def test_long_motions_are_drained_between_launches() -> None:
     """A series longer than the device's record has every look, in order and without a gap."""
     setup = brief_setup(1, record_interval=1e-6, walk_limit=0.04)  # a look after each step
-    ((_, course),) = run_setups([setup], keeps=[Keep(series_every=1, frame_every=10)])
-    time = course.motion.series[:, 0]
-    skipped = 1 + course.counts["accepted"] - len(time)
+    ((_, run),) = run_setups([setup], keeps=[Keep(series_every=1, frame_every=10)])
+    time = run.motion.series[:, 0]
+    skipped = 1 + run.counts["accepted"] - len(time)
     assert (
         skipped in range(4) and len(time) > 3 * CAPACITY_SAMPLES and np.all(np.diff(time) > 0)
     )  # first steps are short
-    frames = course.motion.frame_time
+    frames = run.motion.frame_time
     assert len(frames) > 100 and set(frames) <= set(time)
 
 
@@ -239,7 +239,7 @@ def test_a_shard_without_its_motions_is_not_written(kept: Path, tmp_path: Path) 
     """Rows whose motions should be kept are refused without them, and motions that should not be kept as well."""
     manifest = read_manifest(kept)
     assert [manifest.kept(walks) for walks in manifest.shards[:5]] == [[0], [], [], [3], []]
-    with Store.open(tmp_path, load_sweep(KEPT), shard_size=manifest.shard_size) as store:
+    with SweepFolder.open(tmp_path, load_sweep(KEPT), shard_size=manifest.shard_size) as store:
         rows = read_shard(kept, manifest.digest, manifest.shards[0])
         with pytest.raises(ValueError, match="motions are not those that are kept of walks 0 to 0"):
             store.write(manifest.shards[0], rows)
@@ -250,7 +250,7 @@ def test_a_disk_too_small_for_series_is_said_at_once(tmp_path: Path) -> None:
     """Series are in the estimate of the room that a sweep takes."""
     huge = TINY | {"samples": 10**9, "record": {"series": True}}
     with pytest.raises(OSError, match=r"the rest of the sweep takes .* MB, but .* MB are free"):
-        Store.open(tmp_path, load_sweep(huge), shard_size=10**9)
+        SweepFolder.open(tmp_path, load_sweep(huge), shard_size=10**9)
 
 
 def test_the_merged_file_has_series_by_name(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

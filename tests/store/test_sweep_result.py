@@ -20,7 +20,7 @@ from warpchain.cli.main import main
 from warpchain.inputs.parameters import InputError
 from warpchain.reports.sweep_page import write_report
 from warpchain.status import Status
-from warpchain.store.folder import Store, empty_rows
+from warpchain.store.folder import SweepFolder, empty_rows
 from warpchain.store.merged_file import merge
 from warpchain.store.shards import NUMERICS_VERSION, BlockLayout, shard_name
 from warpchain.store.sweep_result import BlockResult, SweepResult, load
@@ -91,7 +91,7 @@ def test_the_layout_is_that_of_the_sweep(tmp_path: Path) -> None:
             ],
         }
     )
-    with Store.open(tmp_path, sweep, shard_size=5) as store:
+    with SweepFolder.open(tmp_path, sweep, shard_size=5) as store:
         for walks in store.missing():
             rows = empty_rows(sweep, walks)
             rows["status"] = Status.TIME_LIMIT
@@ -163,7 +163,7 @@ def test_missing_walks_are_counted(single: Path) -> None:
 
 def test_a_sweep_just_begun_is_all_missing(tmp_path: Path) -> None:
     """A folder is read while its sweep runs, from the first moment, without the lock."""
-    with Store.open(tmp_path, SWEEP, shard_size=20):
+    with SweepFolder.open(tmp_path, SWEEP, shard_size=20):
         assert load(tmp_path).summary() == {"at_rest": 0, "missing": 160}
         (tmp_path / "shards").rmdir()
         result = load(tmp_path)
@@ -174,7 +174,7 @@ def test_statistics_are_over_walks_at_rest(tmp_path: Path) -> None:
     """Mean and deviation of known numbers; failed and missing walks are in neither, but counted."""
     sweep: Any = SyntheticSweep(blocks=(BlockLayout("main", {"links": (10, 20, 30, 40, 50)}, 4, 0, ()),))
     status = [[1, 1, 1, 1], [1, 3, 6, 1], [1, 3, 3, 3], [3, 3, 3, 3]]
-    with Store.open(tmp_path, sweep, shard_size=4) as store:
+    with SweepFolder.open(tmp_path, sweep, shard_size=4) as store:
         for cell, walks in enumerate(store.missing()[:4]):
             rows = synthetic_rows(sweep, walks)
             rows["status"] = status[cell]

@@ -73,7 +73,7 @@ def batch_of(
     options = Options(method=method, tolerance=0.1 if fixed_step else tolerance, self_contact=self_contact)
     kept = {"keeps_samples": keeps, "frame_every": 2 if keeps else None, "keeps_loads": keeps}
     batch = Batch(len(chains), longest, options, **kept)
-    batch.control.launch_time = 1e9  # tries alone end a launch, however busy the machine is
+    batch.control.launch_time = 1e9  # attempts alone end a launch, however busy the machine is
     if fixed_step:
         batch.control.skin = 1e-9
         batch.control.contact_step = FIXED_STEP
@@ -81,7 +81,7 @@ def batch_of(
     for world, (position, velocity) in enumerate(chains):
         batch.set_chain(world, SOFT, len(position))
         batch.load(world, position, velocity, stop_time=stop_time, stop_status=Status.FINISHED)
-        batch.set_program(world, sprocket_speed=-50.0)
+        batch.set_drive(world, sprocket_speed=-50.0)
         if fixed_step:
             batch.state.step.numpy()[world] = FIXED_STEP
     return batch
@@ -92,11 +92,11 @@ def features_of(batch: Batch, *, fixed_body: str, watch: str = "none", broad_pha
     return batch.features(fixed_body=fixed_body, watch=watch, broad_phase=broad_phase)
 
 
-def launch_blocks(batch: Batch, features: Features, tries: int, *, block_dim: int) -> None:
-    """Carry all worlds of a batch on by at most this many tries each, in the block form."""
-    batch.control.tries = tries
+def launch_blocks(batch: Batch, features: Features, attempts: int, *, block_dim: int) -> None:
+    """Carry all worlds of a batch on by at most this many attempts each, in the block form."""
+    batch.control.attempts = attempts
     worlds = wp.array(np.arange(len(batch.links), dtype=np.int32), dtype=wp.int32, device="cpu")
-    inputs = [worlds, batch.model, batch.program, batch.state, batch.record, batch.scratch, batch.lists, batch.control]
+    inputs = [worlds, batch.model, batch.drive, batch.state, batch.record, batch.scratch, batch.lists, batch.control]
     with fibers():
         wp.launch_tiled(
             make_advance_block(features, block_dim),
@@ -107,9 +107,9 @@ def launch_blocks(batch: Batch, features: Features, tries: int, *, block_dim: in
         )
 
 
-def launch_chains(batch: Batch, features: Features, tries: int) -> None:
+def launch_chains(batch: Batch, features: Features, attempts: int) -> None:
     """The same in the CPU form."""
-    batch.launch(range(len(batch.links)), features, tries)
+    batch.launch(range(len(batch.links)), features, attempts)
 
 
 def listed_pairs(batch: Batch, world: int = 0) -> set[tuple[int, int]]:

@@ -13,7 +13,7 @@ from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 from warpchain.run.single_walk import setup_walk
 from warpchain.status import Status
-from warpchain.walks.walk_phases import Course, Phase
+from warpchain.walks.walk_phases import Phase, WalkRun
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ class Loop:
         shape: Means over its last period of height, width, and x, y of its centre [m].
         hold_time: For which it was held [s].
         drift: How far it moved while it was watched last.
-        tries: Steps tried.
+        attempts: Steps tried.
         depth: Greatest by which circles sank into the sprocket [m].
         is_released: Or whether the hold ended otherwise.
         status: Of the batch's world when the drive was over.
@@ -44,7 +44,7 @@ class Loop:
     shape: Array
     hold_time: float
     drift: float
-    tries: int
+    attempts: int
     depth: float
     is_released: bool
     status: Status
@@ -56,25 +56,25 @@ def period_of(setup: Setup) -> float:
     return setup.scene.links * setup.parameters.link_length / speed if speed > 0 else 0.25
 
 
-def released_loop(preset: str = "soft", program: dict[str, float] | None = None, **settings: Any) -> Loop:
+def released_loop(preset: str = "soft", drive: dict[str, float] | None = None, **settings: Any) -> Loop:
     """Carry a walk to the end of its drive.
 
     Args:
         preset: Its chain.
-        program: What its world's program says otherwise.
+        drive: What its world's drive says otherwise.
         settings: Of the walk.
     """
     setup = setup_walk(preset, {"method": "explicit"} | settings, None)
     batch = Batch(1, setup.scene.links, setup.options, keeps_samples=True)
-    course = Course(batch, 0, setup)
-    batch.set_program(0, **(program or {}))
+    run = WalkRun(batch, 0, setup)
+    batch.set_drive(0, **(drive or {}))
     samples: list[Array] = []
     while True:
-        batch.run([0], course.features, lambda: samples.append(batch.drain_samples(0)))
+        batch.run([0], run.features, lambda: samples.append(batch.drain_samples(0)))
         status = batch.status(0)
         position, velocity = batch.position(0), batch.velocity(0)
-        goes_on = course.next_phase()
-        if not goes_on or course.phase == Phase.WALK:
+        goes_on = run.next_phase()
+        if not goes_on or run.phase == Phase.WALK:
             break
     rows = np.concatenate(samples)
     last = rows[rows[:, layout.TIME] > rows[-1, layout.TIME] - period_of(setup)]
@@ -83,10 +83,10 @@ def released_loop(preset: str = "soft", program: dict[str, float] | None = None,
         position=position,
         velocity=velocity,
         shape=last[:, SHAPE].mean(axis=0),
-        hold_time=course.hold_time,
-        drift=course.drift,
-        tries=course.tries,
-        depth=course.extremes["sprocket"],
+        hold_time=run.hold_time,
+        drift=run.drift,
+        attempts=run.attempts,
+        depth=run.extremes["sprocket"],
         is_released=goes_on,
         status=status,
     )
@@ -100,7 +100,7 @@ def hold(loop: Loop, parameters: Parameters, duration: float, load_factor: float
     batch.set_chain(0, parameters, scene.links, contact_radius(scene, parameters))
     softness = 1.0 if setup.options.soften_drive else 0.0
     batch.load(0, loop.position, loop.velocity, stop_time=duration, stop_status=Status.NOT_STEADY, softness=softness)
-    batch.set_program(
+    batch.set_drive(
         0,
         sprocket_speed=-2 * np.pi * scene.frequency,
         loop_speed=loop_speed(scene, parameters),

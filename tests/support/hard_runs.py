@@ -5,7 +5,7 @@ import pytest
 
 import warpchain
 from warpchain import Status
-from warpchain.bench.trials.hard_starts import energy_error, energy_scale
+from warpchain.bench.problems.hard_starts import energy_error, energy_scale
 
 METHODS = ("rkf78", "dp5", "bs32", "os32", "rodas4p", "rodas5p", "hybrid")
 every_method = pytest.mark.parametrize("method", METHODS)
@@ -22,8 +22,8 @@ def assert_sound(flight, parameters, state, within=1e-5):
     position, velocity = flight.position[-1], flight.velocity[-1]
     assert np.all(np.isfinite(position)) and np.all(np.isfinite(velocity))
     # a flight on rigid joints is looser than springs
-    closes_within = max(within, 1e-4) if flight.losses["hand_over"] else within
+    closes_within = max(within, 1e-4) if flight.losses["joint_switch"] else within
     assert energy_error(flight, parameters, state) < closes_within
-    assert abs(flight.losses["hand_over"]) < 1e-3 * energy_scale(parameters, state)
-    losses = [loss for name, loss in flight.losses.items() if name != "hand_over"]
+    assert abs(flight.losses["joint_switch"]) < 1e-3 * energy_scale(parameters, state)
+    losses = [loss for name, loss in flight.losses.items() if name != "joint_switch"]
     assert all(loss > -within * energy_scale(parameters, state) for loss in losses)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from warpchain.status import Status
-from warpchain.store.folder import Store
+from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import empty_rows
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, load_sweep
@@ -88,7 +88,7 @@ def make_sweep(folder: Path, content: Mapping[str, object], outcome: Outcome = d
     sweep = load_sweep(content)
     walks = [sweep.planned(index) for index in range(sweep.walk_count)]
     outcomes = [outcome(walk) for walk in walks]
-    with Store.open(folder, sweep, shard_size=1 if None in outcomes else len(walks)) as store:
+    with SweepFolder.open(folder, sweep, shard_size=1 if None in outcomes else len(walks)) as store:
         for shard in store.missing():
             rows = empty_rows(sweep, shard)
             for place, index in enumerate(shard):

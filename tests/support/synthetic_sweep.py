@@ -20,7 +20,7 @@ import h5py  # noqa: F401 - before the forks below, or each would read it anew
 import numpy as np
 
 from warpchain.status import Status
-from warpchain.store.folder import Store, empty_rows
+from warpchain.store.folder import SweepFolder, empty_rows
 from warpchain.store.shards import BlockLayout
 from warpchain.store.sweep_result import load
 from warpchain.walks.rows import Rows
@@ -87,7 +87,7 @@ def synthetic_rows(sweep: Any, walks: range) -> Rows:
 
 def run(directory: Path | str, sweep: Any = SWEEP, *, shard_size: int = SHARD_SIZE, **settings: Any) -> None:
     """Begin or go on with a sweep, to its end."""
-    with Store.open(directory, sweep, shard_size=shard_size, **settings) as store:
+    with SweepFolder.open(directory, sweep, shard_size=shard_size, **settings) as store:
         for walks in store.missing():
             store.write(walks, synthetic_rows(sweep, walks))
 
@@ -129,7 +129,7 @@ def play_killed(directory: Path) -> None:
 
 def play_holder(directory: Path) -> None:
     """Hold a folder, with a forked worker that outlives this process when it is killed."""
-    Store.open(directory, SWEEP, shard_size=SHARD_SIZE)
+    SweepFolder.open(directory, SWEEP, shard_size=SHARD_SIZE)
     if not os.fork():
         print(os.getpid(), flush=True)  # by itself: it has begun to live, and given up the lock
     time.sleep(60)
@@ -137,7 +137,7 @@ def play_holder(directory: Path) -> None:
 
 def play_race(directory: Path) -> None:
     """Write the same shards from four processes at the same time, again and again."""
-    with Store.open(directory, SWEEP, shard_size=SHARD_SIZE) as store:
+    with SweepFolder.open(directory, SWEEP, shard_size=SHARD_SIZE) as store:
         children = []
         for _ in range(4):
             children.append(os.fork())
@@ -153,7 +153,7 @@ def play_full_disk(directory: Path) -> None:
     directory.mkdir()
     subprocess.run(["mount", "-t", "tmpfs", "-o", "size=600k", "tmpfs", directory], check=True)
     messages = []
-    with Store.open(directory, SWEEP, shard_size=40) as store:
+    with SweepFolder.open(directory, SWEEP, shard_size=40) as store:
         first, second, *_ = store.missing()
         store.write(first, synthetic_rows(SWEEP, first))
         before = content(directory)
@@ -181,7 +181,7 @@ def play_read_only(directory: Path) -> None:
     subprocess.run(["mount", "--bind", directory, directory], check=True)
     subprocess.run(["mount", "-o", "remount,ro,bind", directory], check=True)
     try:
-        Store.open(directory, SWEEP, shard_size=SHARD_SIZE)
+        SweepFolder.open(directory, SWEEP, shard_size=SHARD_SIZE)
     except OSError as error:
         print(json.dumps({"message": str(error), "missing": load(directory).missing_count}))
 

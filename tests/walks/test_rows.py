@@ -27,7 +27,7 @@ def test_columns_of_a_row() -> None:
         *("impulses_floor", "impulses_sprocket", "impulses_self", "greatest_opening"),
         *("penetration_floor", "penetration_sprocket", "penetration_self", "energy_at_release"),
         *("loss_joint_friction", "loss_joint_damping", "loss_floor", "loss_self_contact", "loss_softening"),
-        "loss_hand_over",
+        "loss_joint_switch",
         "energy_residual",
     )
     assert ROW.itemsize == sum(ROW[name].itemsize for name in ROW.names)

@@ -280,15 +280,15 @@ def test_frames_do_not_change_the_walk():
 
 
 def test_progress_goes_through_all_phases():
-    """Progress names every phase in its order, while simulated time and the number of tries rise."""
+    """Progress names every phase in its order, while simulated time and the number of attempts rise."""
     reports = []
     walk = soft_walk(on_progress=reports.append)
     phases = [phase for phase, _ in itertools.groupby(report.phase for report in reports)]
     assert [phase for phase in phases if phase != "compile"] == ["settle", "spin up", "hold", "walk"]
     assert phases[0] == "compile"
-    tries = [report.tries for report in reports]
-    assert tries == sorted(tries)
-    assert tries[-1] == walk.steps_accepted + walk.steps_rejected
+    attempts = [report.attempts for report in reports]
+    assert attempts == sorted(attempts)
+    assert attempts[-1] == walk.steps_accepted + walk.steps_rejected
     for _, group in itertools.groupby(reports, key=lambda report: report.phase == "walk"):
         times = [report.time for report in group]
         assert times == sorted(times)
@@ -333,7 +333,7 @@ def test_not_steady():
 
 @pytest.mark.parametrize(("start", "limit"), [("ellipse", 60_000), ("spinning", 180_000)])
 def test_step_limit(start, limit):
-    """The tries of a walk, those before the release included, stop at the limit, and the status says so."""
+    """The attempts of a walk, those before the release included, stop at the limit, and the status says so."""
     walk = soft_walk(links=60, start=start, step_limit=limit)
     assert walk.status == Status.STEP_LIMIT
     assert np.isnan(walk.dx)

@@ -32,8 +32,8 @@ FAR = 1e9
 """A stop time [s] that no measurement reaches."""
 LONGEST_STRETCH = 0.5
 """Simulated time [s] after which a measured chain begins anew: on rigid joints it flies so far that it would land."""
-SETTLING_TRIES = 200
-"""Tries past the first, small steps, which are not measured."""
+SETTLING_ATTEMPTS = 200
+"""Attempts past the first, small steps, which are not measured."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +45,10 @@ class StepCost:
             was dropped and has come down, tens of impulses a step).
         method: A method of the engine, or ``"DOP853 (SciPy)"`` on the NumPy model in flight, without contacts.
         links: n.
-        microseconds: Median time per try [µs].
-        per_link_stage: The same per link and stage [ns]; NaN where tries are of two kinds.
+        microseconds: Median time per attempt [µs].
+        per_link_stage: The same per link and stage [ns]; NaN where attempts are of two kinds.
         step: Mean accepted step [s].
-        rejected: Fraction of tries that were rejected.
+        rejected: Fraction of attempts that were rejected.
         wall_per_simulated: Seconds of one core per simulated second.
     """
 
@@ -109,13 +109,13 @@ def dropped(links: int, device: str = "cpu") -> tuple[Array, Array]:
 
 
 def step_costs(
-    links: Sequence[int] = (60, 150), tries: int = 2000, rounds: int = 7, *, report: Callable[[str], None]
+    links: Sequence[int] = (60, 150), attempts: int = 2000, rounds: int = 7, *, report: Callable[[str], None]
 ) -> list[StepCost]:
     """Cost of a step for each method, in flight and in the pile, at Table 1's parameters and each method's tolerance.
 
     Args:
         links: Chain lengths.
-        tries: Tries per measurement.
+        attempts: Attempts per measurement.
         rounds: Measurements of each; the methods take turns.
         report: Called with a line when something takes a while.
     """
@@ -135,7 +135,7 @@ def step_costs(
     for turn in range(rounds):
         report(f"round {turn + 1} of {rounds}")
         for key, stepper in runs.items():
-            seconds[key].append(stepper.run(tries))
+            seconds[key].append(stepper.run(attempts))
         for n, (position, velocity) in scipy_starts.items():
             began = time.perf_counter()
             for _ in range(200):
@@ -151,18 +151,18 @@ def step_costs(
         _, _, calls = motion_equations.solve_flight(
             position, velocity, np.array([0.0, duration]), parameters, rtol=1e-6, atol=1e-6
         )
-        per_try = statistics.median(scipy_seconds[n])
-        attempts = calls / DOP853_STAGES
+        per_attempt = statistics.median(scipy_seconds[n])
+        taken = calls / DOP853_STAGES
         costs.append(
             StepCost(
                 scene="flight",
                 method="DOP853 (SciPy)",
                 links=n,
-                microseconds=per_try * 1e6,
-                per_link_stage=per_try * 1e9 / (n * DOP853_STAGES),
-                step=duration / attempts,
+                microseconds=per_attempt * 1e6,
+                per_link_stage=per_attempt * 1e9 / (n * DOP853_STAGES),
+                step=duration / taken,
                 rejected=math.nan,
-                wall_per_simulated=per_try * attempts / duration,
+                wall_per_simulated=per_attempt * taken / duration,
             )
         )
     return costs
@@ -184,7 +184,7 @@ def broad_phase_costs(
             position[:, 1] -= position[:, 1].min() - parameters.circle_radius
         else:
             position, velocity = dropped(n)
-        tries = 200_000 // n
+        attempts = 200_000 // n
         # a list with no margin is void after each step; a step too short to move keeps both states the same
         options = {"method": "bs32", "contact_step": 1e-9, "smallest_step": 1e-15}
         kept = _Stepper(parameters, Options.model_validate(options), position, velocity)
@@ -193,10 +193,10 @@ def broad_phase_costs(
         pairs = _Stepper(parameters, void, position, velocity, broad_phase="all_pairs")
         seconds: dict[str, list[float]] = {"kept": [], "grid": [], "pairs": []}
         for stepper in (kept, grid, pairs):
-            stepper.run(tries)
+            stepper.run(attempts)
         for _ in range(rounds):
             for name, stepper in (("kept", kept), ("grid", grid), ("pairs", pairs)):
-                seconds[name].append(1e6 * stepper.run(tries))
+                seconds[name].append(1e6 * stepper.run(attempts))
         base = statistics.median(seconds["kept"])
         costs.append(
             BroadPhaseCost(
@@ -223,7 +223,7 @@ def as_json(steps: list[StepCost], broad_phase: list[BroadPhaseCost]) -> dict[st
 
 
 class _Stepper:
-    """One chain, floor and self-contacts on, that is carried on by a given number of tries at a time."""
+    """One chain, floor and self-contacts on, that is carried on by a given number of attempts at a time."""
 
     def __init__(
         self,
@@ -243,35 +243,35 @@ class _Stepper:
         self._advance = self._begin()
 
     def _begin(self) -> float:
-        """Put the chain back to its start, and past the first steps; returns the mean simulated time of a try [s]."""
+        """Put the chain back to its start, past the first steps; returns the mean simulated time of an attempt [s]."""
         self.batch.load(0, *self._start, stop_time=FAR, stop_status=Status.FINISHED)
-        self.batch.launch([0], self.features, SETTLING_TRIES)
-        return self.batch.time(0) / SETTLING_TRIES
+        self.batch.launch([0], self.features, SETTLING_ATTEMPTS)
+        return self.batch.time(0) / SETTLING_ATTEMPTS
 
-    def run(self, tries: int) -> float:
-        """Carry on by so many tries, or as many as there is room for; returns the wall time of a try [s].
+    def run(self, attempts: int) -> float:
+        """Carry on by so many attempts, or as many as there is room for; returns the wall time of an attempt [s].
 
         What happens is added to ``counts`` and ``simulated`` [s].
         """
-        tries = max(1, min(tries, round(LONGEST_STRETCH / self._advance) - SETTLING_TRIES))
-        if self.batch.time(0) + tries * self._advance > LONGEST_STRETCH:
+        attempts = max(1, min(attempts, round(LONGEST_STRETCH / self._advance) - SETTLING_ATTEMPTS))
+        if self.batch.time(0) + attempts * self._advance > LONGEST_STRETCH:
             self._begin()
         time_before, before = self.batch.time(0), self.batch.counts(0)
-        seconds = self.batch.launch([0], self.features, tries)
+        seconds = self.batch.launch([0], self.features, attempts)
         if self.batch.status(0) != Status.RUNNING:
             raise RuntimeError(f"a measured chain stopped: {self.batch.status(0).sentence}")
         self.simulated += self.batch.time(0) - time_before
         for name, count in self.batch.counts(0).items():
             self.counts[name] += count - before[name]
-        return seconds / tries
+        return seconds / attempts
 
     def listed_pairs(self) -> int:
         """Pairs in the neighbour list now."""
         return self.batch.listed_pairs(0)
 
     def cost(self, scene: str, method: str, links: int, seconds: float) -> StepCost:
-        """What was measured, at so much wall time [s] a try."""
-        accepted, tries = self.counts["accepted"], self.counts["accepted"] + self.counts["rejected"]
+        """What was measured, at so much wall time [s] an attempt."""
+        accepted, attempts = self.counts["accepted"], self.counts["accepted"] + self.counts["rejected"]
         if scene == "flight" and self.counts["floor"]:
             raise RuntimeError(f"a chain of {links} links that was to fly came down, with {method}")
         stages = math.nan if METHODS[method].flight else METHODS[method].stages
@@ -282,6 +282,6 @@ class _Stepper:
             microseconds=seconds * 1e6,
             per_link_stage=seconds * 1e9 / (links * stages),
             step=self.simulated / accepted,
-            rejected=1 - accepted / tries,
-            wall_per_simulated=seconds * tries / self.simulated,
+            rejected=1 - accepted / attempts,
+            wall_per_simulated=seconds * attempts / self.simulated,
         )

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import warp as wp
 
-from warpchain.bench.cpu_steps import FAR, LONGEST_STRETCH, SETTLING_TRIES, Array, dropped, flying
+from warpchain.bench.cpu_steps import FAR, LONGEST_STRETCH, SETTLING_ATTEMPTS, Array, dropped, flying
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import start_device, versions
 from warpchain.engine.kernel_choice import block_kernel, block_threads, features_of, load_kernels
@@ -48,28 +48,28 @@ STAGE_FLOPS: Final = {"direction": 26, "state": 14, "ends": 10, "joint": 52, "po
 A reciprocal counts 6: an approximate one made exact by fused operations.
 """
 END_FLOPS: Final = 50
-"""The same for new state, error norm, direction and what is measured of a link at the end of a try."""
+"""The same for new state, error norm, direction and what is measured of a link at the end of an attempt."""
 
 
 @dataclass(frozen=True)
 class GpuCost:
-    """What a try costs.
+    """What an attempt costs.
 
     Attributes:
         scene: ``"flight"`` (a circulating ellipse in the air) or ``"pile"`` (a chain that was dropped and came down).
         method: A method of the engine.
         links: n.
         chains: Chains that are carried on together.
-        microseconds: Median wall time of one try of all of them [µs].
+        microseconds: Median wall time of one attempt of all of them [µs].
         link_stages: Stages of a link per second [1/s]; NaN for methods that also solve equations.
         chain_seconds: Simulated time of all chains per wall time.
-        rejected: Fraction of tries that were rejected.
+        rejected: Fraction of attempts that were rejected.
         registers: Of a thread.
         spilled: Local memory of a thread [B], where what does not fit into registers goes.
         blocks: Chains that a multiprocessor holds at a time.
         occupancy: Threads that a multiprocessor then holds, as a fraction of the most it can.
         peak: Arithmetic in double precision as a fraction of what the device could do at its highest clock, see
-            :func:`flops_per_try`; NaN where either is unknown.
+            :func:`flops_per_attempt`; NaN where either is unknown.
     """
 
     scene: str
@@ -87,8 +87,8 @@ class GpuCost:
     peak: float
 
 
-def flops_per_try(method: str) -> float:
-    """Arithmetic of a link and a try in double precision, contacts not counted, see :data:`STAGE_FLOPS`.
+def flops_per_attempt(method: str) -> float:
+    """Arithmetic of a link and an attempt in double precision, contacts not counted, see :data:`STAGE_FLOPS`.
 
     Every coefficient of the tableau that is not zero is a product and a sum for each of three components, for
     velocities and for positions. NaN for methods that also solve equations.
@@ -103,7 +103,7 @@ def flops_per_try(method: str) -> float:
 
 
 def evaluations(method: str) -> float:
-    """Stages that a try evaluates: one less if the last stage of a step is the first of the next.
+    """Stages that an attempt evaluates: one less if the last stage of a step is the first of the next.
 
     NaN for methods that also solve equations.
     """
@@ -123,7 +123,7 @@ def gpu_costs(
     rounds: int = 5,
     report: Callable[[str], None],
 ) -> list[GpuCost]:
-    """Cost of a try at Table 1's parameters and each method's tolerances.
+    """Cost of an attempt at Table 1's parameters and each method's tolerances.
 
     Args:
         device: ``"cuda"`` or ``"cuda:N"``.
@@ -179,7 +179,11 @@ def gpu_machine(device: str) -> dict[str, str]:
 def as_json(machine: Mapping[str, str], costs: Sequence[GpuCost]) -> dict[str, Any]:
     """Everything measured, as JSON has it."""
     rows = [{name: None if value != value else value for name, value in asdict(cost).items()} for cost in costs]
-    return {"machine": dict(machine), "flops_per_try": {name: flops_per_try(name) for name in TABLEAUS}, "tries": rows}
+    return {
+        "machine": dict(machine),
+        "flops_per_attempt": {name: flops_per_attempt(name) for name in TABLEAUS},
+        "attempts": rows,
+    }
 
 
 def highest_clock(device: wp.Device) -> float:
@@ -217,10 +221,10 @@ class Stretch:
     """What a crowd did between two looks; its chains are all alike.
 
     Attributes:
-        seconds: Wall time of one try of all chains [s].
+        seconds: Wall time of one attempt of all chains [s].
         simulated: Simulated time of a chain [s].
-        accepted: Accepted tries of a chain.
-        rejected: Rejected tries of a chain.
+        accepted: Accepted attempts of a chain.
+        rejected: Rejected attempts of a chain.
         floor: Impulses with the floor of a chain.
     """
 
@@ -232,7 +236,7 @@ class Stretch:
 
     @property
     def tried(self) -> int:
-        """Tries of a chain."""
+        """Attempts of a chain."""
         return self.accepted + self.rejected
 
 
@@ -246,7 +250,7 @@ class Crowd:
         self.batches = [Batch(min(worlds, chains - first), self.links, options) for first in range(0, chains, worlds)]
         for batch in self.batches:
             batch.control.rest_speed = 0.0  # a pile is at rest, and goes on
-            batch.control.launch_time = math.inf  # launches are cut by tries alone, which are counted on
+            batch.control.launch_time = math.inf  # launches are cut by attempts alone, which are counted on
             for world in range(len(batch.links)):
                 batch.set_chain(world, parameters, self.links)
         self.features = self.batches[0].features(fixed_body="floor", watch="rest")
@@ -257,14 +261,14 @@ class Crowd:
         for batch in self.batches:
             for world in range(len(batch.links)):
                 batch.load(world, *self._start, stop_time=FAR, stop_status=Status.FINISHED)
-        self.run(SETTLING_TRIES)
-        return self.run(SETTLING_TRIES)
+        self.run(SETTLING_ATTEMPTS)
+        return self.run(SETTLING_ATTEMPTS)
 
-    def run(self, tries: int) -> Stretch:
-        """Carry all chains on by about so many tries."""
+    def run(self, attempts: int) -> Stretch:
+        """Carry all chains on by about so many attempts."""
         batch = self.batches[0]
         time_before, before = batch.time(0), batch.counts(0)
-        share = -(-tries // LAUNCHES)
+        share = -(-attempts // LAUNCHES)
         began = time.perf_counter()
         for _ in range(LAUNCHES):
             for each in self.batches:
@@ -288,13 +292,13 @@ class Crowd:
         """So many stretches of :data:`SECONDS` each, or shorter ones that end before a flying chain lands."""
         first = self.begin()
         advance = first.simulated / first.tried
-        room = round(LONGEST_STRETCH / advance) - 2 * SETTLING_TRIES
-        tries = max(LAUNCHES, min(round(SECONDS / first.seconds), room))
+        room = round(LONGEST_STRETCH / advance) - 2 * SETTLING_ATTEMPTS
+        attempts = max(LAUNCHES, min(round(SECONDS / first.seconds), room))
         stretches = []
         for _ in range(rounds):
-            if self.batches[0].time(0) + tries * advance > LONGEST_STRETCH:
+            if self.batches[0].time(0) + attempts * advance > LONGEST_STRETCH:
                 self.begin()
-            stretches.append(self.run(tries))
+            stretches.append(self.run(attempts))
         return stretches
 
     def cost(self, scene: str, method: str, rounds: int) -> GpuCost:
@@ -322,5 +326,5 @@ class Crowd:
             spilled=spilled,
             blocks=blocks,
             occupancy=blocks * threads / 2048,
-            peak=self.links * self.chains * flops_per_try(method) / seconds / peak,
+            peak=self.links * self.chains * flops_per_attempt(method) / seconds / peak,
         )

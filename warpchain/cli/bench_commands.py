@@ -34,7 +34,7 @@ def accuracy(
         str | None, typer.Option(metavar="TOL,…", help="Of the work–precision diagrams. Default: 1e-3 … 1e-9.")
     ] = None,
     links: Annotated[str, typer.Option(metavar="N,…", help="Links, in all parts but the hard cases.")] = "60,150",
-    trials: Annotated[
+    problems: Annotated[
         str, typer.Option(metavar="NAME,…", help="What the diagrams are about.")
     ] = "flight,impact,sprocket",
     presets: Annotated[str, typer.Option(metavar="NAME,…", help="Of the ensembles.")] = "soft,paper",
@@ -80,10 +80,10 @@ def accuracy(
     from warpchain.bench.accuracy.plan import make_plan, run_accuracy
     from warpchain.cli.terminal import status_line, try_folder
 
-    lists = {"parts": _words("--parts", parts), "trials": _words("--trials", trials)}
+    lists = {"parts": _words("--parts", parts), "problems": _words("--problems", problems)}
     lists["presets"] = _words("--presets", presets)
     if chosen is not None:
-        lists["contestants"] = _words("--methods", chosen)
+        lists["method_settings"] = _words("--methods", chosen)
     if cases is not None:
         lists["cases"] = _words("--cases", cases)
     numbers = {"tolerances": _numbers("--tolerances", tolerances)} if tolerances is not None else {}

@@ -69,7 +69,7 @@ def bench(
         from warpchain.cli.terminal import print_gpu_costs
 
         with status_line() as show:
-            tries = gpu_steps.gpu_costs(
+            attempts = gpu_steps.gpu_costs(
                 where,
                 scenes=scenes or gpu_steps.SCENES,
                 methods=methods or gpu_steps.METHODS,
@@ -79,7 +79,7 @@ def bench(
                 report=show,
             )
         machine = gpu_steps.gpu_machine(where)
-        costs, print_tables = gpu_steps.as_json(machine, tries), partial(print_gpu_costs, machine, tries)
+        costs, print_tables = gpu_steps.as_json(machine, attempts), partial(print_gpu_costs, machine, attempts)
     text = json.dumps(costs, indent=2, allow_nan=False)
     if output is not None:
         output.write_text(text + "\n", encoding="utf-8")

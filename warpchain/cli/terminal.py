@@ -61,7 +61,7 @@ def progress_text(progress: "Progress") -> str:
     if progress.phase == "compile":
         return "compiling kernels; later runs find them ready"
     where, speed = f"{progress.phase:8}{progress.time:8.3f} s", f"{progress.speed:9.3f} m/s"
-    return f"{where}{speed}{progress.tries:14,} steps"
+    return f"{where}{speed}{progress.attempts:14,} steps"
 
 
 def print_walk(result: WalkResult) -> None:
@@ -99,7 +99,7 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
         return  # the chain never got so far
     yield "energy at release", f"{released:.5f} J, kinetic {energy['kinetic_at_release']:.5f} J"
     for cause in LOST:
-        if energy[cause] or cause not in ("softening", "hand_over"):
+        if energy[cause] or cause not in ("softening", "joint_switch"):
             yield f"  lost to {cause.replace('_', ' ')}", f"{energy[cause]:.5f} J"
     left = energy["kinetic_at_end"] + energy["potential_at_end"]
     yield "energy at the end", f"{left:.5f} J, kinetic {energy['kinetic_at_end']:.5f} J"
@@ -118,7 +118,7 @@ def print_costs(
     table = Table(box=None, pad_edge=False)
     for heading in ("scene", "links", "method"):
         table.add_column(heading)
-    for heading in ("µs/try", "ns/link/stage", "step µs", "rejected", "s/s"):
+    for heading in ("µs/attempt", "ns/link/stage", "step µs", "rejected", "s/s"):
         table.add_column(heading, justify="right")
     for cost in sorted(steps, key=lambda cost: (cost.scene, cost.links)):
         rejected = "" if math.isnan(cost.rejected) else f"{cost.rejected:.1%}"
@@ -146,7 +146,7 @@ def print_gpu_costs(machine: Mapping[str, str], costs: "Sequence[GpuCost]") -> N
     table = Table(box=None, pad_edge=False)
     for heading in ("scene", "links", "method"):
         table.add_column(heading)
-    for heading in ("chains", "µs/try", "link stages/s", "chain·s/s", "rejected"):
+    for heading in ("chains", "µs/attempt", "link stages/s", "chain·s/s", "rejected"):
         table.add_column(heading, justify="right")
     for heading in ("registers", "spilled B", "blocks", "of peak"):
         table.add_column(heading, justify="right")

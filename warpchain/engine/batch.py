@@ -21,7 +21,7 @@ from warpchain.kernels import layout
 from warpchain.kernels.cpu.contacts.neighbour_list import list_layout
 from warpchain.kernels.cpu.loop import Features, make_advance
 from warpchain.kernels.events.steadiness import LOADING_TIME
-from warpchain.kernels.types import Model, Program, Record, State
+from warpchain.kernels.types import Drive, Model, Record, State
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ PROGRAM = (
     *("loop_speed", "loop_period", "load_factor", "steady_window", "steady_time", "steady_tolerance"),
     *("further_hold", "release_phase", "hold_softness", "loaded_softness", "push_rate"),
 )
-"""Fields of :class:`warpchain.kernels.types.Program`."""
+"""Fields of :class:`warpchain.kernels.types.Drive`."""
 FIRST_STEP = 1e-7  # s; the controller grows it fivefold per step
 LANES = 3  # streams of a batch for kernels side by side: chains of one length do not fill the device
 LAUNCH_SECONDS = 0.1  # how long a launch should take: the grain of progress and of Ctrl-C
@@ -45,7 +45,7 @@ COUNTS = ("accepted", "rejected", "floor", "sprocket", "self", "bounces", "list_
 """Counters of a world, in the order of :mod:`warpchain.kernels.layout`."""
 EXTREMES = ("opening", "floor", "sprocket", "self")
 """Greatest joint opening and depths of a world, likewise."""
-LOSSES = ("joint_friction", "joint_damping", "floor", "sprocket", "self_contact", "softening", "hand_over")
+LOSSES = ("joint_friction", "joint_damping", "floor", "sprocket", "self_contact", "softening", "joint_switch")
 """Losses of energy of a world, likewise."""
 
 
@@ -93,9 +93,9 @@ class Batch:
         for name in Parameters.model_fields:
             setattr(self.model, name, self._array(np.ones(worlds)))
 
-        self.program = Program()
+        self.drive = Drive()
         for name in PROGRAM:
-            setattr(self.program, name, self._array(np.zeros(worlds)))
+            setattr(self.drive, name, self._array(np.zeros(worlds)))
 
         self._constant = set(self._mirrors)
         self._order = Mirror(np.zeros(worlds, dtype=np.int32), self.device, self._stream)
@@ -106,13 +106,13 @@ class Batch:
             *("softness", "load_factor", "first_area"),
         ):
             setattr(self.state, name, self._array(np.zeros(worlds)))
-        for name in ("stop_status", "is_fresh", "has_first_stage", "flies"):
+        for name in ("stop_status", "is_fresh", "has_first_stage", "is_rigid"):
             setattr(self.state, name, self._array(np.zeros(worlds, dtype=np.int32)))
         self.state.status = self._array(np.full(worlds, int(Status.FINISHED), dtype=np.int32))
-        self.state.tries_before = self._array(np.zeros(worlds, dtype=np.int64))
+        self.state.attempts_before = self._array(np.zeros(worlds, dtype=np.int64))
         self.state.next_sample = self._array(np.zeros(worlds, dtype=np.int64))
         self.state.watch = self._array(np.zeros((worlds, layout.WATCH_ROWS)))
-        for name in ("first_look", "last_look"):
+        for name in ("first_sample", "last_sample"):
             setattr(self.state, name, self._array(np.zeros((worlds, layout.SAMPLE_COLUMNS))))
         self.state.counts = self._array(np.zeros((worlds, layout.COUNT_ROWS), dtype=np.int64))
         self.state.extremes = self._array(np.zeros((worlds, layout.EXTREME_ROWS)))
@@ -131,7 +131,7 @@ class Batch:
         self.control.launch_time = LAUNCH_SECONDS
         self.control.frame_every = frame_every or 1
 
-        self._tries = 500
+        self._attempts = 500
         self.scratch = wp.zeros((worlds, rows, self.columns), dtype=wp.float64, device=self.device)
         self.lists = wp.zeros((worlds, list_layout(self.columns).size), dtype=wp.int32, device=self.device)
 
@@ -177,7 +177,7 @@ class Batch:
         *,
         stop_time: float,
         stop_status: Status,
-        tries_before: int = 0,
+        attempts_before: int = 0,
         softness: float = 0.0,
     ) -> None:
         """Set the state of a world's chain and start its clock at zero; its statistics and watches start anew.
@@ -188,7 +188,7 @@ class Batch:
             velocity: (n, 3), their rates.
             stop_time: The run lands on this time [s] and ends.
             stop_status: Status it then has.
-            tries_before: Tries of earlier phases, which the limit of the options counts as well.
+            attempts_before: Attempts of earlier phases, which the limit of the options counts as well.
             softness: Of the joints, see :mod:`warpchain.kernels.events.softening`.
         """
         state = self.state
@@ -210,14 +210,14 @@ class Batch:
         self._edit(state.watch)[world, list(UNSET_WATCHES)] = -1.0
         self._edit(state.softness)[world] = softness
         self._edit(state.load_factor)[world] = 1.0
-        self._edit(state.last_look)[world, layout.TIME] = -1.0
+        self._edit(state.last_sample)[world, layout.TIME] = -1.0
         self._edit(state.watch)[world, layout.LAST_FLOOR_IMPULSE] = -np.inf
-        self._edit(state.tries_before)[world] = tries_before
+        self._edit(state.attempts_before)[world] = attempts_before
         self._edit(state.has_first_stage)[world] = 0
         self._edit(state.is_fresh)[world] = 1
         self._edit(state.step)[world] = FIRST_STEP
         self._edit(state.other_step)[world] = FIRST_STEP
-        self._edit(state.flies)[world] = 0
+        self._edit(state.is_rigid)[world] = 0
         self._edit(state.closing_time)[world] = 0.0
         self._edit(state.last_error)[world] = 1.0
         self._edit(self.record.sample_count)[world] = 0
@@ -230,10 +230,10 @@ class Batch:
         self._edit(self.state.stop_status)[world] = int(stop_status)
         self._edit(self.state.status)[world] = int(Status.RUNNING)
 
-    def set_program(self, world: int, **values: float) -> None:
-        """Set fields of :class:`Program` of a world."""
+    def set_drive(self, world: int, **values: float) -> None:
+        """Set fields of :class:`Drive` of a world."""
         for name, value in values.items():
-            self._edit(getattr(self.program, name))[world] = value
+            self._edit(getattr(self.drive, name))[world] = value
 
     def features(self, *, fixed_body: str, watch: str, broad_phase: str = "grid") -> Features:
         """Kernel features for these worlds."""
@@ -254,11 +254,11 @@ class Batch:
             active = [world for world in worlds if status[world] == Status.RUNNING]
             if not active:
                 return
-            seconds = self.launch(active, features, self._tries)
+            seconds = self.launch(active, features, self._attempts)
             if seconds < LAUNCH_SECONDS / 2:
-                self._tries = min(2 * self._tries, 1_000_000)
+                self._attempts = min(2 * self._attempts, 1_000_000)
             elif seconds > 2 * LAUNCH_SECONDS:
-                self._tries = max(self._tries // 2, 1)
+                self._attempts = max(self._attempts // 2, 1)
             if after_launch is not None:
                 after_launch()
 
@@ -276,24 +276,24 @@ class Batch:
         """Threads of the block that carries a chain of so many links on a GPU."""
         return self._threads or block_threads(links)
 
-    def launch(self, worlds: Sequence[int], features: Features, tries: int) -> float:
-        """Carry worlds on by at most this many tries each; returns the wall time [s]."""
-        return self.launch_together({features: worlds}, tries)
+    def launch(self, worlds: Sequence[int], features: Features, attempts: int) -> float:
+        """Carry worlds on by at most this many attempts each; returns the wall time [s]."""
+        return self.launch_together({features: worlds}, attempts)
 
-    def launch_together(self, groups: Mapping[Features, Sequence[int]], tries: int) -> float:
+    def launch_together(self, groups: Mapping[Features, Sequence[int]], attempts: int) -> float:
         """Carry groups of worlds on, each with features of its own, at the same time if the device can."""
         before = time.perf_counter()
-        self.start(groups, tries)
+        self.start(groups, attempts)
         self.finish()
         return time.perf_counter() - before
 
-    def start(self, groups: Mapping[Features, Sequence[int]], tries: int) -> None:
+    def start(self, groups: Mapping[Features, Sequence[int]], attempts: int) -> None:
         """Begin a launch as of :meth:`launch_together`; until :meth:`finish` the host may not look at the worlds.
 
         On a GPU this returns at once, and launches of other batches go on at the same time.
         """
-        self.control.tries = tries
-        arrays = [self.model, self.program, self.state, self.record, self.scratch, self.lists, self.control]
+        self.control.attempts = attempts
+        arrays = [self.model, self.drive, self.state, self.record, self.scratch, self.lists, self.control]
         if self._stream is None:
             for features, worlds in groups.items():
                 inputs = [wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device), *arrays]
@@ -369,7 +369,7 @@ class Batch:
         row = self._view(self.state.counts)[world]
         return {name: int(value) for name, value in zip(COUNTS, row, strict=True)}
 
-    def tries(self, world: int) -> int:
+    def attempts(self, world: int) -> int:
         """Steps tried since loading, accepted or not."""
         counts = self.counts(world)
         return counts["accepted"] + counts["rejected"]
@@ -384,13 +384,13 @@ class Batch:
         row = self._view(self.state.losses)[world]
         return {name: float(value) for name, value in zip(LOSSES, row, strict=True)}
 
-    def first_look(self, world: int) -> Array:
+    def first_sample(self, world: int) -> Array:
         """Sums over the chain when its run began: (SAMPLE_COLUMNS,), see :mod:`warpchain.kernels.layout`."""
-        return np.array(self._view(self.state.first_look)[world])
+        return np.array(self._view(self.state.first_sample)[world])
 
-    def last_look(self, world: int) -> Array:
+    def last_sample(self, world: int) -> Array:
         """The same when the chain was last looked at; at the end of the run if that has ended."""
-        return np.array(self._view(self.state.last_look)[world])
+        return np.array(self._view(self.state.last_sample)[world])
 
     def softened_at(self, world: int) -> float:
         """Time [s] since loading at which the joints of a collapsed loop were softened; NaN if they were not."""

@@ -14,9 +14,9 @@ SOFTEST = SOFT.with_values({"joint_stiffness": 1e6, "joint_damping": 30.0})
 
 Measured with `paper` and dp5 at 1e-4 on walks that are the same until the loop encloses half of its first area: Δx then
 shifts by 0.01 ± 0.04 mm (24 walks of 60 links at 15 Hz) and 1.5 ± 1.5 mm (16 of 150 at 20 Hz; 0.01 ± 0.08 mm from 0.3
-of the area), in 2.7 times fewer tries. That was with ω_c = 1 rad/s, which takes 5 % fewer tries than the ω_c of soft
-joints but lets circles sink in half as deep again. k = 3e5 N/m takes 1.6 times fewer again, but circles sink 2 mm into
-the floor. From 0.9 of the area 1e6 N/m may shift Δx: by 8 ± 4 mm of 1 m (12 walks of 150 links).
+of the area), in 2.7 times fewer attempts. That was with ω_c = 1 rad/s, which takes 5 % fewer attempts than the ω_c of
+soft joints but lets circles sink in half as deep again. k = 3e5 N/m takes 1.6 times fewer again, but circles sink 2 mm
+into the floor. From 0.9 of the area 1e6 N/m may shift Δx: by 8 ± 4 mm of 1 m (12 walks of 150 links).
 """
 STIFFENING_TIME = 0.03
 """Time [s] in which joints that were soft on the sprocket get their own values back after the release."""

@@ -96,7 +96,7 @@ def world_bytes(
         keeps_loads: Loads of joints are kept with the frames.
     """
     columns = layout.padded_width(longest)
-    few = len(Parameters.model_fields) + 107  # numbers of a world in model, program and state
+    few = len(Parameters.model_fields) + 107  # numbers of a world in model, drive and state
     numbers = columns * scratch_rows(options, longest, device) + 6 * longest + few
     numbers += samples * layout.SAMPLE_COLUMNS + frames * ((2 + 3 * keeps_loads) * longest + 1)
     return 8 * numbers + 4 * list_layout(columns).size

@@ -17,9 +17,9 @@ REGISTERS = 168
 FEWER_REGISTERS = {160: 128, 224: 128, 256: 128}
 """The same, by threads of a block, where fewer let another block onto a multiprocessor.
 
-A multiprocessor has four schedulers with 16384 registers each, so that a block's number of warps of 32 threads and
-the registers decide how many blocks it holds. Measured on an H200 with slightly older kernels, 4000 chains in flight,
-ns per try and chain, with 128 and 168: 60 links 12.0, 6.2, 5.5 and 11.5, 5.5, 4.9 (rkf78, dp5, os32); 150 links 15.5,
+A multiprocessor has four schedulers with 16384 registers each, so that a block's number of warps of 32 threads and the
+registers decide how many blocks it holds. Measured on an H200 with slightly older kernels, 4000 chains in flight, ns
+per attempt and chain, with 128 and 168: 60 links 12.0, 6.2, 5.5 and 11.5, 5.5, 4.9 (rkf78, dp5, os32); 150 links 15.5,
 13.3 and 16.8, 15.4 (dp5, os32). Without a bound, few chains run up to 15 % faster and many slower. No bit of a walk
 depends on it: the compiler fuses the same products and sums (`tests/test_on_gpu.py`, walks in blocks of their own and
 of 192 threads). rodas4p is fastest without one.

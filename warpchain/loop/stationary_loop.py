@@ -37,7 +37,7 @@ from warpchain.inputs.setup import Setup
 from warpchain.loop.before_release import BeforeRelease
 
 if TYPE_CHECKING:
-    from warpchain.store.kept_walk import KeptWalk
+    from warpchain.store.walk_motion import WalkMotion
     from warpchain.walks.walk_result import WalkResult
 
 Array = NDArray[np.float64]
@@ -157,7 +157,7 @@ class StationaryLoop:
         return float(np.interp(0.0, self.s, self.curvature))
 
 
-def average_loop(walk: "WalkResult | KeptWalk") -> StationaryLoop:
+def average_loop(walk: "WalkResult | WalkMotion") -> StationaryLoop:
     """The mean loop of a walk in the last moments before its release.
 
     Raises:

@@ -15,7 +15,7 @@ from warpchain.loop.theory import NoSolutionError, TheoreticalLoop, catenary, pr
 from warpchain.pictures.walk_figures import FAINT, GROUND, INK, LINE_COLORS, _tidy
 
 if TYPE_CHECKING:
-    from warpchain.store.kept_walk import KeptWalk
+    from warpchain.store.walk_motion import WalkMotion
     from warpchain.walks.walk_result import WalkResult
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ IN_LINKS: Final = 2.0
 """The tension is shown from this many links inside of the free part: averages mix in what touches the sprocket."""
 
 
-def loop_figure(walk: "WalkResult | KeptWalk", *, figure: Figure | None = None) -> Figure:
+def loop_figure(walk: "WalkResult | WalkMotion", *, figure: Figure | None = None) -> Figure:
     """The mean loop of a walk before its release, to scale, and its curvature and tension along the arc.
 
     Args:
@@ -86,7 +86,7 @@ def _hanging(loop: StationaryLoop) -> TheoreticalLoop | None:
 
 def _draw_shape(
     axes: Axes,
-    walk: "WalkResult | KeptWalk",
+    walk: "WalkResult | WalkMotion",
     loop: StationaryLoop,
     theory: TheoreticalLoop | None,
     hanging: TheoreticalLoop | None,

@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 from warpchain.status import Status
 
 if TYPE_CHECKING:
-    from warpchain.store.kept_walk import KeptWalk
+    from warpchain.store.walk_motion import WalkMotion
     from warpchain.walks.walk_result import WalkResult
 
-    Walk: TypeAlias = WalkResult | KeptWalk
+    Walk: TypeAlias = WalkResult | WalkMotion
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from warpchain.pictures.walk_figures import LINE_COLORS, figure5
 from warpchain.reports.statistics import NothingToShow, cell_text
 
 if TYPE_CHECKING:
-    from warpchain.store.kept_walk import KeptWalk
     from warpchain.store.sweep_result import SweepResult
+    from warpchain.store.walk_motion import WalkMotion
 
 MOST_CELLS: Final = len(LINE_COLORS) - 1
 """Most cells shown: one colour each."""
@@ -36,10 +36,10 @@ def sweep_figure5(result: "SweepResult") -> tuple[Figure, str]:
     shown = (
         [cells[i] for i in np.unique(np.linspace(0, len(cells) - 1, MOST_CELLS).round().astype(int))] if cells else []
     )
-    walks: list[KeptWalk] = []
+    walks: list[WalkMotion] = []
     labels: list[str] = []
     for block, place, samples in shown:
-        released = (walk for sample in samples if len((walk := block.kept_walk((*place, int(sample)))).time))
+        released = (walk for sample in samples if len((walk := block.walk_motion((*place, int(sample)))).time))
         found = [walk for walk, _ in zip(released, range(MOST_SAMPLES), strict=False)]
         at = {name: values[i] for (name, values), i in zip(block.axes.items(), place, strict=True)}
         name = ", ".join(filter(None, [block.name if len(result.blocks) > 1 else "", cell_text(at)]))

@@ -58,7 +58,7 @@ def sweep_kink(result: "SweepResult") -> tuple[Figure, str]:
 def _kinks(block: "BlockResult") -> Iterator[tuple[int, float, Kink]]:
     """Links, frequency and kink of every walk of a block that has a mean loop."""
     for place in np.argwhere(block.kept):
-        walk = block.kept_walk(tuple(int(index) for index in place))
+        walk = block.walk_motion(tuple(int(index) for index in place))
         if walk.before_release is None:
             continue
         yield walk.setup.scene.links, walk.setup.scene.frequency, find_kink(average_loop(walk))

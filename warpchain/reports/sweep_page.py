@@ -158,7 +158,7 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
     cell = _cell(block, planned.cell)
     walk: Walk
     if _has_frames(result, block, place):
-        walk, again = block.kept_walk(place), ""
+        walk, again = block.walk_motion(place), ""
         seconds, bounces = block.columns["walk_time"][place], block.columns["bounces"][place]
     else:
         walk = ran = run_walk(planned.setup, frame_interval=FRAME_INTERVAL)

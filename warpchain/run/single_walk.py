@@ -19,7 +19,7 @@ from warpchain.inputs.setup import Setup, resolve
 from warpchain.kernels import layout
 from warpchain.kernels.cpu.loop import Features
 from warpchain.walks.recorder import EVERYTHING
-from warpchain.walks.walk_phases import Course
+from warpchain.walks.walk_phases import WalkRun
 from warpchain.walks.walk_result import CONTACTS, WalkResult
 
 Array = NDArray[np.float64]
@@ -38,13 +38,13 @@ class Progress:
         phase: ``"compile"``, ``"settle"``, ``"spin up"``, ``"hold"`` or ``"walk"``.
         time: Simulated time [s] since the start, in phase ``"walk"`` since the release.
         speed: Speed [m/s] along the loop, in phase ``"walk"`` of the centre of mass.
-        tries: Steps tried so far, accepted or not.
+        attempts: Steps tried so far, accepted or not.
     """
 
     phase: str
     time: float
     speed: float
-    tries: int
+    attempts: int
 
 
 OnProgress = Callable[[Progress], None]
@@ -151,22 +151,22 @@ def run_walk(
     frame_every = None if frame_interval is None else _samples_per_frame(frame_interval, options)
     before = _time_before(record_before, frame_every) if setup.scene.start != "ellipse" else 0.0
     batch = Batch(1, setup.scene.links, options, keeps_samples=True, frame_every=frame_every, keeps_loads=before > 0)
-    course = Course(batch, 0, setup, replace(EVERYTHING, before=before))
+    run = WalkRun(batch, 0, setup, replace(EVERYTHING, before=before))
     compiled: set[Features] = set()
 
     def after_launch() -> None:
-        course.drain()
-        report(Progress(course.phase.value, course.walk_time or course.simulated_time, course.speed, course.tries))
+        run.drain()
+        report(Progress(run.phase.value, run.walk_time or run.simulated_time, run.speed, run.attempts))
 
     running = True
     while running:
-        features = course.features
+        features = run.features
         if features not in compiled:
-            report(Progress("compile", course.simulated_time, 0.0, course.tries))
+            report(Progress("compile", run.simulated_time, 0.0, run.attempts))
             compiled.add(features)
         batch.run([0], features, after_launch)
-        running = course.next_phase()
-    return _result(course, seed, time.perf_counter() - started)
+        running = run.next_phase()
+    return _result(run, seed, time.perf_counter() - started)
 
 
 def _samples_per_frame(frame_interval: float, options: Options) -> int:
@@ -205,19 +205,19 @@ def _is_number(value: object) -> bool:
     return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
 
 
-def _result(course: Course, seed: int | None, wall_time: float) -> WalkResult:
+def _result(run: WalkRun, seed: int | None, wall_time: float) -> WalkResult:
     """Put the result together; the record is empty if the chain was never released."""
-    setup, counts, extremes = course.setup, course.counts, course.extremes
+    setup, counts, extremes = run.setup, run.counts, run.extremes
     on_sprocket = setup.scene.start != "ellipse"
-    samples, (frame_time, frames) = course.recorder.samples(), course.recorder.frames(setup.scene.links)
+    samples, (frame_time, frames) = run.recorder.samples(), run.recorder.frames(setup.scene.links)
     return WalkResult(
-        status=course.status,
-        dx=course.dx,
-        walk_time=course.walk_time,
-        simulated_time=course.simulated_time,
-        hold_time=course.hold_time,
-        drift=course.drift,
-        softened_at=course.softened_at,
+        status=run.status,
+        dx=run.dx,
+        walk_time=run.walk_time,
+        simulated_time=run.simulated_time,
+        hold_time=run.hold_time,
+        drift=run.drift,
+        softened_at=run.softened_at,
         wall_time=wall_time,
         bounces=counts["bounces"],
         steps_accepted=counts["accepted"],
@@ -225,8 +225,8 @@ def _result(course: Course, seed: int | None, wall_time: float) -> WalkResult:
         impulses={kind: counts[kind] for kind in CONTACTS},
         greatest_opening=extremes["opening"],
         greatest_penetration={kind: extremes[kind] for kind in CONTACTS},
-        energy=course.energy(),
-        sprocket_center=np.array([0.0, course.raised]) if on_sprocket else None,
+        energy=run.energy(),
+        sprocket_center=np.array([0.0, run.raised]) if on_sprocket else None,
         sprocket_radius=contact_radius(setup.scene, setup.parameters) if on_sprocket else math.nan,
         setup=setup,
         seed=seed,
@@ -241,5 +241,5 @@ def _result(course: Course, seed: int | None, wall_time: float) -> WalkResult:
         rms_speed=samples[:, layout.RMS_SPEED],
         frame_time=frame_time,
         frame_joints=frames,
-        before_release=course.recorder.before,
+        before_release=run.recorder.before,
     )

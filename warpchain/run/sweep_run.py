@@ -20,13 +20,13 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import InputError, validated
 from warpchain.inputs.setup import Setup
 from warpchain.status import Status
-from warpchain.store.folder import Store, empty_rows, read_shard, write_shard
+from warpchain.store.folder import SweepFolder, empty_rows, read_shard, write_shard
 from warpchain.store.shards import shard_name
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
 from warpchain.walks.motion import Motion
 from warpchain.walks.scheduler import compile_kernels, run_setups
-from warpchain.walks.walk_phases import Course
+from warpchain.walks.walk_phases import WalkRun
 from warpchain.walks.walk_result import LOST
 
 SHARD_WALKS = 256
@@ -114,7 +114,7 @@ def sweep(
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
         raise InputError(f"workers: {workers!r} is not a number of workers; give a whole number from 1")
     at_once = workers or (GPU_WORKERS if _is_on_gpu(planned) else processors())
-    with Store.open(Path(out), planned, fresh=fresh, shard_size=shard_size(planned.walk_count)) as store:
+    with SweepFolder.open(Path(out), planned, fresh=fresh, shard_size=shard_size(planned.walk_count)) as store:
         missing = store.missing()
         before = planned.walk_count - sum(len(shard) for shard in missing)
         progress = SweepProgress(walks=planned.walk_count, done=before, before=before)
@@ -191,28 +191,28 @@ def run_shards(
         return under_way[place].setup
 
     setups, threads = [walk.setup for walk in undrawn], _shared_threads(planned)
-    for place, course in run_setups(setups, draw=draw, keeps=keeps, threads=threads, stop=stop):
+    for place, run in run_setups(setups, draw=draw, keeps=keeps, threads=threads, stop=stop):
         walk = under_way.pop(place)
         shard = shard_of[walk.index]
-        _fill(rows[shard][walk.index - shard[0]], walk, course)
+        _fill(rows[shard][walk.index - shard[0]], walk, run)
         if keeps[place].series_every is not None:
-            motions[shard][walk.index] = course.motion
+            motions[shard][walk.index] = run.motion
         left[shard] -= 1
         if left[shard] == 0:
             keys.append(write_shard(directory, digest, range(*shard), rows.pop(shard), motions.pop(shard)))
     return keys
 
 
-def _fill(row: Any, walk: PlannedWalk, course: Course) -> None:
+def _fill(row: Any, walk: PlannedWalk, run: WalkRun) -> None:
     """Write what is kept of a walk into its row."""
-    counts, extremes, energy = course.counts, course.extremes, course.energy()
-    row["status"] = int(course.status)
-    row["dx"] = course.dx
-    row["walk_time"] = course.walk_time
-    row["simulated_time"] = course.simulated_time
-    row["hold_time"] = course.hold_time
-    row["drift"] = course.drift
-    row["softened_at"] = course.softened_at
+    counts, extremes, energy = run.counts, run.extremes, run.energy()
+    row["status"] = int(run.status)
+    row["dx"] = run.dx
+    row["walk_time"] = run.walk_time
+    row["simulated_time"] = run.simulated_time
+    row["hold_time"] = run.hold_time
+    row["drift"] = run.drift
+    row["softened_at"] = run.softened_at
     row["bounces"] = counts["bounces"]
     row["steps_accepted"] = counts["accepted"]
     row["steps_rejected"] = counts["rejected"]
@@ -230,7 +230,7 @@ def _fill(row: Any, walk: PlannedWalk, course: Course) -> None:
 
 def _run_in_threads(
     planned: Sweep,
-    store: Store,
+    store: SweepFolder,
     missing: Sequence[range],
     workers: int,
     progress: SweepProgress,
@@ -284,7 +284,7 @@ def _run(
     executor: Executor,
     more: tuple[Any, ...],
     planned: Sweep,
-    store: Store,
+    store: SweepFolder,
     missing: Sequence[range],
     workers: int,
     progress: SweepProgress,

@@ -6,7 +6,7 @@
     DIR/log.txt        what the runs of the sweep did, with times
     DIR/lock           locked by the process that runs the sweep; the system unlocks it when that ends
 
-Whatever happens between two of these lines, the next `Store.open` goes on from there.
+Whatever happens between two of these lines, the next `SweepFolder.open` goes on from there.
 """
 
 import datetime
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
     from warpchain.sweeps.plan import Sweep
 
-__all__ = ["Store", "empty_rows", "read_rows", "read_shard", "write_shard"]
+__all__ = ["SweepFolder", "empty_rows", "read_rows", "read_shard", "write_shard"]
 
 SHARD_OVERHEAD: Final = 16 * 1024
 """Bytes that a shard takes at most beside its rows."""
@@ -67,7 +67,7 @@ _YAML_HEAD: Final = """\
 """
 
 
-class Store:
+class SweepFolder:
     """The folder of a sweep, locked against other processes until `close` or the end of this process.
 
     Attributes:
@@ -76,7 +76,7 @@ class Store:
     """
 
     def __init__(self, directory: Path, manifest: Manifest, lock: int) -> None:
-        """For `Store.open`, which prepares and checks the folder."""
+        """For `SweepFolder.open`, which prepares and checks the folder."""
         self.directory = directory
         self.manifest = manifest
         self._lock = lock

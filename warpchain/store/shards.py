@@ -217,7 +217,7 @@ def shard_key(digest: str, walks: range, numerics_version: int = NUMERICS_VERSIO
 def write_shard(
     directory: Folder, digest: str, walks: range, rows: Rows, motions: Mapping[int, Motion] | None = None
 ) -> str:
-    """Write the rows of a shard; needs no lock and no `Store`, so that the workers of a sweep can call it.
+    """Write the rows of a shard; needs no lock and no `SweepFolder`, so that the workers of a sweep can call it.
 
     Two workers may write the same shard at the same time: both have the same bytes, and one replaces the
     other's.
@@ -225,7 +225,7 @@ def write_shard(
     Args:
         directory: folder of the sweep, opened before by the process that runs the sweep.
         digest: digest of the sweep that the rows were computed for.
-        walks: indices of the walks; one of `Store.missing`.
+        walks: indices of the walks; one of `SweepFolder.missing`.
         rows: their rows, shape (len(walks),), in order, of the type that the manifest says.
         motions: index → motion of those of the walks whose motion the sweep keeps; None: of none.
 

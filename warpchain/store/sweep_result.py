@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from warpchain.inputs.parameters import InputError, Parameters, shown, suggestion
 from warpchain.status import Status
 from warpchain.store.folder import read_rows
-from warpchain.store.kept_walk import KeptMotions, KeptWalk, kept_motions
 from warpchain.store.shards import FORMAT_VERSION, Folder, Manifest, read_manifest
+from warpchain.store.walk_motion import MotionReader, WalkMotion, motion_reader
 from warpchain.walks.rows import COLUMNS, MISSING, Column, Rows, field_column, missing_rows
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class BlockResult:
     axes: dict[str, Array]
     drawn: tuple[str, ...]
     columns: dict[str, Array]
-    motions: KeptMotions | None = None
+    motions: MotionReader | None = None
 
     @property
     def dims(self) -> tuple[str, ...]:
@@ -141,7 +141,7 @@ class BlockResult:
         there: NDArray[np.bool_] = chosen & (self.columns["status"] != MISSING)
         return there
 
-    def series(self, *, sample: int = 0, **at: float | str) -> KeptWalk:
+    def series(self, *, sample: int = 0, **at: float | str) -> WalkMotion:
         """The motion of one walk: `series(links=60, frequency=15, sample=2).time`.
 
         Args:
@@ -168,9 +168,9 @@ class BlockResult:
         is_whole = isinstance(sample, (int, np.integer)) and not isinstance(sample, bool)
         if not is_whole or not 0 <= sample < self.shape[-1]:
             raise InputError(f"sample: there is no sample {shown(sample)}; give 0 to {self.shape[-1] - 1}")
-        return self.kept_walk((*place, sample))
+        return self.walk_motion((*place, sample))
 
-    def kept_walk(self, place: tuple[int, ...]) -> KeptWalk:
+    def walk_motion(self, place: tuple[int, ...]) -> WalkMotion:
         """The motion of the walk at a place along the axes and samples; errors as of `series`."""
         if self.motions is None or not self.kept[place]:
             kept = np.flatnonzero(self.kept.any(axis=tuple(range(len(self.axes)))))
@@ -366,13 +366,13 @@ def load(directory: Folder) -> SweepResult:
     return SweepResult(
         name=manifest.name,
         seed=manifest.seed,
-        blocks=_blocks(manifest, rows, kept_motions(directory, manifest)),
+        blocks=_blocks(manifest, rows, motion_reader(directory, manifest)),
         sweep=manifest.sweep,
         provenance=provenance,
     )
 
 
-def _blocks(manifest: Manifest, rows: Rows, motions: KeptMotions | None) -> dict[str, BlockResult]:
+def _blocks(manifest: Manifest, rows: Rows, motions: MotionReader | None) -> dict[str, BlockResult]:
     """The blocks of a sweep, from the rows of all of its walks."""
     blocks = {}
     for layout in manifest.blocks:

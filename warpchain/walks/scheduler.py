@@ -14,13 +14,13 @@ from warpchain.kernels import layout
 from warpchain.kernels.cpu.loop import Features
 from warpchain.status import Status
 from warpchain.sweeps.recording import NOTHING, Keep
-from warpchain.walks.walk_phases import Course
+from warpchain.walks.walk_phases import WalkRun
 
-TRIES = {"cpu": 20_000, "cuda": 200_000}
-"""Most tries of each chain per launch, by kind of device; what a walk gives does not depend on it.
+ATTEMPTS = {"cpu": 20_000, "cuda": 200_000}
+"""Most attempts of each chain per launch, by kind of device; what a walk gives does not depend on it.
 
-On a GPU a launch is cut by its time: tries in a pile take three times as long as in flight, and with equal numbers of
-tries every chain would wait for the slowest of its batch.
+On a GPU a launch is cut by its time: attempts in a pile take three times as long as in flight, and with equal numbers
+of attempts every chain would wait for the slowest of its batch.
 """
 CREWS = 4
 """Batches that share a GPU: while the host looks after one of them, the others go on and fill the device."""
@@ -36,16 +36,16 @@ def run_setups(
     slots: int | None = None,
     threads: int | None = None,
     stop: threading.Event | None = None,
-) -> Iterator[tuple[int, Course]]:
-    """Run walks and yield each when it is over, as (place in ``setups``, course).
+) -> Iterator[tuple[int, WalkRun]]:
+    """Run walks and yield each when it is over, as (place in ``setups``, run).
 
-    A course must be read before the next one is asked for: its world is used again. What a walk gives does not depend,
+    A run must be read before the next one is asked for: its world is used again. What a walk gives does not depend,
     to the bit, on the others or on the number of slots.
 
     Args:
         setups: The walks, samples drawn; with ``draw``, options and links suffice.
         draw: Asked for a walk, by its place, when it begins; its options and links are those of ``setups``.
-        keeps: What is kept of the motion of each, for ``course.motion``; None: nothing. Walks of equal options keep
+        keeps: What is kept of the motion of each, for ``run.motion``; None: nothing. Walks of equal options keep
             frames equally often.
         slots: Chains that are carried on together in one launch. Default: on a GPU as many as fill it, on a CPU, where
             a launch is one core's work, one at a time, which stays in the cache.
@@ -125,34 +125,34 @@ class _Crew:
         self.batch = batch
         self._draw, self._wanted = draw, wanted
         self._free = list(reversed(range(len(batch.links))))
-        self._running: dict[int, tuple[int, Course]] = {}
+        self._running: dict[int, tuple[int, WalkRun]] = {}
         self._features: dict[int, Features] = {}
 
     def begin(self, waiting: Iterator[int]) -> bool:
         """Give waiting walks the free worlds and begin a launch; False if there is nothing to carry on."""
         while self._free and (place := next(waiting, None)) is not None:
             world = self._free.pop()
-            course = Course(self.batch, world, self._draw(place), self._wanted[place])
-            self._running[world] = place, course
-            self._features[world] = course.features
+            run = WalkRun(self.batch, world, self._draw(place), self._wanted[place])
+            self._running[world] = place, run
+            self._features[world] = run.features
         together: dict[Features, list[int]] = defaultdict(list)
         for world, features in self._features.items():
             together[features].append(world)
-        self.batch.start(together, TRIES["cuda" if self.batch.device.is_cuda else "cpu"])
+        self.batch.start(together, ATTEMPTS["cuda" if self.batch.device.is_cuda else "cpu"])
         return bool(together)
 
-    def end(self) -> Iterator[tuple[int, Course]]:
+    def end(self) -> Iterator[tuple[int, WalkRun]]:
         """Wait for the launch, and yield every walk that is over as its world becomes free."""
         self.batch.finish()
         running = self.batch.statuses() == Status.RUNNING
-        for world, (place, course) in list(self._running.items()):
-            course.drain()
+        for world, (place, run) in list(self._running.items()):
+            run.drain()
             if running[world]:
                 continue
-            if course.next_phase():
-                self._features[world] = course.features
+            if run.next_phase():
+                self._features[world] = run.features
                 continue
-            yield place, course
+            yield place, run
             del self._running[world], self._features[world]
             self._free.append(world)
 
@@ -163,7 +163,7 @@ def _run_bucket(
     wanted: Mapping[int, Keep],
     batches: Sequence[Batch],
     stop: threading.Event | None,
-) -> Iterator[tuple[int, Course]]:
+) -> Iterator[tuple[int, WalkRun]]:
     """Run walks, by place, that share options and the width of their arrays."""
     # long chains take longest: begun first, they are not what is waited for in the end
     waiting = iter(sorted(wanted, key=lambda place: -setups[place].scene.links))

@@ -1,4 +1,4 @@
-"""The course of one walk on one world of a batch: which phase follows which, and what remains in the end.
+"""The run of one walk on one world of a batch: which phase follows which, and what remains in the end.
 
 The drive (settle, spin-up, hold until steady) needs a sprocket and no floor, the walk a floor and no sprocket. The
 equations do not know where the floor is, so the chain is driven about the origin and raised to its clearance at the
@@ -52,12 +52,12 @@ class Phase(Enum):
     WALK = "walk"
 
 
-class Course:
+class WalkRun:
     """One walk: loads a world, and takes it into its next phase whenever it has stopped.
 
     Attributes:
         setup: What the walk is.
-        status: RUNNING until the course is over.
+        status: RUNNING until the run is over.
         raised: Height [m] by which the chain was raised at the release, where the sprocket's centre was then; NaN
             before the release.
         drive_time: Simulated time [s] before the release.
@@ -127,7 +127,7 @@ class Course:
             stop_status=Status.FINISHED,
             softness=self._hold_softness,
         )
-        batch.set_program(
+        batch.set_drive(
             world,
             sprocket_speed=-2 * math.pi * scene.frequency,  # clockwise, so that the walk goes towards +x
             spin_up_start=self._settled,
@@ -166,7 +166,7 @@ class Course:
         return self._batch.features(fixed_body="sprocket", watch="steady")
 
     @property
-    def tries(self) -> int:
+    def attempts(self) -> int:
         """Steps tried so far, accepted or not."""
         counts = self.counts
         return counts["accepted"] + counts["rejected"]
@@ -208,7 +208,7 @@ class Course:
     @property
     def speed(self) -> float:
         """Speed [m/s] of the centre of mass in the walk, along the loop before."""
-        look = self._batch.last_look(self._world)
+        look = self._batch.last_sample(self._world)
         if self._released:
             return math.hypot(look[layout.CENTER_U], look[layout.CENTER_V])
         return float(look[layout.LOOP_SPEED])
@@ -218,7 +218,7 @@ class Course:
         """Δx [m]; NaN unless the chain is at rest."""
         if self.status != Status.AT_REST:
             return math.nan
-        return float(self._batch.last_look(self._world)[layout.CENTER_X])
+        return float(self._batch.last_sample(self._world)[layout.CENTER_X])
 
     @property
     def softened_at(self) -> float:
@@ -227,7 +227,7 @@ class Course:
 
     def energy(self) -> dict[str, float]:
         """Where the energy of the walk went [J]; NaN before the release. Keys: ``results.ENERGIES``."""
-        first, last = self._batch.first_look(self._world), self._batch.last_look(self._world)
+        first, last = self._batch.first_sample(self._world), self._batch.last_sample(self._world)
         losses = self._batch.losses(self._world)
         lost = {name: losses[name] for name in LOST}
         ledger = {
@@ -253,7 +253,7 @@ class Course:
         self.recorder.drain(self._released)
 
     def next_phase(self) -> bool:
-        """Take a world that has stopped into its next phase; False if the course is over."""
+        """Take a world that has stopped into its next phase; False if the run is over."""
         status = self._batch.status(self._world)
         if not self._released:
             self.drift = self._batch.drift(self._world)
@@ -290,7 +290,7 @@ class Course:
             velocity,
             stop_time=scene.walk_limit,
             stop_status=Status.TIME_LIMIT,
-            tries_before=self.drive_counts["accepted"] + self.drive_counts["rejected"],
+            attempts_before=self.drive_counts["accepted"] + self.drive_counts["rejected"],
             softness=self._hold_softness,
         )
         self._released = True

@@ -56,12 +56,12 @@ ENERGIES: Final = {
     "floor": "energy lost in impacts on the floor",
     "self_contact": "energy lost in impacts of links on one another",
     "softening": "energy taken out of the joint springs by softening them in the pile",
-    "hand_over": "energy lost where joints go from springs to rigid, less that gained where they go back",
+    "joint_switch": "energy lost where joints go from springs to rigid, less that gained where they go back",
     "residual": "energy at release, less that at the end and all losses: the error of the integration",
 }
 """Keys of `WalkResult.energy`. Losses count as positive."""
 
-LOST: Final = ("joint_friction", "joint_damping", "floor", "self_contact", "softening", "hand_over")
+LOST: Final = ("joint_friction", "joint_damping", "floor", "self_contact", "softening", "joint_switch")
 """Those of them that are losses of the walk."""
 
 

@@ -32,7 +32,7 @@ of them is what the projection takes, and that is booked.
 
 
 @functools.cache
-def hand_over(columns: int, first_row: int):
+def joint_switch(columns: int, first_row: int):
     """Warp functions (close joints, open joints) for flights in the rows from ``first_row`` on.
 
     Returns:

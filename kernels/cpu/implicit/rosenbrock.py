@@ -85,7 +85,7 @@ def rosenbrock_rows(name: str, columns: int) -> int:
 
 @functools.cache
 def rosenbrock_method(name: str, columns: int):
-    """Warp functions of one table: (evaluate the first stage, try a step, commit it), as those of an explicit method.
+    """Warp functions of one table: (evaluate the first stage, attempt a step, commit it), as of an explicit one.
 
     Args:
         name: Key of :data:`ROSENBROCK_TABLES`.

@@ -30,7 +30,7 @@ from warpchain.kernels.layout import (
 )
 from warpchain.kernels.methods.controller import quick_quotient, quick_root
 from warpchain.kernels.physics.elementary import TWO, ZERO, from_order_key_single, order_bits_single, order_key_single
-from warpchain.kernels.types import Chain, Control, Program
+from warpchain.kernels.types import Chain, Control, Drive
 
 wp.set_module_options({"enable_backward": False})
 
@@ -113,7 +113,7 @@ def block_surroundings(features: Features, block_dim: int):
         K: wp.array2d(dtype=wp.float64),
         place: Place,
         chain: Chain,
-        program: Program,
+        drive: Drive,
         world: int,
         time: wp.float64,
     ):
@@ -144,8 +144,8 @@ def block_surroundings(features: Features, block_dim: int):
         if wp.static(has_sprocket):
             u, v, omega, lost_left, lost_right, hits = meet_sprocket(
                 chain,
-                sprocket_turning(program, world, time),
-                program.push_rate[world],
+                sprocket_turning(drive, world, time),
+                drive.push_rate[world],
                 left_x,
                 left_y,
                 right_x,

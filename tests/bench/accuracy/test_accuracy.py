@@ -17,18 +17,18 @@ from warpchain import InputError
 from warpchain.bench.accuracy.columns import COLUMNS
 from warpchain.bench.accuracy.ensembles import Ensemble, run_ensemble, summary
 from warpchain.bench.accuracy.figures import figures
-from warpchain.bench.accuracy.method_settings import LOOSE, TIGHT, Contestant, default_contestants
+from warpchain.bench.accuracy.method_settings import LOOSE, TIGHT, MethodSetting, default_method_settings
 from warpchain.bench.accuracy.plan import FILE, load_document, make_plan, run_accuracy
 from warpchain.bench.accuracy.walk_costs import walk_costs
-from warpchain.bench.trials.hard_cases import HARD_CASES, Flight, Order, Outcome, Walk
-from warpchain.bench.trials.hard_starts import SOFT, dropped
-from warpchain.bench.trials.scipy_solvers import GAVE_UP, scipy_points
-from warpchain.bench.trials.work_precision import (
-    Trial,
+from warpchain.bench.problems.hard_cases import HARD_CASES, Flight, Order, Outcome, Walk
+from warpchain.bench.problems.hard_starts import SOFT, dropped
+from warpchain.bench.problems.scipy_solvers import GAVE_UP, scipy_points
+from warpchain.bench.problems.work_precision import (
+    Problem,
     errors,
     evaluations,
+    make_problem,
     make_reference,
-    make_trial,
     methods,
     points,
 )
@@ -46,7 +46,7 @@ RUN_ELSEWHERE = {"pile-slow-walk", "sixty-hertz", "standing", "links-1000"}
 All but one: `pile-slow-walk` with os32 has 100 links there instead of 180, which take minutes.
 """
 SLOW_CASES = {"pile-dropped-soft", "pile-dropped-paper"} | RUN_ELSEWHERE
-TINY = "--links 8 --methods rkf78,dp5 --trials flight --tolerances 1e-3,1e-6 --no-scipy --rounds 1 --presets soft"
+TINY = "--links 8 --methods rkf78,dp5 --problems flight --tolerances 1e-3,1e-6 --no-scipy --rounds 1 --presets soft"
 WALKS = "--start ellipse --samples 3"
 
 
@@ -55,9 +55,9 @@ def silent(text: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def short() -> Trial:
+def short() -> Problem:
     """A flight of 8 links for a millisecond."""
-    return replace(make_trial("flight", 8), duration=1e-3)
+    return replace(make_problem("flight", 8), duration=1e-3)
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +71,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Answer, Path]:
 # --- work and precision ---
 
 
-def test_errors_shrink_with_the_tolerance_and_scipy_agrees(short: Trial) -> None:
+def test_errors_shrink_with_the_tolerance_and_scipy_agrees(short: Problem) -> None:
     """Tighter tolerances err less, and SciPy on the NumPy model ends where the reference does."""
     true = make_reference(short)
     assert true.trust.position < 1e-12 and true.trust.velocity < 1e-9
@@ -86,15 +86,15 @@ def test_errors_shrink_with_the_tolerance_and_scipy_agrees(short: Trial) -> None
         assert point.evaluations is not None and point.evaluations > 100
 
 
-def test_scipy_that_takes_too_long_is_given_up(short: Trial, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_scipy_that_takes_too_long_is_given_up(short: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run beyond the patience ends with a status of its own and no errors."""
-    monkeypatch.setattr("warpchain.bench.trials.scipy_solvers.PATIENCE", 1e-9)
+    monkeypatch.setattr("warpchain.bench.problems.scipy_solvers.PATIENCE", 1e-9)
     true = make_reference(short)
     (point, _) = scipy_points(short, true, [1e-3], silent)
     assert point.status == GAVE_UP and math.isnan(point.position_error)
 
 
-def test_errors_are_distances(short: Trial) -> None:
+def test_errors_are_distances(short: Problem) -> None:
     """A link moved by (3, 4) µm is 5 µm off, whatever its angle; so are velocities."""
     (start,) = short.starts
     moved = start[0].copy(), start[1].copy()
@@ -108,15 +108,15 @@ def test_errors_are_distances(short: Trial) -> None:
 def test_the_impulse_is_what_gravity_does_not_explain() -> None:
     """A thing in free fall has had no impulse; one that gained a momentum more has had that."""
     state = dropped(links=8)
-    trial = Trial("impact", 8, SOFT, (state,), 0.01, "floor")
+    problem = Problem("impact", 8, SOFT, (state,), 0.01, "floor")
     falling = state[0], state[1] - [0.0, SOFT.gravity * 0.01, 0.0]
-    impulse = trial.momenta([falling])
+    impulse = problem.momenta([falling])
     assert impulse is not None and np.abs(impulse).max() < 1e-15
     mass = motion_equations.link_masses(8, SOFT).sum()
     struck = falling[0], falling[1] + [0.2, 0.5, 0.0]
-    assert trial.momenta([struck]) == pytest.approx(np.array([[0.2 * mass, 0.5 * mass]]))
+    assert problem.momenta([struck]) == pytest.approx(np.array([[0.2 * mass, 0.5 * mass]]))
     harder = falling[0], falling[1] + [0.2, 0.6, 0.0]
-    found = errors(trial, [harder], [struck])
+    found = errors(problem, [harder], [struck])
     assert found.momentum == pytest.approx(0.1 / math.hypot(0.2, 0.5))
     assert found.bias == pytest.approx(0.2)
 
@@ -126,13 +126,13 @@ def test_angular_momentum_of_a_circling_loop() -> None:
     angle = 2 * np.pi * np.arange(8) / 8
     circle = np.column_stack([0.1 * np.cos(angle), 0.1 * np.sin(angle), angle])
     turning = 7.0 * np.column_stack([-circle[:, 1], circle[:, 0], np.ones(8)])
-    trial = Trial("sprocket", 8, SOFT, ((circle, turning),), 0.1, "sprocket", 1.0)
+    problem = Problem("sprocket", 8, SOFT, ((circle, turning),), 0.1, "sprocket", 1.0)
     inertia = (motion_equations.link_masses(8, SOFT) * 0.01 + motion_equations.link_inertias(8, SOFT)).sum()
-    assert trial.momenta([(circle, turning)]) == pytest.approx(np.array([[7.0 * inertia]]))
+    assert problem.momenta([(circle, turning)]) == pytest.approx(np.array([[7.0 * inertia]]))
 
 
 def test_evaluations_are_counted_by_stages() -> None:
-    """13 a step and 12 a rejected one for Fehlberg's pair; 6 a try for Dormand and Prince's, but after impulses."""
+    """13 a step, 12 a rejected one for Fehlberg's pair; 6 an attempt for Dormand and Prince's, but after impulses."""
     assert evaluations("rkf78", 10, 3, 5) == 13 * 10 + 12 * 3
     assert evaluations("dp5", 10, 3, 0) == 6 * 13 + 1
     assert evaluations("dp5", 10, 3, 4) == 6 * 13 + 1 + 4
@@ -146,13 +146,13 @@ def test_evaluations_are_counted_by_stages() -> None:
 def test_impacts_and_sprocket_converge_to_what_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
     """With contacts, impulse and angular momentum agree to the accuracy that the methods are told apart by."""
     monkeypatch.setattr(
-        "warpchain.bench.trials.scipy_solvers.PATIENCE", math.inf
+        "warpchain.bench.problems.scipy_solvers.PATIENCE", math.inf
     )  # 30 s of a core alone are more of a shared one
     for name, links, close in (("impact", 20, 0.03), ("sprocket", 60, 1e-3)):
-        trial = make_trial(name, links)
-        true = make_reference(trial)
+        problem = make_problem(name, links)
+        true = make_reference(problem)
         assert true.trust.momentum < close
-        found = points(trial, true, ["dp5"], [1e-6], 1, silent) + scipy_points(trial, true, [1e-6], silent)
+        found = points(problem, true, ["dp5"], [1e-6], 1, silent) + scipy_points(problem, true, [1e-6], silent)
         assert len(found) == (2 if name == "impact" else 1)
         for point in found:
             assert point.status == "finished" and abs(point.momentum_bias) <= point.momentum_error * 1.5 < close
@@ -164,13 +164,13 @@ def test_impacts_and_sprocket_converge_to_what_they_say(monkeypatch: pytest.Monk
 def test_an_ensemble_goes_on_and_is_summed_up(tmp_path: Path) -> None:
     """Methods added later join those that are there, whose walks and costs stay; statistics are those of the walks."""
     ensemble = Ensemble(links=8, preset="soft", start="ellipse", samples=3)
-    for contestant in (LOOSE, TIGHT):
-        run_ensemble(tmp_path, ensemble, contestant, silent)
+    for method_setting in (LOOSE, TIGHT):
+        run_ensemble(tmp_path, ensemble, method_setting, silent)
     before = summary(tmp_path, ensemble)
     shards = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.h5")}
     assert shards
-    for contestant in (Contestant("dp5", 1e-4), LOOSE, TIGHT):
-        run_ensemble(tmp_path, ensemble, contestant, silent)
+    for method_setting in (MethodSetting("dp5", 1e-4), LOOSE, TIGHT):
+        run_ensemble(tmp_path, ensemble, method_setting, silent)
     after = summary(tmp_path, ensemble)
     assert [(row["method"], row["tolerance"]) for row in after] == [("rkf78", 1e-6), ("rkf78", 1e-9), ("dp5", 1e-4)]
     assert repr(after[:2]) == repr(before)
@@ -189,33 +189,33 @@ def test_an_ensemble_goes_on_and_is_summed_up(tmp_path: Path) -> None:
     assert after[0]["difference_loose"] == after[0]["ks_loose"] == 0 and after[0]["passes"]
 
 
-def test_contestants_that_differ_in_the_last_digit_have_different_names() -> None:
-    """Names and titles hold every digit of tolerances and settings, so no two contestants share a folder or a row."""
+def test_method_settings_that_differ_in_the_last_digit_have_different_names() -> None:
+    """Names and titles hold every digit of tolerances and settings, so no two share a folder or a row."""
     next_tolerance, next_area = math.nextafter(1e-4, 1), math.nextafter(0.7, 1)
     alike = [
-        Contestant("rkf78", tolerance, (("soften_pile", True), ("soften_area", area)))
+        MethodSetting("rkf78", tolerance, (("soften_pile", True), ("soften_area", area)))
         for tolerance in (1e-4, next_tolerance)
         for area in (0.7, next_area)
     ]
     assert len({one.name for one in alike}) == len({one.title for one in alike}) == len(alike)
-    assert [Contestant.parse(one.name) for one in alike] == alike
+    assert [MethodSetting.parse(one.name) for one in alike] == alike
 
 
 def test_contestants_are_read_as_they_are_named() -> None:
     """A name with tolerance and settings, in any order, is read back from itself, which a folder's name needs."""
     for one in (
-        Contestant("dp5", 1e-6),
-        Contestant("hybrid", 1e-6),
-        Contestant("bs32", 1e-9),
-        Contestant("os32", 1e-3, (("soft_tolerance", 3e-3), ("controller", "pi"))),
-        Contestant("rkf78", 2e-3, (("soften_pile", True), ("soften_area", 0.7), ("soften_drive", True))),
+        MethodSetting("dp5", 1e-6),
+        MethodSetting("hybrid", 1e-6),
+        MethodSetting("bs32", 1e-9),
+        MethodSetting("os32", 1e-3, (("soft_tolerance", 3e-3), ("controller", "pi"))),
+        MethodSetting("rkf78", 2e-3, (("soften_pile", True), ("soften_area", 0.7), ("soften_drive", True))),
     ):
-        assert Contestant.parse(one.name) == one
-    assert Contestant.parse("dp5") == Contestant("dp5", 1e-6)
-    assert Contestant.parse("hybrid") == Contestant("hybrid", 1e-4)
-    assert one == Contestant.parse("rkf78@2e-3+soften_drive+soften_area=0.7+soften_pile")
+        assert MethodSetting.parse(one.name) == one
+    assert MethodSetting.parse("dp5") == MethodSetting("dp5", 1e-6)
+    assert MethodSetting.parse("hybrid") == MethodSetting("hybrid", 1e-4)
+    assert one == MethodSetting.parse("rkf78@2e-3+soften_drive+soften_area=0.7+soften_pile")
     assert one.title == "rkf78 at 0.002, soften pile, soften area 0.7, soften drive"
-    content = Ensemble(8, "soft").content(Contestant.parse("dp5@1e-3+soften_pile+soften_area=0.5"))
+    content = Ensemble(8, "soft").content(MethodSetting.parse("dp5@1e-3+soften_pile+soften_area=0.5"))
     expected = {"method": "dp5", "tolerance": 1e-3, "soften_pile": True, "soften_area": 0.5, "device": "cpu"}
     assert content["options"] == expected
 
@@ -223,18 +223,18 @@ def test_contestants_are_read_as_they_are_named() -> None:
 @pytest.mark.parametrize("word", METHODS_BY_NEED)
 def test_words_are_what_the_options_make_of_them(word: str) -> None:
     """A word means the options that it means in a walk, takes other settings, and is found again in a title."""
-    one = Contestant.parse(word)
+    one = MethodSetting.parse(word)
     assert Options.model_validate(one.options) == Options.model_validate({"method": word})
     assert one.word == word and one.title.startswith(f"{word}: {one.method} at ")
-    changed = Contestant.parse(f"{word}@3e-5+contact_step=1e-5")
+    changed = MethodSetting.parse(f"{word}@3e-5+contact_step=1e-5")
     wanted = {"method": word, "tolerance": 3e-5, "contact_step": 1e-5}
     assert Options.model_validate(changed.options) == Options.model_validate(wanted)
     assert changed.word == ""
 
 
 def test_defaults_are_words_and_every_method() -> None:
-    """Each method has its turn, the words among them, no contestant twice."""
-    chosen = default_contestants()
+    """Each method has its turn, the words among them, no method_setting twice."""
+    chosen = default_method_settings()
     assert len(set(chosen)) == len(chosen)
     assert {one.method for one in chosen} == set(methods())
     assert {one.word for one in chosen} - {""} == set(METHODS_BY_NEED)
@@ -242,8 +242,8 @@ def test_defaults_are_words_and_every_method() -> None:
 
 def test_the_tight_reference_is_an_extra() -> None:
     """The dear ensembles of rkf78 at 1e-9 are made on demand only."""
-    assert not make_plan(parts=["ensembles"], contestants=["standard"]).tight
-    assert make_plan(parts=["ensembles"], contestants=["standard"], tight=True).tight
+    assert not make_plan(parts=["ensembles"], method_settings=["standard"]).tight
+    assert make_plan(parts=["ensembles"], method_settings=["standard"], tight=True).tight
 
 
 # --- whole walks ---
@@ -252,8 +252,8 @@ def test_the_tight_reference_is_an_extra() -> None:
 def test_walks_are_timed_in_turn_and_compared_with_the_reference() -> None:
     """Methods take turns with the same samples, the reference among them; rows hold medians of walks at rest."""
     said: list[str] = []
-    hopeless = Contestant.parse("dp5+smallest_step=1.9e-5")
-    rows = walk_costs(8, [Contestant.parse("dp5@1e-4"), hopeless, LOOSE], 2, said.append)
+    hopeless = MethodSetting.parse("dp5+smallest_step=1.9e-5")
+    rows = walk_costs(8, [MethodSetting.parse("dp5@1e-4"), hopeless, LOOSE], 2, said.append)
     reference, loose, failed = rows
     assert [row["name"] for row in rows] == [LOOSE.name, "dp5@0.0001", hopeless.name]
     assert [line.split(", ", 1)[1] for line in said[1:]] == [row["title"] for row in rows] * 2
@@ -266,7 +266,7 @@ def test_walks_are_timed_in_turn_and_compared_with_the_reference() -> None:
     assert loose["at_rest"] == 2
     assert (loose["ledger"], loose["greatest_ledger"]) == (np.mean(errors), max(errors))
     assert loose["walk_time"] == np.mean([walk.walk_time for walk in walks])
-    assert loose["tries"] == np.mean([walk.steps_accepted + walk.steps_rejected for walk in walks])
+    assert loose["attempts"] == np.mean([walk.steps_accepted + walk.steps_rejected for walk in walks])
     assert reference["ledger"] < loose["ledger"] / 10
     for row in (reference, loose):
         assert row["seconds"] == np.mean(row["each"]) and min(row["each"]) > 0
@@ -330,7 +330,7 @@ def test_a_method_that_refuses_a_case_says_so(tmp_path: Path, monkeypatch: pytes
         raise InputError("options.method: no such joints")
 
     monkeypatch.setattr(Walk, "run", refuse)
-    plan = make_plan(parts=["hard-cases"], contestants=["dp5"], cases=["links-4", "refused"])
+    plan = make_plan(parts=["hard-cases"], method_settings=["dp5"], cases=["links-4", "refused"])
     rows = run_accuracy(tmp_path, plan, silent)["hard_cases"]
     assert [(row["case"], row["status"], row["sound"]) for row in rows] == [
         ("links-4", "refused", False),
@@ -343,7 +343,7 @@ def test_a_method_that_refuses_a_case_says_so(tmp_path: Path, monkeypatch: pytes
 
 
 def test_command_writes_everything(results: tuple[Answer, Path]) -> None:
-    """Paths of the results, a figure for each trial and ensemble and for the table, and of the page are printed."""
+    """Paths of the results, a figure for each problem and ensemble and for the table, and of the page are printed."""
     answer, folder = results
     assert (answer.status, answer.err) == (0, "")
     names = [Path(line).name for line in answer.out.splitlines()]
@@ -434,7 +434,7 @@ REFUSED = {
     "--tolerances 0": "--tolerances.tolerance: 0.0 is less than 1e-13",
     "--tolerances tight": "--tolerances: 'tight' is no number",
     "--parts all": "--parts: 'all' is unknown",
-    "--trials jump": "--trials: 'jump' is unknown",
+    "--problems jump": "--problems: 'jump' is unknown",
     "--presets hard": "preset: 'hard' is unknown",
     "--cases pile": "--cases: 'pile' is unknown; give one of pile-slow-walk,",
     "--device gpu": "options.device: 'gpu' is no device",

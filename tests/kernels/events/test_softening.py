@@ -19,10 +19,10 @@ from warpchain.kernels import layout
 from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.loop import load_state
 from warpchain.kernels.events.softening import contact_step, enclosed_area, softened, spring_tolerance
-from warpchain.kernels.types import Chain, Control, Model, Program, State, read_chain
+from warpchain.kernels.types import Chain, Control, Drive, Model, State, read_chain
 from warpchain.run.single_walk import setup_walk
 from warpchain.walks import scheduler
-from warpchain.walks.walk_phases import Course, Phase
+from warpchain.walks.walk_phases import Phase, WalkRun
 
 PAPER = preset("paper")
 SERIES = ("time", "center", "center_velocity", "kinetic_energy", "spring_energy", "lowest", "rms_speed")
@@ -125,16 +125,16 @@ def test_no_joint_becomes_stiffer() -> None:
 
 
 @wp.kernel(module="unique", enable_backward=False)
-def _bounds(program: Program, state: State, control: Control, is_driven: bool, bounds: wp.array2d(dtype=wp.float64)):
+def _bounds(drive: Drive, state: State, control: Control, is_driven: bool, bounds: wp.array2d(dtype=wp.float64)):
     i = wp.tid()
     bounds[i, 0] = contact_step(state, control, i, is_driven)
-    bounds[i, 1] = spring_tolerance(program, state, control, i, is_driven)
+    bounds[i, 1] = spring_tolerance(drive, state, control, i, is_driven)
 
 
 def bounds_of(batch: Batch, *, is_driven: bool) -> np.ndarray:
     """`contact_step` and `spring_tolerance` (W, 2) of the worlds of a batch."""
     bounds = wp.full((len(batch.links), 2), np.nan, dtype=wp.float64, device=start_device("cpu"))
-    inputs = [batch.program, batch.state, batch.control, is_driven, bounds]
+    inputs = [batch.drive, batch.state, batch.control, is_driven, bounds]
     wp.launch(_bounds, dim=len(batch.links), inputs=inputs, device="cpu")
     return bounds.numpy()
 
@@ -157,8 +157,8 @@ def test_tolerance_of_a_drive_is_tenfold_until_the_loop_is_watched_free(softness
     batch = Batch(5, 4, Options(tolerance=1e-5, soft_tolerance=2e-4))
     batch.state.softness.numpy()[:] = softness
     for world in range(5):
-        batch.set_program(world, hold_start=2.5)
-    batch.state.last_look.numpy()[:, layout.TIME] = [-1.0, 2.4, 2.5, 2.6, 2.6]
+        batch.set_drive(world, hold_start=2.5)
+    batch.state.last_sample.numpy()[:, layout.TIME] = [-1.0, 2.4, 2.5, 2.6, 2.6]
     batch.state.load_factor.numpy()[:] = [1.0, 1.0, 50.0, 1.001, 1.0]
     tenfold = 10 * own if is_driven else own
     assert_allclose(bounds_of(batch, is_driven=is_driven)[:, 1], [tenfold] * 4 + [own], rtol=1e-15)
@@ -270,11 +270,11 @@ def test_ledger_closes_when_much_is_freed() -> None:
     setup = dataclasses.replace(setup, scene=setup.scene.model_copy(update={"walk_limit": 4e-3}))
     batch = Batch(1, 20, setup.options)
     batch.control.soften_area = 2.0
-    course = Course(batch, 0, setup)
-    batch.run([0], course.features)
-    course.next_phase()
-    energy = course.energy()
-    assert course.softened_at == pytest.approx(1e-3, abs=2e-5)
+    run = WalkRun(batch, 0, setup)
+    batch.run([0], run.features)
+    run.next_phase()
+    energy = run.energy()
+    assert run.softened_at == pytest.approx(1e-3, abs=2e-5)
     assert energy["softening"] > 1e-5 * energy["kinetic_at_release"]
     assert abs(energy["residual"]) < 1e-2 * energy["softening"]
 
@@ -328,12 +328,12 @@ def test_joints_are_softest_until_the_sprocket_has_spun_up(frequency: float, hel
     settings |= {"load_factor": 1.0}
     setup = setup_walk("paper", settings, None)
     batch = Batch(1, 30, setup.options)
-    course = Course(batch, 0, setup)
+    run = WalkRun(batch, 0, setup)
     levels = []
     for moment in (0.09, 0.4 - 1.1 * STIFFENING_TIME, 0.45):
         batch.resume(0, moment, Status.FINISHED)
-        batch.run([0], course.features)
-        look = batch.last_look(0)
+        batch.run([0], run.features)
+        look = batch.last_sample(0)
         levels.append((batch.state.softness.numpy()[0], look[layout.SPRING], look[layout.LOOP_SPEED]))
     assert_allclose([softness for softness, _, _ in levels], [2.0, 2.0, 1 + np.log10(1e7 / held)], atol=5e-3)
     mass = (PAPER.inner_mass + PAPER.outer_mass) / 2
@@ -349,7 +349,7 @@ def test_joints_under_load_are_as_soft_as_it_allows(load_factor: float) -> None:
     settings = {"links": links, "frequency": frequency, "start": "spinning", "load_factor": load_factor}
     setup = setup_walk("soft", settings | {"method": "explicit"}, None)
     batch = Batch(1, links, setup.options)
-    course = Course(batch, 0, setup)
+    run = WalkRun(batch, 0, setup)
     radius = PAPER.sprocket_radius + PAPER.circle_radius
     density = (PAPER.inner_mass + PAPER.outer_mass) / 2 / PAPER.link_length
     tension = density * (2 * np.pi * frequency * radius) ** 2
@@ -362,15 +362,15 @@ def test_joints_under_load_are_as_soft_as_it_allows(load_factor: float) -> None:
     free, loaded = softness_of(tension / 3e-4), softness_of((tension + weight) / 1e-3)
     assert free != loaded
     seen = set()
-    while course.phase != Phase.WALK:
-        batch.launch([0], course.features, 500)
+    while run.phase != Phase.WALK:
+        batch.launch([0], run.features, 500)
         load, softness = batch.state.load_factor.numpy()[0], batch.state.softness.numpy()[0]
         expected = free + (loaded - free) * np.log(load) / np.log(load_factor)
         if batch.time(0) > 1.5e-3:
             assert softness == pytest.approx(expected, abs=1e-9)
             seen.add(load)
         if batch.status(0) != Status.RUNNING:
-            assert course.next_phase()
+            assert run.next_phase()
             break
     assert {1.0, load_factor} < seen
 
@@ -395,15 +395,15 @@ def energy_before_release(**settings: float) -> tuple[float, int]:
         "soft", {"links": 120, "frequency": 5.0, "start": "spinning", "method": "explicit"} | settings, None
     )
     batch = Batch(1, 120, setup.options, keeps_samples=True)
-    course = Course(batch, 0, setup)
+    run = WalkRun(batch, 0, setup)
     samples: list[np.ndarray] = []
-    while course.phase != Phase.WALK:
-        batch.run([0], course.features, lambda: samples.append(batch.drain_samples(0)))
-        assert course.next_phase()
+    while run.phase != Phase.WALK:
+        batch.run([0], run.features, lambda: samples.append(batch.drain_samples(0)))
+        assert run.next_phase()
     drive = np.concatenate(samples)
     passage = 2 * PAPER.link_length / drive[-1, layout.LOOP_SPEED]
     last = drive[:, layout.TIME] > drive[-1, layout.TIME] - passage
-    return float(drive[last, layout.KINETIC].mean()), course.drive_counts["accepted"]
+    return float(drive[last, layout.KINETIC].mean()), run.drive_counts["accepted"]
 
 
 def test_a_long_slow_loop_has_the_energy_that_shorter_steps_give_it() -> None:
@@ -442,16 +442,16 @@ def test_a_whole_walk_from_soft_joints() -> None:
 
 
 def test_cuts_into_launches_do_not_change_a_softened_walk(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A walk softened on the sprocket and in the pile is the same to the bit in launches of 20000 and of 777 tries."""
+    """A walk softened on sprocket and in the pile is the same to the bit in launches of 20000 and of 777 attempts."""
     setup = setup_walk(
         "paper", SPINNING | {"method": "dp5", "soften_drive": True, "soften_pile": True, "soften_area": 0.3}, None
     )
     seen = []
-    for tries in (20_000, 777):
-        monkeypatch.setitem(scheduler.TRIES, "cpu", tries)
-        ((_, course),) = scheduler.run_setups([setup])
-        times = course.drive_time, course.walk_time, course.softened_at, course.drift
-        seen.append((course.dx, times, course.counts, course.energy()))
+    for attempts in (20_000, 777):
+        monkeypatch.setitem(scheduler.ATTEMPTS, "cpu", attempts)
+        ((_, run),) = scheduler.run_setups([setup])
+        times = run.drive_time, run.walk_time, run.softened_at, run.drift
+        seen.append((run.dx, times, run.counts, run.energy()))
     assert seen[0] == seen[1]
     assert seen[0][1][2] > 0
 

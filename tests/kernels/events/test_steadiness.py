@@ -30,7 +30,7 @@ from warpchain.kernels.events.steadiness import (
 )
 from warpchain.kernels.events.summary import Summary
 from warpchain.kernels.physics.scaled_loads import under_load
-from warpchain.kernels.types import Model, Program, State, read_chain
+from warpchain.kernels.types import Drive, Model, State, read_chain
 from warpchain.run.single_walk import setup_walk
 from warpchain.walks import scheduler
 
@@ -52,7 +52,7 @@ FALL = float(LOADING_TIME)
 @wp.kernel(module="unique", enable_backward=False)
 def _watch(
     model: Model,
-    program: Program,
+    drive: Drive,
     state: State,
     looks: wp.array2d(dtype=wp.float64),
     loads: wp.array(dtype=wp.float64),
@@ -67,8 +67,8 @@ def _watch(
         summary.center_y = looks[i, 4]
         summary.loop_speed = looks[i, 5]
         chain = under_load(read_chain(model, 0), state.load_factor[0])
-        watch_steadiness(chain, state, program, 0, time, summary)
-        state.load_factor[0] = load_at(state, program, 0, time)
+        watch_steadiness(chain, state, drive, 0, time, summary)
+        state.load_factor[0] = load_at(state, drive, 0, time)
         loads[i] = state.load_factor[0]
 
 
@@ -78,21 +78,21 @@ class Watched:
 
     Attributes:
         duration: Of all looks [s].
-        program: What the world's program says otherwise.
+        drive: What the world's drive says otherwise.
         loads: Factor of the loads after each look.
     """
 
     duration: float = 4.0
-    program: dict[str, float] = field(default_factory=dict)
+    drive: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Make a world whose loop is held from 0.5 s on."""
         self.batch = Batch(1, 4, Options())
         self.batch.set_chain(0, SOFT, 4)
         self.batch.load(0, np.zeros((4, 3)), np.zeros((4, 3)), stop_time=30.0, stop_status=Status.NOT_STEADY)
-        program = {"hold_start": 0.5, "loop_speed": SPEED, "loop_period": 0.25, "load_factor": 16.0}
-        program |= {"steady_window": 0.125, "steady_time": -1.0, "steady_tolerance": 0.01}
-        self.batch.set_program(0, **program | self.program)
+        drive = {"hold_start": 0.5, "loop_speed": SPEED, "loop_period": 0.25, "load_factor": 16.0}
+        drive |= {"steady_window": 0.125, "steady_time": -1.0, "steady_tolerance": 0.01}
+        self.batch.set_drive(0, **drive | self.drive)
         self.time = STEP * np.arange(round(self.duration / STEP) + 1)
         self.loads = np.full(len(self.time), np.nan)
 
@@ -103,7 +103,7 @@ class Watched:
         rows = np.stack([time, *(np.broadcast_to(value, time.shape) for value in (USUAL | seen).values())], axis=1)
         loads = wp.full(len(rows), np.nan, dtype=wp.float64, device=CPU)
         looks = wp.array(rows, dtype=wp.float64, device=CPU)
-        inputs = [self.batch.model, self.batch.program, self.batch.state, looks, loads]
+        inputs = [self.batch.model, self.batch.drive, self.batch.state, looks, loads]
         wp.launch(_watch, dim=1, inputs=inputs, device=CPU)
         self.loads[of] = loads.numpy()
         return self
@@ -127,7 +127,7 @@ def crossing(load: float, gravity: float = SOFT.gravity) -> float:
     return HEIGHT * float(weights @ ((np.sqrt(SPEED**2 + pull) + SPEED) / pull))
 
 
-def first_look(moment: float) -> float:
+def first_sample(moment: float) -> float:
     """The first look at a moment or after it."""
     return math.ceil(moment / STEP - 1e-9) * STEP
 
@@ -141,7 +141,7 @@ def end_of_watch(start: float, window: float, wanted: float, since: float | None
         wanted: The time for which the shape must be kept.
         since: From when on it is counted; None: from the end of the first window.
     """
-    length = first_look(window)
+    length = first_sample(window)
     if since is None:
         since = start + length
         start = since
@@ -155,7 +155,7 @@ def fall_of(load: float, start: float = 0.5) -> float:
 
 def test_a_loop_that_keeps_its_shape_is_released_in_time() -> None:
     """Held for a window and a crossing under load, let down, watched for a period; then further_hold and the phase."""
-    watched = Watched(program={"further_hold": 0.75, "release_phase": 0.5}).look()
+    watched = Watched(drive={"further_hold": 0.75, "release_phase": 0.5}).look()
     time, loads = watched.time, watched.loads
     fall = fall_of(16.0)
     assert np.all(loads[time < 0.5] == 1.0)
@@ -163,7 +163,7 @@ def test_a_loop_that_keeps_its_shape_is_released_in_time() -> None:
     falling = (time >= fall) & (time < fall + FALL)
     assert loads[falling] == pytest.approx(16.0 ** (1 - (time[falling] - fall) / FALL), rel=1e-9)
     assert np.all(loads[time >= fall + FALL] == 1.0)
-    watch = first_look(fall + FALL) + STEP  # the look that makes it free is the last under load
+    watch = first_sample(fall + FALL) + STEP  # the look that makes it free is the last under load
     end = end_of_watch(watch, 0.125, 0.25, since=fall + FALL)
     assert watched.release == pytest.approx(end + 0.75 + 0.5 * 0.25, abs=1e-12)
     assert watched.drift == pytest.approx(0, abs=1e-12)
@@ -172,7 +172,7 @@ def test_a_loop_that_keeps_its_shape_is_released_in_time() -> None:
 def test_steady_time_sets_how_long_a_free_loop_is_watched() -> None:
     """With a steady_time of 1 s instead of a period's 0.25 s the release is 0.75 s later; 0 takes one window."""
     by_itself, second, none = (
-        Watched(program={"steady_time": steady_time}).look().release for steady_time in (-1.0, 1.0, 0.0)
+        Watched(drive={"steady_time": steady_time}).look().release for steady_time in (-1.0, 1.0, 0.0)
     )
     assert second - by_itself == 0.75
     assert by_itself - none == 0.125
@@ -180,11 +180,11 @@ def test_steady_time_sets_how_long_a_free_loop_is_watched() -> None:
 
 def test_own_loads_are_watched_for_as_long_as_slow_waves_need() -> None:
     """With a factor of 1 there is one watch, of 6 s in this loop; a steady_time that is given overrides that."""
-    watched = Watched(duration=8.0, program={"load_factor": 1.0}).look()
+    watched = Watched(duration=8.0, drive={"load_factor": 1.0}).look()
     assert np.all(watched.loads == 1.0)
     assert 6.0 < crossing(1.0) < 6.2
     assert watched.release == end_of_watch(0.5, 0.125, crossing(1.0))
-    given = Watched(program={"load_factor": 1.0, "steady_time": 0.5}).look()
+    given = Watched(drive={"load_factor": 1.0, "steady_time": 0.5}).look()
     assert given.release == end_of_watch(0.5, 0.125, 0.5)
 
 
@@ -193,7 +193,7 @@ def test_own_loads_are_watched_for_as_long_as_slow_waves_need() -> None:
 def test_a_loop_that_drifts_is_not_released(name: str, size: float, load_factor: float) -> None:
     """A drift by 3 % in a crossing is never let pass, one by 0.1 % is."""
     for part, is_released in ((0.03, False), (0.001, True)):
-        watched = Watched(duration=10.0, program={"load_factor": load_factor})
+        watched = Watched(duration=10.0, drive={"load_factor": load_factor})
         rate = part * size / crossing(load_factor)
         watched.look(**{name: USUAL[name] + rate * (watched.time - 5.0)})
         assert math.isfinite(watched.release) == is_released, part
@@ -263,7 +263,7 @@ def test_a_free_loop_that_slips_more_is_watched_for_as_long_as_slow_waves_need(s
     """Beyond LITTLE_SLIP it is not released after a period, but after a crossing under its own loads."""
     watched = Watched(duration=10.0).look(speed=SPEED * (1 - slip))
     fall = fall_of(16.0)
-    watch = first_look(fall + FALL) + STEP
+    watch = first_sample(fall + FALL) + STEP
     assert watched.release == end_of_watch(watch, 0.125, crossing(1.0), since=fall + FALL)
 
 
@@ -292,9 +292,9 @@ def test_a_loop_whose_speed_varies_is_not_released() -> None:
 
 def test_a_standing_loop_is_released() -> None:
     """On a sprocket that stands still the speed may be anything below 2 cm/s."""
-    program = {"loop_speed": 0.0, "loop_period": 0.25}
-    assert math.isfinite(Watched(program=program).look(speed=0.015).release)
-    assert math.isnan(Watched(program=program).look(speed=0.025).release)
+    drive = {"loop_speed": 0.0, "loop_period": 0.25}
+    assert math.isfinite(Watched(drive=drive).look(speed=0.015).release)
+    assert math.isnan(Watched(drive=drive).look(speed=0.025).release)
 
 
 def test_what_happens_before_the_hold_does_not_matter() -> None:
@@ -381,8 +381,8 @@ def test_a_drive_takes_no_more_steps_than_when_loops_were_released_swinging(cell
     """From a turning start it takes fewer, from rest at most a fifth more."""
     links, frequency = cell
     turning, hanging = TRIES_OF_SWINGING_RELEASES[cell]
-    assert released_loop(links=links, frequency=frequency, start="spinning").tries < turning
-    assert released_loop(links=links, frequency=frequency, start="rest").tries < 1.2 * hanging
+    assert released_loop(links=links, frequency=frequency, start="spinning").attempts < turning
+    assert released_loop(links=links, frequency=frequency, start="rest").attempts < 1.2 * hanging
 
 
 def test_hold_time_and_drift_are_in_the_result_its_file_and_its_row(tmp_path: Path) -> None:
@@ -423,12 +423,12 @@ def test_a_drive_depends_neither_on_its_launches_nor_on_its_neighbours(monkeypat
         for case in cases
     ]
 
-    def outcomes(tries: int, slots: int) -> dict[int, tuple[Any, ...]]:
-        monkeypatch.setitem(scheduler.TRIES, "cpu", tries)
+    def outcomes(attempts: int, slots: int) -> dict[int, tuple[Any, ...]]:
+        monkeypatch.setitem(scheduler.ATTEMPTS, "cpu", attempts)
         found = {}
-        for place, course in scheduler.run_setups(setups, slots=slots):
-            assert course.status == Status.TIME_LIMIT
-            found[place] = (course.hold_time, course.drift, course.drive_counts, course.energy(), course.raised)
+        for place, run in scheduler.run_setups(setups, slots=slots):
+            assert run.status == Status.TIME_LIMIT
+            found[place] = (run.hold_time, run.drift, run.drive_counts, run.energy(), run.raised)
         return found
 
     whole = outcomes(20_000, 1)
@@ -441,8 +441,8 @@ def test_a_drive_depends_neither_on_its_launches_nor_on_its_neighbours(monkeypat
 def test_loops_do_not_sink_into_a_sprocket_that_pushes(links: int, frequency: float) -> None:
     """Under fifty times the loads circles sink in by less than 0.1 mm, by a millimetre or more without the push."""
     depths = []
-    for program in ({}, {"push_rate": 0.0}):
-        loop = released_loop(program=program, links=links, frequency=frequency, start="spinning")
+    for drive in ({}, {"push_rate": 0.0}):
+        loop = released_loop(drive=drive, links=links, frequency=frequency, start="spinning")
         depths.append(loop.depth)
     assert depths[0] < 1e-4 < 1e-3 < depths[1]
 

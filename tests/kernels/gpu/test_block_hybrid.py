@@ -28,7 +28,7 @@ def in_the_air(chains, parameters=PAPER):
 
 def assert_close(ours, theirs, tolerance):
     """States, clocks and losses agree to this part of their greatest; counters, models and statuses are the same."""
-    for name in ("counts", "status", "flies"):
+    for name in ("counts", "status", "is_rigid"):
         assert np.array_equal(getattr(ours.state, name).numpy(), getattr(theirs.state, name).numpy()), name
     assert_allclose(ours.state.time.numpy(), theirs.state.time.numpy(), rtol=tolerance)
     losses = theirs.state.losses.numpy()
@@ -39,10 +39,10 @@ def assert_close(ours, theirs, tolerance):
     assert_allclose(ours.state.extremes.numpy(), theirs.state.extremes.numpy(), rtol=1e-5, atol=1e-13)
 
 
-def both(ours, theirs, features, tries):
+def both(ours, theirs, features, attempts):
     """Carry one batch on in the block form, the other in the CPU form."""
-    launch_blocks(ours, features, tries, block_dim=THREADS)
-    launch_chains(theirs, features, tries)
+    launch_blocks(ours, features, attempts, block_dim=THREADS)
+    launch_chains(theirs, features, attempts)
 
 
 @pytest.mark.parametrize("parameters", [PAPER, SOFT], ids=["paper", "soft"])
@@ -56,14 +56,14 @@ def test_steps_of_a_flight_equal_the_cpu_form(parameters):
             for world in range(len(chains)):
                 batch.resume(world, (step + 1) * 2e-4, Status.FINISHED)
         both(ours, theirs, features, 1)
-    assert (theirs.state.flies.numpy() == 1).all()
+    assert (theirs.state.is_rigid.numpy() == 1).all()
     assert theirs.counts(0)["accepted"] == 10
     assert theirs.losses(0)["joint_friction"] > 0
     assert_close(ours, theirs, 1e-9)
 
 
 def test_adaptive_flight_equals_the_cpu_form():
-    """Steps that the controller chooses, some of them refused: the same tries, the same flight to the tolerance."""
+    """Steps that the controller chooses, some of them refused: the same attempts, the same flight to the tolerance."""
     (ours, features), (theirs, _) = (in_the_air([loop(12), loop(22)]) for _ in range(2))
     for batch in (ours, theirs):
         batch.control.flight_tolerance = 1e-5
@@ -78,7 +78,7 @@ def test_a_nan_of_either_sign_ends_a_flight_at_once(sign):
     """A place that is no number is seen after one step, when joints cannot be closed there, whatever its sign bit."""
     batch, features = in_the_air([loop(12)])
     launch_blocks(batch, features, 3, block_dim=THREADS)
-    assert batch.state.flies.numpy()[0] == 1
+    assert batch.state.is_rigid.numpy()[0] == 1
     batch.state.links.numpy()[0, layout.X, 4] = np.copysign(np.nan, sign)
     launch_blocks(batch, features, 30, block_dim=THREADS)
     assert batch.status(0) == Status.NOT_FINITE
@@ -91,7 +91,7 @@ def test_springs_that_ring_or_stretch_stay_springs(size, parameters):
     (ours, features), (theirs, _) = (in_the_air([shaken(12, size, parameters)], parameters) for _ in range(2))
     both(ours, theirs, features, 5)
     assert theirs.counts(0)["accepted"] > 0
-    assert theirs.state.flies.numpy()[0] == 0
+    assert theirs.state.is_rigid.numpy()[0] == 0
     assert_close(ours, theirs, 1e-6)
 
 
@@ -104,7 +104,7 @@ def test_landings_equal_the_cpu_form():
     assert theirs.time(0) > 450 * CONTACT_STEP
     assert theirs.counts(0)["floor"] > 100
     assert theirs.counts(1)["list_builds"] > 0
-    assert theirs.losses(0)["hand_over"] != 0.0
+    assert theirs.losses(0)["joint_switch"] != 0.0
     assert_close(ours, theirs, 1e-7)
 
 
@@ -116,12 +116,12 @@ def test_softness_changes_as_in_the_cpu_form():
     for batch in (ours, theirs):
         batch.control.stiffening_time = 2e-3
         for world in range(2):
-            batch.set_program(world, hold_softness=1.0)
+            batch.set_drive(world, hold_softness=1.0)
     both(ours, theirs, features, 100)
     assert (theirs.state.softness.numpy() < 0.99).all()
     assert theirs.losses(0)["softening"] != 0.0
     assert (theirs.state.softness.numpy() > 0).all()
-    assert not theirs.state.flies.numpy().any()
+    assert not theirs.state.is_rigid.numpy().any()
     assert_close(ours, theirs, 1e-6)
 
 
@@ -133,15 +133,15 @@ def test_joints_that_soften_in_flight_stay_closed_as_in_the_cpu_form():
         batch.control.soften_area = 2.0  # any loop has collapsed
     both(ours, theirs, features, 100)
     assert (theirs.state.softness.numpy() >= 1).all()
-    assert list(theirs.state.flies.numpy()) == [0, 1]
-    assert theirs.losses(0)["hand_over"] != 0.0
+    assert list(theirs.state.is_rigid.numpy()) == [0, 1]
+    assert theirs.losses(0)["joint_switch"] != 0.0
     assert_close(ours, theirs, 1e-6)
 
 
 def ends_of(batch):
     """All that a run leaves of its last world."""
     world = len(batch.links) - 1
-    names = ("time", "step", "last_error", "flies", "closing_time", "other_step", "counts", "losses", "extremes")
+    names = ("time", "step", "last_error", "is_rigid", "closing_time", "other_step", "counts", "losses", "extremes")
     numbers = [getattr(batch.state, name).numpy()[world].copy() for name in names]
     return [batch.position(world), batch.velocity(world), *numbers]
 
@@ -150,12 +150,12 @@ def test_cuts_neighbours_and_memory_do_not_change_a_bit(monkeypatch):
     """A chain gives the same bits in any launches, in any batch, and with the memory of its flights anywhere."""
     start = falling(12, PAPER, 0.3)
     runs = []
-    for tries, others, limit in ((240, 0, 64), (1, 0, 64), (13, 2, 64), (240, 0, 0)):
+    for attempts, others, limit in ((240, 0, 64), (1, 0, 64), (13, 2, 64), (240, 0, 0)):
         monkeypatch.setattr(functions, "LARGEST_SHARED_FLIGHT", limit)
         make_advance_block.cache_clear()
         batch, features = bouncing([*(falling(20, PAPER, 0.6),) * others, start])
-        while batch.tries(others) < 240:
-            launch_blocks(batch, features, min(tries, 240 - batch.tries(others)), block_dim=THREADS)
+        while batch.attempts(others) < 240:
+            launch_blocks(batch, features, min(attempts, 240 - batch.attempts(others)), block_dim=THREADS)
         runs.append(ends_of(batch))
     make_advance_block.cache_clear()
     assert runs[0][-3][layout.FLOOR_IMPULSES] > 100

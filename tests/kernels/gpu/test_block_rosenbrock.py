@@ -183,7 +183,7 @@ def test_memory_in_the_scratch_block_changes_no_bit(monkeypatch: pytest.MonkeyPa
 
 
 def test_flight_equals_the_cpu_form() -> None:
-    """Adaptive long steps of a chain that touches nothing: the same tries, the same flight, the same losses."""
+    """Adaptive long steps of a chain that touches nothing: the same attempts, the same flight, the same losses."""
     position, velocity = lay_chain(ellipse(1.5), LINKS, SOFT.link_length, 2.0, 0.1)
     velocity[:, 2] += np.random.default_rng(1).normal(size=LINKS)
     ours, theirs = (
@@ -202,13 +202,13 @@ def test_flight_equals_the_cpu_form() -> None:
 def test_cuts_and_neighbours_do_not_change_a_bit() -> None:
     """A chain gives the same bits however its run is cut into launches, and in whatever batch."""
     runs = []
-    for worlds, tries in ((2, 30), (2, 7), (3, 30)):
+    for worlds, attempts in ((2, 30), (2, 7), (3, 30)):
         batch = batch_of(
             [heap(LINKS, 5)] + [heap(LINKS, 6)] * (worlds - 1), method="rodas4p", stop_time=20 * FIXED_STEP
         )
         features = features_of(batch, fixed_body="floor")
-        for _ in range(-(-30 // tries)):
-            launch_blocks(batch, features, tries, block_dim=LINKS)
+        for _ in range(-(-30 // attempts)):
+            launch_blocks(batch, features, attempts, block_dim=LINKS)
         runs.append(batch)
     assert runs[0].counts(1)["self"] > 10
     for run in runs[1:]:

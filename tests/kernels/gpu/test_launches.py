@@ -41,12 +41,12 @@ def piles(method: str) -> Batch:
     return batch
 
 
-def launch(batch: Batch, kernel: wp.Kernel, worlds: list[int], tries: int) -> None:
+def launch(batch: Batch, kernel: wp.Kernel, worlds: list[int], attempts: int) -> None:
     """Carry worlds on in the block form."""
-    batch.control.tries = tries
+    batch.control.attempts = attempts
     inputs = [
         wp.array(worlds, dtype=wp.int32, device="cpu"),
-        *(batch.model, batch.program, batch.state, batch.record, batch.scratch, batch.lists, batch.control),
+        *(batch.model, batch.drive, batch.state, batch.record, batch.scratch, batch.lists, batch.control),
     ]
     with fibers():
         wp.launch_tiled(kernel, dim=[len(worlds)], inputs=inputs, block_dim=LINKS, device="cpu")
@@ -66,12 +66,14 @@ def features_of(batch: Batch) -> Features:
     return dataclasses.replace(batch.features(fixed_body="floor", watch="rest"), softens=True)
 
 
-def run(method: str, factory: Callable[[Features, int], wp.Kernel], tries: int) -> list[dict[str, NDArray[np.generic]]]:
-    """Both piles to their end, in launches of so many tries."""
+def run(
+    method: str, factory: Callable[[Features, int], wp.Kernel], attempts: int
+) -> list[dict[str, NDArray[np.generic]]]:
+    """Both piles to their end, in launches of so many attempts."""
     batch = piles(method)
     kernel = factory(features_of(batch), LINKS)
     while batch.status(0) == Status.RUNNING or batch.status(1) == Status.RUNNING:
-        launch(batch, kernel, [0, 1], tries)
+        launch(batch, kernel, [0, 1], attempts)
     return [everything(batch, world) for world in (0, 1)]
 
 
@@ -85,15 +87,15 @@ def assert_same(ours: list[dict[str, NDArray[np.generic]]], theirs: list[dict[st
 
 @pytest.mark.parametrize("method", ["dp5", "rkf78"])
 def test_cuts_change_no_number(method: str) -> None:
-    """Launches of one, seven or all tries end in the same numbers, every counter, list and clock included."""
+    """Launches of one, seven or all attempts end in the same numbers, every counter, list and clock included."""
     whole = run(method, make_advance_block, 10**6)
     for world in whole:
         assert world["status"] == Status.FINISHED
         assert world["counts"][layout.SELF_IMPULSES] > 10
         assert 3 < world["counts"][layout.LIST_BUILDS] < world["counts"][layout.ACCEPTED] / 3
         assert 0 < world["watch"][layout.SOFTENED_AT] < world["time"]
-    for tries in (1, 7):
-        assert_same(run(method, make_advance_block, tries), whole)
+    for attempts in (1, 7):
+        assert_same(run(method, make_advance_block, attempts), whole)
     alone = piles(method)
     launch(alone, make_advance_block(features_of(alone), LINKS), [1], 10**6)
     assert_same([everything(alone, 1)], whole[1:])

@@ -39,7 +39,7 @@ def fixed_steps(device: str, method: str, fixed_body: str) -> dict[str, np.ndarr
             position[:, 1] += 0.9 * SOFT.sprocket_radius
         batch.set_chain(world, SOFT, LINKS)
         batch.load(world, position, velocity, stop_time=STEPS * FIXED_STEP, stop_status=Status.FINISHED)
-        batch.set_program(world, sprocket_speed=-50.0)
+        batch.set_drive(world, sprocket_speed=-50.0)
         batch._edit(batch.state.step)[world] = FIXED_STEP
     batch.run(range(2), batch.features(fixed_body=fixed_body, watch="none"))
     worlds = range(2)
@@ -113,7 +113,7 @@ def test_flights_and_landings_agree_with_the_cpu() -> None:
         batches.append(batch)
     ours, theirs = batches
     for world in range(2):
-        assert theirs.losses(world)["hand_over"] != 0.0
+        assert theirs.losses(world)["joint_switch"] != 0.0
         assert ours.counts(world) == theirs.counts(world)
         assert np.abs(ours.position(world) - theirs.position(world)).max() < 1e-6
         assert np.abs(ours.velocity(world) - theirs.velocity(world)).max() < 1e-6 * np.abs(theirs.velocity(world)).max()

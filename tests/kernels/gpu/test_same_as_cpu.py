@@ -105,7 +105,7 @@ def test_chains_too_long_for_shared_memory_equal_the_cpu_form(block_dim: int, mo
 
 
 def test_free_flight_equals_the_cpu_form() -> None:
-    """Adaptive steps of a chain that touches nothing: the same number of tries, the same flight to the tolerance."""
+    """Adaptive steps of a chain that touches nothing: the same number of attempts, the same flight to the tolerance."""
     position, velocity = lay_chain(ellipse(1.5), LINKS, SOFT.link_length, 2.0, 0.1)
     velocity[:, 2] += np.random.default_rng(1).normal(size=LINKS)
     ours, theirs = (
@@ -133,7 +133,7 @@ def bounded_heaps(count: int) -> Batch:
 def test_cuts_and_neighbours_do_not_change_a_bit() -> None:
     """A chain gives the same bits however its run is cut into launches, in whatever batch, among whatever threads."""
     runs = []
-    for worlds, tries, block_dim, seconds, expected in (
+    for worlds, attempts, block_dim, seconds, expected in (
         (2, 60, LINKS, 1e9, 1),
         (2, 7, LINKS, 1e9, 6),
         (3, 60, LINKS, 1e9, 1),
@@ -145,13 +145,13 @@ def test_cuts_and_neighbours_do_not_change_a_bit() -> None:
         features = features_of(batch, fixed_body="floor", watch="rest")
         launches = 0
         while batch.status(1) == Status.RUNNING:
-            launch_blocks(batch, features, tries, block_dim=block_dim)
+            launch_blocks(batch, features, attempts, block_dim=block_dim)
             launches += 1
         assert launches == expected
         runs.append(batch)
     assert runs[0].counts(1)["self"] > 10
     for run in runs[1:]:
-        for name in ("links", "time", "step", "last_error", "counts", "losses", "extremes", "last_look", "watch"):
+        for name in ("links", "time", "step", "last_error", "counts", "losses", "extremes", "last_sample", "watch"):
             assert np.array_equal(getattr(run.state, name).numpy()[1], getattr(runs[0].state, name).numpy()[1]), name
         assert np.array_equal(run.drain_samples(1), runs[0].record.samples.numpy()[1, : run_length(runs[0])])
 
@@ -171,7 +171,7 @@ def test_samples_frames_and_rest_equal_the_cpu_form() -> None:
     launch_chains(theirs, features, 100)
     assert theirs.status(0) == Status.AT_REST
     assert_same(ours, theirs)
-    for name in ("first_look", "last_look"):
+    for name in ("first_sample", "last_sample"):
         expected = getattr(theirs.state, name).numpy()
         assert np.array_equal(getattr(ours.state, name).numpy(), expected)
     assert np.array_equal(ours.drain_samples(1), theirs.drain_samples(1))
@@ -216,7 +216,7 @@ def test_failures_stop_one_chain_and_leave_the_others() -> None:
     limited.control.step_limit = 4
     launch_blocks(limited, features, 10, block_dim=LINKS)
     assert limited.status(0) == Status.STEP_LIMIT
-    assert limited.tries(0) == 4
+    assert limited.attempts(0) == 4
 
     stiff = batch_of([good], method="dp5", fixed_step=False, tolerance=1e-13)
     stiff.control.smallest_step = 1e-8

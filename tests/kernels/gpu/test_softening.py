@@ -60,7 +60,7 @@ def released() -> Batch:
     batch.control.sample_interval = 4 * FIXED_STEP
     batch.control.stiffening_time = 40 * FIXED_STEP
     batch.control.soften_area = -np.inf
-    batch.set_program(0, hold_softness=1.25)
+    batch.set_drive(0, hold_softness=1.25)
     batch.state.softness.numpy()[0] = 1.25
     return soften_much(batch)
 
@@ -91,9 +91,9 @@ def driven() -> Batch:
     batch.control.sample_interval = 4 * FIXED_STEP
     batch.control.stiffening_time = 30 * FIXED_STEP
     times = {"spin_up_start": 12 * FIXED_STEP, "spin_up_time": 58 * FIXED_STEP, "hold_start": 70 * FIXED_STEP}
-    batch.set_program(0, **times, loop_speed=3.0, loop_period=12 * FIXED_STEP, load_factor=15.0, push_rate=1e4)
-    batch.set_program(0, steady_window=12 * FIXED_STEP, steady_time=-1.0, steady_tolerance=1.0, further_hold=1.0)
-    batch.set_program(0, hold_softness=1.25, loaded_softness=1.1)
+    batch.set_drive(0, **times, loop_speed=3.0, loop_period=12 * FIXED_STEP, load_factor=15.0, push_rate=1e4)
+    batch.set_drive(0, steady_window=12 * FIXED_STEP, steady_time=-1.0, steady_tolerance=1.0, further_hold=1.0)
+    batch.set_drive(0, hold_softness=1.25, loaded_softness=1.1)
     batch.state.watch.numpy()[0, layout.UNLOADED_SINCE] = UNLOADED
     batch.state.softness.numpy()[0] = 1.25
     batch.state.stop_status.numpy()[0] = Status.NOT_STEADY
@@ -114,9 +114,9 @@ def softening_features(batch: Batch, fixed_body: str, watch: str) -> Features:
     return dataclasses.replace(batch.features(fixed_body=fixed_body, watch=watch), softens=True)
 
 
-def launch_both(ours: Batch, theirs: Batch, features: Features, cut: int, tries: int = 60) -> None:
-    """So many tries or a few more: in blocks, a part of them to a launch, and in the CPU form, all at once."""
-    launches = -(-tries // cut)
+def launch_both(ours: Batch, theirs: Batch, features: Features, cut: int, attempts: int = 60) -> None:
+    """So many attempts or a few more: in blocks, a part of them to a launch, and in the CPU form, all at once."""
+    launches = -(-attempts // cut)
     for _ in range(launches):
         launch_blocks(ours, features, cut, block_dim=LINKS)
     launch_chains(theirs, features, cut * launches)
@@ -152,7 +152,7 @@ def test_blocks_drive_under_load_as_the_cpu_form_does(cut: int, quick_unloading:
     """In the block form loads and softness change in the same steps of the drive, however cut: on, falling, off."""
     ours, theirs = driven(), driven()
     features = softening_features(ours, "sprocket", "steady")
-    launch_both(ours, theirs, features, cut, tries=80)
+    launch_both(ours, theirs, features, cut, attempts=80)
     assert theirs.counts(0)["sprocket"] > 10
     assert theirs.time(0) > UNLOADED + LOAD_FALLS + 12 * FIXED_STEP
     assert theirs.state.load_factor.numpy()[0] == 1.0
@@ -170,7 +170,7 @@ def test_loads_are_on_then_fall_then_are_off(form: str, quick_unloading: None) -
     seen = []
     for _ in range(80):
         advance(batch, form, features, 1)
-        look = batch.last_look(0)[layout.TIME]
+        look = batch.last_sample(0)[layout.TIME]
         seen.append((look / FIXED_STEP, batch.state.load_factor.numpy()[0], batch.state.softness.numpy()[0]))
     fell = False
     for steps, load, softness in seen:
@@ -182,12 +182,12 @@ def test_loads_are_on_then_fall_then_are_off(form: str, quick_unloading: None) -
     assert fell and {1.0, 15.0} <= {load for _, load, _ in seen}
 
 
-def advance(batch: Batch, form: str, features: Features, tries: int) -> None:
+def advance(batch: Batch, form: str, features: Features, attempts: int) -> None:
     """Carry a batch on in the block form or in the CPU form."""
     if form == "block":
-        launch_blocks(batch, features, tries, block_dim=LINKS)
+        launch_blocks(batch, features, attempts, block_dim=LINKS)
     else:
-        launch_chains(batch, features, tries)
+        launch_chains(batch, features, attempts)
 
 
 @pytest.mark.parametrize("form", ["block", "cpu"])

@@ -338,26 +338,26 @@ def assert_same_outcome(first, second):
         assert_array_equal(value, second[name], err_msg=name)
 
 
-def run_in_launches(batch, tries):
-    """Run all worlds to their ends in launches of this many tries; returns the number of launches."""
+def run_in_launches(batch, attempts):
+    """Run all worlds to their ends in launches of this many attempts; returns the number of launches."""
     features = batch.features(fixed_body="floor", watch="none")
     worlds = range(len(batch.links))
     launches = 0
     while any(batch.status(world) == Status.RUNNING for world in worlds):
-        batch.launch(worlds, features, tries)
+        batch.launch(worlds, features, attempts)
         launches += 1
     return launches
 
 
 @pytest.mark.parametrize("method", [*METHODS, "hybrid"])
 def test_launch_size_does_not_change_a_bit(method):
-    """A chain that drops on the floor ends the same to the bit in launches of 1, 7 or 1000 tries, counters included."""
+    """A chain that drops on the floor ends with the same bits in launches of 1, 7 or 1000 attempts, counters too."""
     outcomes = {}
-    for tries in (1, 7, 1000):
+    for attempts in (1, 7, 1000):
         batch = dropped_batch([20], Options(method=method), 0.01)
-        launches = run_in_launches(batch, tries)
-        assert launches >= batch.tries(0) // tries
-        outcomes[tries] = outcome(batch, 0)
+        launches = run_in_launches(batch, attempts)
+        assert launches >= batch.attempts(0) // attempts
+        outcomes[attempts] = outcome(batch, 0)
     assert outcomes[1]["status"] == Status.FINISHED
     assert outcomes[1]["count floor"] > 100
     assert_same_outcome(outcomes[1], outcomes[7])

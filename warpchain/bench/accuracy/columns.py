@@ -13,8 +13,8 @@ _ERRORS: Final = {
     "momentum_bias": ("1", "mean relative error of the vertical impulse or the angular momentum, with its sign"),
 }
 
-_TRIAL: Final = {
-    "trial": ("1", "flight: a circulating ellipse thrown; impact: it hits the floor; sprocket: one turn at 15 Hz"),
+_PROBLEM: Final = {
+    "problem": ("1", "flight: a circulating ellipse thrown; impact: it hits the floor; sprocket: one turn at 15 Hz"),
     "links": ("1", "number of links"),
 }
 
@@ -34,14 +34,14 @@ _LEDGER: Final = {
 
 COLUMNS: Final[dict[str, dict[str, tuple[str, str]]]] = {
     "references": {
-        **_TRIAL,
+        **_PROBLEM,
         "duration": ("s", "simulated time of each start"),
         "starts": ("1", "number of starts"),
         **{name: (unit, f"{text}: dp5 at 1e-11 against rkf78 at 1e-12") for name, (unit, text) in _ERRORS.items()},
         **_MACHINE,
     },
     "points": {
-        **_TRIAL,
+        **_PROBLEM,
         "method": ("1", "method of the engine, or of SciPy on the NumPy model"),
         "tolerance": ("1", "tolerance asked for, absolute in SI units and relative alike"),
         "status": ("1", "how it ended"),
@@ -64,7 +64,7 @@ COLUMNS: Final[dict[str, dict[str, tuple[str, str]]]] = {
         "seconds": ("s", "processor time of one core from the release to rest, median"),
         "each": ("s", "the same of each walk"),
         "reference_seconds": ("s", "the same of rkf78 at 1e-6 in the same run, median"),
-        "tries": ("1", "steps tried, accepted or not, median"),
+        "attempts": ("1", "steps tried, accepted or not, median"),
         "walk_time": ("s", "simulated time from the release to rest, median"),
         **_LEDGER,
         **_MACHINE,
@@ -109,7 +109,7 @@ COLUMNS: Final[dict[str, dict[str, tuple[str, str]]]] = {
         "result": ("1", "what came out"),
         "seconds": ("s", "processor time, compilation apart"),
         "simulated": ("s", "simulated time"),
-        "tries": ("1", "steps tried"),
+        "attempts": ("1", "steps tried"),
         "energy_error": ("1", "what the energy ledger leaves open, as a fraction of the energy"),
         "sound": ("1", "whether status, result and energy are such as the case may have"),
         **_MACHINE,

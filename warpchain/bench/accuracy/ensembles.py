@@ -15,9 +15,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.bench.accuracy.method_settings import LOOSE, TIGHT, Contestant
+from warpchain.bench.accuracy.method_settings import LOOSE, TIGHT, MethodSetting
 from warpchain.bench.accuracy.two_samples import bootstrap_interval, kolmogorov_smirnov, means, standard_deviations
-from warpchain.bench.trials.work_precision import methods
+from warpchain.bench.problems.work_precision import methods
 from warpchain.inputs.options import METHODS_BY_NEED
 from warpchain.run.sweep_run import SweepProgress, sweep
 from warpchain.status import Status
@@ -66,16 +66,16 @@ class Ensemble:
         """For people."""
         return f"{self.links} links, {self.frequency:g} Hz, {self.preset}, {self.start}, {self.samples} walks"
 
-    def content(self, contestant: Contestant) -> dict[str, Any]:
+    def content(self, method_setting: MethodSetting) -> dict[str, Any]:
         """The sweep of a method."""
         return {
             "version": 1,
-            "name": f"{self.title}, {contestant.name}",
+            "name": f"{self.title}, {method_setting.name}",
             "seed": SEED,
             "preset": self.preset,
             "samples": self.samples,
             "scene": {"links": self.links, "frequency": self.frequency, "start": self.start},
-            "options": {**contestant.options, "device": self.device},
+            "options": {**method_setting.options, "device": self.device},
         }
 
 
@@ -89,22 +89,24 @@ def default_samples(links: int) -> int:
     return 60 if links >= LONG else 200
 
 
-def run_ensemble(folder: Path, ensemble: Ensemble, contestant: Contestant, report: Callable[[str], None]) -> None:
+def run_ensemble(
+    folder: Path, ensemble: Ensemble, method_setting: MethodSetting, report: Callable[[str], None]
+) -> None:
     """Make the walks of a method, or what is left of them, and note what they cost beside them.
 
     Args:
         folder: Of all ensembles.
         ensemble: What the walks are.
-        contestant: How they are computed.
+        method_setting: How they are computed.
         report: Called with a line of progress.
 
     Raises:
         InputError: The folder holds something else, or the device is not there.
     """
-    planned = load_sweep(ensemble.content(contestant))
-    place = _place(folder, ensemble, contestant)
+    planned = load_sweep(ensemble.content(method_setting))
+    place = _place(folder, ensemble, method_setting)
     place.parent.mkdir(parents=True, exist_ok=True)
-    who = f"{ensemble.title}, {contestant.title}"
+    who = f"{ensemble.title}, {method_setting.title}"
     report(f"{who}: compiling")
     compile_kernels([planned.planned(0).setup])
     cost_file = _cost_file(place)
@@ -125,15 +127,15 @@ def run_ensemble(folder: Path, ensemble: Ensemble, contestant: Contestant, repor
 
 
 def summary(folder: Path, ensemble: Ensemble) -> list[dict[str, Any]]:
-    """What the ensembles on disk say, one row for each contestant; the references first.
+    """What the ensembles on disk say, one row for each method_setting; the references first.
 
     Walks that did not come to rest are counted and in no mean. NaN stands for what cannot be known: intervals of fewer
     than two walks, tests against a reference without walks, cost of walks made without a record of it.
     """
-    found: dict[Contestant, SweepResult] = {}
+    found: dict[MethodSetting, SweepResult] = {}
     for place in sorted((folder / ensemble.name).glob("*@*")):
         if place.is_dir():
-            found[Contestant.parse(place.name)] = load(place)
+            found[MethodSetting.parse(place.name)] = load(place)
     ranks = {name: rank for rank, name in enumerate((*METHODS_BY_NEED, *methods()))}
     ordered = sorted(
         found,
@@ -223,8 +225,8 @@ def _cost(place: Path, device: str) -> dict[str, float]:
     return {"seconds_per_walk": cost["core_seconds"] / cost["walks"], "walks_per_second": nan}
 
 
-def _place(folder: Path, ensemble: Ensemble, contestant: Contestant) -> Path:
-    return folder / ensemble.name / contestant.name
+def _place(folder: Path, ensemble: Ensemble, method_setting: MethodSetting) -> Path:
+    return folder / ensemble.name / method_setting.name
 
 
 def _cost_file(place: Path) -> Path:

@@ -56,16 +56,16 @@ _NOTES: Final = {
 def figures(document: dict[str, Any]) -> Iterator[Picture]:
     """Every figure that the document has something for."""
     for true in document["references"]:
-        rows = [row for row in document["points"] if (row["trial"], row["links"]) == (true["trial"], true["links"])]
-        note = _NOTES[true["trial"]].format(starts=true["starts"], milliseconds=1e3 * true["duration"])
+        rows = [row for row in document["points"] if (row["problem"], row["links"]) == (true["problem"], true["links"])]
+        note = _NOTES[true["problem"]].format(starts=true["starts"], milliseconds=1e3 * true["duration"])
         caption = (
-            f"{_TITLES[true['trial']]}, {true['links']} links, {1e3 * true['duration']:.3g} ms at Table 1's values: "
+            f"{_TITLES[true['problem']]}, {true['links']} links, {1e3 * true['duration']:.3g} ms at Table 1's values: "
             "greatest error over the links against rkf78 at 1e-12, by processor time and by evaluations of the "
             "chain's equations (without an implicit method's Jacobians and linear systems). "
             "Small numbers are decimal exponents of the tolerance. The dashed line is how "
             f"far dp5 at 1e-11 is from that reference: nothing below it is certain.{note}"
         )
-        yield Picture(f"work_precision_{true['trial']}_{true['links']}", caption, work_precision(true, rows))
+        yield Picture(f"work_precision_{true['problem']}_{true['links']}", caption, work_precision(true, rows))
     for links in dict.fromkeys(row["links"] for row in document["walks"]):
         rows = [row for row in document["walks"] if row["links"] == links]
         caption = (
@@ -91,13 +91,13 @@ def figures(document: dict[str, Any]) -> Iterator[Picture]:
 
 
 def work_precision(true: Row, rows: Sequence[Row]) -> Figure:
-    """Two errors of a trial against wall time and against evaluations, a line for each method.
+    """Two errors of a problem against wall time and against evaluations, a line for each method.
 
     Args:
         true: row of the reference.
-        rows: points of the same trial and number of links.
+        rows: points of the same problem and number of links.
     """
-    shown = _ERRORS[true["trial"]]
+    shown = _ERRORS[true["problem"]]
     chosen = list(dict.fromkeys(row["method"] for row in rows))
     colors = _colors(chosen)
     figure = Figure(figsize=(9.0, 6.2), layout="constrained")
@@ -131,9 +131,9 @@ def work_precision(true: Row, rows: Sequence[Row]) -> Figure:
         Line2D([], [], color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)), label="references\ndiffer by this")
     )
     figure.legend(handles=handles, loc="outside right center", frameon=False)
-    if _ON_FIGURE[true["trial"]]:
-        figure.supxlabel(_ON_FIGURE[true["trial"]], fontsize="small", color=FAINT)
-    figure.suptitle(f"{_TITLES[true['trial']]}, $n$ = {true['links']}", fontsize="medium", x=0.01, ha="left")
+    if _ON_FIGURE[true["problem"]]:
+        figure.supxlabel(_ON_FIGURE[true["problem"]], fontsize="small", color=FAINT)
+    figure.suptitle(f"{_TITLES[true['problem']]}, $n$ = {true['links']}", fontsize="medium", x=0.01, ha="left")
     return figure
 
 
@@ -221,7 +221,7 @@ def hard_cases(rows: Sequence[Row]) -> Figure:
         x, y = chosen.index(row["method"]), cases.index(row["case"])
         color = LINE_COLORS[0] if row["sound"] else LINE_COLORS[1]
         axes.add_patch(Rectangle((x - 0.48, y - 0.45), 0.96, 0.9, facecolor=(color, 0.25), edgecolor=color))
-        numbers = [f"{row['seconds']:.2g} s"] * (row["tries"] > 0)
+        numbers = [f"{row['seconds']:.2g} s"] * (row["attempts"] > 0)
         numbers += [] if row["energy_error"] is None else [f"{row['energy_error']:.0e}"]
         expected = row["sound"] and numbers and row["status"] in (Status.AT_REST.label, Status.FINISHED.label)
         text = "   ".join([*([] if expected else [row["status"].replace("_", " ")]), *numbers])
@@ -284,7 +284,7 @@ def _marker(method: str, chosen: Sequence[str]) -> str:
 
 
 def _contestant_texts(figure: Figure, rows: Sequence[Row]) -> list[str]:
-    """Title of each contestant, its settings in a line of their own, and how many of its walks are not drawn.
+    """Title of each method_setting, its settings in a line of their own, and how many of its walks are not drawn.
 
     The most common settings are written below the figure, and a star stands for them.
     """

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Self
 
-from warpchain.bench.trials.work_precision import methods
+from warpchain.bench.problems.work_precision import methods
 from warpchain.inputs.options import METHODS_BY_NEED, Options
 from warpchain.inputs.parameters import InputError, shown, suggestion, validated
 
@@ -23,7 +23,7 @@ CHOICES: Final = ("controller",)
 
 
 @dataclass(frozen=True)
-class Contestant:
+class MethodSetting:
     """How walks are computed.
 
     Attributes:
@@ -39,7 +39,7 @@ class Contestant:
 
     @classmethod
     def of(cls, options: Mapping[str, object]) -> Self:
-        """The contestant with these options; those that have their default values anyway are left out.
+        """The method_setting with these options; those that have their default values anyway are left out.
 
         Raises:
             InputError: One of them is unknown or impossible.
@@ -66,7 +66,7 @@ class Contestant:
     @property
     def word(self) -> str:
         """The key of `METHODS_BY_NEED` that means the same; empty if none does."""
-        return next((word for word in METHODS_BY_NEED if Contestant.of({"method": word}) == self), "")
+        return next((word for word in METHODS_BY_NEED if MethodSetting.of({"method": word}) == self), "")
 
     @property
     def title(self) -> str:
@@ -133,17 +133,17 @@ def _number(text: str, number: str, place: str) -> float:
         raise InputError(f"--methods: {shown(text)} has no number {place}") from None
 
 
-LOOSE: Final = Contestant("rkf78", 1e-6)
+LOOSE: Final = MethodSetting("rkf78", 1e-6)
 """What the others are tested against."""
-TIGHT: Final = Contestant("rkf78", 1e-9)
+TIGHT: Final = MethodSetting("rkf78", 1e-9)
 """What they are tested against as well where it is there, and it costs."""
 
 
-def default_contestants(device: str = "cpu") -> tuple[Contestant, ...]:
+def default_method_settings(device: str = "cpu") -> tuple[MethodSetting, ...]:
     """The words, and every method with the settings of `explicit`, each once.
 
     At 1e-6 and without softer joints the implicit method and those of low order walk for half a minute and longer.
     """
-    words = [Contestant.parse(word, device) for word in METHODS_BY_NEED]
-    alike = [Contestant.of({**METHODS_BY_NEED["explicit"], "method": method}) for method in methods()]
+    words = [MethodSetting.parse(word, device) for word in METHODS_BY_NEED]
+    alike = [MethodSetting.of({**METHODS_BY_NEED["explicit"], "method": method}) for method in methods()]
     return tuple(dict.fromkeys((*words, *alike)))

@@ -65,12 +65,12 @@ def _work_precision(document: dict[str, Any], pictures: Sequence[Picture]) -> st
         return ""
     parts = [f"<p>{escape(note)}</p>" for note in document["notes"].values()]
     parts += [picture(drawn.figure, drawn.caption) for drawn in pictures if drawn.name.startswith("work_precision")]
-    points = _together(document["points"], "trial", "links", "method")
-    head = ["trial", "n", "method", "tolerance", "position / m", "velocity / (m/s)", "momentum", "bias"]
+    points = _together(document["points"], "problem", "links", "method")
+    head = ["problem", "n", "method", "tolerance", "position / m", "velocity / (m/s)", "momentum", "bias"]
     head += ["s / s", "speed", "evaluations / s", "rejected", "status"]
     rows = [
         [
-            *(row["trial"], f"{row['links']}", row["method"], f"{row['tolerance']:g}"),
+            *(row["problem"], f"{row['links']}", row["method"], f"{row['tolerance']:g}"),
             *(_number(row[name], ".1e") for name in ("position_error", "velocity_error", "momentum_error")),
             _number(row["momentum_bias"], "+.1e"),
             _number(_per_second(row, "seconds"), ".3g"),
@@ -101,14 +101,14 @@ def _walks(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
         "(and the greatest of that). Speed is how many times cheaper than rkf78 at 1e-6 in the same run.</p>"
     )
     parts = [text, *(picture(drawn.figure, drawn.caption) for drawn in pictures if drawn.name.startswith("walks_"))]
-    head = ["n", "method", "walks", "at rest", "s", "s / s", "speed", "tries", "ledger", "greatest"]
+    head = ["n", "method", "walks", "at rest", "s", "s / s", "speed", "attempts", "ledger", "greatest"]
     lines = [
         [
             *(f"{row['links']}", row["title"], f"{row['walks']}", f"{row['at_rest']}"),
             _number(row["seconds"], ".3g"),
             _number(_ratio(row["seconds"], row["walk_time"]), ".3g"),
             _number(_ratio(row["reference_seconds"], row["seconds"]), ".3g"),
-            _number(row["tries"], ",.0f"),
+            _number(row["attempts"], ",.0f"),
             *(_number(row[name], ".1e") for name in ("ledger", "greatest_ledger")),
         ]
         for row in rows
@@ -163,11 +163,11 @@ def _hard_cases(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
     if not rows:
         return ""
     parts = [picture(drawn.figure, drawn.caption) for drawn in pictures if drawn.name == "hard_cases"]
-    head = ["kind", "case", "method", "status", "result", "s", "simulated s", "tries", "energy error", "sound"]
+    head = ["kind", "case", "method", "status", "result", "s", "simulated s", "attempts", "energy error", "sound"]
     lines = [
         [
             *(row["group"], row["what"], row["method"], row["status"], row["result"]),
-            *(f"{row['seconds']:.3g}", f"{row['simulated']:.3g}", f"{row['tries']:,}"),
+            *(f"{row['seconds']:.3g}", f"{row['simulated']:.3g}", f"{row['attempts']:,}"),
             *(_number(row["energy_error"], ".1e"), "yes" if row["sound"] else "no"),
         ]
         for row in rows
@@ -193,11 +193,11 @@ def _per_second(row: Row, cost: str) -> float | None:
 
 
 def _speed(row: Row, points: Sequence[Row]) -> float | None:
-    """How many times faster a point is than rkf78 at 1e-6 in the same trial; None if that was not measured."""
+    """How many times faster a point is than rkf78 at 1e-6 in the same problem; None if that was not measured."""
     for true in points:
         if true["method"] == "rkf78" and true["tolerance"] == 1e-6:
             seconds, own = _per_second(true, "seconds"), _per_second(row, "seconds")
-            if all(true[key] == row[key] for key in ("trial", "links")) and seconds and own:
+            if all(true[key] == row[key] for key in ("problem", "links")) and seconds and own:
                 return seconds / own
     return None
 

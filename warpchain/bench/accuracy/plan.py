@@ -15,16 +15,16 @@ from typing import Any, Final
 
 from warpchain.bench.accuracy.columns import COLUMNS
 from warpchain.bench.accuracy.ensembles import Ensemble, default_samples, run_ensemble, summary
-from warpchain.bench.accuracy.method_settings import LOOSE, TIGHT, Contestant, default_contestants
+from warpchain.bench.accuracy.method_settings import LOOSE, TIGHT, MethodSetting, default_method_settings
 from warpchain.bench.accuracy.walk_costs import walk_costs
 from warpchain.bench.cpu_steps import machine
-from warpchain.bench.trials.hard_cases import HARD_CASES
-from warpchain.bench.trials.work_precision import (
+from warpchain.bench.problems.hard_cases import HARD_CASES
+from warpchain.bench.problems.work_precision import (
+    PROBLEMS,
     TOLERANCES,
-    TRIALS,
     Errors,
+    make_problem,
     make_reference,
-    make_trial,
     methods,
     points,
 )
@@ -43,8 +43,8 @@ SCIPY_TOLERANCES: Final = (1e-3, 1e-6, 1e-9)
 """Those of the tolerances that SciPy's solvers, which take a minute each, are run at."""
 
 KEYS: Final = {
-    "references": ("trial", "links"),
-    "points": ("trial", "links", "method", "tolerance"),
+    "references": ("problem", "links"),
+    "points": ("problem", "links", "method", "tolerance"),
     "walks": ("links", "name"),
     "ensembles": ("name",),
     "hard_cases": ("case", "method"),
@@ -61,10 +61,10 @@ class Plan:
     """What is to be run, checked; see `make_plan`."""
 
     parts: tuple[str, ...]
-    contestants: tuple[Contestant, ...]
+    method_settings: tuple[MethodSetting, ...]
     tolerances: tuple[float, ...]
     links: tuple[int, ...]
-    trials: tuple[str, ...]
+    problems: tuple[str, ...]
     ensembles: tuple[Ensemble, ...]
     tight: bool
     cases: tuple[str, ...]
@@ -74,17 +74,17 @@ class Plan:
     @property
     def methods(self) -> tuple[str, ...]:
         """Names of the methods, each once."""
-        chosen = {one.method for one in self.contestants}
+        chosen = {one.method for one in self.method_settings}
         return tuple(name for name in methods() if name in chosen)
 
 
 def make_plan(
     *,
     parts: Sequence[str] = PARTS,
-    contestants: Sequence[str] | None = None,
+    method_settings: Sequence[str] | None = None,
     tolerances: Sequence[float] = TOLERANCES,
     links: Sequence[int] = (60, 150),
-    trials: Sequence[str] = TRIALS,
+    problems: Sequence[str] = PROBLEMS,
     presets: Sequence[str] = ("soft", "paper"),
     start: str = "spinning",
     samples: int | None = None,
@@ -98,11 +98,11 @@ def make_plan(
 
     Args:
         parts: Some of `PARTS`.
-        contestants: Methods, each as `Contestant.parse` reads it; None: those of `default_contestants`. Tolerances and
-            other settings are for walks and ensembles.
+        method_settings: Methods, each as `MethodSetting.parse` reads it; None: `default_method_settings`. Tolerances
+            and other settings are for walks and ensembles.
         tolerances: Of the work–precision diagrams.
         links: Numbers of links in the diagrams, the walks and the ensembles.
-        trials: Some of `TRIALS`.
+        problems: Some of `PROBLEMS`.
         presets: Of the ensembles.
         start: Of the ensembles.
         samples: Walks of each ensemble; None: 200, and 60 from 100 links on.
@@ -118,7 +118,7 @@ def make_plan(
     names = [case.name for case in HARD_CASES]
     for option, given, known in (
         ("--parts", parts, PARTS),
-        ("--trials", trials, TRIALS),
+        ("--problems", problems, PROBLEMS),
         ("--cases", cases or (), names),
     ):
         for name in given:
@@ -131,12 +131,12 @@ def make_plan(
     validated(Options, {"device": device}, "options")
     plan = Plan(
         parts=tuple(parts),
-        contestants=default_contestants(device)
-        if contestants is None
-        else tuple(Contestant.parse(text, device) for text in contestants),
+        method_settings=default_method_settings(device)
+        if method_settings is None
+        else tuple(MethodSetting.parse(text, device) for text in method_settings),
         tolerances=tuple(tolerances),
         links=tuple(validated(Scene, {"links": count}, "--links").links for count in links),
-        trials=tuple(trials),
+        problems=tuple(problems),
         ensembles=tuple(
             Ensemble(count, name, start, default_samples(count) if samples is None else samples, device)
             for count in links
@@ -147,19 +147,19 @@ def make_plan(
         rounds=rounds,
         scipy=scipy,
     )
-    if "work-precision" in parts and "sprocket" in trials:
+    if "work-precision" in parts and "sprocket" in problems:
         for count in plan.links:
             check_scene(Scene(links=count), preset("paper"))
     if "ensembles" in parts:
         start_device(validated(Options, {"device": device}, "options").device)
         for ensemble in plan.ensembles:
-            for contestant in plan.contestants:
-                load_sweep(ensemble.content(contestant))
+            for method_setting in plan.method_settings:
+                load_sweep(ensemble.content(method_setting))
     return plan
 
 
 def run_accuracy(folder: Path, plan: Plan, report: Report) -> Document:
-    """Run a plan; the document in the folder grows with each trial, ensemble and case.
+    """Run a plan; the document in the folder grows with each problem, ensemble and case.
 
     Args:
         folder: Of the results; results of other parts, methods and cases in it are kept.
@@ -180,11 +180,11 @@ def run_accuracy(folder: Path, plan: Plan, report: Report) -> Document:
     _record(folder, here, {})
     if "work-precision" in plan.parts:
         for links in plan.links:
-            for name in plan.trials:
-                _record(folder, here, _trial_rows(plan, name, links, report), _scipy_note(plan))
+            for name in plan.problems:
+                _record(folder, here, _problem_rows(plan, name, links, report), _scipy_note(plan))
     if "walks" in plan.parts:
         for links in plan.links:
-            _record(folder, here, {"walks": walk_costs(links, plan.contestants, plan.rounds, report)})
+            _record(folder, here, {"walks": walk_costs(links, plan.method_settings, plan.rounds, report)})
     if "hard-cases" in plan.parts:
         for case in HARD_CASES:
             for method in plan.methods if case.name in plan.cases else ():
@@ -202,8 +202,8 @@ def run_accuracy(folder: Path, plan: Plan, report: Report) -> Document:
                 **asdict(ensemble),
             }
             references = (LOOSE, TIGHT) if plan.tight else (LOOSE,)
-            for contestant in dict.fromkeys((*references, *plan.contestants)):
-                run_ensemble(folder / "ensembles", ensemble, contestant, report)
+            for method_setting in dict.fromkeys((*references, *plan.method_settings)):
+                run_ensemble(folder / "ensembles", ensemble, method_setting, report)
                 row = about | {"methods": summary(folder / "ensembles", ensemble)}
                 _record(folder, on, {"ensembles": [row]})
     return load_document(folder)
@@ -256,17 +256,17 @@ def _record(folder: Path, on: dict[str, str], tables: Mapping[str, Sequence[Row]
         part.write_text(json.dumps(_plain(document), indent=1, allow_nan=False, ensure_ascii=False), encoding="utf-8")
 
 
-def _trial_rows(plan: Plan, name: str, links: int, report: Report) -> dict[str, list[Row]]:
-    """Run a trial with all methods: the row of its reference and those of its points."""
+def _problem_rows(plan: Plan, name: str, links: int, report: Report) -> dict[str, list[Row]]:
+    """Run a problem with all methods: the row of its reference and those of its points."""
     report(f"{name}, {links} links: reference")
-    trial = make_trial(name, links)
-    true = make_reference(trial)
-    found = points(trial, true, plan.methods, plan.tolerances, plan.rounds, report)
+    problem = make_problem(name, links)
+    true = make_reference(problem)
+    found = points(problem, true, plan.methods, plan.tolerances, plan.rounds, report)
     if plan.scipy and find_spec("scipy") is not None:
-        from warpchain.bench.trials.scipy_solvers import scipy_points
+        from warpchain.bench.problems.scipy_solvers import scipy_points
 
-        found += scipy_points(trial, true, [x for x in plan.tolerances if x in SCIPY_TOLERANCES], report)
-    row = {"trial": name, "links": links, "duration": trial.duration, "starts": len(trial.starts)}
+        found += scipy_points(problem, true, [x for x in plan.tolerances if x in SCIPY_TOLERANCES], report)
+    row = {"problem": name, "links": links, "duration": problem.duration, "starts": len(problem.starts)}
     return {"references": [row | _error_columns(true.trust)], "points": [asdict(point) for point in found]}
 
 
@@ -282,7 +282,7 @@ def _error_columns(errors: Errors) -> dict[str, float]:
 
 def _outcome(case: Any, method: str) -> Any:
     """What a method makes of a hard case; one that refuses it says so in its own words."""
-    from warpchain.bench.trials.hard_cases import Outcome
+    from warpchain.bench.problems.hard_cases import Outcome
 
     try:
         return case.subject.run(method)
@@ -296,7 +296,7 @@ def _scipy_note(plan: Plan) -> str:
         return "SciPy's solvers were left out on demand."
     if find_spec("scipy") is None:
         return "SciPy is not installed, so its solvers are missing: pip install 'warpchain[scipy]'."
-    from warpchain.bench.trials.scipy_solvers import PATIENCE
+    from warpchain.bench.problems.scipy_solvers import PATIENCE
 
     return (
         f"SciPy's solvers run on the NumPy model, once each, {PATIENCE:g} s at most: what took longer is missing. "

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from warpchain.bench.accuracy.ensembles import ledger_errors, release_frequency
-from warpchain.bench.accuracy.method_settings import LOOSE, Contestant
+from warpchain.bench.accuracy.method_settings import LOOSE, MethodSetting
 from warpchain.inputs.setup import Setup
 from warpchain.run.single_walk import run_walk, setup_walk
 from warpchain.status import Status
@@ -22,24 +22,24 @@ PRESET: Final = "paper"
 
 
 def walk_costs(
-    links: int, contestants: Sequence[Contestant], walks: int, report: Callable[[str], None]
+    links: int, method_settings: Sequence[MethodSetting], walks: int, report: Callable[[str], None]
 ) -> list[dict[str, Any]]:
     """Time some walks with each method.
 
     Args:
         links: n.
-        contestants: How they are computed; the reference is timed beside them in any case.
+        method_settings: How they are computed; the reference is timed beside them in any case.
         walks: Of each; walk k is drawn with the seed k.
         report: Called with a line of progress.
 
     Returns:
-        A row for each contestant, the reference first; what is medians or means of no walk is NaN.
+        A row for each method_setting, the reference first; what is medians or means of no walk is NaN.
     """
-    every = list(dict.fromkeys((LOOSE, *contestants)))
+    every = list(dict.fromkeys((LOOSE, *method_settings)))
     report(f"walks of {links} links: compiling")
     compile_kernels([_setup(links, one, 0) for one in every])
-    seconds: dict[Contestant, list[float]] = {one: [] for one in every}
-    ends: dict[Contestant, list[Any]] = {one: [] for one in every}
+    seconds: dict[MethodSetting, list[float]] = {one: [] for one in every}
+    ends: dict[MethodSetting, list[Any]] = {one: [] for one in every}
     for number in range(walks):
         for one in every:
             report(f"walks of {links} links: {number + 1} of {walks}, {one.title}")
@@ -66,7 +66,7 @@ def walk_costs(
                 "at_rest": len(at_rest),
                 "seconds": _median([cost for _, cost in at_rest]),
                 "each": [cost for _, cost in at_rest],
-                "tries": _median([end.steps_accepted + end.steps_rejected for end, _ in at_rest]),
+                "attempts": _median([end.steps_accepted + end.steps_rejected for end, _ in at_rest]),
                 "walk_time": _median([end.walk_time for end, _ in at_rest]),
                 **ledger_errors(errors),
             }
@@ -76,9 +76,9 @@ def walk_costs(
     return rows
 
 
-def _setup(links: int, contestant: Contestant, seed: int) -> Setup:
+def _setup(links: int, method_setting: MethodSetting, seed: int) -> Setup:
     scene = {"links": links, "frequency": release_frequency(links), "start": "ellipse"}
-    return setup_walk(PRESET, {**scene, **contestant.options}, seed)
+    return setup_walk(PRESET, {**scene, **method_setting.options}, seed)
 
 
 def _ledger_error(walk: Any) -> float:

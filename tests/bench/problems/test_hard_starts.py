@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import warpchain
 from tests.support.hard_runs import assert_sound, every_method, simulate
 from warpchain import Status
-from warpchain.bench.trials.hard_starts import PAPER, SOFT, dropped, folded, overlapping, pulled_apart
+from warpchain.bench.problems.hard_starts import PAPER, SOFT, dropped, folded, overlapping, pulled_apart
 from warpchain.oracle import contact_equations, motion_equations
 
 

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.bench.trials.hard_starts import (
+from warpchain.bench.problems.hard_starts import (
     ELASTIC,
     PAPER,
     SOFT,
@@ -40,7 +40,7 @@ from warpchain.walks.scheduler import compile_kernels
 Array = NDArray[np.float64]
 
 STEP_LIMIT: Final = 20_000_000
-"""Tries after which a case counts as hanging."""
+"""Attempts after which a case counts as hanging."""
 LIMITS: Final = {"step_limit": STEP_LIMIT, "tolerance": 1e-6, "flight_tolerance": 1e-4}
 """Of every case that says nothing else; the energy error of `hybrid` follows the tolerance of its flights, too."""
 
@@ -63,7 +63,7 @@ class Outcome:
         result: What came out, for people.
         seconds: Processor time [s], compilation apart.
         simulated: Simulated time [s].
-        tries: Steps tried.
+        attempts: Steps tried.
         energy_error: What the energy ledger leaves open, as a fraction of the energy; NaN if there is no ledger.
         sound: Whether status and result are such as the case may have.
     """
@@ -72,7 +72,7 @@ class Outcome:
     result: str
     seconds: float
     simulated: float
-    tries: int
+    attempts: int
     energy_error: float
     sound: bool
 
@@ -104,7 +104,7 @@ class Flight:
             result=f"{flight.impulses['floor']} floor and {flight.impulses['self']} self-impulses",
             seconds=seconds,
             simulated=float(flight.time[-1]),
-            tries=flight.steps_accepted + flight.steps_rejected,
+            attempts=flight.steps_accepted + flight.steps_rejected,
             energy_error=error,
             sound=flight.status in self.expected and finite and error < self.bound,
         )
@@ -135,7 +135,7 @@ class Walk:
             result=f"Δx = {walk.dx:.3f} m" if math.isfinite(walk.dx) else f"moving after {walk.walk_time:.3g} s",
             seconds=seconds,
             simulated=walk.simulated_time,
-            tries=walk.steps_accepted + walk.steps_rejected,
+            attempts=walk.steps_accepted + walk.steps_rejected,
             energy_error=error,
             sound=walk.status == self.expected and within and error < self.bound,
         )
@@ -152,14 +152,14 @@ class Order:
         start = dropped(links=6, fall=0.0, gap=0.02)
         energy = motion_equations.total_energy(*start, ELASTIC)
         settings: dict[str, Any] = {"method": method, "tolerance": 0.1, "skin": 3.0, "step_limit": STEP_LIMIT}
-        drifts, statuses, tries, seconds = [], [], 0, 0.0
+        drifts, statuses, attempts, seconds = [], [], 0, 0.0
         simulate(ELASTIC, *start, 0.0, times=[0.0], **settings)
         for step in self.steps:
             began = time.process_time()
             # a skin beyond the height of the fall makes contact_step, not the loose tolerance, set the step
             flight = simulate(ELASTIC, *start, 0.3, times=[0.3], contact_step=step, **settings)
             seconds += time.process_time() - began
-            tries += flight.steps_accepted + flight.steps_rejected
+            attempts += flight.steps_accepted + flight.steps_rejected
             statuses.append(flight.status)
             end = motion_equations.total_energy(flight.position[-1], flight.velocity[-1], ELASTIC)
             drifts.append(abs(energy - end) / energy)
@@ -173,7 +173,7 @@ class Order:
             result=f"drift of the energy ∝ h^{power:.1f}" if seen and power == power else "too few steps for a slope",
             seconds=seconds,
             simulated=0.3 * len(self.steps),
-            tries=tries,
+            attempts=attempts,
             energy_error=drifts[-1],
             sound=finished and drifts[-1] < 1e-2 and (len(seen) < 2 or power > 2),
         )
@@ -197,7 +197,7 @@ class Refusals:
             result=f"{named} of {len(IMPOSSIBLE)} refused, naming the field",
             seconds=time.process_time() - began,
             simulated=0.0,
-            tries=0,
+            attempts=0,
             energy_error=math.nan,
             sound=named == len(IMPOSSIBLE),
         )
@@ -214,7 +214,7 @@ class OneBroken:
         """The broken one gets its status, the others the same bits as without it."""
         broken = self.worlds // 2
         whole, _, _ = self._ends(method, None)
-        ends, statuses, (seconds, tries) = self._ends(method, broken)
+        ends, statuses, (seconds, attempts) = self._ends(method, broken)
         others = [world for world in range(self.worlds) if world != broken]
         same = sum(bool(np.array_equal(whole[world], ends[world])) for world in others)
         finished = all(statuses[world] == Status.FINISHED for world in others)
@@ -223,13 +223,13 @@ class OneBroken:
             result=f"{same} of {len(others)} others unchanged to the bit",
             seconds=seconds,
             simulated=self.duration * self.worlds,
-            tries=tries,
+            attempts=attempts,
             energy_error=math.nan,
             sound=finished and same == len(others) and not statuses[broken].ok,
         )
 
     def _ends(self, method: str, broken: int | None) -> tuple[list[Array], list[Status], tuple[float, int]]:
-        """State (2n, 3) and status of every chain, and what it cost: seconds and tries."""
+        """State (2n, 3) and status of every chain, and what it cost: seconds and attempts."""
         options = validated(Options, {"method": method, "step_limit": 1_000_000}, "options")
         batch = Batch(self.worlds, 8, options)
         for world in range(self.worlds):
@@ -243,9 +243,9 @@ class OneBroken:
         began = time.process_time()
         batch.run(range(self.worlds), features)
         seconds = time.process_time() - began
-        tries = sum(batch.tries(world) for world in range(self.worlds))
+        attempts = sum(batch.attempts(world) for world in range(self.worlds))
         ends = [np.concatenate([batch.position(world), batch.velocity(world)]) for world in range(self.worlds)]
-        return ends, [batch.status(world) for world in range(self.worlds)], (seconds, tries)
+        return ends, [batch.status(world) for world in range(self.worlds)], (seconds, attempts)
 
 
 @dataclass(frozen=True)

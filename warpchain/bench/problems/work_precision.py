@@ -31,8 +31,8 @@ Array = NDArray[np.float64]
 State = tuple[Array, Array]
 """Position (n, 3) and velocity (n, 3) of a chain."""
 
-TrialName = Literal["flight", "impact", "sprocket"]
-TRIALS: Final[tuple[str, ...]] = get_args(TrialName)
+ProblemName = Literal["flight", "impact", "sprocket"]
+PROBLEMS: Final[tuple[str, ...]] = get_args(ProblemName)
 TOLERANCES: Final = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 
 FLIGHT_TIME: Final = 0.05
@@ -50,11 +50,11 @@ ENOUGH_SECONDS: Final = 2.0
 
 
 @dataclass(frozen=True)
-class Trial:
+class Problem:
     """Something short that every method has to do.
 
     Attributes:
-        name: One of `TRIALS`.
+        name: One of `PROBLEMS`.
         links: n.
         parameters: Of the chain.
         starts: States that it begins in; each is run by itself.
@@ -93,12 +93,12 @@ class Trial:
 
 @dataclass(frozen=True)
 class Errors:
-    """Distance of the ends of a trial from those of its reference.
+    """Distance of the ends of a problem from those of its reference.
 
     Attributes:
         position: Greatest over links and starts [m].
         velocity: Greatest over links and starts [m/s].
-        momentum: See `Trial.momenta`: rms over the starts relative to the rms of the reference; NaN for a flight.
+        momentum: See `Problem.momenta`: rms over the starts relative to the rms of the reference; NaN for a flight.
         bias: Mean of the last component of the momenta less the reference's, relative to the latter; NaN for a flight.
     """
 
@@ -110,16 +110,16 @@ class Errors:
 
 @dataclass(frozen=True)
 class Reference:
-    """What the errors of a trial are measured against.
+    """What the errors of a problem are measured against.
 
     Attributes:
-        trial: Name of the trial.
+        problem: Name of the problem.
         links: n.
         ends: State at the end of each start.
         trust: How far another method at 1e-11 is from it.
     """
 
-    trial: str
+    problem: str
     links: int
     ends: tuple[State, ...]
     trust: Errors
@@ -130,7 +130,7 @@ class Point:
     """One point of a work–precision diagram.
 
     Attributes:
-        trial: One of `TRIALS`.
+        problem: One of `PROBLEMS`.
         links: n.
         method: A method of the engine, or one of SciPy on the NumPy model.
         tolerance: Asked for.
@@ -147,7 +147,7 @@ class Point:
         rejected: Rejected steps in it; None if the solver does not tell.
     """
 
-    trial: str
+    problem: str
     links: int
     method: str
     tolerance: float
@@ -168,8 +168,8 @@ def methods() -> tuple[str, ...]:
     return tuple(get_args(Options.model_fields["method"].annotation))
 
 
-def make_trial(name: str, links: int) -> Trial:
-    """Set a trial up, at Table 1's values.
+def make_problem(name: str, links: int) -> Problem:
+    """Set a problem up, at Table 1's values.
 
     Every start has been carried on for a while by ``rkf78``, so that the joints bear their loads when it begins.
 
@@ -182,14 +182,14 @@ def make_trial(name: str, links: int) -> Trial:
         check_scene(scene, parameters)
         radius, turning = joint_radius(scene, parameters), 2 * math.pi * FREQUENCY
         laid = lay_chain(stadium(radius), links, parameters.link_length, turning * radius)
-        trial = Trial(name, links, parameters, (laid,), 1 / FREQUENCY, "sprocket", -turning)
-        end, _ = _run(trial, laid, "rkf78", 1e-9)
-        return Trial(name, links, parameters, (end,), trial.duration, "sprocket", -turning)
+        problem = Problem(name, links, parameters, (laid,), 1 / FREQUENCY, "sprocket", -turning)
+        end, _ = _run(problem, laid, "rkf78", 1e-9)
+        return Problem(name, links, parameters, (end,), problem.duration, "sprocket", -turning)
     count = IMPACTS if name == "impact" else 1
     starts = []
     for number in range(count):
         laid = lay_chain(ellipse(1.5), links, parameters.link_length, speed=5.0, phase=number / count / links)
-        free = Trial("flight", links, parameters, (laid,), 2e-3, "none")
+        free = Problem("flight", links, parameters, (laid,), 2e-3, "none")
         (position, velocity), _ = _run(free, laid, "rkf78", 1e-9)
         drift = (
             motion_equations.linear_momentum(velocity, parameters)
@@ -200,26 +200,26 @@ def make_trial(name: str, links: int) -> Trial:
         position[:, 1] -= ends[:, 1].min() - parameters.circle_radius - 5e-4
         starts.append((position, velocity))
     if name == "impact":
-        return Trial(name, links, parameters, tuple(starts), IMPACT_TIME, "floor")
-    return Trial(name, links, parameters, tuple(starts), FLIGHT_TIME, "none")
+        return Problem(name, links, parameters, tuple(starts), IMPACT_TIME, "floor")
+    return Problem(name, links, parameters, tuple(starts), FLIGHT_TIME, "none")
 
 
-def make_reference(trial: Trial) -> Reference:
-    """Run the reference of a trial, and another method to tell how far it can be trusted."""
+def make_reference(problem: Problem) -> Reference:
+    """Run the reference of a problem, and another method to tell how far it can be trusted."""
     ends, others = (
-        tuple(_run(trial, start, method, tolerance, contact_step=step)[0] for start in trial.starts)
+        tuple(_run(problem, start, method, tolerance, contact_step=step)[0] for start in problem.starts)
         for method, tolerance, step in (("rkf78", 1e-12, CONTACT_STEP), ("dp5", 1e-11, 2 * CONTACT_STEP))
     )
-    return Reference(trial.name, trial.links, ends, errors(trial, others, ends))
+    return Reference(problem.name, problem.links, ends, errors(problem, others, ends))
 
 
-def errors(trial: Trial, ends: Sequence[State], true: Sequence[State]) -> Errors:
-    """Compare the ends of a trial with true ones."""
+def errors(problem: Problem, ends: Sequence[State], true: Sequence[State]) -> Errors:
+    """Compare the ends of a problem with true ones."""
     position, velocity = (
         max(float(np.linalg.norm((end[k] - aim[k])[:, :2], axis=1).max()) for end, aim in zip(ends, true, strict=True))
         for k in (0, 1)
     )
-    momenta, aims = trial.momenta(ends), trial.momenta(true)
+    momenta, aims = problem.momenta(ends), problem.momenta(true)
     if momenta is None or aims is None:
         return Errors(position, velocity, math.nan, math.nan)
     relative = math.sqrt(float(((momenta - aims) ** 2).sum() / (aims**2).sum()))
@@ -227,17 +227,17 @@ def errors(trial: Trial, ends: Sequence[State], true: Sequence[State]) -> Errors
 
 
 def points(
-    trial: Trial,
+    problem: Problem,
     true: Reference,
     chosen: Sequence[str],
     tolerances: Sequence[float],
     rounds: int,
     report: Callable[[str], None],
 ) -> list[Point]:
-    """Run a trial with each method at each tolerance, the methods taking turns in several rounds.
+    """Run a problem with each method at each tolerance, the methods taking turns in several rounds.
 
     Args:
-        trial: What is run.
+        problem: What is run.
         true: Its reference.
         chosen: Methods.
         tolerances: Of each.
@@ -252,11 +252,13 @@ def points(
                 key = method, tolerance
                 if sum(seconds.get(key, [])) > ENOUGH_SECONDS:
                     continue
-                report(f"{trial.name}, {trial.links} links: round {turn + 1} of {rounds}, {method} at {tolerance:g}")
-                runs = [_run(trial, start, method, tolerance) for start in trial.starts]
+                report(
+                    f"{problem.name}, {problem.links} links: round {turn + 1} of {rounds}, {method} at {tolerance:g}"
+                )
+                runs = [_run(problem, start, method, tolerance) for start in problem.starts]
                 seconds.setdefault(key, []).append(sum(cost["seconds"] for _, cost in runs))
                 if key not in found:
-                    found[key] = _point(trial, true, method, tolerance, runs)
+                    found[key] = _point(problem, true, method, tolerance, runs)
     return [Point(**{**vars(point), "seconds": statistics.median(seconds[key])}) for key, point in found.items()]
 
 
@@ -265,29 +267,29 @@ def evaluations(method: str, accepted: int, rejected: int, impulses: int) -> int
 
     Jacobians and solutions of linear systems are not counted.
 
-    A rejected step leaves its first stage to the next try. So does an accepted one to the next step if the method
+    A rejected step leaves its first stage to the next attempt. So does an accepted one to the next step if the method
     is so made, unless an impulse came between: then at most one more for each impulse.
     """
     if method not in METHODS or METHODS[method].flight is not None:
         return None
-    stages, tries = METHODS[method].stages, accepted + rejected
+    stages, attempts = METHODS[method].stages, accepted + rejected
     if METHODS[method].reuses_last:
-        return tries * (stages - 1) + 1 + min(impulses, accepted)
-    return tries * (stages - 1) + accepted
+        return attempts * (stages - 1) + 1 + min(impulses, accepted)
+    return attempts * (stages - 1) + accepted
 
 
 def _point(
-    trial: Trial, true: Reference, method: str, tolerance: float, runs: Sequence[tuple[State, dict[str, Any]]]
+    problem: Problem, true: Reference, method: str, tolerance: float, runs: Sequence[tuple[State, dict[str, Any]]]
 ) -> Point:
     ends, costs = zip(*runs, strict=True)
     statuses = [cost["status"] for cost in costs]
     worst = next((status for status in statuses if not status.ok), Status.FINISHED)
-    found = errors(trial, ends, true.ends) if worst.ok else Errors(*[math.nan] * 4)
+    found = errors(problem, ends, true.ends) if worst.ok else Errors(*[math.nan] * 4)
     accepted, rejected = (sum(cost[name] for cost in costs) for name in ("accepted", "rejected"))
     impulses = sum(cost["impulses"] for cost in costs)
     return Point(
-        trial=trial.name,
-        links=trial.links,
+        problem=problem.name,
+        links=problem.links,
         method=method,
         tolerance=tolerance,
         status=worst.label,
@@ -295,7 +297,7 @@ def _point(
         velocity_error=found.velocity,
         momentum_error=found.momentum,
         momentum_bias=found.bias,
-        simulated=trial.duration * len(trial.starts),
+        simulated=problem.duration * len(problem.starts),
         seconds=math.nan,
         evaluations=evaluations(method, accepted, rejected, impulses),
         accepted=accepted,
@@ -303,15 +305,17 @@ def _point(
     )
 
 
-def _run(trial: Trial, start: State, method: str, tolerance: float, **settings: float) -> tuple[State, dict[str, Any]]:
-    """Carry one start of a trial to its end: the state there, and status, seconds and counts."""
+def _run(
+    problem: Problem, start: State, method: str, tolerance: float, **settings: float
+) -> tuple[State, dict[str, Any]]:
+    """Carry one start of a problem to its end: the state there, and status, seconds and counts."""
     given = {"method": method, "tolerance": tolerance, "flight_tolerance": tolerance, "self_contact": False, **settings}
-    batch = Batch(1, trial.links, validated(Options, given, "options"))
-    batch.set_chain(0, trial.parameters, trial.links)
-    batch.load(0, *start, stop_time=trial.duration, stop_status=Status.FINISHED)
-    batch.set_program(0, sprocket_speed=trial.sprocket_speed)
-    features = batch.features(fixed_body=trial.fixed_body, watch="none")
-    batch.compile(features, [trial.links])
+    batch = Batch(1, problem.links, validated(Options, given, "options"))
+    batch.set_chain(0, problem.parameters, problem.links)
+    batch.load(0, *start, stop_time=problem.duration, stop_status=Status.FINISHED)
+    batch.set_drive(0, sprocket_speed=problem.sprocket_speed)
+    features = batch.features(fixed_body=problem.fixed_body, watch="none")
+    batch.compile(features, [problem.links])
     began = time.process_time()
     batch.run([0], features)
     seconds = time.process_time() - began

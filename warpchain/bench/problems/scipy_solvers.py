@@ -1,4 +1,4 @@
-"""The trials of the work–precision diagrams by SciPy's solvers on the NumPy model, one core: flights and impacts.
+"""The problems of the work–precision diagrams by SciPy's solvers on the NumPy model, one core: flights and impacts.
 
 SciPy is an extra; nothing here is imported without it. Radau gets the pattern of the Jacobian, so that its finite
 differences and its factorisation are sparse.
@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.bench.trials.work_precision import Errors, Point, Reference, State, Trial, errors
+from warpchain.bench.problems.work_precision import Errors, Point, Problem, Reference, State, errors
 from warpchain.inputs.options import Options
 from warpchain.oracle import contact_equations, motion_equations
 
@@ -28,30 +28,30 @@ class _OutOfPatienceError(Exception):
     """A run has taken longer than `PATIENCE`."""
 
 
-def solvers_for(trial: Trial) -> tuple[str, ...]:
-    """Solvers that can do a trial: an impulse ends Radau's large steps, and a turn has 100,000 contacts in Python."""
-    return {"flight": SOLVERS, "impact": SOLVERS[:1]}.get(trial.name, ())
+def solvers_for(problem: Problem) -> tuple[str, ...]:
+    """Solvers that can do a problem: an impulse ends Radau's large steps, and a turn has 100,000 contacts in Python."""
+    return {"flight": SOLVERS, "impact": SOLVERS[:1]}.get(problem.name, ())
 
 
 def scipy_points(
-    trial: Trial, true: Reference, tolerances: Sequence[float], report: Callable[[str], None]
+    problem: Problem, true: Reference, tolerances: Sequence[float], report: Callable[[str], None]
 ) -> list[Point]:
-    """Run a trial with SciPy's solvers, each once; what takes longer than `PATIENCE` has the status `GAVE_UP`."""
+    """Run a problem with SciPy's solvers, each once; what takes longer than `PATIENCE` has the status `GAVE_UP`."""
     found = []
-    for solver in solvers_for(trial):
+    for solver in solvers_for(problem):
         for tolerance in tolerances:
-            report(f"{trial.name}, {trial.links} links: SciPy's {solver} at {tolerance:g}")
+            report(f"{problem.name}, {problem.links} links: SciPy's {solver} at {tolerance:g}")
             began = time.process_time()
             counts = {"evaluations": 0, "steps": 0}
             try:
-                ends = [_run(trial, start, solver, tolerance, began + PATIENCE, counts) for start in trial.starts]
-                status, error = "finished", errors(trial, ends, true.ends)
+                ends = [_run(problem, start, solver, tolerance, began + PATIENCE, counts) for start in problem.starts]
+                status, error = "finished", errors(problem, ends, true.ends)
             except _OutOfPatienceError:
                 status, error = GAVE_UP, Errors(*[math.nan] * 4)
             found.append(
                 Point(
-                    trial=trial.name,
-                    links=trial.links,
+                    problem=problem.name,
+                    links=problem.links,
                     method=f"{solver} (SciPy)",
                     tolerance=tolerance,
                     status=status,
@@ -59,7 +59,7 @@ def scipy_points(
                     velocity_error=error.velocity,
                     momentum_error=error.momentum,
                     momentum_bias=error.bias,
-                    simulated=trial.duration * len(trial.starts),
+                    simulated=problem.duration * len(problem.starts),
                     seconds=time.process_time() - began,
                     evaluations=counts["evaluations"],
                     accepted=counts["steps"],
@@ -69,7 +69,9 @@ def scipy_points(
     return found
 
 
-def _run(trial: Trial, start: State, solver: str, tolerance: float, deadline: float, counts: dict[str, int]) -> State:
+def _run(
+    problem: Problem, start: State, solver: str, tolerance: float, deadline: float, counts: dict[str, int]
+) -> State:
     """Carry one start to its end, floor contacts after each step.
 
     Raises:
@@ -78,33 +80,35 @@ def _run(trial: Trial, start: State, solver: str, tolerance: float, deadline: fl
     """
     import scipy.integrate
 
-    n = trial.links
+    n = problem.links
 
     def derivative(_: float, state: Array) -> Array:
         counts["evaluations"] += 1
         if time.process_time() > deadline:
             raise _OutOfPatienceError
         x, v = state.reshape(2, n, 3)
-        rates: Array = np.concatenate([v, motion_equations.acceleration(x, v, trial.parameters)]).ravel()
+        rates: Array = np.concatenate([v, motion_equations.acceleration(x, v, problem.parameters)]).ravel()
         return rates
 
     make = getattr(scipy.integrate, solver)
     settings: dict[str, Any] = {"rtol": tolerance, "atol": tolerance}
-    if trial.fixed_body == "floor":
+    if problem.fixed_body == "floor":
         settings["max_step"] = Options().contact_step
     if solver == "Radau":
         settings["jac_sparsity"] = _pattern(n)
     now, state, first = 0.0, np.concatenate(start).ravel(), 1e-7
-    while now < trial.duration:
-        stepper = make(derivative, now, state, trial.duration, first_step=min(first, trial.duration - now), **settings)
+    while now < problem.duration:
+        stepper = make(
+            derivative, now, state, problem.duration, first_step=min(first, problem.duration - now), **settings
+        )
         while stepper.status == "running":
             message = stepper.step()
             if stepper.status == "failed":
                 raise RuntimeError(f"SciPy's {solver} failed at {stepper.t} s: {message}")
             counts["steps"] += 1
-            if trial.fixed_body == "floor":
+            if problem.fixed_body == "floor":
                 position, velocity = stepper.y.reshape(2, n, 3)
-                after = _after_contacts(trial, position, velocity)
+                after = _after_contacts(problem, position, velocity)
                 if after is not None:
                     now, state, first = stepper.t, np.concatenate([position, after]).ravel(), stepper.step_size
                     break
@@ -114,12 +118,12 @@ def _run(trial: Trial, start: State, solver: str, tolerance: float, deadline: fl
     return position, velocity
 
 
-def _after_contacts(trial: Trial, position: Array, velocity: Array) -> Array | None:
+def _after_contacts(problem: Problem, position: Array, velocity: Array) -> Array | None:
     """Velocity (n, 3) after the impulses of the floor; None if there were none."""
-    ends = np.concatenate(motion_equations.link_ends(position, trial.parameters))
-    if ends[:, 1].min() > trial.parameters.circle_radius:
+    ends = np.concatenate(motion_equations.link_ends(position, problem.parameters))
+    if ends[:, 1].min() > problem.parameters.circle_radius:
         return None
-    after, hits = contact_equations.resolve_contacts(position, velocity, trial.parameters, self_contact=False)
+    after, hits = contact_equations.resolve_contacts(position, velocity, problem.parameters, self_contact=False)
     return after if hits["floor"] else None
 
 

@@ -35,7 +35,7 @@ FIELDS: Final[Mapping[str, Stored]] = {
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class KeptWalk:
+class WalkMotion:
     """The motion of one walk of a sweep: t instants and f frames of a chain of n links.
 
     Time counts from the release, x from wherever the release put it, y from the floor upwards. A walk that was never
@@ -72,7 +72,7 @@ class KeptWalk:
     def __repr__(self) -> str:
         """One line."""
         counts = f"{len(self.time)} instants, {len(self.frame_time)} frames"
-        return f"<KeptWalk {self.index} {self.status.label}: dx {self.dx:.4g} m, {counts}>"
+        return f"<WalkMotion {self.index} {self.status.label}: dx {self.dx:.4g} m, {counts}>"
 
     def unit(self, name: str) -> str:
         """SI unit of an array.
@@ -104,7 +104,7 @@ class KeptWalk:
 
 
 @dataclass(frozen=True)
-class KeptMotions:
+class MotionReader:
     """Where the motions of a sweep are.
 
     Attributes:
@@ -120,7 +120,7 @@ class KeptMotions:
         """The sweep itself, planned."""
         return load_sweep(self.manifest.sweep)
 
-    def walk(self, index: int, row: Mapping[str, Any]) -> KeptWalk:
+    def walk(self, index: int, row: Mapping[str, Any]) -> WalkMotion:
         """A walk whose motion is kept.
 
         Args:
@@ -134,7 +134,7 @@ class KeptMotions:
         motion: Motion = read_motions(self.directory, self.manifest, range(index, index + 1))[index]
         setup = self.sweep.planned(index).setup
         has_sprocket = not math.isnan(motion.sprocket_height)
-        return KeptWalk(
+        return WalkMotion(
             index=index,
             status=Status(int(row["status"])),
             dx=float(row["dx"]),
@@ -150,8 +150,8 @@ class KeptMotions:
         )
 
 
-def kept_motions(directory: str | os.PathLike[str], manifest: Manifest) -> KeptMotions | None:
+def motion_reader(directory: str | os.PathLike[str], manifest: Manifest) -> MotionReader | None:
     """Where the motions of a sweep are; None if it keeps none."""
     if manifest.recording.series is None:
         return None
-    return KeptMotions(Path(directory).absolute(), manifest)
+    return MotionReader(Path(directory).absolute(), manifest)

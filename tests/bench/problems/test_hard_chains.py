@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 import warpchain
 from tests.support.hard_runs import assert_sound, every_method, simulate
 from warpchain import Status
-from warpchain.bench.trials.hard_starts import (
+from warpchain.bench.problems.hard_starts import (
     ELASTIC,
     PAPER,
     SOFT,
