@@ -29,21 +29,21 @@ STAGES = 38
 STAGE_ROWS = 5
 
 # The block form keeps the first 16 rows above and the following ones on a board that all threads of the block see; the
-# scratch block keeps rows from BOARD_LOST_SELF up to BOARD_NOTES between launches. Every row less leaves a
+# scratch block keeps rows from BOARD_LOST_SELF up to BOARD_VALUES between launches. Every row less leaves a
 # multiprocessor more cache for what does not fit into registers.
 BOARD_LOST_SELF, BOARD_LOST_FRICTION, BOARD_LOST_DAMPING, BOARD_LOST_FIXED = 16, 17, 18, 19
 BOARD_LISTED_X, BOARD_LISTED_Y = 20, 21
 # First stage of the next step: accelerations, then the two powers (see STAGES).
 BOARD_FIRST = 22
 # Numbers of the chain rather than of its links, in the first columns of one more row.
-BOARD_NOTES = 27
-NOTE_OPENING, NOTE_FIXED_DEPTH, NOTE_LAST_IMPULSE, NOTE_STOP_TIME, NOTE_NEXT_LOOK = 0, 1, 2, 3, 4
-NOTE_STIFFNESS, NOTE_DAMPING, NOTE_VISCOUS, NOTE_COULOMB, NOTE_INVERSE_SMOOTHING = 5, 6, 7, 8, 9
-NOTE_GRAVITY, NOTE_CIRCLE_RADIUS, NOTE_SPROCKET_RADIUS, NOTE_TANGENTIAL = 10, 11, 12, 13
-NOTE_FLOOR_RESTITUTION, NOTE_FLOOR_FRICTION, NOTE_SPROCKET_RESTITUTION, NOTE_SPROCKET_FRICTION = 14, 15, 16, 17
-NOTE_CHAIN_RESTITUTION, NOTE_CHAIN_FRICTION, NOTE_HALF_LENGTH = 18, 19, 20
-NOTE_DEADLINE, NOTE_CONTACT_STEP, NOTE_TOLERANCE, NOTE_CLOSING_TIME, NOTE_OTHER_STEP = 21, 22, 23, 24, 25
-NOTES = 26
+BOARD_VALUES = 27
+VALUE_OPENING, VALUE_FIXED_DEPTH, VALUE_LAST_IMPULSE, VALUE_STOP_TIME, VALUE_NEXT_SAMPLE = 0, 1, 2, 3, 4
+VALUE_STIFFNESS, VALUE_DAMPING, VALUE_VISCOUS, VALUE_COULOMB, VALUE_INVERSE_SMOOTHING = 5, 6, 7, 8, 9
+VALUE_GRAVITY, VALUE_CIRCLE_RADIUS, VALUE_SPROCKET_RADIUS, VALUE_TANGENTIAL = 10, 11, 12, 13
+VALUE_FLOOR_RESTITUTION, VALUE_FLOOR_FRICTION, VALUE_SPROCKET_RESTITUTION, VALUE_SPROCKET_FRICTION = 14, 15, 16, 17
+VALUE_CHAIN_RESTITUTION, VALUE_CHAIN_FRICTION, VALUE_HALF_LENGTH = 18, 19, 20
+VALUE_DEADLINE, VALUE_CONTACT_STEP, VALUE_TOLERANCE = 21, 22, 23
+VALUES = 24
 BOARD_ROWS = 28
 
 # State.watch
@@ -101,7 +101,7 @@ def scratch_rows(stages: int) -> int:
 
 def board_size(threads: int) -> int:
     """Doubles of the board of a block of so many threads: a column for each, one more, and the last row's numbers."""
-    return BOARD_NOTES * (threads + 1) + max(threads + 1, NOTES)
+    return BOARD_VALUES * (threads + 1) + max(threads + 1, VALUES)
 
 
 def padded_width(link_count: int) -> int:

@@ -1,25 +1,23 @@
-"""How a run ended.
-
-Kernels hold these codes as plain integers, so the numbers are fixed: a code is never renumbered or reused,
-and a new one gets the next number.
-"""
+"""How a run ended: the codes of the kernels, each with a sentence."""
 
 from enum import IntEnum
 from typing import Final
+
+from warpchain.kernels import codes
 
 
 class Status(IntEnum):
     """What ended the run of one chain; the first error of a run is the one that stays."""
 
-    RUNNING = 0
-    AT_REST = 1
-    FINISHED = 2
-    TIME_LIMIT = 3
-    STEP_LIMIT = 4
-    STEP_TOO_SMALL = 5
-    NOT_FINITE = 6
-    NOT_STEADY = 7
-    LIST_OVERFLOW = 8
+    RUNNING = codes.RUNNING
+    AT_REST = codes.AT_REST
+    FINISHED = codes.FINISHED
+    TIME_LIMIT = codes.TIME_LIMIT
+    STEP_LIMIT = codes.STEP_LIMIT
+    STEP_TOO_SMALL = codes.STEP_TOO_SMALL
+    NOT_FINITE = codes.NOT_FINITE
+    NOT_STEADY = codes.NOT_STEADY
+    LIST_OVERFLOW = codes.LIST_OVERFLOW
 
     @property
     def label(self) -> str:

@@ -6,13 +6,15 @@ that is not accepted leaves no trace but the counter and a smaller step.
 """
 
 import functools
-from dataclasses import dataclass
 
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.contacts.approach import FLIGHT_SKIN, LEAST_SLACK, SMALLEST_GAP, fastest_fall, fastest_meeting
-from warpchain.kernels.cpu.contacts.fixed_body import (
+from warpchain.kernels.codes import LIST_OVERFLOW, NOT_FINITE, RUNNING, STEP_LIMIT, STEP_TOO_SMALL
+from warpchain.kernels.contacts.fixed_body import BOUNCE_PAUSE, sprocket_turning
+from warpchain.kernels.contacts.pair_list import list_layout
+from warpchain.kernels.cpu.contacts.neighbour_list import list_slack, neighbour_list
+from warpchain.kernels.cpu.contacts.proximity import (
     floor_gap,
     greatest_opening,
     greatest_speed,
@@ -20,14 +22,23 @@ from warpchain.kernels.cpu.contacts.fixed_body import (
     resolve_sprocket,
     sprocket_gap,
 )
-from warpchain.kernels.cpu.contacts.neighbour_list import list_layout, list_slack, neighbour_list
 from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
+from warpchain.kernels.cpu.contacts.time_to_contact import (
+    FLIGHT_SKIN,
+    LEAST_SLACK,
+    SMALLEST_GAP,
+    fastest_fall,
+    fastest_meeting,
+)
 from warpchain.kernels.cpu.explicit import place_ends
+from warpchain.kernels.cpu.functions import cpu_method, rigid_flight, scratch_rows
 from warpchain.kernels.cpu.implicit.joint_switch import QUIET_TIME
 from warpchain.kernels.events.present_chain import has_changed, present_chain
-from warpchain.kernels.events.record import record_is_full, sampling, write_sample
+from warpchain.kernels.events.record import record_is_full, write_sample
+from warpchain.kernels.events.sample import sampling
 from warpchain.kernels.events.softening import book_softening, contact_step, spring_tolerance
 from warpchain.kernels.events.summary import summarise
+from warpchain.kernels.features import COMPILER_FLAGS, Features
 from warpchain.kernels.layout import (
     ACCEPTED,
     BOUNCES,
@@ -55,51 +66,12 @@ from warpchain.kernels.layout import (
     STAGES,
     TIME,
 )
-from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, classical_controller
-from warpchain.kernels.methods.method import METHODS
-from warpchain.kernels.physics.elementary import HALF, ONE, TWO, ZERO
+from warpchain.kernels.methods.controller import LEAST_SHRINKAGE
+from warpchain.kernels.physics.elementary import HALF, ONE, ZERO
 from warpchain.kernels.physics.scaled_loads import lay_inertias
 from warpchain.kernels.types import Chain, Control, Drive, Model, Record, State
 
 wp.set_module_options({"enable_backward": False})
-
-COMPILER_FLAGS = (
-    "-march=native -ffp-contract=fast -mllvm=-inline-threshold=9000 -mllvm=-inline-cold-callsite-threshold=3000"
-)
-"""Clang flags of the step kernels. Fusing a product and a sum makes a stage 1.7 times faster."""
-
-# Codes shared with warpchain.status.
-RUNNING = wp.constant(0)
-STEP_LIMIT = wp.constant(4)
-STEP_TOO_SMALL = wp.constant(5)
-NOT_FINITE = wp.constant(6)
-LIST_OVERFLOW = wp.constant(8)
-
-BOUNCE_PAUSE = wp.constant(wp.float64(0.01))
-"""A floor impulse this long [s] after the one before it begins a new bounce."""
-
-
-@dataclass(frozen=True)
-class Features:
-    """What a kernel is compiled for; everything else is left out of it.
-
-    Attributes:
-        method: Key of :data:`METHODS`.
-        columns: Width of the scratch blocks, see :func:`layout.padded_width`.
-        fixed_body: ``"floor"``, ``"sprocket"`` or ``"none"``.
-        self_contact: Contacts between a chain's own links.
-        broad_phase: ``"grid"`` or ``"all_pairs"``; the latter exists to measure the former against.
-        watch: ``"rest"``, ``"steady"`` or ``"none"``: what ends the run before its stop time.
-        softens: The watch also changes the softness of the joints, see :mod:`events.softening`.
-    """
-
-    method: str
-    columns: int
-    fixed_body: str
-    self_contact: bool
-    broad_phase: str
-    watch: str
-    softens: bool = False
 
 
 @wp.func
@@ -163,17 +135,6 @@ def state_is_finite(K: wp.array2d(dtype=wp.float64), chain: Chain):
     return finite
 
 
-@wp.func
-def sprocket_turning(drive: Drive, world: int, time: wp.float64):
-    """Angular velocity [rad/s] of the sprocket: a smooth step 3s² − 2s³ from 0 to its final value."""
-    ramp = drive.spin_up_time[world]
-    since = time - drive.spin_up_start[world]
-    s = ONE
-    if ramp > ZERO and since < ramp:
-        s = wp.max(since, ZERO) / ramp
-    return drive.sprocket_speed[world] * s * s * (wp.float64(3.0) - TWO * s)
-
-
 @functools.cache
 def make_advance(features: Features):
     """Kernel ``advance(worlds, model, drive, state, record, scratch, lists, control)``, one thread per chain.
@@ -182,9 +143,9 @@ def make_advance(features: Features):
     rows, columns) float64, lists: (W, size) int32, see :mod:`layout` and :mod:`cpu.contacts.neighbour_list`; both
     belong to a world until its run ends.
     """
-    method = METHODS[features.method]
     columns = features.columns
-    rows = method.scratch_rows(columns)
+    rows = scratch_rows(features.method, columns)
+    method = cpu_method(features.method, columns)
     list_size = list_layout(columns).size
     list_count = list_layout(columns).count
     has_floor = features.fixed_body == "floor"
@@ -197,13 +158,15 @@ def make_advance(features: Features):
     is_driven = features.watch == "steady"
     look = sampling(features.watch, softens)
     present = present_chain(softens, is_driven)
-    first_stage, attempt, commit = method.functions(columns)
-    growth, shrinkage = method.controller(wp.float64)
+    first_stage, attempt, commit = method.first_stage, method.attempt, method.commit
+    growth, shrinkage = method.growth, method.shrinkage
     # on the sprocket impulses never pause
-    flight = None if has_sprocket else method.flight
+    flight = None if has_sprocket else rigid_flight(features.method, columns)
     has_flight = flight is not None
-    attempt_flight, commit_flight, close_joints, open_joints = flight.functions(columns) if flight else (None,) * 4
-    flight_growth, flight_shrinkage = classical_controller(flight.error_order) if flight else (None,) * 2
+    if flight is not None:
+        attempt_flight, commit_flight = flight.attempt, flight.commit
+        close_joints, open_joints = flight.close_joints, flight.open_joints
+        flight_growth, flight_shrinkage = flight.growth, flight.shrinkage
     build_by_grid, build_by_all_pairs = neighbour_list(columns)
     build_list = build_by_grid if features.broad_phase == "grid" else build_by_all_pairs
     resolve_self_contacts = self_contacts(columns)

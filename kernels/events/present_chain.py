@@ -4,9 +4,9 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.events.softening import softened
 from warpchain.kernels.physics.elementary import ONE
 from warpchain.kernels.physics.scaled_loads import under_load
+from warpchain.kernels.physics.softness import softened
 from warpchain.kernels.types import Chain, Control, Model, State, read_chain
 
 wp.set_module_options({"enable_backward": False})

@@ -1,12 +1,8 @@
 """What is looked at every sample interval: sums over a chain, the watches that end a phase, time series, frames."""
 
-import functools
-
 import warp as wp
 
-from warpchain.kernels.events.softening import watch_collapse, watch_drive, watch_stiffening
-from warpchain.kernels.events.steadiness import drag_rate, load_at, watch_steadiness
-from warpchain.kernels.events.summary import Summary, summarise
+from warpchain.kernels.events.summary import Summary
 from warpchain.kernels.layout import (
     CENTER_U,
     CENTER_V,
@@ -21,7 +17,6 @@ from warpchain.kernels.layout import (
     LOOP_SPEED,
     LOWEST,
     OMEGA,
-    REST_SINCE,
     RIGHT_X,
     RIGHT_Y,
     RMS_SPEED,
@@ -34,29 +29,9 @@ from warpchain.kernels.layout import (
 )
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.joint import friction_torque, joint_force
-from warpchain.kernels.physics.scaled_loads import drag_shape
-from warpchain.kernels.types import Chain, Control, Drive, Record, State
+from warpchain.kernels.types import Chain, Record, State
 
 wp.set_module_options({"enable_backward": False})
-
-
-# Codes shared with warpchain.status.
-RUNNING = wp.constant(0)
-AT_REST = wp.constant(1)
-
-
-@wp.func
-def watch_rest(state: State, control: Control, world: int, time: wp.float64, summary: Summary):
-    """Status: at rest once the centre's speed and the rms speed have both been low for the rest time."""
-    speed = wp.sqrt(summary.center_u * summary.center_u + summary.center_v * summary.center_v)
-    if wp.max(speed, summary.rms_speed) < control.rest_speed:
-        if state.watch[world, REST_SINCE] < ZERO:
-            state.watch[world, REST_SINCE] = time
-        if time - state.watch[world, REST_SINCE] >= control.rest_time:
-            return AT_REST
-    else:
-        state.watch[world, REST_SINCE] = wp.float64(-1.0)
-    return RUNNING
 
 
 @wp.func
@@ -128,54 +103,3 @@ def record_is_full(record: Record, world: int):
     samples_full = record.samples.shape[1] > 0 and record.sample_count[world] >= record.samples.shape[1]
     frames_full = record.frames.shape[1] > 0 and record.frame_count[world] >= record.frames.shape[1]
     return samples_full or frames_full
-
-
-@functools.cache
-def sampling(watch: str, softens: bool = False):
-    """Warp function ``look``, one sample of a placed chain: time series, frame and watch; returns the status.
-
-    Args:
-        watch: ``"rest"``, ``"steady"`` or ``"none"``.
-        softens: Whether the look may change the softness of the joints, see :mod:`events.softening`.
-
-    A look at a chain on its sprocket (``"steady"``) may also change its loads and the velocities of its links.
-    """
-    watches_rest = watch == "rest"
-    watches_steadiness = watch == "steady"
-
-    @wp.func
-    def look(
-        K: wp.array2d(dtype=wp.float64),
-        chain: Chain,
-        drive: Drive,
-        state: State,
-        record: Record,
-        control: Control,
-        world: int,
-        time: wp.float64,
-    ):
-        mark = state.next_sample[world]
-        last_time = state.last_sample[world, TIME]
-        is_first = last_time < ZERO
-        summary = summarise(K, chain)
-        write_sample(state, record, world, time, summary)
-        if mark % control.frame_every == wp.int64(0):
-            write_frame(record, K, chain, world, time)
-        passed = wp.int64(wp.floor(time / control.sample_interval))
-        state.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
-        if wp.static(softens and watches_rest):
-            watch_stiffening(state, drive, control, world, time)
-            watch_collapse(K, chain, state, control, world, time, is_first)
-        if wp.static(watches_rest):
-            return watch_rest(state, control, world, time, summary)
-        if wp.static(watches_steadiness):
-            if state.load_factor[world] > wp.float64(1.0):
-                rate = drag_rate(chain, state, drive, world, summary.height)
-                drag_shape(K, chain, wp.exp(-rate * (time - last_time)))
-            watch_steadiness(chain, state, drive, world, time, summary)
-            state.load_factor[world] = load_at(state, drive, world, time)
-        if wp.static(softens and watches_steadiness):
-            watch_drive(state, drive, control, world, time)
-        return RUNNING
-
-    return look

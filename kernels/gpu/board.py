@@ -2,14 +2,14 @@
 
 import warp as wp
 
-from warpchain.kernels.gpu.stage import Link, Place, link_on
+from warpchain.kernels.gpu.stage import Link, Place, read_link
 from warpchain.kernels.layout import (
     BOARD_FIRST,
     BOARD_LOST_DAMPING,
     BOARD_LOST_FIXED,
     BOARD_LOST_FRICTION,
     BOARD_LOST_SELF,
-    BOARD_NOTES,
+    BOARD_VALUES,
     COSINE,
     LEFT_X,
     LEFT_Y,
@@ -17,27 +17,27 @@ from warpchain.kernels.layout import (
     LOSS_FRICTION,
     LOSS_SELF,
     MASS,
-    NOTE_CHAIN_FRICTION,
-    NOTE_CHAIN_RESTITUTION,
-    NOTE_CIRCLE_RADIUS,
-    NOTE_COULOMB,
-    NOTE_DAMPING,
-    NOTE_FLOOR_FRICTION,
-    NOTE_FLOOR_RESTITUTION,
-    NOTE_GRAVITY,
-    NOTE_HALF_LENGTH,
-    NOTE_INVERSE_SMOOTHING,
-    NOTE_SPROCKET_FRICTION,
-    NOTE_SPROCKET_RADIUS,
-    NOTE_SPROCKET_RESTITUTION,
-    NOTE_STIFFNESS,
-    NOTE_TANGENTIAL,
-    NOTE_VISCOUS,
     OMEGA,
     RIGHT_X,
     RIGHT_Y,
     SINE,
     THETA,
+    VALUE_CHAIN_FRICTION,
+    VALUE_CHAIN_RESTITUTION,
+    VALUE_CIRCLE_RADIUS,
+    VALUE_COULOMB,
+    VALUE_DAMPING,
+    VALUE_FLOOR_FRICTION,
+    VALUE_FLOOR_RESTITUTION,
+    VALUE_GRAVITY,
+    VALUE_HALF_LENGTH,
+    VALUE_INVERSE_SMOOTHING,
+    VALUE_SPROCKET_FRICTION,
+    VALUE_SPROCKET_RADIUS,
+    VALUE_SPROCKET_RESTITUTION,
+    VALUE_STIFFNESS,
+    VALUE_TANGENTIAL,
+    VALUE_VISCOUS,
     U,
     V,
     X,
@@ -51,7 +51,7 @@ wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def take_place(chain: Chain, lane: int) -> Place:
+def place_of(chain: Chain, lane: int) -> Place:
     """Neighbours of a thread's link."""
     n = chain.link_count
     place = Place()
@@ -67,24 +67,24 @@ def take_place(chain: Chain, lane: int) -> Place:
 
 
 @wp.func
-def note_constants(K: wp.array2d(dtype=wp.float64), chain: Chain):
+def write_constants(K: wp.array2d(dtype=wp.float64), chain: Chain):
     """What stages and contacts need of a chain, onto the board."""
-    K[BOARD_NOTES, NOTE_HALF_LENGTH] = chain.half_length
-    K[BOARD_NOTES, NOTE_STIFFNESS] = chain.joint_stiffness
-    K[BOARD_NOTES, NOTE_DAMPING] = chain.joint_damping
-    K[BOARD_NOTES, NOTE_VISCOUS] = chain.viscous_friction
-    K[BOARD_NOTES, NOTE_COULOMB] = chain.coulomb_friction
-    K[BOARD_NOTES, NOTE_INVERSE_SMOOTHING] = chain.inverse_smoothing
-    K[BOARD_NOTES, NOTE_GRAVITY] = chain.gravity
-    K[BOARD_NOTES, NOTE_CIRCLE_RADIUS] = chain.circle_radius
-    K[BOARD_NOTES, NOTE_SPROCKET_RADIUS] = chain.sprocket_radius
-    K[BOARD_NOTES, NOTE_TANGENTIAL] = chain.tangential_restitution
-    K[BOARD_NOTES, NOTE_FLOOR_RESTITUTION] = chain.floor_restitution
-    K[BOARD_NOTES, NOTE_FLOOR_FRICTION] = chain.floor_friction
-    K[BOARD_NOTES, NOTE_SPROCKET_RESTITUTION] = chain.sprocket_restitution
-    K[BOARD_NOTES, NOTE_SPROCKET_FRICTION] = chain.sprocket_friction
-    K[BOARD_NOTES, NOTE_CHAIN_RESTITUTION] = chain.chain_restitution
-    K[BOARD_NOTES, NOTE_CHAIN_FRICTION] = chain.chain_friction
+    K[BOARD_VALUES, VALUE_HALF_LENGTH] = chain.half_length
+    K[BOARD_VALUES, VALUE_STIFFNESS] = chain.joint_stiffness
+    K[BOARD_VALUES, VALUE_DAMPING] = chain.joint_damping
+    K[BOARD_VALUES, VALUE_VISCOUS] = chain.viscous_friction
+    K[BOARD_VALUES, VALUE_COULOMB] = chain.coulomb_friction
+    K[BOARD_VALUES, VALUE_INVERSE_SMOOTHING] = chain.inverse_smoothing
+    K[BOARD_VALUES, VALUE_GRAVITY] = chain.gravity
+    K[BOARD_VALUES, VALUE_CIRCLE_RADIUS] = chain.circle_radius
+    K[BOARD_VALUES, VALUE_SPROCKET_RADIUS] = chain.sprocket_radius
+    K[BOARD_VALUES, VALUE_TANGENTIAL] = chain.tangential_restitution
+    K[BOARD_VALUES, VALUE_FLOOR_RESTITUTION] = chain.floor_restitution
+    K[BOARD_VALUES, VALUE_FLOOR_FRICTION] = chain.floor_friction
+    K[BOARD_VALUES, VALUE_SPROCKET_RESTITUTION] = chain.sprocket_restitution
+    K[BOARD_VALUES, VALUE_SPROCKET_FRICTION] = chain.sprocket_friction
+    K[BOARD_VALUES, VALUE_CHAIN_RESTITUTION] = chain.chain_restitution
+    K[BOARD_VALUES, VALUE_CHAIN_FRICTION] = chain.chain_friction
 
 
 @wp.func
@@ -92,15 +92,15 @@ def contact_constants(K: wp.array2d(dtype=wp.float64), n: int) -> Chain:
     """What contacts need of a chain, back from the board."""
     chain = Chain()
     chain.link_count = n
-    chain.circle_radius = K[BOARD_NOTES, NOTE_CIRCLE_RADIUS]
-    chain.sprocket_radius = K[BOARD_NOTES, NOTE_SPROCKET_RADIUS]
-    chain.tangential_restitution = K[BOARD_NOTES, NOTE_TANGENTIAL]
-    chain.floor_restitution = K[BOARD_NOTES, NOTE_FLOOR_RESTITUTION]
-    chain.floor_friction = K[BOARD_NOTES, NOTE_FLOOR_FRICTION]
-    chain.sprocket_restitution = K[BOARD_NOTES, NOTE_SPROCKET_RESTITUTION]
-    chain.sprocket_friction = K[BOARD_NOTES, NOTE_SPROCKET_FRICTION]
-    chain.chain_restitution = K[BOARD_NOTES, NOTE_CHAIN_RESTITUTION]
-    chain.chain_friction = K[BOARD_NOTES, NOTE_CHAIN_FRICTION]
+    chain.circle_radius = K[BOARD_VALUES, VALUE_CIRCLE_RADIUS]
+    chain.sprocket_radius = K[BOARD_VALUES, VALUE_SPROCKET_RADIUS]
+    chain.tangential_restitution = K[BOARD_VALUES, VALUE_TANGENTIAL]
+    chain.floor_restitution = K[BOARD_VALUES, VALUE_FLOOR_RESTITUTION]
+    chain.floor_friction = K[BOARD_VALUES, VALUE_FLOOR_FRICTION]
+    chain.sprocket_restitution = K[BOARD_VALUES, VALUE_SPROCKET_RESTITUTION]
+    chain.sprocket_friction = K[BOARD_VALUES, VALUE_SPROCKET_FRICTION]
+    chain.chain_restitution = K[BOARD_VALUES, VALUE_CHAIN_RESTITUTION]
+    chain.chain_friction = K[BOARD_VALUES, VALUE_CHAIN_FRICTION]
     return chain
 
 
@@ -172,7 +172,7 @@ def publish(K: wp.array2d(dtype=wp.float64), place: Place):
     lane = place.lane
     n = place.links
     if lane < n:
-        left_x, left_y, right_x, right_y = ends_of(link_on(K, lane))
+        left_x, left_y, right_x, right_y = ends_of(read_link(K, lane))
         K[LEFT_X, lane] = left_x
         K[LEFT_Y, lane] = left_y
         K[RIGHT_X, lane] = right_x

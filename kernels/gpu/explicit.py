@@ -11,15 +11,15 @@ from typing import Any
 import warp as wp
 
 from warpchain.kernels.gpu.stage import (
+    Attempt,
     Link,
     Place,
-    Trial,
     block_stage,
-    first_on,
     greater,
     greatest_position_error,
     greatest_velocity_error,
-    link_on,
+    read_first_stage,
+    read_link,
     vec3d,
     vec5d,
 )
@@ -44,18 +44,18 @@ class Ahead:
 
 
 @functools.cache
-def explicit_attempt(name: str, block_dim: int, survey: Any, surveyed: Any):
+def explicit_attempt(name: str, block_dim: int, write_proximity: Any, read_proximity: Any):
     """Warp function that attempts a step with a tableau in blocks of this size.
 
     Args:
         name: Key of :data:`TABLEAUS`.
         block_dim: Threads in a block.
-        survey: Warp function that notes what a link knows of the surroundings, see :mod:`gpu.contacts.proximity`.
-        surveyed: Warp function that says what all of them know.
+        write_proximity: Warp function that notes what a link knows of the proximity, see :mod:`gpu.contacts.proximity`.
+        read_proximity: Warp function that says what all of them know.
 
     Returns:
-        ``attempt(ends, forces, maxima, S, K, place, h, tolerance)`` → Trial, from the state and first stage on the
-        board; ``maxima`` is where ``survey`` notes, and neither the memory S nor the tolerance is needed.
+        ``attempt(ends, forces, maxima, S, K, place, h, tolerance)`` → Attempt, from the state and first stage on the
+        board; ``maxima`` is where ``write_proximity`` notes, and neither the memory S nor the tolerance is needed.
     """
     tableau = TABLEAUS[name]
     stages, last = tableau.stages, tableau.stages - 1
@@ -102,27 +102,25 @@ def explicit_attempt(name: str, block_dim: int, survey: Any, surveyed: Any):
         ends: wp.tile[vec5d, block_dim],
         forces: wp.tile[vec3d, block_dim],
         maxima: wp.uint64,
-        S: wp.uint64,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
         h: wp.float64,
-        tolerance: wp.float64,
     ):
         lane = place.lane
         ax = Stages()
         ay = Stages()
         at = Stages()
-        link = link_on(K, lane)
+        link = read_link(K, lane)
         inverse_mass = K[INVERSE_MASS, place.column]
         inverse_inertia = K[INVERSE_INERTIA, place.column]
-        first = first_on(K, lane)
+        first = read_first_stage(K, lane)
         ax[0] = first.x
         ay[0] = first.y
         at[0] = first.theta
-        trial = Trial()
+        result = Attempt()
         if wp.static(velocity_weights[0] != 0.0):
-            trial.friction = wp.static(wp.float64(velocity_weights[0])) * first.friction
-            trial.damping = wp.static(wp.float64(velocity_weights[0])) * first.damping
+            result.friction = wp.static(wp.float64(velocity_weights[0])) * first.friction
+            result.damping = wp.static(wp.float64(velocity_weights[0])) * first.damping
         row = wp.static(rows[1])(link, h, ax, ay, at)
         error = ZERO
         scale = ONE
@@ -162,42 +160,42 @@ def explicit_attempt(name: str, block_dim: int, survey: Any, surveyed: Any):
                         et += wp.static(wp.float64(position_errors[j])) * at[j]
                 theta = K[THETA, lane]
                 error, scale = greatest_position_error(link, theta, h, h * h * ex, h * h * ey, h * h * et)
-                trial.x = row.x
-                trial.y = row.y
-                trial.theta = theta + row.turn
-                trial.turns_far = wp.abs(row.turn) > LARGEST_TURN
-                new_cosine, new_sine = cos_sin(trial.theta)
-                trial.cosine = new_cosine
-                trial.sine = new_sine
+                result.x = row.x
+                result.y = row.y
+                result.theta = theta + row.turn
+                result.turns_far = wp.abs(row.turn) > LARGEST_TURN
+                new_cosine, new_sine = cos_sin(result.theta)
+                result.cosine = new_cosine
+                result.sine = new_sine
                 if wp.static(reuses_last):
-                    survey(K, maxima, place, there, next_end)
+                    write_proximity(K, maxima, place, there, next_end)
             rates = stage(forces, K, place, next_end, there, inverse_mass, inverse_inertia)
             if wp.static(s == last and reuses_last):
-                trial.around = surveyed(maxima)
+                result.proximity = read_proximity(maxima)
             ax[s] = rates.x
             ay[s] = rates.y
             at[s] = rates.theta
             if wp.static(velocity_weights[s] != 0.0):
-                trial.friction += wp.static(wp.float64(velocity_weights[s])) * rates.friction
-                trial.damping += wp.static(wp.float64(velocity_weights[s])) * rates.damping
+                result.friction += wp.static(wp.float64(velocity_weights[s])) * rates.friction
+                result.damping += wp.static(wp.float64(velocity_weights[s])) * rates.damping
             if wp.static(s == last):
-                trial.last = rates
-        link = link_on(K, lane)  # read again: meanwhile its registers were free
+                result.last = rates
+        link = read_link(K, lane)  # read again: meanwhile its registers were free
         if wp.static(not reuses_last and velocity_weights[last] != 0.0):
-            row.u += wp.static(wp.float64(velocity_weights[last])) * trial.last.x
-            row.v += wp.static(wp.float64(velocity_weights[last])) * trial.last.y
-            row.omega += wp.static(wp.float64(velocity_weights[last])) * trial.last.theta
-        trial.u = link.u + h * row.u
-        trial.v = link.v + h * row.v
-        trial.omega = link.omega + h * row.omega
+            row.u += wp.static(wp.float64(velocity_weights[last])) * result.last.x
+            row.v += wp.static(wp.float64(velocity_weights[last])) * result.last.y
+            row.omega += wp.static(wp.float64(velocity_weights[last])) * result.last.theta
+        result.u = link.u + h * row.u
+        result.v = link.v + h * row.v
+        result.omega = link.omega + h * row.omega
         if wp.static(velocity_errors[last] != 0.0):
-            eu += wp.static(wp.float64(velocity_errors[last])) * trial.last.x
-            ev += wp.static(wp.float64(velocity_errors[last])) * trial.last.y
-            ew += wp.static(wp.float64(velocity_errors[last])) * trial.last.theta
-        error_v, scale_v = greatest_velocity_error(link, first_on(K, lane), h, h * eu, h * ev, h * ew)
+            eu += wp.static(wp.float64(velocity_errors[last])) * result.last.x
+            ev += wp.static(wp.float64(velocity_errors[last])) * result.last.y
+            ew += wp.static(wp.float64(velocity_errors[last])) * result.last.theta
+        error_v, scale_v = greatest_velocity_error(link, read_first_stage(K, lane), h, h * eu, h * ev, h * ew)
         error, scale = greater(error, scale, error_v, scale_v)
-        trial.error = error
-        trial.scale = scale
-        return trial
+        result.error = error
+        result.scale = scale
+        return result
 
     return attempt

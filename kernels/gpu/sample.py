@@ -4,20 +4,20 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.cpu.loop import Features
 from warpchain.kernels.events.present_chain import has_changed, present_chain
-from warpchain.kernels.events.record import sampling
+from warpchain.kernels.events.sample import sampling
 from warpchain.kernels.events.softening import book_softening, contact_step, spring_tolerance
-from warpchain.kernels.gpu.board import note_constants
+from warpchain.kernels.features import Features
+from warpchain.kernels.gpu.board import write_constants
 from warpchain.kernels.gpu.contacts.self_contacts import TouchLayout
 from warpchain.kernels.gpu.threads import clock
 from warpchain.kernels.layout import (
-    BOARD_NOTES,
-    NOTE_CONTACT_STEP,
-    NOTE_DEADLINE,
-    NOTE_NEXT_LOOK,
-    NOTE_STOP_TIME,
-    NOTE_TOLERANCE,
+    BOARD_VALUES,
+    VALUE_CONTACT_STEP,
+    VALUE_DEADLINE,
+    VALUE_NEXT_SAMPLE,
+    VALUE_STOP_TIME,
+    VALUE_TOLERANCE,
 )
 from warpchain.kernels.physics.scaled_loads import lay_inertias
 from warpchain.kernels.types import Control, Drive, Model, Record, State
@@ -26,16 +26,16 @@ wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def note_bounds(
+def write_step_bounds(
     K: wp.array2d(dtype=wp.float64), drive: Drive, state: State, control: Control, world: int, is_driven: bool
 ):
     """Puts on the board what bounds steps of the springs after the last look."""
-    K[BOARD_NOTES, NOTE_CONTACT_STEP] = contact_step(state, control, world, is_driven)
-    K[BOARD_NOTES, NOTE_TOLERANCE] = spring_tolerance(drive, state, control, world, is_driven)
+    K[BOARD_VALUES, VALUE_CONTACT_STEP] = contact_step(state, control, world, is_driven)
+    K[BOARD_VALUES, VALUE_TOLERANCE] = spring_tolerance(drive, state, control, world, is_driven)
 
 
 @functools.cache
-def block_look(features: Features, touch: TouchLayout):
+def block_sample(features: Features, touch: TouchLayout):
     """Warp function ``look(K, T, model, drive, state, record, control, world, time)`` for one thread of a block.
 
     It is called behind a barrier behind the board's rows of ends, and leaves none; it puts the status into the mailbox
@@ -66,13 +66,13 @@ def block_look(features: Features, touch: TouchLayout):
             if has_changed(state, world, softness, load_factor):
                 after = present(model, state, control, world)
                 book_softening(chain, after, state, world)
-                note_constants(K, after)
+                write_constants(K, after)
                 if wp.static(is_driven):
                     lay_inertias(K, after)
-            note_bounds(K, drive, state, control, world, wp.static(is_driven))
-        K[BOARD_NOTES, NOTE_STOP_TIME] = state.stop_time[world]
-        K[BOARD_NOTES, NOTE_NEXT_LOOK] = wp.float64(state.next_sample[world]) * control.sample_interval
-        if clock() > K[BOARD_NOTES, NOTE_DEADLINE]:
+            write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
+        K[BOARD_VALUES, VALUE_STOP_TIME] = state.stop_time[world]
+        K[BOARD_VALUES, VALUE_NEXT_SAMPLE] = wp.float64(state.next_sample[world]) * control.sample_interval
+        if clock() > K[BOARD_VALUES, VALUE_DEADLINE]:
             T[wp.static(touch.is_late)] = 1
 
     return look

@@ -13,17 +13,17 @@ import warp as wp
 
 from warpchain.kernels.layout import (
     BOARD_FIRST,
-    BOARD_NOTES,
+    BOARD_VALUES,
     COSINE,
-    NOTE_COULOMB,
-    NOTE_DAMPING,
-    NOTE_GRAVITY,
-    NOTE_HALF_LENGTH,
-    NOTE_INVERSE_SMOOTHING,
-    NOTE_STIFFNESS,
-    NOTE_VISCOUS,
     OMEGA,
     SINE,
+    VALUE_COULOMB,
+    VALUE_DAMPING,
+    VALUE_GRAVITY,
+    VALUE_HALF_LENGTH,
+    VALUE_INVERSE_SMOOTHING,
+    VALUE_STIFFNESS,
+    VALUE_VISCOUS,
     U,
     V,
     X,
@@ -80,7 +80,7 @@ class Rates:
 
 
 @wp.struct
-class Surroundings:
+class Proximity:
     """What is known of a whole chain in a state; compared in single precision, which keeps signs."""
 
     opening: wp.float32  # greatest of a joint [m]
@@ -90,7 +90,7 @@ class Surroundings:
 
 
 @wp.struct
-class Trial:
+class Attempt:
     """A finished attempt: the link's new state, its last stage, and losses averaged over the step."""
 
     x: wp.float64
@@ -100,7 +100,7 @@ class Trial:
     v: wp.float64
     omega: wp.float64
     last: Rates
-    around: Surroundings  # of the new state, from methods that reuse the last stage
+    proximity: Proximity  # of the new state, from methods that reuse the last stage
     cosine: wp.float64  # direction of the new state
     sine: wp.float64
     friction: wp.float64
@@ -111,7 +111,7 @@ class Trial:
 
 
 @wp.func
-def link_on(K: wp.array2d(dtype=wp.float64), column: int) -> Link:
+def read_link(K: wp.array2d(dtype=wp.float64), column: int) -> Link:
     """A link as it stands on the board."""
     link = Link()
     link.x = K[X, column]
@@ -119,20 +119,14 @@ def link_on(K: wp.array2d(dtype=wp.float64), column: int) -> Link:
     link.u = K[U, column]
     link.v = K[V, column]
     link.omega = K[OMEGA, column]
-    half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
+    half_length = K[BOARD_VALUES, VALUE_HALF_LENGTH]
     link.arm_x = half_length * K[COSINE, column]
     link.arm_y = half_length * K[SINE, column]
     return link
 
 
 @wp.func
-def direction_on(K: wp.array2d(dtype=wp.float64), column: int):
-    """Cosine and sine of a link as it stands on the board."""
-    return K[COSINE, column], K[SINE, column]
-
-
-@wp.func
-def note_first(K: wp.array2d(dtype=wp.float64), column: int, first: Rates, with_powers: bool):
+def write_first_stage(K: wp.array2d(dtype=wp.float64), column: int, first: Rates, with_powers: bool):
     """Puts a link's first stage of the next step on the board."""
     K[BOARD_FIRST, column] = first.x
     K[BOARD_FIRST + 1, column] = first.y
@@ -143,7 +137,7 @@ def note_first(K: wp.array2d(dtype=wp.float64), column: int, first: Rates, with_
 
 
 @wp.func
-def first_on(K: wp.array2d(dtype=wp.float64), column: int) -> Rates:
+def read_first_stage(K: wp.array2d(dtype=wp.float64), column: int) -> Rates:
     """A link's first stage as it stands on the board, with powers if they were noted."""
     first = Rates()
     first.x = K[BOARD_FIRST, column]
@@ -158,12 +152,12 @@ def first_on(K: wp.array2d(dtype=wp.float64), column: int) -> Rates:
 def joint_constants(K: wp.array2d(dtype=wp.float64)) -> Chain:
     """What joints need of a chain, but for gravity, from the board."""
     chain = Chain()
-    chain.half_length = K[BOARD_NOTES, NOTE_HALF_LENGTH]
-    chain.joint_stiffness = K[BOARD_NOTES, NOTE_STIFFNESS]
-    chain.joint_damping = K[BOARD_NOTES, NOTE_DAMPING]
-    chain.viscous_friction = K[BOARD_NOTES, NOTE_VISCOUS]
-    chain.coulomb_friction = K[BOARD_NOTES, NOTE_COULOMB]
-    chain.inverse_smoothing = K[BOARD_NOTES, NOTE_INVERSE_SMOOTHING]
+    chain.half_length = K[BOARD_VALUES, VALUE_HALF_LENGTH]
+    chain.joint_stiffness = K[BOARD_VALUES, VALUE_STIFFNESS]
+    chain.joint_damping = K[BOARD_VALUES, VALUE_DAMPING]
+    chain.viscous_friction = K[BOARD_VALUES, VALUE_VISCOUS]
+    chain.coulomb_friction = K[BOARD_VALUES, VALUE_COULOMB]
+    chain.inverse_smoothing = K[BOARD_VALUES, VALUE_INVERSE_SMOOTHING]
     return chain
 
 
@@ -175,11 +169,11 @@ def greater(error_a: wp.float64, scale_a: wp.float64, error_b: wp.float64, scale
 
 
 @wp.func
-def error_of(trial: Trial, tolerance: wp.float64):
+def error_of(result: Attempt, tolerance: wp.float64):
     """Error ratio of a link as ordered bits, a NaN above all numbers; turning too far counts as an error of 2."""
-    scale = wp.float32(trial.scale * tolerance)
-    ratio = quick_quotient(wp.float32(wp.abs(trial.error)), wp.where(scale > LARGEST_SCALE, LARGEST_SCALE, scale))
-    if trial.turns_far and ratio < wp.float32(2.0):
+    scale = wp.float32(result.scale * tolerance)
+    ratio = quick_quotient(wp.float32(wp.abs(result.error)), wp.where(scale > LARGEST_SCALE, LARGEST_SCALE, scale))
+    if result.turns_far and ratio < wp.float32(2.0):
         ratio = wp.float32(2.0)
     return order_bits_single(ratio)
 
@@ -229,25 +223,6 @@ def greatest_velocity_error(link: Link, first: Rates, h: wp.float64, eu: wp.floa
     )
 
 
-@wp.func
-def greatest_error(
-    link: Link,
-    theta: wp.float64,
-    first: Rates,
-    h: wp.float64,
-    ex: wp.float64,
-    ey: wp.float64,
-    et: wp.float64,
-    eu: wp.float64,
-    ev: wp.float64,
-    ew: wp.float64,
-):
-    """The greatest of all six."""
-    error_p, scale_p = greatest_position_error(link, theta, h, ex, ey, et)
-    error_v, scale_v = greatest_velocity_error(link, first, h, eu, ev, ew)
-    return greater(error_p, scale_p, error_v, scale_v)
-
-
 @functools.cache
 def block_stage(block_dim: int):
     """Warp functions for blocks of this size: (hand over ends, evaluate a stage).
@@ -295,7 +270,7 @@ def block_stage(block_dim: int):
         damping = cu * cu + cv * cv
         forces[place.lane] = vec3d(force_x, force_y, torque)
         left = forces[place.before]
-        chain.gravity = K[BOARD_NOTES, NOTE_GRAVITY]
+        chain.gravity = K[BOARD_VALUES, VALUE_GRAVITY]
         rates = Rates()
         ax, ay, at = link_acceleration(
             chain,

@@ -73,30 +73,6 @@ def warp_width() -> int:
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
-    __syncwarp();
-#else
-    WP_TILE_SYNC();
-#endif
-""")
-def warp_barrier():
-    """Wait until all threads of a hardware warp are here; on fibers all of the block."""
-    ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-    return lane < 32;
-#else
-    return true;
-#endif
-""")
-def is_in_first_warp(lane: int) -> bool:
-    """Whether a thread belongs to the hardware warp that carries the last level; fibers all wait with it."""
-    ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
     unsigned long long now;
     asm volatile("mov.u64 %0, %globaltimer;" : "=l"(now));
     return 1e-9 * now;
@@ -120,57 +96,6 @@ def tile_address(dtype: type, size: int):
     def address(tile: wp.tile[dtype, size]) -> wp.uint64: ...
 
     return address
-
-
-@wp.func_native("return reinterpret_cast<const double*>(memory)[index];")
-def read(memory: wp.uint64, index: int) -> wp.float64:
-    """A double from the memory at this address.
-
-    An element of an array costs five integer instructions more: negative indices count from an array's end.
-    """
-    ...
-
-
-@wp.func_native("reinterpret_cast<double*>(memory)[index] = value;")
-def write(memory: wp.uint64, index: int, value: wp.float64):
-    """A double into the memory at this address, see :func:`read`."""
-    ...
-
-
-@functools.cache
-def exchange(block_dim: int):
-    """Warp functions (hand, handed) for numbers that threads put down at an address, those of one kind side by side.
-
-    ``hand(memory, kind, lane, value)``, a barrier, ``handed(memory, kind, lane)`` → value.
-    """
-
-    @wp.func
-    def hand(memory: wp.uint64, kind: int, lane: int, value: wp.float64):
-        write(memory, kind * wp.static(block_dim) + lane, value)
-
-    @wp.func
-    def handed(memory: wp.uint64, kind: int, lane: int):
-        return read(memory, kind * wp.static(block_dim) + lane)
-
-    return hand, handed
-
-
-@functools.cache
-def constant_table(rows: tuple[tuple[float, ...], ...]):
-    """Warp function ``entry(row, column)`` of a table of numbers, rows of equal length.
-
-    Read from memory by all threads at once, so that a loop over stages need not be unrolled.
-    """
-    width = len(rows[0])
-    numbers = ", ".join(repr(number) for row in rows for number in row)
-
-    @wp.func_native(f"""
-    static constexpr double table[] = {{{numbers}}};
-    return table[{width} * row + column];
-    """)
-    def entry(row: int, column: int) -> wp.float64: ...
-
-    return entry
 
 
 vec4i = wp.types.vector(length=4, dtype=wp.int32)
@@ -207,7 +132,8 @@ def block_maxima(block_dim: int):
 
     Returns:
         ``greatest(tile, lane, value)`` → the greatest of an integer, in all threads;
-        ``note(memory, lane, values)``, a barrier of the caller's, ``noted(memory)`` → the greatest of each of four.
+        ``write_maxima(memory, lane, values)``, a barrier of the caller's, then
+        ``read_maxima(memory)`` → the greatest of each of four.
         Tile and memory may be used again after any other barrier.
     """
 
@@ -222,14 +148,14 @@ def block_maxima(block_dim: int):
         return top
 
     @wp.func
-    def note(memory: wp.uint64, lane: int, values: vec4i):
+    def write_maxima(memory: wp.uint64, lane: int, values: vec4i):
         of_warp = vec4i(
             warp_greatest(values[0]), warp_greatest(values[1]), warp_greatest(values[2]), warp_greatest(values[3])
         )
         write_four(memory, lane // warp_width(), of_warp)
 
     @wp.func
-    def noted(memory: wp.uint64):
+    def read_maxima(memory: wp.uint64):
         top = read_four(memory, 0)
         i = int(1)
         while i < wp.static(block_dim) // warp_width():
@@ -240,4 +166,4 @@ def block_maxima(block_dim: int):
             i += 1
         return top
 
-    return greatest, note, noted
+    return greatest, write_maxima, read_maxima

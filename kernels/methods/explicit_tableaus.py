@@ -18,6 +18,7 @@ class Tableau:
 
     Attributes:
         name: What a user writes for ``method``.
+        title: One line for help texts.
         order: Order of the solution that is propagated.
         error_order: Order of the embedded solution; sets the exponent of the step controller after a rejection.
         matrix: Lower-triangular stage coefficients A; row s has s entries.
@@ -27,6 +28,7 @@ class Tableau:
     """
 
     name: str
+    title: str
     order: int
     error_order: int
     matrix: tuple[tuple[F, ...], ...]
@@ -93,6 +95,7 @@ class Tableau:
 
 RKF78 = Tableau(
     name="rkf78",
+    title="Fehlberg 7(8)",
     order=8,
     error_order=7,
     matrix=(
@@ -132,6 +135,7 @@ RKF78 = Tableau(
 
 DP5 = Tableau(
     name="dp5",
+    title="Dormand–Prince 5(4)",
     order=5,
     error_order=4,
     matrix=(
@@ -153,6 +157,7 @@ DP5 = Tableau(
 
 BS32 = Tableau(
     name="bs32",
+    title="Bogacki–Shampine 3(2)",
     order=3,
     error_order=2,
     matrix=((), (F(1, 2),), (F(0), F(3, 4)), (F(2, 9), F(1, 3), F(4, 9))),
@@ -163,6 +168,7 @@ BS32 = Tableau(
 
 OS32 = Tableau(
     name="os32",
+    title="six stages of order 3(2) for long stable steps",
     order=3,
     error_order=2,
     matrix=(

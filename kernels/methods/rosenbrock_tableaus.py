@@ -14,6 +14,7 @@ class RosenbrockTable:
 
     Attributes:
         name: What a user writes for ``method``.
+        title: One line for help texts.
         order: Order of the solution that is propagated.
         error_order: Order of the embedded solution.
         gamma: γ.
@@ -23,6 +24,7 @@ class RosenbrockTable:
     """
 
     name: str
+    title: str
     order: int
     error_order: int
     gamma: float
@@ -117,36 +119,11 @@ class SecondOrderTable:
     loss_place: float
 
 
-_FOURTH = (-7.170454962423024, -4.741636671481785, -16.31002631330971, -1.062004044111401)
-
-RODAS4P = RosenbrockTable(
-    name="rodas4p",
-    order=4,
-    error_order=3,
-    gamma=0.25,
-    matrix=(
-        (),
-        (3.0,),
-        (1.831036793486759, 0.4955183967433795),
-        (2.304376582692669, -0.05249275245743001, -1.176798761832782),
-        _FOURTH,
-        (*_FOURTH, 1.0),
-    ),
-    couplings=(
-        (),
-        (-12.0,),
-        (-8.791795173947035, -2.207865586973518),
-        (10.81793056857153, 6.780270611428266, 19.53485944642410),
-        (34.19095006749676, 15.49671153725963, 54.74760875964130, 14.16005392148534),
-        (34.62605830930532, 15.30084976114473, 56.99955578662667, 18.40807009793095, -5.714285714285717),
-    ),
-    source="G. Steinebach, preprint 1741, TH Darmstadt (1995); as RODASP in E. Hairer's code rodas.f",
-)
-
 _FIFTH = (-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946)
 
 RODAS5P = RosenbrockTable(
     name="rodas5p",
+    title="RODAS5P 5(4), implicit",
     order=5,
     error_order=4,
     gamma=0.21193756319429014,
@@ -188,4 +165,4 @@ RODAS5P = RosenbrockTable(
     source="G. Steinebach, BIT Numerical Mathematics 63 (2023) 27",
 )
 
-ROSENBROCK_TABLES = {table.name: table for table in (RODAS4P, RODAS5P)}
+ROSENBROCK_TABLES = {table.name: table for table in (RODAS5P,)}

@@ -67,7 +67,7 @@ def test_table_shows_a_row_for_each_measurement(capsys: pytest.CaptureFixture[st
 
 def test_what_has_no_meaning_for_a_method_is_left_out(capsys: pytest.CaptureFixture[str]) -> None:
     """Methods that solve equations have no stages and no arithmetic of a tableau; the rest is shown."""
-    for method in ("hybrid", "rodas4p", "rodas5p"):
+    for method in ("hybrid", "rodas5p"):
         assert math.isnan(evaluations(method)) and math.isnan(flops_per_attempt(method))
     cost = replace(COST, method="hybrid", link_stages=math.nan)
     assert as_json({}, [cost])["attempts"][0]["link_stages"] is None
@@ -76,7 +76,7 @@ def test_what_has_no_meaning_for_a_method_is_left_out(capsys: pytest.CaptureFixt
     assert rows == [["flight", "60", "hybrid", "1000", "6.50", "210", "25.0%", "168", "160", "6", "(19%)"]]
 
 
-@pytest.mark.parametrize("method", ["hybrid", "rodas4p", "dp5"])
+@pytest.mark.parametrize("method", ["hybrid", "rodas5p", "dp5"])
 def test_a_crowd_flies_and_never_lands(method: str) -> None:
     """Stretches are of flight alone, however far an attempt goes; on the CPU here, where a crowd does the same."""
     parameters = preset("paper")

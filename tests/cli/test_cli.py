@@ -395,7 +395,7 @@ def test_bench_measures_every_method(tmp_path: Path) -> None:
     ours = {
         (scene, method)
         for scene in ("flight", "pile")
-        for method in ("rkf78", "dp5", "bs32", "os32", "rodas4p", "rodas5p", "hybrid")
+        for method in ("rkf78", "dp5", "bs32", "os32", "rodas5p", "hybrid")
     }
     assert methods == ours | {("flight", "DOP853 (SciPy)")}
     for cost in costs["steps"]:

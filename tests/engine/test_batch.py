@@ -16,7 +16,7 @@ from warpchain.engine.mirror import Mirror
 from warpchain.inputs.options import Options
 from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
-from warpchain.kernels.cpu.loop import Features
+from warpchain.kernels.features import Features
 from warpchain.run import sweep_run
 from warpchain.run.sweep_run import SweepProgress, prepare, run_shards
 from warpchain.sweeps.plan import load_sweep
@@ -114,7 +114,7 @@ def test_few_walks_of_several_lengths_share_a_kernel() -> None:
     assert shared_threads("os32", [60, 64], 504) is None
     assert shared_threads("os32", [60, 90, 180], 20_000) is None
     assert shared_threads("os32", [60, 240], 504) is None
-    assert shared_threads("rodas4p", [60, 90, 180], 504) is None
+    assert shared_threads("rodas5p", [60, 90, 180], 504) is None
     assert shared_threads("hybrid", [60, 90, 180], 504) is None
 
 

@@ -224,7 +224,7 @@ def test_scene_upper_bounds(name: str, greatest: float, message: str) -> None:
             "options",
             {"method": "rk45"},
             "options.method: 'rk45' is unknown; give one of standard, explicit, reference, rkf78, dp5, bs32, os32, "
-            "rodas4p, rodas5p, hybrid",
+            "rodas5p, hybrid",
         ),
         ("options", {"tolerance": 1e-14}, "options.tolerance: 1e-14 is less than 1e-13; give 1e-13 or more"),
         ("options", {"tolerance": 0.2}, "options.tolerance: 0.2 is greater than 0.1; give 0.1 or less"),

@@ -73,7 +73,7 @@ def test_good_input_is_computed():
         (
             {"method": "rk4"},
             r"options\.method: 'rk4' is unknown; give one of standard, explicit, reference, rkf78, dp5, bs32, os32, "
-            r"rodas4p, rodas5p, hybrid",
+            r"rodas5p, hybrid",
         ),
         ({"method": None}, r"options\.method: None is unknown; .*"),
         ({"tolerance": 0.0}, r"options\.tolerance: 0.0 is less than 1e-13; .*"),

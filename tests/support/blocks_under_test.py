@@ -11,8 +11,8 @@ from tests.support.folded_chains import folded_chain
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
-from warpchain.kernels.cpu.contacts.neighbour_list import list_layout
-from warpchain.kernels.cpu.loop import Features
+from warpchain.kernels.contacts.pair_list import list_layout
+from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.loop import make_advance_block
 from warpchain.status import Status
 

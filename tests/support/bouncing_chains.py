@@ -11,7 +11,7 @@ from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.start_shapes import ellipse, lay_chain
-from warpchain.kernels.cpu.loop import Features
+from warpchain.kernels.features import Features
 from warpchain.oracle import motion_equations
 
 Array = NDArray[np.float64]

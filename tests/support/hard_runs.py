@@ -7,7 +7,7 @@ import warpchain
 from warpchain import Status
 from warpchain.bench.problems.hard_starts import energy_error, energy_scale
 
-METHODS = ("rkf78", "dp5", "bs32", "os32", "rodas4p", "rodas5p", "hybrid")
+METHODS = ("rkf78", "dp5", "bs32", "os32", "rodas5p", "hybrid")
 every_method = pytest.mark.parametrize("method", METHODS)
 
 

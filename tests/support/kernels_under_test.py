@@ -16,17 +16,20 @@ from warpchain.engine.devices import start_device
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.impulse import collision_impulse, fixed_contact, inverse_masses
-from warpchain.kernels.cpu.contacts.fixed_body import (
+from warpchain.kernels.contacts.link_pair import circles_of_links, collide
+from warpchain.kernels.contacts.pair_list import list_layout
+from warpchain.kernels.cpu.contacts.neighbour_list import greatest_displacement, list_slack, neighbour_list
+from warpchain.kernels.cpu.contacts.proximity import (
     floor_gap,
     greatest_opening,
     resolve_floor,
     resolve_sprocket,
     sprocket_gap,
 )
-from warpchain.kernels.cpu.contacts.neighbour_list import greatest_displacement, list_layout, list_slack, neighbour_list
-from warpchain.kernels.cpu.contacts.self_contacts import circles_of_links, collide, self_contacts
+from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
 from warpchain.kernels.cpu.explicit import place_ends
-from warpchain.kernels.cpu.loop import COMPILER_FLAGS, load_state
+from warpchain.kernels.cpu.loop import load_state
+from warpchain.kernels.features import COMPILER_FLAGS
 from warpchain.kernels.types import Chain, Model, State, read_chain
 
 Array = NDArray[np.float64]

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from warpchain.engine.devices import start_device
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
-from warpchain.kernels.cpu.loop import COMPILER_FLAGS, load_state
-from warpchain.kernels.methods.method import METHODS
+from warpchain.kernels.cpu.functions import rigid_flight, scratch_rows
+from warpchain.kernels.cpu.loop import load_state
+from warpchain.kernels.features import COMPILER_FLAGS
 from warpchain.kernels.types import Model, State, read_chain
 
 Array = NDArray[np.float64]
@@ -44,8 +45,10 @@ class Outcome:
 
 @functools.cache
 def _visit(columns: int) -> wp.Kernel:
-    attempt, commit, close_joints, open_joints = METHODS["hybrid"].flight.functions(columns)
-    rows = METHODS["hybrid"].scratch_rows(columns)
+    flight = rigid_flight("hybrid", columns)
+    attempt, commit = flight.attempt, flight.commit
+    close_joints, open_joints = flight.close_joints, flight.open_joints
+    rows = scratch_rows("hybrid", columns)
 
     @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS})
     def visit(
@@ -85,7 +88,7 @@ def visit(
         setattr(model, name, wp.array([value], dtype=wp.float64, device=DEVICE))
     state = State()
     state.links = wp.array(np.hstack([position, velocity]).T[None], dtype=wp.float64, device=DEVICE)
-    scratch = wp.full((1, METHODS["hybrid"].scratch_rows(columns), columns), np.nan, dtype=wp.float64, device=DEVICE)
+    scratch = wp.full((1, scratch_rows("hybrid", columns), columns), np.nan, dtype=wp.float64, device=DEVICE)
     results = wp.full(3, np.nan, dtype=wp.float64, device=DEVICE)
     wp.launch(_visit(columns), dim=1, inputs=[model, state, scratch, h, steps, int(opens), results], device=DEVICE)
     rows = scratch.numpy()[0, :, :links]

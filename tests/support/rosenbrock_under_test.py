@@ -10,9 +10,10 @@ from warpchain.engine.devices import start_device
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
 from warpchain.kernels.cpu.explicit import place_ends
+from warpchain.kernels.cpu.functions import cpu_method, scratch_rows
 from warpchain.kernels.cpu.implicit.solver import SegmentLayout, cyclic_solver, segment_columns, segment_places
-from warpchain.kernels.cpu.loop import COMPILER_FLAGS, load_state
-from warpchain.kernels.methods.method import METHODS
+from warpchain.kernels.cpu.loop import load_state
+from warpchain.kernels.features import COMPILER_FLAGS
 from warpchain.kernels.types import Model, State, read_chain
 
 Array = NDArray[np.float64]
@@ -83,8 +84,9 @@ def solve_loop(lower: Array, diagonal: Array, upper: Array, right: Array) -> Arr
 
 @functools.cache
 def _step(method: str, columns: int) -> wp.Kernel:
-    first_stage, attempt, commit = METHODS[method].functions(columns)
-    rows = METHODS[method].scratch_rows(columns)
+    functions = cpu_method(method, columns)
+    first_stage, attempt, commit = functions.first_stage, functions.attempt, functions.commit
+    rows = scratch_rows(method, columns)
 
     @_compiled
     def step(
@@ -121,7 +123,7 @@ def one_step(
         setattr(model, name, wp.array([value], dtype=wp.float64, device=DEVICE))
     state = State()
     state.links = wp.array(np.hstack([position, velocity]).T[None], dtype=wp.float64, device=DEVICE)
-    scratch = wp.full((1, METHODS[method].scratch_rows(columns), columns), np.nan, dtype=wp.float64, device=DEVICE)
+    scratch = wp.full((1, scratch_rows(method, columns), columns), np.nan, dtype=wp.float64, device=DEVICE)
     error = wp.full(1, np.nan, dtype=wp.float64, device=DEVICE)
     wp.launch(_step(method, columns), dim=1, inputs=[model, state, scratch, h, tolerance, error], device=DEVICE)
     rows = scratch.numpy()[0, :, :links]

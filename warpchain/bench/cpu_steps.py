@@ -20,7 +20,7 @@ from warpchain.engine.devices import versions
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain
-from warpchain.kernels.methods.method import METHODS
+from warpchain.kernels.methods.method import find_method, method_names
 from warpchain.oracle import motion_equations
 from warpchain.run.simulation import simulate
 from warpchain.status import Status
@@ -127,7 +127,7 @@ def step_costs(
         starts = {"flight": flying(n, parameters), "pile": dropped(n)}
         scipy_starts[n] = starts["flight"]
         for scene, (position, velocity) in starts.items():
-            for method in METHODS:
+            for method in method_names():
                 options = Options.model_validate({"method": method})
                 runs[scene, method, n] = _Stepper(parameters, options, position, velocity)
     seconds: dict[tuple[str, str, int], list[float]] = {key: [] for key in runs}
@@ -274,7 +274,7 @@ class _Stepper:
         accepted, attempts = self.counts["accepted"], self.counts["accepted"] + self.counts["rejected"]
         if scene == "flight" and self.counts["floor"]:
             raise RuntimeError(f"a chain of {links} links that was to fly came down, with {method}")
-        stages = math.nan if METHODS[method].flight else METHODS[method].stages
+        stages = math.nan if find_method(method).has_rigid_flight else find_method(method).stages
         return StepCost(
             scene=scene,
             method=method,

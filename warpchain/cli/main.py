@@ -119,7 +119,7 @@ def walk(
             metavar="NAME",
             help="standard: hybrid at 1e-3, joints softened on the sprocket and in the pile, on a GPU the next; "
             "explicit: os32 at 1e-3, softened likewise; reference: rkf78 at 1e-6, as in the paper; or an integrator: "
-            "rkf78, dp5, bs32, os32, rodas4p and rodas5p (implicit), hybrid (rigid flight). Default: standard.",
+            "rkf78, dp5, bs32, os32, rodas5p (implicit), hybrid (rigid flight). Default: standard.",
         ),
     ] = None,
     tolerance: Annotated[

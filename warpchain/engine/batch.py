@@ -18,9 +18,10 @@ from warpchain.engine.mirror import Mirror
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
-from warpchain.kernels.cpu.contacts.neighbour_list import list_layout
-from warpchain.kernels.cpu.loop import Features, make_advance
-from warpchain.kernels.events.steadiness import LOADING_TIME
+from warpchain.kernels.contacts.pair_list import list_layout
+from warpchain.kernels.cpu.loop import make_advance
+from warpchain.kernels.events.release import LOADING_TIME
+from warpchain.kernels.features import Features
 from warpchain.kernels.types import Drive, Model, Record, State
 from warpchain.status import Status
 

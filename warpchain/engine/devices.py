@@ -15,9 +15,9 @@ from warpchain.engine.kernel_choice import block_threads
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import InputError, Parameters
 from warpchain.kernels import layout
-from warpchain.kernels.cpu.contacts.neighbour_list import list_layout
-from warpchain.kernels.gpu.functions import block_rows
-from warpchain.kernels.methods.method import METHODS
+from warpchain.kernels.contacts.pair_list import list_layout
+from warpchain.kernels.cpu import functions as cpu_functions
+from warpchain.kernels.gpu import functions as gpu_functions
 
 CONNECTIONS = "32"  # queues between host and GPU; with fewer than streams, streams wait for one another
 BLOCKS_OF_MULTIPROCESSOR = 32  # most that an NVIDIA multiprocessor holds
@@ -78,8 +78,8 @@ def scratch_rows(options: Options, longest: int, device: wp.Device, threads: int
     """Rows of a chain's scratch block on a device, for chains of up to this many links; threads as for a batch."""
     columns = layout.padded_width(longest)
     if device.is_cuda:
-        return block_rows(options.method, threads or block_threads(longest), columns)
-    return METHODS[options.method].scratch_rows(columns)
+        return gpu_functions.board_rows(threads or block_threads(longest), columns)
+    return cpu_functions.scratch_rows(options.method, columns)
 
 
 def world_bytes(

@@ -7,10 +7,10 @@ import warp as wp
 
 from warpchain.engine.processors import processors
 from warpchain.inputs.options import Options
-from warpchain.kernels.cpu.loop import Features, make_advance
+from warpchain.kernels.cpu.loop import make_advance
+from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.loop import make_advance_block
-from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
-from warpchain.kernels.methods.rosenbrock_tableaus import ROSENBROCK_TABLES
+from warpchain.kernels.methods.method import find_method
 
 REGISTERS = 168
 """Registers a thread may take."""
@@ -22,7 +22,7 @@ registers decide how many blocks it holds. Measured on an H200 with slightly old
 per attempt and chain, with 128 and 168: 60 links 12.0, 6.2, 5.5 and 11.5, 5.5, 4.9 (rkf78, dp5, os32); 150 links 15.5,
 13.3 and 16.8, 15.4 (dp5, os32). Without a bound, few chains run up to 15 % faster and many slower. No bit of a walk
 depends on it: the compiler fuses the same products and sums (`tests/test_on_gpu.py`, walks in blocks of their own and
-of 192 threads). rodas4p is fastest without one.
+of 192 threads).
 """
 SHARED_THREADS = 192
 """Most threads of a block that chains of several lengths share."""
@@ -30,16 +30,9 @@ SHARED_WALKS = 2000
 """Most walks of a sweep that are carried on in such blocks; with 2016 it made no difference."""
 
 
-def registers(method: str, threads: int) -> int | None:
-    """Registers that a thread of such a block may take; None: as many as it likes."""
-    if method in ROSENBROCK_TABLES:
-        return None
-    return FEWER_REGISTERS.get(threads, REGISTERS)
-
-
 def block_kernel(features: Features, threads: int) -> wp.Kernel:
     """The kernel of the block form for blocks of this many threads."""
-    return make_advance_block(features, threads, registers(features.method, threads))
+    return make_advance_block(features, threads, FEWER_REGISTERS.get(threads, REGISTERS))
 
 
 def block_threads(links: int) -> int:
@@ -61,7 +54,7 @@ def shared_threads(method: str, links: Iterable[int], walks: int) -> int | None:
         walks: How many walks there are.
     """
     sizes = {block_threads(n) for n in links}
-    if len(sizes) < 2 or walks > SHARED_WALKS or method not in TABLEAUS or max(sizes) > SHARED_THREADS:
+    if len(sizes) < 2 or walks > SHARED_WALKS or not find_method(method).runs_on_gpus or max(sizes) > SHARED_THREADS:
         return None
     return max(sizes)
 

@@ -52,10 +52,10 @@ class Options(BaseModel):
 
     model_config = STRICT
 
-    method: Literal["rkf78", "dp5", "bs32", "os32", "rodas4p", "rodas5p", "hybrid"] = Field(
+    method: Literal["rkf78", "dp5", "bs32", "os32", "rodas5p", "hybrid"] = Field(
         default="rkf78",
         description="embedded pair: Fehlberg 7(8), Dormand–Prince 5(4), Bogacki–Shampine 3(2), six stages of order "
-        "3(2) for long stable steps, RODAS4P 4(3) or RODAS5P 5(4), the last two implicit; "
+        "3(2) for long stable steps, RODAS5P 5(4), which is implicit; "
         "hybrid: rigid joints between impulses, os32 around them",
     )
     tolerance: float = Field(

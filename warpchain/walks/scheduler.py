@@ -11,7 +11,7 @@ from warpchain.engine.kernel_choice import block_threads, features_of, load_kern
 from warpchain.inputs.options import Options
 from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
-from warpchain.kernels.cpu.loop import Features
+from warpchain.kernels.features import Features
 from warpchain.status import Status
 from warpchain.sweeps.recording import NOTHING, Keep
 from warpchain.walks.walk_phases import WalkRun

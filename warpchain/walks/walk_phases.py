@@ -26,7 +26,7 @@ from warpchain.inputs.scene import contact_radius, joint_radius, loop_speed
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
 from warpchain.kernels import layout
-from warpchain.kernels.cpu.loop import Features
+from warpchain.kernels.features import Features
 from warpchain.status import Status
 from warpchain.sweeps.recording import NOTHING, Keep
 from warpchain.walks.motion import Motion
@@ -40,7 +40,7 @@ STILL_PERIOD = 0.25
 SHORTEST_WINDOW, LONGEST_WINDOW = 0.05, 0.25
 """Bounds of the time [s] over which means are taken of a loop under its own loads; between them half a loop period."""
 BY_ITSELF = -1.0
-"""A time that the kernel sets, see :mod:`warpchain.kernels.events.steadiness`."""
+"""A time that the kernel sets, see :mod:`warpchain.kernels.events.release`."""
 
 
 class Phase(Enum):

@@ -15,22 +15,19 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.contacts.impulse import collision_impulse, inverse_masses
-from warpchain.kernels.cpu.contacts.neighbour_list import list_layout
+from warpchain.kernels.contacts.link_pair import are_neighbours, circles_of_links, collide, links_of, natural
+from warpchain.kernels.contacts.pair_list import list_layout
 from warpchain.kernels.layout import (
     INVERSE_INERTIA,
     INVERSE_MASS,
     LEFT_X,
     LEFT_Y,
-    OMEGA,
     RIGHT_X,
     RIGHT_Y,
-    U,
-    V,
     X,
     Y,
 )
-from warpchain.kernels.physics.elementary import HALF, TWO, ZERO, order_bits, quotient
+from warpchain.kernels.physics.elementary import TWO, ZERO, order_bits
 from warpchain.kernels.types import Chain
 
 wp.set_module_options({"enable_backward": False})
@@ -42,201 +39,6 @@ END_X, END_Y, CENTER_X, CENTER_Y = 0, 1, 2, 3
 # Two contacts, those of a half; each with the numbers that circles_of_links returns.
 FIRST_CONTACT, SECOND_CONTACT = 16, 25
 DEPTH, NORMAL_X, NORMAL_Y, A_N, A_T, B_N, B_T, INVERSE_NN, INVERSE_DETERMINANT = 0, 1, 2, 3, 4, 5, 6, 7, 8
-
-
-@wp.func
-def natural(index: int):
-    """The same index, now known to the compiler as not negative: such ones count from an array's end in Warp."""
-    return index & 2147483647
-
-
-@wp.func
-def are_neighbours(link_a: int, link_b: int, link_count: int):
-    """True for the same link or links that share a joint."""
-    apart = wp.abs(link_a - link_b)
-    return apart < 2 or apart > link_count - 2
-
-
-@wp.func
-def effective_masses(
-    mass: wp.float64,
-    inertia_a: wp.float64,
-    inertia_b: wp.float64,
-    a_n: wp.float64,
-    a_t: wp.float64,
-    b_n: wp.float64,
-    b_t: wp.float64,
-):
-    """W_nn, W_nt, W_tt [1/kg] of a contact: 1/m_A + 1/m_B, 1/I_A, 1/I_B, and levers as of :func:`circles_of_links`."""
-    return (
-        mass + a_n * a_n * inertia_a + b_n * b_n * inertia_b,
-        a_n * a_t * inertia_a + b_n * b_t * inertia_b,
-        mass + a_t * a_t * inertia_a + b_t * b_t * inertia_b,
-    )
-
-
-@wp.func
-def circles_of_links(
-    radius: wp.float64,
-    end_a_x: wp.float64,
-    end_a_y: wp.float64,
-    end_b_x: wp.float64,
-    end_b_y: wp.float64,
-    center_a_x: wp.float64,
-    center_a_y: wp.float64,
-    center_b_x: wp.float64,
-    center_b_y: wp.float64,
-    mass: wp.float64,
-    inertia_a: wp.float64,
-    inertia_b: wp.float64,
-):
-    """Geometry of the contact of a circle of link A and one of link B, without branches.
-
-    Numbers, not a struct: clang would carry that through memory, which makes a pile on the CPU twice as slow.
-
-    Args:
-        radius: Of both circles [m].
-        end_a_x: Centre of A's circle [m].
-        end_a_y: See ``end_a_x``.
-        end_b_x: Centre of B's circle [m].
-        end_b_y: See ``end_b_x``.
-        center_a_x: A's centre of mass [m].
-        center_a_y: See ``center_a_x``.
-        center_b_x: B's centre of mass [m].
-        center_b_y: See ``center_b_x``.
-        mass: 1/m_A + 1/m_B [1/kg].
-        inertia_a: 1/I_A [1/(kg m²)].
-        inertia_b: 1/I_B [1/(kg m²)].
-
-    Returns:
-        Depth of the overlap [m], 0 if there is none (exactly concentric circles have no normal: no contact); normal
-        from A to B; levers of A crossed with normal and tangent [m], likewise of B; 1/W_nn [kg] and 1/det W [kg²].
-        Without an overlap all but the depth mean nothing.
-    """
-    dx = end_b_x - end_a_x
-    dy = end_b_y - end_a_y
-    reach = TWO * radius
-    square = dx * dx + dy * dy
-    overlap = square < reach * reach and square > ZERO
-    distance = wp.sqrt(square)
-    depth = wp.where(overlap, reach - distance, ZERO)
-    nx = quotient(dx, distance)
-    ny = quotient(dy, distance)
-    px = HALF * (end_a_x + end_b_x)
-    py = HALF * (end_a_y + end_b_y)
-    ax = px - center_a_x
-    ay = py - center_a_y
-    bx = px - center_b_x
-    by = py - center_b_y
-    a_n = ax * ny - ay * nx
-    a_t = ax * nx + ay * ny
-    b_n = bx * ny - by * nx
-    b_t = bx * nx + by * ny
-    w_nn, w_nt, w_tt = effective_masses(mass, inertia_a, inertia_b, a_n, a_t, b_n, b_t)
-    inverse_nn, inverse_determinant = inverse_masses(w_nn, w_nt, w_tt)
-    return depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant
-
-
-@wp.func
-def links_of(p: int, q: int, half: int, second: int, n: int):
-    """Links A and B of the contact of joints p < q in this half of the sequence, the first (0) or second (1) of two."""
-    link_b = q + (second ^ half)
-    return p + second, wp.where(link_b == n, 0, link_b)
-
-
-@wp.func
-def touching_circles(K: wp.array2d(dtype=wp.float64), chain: Chain, p: int, q: int, half: int, second: int):
-    """Geometry of that contact, see :func:`links_of`; links that share a joint have none.
-
-    Joint j's left-hand circle belongs to link j's right end, its right-hand circle to the left end of the link after.
-    """
-    after_q = second ^ half
-    link_a, link_b = links_of(p, q, half, second, chain.link_count)
-    ax = wp.where(second == 0, K[RIGHT_X, p], K[LEFT_X, p + 1])
-    ay = wp.where(second == 0, K[RIGHT_Y, p], K[LEFT_Y, p + 1])
-    bx = wp.where(after_q == 0, K[RIGHT_X, q], K[LEFT_X, q + 1])
-    by = wp.where(after_q == 0, K[RIGHT_Y, q], K[LEFT_Y, q + 1])
-    if are_neighbours(link_a, link_b, chain.link_count):
-        bx = ax
-        by = ay
-    return circles_of_links(
-        chain.circle_radius,
-        ax,
-        ay,
-        bx,
-        by,
-        K[X, link_a],
-        K[Y, link_a],
-        K[X, link_b],
-        K[Y, link_b],
-        K[INVERSE_MASS, link_a] + K[INVERSE_MASS, link_b],
-        K[INVERSE_INERTIA, link_a],
-        K[INVERSE_INERTIA, link_b],
-    )
-
-
-@wp.func
-def collide(
-    K: wp.array2d(dtype=wp.float64),
-    chain: Chain,
-    link_a: int,
-    link_b: int,
-    nx: wp.float64,
-    ny: wp.float64,
-    a_n: wp.float64,
-    a_t: wp.float64,
-    b_n: wp.float64,
-    b_t: wp.float64,
-    inverse_nn: wp.float64,
-    inverse_determinant: wp.float64,
-):
-    """Impulse between two touching links, if they approach; returns the energy lost [J] and the number of impulses."""
-    # all is read before anything is written: otherwise the compiler would read again, not knowing that A is not B
-    u_a = K[U, link_a]
-    v_a = K[V, link_a]
-    omega_a = K[OMEGA, link_a]
-    u_b = K[U, link_b]
-    v_b = K[V, link_b]
-    omega_b = K[OMEGA, link_b]
-    u = u_a - u_b
-    v = v_a - v_b
-    normal_speed = u * nx + v * ny
-    normal_speed += omega_a * a_n - omega_b * b_n
-    lost = ZERO
-    hits = wp.int64(0)
-    if normal_speed > ZERO:
-        tangential_speed = v * nx - u * ny
-        tangential_speed += omega_a * a_t - omega_b * b_t
-        mass_a = K[INVERSE_MASS, link_a]
-        mass_b = K[INVERSE_MASS, link_b]
-        inertia_a = K[INVERSE_INERTIA, link_a]
-        inertia_b = K[INVERSE_INERTIA, link_b]
-        w_nn, w_nt, w_tt = effective_masses(mass_a + mass_b, inertia_a, inertia_b, a_n, a_t, b_n, b_t)
-        jn, jt = collision_impulse(
-            normal_speed,
-            tangential_speed,
-            w_nn,
-            w_nt,
-            w_tt,
-            inverse_nn,
-            inverse_determinant,
-            chain.chain_restitution,
-            chain.chain_friction,
-            chain.tangential_restitution,
-        )
-        jx = jn * nx - jt * ny
-        jy = jn * ny + jt * nx
-        K[U, link_a] = u_a - jx * mass_a
-        K[V, link_a] = v_a - jy * mass_a
-        K[OMEGA, link_a] = omega_a - (a_n * jn + a_t * jt) * inertia_a
-        K[U, link_b] = u_b + jx * mass_b
-        K[V, link_b] = v_b + jy * mass_b
-        K[OMEGA, link_b] = omega_b + (b_n * jn + b_t * jt) * inertia_b
-        changed_n = w_nn * jn + w_nt * jt
-        changed_t = w_nt * jn + w_tt * jt
-        lost = jn * (normal_speed - HALF * changed_n) + jt * (tangential_speed - HALF * changed_t)
-        hits = wp.int64(1)
-    return lost, hits
 
 
 @wp.func

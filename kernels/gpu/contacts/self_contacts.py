@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from warpchain.kernels.cpu.contacts.neighbour_list import list_layout
-from warpchain.kernels.cpu.contacts.self_contacts import collide, links_of, natural, touching_circles
+from warpchain.kernels.contacts.link_pair import collide, links_of, natural, touching_circles
+from warpchain.kernels.contacts.pair_list import list_layout
 from warpchain.kernels.gpu.threads import barrier, barrier_if_any
 from warpchain.kernels.layout import BOARD_LOST_SELF, RIGHT_X, RIGHT_Y
 from warpchain.kernels.physics.elementary import TWO, ZERO
@@ -313,7 +313,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         return int(hits)
 
     @wp.func
-    def measure(
+    def write_proximity(
         K: wp.array2d(dtype=wp.float64), T: wp.array(dtype=wp.int32), chain: Chain, pair: int, half: int, second: int
     ):
         """1 if the circles of a further contact meet, else 0."""
@@ -373,7 +373,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
             k = lane + wp.static(block_dim)
             while k < contacts:
                 pair = pair_at(L, T, k >> 1)
-                touches = measure(K, T, chain, pair, turn, k & 1)
+                touches = write_proximity(K, T, chain, pair, turn, k & 1)
                 L[wp.static(lists.pending) + k] = touches
                 left += touches
                 if touches != 0:

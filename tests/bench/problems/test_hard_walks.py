@@ -17,7 +17,7 @@ every_method_walks = pytest.mark.parametrize(
     [
         "rkf78",
         "dp5",
-        "rodas4p",
+        "rodas5p",
         "hybrid",
         *(pytest.param(name, marks=pytest.mark.slow) for name in ("bs32", "os32", "rodas5p")),
     ],
@@ -58,7 +58,7 @@ def walk_of_case(name, method, **settings):
         ("rkf78", 180, 1e-6),
         ("hybrid", 180, 1e-6),
         ("os32", 100, 1e-6),
-        *((method, 100, 1e-4) for method in ("bs32", "rodas4p", "rodas5p")),
+        *((method, 100, 1e-4) for method in ("bs32", "rodas5p")),
     ],
 )
 def test_longest_slow_walk_ends_in_a_pile_at_rest(method, links, tolerance):

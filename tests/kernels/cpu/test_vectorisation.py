@@ -27,7 +27,7 @@ RIGID = COMMON | {
     *("fastest_fall", "meeting", "prepare", "place_stage", "assemble", "solve_forces", "damp", "keep_stage"),
     *("openings", "opening_rates", "push", "close", "begin"),
 }
-HOT_FUNCTIONS = {"rkf78": EXPLICIT, "dp5": EXPLICIT, "rodas4p": IMPLICIT, "hybrid": RIGID}
+HOT_FUNCTIONS = {"rkf78": EXPLICIT, "dp5": EXPLICIT, "rodas5p": IMPLICIT, "hybrid": RIGID}
 
 
 def remarks_by_function(folder: Path, method: str, fixed_body: str) -> list[tuple[str, str]]:
@@ -55,7 +55,7 @@ def remarks_by_function(folder: Path, method: str, fixed_body: str) -> list[tupl
 )
 @pytest.mark.parametrize(
     ("method", "fixed_body"),
-    [("rkf78", "floor"), ("dp5", "sprocket"), ("rodas4p", "floor"), ("hybrid", "floor")],
+    [("rkf78", "floor"), ("dp5", "sprocket"), ("rodas5p", "floor"), ("hybrid", "floor")],
 )
 def test_hot_loops_are_vectorised(tmp_path: Path, method: str, fixed_body: str) -> None:
     """Every loop over links that runs once per stage or step is vectorised, to at least four doubles."""

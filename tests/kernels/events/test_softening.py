@@ -18,7 +18,8 @@ from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
 from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.loop import load_state
-from warpchain.kernels.events.softening import contact_step, enclosed_area, softened, spring_tolerance
+from warpchain.kernels.events.softening import contact_step, enclosed_area, spring_tolerance
+from warpchain.kernels.physics.softness import softened
 from warpchain.kernels.types import Chain, Control, Drive, Model, State, read_chain
 from warpchain.run.single_walk import setup_walk
 from warpchain.walks import scheduler

@@ -18,7 +18,7 @@ from warpchain.engine.control import push_rate, suitable_load
 from warpchain.engine.devices import start_device
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options
 from warpchain.inputs.scene import Scene, fewest_links, greatest_load
-from warpchain.kernels.events.steadiness import (
+from warpchain.kernels.events.release import (
     LEAST_LOAD,
     LITTLE_SLIP,
     LOADING_TIME,

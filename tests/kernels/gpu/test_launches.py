@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tests.support.blocks_under_test import FIXED_STEP, SOFT, batch_of, fibers, heap, listed_pairs
 from warpchain.engine.batch import Batch
 from warpchain.kernels import layout
-from warpchain.kernels.cpu.loop import Features
+from warpchain.kernels.features import Features
 from warpchain.kernels.gpu import loop
 from warpchain.kernels.gpu.loop import make_advance_block
 from warpchain.kernels.types import State
@@ -55,7 +55,7 @@ def launch(batch: Batch, kernel: wp.Kernel, worlds: list[int], attempts: int) ->
 def everything(batch: Batch, world: int) -> dict[str, NDArray[np.generic]]:
     """All that is kept of a world: its state, what its board leaves, its list and its time series."""
     found = {name: getattr(batch.state, name).numpy()[world].copy() for name in State.vars}
-    found["board"] = batch.scratch.numpy()[world, layout.BOARD_LOST_SELF : layout.BOARD_NOTES, :LINKS].copy()
+    found["board"] = batch.scratch.numpy()[world, layout.BOARD_LOST_SELF : layout.BOARD_VALUES, :LINKS].copy()
     found["pairs"] = np.array(sorted(listed_pairs(batch, world)))
     found["samples"] = batch.drain_samples(world)
     return found
@@ -108,9 +108,9 @@ def reversed_factory(tmp_path: Path) -> Iterator[Callable[[Features, int], wp.Ke
     numbered = "        block, lane = wp.tid()\n"
     assert source.count(numbered) == 1
     turned = "        block, thread = wp.tid()\n        lane = wp.static(block_dim - 1) - thread\n"
-    path = tmp_path / "block_reversed.py"
+    path = tmp_path / "loop_reversed.py"
     path.write_text(source.replace(numbered, turned), encoding="utf-8")
-    name = "warpchain.kernels.block_reversed"
+    name = "warpchain.kernels.gpu.loop_reversed"
     spec = importlib.util.spec_from_file_location(name, path)
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
@@ -119,7 +119,7 @@ def reversed_factory(tmp_path: Path) -> Iterator[Callable[[Features, int], wp.Ke
     del sys.modules[name]
 
 
-@pytest.mark.parametrize("method", ["dp5", "rodas4p"])
+@pytest.mark.parametrize("method", ["dp5", "os32"])
 def test_the_order_of_threads_changes_no_number(
     method: str, reversed_factory: Callable[[Features, int], wp.Kernel]
 ) -> None:

@@ -14,12 +14,13 @@ from warpchain.engine.control import SOFT
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
 from warpchain.kernels.cpu import loop as cpu_loop
-from warpchain.kernels.cpu.loop import Features, make_advance
-from warpchain.kernels.events import steadiness
-from warpchain.kernels.events.record import sampling
+from warpchain.kernels.cpu.loop import make_advance
+from warpchain.kernels.events import release
+from warpchain.kernels.events.sample import sampling
+from warpchain.kernels.features import Features
 from warpchain.kernels.gpu import loop as gpu_loop
 from warpchain.kernels.gpu.loop import make_advance_block
-from warpchain.kernels.gpu.sample import block_look
+from warpchain.kernels.gpu.sample import block_sample
 from warpchain.status import Status
 
 LINKS = 12
@@ -72,11 +73,11 @@ UNLOADED = 90 * FIXED_STEP  # s when they begin to
 @pytest.fixture
 def quick_unloading(monkeypatch: pytest.MonkeyPatch, exact_kernels: None) -> Iterator[None]:
     """Loads that fall in twenty steps, in kernels made anew."""
-    monkeypatch.setattr(steadiness, "LOADING_TIME", wp.constant(wp.float64(LOAD_FALLS)))
-    for cached in (sampling, block_look):
+    monkeypatch.setattr(release, "LOADING_TIME", wp.constant(wp.float64(LOAD_FALLS)))
+    for cached in (sampling, block_sample):
         cached.cache_clear()
     yield
-    for cached in (sampling, block_look):
+    for cached in (sampling, block_sample):
         cached.cache_clear()
 
 

@@ -9,7 +9,8 @@ import pytest
 from warpchain.bench.cpu_steps import flying
 from warpchain.inputs.parameters import preset
 from warpchain.kernels import layout
-from warpchain.kernels.cpu.loop import Features, make_advance
+from warpchain.kernels.cpu.loop import make_advance
+from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.loop import make_advance_block
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS, Tableau
 from warpchain.oracle.motion_equations import acceleration

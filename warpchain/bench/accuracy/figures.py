@@ -23,7 +23,7 @@ _MARKERS: Final = "osDvP*Xp"
 _GRID: Final = {"color": "#E6E6E6", "linewidth": 0.6}
 _SCIPY: Final = {"DOP853 (SciPy)": "s", "Radau (SciPy)": "^"}
 """Solvers of SciPy, all in black, and their markers."""
-_FIRST: Final = ("rkf78", "dp5", "bs32", "os32", "rodas4p", "rodas5p", "hybrid")
+_FIRST: Final = ("rkf78", "dp5", "bs32", "os32", "rodas5p", "hybrid")
 """Methods that have the same colours in every figure, whichever others there are."""
 
 _TITLES: Final = {

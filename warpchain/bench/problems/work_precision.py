@@ -23,7 +23,7 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset, validated
 from warpchain.inputs.scene import Scene, check_scene, joint_radius
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
-from warpchain.kernels.methods.method import METHODS
+from warpchain.kernels.methods.method import find_method, method_names
 from warpchain.oracle import motion_equations
 from warpchain.status import Status
 
@@ -270,10 +270,10 @@ def evaluations(method: str, accepted: int, rejected: int, impulses: int) -> int
     A rejected step leaves its first stage to the next attempt. So does an accepted one to the next step if the method
     is so made, unless an impulse came between: then at most one more for each impulse.
     """
-    if method not in METHODS or METHODS[method].flight is not None:
+    if method not in method_names() or find_method(method).has_rigid_flight:
         return None
-    stages, attempts = METHODS[method].stages, accepted + rejected
-    if METHODS[method].reuses_last:
+    stages, attempts = find_method(method).stages, accepted + rejected
+    if find_method(method).reuses_last:
         return attempts * (stages - 1) + 1 + min(impulses, accepted)
     return attempts * (stages - 1) + accepted
 

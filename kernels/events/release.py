@@ -16,6 +16,7 @@ curve under load differs by. Loads that fall to a smaller multiple do so at once
 
 import warp as wp
 
+from warpchain.kernels.codes import FINISHED
 from warpchain.kernels.events.summary import Summary
 from warpchain.kernels.layout import (
     DRIFT,
@@ -47,7 +48,6 @@ from warpchain.kernels.types import Chain, Drive, State
 
 wp.set_module_options({"enable_backward": False})
 
-FINISHED = wp.constant(2)
 """Status of a drive whose end has been set, a code shared with warpchain.status."""
 LITTLE_SLIP = wp.constant(wp.float64(0.006))
 """Loops of Table 1 slip on their sprocket by 0.1 to 0.6 % up to 45 Hz. One that slips more may do so now more, now

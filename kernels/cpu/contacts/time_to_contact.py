@@ -9,7 +9,7 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.cpu.contacts.neighbour_list import list_layout
+from warpchain.kernels.contacts.pair_list import list_layout
 from warpchain.kernels.layout import COSINE, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, SINE, U, V
 from warpchain.kernels.physics.elementary import TWO, ZERO, order_bits
 from warpchain.kernels.types import Chain

@@ -1,0 +1,186 @@
+"""A link meets the floor or the sprocket: one impulse for each of its circles that overlaps and approaches."""
+
+import warp as wp
+
+from warpchain.kernels.contacts.impulse import fixed_contact
+from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, quotient
+from warpchain.kernels.types import Chain, Drive
+
+wp.set_module_options({"enable_backward": False})
+
+
+BOUNCE_PAUSE = wp.constant(wp.float64(0.01))
+"""A floor impulse this long [s] after the one before it begins a new bounce."""
+
+SMALLEST = wp.constant(wp.float64(1e-300))
+
+
+@wp.func
+def sprocket_turning(drive: Drive, world: int, time: wp.float64):
+    """Angular velocity [rad/s] of the sprocket: a smooth step 3s² − 2s³ from 0 to its final value."""
+    ramp = drive.spin_up_time[world]
+    since = time - drive.spin_up_start[world]
+    s = ONE
+    if ramp > ZERO and since < ramp:
+        s = wp.max(since, ZERO) / ramp
+    return drive.sprocket_speed[world] * s * s * (wp.float64(3.0) - TWO * s)
+
+
+@wp.func
+def meet_floor(
+    chain: Chain,
+    left_x: wp.float64,
+    left_y: wp.float64,
+    right_x: wp.float64,
+    right_y: wp.float64,
+    x: wp.float64,
+    y: wp.float64,
+    inverse_mass: wp.float64,
+    inverse_inertia: wp.float64,
+    u: wp.float64,
+    v: wp.float64,
+    omega: wp.float64,
+):
+    """One link against the floor y = 0 (body A; n̂ = ŷ), its left circle first.
+
+    Returns:
+        u, v, ω afterwards, energy lost [J] by the left and the right circle, number of impulses.
+    """
+    r = chain.circle_radius
+    u, v, omega, lost_left, hit_left = fixed_contact(
+        chain,
+        left_y - r,
+        ZERO,
+        ONE,
+        left_x - x,
+        left_y - y - r,
+        ZERO,
+        ZERO,
+        inverse_mass,
+        inverse_inertia,
+        chain.floor_restitution,
+        chain.floor_friction,
+        u,
+        v,
+        omega,
+    )
+    u, v, omega, lost_right, hit_right = fixed_contact(
+        chain,
+        right_y - r,
+        ZERO,
+        ONE,
+        right_x - x,
+        right_y - y - r,
+        ZERO,
+        ZERO,
+        inverse_mass,
+        inverse_inertia,
+        chain.floor_restitution,
+        chain.floor_friction,
+        u,
+        v,
+        omega,
+    )
+    return u, v, omega, lost_left, lost_right, hit_left + hit_right
+
+
+@wp.func
+def sprocket_circle(
+    chain: Chain,
+    surface_speed: wp.float64,
+    push_rate: wp.float64,
+    circle_x: wp.float64,
+    circle_y: wp.float64,
+    arm_x: wp.float64,
+    arm_y: wp.float64,
+    inverse_mass: wp.float64,
+    inverse_inertia: wp.float64,
+    u: wp.float64,
+    v: wp.float64,
+    omega: wp.float64,
+):
+    """One circle against the sprocket about the origin (body A; n̂ points outwards).
+
+    ``arm`` leads from the link's centre to the circle's; ``surface_speed`` is the sprocket's angular velocity. The
+    touching point is the circle's nearest to the sprocket's centre. Where the circle has sunk in by d, the surface
+    moves outwards at ``push_rate`` d. Impulses alone stop a circle only after a step in which it has sunk in: in steps
+    of 50 µs loops sank by 0.06 to 0.14 mm, and were slower for it.
+    """
+    # a circle exactly at the centre has no normal: zero instead makes it one that does not approach
+    distance = wp.max(wp.sqrt(circle_x * circle_x + circle_y * circle_y), SMALLEST)
+    normal_x = quotient(circle_x, distance)
+    normal_y = quotient(circle_y, distance)
+    r = chain.circle_radius
+    point_x = circle_x - r * normal_x
+    point_y = circle_y - r * normal_y
+    gap = distance - r - chain.sprocket_radius
+    push = push_rate * wp.max(ZERO, -gap)
+    return fixed_contact(
+        chain,
+        gap,
+        normal_x,
+        normal_y,
+        arm_x - r * normal_x,
+        arm_y - r * normal_y,
+        push * normal_x - surface_speed * point_y,
+        push * normal_y + surface_speed * point_x,
+        inverse_mass,
+        inverse_inertia,
+        chain.sprocket_restitution,
+        chain.sprocket_friction,
+        u,
+        v,
+        omega,
+    )
+
+
+@wp.func
+def meet_sprocket(
+    chain: Chain,
+    surface_speed: wp.float64,
+    push_rate: wp.float64,
+    left_x: wp.float64,
+    left_y: wp.float64,
+    right_x: wp.float64,
+    right_y: wp.float64,
+    x: wp.float64,
+    y: wp.float64,
+    inverse_mass: wp.float64,
+    inverse_inertia: wp.float64,
+    u: wp.float64,
+    v: wp.float64,
+    omega: wp.float64,
+):
+    """One link against the sprocket, otherwise as :func:`meet_floor`.
+
+    It turns at ``surface_speed`` [rad/s] and pushes out what has sunk in at ``push_rate`` [1/s].
+    """
+    u, v, omega, lost_left, hit_left = sprocket_circle(
+        chain,
+        surface_speed,
+        push_rate,
+        left_x,
+        left_y,
+        left_x - x,
+        left_y - y,
+        inverse_mass,
+        inverse_inertia,
+        u,
+        v,
+        omega,
+    )
+    u, v, omega, lost_right, hit_right = sprocket_circle(
+        chain,
+        surface_speed,
+        push_rate,
+        right_x,
+        right_y,
+        right_x - x,
+        right_y - y,
+        inverse_mass,
+        inverse_inertia,
+        u,
+        v,
+        omega,
+    )
+    return u, v, omega, lost_left, lost_right, hit_left + hit_right

@@ -1,0 +1,91 @@
+"""Every method's Warp functions for one thread per chain."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import warp as wp
+
+from warpchain.kernels import layout
+from warpchain.kernels.cpu.explicit import explicit_method
+from warpchain.kernels.cpu.implicit.joint_switch import joint_switch
+from warpchain.kernels.cpu.implicit.rigid_flight import flight_method, flight_rows
+from warpchain.kernels.cpu.implicit.rosenbrock import rosenbrock_method, rosenbrock_rows
+from warpchain.kernels.methods.controller import classical_controller, implicit_controller, step_controller
+from warpchain.kernels.methods.method import find_method
+from warpchain.kernels.methods.w_tableaus import ROS34PW2
+
+
+@dataclass(frozen=True)
+class CpuMethod:
+    """Warp functions of a method for scratch blocks of one width.
+
+    Attributes:
+        first_stage: ``(K, chain)``: evaluates the first stage of the next step.
+        attempt: ``(K, chain, h, tolerance)`` → error ratio as ordered bits.
+        commit: ``(K, chain, h)``: takes over the state that the last attempt found.
+        growth: Factor of the step after acceptance, see :mod:`methods.controller`.
+        shrinkage: Factor of the step after rejection.
+        reuses_last: Whether a step leaves the first stage of the next.
+    """
+
+    first_stage: Any
+    attempt: Any
+    commit: Any
+    growth: Any
+    shrinkage: Any
+    reuses_last: bool
+
+
+@dataclass(frozen=True)
+class RigidFlight:
+    """Warp functions for flight on rigid joints, from one impulse to the next.
+
+    Attributes:
+        attempt: As that of a method.
+        commit: ``(K, chain, h)`` → whether springs would hold little enough energy for the flight to go on.
+        close_joints: ``(K, chain)`` → (whether joints are rigid now, energy lost [J]).
+        open_joints: ``(K, chain)`` → energy lost [J].
+        growth: As that of a method.
+        shrinkage: As that of a method.
+    """
+
+    attempt: Any
+    commit: Any
+    close_joints: Any
+    open_joints: Any
+    growth: Any
+    shrinkage: Any
+
+
+def scratch_rows(name: str, columns: int) -> int:
+    """Rows of a chain's scratch block of so many columns."""
+    method = find_method(name)
+    if method.kind == "rosenbrock":
+        return rosenbrock_rows(method.tableau, columns)
+    rows = layout.scratch_rows(method.stages)
+    return rows + flight_rows(columns) if method.has_rigid_flight else rows
+
+
+def cpu_method(name: str, columns: int) -> CpuMethod:
+    """A method's steps on springs."""
+    method = find_method(name)
+    if method.kind == "rosenbrock":
+        functions = rosenbrock_method(method.tableau, columns)
+        controller = implicit_controller(method.error_order, wp.float64)
+    else:
+        functions = explicit_method(method.tableau)
+        controller = step_controller(method.order, method.error_order, wp.float64)
+    return CpuMethod(*functions, *controller, method.reuses_last)
+
+
+def rigid_flight(name: str, columns: int) -> RigidFlight | None:
+    """A method's flight on rigid joints, if it has one."""
+    method = find_method(name)
+    if not method.has_rigid_flight:
+        return None
+    first_row = layout.scratch_rows(method.stages)
+    return RigidFlight(
+        *flight_method(columns, first_row),
+        *joint_switch(columns, first_row),
+        *classical_controller(ROS34PW2.error_order),
+    )

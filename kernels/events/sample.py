@@ -1,0 +1,71 @@
+"""One sample: record the chain, then ask every watch."""
+
+import functools
+
+import warp as wp
+
+from warpchain.kernels.codes import RUNNING
+from warpchain.kernels.events.record import write_frame, write_sample
+from warpchain.kernels.events.release import drag_rate, load_at, watch_steadiness
+from warpchain.kernels.events.rest import watch_rest
+from warpchain.kernels.events.softening import watch_collapse, watch_drive, watch_stiffening
+from warpchain.kernels.events.summary import summarise
+from warpchain.kernels.layout import (
+    TIME,
+)
+from warpchain.kernels.physics.elementary import ZERO
+from warpchain.kernels.physics.scaled_loads import drag_shape
+from warpchain.kernels.types import Chain, Control, Drive, Record, State
+
+wp.set_module_options({"enable_backward": False})
+
+
+@functools.cache
+def sampling(watch: str, softens: bool = False):
+    """Warp function ``look``, one sample of a placed chain: time series, frame and watch; returns the status.
+
+    Args:
+        watch: ``"rest"``, ``"steady"`` or ``"none"``.
+        softens: Whether the look may change the softness of the joints, see :mod:`events.softening`.
+
+    A look at a chain on its sprocket (``"steady"``) may also change its loads and the velocities of its links.
+    """
+    watches_rest = watch == "rest"
+    watches_steadiness = watch == "steady"
+
+    @wp.func
+    def look(
+        K: wp.array2d(dtype=wp.float64),
+        chain: Chain,
+        drive: Drive,
+        state: State,
+        record: Record,
+        control: Control,
+        world: int,
+        time: wp.float64,
+    ):
+        mark = state.next_sample[world]
+        last_time = state.last_sample[world, TIME]
+        is_first = last_time < ZERO
+        summary = summarise(K, chain)
+        write_sample(state, record, world, time, summary)
+        if mark % control.frame_every == wp.int64(0):
+            write_frame(record, K, chain, world, time)
+        passed = wp.int64(wp.floor(time / control.sample_interval))
+        state.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
+        if wp.static(softens and watches_rest):
+            watch_stiffening(state, drive, control, world, time)
+            watch_collapse(K, chain, state, control, world, time, is_first)
+        if wp.static(watches_rest):
+            return watch_rest(state, control, world, time, summary)
+        if wp.static(watches_steadiness):
+            if state.load_factor[world] > wp.float64(1.0):
+                rate = drag_rate(chain, state, drive, world, summary.height)
+                drag_shape(K, chain, wp.exp(-rate * (time - last_time)))
+            watch_steadiness(chain, state, drive, world, time, summary)
+            state.load_factor[world] = load_at(state, drive, world, time)
+        if wp.static(softens and watches_steadiness):
+            watch_drive(state, drive, control, world, time)
+        return RUNNING
+
+    return look

@@ -1,0 +1,45 @@
+"""A chain with softer joints: its values between its own, soft ones and the softest."""
+
+import warp as wp
+
+from warpchain.kernels.physics.elementary import ONE, ZERO
+from warpchain.kernels.types import Chain, Control
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def between(own: wp.float64, soft: wp.float64, softness: wp.float64):
+    """From a joint's own value to the lesser of that and a soft one, exact at both ends."""
+    least = wp.min(own, soft)
+    if softness <= ZERO or least == own:
+        return own
+    if softness >= ONE:
+        return least
+    return own * wp.pow(least / own, softness)
+
+
+@wp.func
+def on_scale(own: wp.float64, soft: wp.float64, softest: wp.float64, softness: wp.float64):
+    """A joint's value from its own at 0 over the soft one at 1 to the softest at 2."""
+    return between(between(own, soft, softness), softest, softness - ONE)
+
+
+@wp.func
+def softened(own: Chain, control: Control, softness: wp.float64) -> Chain:
+    """A chain whose joints have this softness, from one that has its own values."""
+    chain = own
+    chain.joint_stiffness = on_scale(own.joint_stiffness, control.soft_stiffness, control.softest_stiffness, softness)
+    chain.joint_damping = on_scale(own.joint_damping, control.soft_damping, control.softest_damping, softness)
+    chain.inverse_smoothing = between(own.inverse_smoothing, ONE / control.soft_smoothing, softness)
+    return chain
+
+
+@wp.func
+def is_stiffer(chain: Chain, other: Chain):
+    """Whether any value of a chain's joints is above the other's."""
+    return (
+        chain.joint_stiffness > other.joint_stiffness
+        or chain.joint_damping > other.joint_damping
+        or chain.inverse_smoothing > other.inverse_smoothing
+    )
