@@ -14,5 +14,5 @@ def shares_board(block_dim: int) -> bool:
 def board_rows(block_dim: int, columns: int) -> int:
     """Rows of this width for what a chain keeps of its board between launches, or for all of a board not shared."""
     if shares_board(block_dim):
-        return layout.BOARD_CHAIN
+        return layout.BOARD_VALUES
     return -(-layout.board_size(block_dim) // columns)

@@ -6,6 +6,8 @@ import warp as wp
 
 from tests.support.blocks_under_test import fibers
 from warpchain.engine.devices import start_device
+from warpchain.kernels import layout
+from warpchain.kernels.gpu.functions import board_rows, shares_board
 from warpchain.kernels.gpu.threads import barrier, block_maxima, tile_address, vec4i
 from warpchain.kernels.physics.elementary import order_bits_single
 
@@ -58,3 +60,14 @@ def test_all_threads_find_the_greatest_of_each_of_four() -> None:
         given = wp.array(numbers, dtype=vec4i, device=DEVICE)
         wp.launch_tiled(greatest_of_four, dim=[1], inputs=[given, found], block_dim=THREADS, device=DEVICE)
     np.testing.assert_array_equal(found.numpy(), np.tile(numbers.max(axis=0), (THREADS, 1)))
+
+
+@pytest.mark.parametrize(("threads", "links"), [(32, 8), (64, 60), (192, 180), (1024, 1000)])
+def test_scratch_holds_what_a_board_leaves_there(threads: int, links: int) -> None:
+    """Between launches a scratch block holds what a shared board cannot keep, or all of a board not shared."""
+    columns = layout.padded_width(links)
+    rows = board_rows(threads, columns)
+    if shares_board(threads):
+        assert rows == layout.BOARD_VALUES > layout.BOARD_LOST_SELF
+    else:
+        assert (rows - 1) * columns < layout.board_size(threads) <= rows * columns
