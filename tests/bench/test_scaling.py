@@ -15,7 +15,7 @@ from warpchain.bench.scaling import Run, different_walks, measure
 from warpchain.cli.main import main
 from warpchain.cli.terminal import print_scaling
 from warpchain.engine.processors import processors
-from warpchain.inputs.parameters import InputError
+from warpchain.inputs.validation import InputError
 from warpchain.run.sweep_run import sweep
 from warpchain.store.shards import empty_rows
 from warpchain.sweeps.plan import load_sweep

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from tests.support.table_1 import TABLE_1, UNCERTAIN
 from warpchain.inputs.distributions import DRAW_LIMIT, random_generator, sample_parameters, sample_scene
-from warpchain.inputs.parameters import InputError, Parameters, preset
+from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene
+from warpchain.inputs.validation import InputError
 
 
 @settings(max_examples=60, deadline=None)

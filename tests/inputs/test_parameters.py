@@ -9,9 +9,10 @@ from pydantic import BaseModel, ValidationError
 
 from tests.support.table_1 import TABLE_1
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import PRESETS, InputError, Parameters, preset
+from warpchain.inputs.parameters import PRESETS, Parameters, preset
 from warpchain.inputs.scene import Scene, check_scene, contact_radius, fewest_links, joint_radius
 from warpchain.inputs.setup import Setup, read_setup, resolve
+from warpchain.inputs.validation import InputError
 
 
 def refused(section: str, values: object) -> str:

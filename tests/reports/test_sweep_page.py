@@ -19,7 +19,7 @@ from PIL import Image
 from tests.support.made_sweeps import FIGURE_6, distance, make_sweep
 from tests.support.made_walks import make_unreleased, make_walk
 from warpchain.cli.main import main
-from warpchain.inputs.parameters import InputError
+from warpchain.inputs.validation import InputError
 from warpchain.reports import sweep_page
 from warpchain.reports.sweep_page import write_report
 from warpchain.status import Status

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from tests.support.sweep_content import UNIFORM, blocks, content
-from warpchain.inputs.parameters import PRESETS, InputError, preset
+from warpchain.inputs.parameters import PRESETS, preset
+from warpchain.inputs.validation import InputError
 from warpchain.run.sweep_run import on_device
 from warpchain.sweeps.plan import load_sweep
 

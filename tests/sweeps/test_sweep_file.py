@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content
-from warpchain.inputs.parameters import InputError
+from warpchain.inputs.validation import InputError
 from warpchain.sweeps import designs
 from warpchain.sweeps.plan import CELL_LIMIT, load_sweep
 

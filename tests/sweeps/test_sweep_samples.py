@@ -12,9 +12,9 @@ from scipy import stats
 
 from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content, drawn
 from warpchain.inputs.distributions import Gaussian, Uniform, random_generator, sample_parameters, sample_scene
-from warpchain.inputs.parameters import Bounds, InputError
 from warpchain.inputs.scene import check_scene, fewest_links
 from warpchain.inputs.setup import resolve
+from warpchain.inputs.validation import Bounds, InputError
 from warpchain.run.single_walk import setup_walk
 from warpchain.sweeps.designs import design_points, saltelli_outputs, sobol_indices
 from warpchain.sweeps.plan import Sweep, load_sweep

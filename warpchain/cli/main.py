@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except OSError as error:
         _refuse(str(error))
     except ValueError as error:
-        from warpchain.inputs.parameters import InputError
+        from warpchain.inputs.validation import InputError
 
         if not isinstance(error, InputError):
             raise
@@ -235,7 +235,7 @@ def _given_values(named: Mapping[str, str], assignments: Sequence[str]) -> Secti
     Raises:
         InputError: an assignment is not of that form, its name is unknown, or a name is given twice.
     """
-    from warpchain.inputs.parameters import InputError, shown
+    from warpchain.inputs.validation import InputError, shown
 
     pairs = list(named.items())
     for assignment in assignments:
@@ -272,8 +272,9 @@ def _located(name: str) -> tuple[str, str]:
         InputError: there is no such field.
     """
     from warpchain.inputs.options import Options
-    from warpchain.inputs.parameters import InputError, Parameters, shown, suggestion
+    from warpchain.inputs.parameters import Parameters
     from warpchain.inputs.scene import Scene
+    from warpchain.inputs.validation import InputError, shown, suggestion
 
     fields = {
         "parameters": list(Parameters.model_fields),
@@ -296,7 +297,7 @@ def _parsed(path: str, text: str) -> Any:
     """
     import yaml
 
-    from warpchain.inputs.parameters import InputError, shown
+    from warpchain.inputs.validation import InputError, shown
     from warpchain.inputs.yaml_files import Loader
 
     try:
@@ -311,8 +312,8 @@ def _setup(config: Path | None, preset: str | None, given: Sections, seed: int |
     Raises:
         InputError: something is refused; one line with the field's path and the remedy.
     """
-    from warpchain.inputs.parameters import InputError
     from warpchain.inputs.setup import read_setup, resolve
+    from warpchain.inputs.validation import InputError
     from warpchain.run.single_walk import setup_walk
 
     file_preset, sections = read_setup(config) if config is not None else ("paper", {name: {} for name in given})
@@ -335,7 +336,7 @@ def _frame_interval(output: Path | None, animation: str | None, text: str | None
     """
     from importlib.util import find_spec
 
-    from warpchain.inputs.parameters import InputError, shown
+    from warpchain.inputs.validation import InputError, shown
 
     for option, value in (("--animate", animation), ("--frame-interval", text)):
         if value is not None and output is None:

@@ -123,7 +123,7 @@ def report(
     ] = None,
 ) -> None:
     """Write one self-contained HTML page: figures, table, parameters, provenance, failed walks, a walk in motion."""
-    from warpchain.inputs.parameters import InputError
+    from warpchain.inputs.validation import InputError
     from warpchain.reports.sweep_page import write_report
 
     if device is not None and walk is None:
@@ -156,7 +156,7 @@ def _device_of_gpus(scheduler: str | None, workers: int | None, device: str | No
     Raises:
         InputError: another option contradicts --gpus.
     """
-    from warpchain.inputs.parameters import InputError
+    from warpchain.inputs.validation import InputError
 
     for name, value in (("--scheduler", scheduler), ("--workers", workers)):
         if value is not None:
@@ -185,7 +185,7 @@ def _dask(address: str | None) -> "Iterator[tuple[Executor | None, int | None]]"
     if address is None:
         yield None, None
         return
-    from warpchain.inputs.parameters import InputError, shown
+    from warpchain.inputs.validation import InputError, shown
 
     try:
         from distributed import Client

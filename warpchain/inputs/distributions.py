@@ -15,8 +15,9 @@ from typing import Final
 
 import numpy as np
 
-from warpchain.inputs.parameters import Bounds, InputError, Parameters, shown, validated
+from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
+from warpchain.inputs.validation import Bounds, InputError, shown, validated
 
 CLEARANCE_RANGE: Final = (0.005, 0.015)
 """Interval of the release height that a sample draws from, in m."""

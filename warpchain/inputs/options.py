@@ -7,7 +7,7 @@ from typing import Final, Literal, Self, get_args
 
 from pydantic import BaseModel, Field, field_validator, model_validator
 
-from warpchain.inputs.parameters import STRICT, refusal, shown, suggestion
+from warpchain.inputs.validation import STRICT, refusal, shown, suggestion
 
 LONGEST_DRIVE_INTERVAL: Final = 2e-3
 """Greatest time [s] between two of the small steps in which soft joints become stiff, or multiplied loads fall."""

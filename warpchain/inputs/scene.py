@@ -5,7 +5,8 @@ from typing import Final, Literal, Self
 
 from pydantic import BaseModel, Field, field_validator, model_validator
 
-from warpchain.inputs.parameters import STRICT, InputError, Parameters, refusal
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.validation import STRICT, InputError, refusal
 
 MOST_LINKS: Final = 100_000
 """A chain of so many takes 0.4 GB, and kernels of its own."""

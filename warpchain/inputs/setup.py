@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options
-from warpchain.inputs.parameters import InputError, Parameters, shown, suggestion, validated
+from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import Scene, check_links_on_gpu, check_scene
+from warpchain.inputs.validation import InputError, shown, suggestion, validated
 from warpchain.inputs.yaml_files import read_yaml
 
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import yaml
 
-from warpchain.inputs.parameters import DIMENSIONLESS, InputError
+from warpchain.inputs.validation import DIMENSIONLESS, InputError
 from warpchain.reports.html_page import page, picture, table
 from warpchain.reports.statistics import axis_symbol, cell_text, number_text
 from warpchain.status import Status

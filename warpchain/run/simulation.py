@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import InputError, Parameters, preset, shown, validated
+from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import check_links_on_gpu
+from warpchain.inputs.validation import InputError, shown, validated
 from warpchain.status import Status
 from warpchain.walks.walk_result import Trajectory
 

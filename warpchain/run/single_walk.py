@@ -13,9 +13,10 @@ from warpchain.engine.batch import Batch
 from warpchain.engine.devices import versions
 from warpchain.inputs.distributions import random_generator, sample_parameters, sample_scene
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import InputError, Parameters, shown, suggestion, validated
+from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, check_scene, contact_radius
 from warpchain.inputs.setup import Setup, resolve
+from warpchain.inputs.validation import InputError, shown, suggestion, validated
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.walks.recorder import EVERYTHING

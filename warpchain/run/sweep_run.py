@@ -17,8 +17,8 @@ from typing import Any, Protocol
 from warpchain.engine.kernel_choice import shared_threads
 from warpchain.engine.processors import processors
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import InputError, validated
 from warpchain.inputs.setup import Setup
+from warpchain.inputs.validation import InputError, validated
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder, empty_rows, read_shard, write_shard
 from warpchain.store.shards import shard_name

@@ -18,9 +18,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, Gaussian, draw, placed, random_generator
-from warpchain.inputs.parameters import PRESETS, InputError, validated
+from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.scene import Scene, check_scene
 from warpchain.inputs.setup import Setup, resolve
+from warpchain.inputs.validation import InputError, validated
 from warpchain.sweeps.designs import design_points, saltelli_points, walks_per_sample
 from warpchain.sweeps.recording import Keep, Recording
 from warpchain.sweeps.sweep_file import SECTIONS, VERSION, BlockPlan, Value, read_sweep

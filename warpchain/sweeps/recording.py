@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import InputError
+from warpchain.inputs.validation import InputError
 
 SERIES_INTERVAL: Final = 1e-3
 """Default time [s] between two samples of a series."""

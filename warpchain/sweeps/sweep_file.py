@@ -17,8 +17,9 @@ from pydantic import BaseModel, ValidationError
 
 from warpchain.inputs.distributions import TABLE, Distribution, Gaussian, Uniform, physical_values
 from warpchain.inputs.options import METHODS_BY_NEED, Options
-from warpchain.inputs.parameters import InputError, Parameters, preset, shown, suggestion, validated
+from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene
+from warpchain.inputs.validation import InputError, shown, suggestion, validated
 from warpchain.inputs.yaml_files import read_yaml
 from warpchain.sweeps.designs import SAMPLERS, check_design
 from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL, Choice, Recording

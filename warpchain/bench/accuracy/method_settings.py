@@ -6,7 +6,7 @@ from typing import Final, Self
 
 from warpchain.bench.problems.work_precision import methods
 from warpchain.inputs.options import METHODS_BY_NEED, Options
-from warpchain.inputs.parameters import InputError, shown, suggestion, validated
+from warpchain.inputs.validation import InputError, shown, suggestion, validated
 
 SWITCHES: Final = tuple(
     name for name, field in Options.model_fields.items() if field.annotation is bool and field.default is False
