@@ -12,7 +12,8 @@ import yaml
 from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps import designs
-from warpchain.sweeps.plan import CELL_LIMIT, load_sweep
+from warpchain.sweeps.plan import load_sweep
+from warpchain.sweeps.sweep_file import CELL_LIMIT
 
 
 def test_values_and_layout() -> None:

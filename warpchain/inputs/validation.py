@@ -72,6 +72,29 @@ def validated(model: type[ModelT], values: Mapping[str, object], path: str) -> M
         raise InputError(_described(first, model, path) + count) from None
 
 
+def checked_whole(value: object, path: str, least: int, most: int) -> int:
+    """The value, if it is a whole number in [least, most].
+
+    Raises:
+        InputError: it is not; the message begins with `path`.
+    """
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        limit = f"2**{most.bit_length()} - 1" if most > 2**64 else str(most)
+        raise InputError(f"{path}: {shown(value)} is no whole number from {least} to {limit}; give one")
+    return value
+
+
+def checked_positive(value: object, path: str) -> float:
+    """The value, if it is a positive finite number.
+
+    Raises:
+        InputError: it is not; the message begins with `path`.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
+        raise InputError(f"{path}: {shown(value)} is no positive number; give one")
+    return value
+
+
 def suggestion(given: object, known: Iterable[str]) -> str:
     """The remedy for an unknown name: the closest known one, or all of them."""
     names = list(known)
@@ -110,7 +133,7 @@ _LIMITS: Final = {
 def _problem(error: ErrorDetails, field: FieldInfo, name: str) -> str:
     """What is wrong with the value of a known field, in the words of the field's own unit, and the remedy."""
     kind, given, value = error["type"], error["input"], shown(error["input"])
-    unit = _unit(field)
+    unit = field_unit(field)
     in_unit = "" if unit == DIMENSIONLESS else f" {unit}"
     number = "whole number" if field.annotation is int else "plain number"
     number += f" in{in_unit}" if in_unit else ""
@@ -137,7 +160,7 @@ def _problem(error: ErrorDetails, field: FieldInfo, name: str) -> str:
             return str(error["msg"])
 
 
-def _unit(field: FieldInfo) -> str:
+def field_unit(field: FieldInfo) -> str:
     """Unit of a field: that of its metadata (a `Quantity`), or `unit` in its JSON schema extra."""
     for metadata in field.metadata:
         if hasattr(metadata, "unit"):
