@@ -7,7 +7,7 @@ from typing import Final, Literal, Self, get_args
 
 from pydantic import BaseModel, Field, field_validator, model_validator
 
-from warpchain.inputs.validation import STRICT, refusal, shown, suggestion
+from warpchain.inputs.validation import STRICT, number_field, refusal, shown, suggestion
 
 LONGEST_DRIVE_INTERVAL: Final = 2e-3
 """Greatest time [s] between two of the small steps in which soft joints become stiff, or multiplied loads fall."""
@@ -58,94 +58,60 @@ class Options(BaseModel):
         "3(2) for long stable steps, RODAS5P 5(4), which is implicit; "
         "hybrid: rigid joints between impulses, os32 around them",
     )
-    tolerance: float = Field(
-        default=1e-6,
+    tolerance: float = number_field(
+        1e-6,
+        "1",
+        "error allowed in a step, absolute (SI units) and relative alike; of method hybrid 1e-4 by default",
         ge=1e-13,
         le=1e-1,
-        description="error allowed in a step, absolute (SI units) and relative alike; of method hybrid 1e-4 by default",
-        json_schema_extra={"unit": "1"},
     )
-    soft_tolerance: float | None = Field(
-        default=None,
+    soft_tolerance: float | None = number_field(
+        None,
+        "1",
+        "the same where soften_drive or soften_pile has made joints soft or softest; null: tolerance",
         ge=1e-13,
         le=1e-1,
-        description="the same where soften_drive or soften_pile has made joints soft or softest; null: tolerance",
-        json_schema_extra={"unit": "1"},
     )
-    flight_tolerance: float = Field(
-        default=1e-3,
+    flight_tolerance: float = number_field(
+        1e-3,
+        "1",
+        "of method hybrid: error allowed in a step between impulses, where joints are taken for rigid",
         ge=1e-13,
         le=1e-1,
-        description="of method hybrid: error allowed in a step between impulses, where joints are taken for rigid",
-        json_schema_extra={"unit": "1"},
     )
     controller: Literal["standard", "pi"] = Field(
         default="standard",
         description="rule for the next step: from this error alone, or proportional–integral; "
         "implicit methods have one of the latter kind for both",
     )
-    contact_step: float = Field(
-        default=2e-5,
-        gt=0,
-        description="longest step near a contact; bounds how deep circles sink in before a contact is seen",
-        json_schema_extra={"unit": "s"},
+    contact_step: float = number_field(
+        2e-5, "s", "longest step near a contact; bounds how deep circles sink in before a contact is seen", gt=0
     )
-    soft_contact_step: float = Field(
-        default=5e-5,
-        gt=0,
-        description="longest step near a contact where soften_drive makes joints soft, or soften_pile softest, unless "
+    soft_contact_step: float = number_field(
+        5e-5,
+        "s",
+        "longest step near a contact where soften_drive makes joints soft, or soften_pile softest, unless "
         "contact_step is longer; long or slow loops take shorter ones just before the release",
-        json_schema_extra={"unit": "s"},
-    )
-    skin: float = Field(
-        default=2e-3,
         gt=0,
-        description="margin of the neighbour list; the list lasts until some joint has moved half of it",
-        json_schema_extra={"unit": "m"},
     )
-    step_limit: int = Field(
-        default=2_000_000_000,
-        ge=1,
-        le=10**15,
-        description="most steps tried in one walk, accepted and rejected",
-        json_schema_extra={"unit": "1"},
+    skin: float = number_field(
+        2e-3, "m", "margin of the neighbour list; the list lasts until some joint has moved half of it", gt=0
     )
-    smallest_step: float = Field(
-        default=1e-12,
-        gt=0,
-        description="a step that has to be shorter than this ends the walk",
-        json_schema_extra={"unit": "s"},
-    )
+    step_limit: int = number_field(2_000_000_000, "1", "most steps attempted in one walk", ge=1, le=10**15)
+    smallest_step: float = number_field(1e-12, "s", "a step that has to be shorter than this ends the walk", gt=0)
     self_contact: bool = Field(default=True, description="whether links of the chain can touch one another")
-    rest_speed: float = Field(
-        default=0.02,
-        gt=0,
-        description="a chain is slow while its centre of mass and its links (rms) are both below this speed",
-        json_schema_extra={"unit": "m/s"},
+    rest_speed: float = number_field(
+        0.02, "m/s", "a chain is slow while its centre of mass and its links (rms) are both below this speed", gt=0
     )
-    rest_time: float = Field(
-        default=0.05,
-        gt=0,
-        description="a chain that has been slow for this long is at rest",
-        json_schema_extra={"unit": "s"},
-    )
-    record_interval: float = Field(
-        default=1e-3,
-        ge=1e-6,
-        description="time between two recorded points of the centre of mass",
-        json_schema_extra={"unit": "s"},
-    )
+    rest_time: float = number_field(0.05, "s", "a chain that has been slow for this long is at rest", gt=0)
+    record_interval: float = number_field(1e-3, "s", "time between two samples of a walk", ge=1e-6)
     soften_pile: bool = Field(
         default=False,
         description="whether the joints of a walking loop that has collapsed become soft, and softest once it encloses "
         "half of soften_area",
     )
-    soften_area: float = Field(
-        default=0.9,
-        gt=0,
-        lt=1,
-        description="a loop has collapsed when it encloses less than this fraction of its area at the release",
-        json_schema_extra={"unit": "1"},
+    soften_area: float = number_field(
+        0.9, "1", "a loop has collapsed when it encloses less than this fraction of its area at the release", gt=0, lt=1
     )
     soften_drive: bool = Field(
         default=False,

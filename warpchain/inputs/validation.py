@@ -9,9 +9,9 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Final, TypeVar, get_args
+from typing import Any, Final, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticCustomError
 
@@ -43,6 +43,18 @@ class Bounds:
         """Whether `value` is finite and inside the interval."""
         above = value >= self.lower if self.lower_included else value > self.lower
         return math.isfinite(value) and above and value <= self.upper
+
+
+def number_field(default: float | None, unit: str, description: str, **limits: float) -> Any:
+    """A pydantic field that holds a number.
+
+    Args:
+        default: its default, in `unit`.
+        unit: SI unit, `DIMENSIONLESS` for pure numbers.
+        description: its meaning, in one line.
+        limits: `ge`, `gt`, `le` or `lt`, as of `pydantic.Field`.
+    """
+    return Field(default=default, description=description, json_schema_extra={"unit": unit}, **limits)  # type: ignore
 
 
 def refusal(field: str, message: str) -> PydanticCustomError:

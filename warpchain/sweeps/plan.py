@@ -9,14 +9,15 @@ the order in which walks are asked for nor who asks changes them.
 
 import bisect
 import hashlib
-import itertools
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, random_generator
+import numpy as np
+
+from warpchain.inputs.distributions import DRAW_LIMIT, draw, random_generator
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.setup import Setup
@@ -97,15 +98,11 @@ class Sweep:
         if not block.drawn:
             return PlannedWalk(index, number, cell, sample, fixed, {})
         row, member = divmod(sample, walks_per_sample(block.sampler, len(block.drawn)))
-        distributions, stream = block.placed(fixed), self._stream(block, cell)
-        candidates = self._random(block, stream, row, distributions)
-        if block.sampler != "random":
-            candidates = itertools.chain([self._designed(block, stream, row, distributions)], candidates)
-        points, setups = _first_possible(block, fixed, candidates)
+        points, setups = self._first_possible(block, cell, fixed, row, designed=block.sampler != "random")
         return PlannedWalk(index, number, cell, sample, setups[member], points[member])
 
     def undrawn(self, indices: Iterable[int]) -> Iterator[PlannedWalk]:
-        """Walks before anything is drawn for them, which takes most of the time: options and links are theirs already.
+        """Walks without their draws, which take most of the time; options and number of links never depend on them.
 
         Raises:
             IndexError: there is no such walk.
@@ -123,12 +120,8 @@ class Sweep:
             raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
         number = bisect.bisect_right(self.blocks, index, key=lambda block: block.first) - 1
         block = self.blocks[number]
-        rest, sample = divmod(index - block.first, block.samples)
-        places = []
-        for values in reversed(block.axes.values()):
-            rest, place = divmod(rest, len(values))
-            places.append(place)
-        return number, tuple(reversed(places)), sample
+        *cell, sample = (int(place) for place in np.unravel_index(index - block.first, block.shape))
+        return number, tuple(cell), sample
 
     def keep(self, walk: PlannedWalk) -> Keep:
         """What is kept of the motion of a walk."""
@@ -168,31 +161,42 @@ class Sweep:
                         )
                 for name, choice in self.recording.choices.items():
                     choice.steps(fixed.options, f"sweep.record.{name}")
-                distributions = block.placed(fixed)
-                for name, distribution in distributions.items():
+                for name, distribution in block.placed(fixed).items():
                     if distribution.share() < LEAST_SHARE:
                         raise InputError(
                             f"{block.path}.distributions.{name}: less than {LEAST_SHARE:.0%} of the draws "
                             f"{distribution.described('')} are physical; give a uniform distribution"
                         )
-                _first_possible(block, fixed, self._random(block, self._stream(block, cell), 0, distributions))
+                self._first_possible(block, cell, fixed, 0, designed=False)
 
-    def _designed(self, block: Block, stream: int, row: int, distributions: Mapping[str, Distribution]) -> list[Point]:
-        """The designed sample `row` of a cell: a point for each of its walks."""
-        matrix = design_points(block.sampler, self.seed, stream, block.samples_given, len(distributions))
-        fractions = iter(matrix[row].tolist())
-        return _walks_of(
-            block,
-            lambda: {name: spread.quantile(next(fractions)) for name, spread in distributions.items()},
-        )
+    def _first_possible(
+        self, block: Block, cell: tuple[int, ...], fixed: Setup, row: int, *, designed: bool
+    ) -> tuple[list[Point], list[Setup]]:
+        """The first candidate for sample `row` of a cell all of whose walks are possible, and their setups.
 
-    def _random(
-        self, block: Block, stream: int, row: int, distributions: Mapping[str, Distribution]
+        Raises:
+            InputError: there is none.
+        """
+        problem = ""
+        for points in self._candidates(block, cell, fixed, row, designed):
+            try:
+                return points, [fixed.with_drawn(point) for point in points]
+            except InputError as error:
+                problem = str(error)
+        raise InputError(f"{block.path}.distributions: {DRAW_LIMIT} samples made no possible walk; the last: {problem}")
+
+    def _candidates(
+        self, block: Block, cell: tuple[int, ...], fixed: Setup, row: int, designed: bool
     ) -> Iterator[list[Point]]:
-        """Random samples for the place of sample `row` of a cell, each a point for each of its walks."""
+        """Candidates for sample `row` of a cell, a point for each of its walks: the designed one, then random ones."""
+        distributions, stream = block.placed(fixed), self._stream(block, cell)
+        if designed:
+            matrix = design_points(block.sampler, self.seed, stream, block.samples_given, len(distributions))
+            fractions = iter(matrix[row].tolist())
+            yield _points(block, lambda: {name: each.quantile(next(fractions)) for name, each in distributions.items()})
         rng = random_generator(self.seed, stream, row)
         for _ in range(DRAW_LIMIT):
-            yield _walks_of(block, lambda: draw(distributions, rng))
+            yield _points(block, lambda: draw(distributions, rng))
 
     def _stream(self, block: Block, cell: tuple[int, ...]) -> int:
         """Number of a cell's stream: cells are counted through all blocks, without the axes of equal samples."""
@@ -247,21 +251,6 @@ def load_sweep(source: "str | os.PathLike[str] | Mapping[str, object] | Sweep") 
     return sweep
 
 
-def _walks_of(block: Block, point: Callable[[], Point]) -> list[Point]:
-    """The points of a sample's walks; `point` makes the next one."""
+def _points(block: Block, point: Callable[[], Point]) -> list[Point]:
+    """The points of a sample's walks; `point` makes the next independent one."""
     return saltelli_points(point(), point()) if block.sampler == "saltelli" else [point()]
-
-
-def _first_possible(block: Block, fixed: Setup, candidates: Iterable[list[Point]]) -> tuple[list[Point], list[Setup]]:
-    """The first candidate for a sample all of whose walks are possible, and their setups.
-
-    Raises:
-        InputError: there is none.
-    """
-    problem = ""
-    for points in candidates:
-        try:
-            return points, [fixed.with_drawn(point) for point in points]
-        except InputError as error:
-            problem = str(error)
-    raise InputError(f"{block.path}.distributions: {DRAW_LIMIT} samples made no possible walk; the last: {problem}")
