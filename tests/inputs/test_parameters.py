@@ -1,6 +1,8 @@
 """Parameters, scene and options: values and refusals."""
 
 import math
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -8,11 +10,13 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from tests.support.table_1 import TABLE_1
+from warpchain.inputs.methods import METHODS_BY_NEED
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters, preset
 from warpchain.inputs.scene import Scene, check_scene, contact_radius, fewest_links, joint_radius
 from warpchain.inputs.setup import Setup, read_setup, resolve
 from warpchain.inputs.validation import InputError
+from warpchain.kernels.methods.method import find_method, method_names
 
 
 def refused(section: str, values: object) -> str:
@@ -224,9 +228,19 @@ def test_scene_upper_bounds(name: str, greatest: float, message: str) -> None:
         (
             "options",
             {"method": "rk45"},
-            "options.method: 'rk45' is unknown; give one of standard, explicit, reference, rkf78, dp5, bs32, os32, "
-            "rodas5p, hybrid",
+            f"options.method: 'rk45' is unknown; give one of {', '.join((*METHODS_BY_NEED, *method_names()))}",
         ),
+        ("options", {"method": "rodas4p"}, "options.method: 'rodas4p' was removed; give rodas5p"),
+        *[
+            (
+                "options",
+                {"method": method, "device": device},
+                f"options.method: {method!r} runs on a CPU only; give explicit, or device: cpu",
+            )
+            for method in method_names()
+            if not find_method(method).runs_on_gpus
+            for device in ("cuda", "cuda:1")
+        ],
         ("options", {"tolerance": 1e-14}, "options.tolerance: 1e-14 is less than 1e-13; give 1e-13 or more"),
         ("options", {"tolerance": 0.2}, "options.tolerance: 0.2 is greater than 0.1; give 0.1 or less"),
         ("options", {"controller": "pid"}, "options.controller: 'pid' is unknown; did you mean pi?"),
@@ -293,6 +307,31 @@ def test_contact_and_pitch_radius() -> None:
     assert joint_radius(contact, parameters) == pytest.approx(5.98e-2, rel=1e-14)
     assert contact_radius(pitch, parameters) == pytest.approx(5.14e-2, rel=1e-14)
     assert joint_radius(pitch, parameters) == 5.56e-2
+
+
+def test_a_new_tableau_is_a_method() -> None:
+    """What is added to the kernels' tables is taken for `method`, and named in its description and in the help."""
+    program = (
+        "from dataclasses import replace\n"
+        "from warpchain.kernels.methods.explicit_tableaus import BS32, TABLEAUS\n"
+        "TABLEAUS['new32'] = replace(BS32, name='new32', title='a new method 3(2)')\n"
+        "from warpchain.cli.main import main\n"
+        "from warpchain.inputs.options import Options\n"
+        "print(Options(method='new32', device='cuda').method)\n"
+        "print('new32: a new method 3(2)' in Options.model_fields['method'].description)\n"
+        "main(['walk', '--help'])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, encoding="utf-8")
+    assert done.stderr == "" and done.stdout.startswith("new32\nTrue\n")
+    assert "new32: a new method" in done.stdout
+
+
+def test_methods_that_a_gpu_has_no_kernel_for_are_refused_there() -> None:
+    """There are some, `standard` is not among the methods that are refused, and the word that is named is taken."""
+    assert {"hybrid", "rodas5p"} == {name for name in method_names() if not find_method(name).runs_on_gpus}
+    for word in METHODS_BY_NEED:
+        assert find_method(Options(method=word, device="cuda").method).runs_on_gpus
+    assert Options(device="cuda") == Options(method="explicit", device="cuda")
 
 
 def test_hybrid_alone_has_the_tolerance_that_it_is_made_for() -> None:

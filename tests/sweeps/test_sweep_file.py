@@ -150,6 +150,15 @@ def test_from_a_file(tmp_path: Path) -> None:
             content(options={"method": "rk4"}),
             "sweep.options.method: 'rk4' is unknown; give one of standard, explicit, reference,",
         ),
+        (content(options={"method": "rodas4p"}), "sweep.options.method: 'rodas4p' was removed; give rodas5p"),
+        (
+            content(options={"device": "cuda", "method": "rodas5p"}),
+            "sweep.options.method: 'rodas5p' runs on a CPU only; give explicit, or device: cpu",
+        ),
+        (
+            content(options={"device": "cuda"}, grid={"method": ["os32", "hybrid"]}),
+            "sweep.grid.method[1]: 'hybrid' runs on a CPU only; give explicit, or device: cpu",
+        ),
         (content(parameters={"outer_mass": 0}), "sweep.parameters.outer_mass: 0 is not greater than 0 kg"),
         (content(record={"serie": True}), "sweep.record.serie: unknown key; did you mean series"),
         (content(record=[1]), "sweep.record: [1] is not a mapping"),

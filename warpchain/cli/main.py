@@ -18,6 +18,7 @@ import typer
 from warpchain.cli.bench_commands import bench_app
 from warpchain.cli.speed_commands import bench
 from warpchain.cli.sweep_commands import add_commands
+from warpchain.inputs.methods import METHODS
 
 if TYPE_CHECKING:
     from warpchain.inputs.setup import Setup
@@ -118,8 +119,8 @@ def walk(
         typer.Option(
             metavar="NAME",
             help="standard: hybrid at 1e-3, joints softened on the sprocket and in the pile, on a GPU the next; "
-            "explicit: os32 at 1e-3, softened likewise; reference: rkf78 at 1e-6, as in the paper; or an integrator: "
-            "rkf78, dp5, bs32, os32, rodas5p (implicit), hybrid (rigid flight). Default: standard.",
+            "explicit: os32 at 1e-3, softened likewise; reference: rkf78 at 1e-6, as in the paper; or an integrator, "
+            f"{'; '.join(f'{name}: {title}' for name, title in METHODS.items())}. Default: standard.",
         ),
     ] = None,
     tolerance: Annotated[

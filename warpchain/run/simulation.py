@@ -51,7 +51,7 @@ def simulate(
         floor: Whether there is a floor at y = 0.
         gravity: Whether gravity acts.
         self_contact: Whether links touch one another.
-        method: ``"rkf78"``, ``"dp5"``, ``"bs32"``, ``"os32"``, ``"rodas5p"`` or ``"hybrid"``.
+        method: A key of ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
         tolerance: See :func:`walk`.
         device: ``"cpu"``, ``"cuda"`` (the first GPU) or ``"cuda:N"``.
         settings: Any other field of :class:`Options` by its name.

@@ -71,8 +71,7 @@ def walk(
         preset: ``"paper"`` (Table 1) or ``"soft"`` (softer joints, 10 to 15 times fewer steps).
         method: ``"standard"`` (``"hybrid"`` at 1e-3, with joints softened on the sprocket and in the pile; on a GPU
             the next), ``"explicit"`` (``"os32"`` at 1e-3, softened likewise), ``"reference"`` (``"rkf78"`` at 1e-6, as
-            in the paper), or an integrator: ``"rkf78"``, ``"dp5"``, ``"bs32"``, ``"os32"``,
-            ``"rodas5p"`` or ``"hybrid"``.
+            in the paper), or an integrator: a key of ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
         tolerance: Error allowed in a step, absolute (SI units) and relative alike; None: the method's, 1e-6 for an
             integrator, 1e-4 for ``"hybrid"``, and of ``"standard"`` and ``"explicit"`` 3e-3 while joints are soft.
         start: ``"rest"``, ``"spinning"`` or ``"ellipse"``.

@@ -24,7 +24,7 @@ from warpchain.inputs.distributions import (
     Uniform,
     physical_values,
 )
-from warpchain.inputs.options import METHODS_BY_NEED
+from warpchain.inputs.methods import METHODS_BY_NEED
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.setup import SECTION_OF, SECTIONS

@@ -166,7 +166,7 @@ class Point:
 
 def methods() -> tuple[str, ...]:
     """Every method that the options know, the reference first."""
-    return tuple(get_args(Options.model_fields["method"].annotation))
+    return method_names()
 
 
 def make_problem(name: str, links: int) -> Problem:
