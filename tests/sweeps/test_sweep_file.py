@@ -172,6 +172,10 @@ def test_from_a_file(tmp_path: Path) -> None:
             "sweep.record.series.interval: 0 is no positive number; give one",
         ),
         (
+            content(record={"series": {"interval": 10**400}}),
+            "sweep.record.series.interval: 1000",
+        ),
+        (
             content(record={"series": {"interval": "1 ms"}}),
             "sweep.record.series.interval: '1 ms' is no positive number",
         ),

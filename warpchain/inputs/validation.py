@@ -7,6 +7,7 @@ into such lines.
 import difflib
 import math
 import re
+import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, TypeVar, get_args
@@ -96,14 +97,14 @@ def checked_whole(value: object, path: str, least: int, most: int) -> int:
     return value
 
 
-def checked_positive(value: object, path: str) -> float:
+def checked_positive(value: object, path: str, kind: str = "number") -> float:
     """The value, if it is a positive finite number.
 
     Raises:
-        InputError: it is not; the message begins with `path`.
+        InputError: it is not; the message begins with `path` and asks for a `kind`.
     """
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
-        raise InputError(f"{path}: {shown(value)} is no positive number; give one")
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= sys.float_info.max:
+        raise InputError(f"{path}: {shown(value)} is no positive {kind}; give one")
     return value
 
 
