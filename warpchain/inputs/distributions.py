@@ -17,8 +17,8 @@ import numpy as np
 
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.setup import SECTION_OF, Setup
-from warpchain.inputs.validation import Bounds, InputError, checked_whole
+from warpchain.inputs.setup import SECTION_OF, SECTIONS, Setup
+from warpchain.inputs.validation import DIMENSIONLESS, Bounds, InputError, checked_whole, field_bounds, field_unit
 
 CLEARANCE_RANGE: Final = (0.005, 0.015)
 """Interval of the release height that a sample draws from, in m."""
@@ -137,20 +137,7 @@ def _between(lower: float, upper: float, fraction: float) -> float:
 
 def physical_values(name: str) -> Bounds:
     """The physical values of a quantity of `DRAWABLE`."""
-    quantities = Parameters.quantities()
-    if name in quantities:
-        return quantities[name].bounds
-    lower, upper, lower_included = -math.inf, math.inf, True
-    for limit in Scene.model_fields[name].metadata:
-        if hasattr(limit, "ge"):
-            lower = float(limit.ge)
-        if hasattr(limit, "gt"):
-            lower, lower_included = float(limit.gt), False
-        if hasattr(limit, "le"):
-            upper = float(limit.le)
-        if hasattr(limit, "lt"):
-            upper = math.nextafter(limit.lt, -math.inf)
-    return Bounds(lower, upper, lower_included)
+    return field_bounds(SECTIONS[SECTION_OF[name]].model_fields[name])
 
 
 def _table() -> dict[str, Distribution]:
@@ -208,10 +195,11 @@ def _physical_draw(name: str, distribution: Distribution, rng: np.random.Generat
         value = distribution.draw(rng)
         if distribution.bounds.admit(value):
             return value
-    quantity = Parameters.quantities().get(name)
-    unit = f" {quantity.unit}" if quantity else ""
+    section = SECTION_OF[name]
+    unit = field_unit(SECTIONS[section].model_fields[name])
+    described = distribution.described("" if unit == DIMENSIONLESS else f" {unit}")
     raise InputError(
-        f"{SECTION_OF[name]}.{name}: {DRAW_LIMIT} draws {distribution.described(unit)} were all outside the physical "
+        f"{section}.{name}: {DRAW_LIMIT} draws {described} were all outside the physical "
         "bounds; give a mean inside them"
     )
 

@@ -1,50 +1,60 @@
 """Physical parameters of a roller chain: Table 1 of the paper, each quantity declared once.
 
-Every field of `Parameters` carries a `Quantity`: symbol, unit, value and uncertainty in Table 1, physical
-bounds and origin. Presets, error messages and the random samples of `warpchain.inputs.distributions` all read it.
+Every field of `Parameters` carries a `Quantity`: symbol, unit, value and uncertainty in Table 1, physical bounds and
+origin. Presets, error messages and the samples of `warpchain.inputs.distributions` are derived from it.
 
 Source: "A walking roller chain", Table 1, unless a quantity says otherwise.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Any, Final, Literal, Self
 
-from pydantic import BaseModel, GetCoreSchemaHandler, model_validator
-from pydantic_core import CoreSchema, core_schema
+from pydantic import BaseModel, model_validator
 
-from warpchain.inputs.validation import DIMENSIONLESS, STRICT, Bounds, InputError, refusal, shown, validated
+from warpchain.inputs.validation import (
+    DIMENSIONLESS,
+    STRICT,
+    Bounds,
+    InputError,
+    field_bounds,
+    number_field,
+    refusal,
+    shown,
+    validated,
+)
 
 Source = Literal["measured", "looked up", "adjusted", "assumed"]
 
-FRACTION: Final = Bounds(0.0, 1.0)
-SIGNED_FRACTION: Final = Bounds(-1.0, 1.0)
-LENGTH: Final = Bounds(1e-9, 1e3)
+Limits = Mapping[str, float]
+
+FRACTION: Final[Limits] = {"ge": 0.0, "le": 1.0}
+SIGNED_FRACTION: Final[Limits] = {"ge": -1.0, "le": 1.0}
+LENGTH: Final[Limits] = {"ge": 1e-9, "le": 1e3}
 """From a few atoms to a kilometre: like the next ones far beyond any chain, and small enough for squares and ratios."""
-MASS: Final = Bounds(0.0, 1e6, lower_included=False)
-INERTIA: Final = Bounds(0.0, 1e12, lower_included=False)
-"""That of the greatest mass at the greatest length."""
-TORQUE: Final = Bounds(0.0, 1e9)
-GRAVITY: Final = Bounds(0.0, 1e6)
+MASS: Final[Limits] = {"gt": 0.0, "le": 1e6}
+INERTIA: Final[Limits] = {"gt": 0.0, "le": 1e12}
+"""Up to that of the greatest mass at the greatest length."""
+TORQUE: Final[Limits] = {"ge": 0.0, "le": 1e9}
+GRAVITY: Final[Limits] = {"ge": 0.0, "le": 1e6}
 """Up to that of a white dwarf."""
-STIFFNESS: Final = Bounds(0.0, 1e12, lower_included=False)
-DAMPING: Final = Bounds(0.0, 1e12)
-TURNING: Final = Bounds(0.0, 1e6, lower_included=False)
-"""Up to what no joint reaches at the highest frequency of a scene."""
+STIFFNESS: Final[Limits] = {"gt": 0.0, "le": 1e12}
+DAMPING: Final[Limits] = {"ge": 0.0, "le": 1e12}
+TURNING: Final[Limits] = {"gt": 0.0, "le": 1e6}
+"""Up to a speed that no joint reaches at the highest frequency of a scene."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """One row of the parameter table; as metadata of a pydantic field it also enforces its bounds.
+    """One row of Table 1.
 
     Attributes:
         symbol: symbol in the paper's equations.
         unit: SI unit, `DIMENSIONLESS` for pure numbers.
         value: value in Table 1, in `unit`.
         sigma: standard deviation in Table 1, in `unit`; 0 when the table gives none.
-        bounds: the physical values, in `unit`.
         source: how the value was obtained; "assumed" when it is not in the paper.
+        bounds: the physical values, in `unit`.
         meaning: one line saying what the quantity is.
     """
 
@@ -52,25 +62,14 @@ class Quantity:
     unit: str
     value: float
     sigma: float
-    bounds: Bounds
     source: Source
+    bounds: Bounds
     meaning: str
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """The same bounds as a pydantic schema: a finite number, never text or a truth value."""
-        bounds = self.bounds
-        return core_schema.float_schema(
-            strict=True,
-            allow_inf_nan=False,
-            ge=bounds.lower if bounds.lower_included else None,
-            gt=None if bounds.lower_included else bounds.lower,
-            le=bounds.upper if math.isfinite(bounds.upper) else None,
-        )
 
-
-def circles_fit(link_length: float, circle_radius: float) -> bool:
-    """Whether the two circles of a link are apart: `circle_radius < link_length / 2` (both in m)."""
-    return circle_radius < link_length / 2
+def _row(symbol: str, unit: str, value: float, sigma: float, limits: Limits, source: Source, meaning: str) -> Any:
+    """A required field that carries a row of the table, see `Parameters.quantities`."""
+    return number_field(..., unit, meaning, symbol=symbol, value=value, sigma=sigma, source=source, **limits)
 
 
 class Parameters(BaseModel):
@@ -86,89 +85,51 @@ class Parameters(BaseModel):
 
     model_config = STRICT
 
-    link_length: Annotated[
-        float,
-        Quantity("ℓ", "m", 1.268e-2, 1e-5, LENGTH, "measured", "distance between the two joints of a link"),
-    ]
-    sprocket_radius: Annotated[
-        float, Quantity("R", "m", 5.56e-2, 5e-4, LENGTH, "measured", "sprocket radius, see Scene")
-    ]
-    inner_mass: Annotated[float, Quantity("m_inner", "kg", 3.700e-3, 2e-6, MASS, "measured", "mass of an inner link")]
-    outer_mass: Annotated[float, Quantity("m_outer", "kg", 3.147e-3, 2e-6, MASS, "measured", "mass of an outer link")]
-    inner_inertia: Annotated[
-        float,
-        Quantity("I_inner", "kg m²", 1.69e-7, 1e-9, INERTIA, "measured", "moment of inertia of an inner link"),
-    ]
-    outer_inertia: Annotated[
-        float,
-        Quantity("I_outer", "kg m²", 1.292e-7, 9e-10, INERTIA, "measured", "moment of inertia of an outer link"),
-    ]
-    viscous_friction: Annotated[
-        float,
-        Quantity("β", "N m s", 9e-5, 1e-5, TORQUE, "measured", "joint torque per angular velocity"),
-    ]
-    coulomb_friction: Annotated[
-        float,
-        Quantity("τ_c", "N m", 1.10e-4, 9e-6, TORQUE, "measured", "joint torque at speeds above ω_c"),
-    ]
-    floor_restitution: Annotated[
-        float,
-        Quantity("e_fc", DIMENSIONLESS, 0.018, 0.004, FRACTION, "measured", "normal restitution, floor and chain"),
-    ]
-    floor_friction: Annotated[
-        float,
-        Quantity("μ_fc", DIMENSIONLESS, 0.27, 0.02, FRACTION, "measured", "friction coefficient, floor and chain"),
-    ]
-    gravity: Annotated[
-        float,
-        Quantity("g", "m/s²", 9.809, 0.0, GRAVITY, "looked up", "gravitational acceleration, along −y"),
-    ]
-    chain_restitution: Annotated[
-        float,
-        Quantity("e_cc", DIMENSIONLESS, 0.80, 0.0, FRACTION, "looked up", "normal restitution, two links"),
-    ]
-    chain_friction: Annotated[
-        float,
-        Quantity("μ_cc", DIMENSIONLESS, 0.62, 0.0, FRACTION, "looked up", "friction coefficient, two links"),
-    ]
-    sprocket_restitution: Annotated[
-        float,
-        Quantity("e_sc", DIMENSIONLESS, 0.01, 0.0, FRACTION, "adjusted", "normal restitution, sprocket and chain"),
-    ]
-    sprocket_friction: Annotated[
-        float,
-        Quantity("μ_sc", DIMENSIONLESS, 0.99, 0.0, FRACTION, "adjusted", "friction coefficient, sprocket and chain"),
-    ]
-    joint_stiffness: Annotated[
-        float, Quantity("k", "N/m", 1e9, 0.0, STIFFNESS, "adjusted", "stiffness of a joint's spring")
-    ]
-    joint_damping: Annotated[
-        float, Quantity("b", "N s/m", 1e3, 0.0, DAMPING, "adjusted", "damping of a joint's spring")
-    ]
-    friction_smoothing: Annotated[
-        float,
-        Quantity(
-            "ω_c",
-            "rad/s",
-            1e-3,
-            0.0,
-            TURNING,
-            "adjusted",
-            "width of Coulomb friction's sign change, tanh(ω/ω_c)",
-        ),
-    ]
-    tangential_restitution: Annotated[
-        float,
-        Quantity("e_t", DIMENSIONLESS, 0.0, 0.0, SIGNED_FRACTION, "adjusted", "tangential restitution, all pairs"),
-    ]
-    circle_radius: Annotated[
-        float, Quantity("r", "m", 4.2e-3, 0.0, LENGTH, "assumed", "radius of the circle at a link end")
-    ]
+    link_length: float = _row("ℓ", "m", 1.268e-2, 1e-5, LENGTH, "measured", "distance between the two joints of a link")
+    sprocket_radius: float = _row("R", "m", 5.56e-2, 5e-4, LENGTH, "measured", "sprocket radius, see Scene")
+    inner_mass: float = _row("m_inner", "kg", 3.700e-3, 2e-6, MASS, "measured", "mass of an inner link")
+    outer_mass: float = _row("m_outer", "kg", 3.147e-3, 2e-6, MASS, "measured", "mass of an outer link")
+    inner_inertia: float = _row(
+        "I_inner", "kg m²", 1.69e-7, 1e-9, INERTIA, "measured", "moment of inertia of an inner link"
+    )
+    outer_inertia: float = _row(
+        "I_outer", "kg m²", 1.292e-7, 9e-10, INERTIA, "measured", "moment of inertia of an outer link"
+    )
+    viscous_friction: float = _row("β", "N m s", 9e-5, 1e-5, TORQUE, "measured", "joint torque per angular velocity")
+    coulomb_friction: float = _row("τ_c", "N m", 1.10e-4, 9e-6, TORQUE, "measured", "joint torque at speeds above ω_c")
+    floor_restitution: float = _row(
+        "e_fc", DIMENSIONLESS, 0.018, 0.004, FRACTION, "measured", "normal restitution, floor and chain"
+    )
+    floor_friction: float = _row(
+        "μ_fc", DIMENSIONLESS, 0.27, 0.02, FRACTION, "measured", "friction coefficient, floor and chain"
+    )
+    gravity: float = _row("g", "m/s²", 9.809, 0.0, GRAVITY, "looked up", "gravitational acceleration, along −y")
+    chain_restitution: float = _row(
+        "e_cc", DIMENSIONLESS, 0.80, 0.0, FRACTION, "looked up", "normal restitution, two links"
+    )
+    chain_friction: float = _row(
+        "μ_cc", DIMENSIONLESS, 0.62, 0.0, FRACTION, "looked up", "friction coefficient, two links"
+    )
+    sprocket_restitution: float = _row(
+        "e_sc", DIMENSIONLESS, 0.01, 0.0, FRACTION, "adjusted", "normal restitution, sprocket and chain"
+    )
+    sprocket_friction: float = _row(
+        "μ_sc", DIMENSIONLESS, 0.99, 0.0, FRACTION, "adjusted", "friction coefficient, sprocket and chain"
+    )
+    joint_stiffness: float = _row("k", "N/m", 1e9, 0.0, STIFFNESS, "adjusted", "stiffness of a joint's spring")
+    joint_damping: float = _row("b", "N s/m", 1e3, 0.0, DAMPING, "adjusted", "damping of a joint's spring")
+    friction_smoothing: float = _row(
+        "ω_c", "rad/s", 1e-3, 0.0, TURNING, "adjusted", "width of Coulomb friction's sign change, tanh(ω/ω_c)"
+    )
+    tangential_restitution: float = _row(
+        "e_t", DIMENSIONLESS, 0.0, 0.0, SIGNED_FRACTION, "adjusted", "tangential restitution, all pairs"
+    )
+    circle_radius: float = _row("r", "m", 4.2e-3, 0.0, LENGTH, "assumed", "radius of the circle at a link end")
     """Not in the paper: between the roller (3.9 mm) and the plates (about 5 mm) of a half-inch chain."""
 
     @model_validator(mode="after")
     def _circles_apart(self) -> Self:
-        if not circles_fit(self.link_length, self.circle_radius):
+        if not self.circle_radius < self.link_length / 2:
             raise refusal(
                 "circle_radius",
                 f"{self.circle_radius} is not smaller than half the link length {self.link_length / 2}; "
@@ -180,10 +141,8 @@ class Parameters(BaseModel):
     def quantities(cls) -> dict[str, Quantity]:
         """The parameter table: name of each field → its `Quantity`, in the order of declaration."""
         return {
-            name: metadata
+            name: Quantity(bounds=field_bounds(field), meaning=field.description, **field.json_schema_extra)  # type: ignore
             for name, field in cls.model_fields.items()
-            for metadata in field.metadata
-            if isinstance(metadata, Quantity)
         }
 
     def with_values(self, values: Mapping[str, object]) -> Self:

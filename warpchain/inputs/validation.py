@@ -46,16 +46,32 @@ class Bounds:
         return math.isfinite(value) and above and value <= self.upper
 
 
-def number_field(default: float | None, unit: str, description: str, **limits: float) -> Any:
+def number_field(default: Any, unit: str, description: str, **more: Any) -> Any:
     """A pydantic field that holds a number.
 
     Args:
-        default: its default, in `unit`.
+        default: its default, in `unit`; `...` for none.
         unit: SI unit, `DIMENSIONLESS` for pure numbers.
         description: its meaning, in one line.
-        limits: `ge`, `gt`, `le` or `lt`, as of `pydantic.Field`.
+        more: limits `ge`, `gt`, `le`, `lt` in `unit`, as of `pydantic.Field`; anything else stands beside the unit.
     """
-    return Field(default=default, description=description, json_schema_extra={"unit": unit}, **limits)  # type: ignore
+    limits = {name: more.pop(name) for name in ("ge", "gt", "le", "lt") if name in more}
+    return Field(default, description=description, json_schema_extra={"unit": unit, **more}, **limits)
+
+
+def field_unit(field: FieldInfo) -> str:
+    """Unit of a field that `number_field` made; `DIMENSIONLESS` for any other."""
+    extra = field.json_schema_extra
+    return str(extra["unit"]) if isinstance(extra, dict) else DIMENSIONLESS
+
+
+def field_bounds(field: FieldInfo) -> Bounds:
+    """The interval that the limits of a field leave."""
+    limits: dict[str, float] = {}
+    for limit in field.metadata:
+        limits |= {name: float(getattr(limit, name)) for name in ("ge", "gt", "le", "lt") if hasattr(limit, name)}
+    upper = math.nextafter(limits["lt"], -math.inf) if "lt" in limits else limits.get("le", math.inf)
+    return Bounds(limits.get("ge", limits.get("gt", -math.inf)), upper, "gt" not in limits)
 
 
 def refusal(field: str, message: str) -> PydanticCustomError:
@@ -171,15 +187,6 @@ def _problem(error: ErrorDetails, field: FieldInfo, name: str) -> str:
             return f"{value} is not text; give a name"
         case _:
             return str(error["msg"])
-
-
-def field_unit(field: FieldInfo) -> str:
-    """Unit of a field: that of its metadata (a `Quantity`), or `unit` in its JSON schema extra."""
-    for metadata in field.metadata:
-        if hasattr(metadata, "unit"):
-            return str(metadata.unit)
-    extra = field.json_schema_extra
-    return str(extra["unit"]) if isinstance(extra, dict) else DIMENSIONLESS
 
 
 _NUMBER_IN_TEXT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\W\d_].*|[%°].*)?", re.DOTALL)

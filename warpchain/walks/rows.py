@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.distributions import DRAWABLE
-from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.setup import SECTION_OF, SECTIONS
 from warpchain.inputs.validation import field_unit
 from warpchain.walks.walk_result import CONTACTS, ENERGIES, LOST, STORED
@@ -81,8 +80,7 @@ def field_column(name: str) -> Column:
     if name == "preset":
         return Column("<f8", "1", "named set of parameters that others are changed from")
     field = SECTIONS[SECTION_OF[name]].model_fields[name]
-    quantity = Parameters.quantities().get(name)
-    return Column("<f8", field_unit(field), quantity.meaning if quantity else field.description or name)
+    return Column("<f8", field_unit(field), field.description or name)
 
 
 def row_type(drawn: Sequence[str]) -> np.dtype[np.void]:
