@@ -32,7 +32,7 @@ WIDE: Final = 110
 
 
 def try_folder(folder: Path) -> None:
-    """Find out, before a long run, whether a folder can be written to; nothing is left there.
+    """Check before a long run that a folder can be written to; nothing is left there.
 
     Raises:
         InputError: it cannot.
@@ -54,7 +54,7 @@ def try_folder(folder: Path) -> None:
 
 @contextmanager
 def status_line() -> Iterator[Callable[[str], None]]:
-    """Yield what shows a changing line on a terminal; where there is none, nothing is shown."""
+    """Yield a function that shows a changing line on a terminal; without a terminal it shows nothing."""
     if not sys.stderr.isatty():
         yield lambda text: None
         return

@@ -135,25 +135,17 @@ def _between(lower: float, upper: float, fraction: float) -> float:
     return _STANDARD.inv_cdf(first + (last - first) * fraction)
 
 
-def physical_values(name: str) -> Bounds:
-    """The physical values of a quantity of `DRAWABLE`."""
-    return field_bounds(SECTIONS[SECTION_OF[name]].model_fields[name])
-
-
-def _table() -> dict[str, Distribution]:
-    table: dict[str, Distribution] = {
+TABLE: Final[Mapping[str, Distribution]] = {
+    **{
         name: Gaussian(None, quantity.sigma, quantity.bounds)
         for name, quantity in Parameters.quantities().items()
         if quantity.sigma > 0
-    }
-    table["phase"] = Uniform(0.0, 1.0, physical_values("phase"))
-    table["clearance"] = Uniform(*CLEARANCE_RANGE, physical_values("clearance"))
-    return table
-
-
-TABLE: Final[Mapping[str, Distribution]] = _table()
-"""What a sample draws unless told otherwise: the Gaussians of Table 1 in the order of the table, then phase and
-clearance of the release."""
+    },
+    "phase": Uniform(0.0, 1.0, field_bounds(Scene.model_fields["phase"])),
+    "clearance": Uniform(*CLEARANCE_RANGE, field_bounds(Scene.model_fields["clearance"])),
+}
+"""Default of what a sample draws: the Gaussians of Table 1 in the order of the table, then phase and clearance of the
+release."""
 
 
 def placed(distributions: Mapping[str, Distribution], setup: Setup) -> dict[str, Distribution]:

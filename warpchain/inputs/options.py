@@ -13,6 +13,8 @@ from warpchain.kernels.methods.method import HYBRID, find_method
 LONGEST_DRIVE_INTERVAL: Final = 2e-3
 """Greatest time [s] between two of the small steps in which soft joints become stiff, or multiplied loads fall."""
 
+TOLERANCES: Final = {"ge": 1e-13, "le": 1e-1}
+
 
 class Options(BaseModel):
     """How a walk is computed.
@@ -32,25 +34,13 @@ class Options(BaseModel):
         default="standard", description="; ".join(f"{name}: {title}" for name, title in METHODS.items())
     )
     tolerance: float = number_field(
-        1e-6,
-        "1",
-        "error allowed in a step, absolute (SI units) and relative alike; of method hybrid 1e-4 by default",
-        ge=1e-13,
-        le=1e-1,
+        1e-6, "1", "error allowed in a step, absolute (SI units) and relative; default of hybrid: 1e-4", **TOLERANCES
     )
     soft_tolerance: float | None = number_field(
-        None,
-        "1",
-        "the same where soften_drive or soften_pile has made joints soft or softest; null: tolerance",
-        ge=1e-13,
-        le=1e-1,
+        None, "1", "the same where soften_drive or soften_pile has softened joints; null: tolerance", **TOLERANCES
     )
     flight_tolerance: float = number_field(
-        1e-3,
-        "1",
-        "of method hybrid: error allowed in a step between impulses, where joints are taken for rigid",
-        ge=1e-13,
-        le=1e-1,
+        1e-3, "1", "of hybrid: error allowed in a step between impulses, where joints are rigid", **TOLERANCES
     )
     controller: Literal["standard", "pi"] = Field(
         default="standard",

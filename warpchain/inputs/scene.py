@@ -9,13 +9,13 @@ from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import STRICT, InputError, number_field, refusal
 
 MOST_LINKS: Final = 100_000
-"""A chain of so many takes 0.4 GB, and kernels of its own."""
+"""A chain of so many links takes 0.4 GB, and kernels of its own."""
 MOST_LINKS_ON_GPU: Final = 1024
 """A chain is a block of threads there, one for each link, and CUDA has no larger blocks."""
 HIGHEST_FREQUENCY: Final = 1e4
-"""Where Table 1's chain passes at 3.8 km/s, under a tension that stretches its joints by a third of a link [Hz]."""
+"""There Table 1's chain moves at 3.8 km/s, under a tension that stretches its joints by a third of a link [Hz]."""
 LEAST_SPROCKET: Final = 1e-3
-"""Least distance of the joints from the sprocket's centre, in links; far smaller ones are lost in rounding."""
+"""Least distance of the joints from the sprocket's centre, in link lengths; far smaller ones are lost in rounding."""
 HIGHEST: Final = 1e6
 """Greatest height, where numbers still tell a nanometre [m]."""
 HIGHEST_LOAD: Final = 1e4
@@ -27,7 +27,7 @@ LONGEST: Final = 1e6
 
 
 class Scene(BaseModel):
-    """What one walk does, from hanging on the sprocket to the end.
+    """What happens in one walk, from hanging on the sprocket to the end.
 
     Raises:
         pydantic.ValidationError: a value is unknown or out of bounds, `links` is odd, or the clearance is

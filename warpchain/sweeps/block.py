@@ -15,7 +15,7 @@ Value = float | int | str
 """A value of a field; truth values are integers to Python."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Block:
     """One block of a sweep.
 

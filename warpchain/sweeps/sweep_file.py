@@ -15,20 +15,21 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from warpchain.inputs.distributions import (
-    DRAWABLE,
-    LARGEST_SEED,
-    TABLE,
-    Distribution,
-    Gaussian,
-    Uniform,
-    physical_values,
-)
+from warpchain.inputs.distributions import DRAWABLE, LARGEST_SEED, TABLE, Distribution, Gaussian, Uniform
 from warpchain.inputs.methods import METHODS_BY_NEED
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.setup import SECTION_OF, SECTIONS
-from warpchain.inputs.validation import InputError, checked_positive, checked_whole, shown, suggestion, validated
+from warpchain.inputs.validation import (
+    Bounds,
+    InputError,
+    checked_positive,
+    checked_whole,
+    field_bounds,
+    shown,
+    suggestion,
+    validated,
+)
 from warpchain.inputs.yaml_files import read_yaml
 from warpchain.sweeps.block import Block, Value
 from warpchain.sweeps.designs import SAMPLERS, check_design
@@ -86,7 +87,7 @@ def _recording(content: object) -> Recording:
 
 
 def _choice(content: object, path: str, interval: float, more: tuple[str, ...] = ()) -> Choice | None:
-    """Of which samples something is kept, and how often; None for none. `more` are keys that only some things have."""
+    """The samples that something is kept of, and how often; None: not at all. `more` are further keys."""
     if content is False:
         return None
     if not (content is True or isinstance(content, Mapping)):
@@ -165,16 +166,7 @@ def _block(name: str, path: str, outer: Mapping[str, Any], inner: Mapping[str, A
     samples = checked_whole(samples, f"{path}.samples", 1, 2**30)
     drawn = _drawn(merged["distributions"], sections, axes)
     check_design(sampler, samples, len(drawn), path)
-    return Block(
-        path=path,
-        name=name,
-        preset=chosen,
-        sections=sections,
-        axes=axes,
-        distributions=drawn,
-        sampler=sampler,
-        samples_given=samples,
-    )
+    return Block(path, name, chosen, sections, axes, drawn, sampler, samples)
 
 
 def _numbered(blocks: Iterable[Block], same_samples_along: Collection[str]) -> Iterator[Block]:
@@ -216,7 +208,7 @@ def _checked(name: str, value: object, path: str) -> Value:
         except ValidationError as error:
             if any(problem["loc"] for problem in error.errors()):
                 validated(model, values, "")
-        # Refused only beside default values, which may be those of no walk: left to the check of the cells.
+        # Refused only beside the defaults of other fields: the check of the cells decides.
         result = float(value) if model.model_fields[name].annotation is float else value  # type: ignore
         return result
     except InputError as error:
@@ -304,13 +296,14 @@ def _distribution(name: str, content: object, path: str) -> Distribution | str:
             f"{path}: {shown(content)} is no distribution; "
             "give table, fixed, {uniform: [lower, upper]} or {gaussian: {mean: …, sigma: …}}"
         )
-    bounds = physical_values(name)
+    bounds = field_bounds(SECTIONS[SECTION_OF[name]].model_fields[name])
     if "uniform" in forms:
         path += ".uniform"
         ends = forms["uniform"]
         if not isinstance(ends, Sequence) or isinstance(ends, str) or len(ends) != 2:
             raise InputError(f"{path}: {shown(ends)} is no interval; give [lower, upper]")
-        lower, upper = (_end(name, end, f"{path}[{number}]", number == 0) for number, end in enumerate(ends))
+        lower = _end(name, ends[0], f"{path}[0]", bounds, inwards=math.inf)
+        upper = _end(name, ends[1], f"{path}[1]", bounds, inwards=-math.inf)
         if lower >= upper:
             raise InputError(f"{path}[1]: {upper} is not greater than {lower}; give a greater value")
         return Uniform(lower, upper, bounds)
@@ -321,14 +314,14 @@ def _distribution(name: str, content: object, path: str) -> Distribution | str:
     return Gaussian(mean, sigma, bounds)
 
 
-def _end(name: str, value: object, path: str, is_lower: bool) -> float:
+def _end(name: str, value: object, path: str, bounds: Bounds, inwards: float) -> float:
     """An end of an interval; it may be a bound that is itself not physical, as 1 is for a phase."""
     try:
         return float(_checked(name, value, path))
     except InputError:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise
-        if not physical_values(name).admit(math.nextafter(value, math.inf if is_lower else -math.inf)):
+        if not bounds.admit(math.nextafter(value, inwards)):
             raise
         return float(value)
 
@@ -340,8 +333,8 @@ def _drawn(
 ) -> dict[str, Distribution]:
     """What a block draws, in the order of drawing.
 
-    A parameter with a given value is drawn about it. Phase and clearance with a given value are not drawn, and a
-    distribution with a mean or ends of its own contradicts a given value.
+    A parameter with a given value is drawn about it, phase and clearance are then not drawn. A given value beside a
+    distribution with a mean or ends of its own is refused.
     """
     _, default = given.get("all", ("", "table"))
     drawn: dict[str, Distribution] = {}
