@@ -163,27 +163,29 @@ def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[tuple[Execut
     Raises:
         InputError: there are not so many GPUs, Dask is not installed, or the scheduler does not answer.
     """
-    from warpchain.inputs.validation import InputError, shown
     from warpchain.run.gpu_workers import gpu_workers
 
     if gpus is not None:
         with gpu_workers(gpus) as executor:
             yield executor, gpus
-        return
-    if scheduler is None:
+    elif scheduler is not None:
+        with _dask_client(scheduler) as client:
+            yield client.get_executor(), sum(client.nthreads().values())
+    else:
         yield None, None
-        return
+
+
+def _dask_client(address: str) -> Any:
+    from warpchain.inputs.validation import InputError, shown
+
     try:
         from distributed import Client
     except ImportError:
         raise InputError("--scheduler: Dask is not installed; pip install 'warpchain[dask]'") from None
     try:
-        client: Any = Client(scheduler, timeout=10)  # type: ignore[no-untyped-call]
+        return Client(address, timeout=10)  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
-        problem = f"{shown(scheduler)}: {error}; give the address of a running scheduler"
-        raise InputError(f"--scheduler: {problem}") from None
-    with client:
-        yield client.get_executor(), sum(client.nthreads().values())
+        raise InputError(f"--scheduler: {shown(address)}: {error}; give the address of a running scheduler") from None
 
 
 def _note_failures(result: "SweepResult") -> None:

@@ -1,8 +1,7 @@
 """One block of a sweep: a grid of cells, and what the samples of a cell draw."""
 
-import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,10 +61,6 @@ class Block:
     def walk_count(self) -> int:
         """Number of walks."""
         return math.prod(self.shape)
-
-    def cells(self) -> Iterator[tuple[int, ...]]:
-        """All cells, each as its place along every axis, in the order of their walks."""
-        return itertools.product(*(range(len(values)) for values in self.axes.values()))
 
     def fixed(self, cell: tuple[int, ...]) -> Setup:
         """The setup of a cell before anything is drawn: the values that Gaussians are centred on.

@@ -148,7 +148,7 @@ class Sweep:
                 )
         for block in self.blocks:
             first: Options | None = None
-            for cell in block.cells():
+            for cell in np.ndindex(block.shape[:-1]):
                 fixed = block.fixed(cell)
                 first = first or fixed.options
                 for name in Options.model_fields:
