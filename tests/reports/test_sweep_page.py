@@ -29,6 +29,7 @@ from warpchain.walks.walk_result import WalkResult
 
 CONTENT: dict[str, Any] = FIGURE_6 | {
     "samples": 3,
+    "options": {"method": "explicit"},
     "distributions": {"gravity": {"uniform": [9.0, 10.0]}},
     "blocks": [
         {"name": "rest", "grid": {"links": [60, 120], "frequency": [10, 20]}},
