@@ -10,8 +10,9 @@ Importing the package starts no device and reads no heavy library; the first wal
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from warpchain.inputs.parameters import InputError, Parameters
+    from warpchain.inputs.parameters import Parameters
     from warpchain.inputs.parameters import preset as preset
+    from warpchain.inputs.validation import InputError
     from warpchain.run.simulation import simulate
     from warpchain.run.single_walk import walk
     from warpchain.run.sweep_run import sweep
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from warpchain.walks.walk_result import Trajectory, WalkResult, load_walk
 
 _HOMES = {
-    "InputError": "inputs.parameters",
+    "InputError": "inputs.validation",
     "Parameters": "inputs.parameters",
     "Status": "status",
     "SweepResult": "store.sweep_result",

@@ -11,7 +11,8 @@ from warpchain.bench.cpu_steps import LONGEST_STRETCH, flying
 from warpchain.bench.gpu_steps import STAGE_FLOPS, Crowd, GpuCost, as_json, evaluations, flops_per_attempt, gpu_costs
 from warpchain.cli.terminal import print_gpu_costs
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import InputError, preset
+from warpchain.inputs.parameters import preset
+from warpchain.inputs.validation import InputError
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 
 COST = GpuCost(

@@ -15,7 +15,7 @@ from warpchain.bench.scaling import Run, different_walks, measure
 from warpchain.cli.main import main
 from warpchain.cli.terminal import print_scaling
 from warpchain.engine.processors import processors
-from warpchain.inputs.parameters import InputError
+from warpchain.inputs.validation import InputError
 from warpchain.run.sweep_run import sweep
 from warpchain.store.shards import empty_rows
 from warpchain.sweeps.plan import load_sweep
@@ -55,7 +55,7 @@ def test_a_word_means_what_it_does_on_the_place(device: str, method: str) -> Non
     """The default method of a sweep is another one on a GPU, and so it is where a sweep is measured there."""
     source = load_sweep({name: value for name, value in TINY.items() if name != "options"})
     (block,) = Place(device, device, samples=3).planned(source).blocks
-    assert block.plan.sections["options"]["method"] == method
+    assert block.sections["options"]["method"] == method
     assert block.samples == 3
 
 

@@ -18,6 +18,7 @@ import pytest
 
 from warpchain import load_walk
 from warpchain.cli.main import main
+from warpchain.inputs.methods import METHODS
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.scene import Scene
@@ -107,6 +108,7 @@ def test_help_tells_the_defaults(command: Command) -> None:
     assert options == Options(method=method)
     assert f"{method}: {options.method} at 1e-3, joints softened on the sprocket and in the pile" in words
     assert (options.tolerance, options.soften_drive, options.soften_pile) == (1e-3, True, True)
+    assert all(f"{name}: {title}" in words for name, title in METHODS.items())
     assert "Default: that of the word, 1e-6 for an integrator, 1e-4 for hybrid." in words
     assert Options(method="rkf78") == Options(method="reference")
     assert Options(method="bs32").tolerance == 1e-6
@@ -130,6 +132,8 @@ REFUSED = {
     "--frequency 15Hz": "scene.frequency: '15Hz' has its unit written with it",
     "--start up": "scene.start: 'up' is unknown",
     "--method rk4": "options.method: 'rk4' is unknown",
+    "--method rodas4p": "options.method: 'rodas4p' was removed; give rodas5p",
+    "--method hybrid --device cuda": "options.method: 'hybrid' runs on a CPU only; give explicit",
     "--tol 0": "options.tolerance: 0 is less than 1e-13",
     "--preset hard": "preset: 'hard' is unknown",
     "--seed -1": "seed: -1",
@@ -152,8 +156,8 @@ REFUSED = {
     "--device cpu --set device=cpu": "options.device: given twice",
     "--set clearance_of=hanging --start spinning": "scene.clearance_of: 'hanging' needs",
     "--config nowhere.yaml": "nowhere.yaml: No such file",
-    "--frame-interval 0": "--frame-interval: 0 is not a positive time",
-    "--frame-interval soon": "--frame-interval: 'soon' is not a positive time",
+    "--frame-interval 0": "--frame-interval: 0 is no positive time in s",
+    "--frame-interval soon": "--frame-interval: 'soon' is no positive time in s",
     "--animate avi": "'--animate'",
     "--frobnicate": "(Possible options: --animate); see warpchain walk --help",
     "extra": "unexpected extra argument(s) (extra); see warpchain walk --help",
@@ -392,11 +396,7 @@ def test_bench_measures_every_method(tmp_path: Path) -> None:
     assert answer.status == 0 and answer.err == ""
     costs = json.loads(answer.out)
     methods = {(cost["scene"], cost["method"]) for cost in costs["steps"]}
-    ours = {
-        (scene, method)
-        for scene in ("flight", "pile")
-        for method in ("rkf78", "dp5", "bs32", "os32", "rodas5p", "hybrid")
-    }
+    ours = {(scene, method) for scene in ("flight", "pile") for method in METHODS}
     assert methods == ours | {("flight", "DOP853 (SciPy)")}
     for cost in costs["steps"]:
         assert cost["links"] == 32 and 0 < cost["microseconds"] < 1e5 and cost["wall_per_simulated"] > 0

@@ -8,7 +8,7 @@ import pytest
 import warp as wp
 
 from tests.run.test_sweep_run import brief_setup, outcomes
-from warpchain.cli.sweep_commands import _progress_text
+from warpchain.cli.terminal import sweep_progress_text
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import CAPACITY_FRAMES, CAPACITY_SAMPLES, start_device, world_bytes
 from warpchain.engine.kernel_choice import block_threads, features_of, kernels_of, shared_threads
@@ -152,6 +152,6 @@ def test_every_task_of_a_sweep_runs_in_the_blocks_that_are_compiled(monkeypatch:
 def test_progress_says_when_kernels_are_compiled() -> None:
     """The line on the terminal speaks of compiling, then of walks."""
     progress = SweepProgress(walks=10, done=0, before=0, compiling=True)
-    assert "compiling" in _progress_text(progress)
+    assert "compiling" in sweep_progress_text(progress)
     progress.compiling = False
-    assert "0 of 10 walks" in _progress_text(progress)
+    assert "0 of 10 walks" in sweep_progress_text(progress)

@@ -9,9 +9,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.support.table_1 import TABLE_1, UNCERTAIN
-from warpchain.inputs.distributions import DRAW_LIMIT, random_generator, sample_parameters, sample_scene
-from warpchain.inputs.parameters import InputError, Parameters, preset
+from warpchain.inputs.distributions import DRAW_LIMIT, random_generator, sampled
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene
+from warpchain.inputs.setup import Setup, resolve
+from warpchain.inputs.validation import InputError
+
+
+def sample_parameters(base: Parameters, rng: np.random.Generator) -> Parameters:
+    """What a sample draws about these parameters."""
+    return sampled(Setup("paper", base, Scene(), Options()), rng).parameters
 
 
 @settings(max_examples=60, deadline=None)
@@ -150,10 +158,10 @@ def test_generator_refusals(arguments: tuple[Any, ...], message: str) -> None:
 def test_sample_scene() -> None:
     """Phase and clearance are uniform in their intervals; the rest of the scene stays."""
     count = 4000
-    base = Scene(links=80, frequency=20.0, start="spinning")
+    base = resolve("paper", scene={"links": 80, "frequency": 20.0, "start": "spinning"}, options={}, parameters={})
     rng = random_generator(4)
-    samples = [sample_scene(base, rng) for _ in range(count)]
-    kept = base.model_dump(exclude={"phase", "clearance"})
+    samples = [sampled(base, rng).scene for _ in range(count)]
+    kept = base.scene.model_dump(exclude={"phase", "clearance"})
     assert all(sample.model_dump(exclude={"phase", "clearance"}) == kept for sample in samples)
     for name, low, high in (("phase", 0.0, 1.0), ("clearance", 0.005, 0.015)):
         drawn = np.array([getattr(sample, name) for sample in samples])

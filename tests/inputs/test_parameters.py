@@ -1,17 +1,23 @@
 """Parameters, scene and options: values and refusals."""
 
 import math
-from pathlib import Path
 from typing import Any
 
 import pytest
 from pydantic import BaseModel, ValidationError
 
 from tests.support.table_1 import TABLE_1
+from warpchain.inputs.methods import METHODS_BY_NEED
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import PRESETS, InputError, Parameters, preset
+from warpchain.inputs.parameters import PRESETS, Parameters, preset
 from warpchain.inputs.scene import Scene, check_scene, contact_radius, fewest_links, joint_radius
-from warpchain.inputs.setup import Setup, read_setup, resolve
+from warpchain.inputs.setup import SECTION_OF, SECTIONS, resolve
+from warpchain.inputs.validation import InputError
+from warpchain.kernels.methods.method import find_method, method_names
+
+NUMBERS = [
+    name for model in SECTIONS.values() for name, field in model.model_fields.items() if field.annotation is float
+]
 
 
 def refused(section: str, values: object) -> str:
@@ -73,18 +79,12 @@ def test_whole_numbers_are_numbers() -> None:
     assert preset("paper").gravity == 9.809
 
 
-@pytest.mark.parametrize("name", ["frequency", "phase", "clearance", "ellipse_aspect", "settle_time"])
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, True, "15", None, [15.0]])
-def test_scene_numbers_strict(name: str, value: object) -> None:
-    """A number of a scene is finite and no text, truth value or list; the message names its path."""
-    assert refused("scene", {name: value}).startswith(f"scene.{name}: ")
-
-
-@pytest.mark.parametrize("name", Parameters.model_fields)
-@pytest.mark.parametrize("value", [math.nan, math.inf, True, "0.5", None])
-def test_parameter_numbers_strict(name: str, value: object) -> None:
-    """A parameter is finite and no text, truth value or nothing; the message names its path."""
-    assert refused("parameters", {name: value}).startswith(f"parameters.{name}: ")
+@pytest.mark.parametrize("name", NUMBERS)
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, True, "0.5", None, [0.5]])
+def test_numbers_are_strict(name: str, value: object) -> None:
+    """A number is finite and no text, truth value, list or nothing; the message names its path."""
+    section = SECTION_OF[name]
+    assert refused(section, {name: value}).startswith(f"{section}.{name}: ")
 
 
 @pytest.mark.parametrize(
@@ -223,9 +223,19 @@ def test_scene_upper_bounds(name: str, greatest: float, message: str) -> None:
         (
             "options",
             {"method": "rk45"},
-            "options.method: 'rk45' is unknown; give one of standard, explicit, reference, rkf78, dp5, bs32, os32, "
-            "rodas5p, hybrid",
+            f"options.method: 'rk45' is unknown; give one of {', '.join((*METHODS_BY_NEED, *method_names()))}",
         ),
+        ("options", {"method": "rodas4p"}, "options.method: 'rodas4p' was removed; give rodas5p"),
+        *[
+            (
+                "options",
+                {"method": method, "device": device},
+                f"options.method: {method!r} runs on a CPU only; give explicit, or device: cpu",
+            )
+            for method in method_names()
+            if not find_method(method).runs_on_gpus
+            for device in ("cuda", "cuda:1")
+        ],
         ("options", {"tolerance": 1e-14}, "options.tolerance: 1e-14 is less than 1e-13; give 1e-13 or more"),
         ("options", {"tolerance": 0.2}, "options.tolerance: 0.2 is greater than 0.1; give 0.1 or less"),
         ("options", {"controller": "pid"}, "options.controller: 'pid' is unknown; did you mean pi?"),
@@ -256,16 +266,14 @@ def test_refusals(section: str, values: object, message: str) -> None:
     assert refused(section, values) == message
 
 
-@pytest.mark.parametrize(("name", "value"), [(name, 0) for name in ("hold_limit", "walk_limit")])
-def test_scene_positive(name: str, value: float) -> None:
-    """Times that limit a phase are positive."""
-    assert refused("scene", {name: value}).startswith(f"scene.{name}: 0 is not greater than 0")
-
-
-@pytest.mark.parametrize("name", ["contact_step", "skin", "smallest_step", "rest_speed", "rest_time"])
-def test_options_positive(name: str) -> None:
-    """Steps, speeds and intervals of the options are positive."""
-    assert refused("options", {name: 0}).startswith(f"options.{name}: 0 is not greater than 0")
+@pytest.mark.parametrize(
+    "name",
+    ["spin_up_time", "hold_limit", "walk_limit", "contact_step", "skin", "smallest_step", "rest_speed", "rest_time"],
+)
+def test_positive_numbers(name: str) -> None:
+    """Times that limit a phase, steps and speeds are positive."""
+    section = SECTION_OF[name]
+    assert refused(section, {name: 0}).startswith(f"{section}.{name}: 0 is not greater than 0")
 
 
 def test_long_values_are_cut() -> None:
@@ -292,22 +300,6 @@ def test_contact_and_pitch_radius() -> None:
     assert joint_radius(contact, parameters) == pytest.approx(5.98e-2, rel=1e-14)
     assert contact_radius(pitch, parameters) == pytest.approx(5.14e-2, rel=1e-14)
     assert joint_radius(pitch, parameters) == 5.56e-2
-
-
-def test_hybrid_alone_has_the_tolerance_that_it_is_made_for() -> None:
-    """1e-4 for its bursts of order 3, unless one says otherwise; other integrators 1e-6."""
-    assert Options.model_validate({"method": "hybrid"}).tolerance == 1e-4
-    assert Options.model_validate({"method": "hybrid", "tolerance": 1e-5}).tolerance == 1e-5
-    assert Options.model_validate({"method": "os32"}).tolerance == 1e-6
-
-
-@pytest.mark.parametrize("word", ["standard", "explicit"])
-def test_a_tolerance_given_beside_a_word_is_that_of_soft_joints_too(word: str) -> None:
-    """A word's tolerance of soft joints goes with the word's own tolerance only; one that is given stays."""
-    assert Options(method=word).soft_tolerance == 3 * Options(method=word).tolerance
-    assert Options(method=word, tolerance=1e-5).soft_tolerance is None
-    assert Options(method=word, tolerance=1e-5, soft_tolerance=1e-4).soft_tolerance == 1e-4
-    assert Options(method=word, tolerance=1e-5).soften_pile
 
 
 def test_pitch_needs_a_sprocket_larger_than_a_circle() -> None:
@@ -346,116 +338,3 @@ def test_chain_too_short_is_refused_at_the_door() -> None:
     """With the values of Table 1 a chain needs 30 links to reach round the sprocket."""
     assert refused("scene", {"links": 28}).endswith("give at least 30")
     assert resolve("paper", scene={"links": 30}, options={}, parameters={}).scene.links == 30
-
-
-def test_resolve_completes() -> None:
-    """Values that are not given come from the preset and from the defaults."""
-    setup = resolve("soft", scene={"links": 80}, options={"method": "dp5"}, parameters={"gravity": 1.62})
-    assert setup == Setup(
-        preset="soft",
-        parameters=PRESETS["soft"].with_values({"gravity": 1.62}),
-        scene=Scene(links=80),
-        options=Options(method="dp5"),
-    )
-
-
-def written(folder: Path, text: str) -> Path:
-    """A YAML file with the text."""
-    path = folder / "walk.yaml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
-def loaded(path: Path | str) -> Setup:
-    """The setup of a YAML file."""
-    preset, sections = read_setup(path)
-    return resolve(preset, **sections)
-
-
-def test_setup_of_a_file(tmp_path: Path) -> None:
-    """A YAML file gives the same setup as the same values given as arguments; 1e7 is a number."""
-    text = """
-    preset: paper
-    scene: {links: 80, frequency: 2e1, start: ellipse}
-    options:
-      tolerance: 1.0e-7
-      step_limit: 1_000_000
-      self_contact: no
-    parameters:
-      joint_stiffness: 1e7
-      tangential_restitution: -.5
-      gravity: 10
-    """
-    assert loaded(written(tmp_path, text)) == resolve(
-        "paper",
-        scene={"links": 80, "frequency": 20.0, "start": "ellipse"},
-        options={"tolerance": 1e-7, "step_limit": 1_000_000, "self_contact": False},
-        parameters={"joint_stiffness": 1e7, "tangential_restitution": -0.5, "gravity": 10.0},
-    )
-
-
-def test_setup_of_a_file_with_empty_sections(tmp_path: Path) -> None:
-    """A section without values, or no section at all, leaves the defaults."""
-    expected = resolve("soft", scene={}, options={}, parameters={})
-    assert loaded(written(tmp_path, "preset: soft")) == expected
-    assert loaded(str(written(tmp_path, "preset: soft\nscene:\noptions: {}\n"))) == expected
-    assert read_setup(written(tmp_path, "scene: {links: 8}")) == (
-        None,
-        {"scene": {"links": 8}, "options": {}, "parameters": {}},
-    )
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("preset: paper\nscene: {links: 61}", "scene.links: 61 is odd"),
-        ("preset: paper\nscene: {links: 060}", "scene.links: '060' is text; give a whole number"),
-        (
-            "preset: paper\nscene: {frequency: 1:30}",
-            "scene.frequency: '1:30' is text; give a plain number in Hz",
-        ),
-        ("preset: paper\nscene: {frequency: 15 Hz}", "scene.frequency: '15 Hz' has its unit written"),
-        ("preset: paper\nscene: {frequency: .nan}", "scene.frequency: nan is not finite"),
-        ("preset: paper\nscene: {frequency: -.inf}", "scene.frequency: -inf is not finite"),
-        ("preset: paper\nscene: {frequency: }", "scene.frequency: empty"),
-        ("preset: paper\nscene: [1]", "scene: [1] is not a mapping"),
-        ("preset: papr", "preset: 'papr' is unknown; presets are paper, soft"),
-        ("preset: [paper]", "preset: ['paper'] is unknown"),
-        ("preset: paper\nsceen: {}", "'sceen': unknown key; did you mean scene?"),
-        ("preset: paper\n7: {}", "7: unknown key; give one of preset, scene, options, parameters"),
-        ("preset: paper\nscene: {links: 60, links: 80}", "{path}, line 2: key 'links' is given twice"),
-        ("preset: paper\nscene: {links: 60, 'links': 60}", "{path}, line 2: key 'links' is given twice"),
-        ("preset: paper\npreset: soft", "{path}, line 2: key 'preset' is given twice"),
-        ("preset: paper\nscene: {links: 60", "{path}, line 2: while parsing a flow mapping, expected ',' or '}'"),
-        (
-            "preset: paper\n---\npreset: soft",
-            "{path}, line 2: expected a single document in the stream, but found another document; correct the YAML",
-        ),
-        ("preset: paper\nscene: {? [1, 2] : 3}", "{path}, line 2: "),
-        ("preset: !!python/object:os.system x", "{path}, line 1: "),
-        ("preset: !!map [a]", "{path}, line 1: "),
-        ("preset: !!int abc", "{path}: "),
-        ("preset: \x00", "{path}: "),
-        ("[" * 5000, "{path}: "),
-        ("", "{path}: no mapping at the top"),
-        ("- paper", "{path}: no mapping at the top"),
-    ],
-)
-def test_setup_of_a_file_refusals(tmp_path: Path, text: str, message: str) -> None:
-    """A bad file is refused in one line that says where and why."""
-    path = written(tmp_path, text)
-    with pytest.raises(InputError) as caught:
-        loaded(path)
-    assert str(caught.value).startswith(message.replace("{path}", str(path)))
-    assert "\n" not in str(caught.value)
-
-
-def test_setup_of_a_file_unreadable(tmp_path: Path) -> None:
-    """A missing file, a folder and a file that is no text are refused in one line."""
-    binary = tmp_path / "binary.yaml"
-    binary.write_bytes(b"\xff\xfe\xff")
-    for path in (tmp_path / "none.yaml", tmp_path, binary):
-        with pytest.raises(InputError) as caught:
-            loaded(path)
-        assert str(caught.value).startswith(f"{path}: ")
-        assert "\n" not in str(caught.value)

@@ -12,7 +12,8 @@ import warpchain
 from tests.support.made_walks import assert_same, make_walk
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import InputError, preset
+from warpchain.inputs.parameters import preset
+from warpchain.inputs.validation import InputError
 from warpchain.loop.before_release import FIELDS, BeforeRelease
 from warpchain.reports.kink_figure import sweep_kink
 from warpchain.run.single_walk import run_walk

@@ -19,7 +19,7 @@ from PIL import Image
 from tests.support.made_sweeps import FIGURE_6, distance, make_sweep
 from tests.support.made_walks import make_unreleased, make_walk
 from warpchain.cli.main import main
-from warpchain.inputs.parameters import InputError
+from warpchain.inputs.validation import InputError
 from warpchain.reports import sweep_page
 from warpchain.reports.sweep_page import write_report
 from warpchain.status import Status
@@ -29,6 +29,7 @@ from warpchain.walks.walk_result import WalkResult
 
 CONTENT: dict[str, Any] = FIGURE_6 | {
     "samples": 3,
+    "options": {"method": "explicit"},
     "distributions": {"gravity": {"uniform": [9.0, 10.0]}},
     "blocks": [
         {"name": "rest", "grid": {"links": [60, 120], "frequency": [10, 20]}},

@@ -9,7 +9,7 @@ import yaml
 
 from tests.run.test_sweep_run import TINY, data_of
 from warpchain.cli.main import main
-from warpchain.inputs.parameters import InputError
+from warpchain.inputs.validation import InputError
 from warpchain.run.gpu_workers import gpu_workers, visible_gpus
 from warpchain.run.sweep_run import sweep
 

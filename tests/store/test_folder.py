@@ -20,7 +20,7 @@ import yaml
 
 from tests.support import synthetic_sweep
 from tests.support.synthetic_sweep import LONG_SWEEP, SHARD_SIZE, SWEEP, content, run, synthetic_rows
-from warpchain.inputs.parameters import InputError
+from warpchain.inputs.validation import InputError
 from warpchain.status import Status
 from warpchain.store import folder, shards
 from warpchain.store.folder import SweepFolder, empty_rows, read_rows, read_shard, write_shard

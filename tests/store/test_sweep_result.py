@@ -17,7 +17,7 @@ import xarray
 
 from tests.support.synthetic_sweep import SWEEP, SyntheticSweep, run, synthetic_rows
 from warpchain.cli.main import main
-from warpchain.inputs.parameters import InputError
+from warpchain.inputs.validation import InputError
 from warpchain.reports.sweep_page import write_report
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder, empty_rows

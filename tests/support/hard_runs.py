@@ -6,8 +6,9 @@ import pytest
 import warpchain
 from warpchain import Status
 from warpchain.bench.problems.hard_starts import energy_error, energy_scale
+from warpchain.kernels.methods.method import method_names
 
-METHODS = ("rkf78", "dp5", "bs32", "os32", "rodas5p", "hybrid")
+METHODS = method_names()
 every_method = pytest.mark.parametrize("method", METHODS)
 
 

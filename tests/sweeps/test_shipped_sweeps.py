@@ -95,7 +95,7 @@ def test_sensitivity_varies_every_quantity() -> None:
         assert len({walk.setup.scene for walk in walks}) == 1
         assert [getattr(walk.setup.parameters, name) for walk in walks] == list(block.axes[name])
         if name in by_name["ranges"].drawn:
-            ends = by_name["ranges"].plan.distributions[name]
+            ends = by_name["ranges"].distributions[name]
             assert isinstance(ends, Uniform)
             assert (ends.lower, ends.upper) == pytest.approx((0.8 * quantity.value, 1.2 * quantity.value))
 

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from tests.support.sweep_content import UNIFORM, blocks, content
-from warpchain.inputs.parameters import PRESETS, InputError, preset
+from warpchain.inputs.parameters import PRESETS, preset
+from warpchain.inputs.validation import InputError
 from warpchain.run.sweep_run import on_device
 from warpchain.sweeps.plan import load_sweep
 
@@ -43,7 +44,7 @@ def test_digest_ignores_what_does_not_matter(change: dict[str, Any]) -> None:
     [
         ({}, ("hybrid", "os32")),
         ({"method": "standard", "tolerance": 1e-4}, ("hybrid", "os32")),
-        ({"method": "hybrid"}, ("hybrid", "hybrid")),
+        ({"method": "dp5"}, ("dp5", "dp5")),
         ({"method": "reference"}, ("rkf78", "rkf78")),
     ],
 )
@@ -75,11 +76,12 @@ def test_a_device_is_refused_beside_devices_on_an_axis() -> None:
 
 
 def test_a_stored_sweep_keeps_its_method_unless_it_is_given_a_word_again() -> None:
-    """What a folder keeps of a sweep goes on as it was, has its method on any device, and takes a word in its place."""
+    """A stored sweep goes on as it was, keeps its method on any device that has it, and takes a word in its place."""
     planned = load_sweep(content(options={}))
     stored = planned.canonical()
     assert load_sweep(stored).digest() == planned.digest()
-    assert on_device(load_sweep(stored), "cuda").planned(0).setup.options.method == "hybrid"
+    with pytest.raises(InputError, match=r"^options\.method: 'hybrid' runs on a CPU only; give explicit"):
+        on_device(load_sweep(stored), "cuda")
     for block in stored["blocks"]:
         block["options"]["method"] = "standard"
     assert load_sweep(stored).digest() == planned.digest()

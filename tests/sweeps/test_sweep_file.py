@@ -10,9 +10,10 @@ import pytest
 import yaml
 
 from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content
-from warpchain.inputs.parameters import InputError
+from warpchain.inputs.validation import InputError
 from warpchain.sweeps import designs
-from warpchain.sweeps.plan import CELL_LIMIT, load_sweep
+from warpchain.sweeps.plan import load_sweep
+from warpchain.sweeps.sweep_file import CELL_LIMIT
 
 
 def test_values_and_layout() -> None:
@@ -149,6 +150,15 @@ def test_from_a_file(tmp_path: Path) -> None:
             content(options={"method": "rk4"}),
             "sweep.options.method: 'rk4' is unknown; give one of standard, explicit, reference,",
         ),
+        (content(options={"method": "rodas4p"}), "sweep.options.method: 'rodas4p' was removed; give rodas5p"),
+        (
+            content(options={"device": "cuda", "method": "rodas5p"}),
+            "sweep.options.method: 'rodas5p' runs on a CPU only; give explicit, or device: cpu",
+        ),
+        (
+            content(options={"device": "cuda"}, grid={"method": ["os32", "hybrid"]}),
+            "sweep.grid.method[1]: 'hybrid' runs on a CPU only; give explicit, or device: cpu",
+        ),
         (content(parameters={"outer_mass": 0}), "sweep.parameters.outer_mass: 0 is not greater than 0 kg"),
         (content(record={"serie": True}), "sweep.record.serie: unknown key; did you mean series"),
         (content(record=[1]), "sweep.record: [1] is not a mapping"),
@@ -160,6 +170,10 @@ def test_from_a_file(tmp_path: Path) -> None:
         (
             content(record={"series": {"interval": 0}}),
             "sweep.record.series.interval: 0 is no positive number; give one",
+        ),
+        (
+            content(record={"series": {"interval": 10**400}}),
+            "sweep.record.series.interval: 1000",
         ),
         (
             content(record={"series": {"interval": "1 ms"}}),

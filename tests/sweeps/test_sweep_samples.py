@@ -11,10 +11,10 @@ import pytest
 from scipy import stats
 
 from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content, drawn
-from warpchain.inputs.distributions import Gaussian, Uniform, random_generator, sample_parameters, sample_scene
-from warpchain.inputs.parameters import Bounds, InputError
+from warpchain.inputs.distributions import Gaussian, Uniform, random_generator, sampled
 from warpchain.inputs.scene import check_scene, fewest_links
 from warpchain.inputs.setup import resolve
+from warpchain.inputs.validation import Bounds, InputError
 from warpchain.run.single_walk import setup_walk
 from warpchain.sweeps.designs import design_points, saltelli_outputs, sobol_indices
 from warpchain.sweeps.plan import Sweep, load_sweep
@@ -78,11 +78,7 @@ def test_first_sample_is_that_of_a_single_walk() -> None:
             options={"tolerance": 1e-7},
             parameters={"floor_friction": 0.1},
         )
-        rng = random_generator(seed, 1, 2)
-        walk = sweep.planned(5)
-        assert walk.setup.parameters == sample_parameters(base.parameters, rng)
-        assert walk.setup.scene == sample_scene(base.scene, rng)
-        assert walk.setup.options == base.options
+        assert sweep.planned(5).setup == sampled(base, random_generator(seed, 1, 2))
 
 
 def test_large_sweeps_cost_nothing() -> None:

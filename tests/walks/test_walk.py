@@ -1,6 +1,7 @@
 """Whole walks: where they end, their statuses, their ledger, samples, records and progress."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import warpchain
 from warpchain import Status, preset
-from warpchain.inputs.distributions import random_generator, sample_parameters, sample_scene
+from warpchain.inputs.distributions import random_generator, sampled
 
 SOFT = preset("soft")
 LOSSES = ("joint_friction", "joint_damping", "floor", "self_contact")
@@ -226,9 +227,7 @@ def test_seed_repeats_its_sample():
 def test_setup_records_what_a_seed_drew():
     """The drawn parameters, then phase and clearance, stand in the setup; what was set by hand is kept."""
     walk = short_walk(seed=7, walk_limit=1e-3)
-    rng = random_generator(7)
-    assert walk.setup.parameters == sample_parameters(SOFT, rng)
-    assert walk.setup.scene == sample_scene(walk.setup.scene, rng)
+    assert walk.setup == sampled(replace(walk.setup, parameters=SOFT), random_generator(7))
     assert walk.setup.parameters.link_length != SOFT.link_length
     assert walk.setup.parameters.joint_stiffness == SOFT.joint_stiffness
     assert walk.lowest[0] == pytest.approx(walk.setup.scene.clearance, abs=1e-12)

@@ -21,7 +21,8 @@ from warpchain.engine.batch import Batch
 from warpchain.engine.devices import start_device, versions
 from warpchain.engine.kernel_choice import block_kernel, block_threads, features_of, load_kernels
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import InputError, Parameters, preset, shown
+from warpchain.inputs.parameters import Parameters, preset
+from warpchain.inputs.validation import InputError, shown
 from warpchain.kernels import layout
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 from warpchain.status import Status

@@ -10,7 +10,7 @@ import warp as wp
 
 from warpchain.engine.devices import start_device
 from warpchain.engine.processors import processors
-from warpchain.inputs.parameters import InputError, shown
+from warpchain.inputs.validation import InputError, shown
 from warpchain.run.sweep_run import on_device
 from warpchain.sweeps.plan import Sweep, load_sweep
 

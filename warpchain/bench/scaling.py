@@ -24,7 +24,7 @@ from warpchain.bench.cpu_steps import machine
 from warpchain.bench.gpu_steps import gpu_machine
 from warpchain.bench.places import Place
 from warpchain.engine.processors import processors
-from warpchain.inputs.parameters import InputError
+from warpchain.inputs.validation import InputError
 from warpchain.run.gpu_workers import GpuWorkers, gpu_workers
 from warpchain.run.sweep_run import SweepProgress, one_of_each_cell, prepare
 from warpchain.run.sweep_run import sweep as run_sweep

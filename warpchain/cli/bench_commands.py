@@ -161,7 +161,7 @@ def _words(option: str, text: str) -> list[str]:
     Raises:
         InputError: there are none.
     """
-    from warpchain.inputs.parameters import InputError
+    from warpchain.inputs.validation import InputError
 
     words = [word.strip() for word in text.split(",") if word.strip()]
     if not words:
@@ -175,7 +175,7 @@ def _numbers(option: str, text: str, *, whole: bool = False) -> list[float]:
     Raises:
         InputError: one is no number.
     """
-    from warpchain.inputs.parameters import InputError, shown
+    from warpchain.inputs.validation import InputError, shown
 
     numbers = []
     for word in _words(option, text):

@@ -1,9 +1,8 @@
 """The command `warpchain`.
 
-Exit status: 0 when the walk ended as it should, 1 when it failed, 2 when the input is refused or a file
-cannot be read or written, 130 when interrupted. Values go through the same door as keyword arguments and YAML
-files, so they are refused in the same words. Heavy libraries are imported by the functions that need them:
-help is quick.
+Exit status: 0 when the walk ended as it should, 1 when it failed, 2 when the input is refused or a file cannot be read
+or written, 130 when interrupted. Values are checked like keyword arguments and YAML files, so they are refused in the
+same words. Heavy libraries are imported by the functions that need them, so that help is quick.
 """
 
 import io
@@ -17,15 +16,15 @@ import typer
 
 from warpchain.cli.bench_commands import bench_app
 from warpchain.cli.speed_commands import bench
-from warpchain.cli.sweep_commands import add_commands
+from warpchain.cli.sweep_commands import FAILED, add_commands
+from warpchain.inputs.methods import METHODS
 
 if TYPE_CHECKING:
     from warpchain.inputs.setup import Setup
 
-FAILED: Final = 1
 REFUSED: Final = 2
 INTERRUPTED: Final = 130
-"""Exit statuses; the last one is what typer makes of Ctrl-C."""
+"""Exit statuses beside `FAILED`; typer makes the last one of Ctrl-C."""
 
 Sections = dict[str, dict[str, object]]
 
@@ -49,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except OSError as error:
         _refuse(str(error))
     except ValueError as error:
-        from warpchain.inputs.parameters import InputError
+        from warpchain.inputs.validation import InputError
 
         if not isinstance(error, InputError):
             raise
@@ -118,8 +117,8 @@ def walk(
         typer.Option(
             metavar="NAME",
             help="standard: hybrid at 1e-3, joints softened on the sprocket and in the pile, on a GPU the next; "
-            "explicit: os32 at 1e-3, softened likewise; reference: rkf78 at 1e-6, as in the paper; or an integrator: "
-            "rkf78, dp5, bs32, os32, rodas5p (implicit), hybrid (rigid flight). Default: standard.",
+            "explicit: os32 at 1e-3, softened likewise; reference: rkf78 at 1e-6, as in the paper; or an integrator, "
+            f"{'; '.join(f'{name}: {title}' for name, title in METHODS.items())}. Default: standard.",
         ),
     ] = None,
     tolerance: Annotated[
@@ -187,6 +186,8 @@ def walk(
 ) -> None:
     """Let one chain walk: hang it on its sprocket, spin it up, drop it and follow it until it rests."""
     from warpchain.cli.terminal import print_walk, progress_text, status_line, try_folder, write_files
+    from warpchain.inputs.distributions import LARGEST_SEED
+    from warpchain.inputs.validation import checked_whole
     from warpchain.run.single_walk import run_walk
 
     named = {
@@ -198,7 +199,7 @@ def walk(
         "device": device,
     }
     given = _given_values({name: text for name, text in named.items() if text is not None}, assignments or [])
-    chosen_seed = None if seed is None else _seed(seed)
+    chosen_seed = None if seed is None else checked_whole(_parsed("seed", seed), "seed", 0, LARGEST_SEED)
     setup = _setup(config, preset, given, chosen_seed)
     interval = _frame_interval(output, animation, frame_interval)
     if output is not None:
@@ -235,7 +236,8 @@ def _given_values(named: Mapping[str, str], assignments: Sequence[str]) -> Secti
     Raises:
         InputError: an assignment is not of that form, its name is unknown, or a name is given twice.
     """
-    from warpchain.inputs.parameters import InputError, shown
+    from warpchain.inputs.setup import SECTION_OF, by_section
+    from warpchain.inputs.validation import InputError, shown, suggestion
 
     pairs = list(named.items())
     for assignment in assignments:
@@ -243,49 +245,17 @@ def _given_values(named: Mapping[str, str], assignments: Sequence[str]) -> Secti
         if not equals:
             raise InputError(f"--set: {shown(assignment)} gives no value; write NAME=VALUE, as in clearance=0.005")
         pairs.append((name.strip(), text))
-    given: Sections = {"parameters": {}, "scene": {}, "options": {}}
+    values: dict[str, object] = {}
     for written, text in pairs:
-        section, name = _located(written)
-        if name in given[section]:
-            raise InputError(f"{section}.{name}: given twice on the command line; give it once")
-        given[section][name] = _parsed(f"{section}.{name}", text)
-    return given
-
-
-def _seed(text: str) -> int:
-    """The number of a sample.
-
-    Raises:
-        InputError: the text is no whole number, or too large.
-    """
-    from warpchain.inputs.distributions import random_generator
-
-    seed: int = _parsed("seed", text)
-    random_generator(seed)
-    return seed
-
-
-def _located(name: str) -> tuple[str, str]:
-    """Section and field of a name such as `clearance` or `scene.clearance`.
-
-    Raises:
-        InputError: there is no such field.
-    """
-    from warpchain.inputs.options import Options
-    from warpchain.inputs.parameters import InputError, Parameters, shown, suggestion
-    from warpchain.inputs.scene import Scene
-
-    fields = {
-        "parameters": list(Parameters.model_fields),
-        "scene": list(Scene.model_fields),
-        "options": list(Options.model_fields),
-    }
-    dotted = {f"{section}.{field}": (section, field) for section, names in fields.items() for field in names}
-    plain = {field: (section, field) for section, field in dotted.values()}
-    known = dotted if "." in name else plain
-    if name not in known:
-        raise InputError(f"--set {shown(name)}: unknown name; {suggestion(name, known)}")
-    return known[name]
+        known = {f"{section}.{name}" if "." in written else name: name for name, section in SECTION_OF.items()}
+        if written not in known:
+            raise InputError(f"--set {shown(written)}: unknown name; {suggestion(written, known)}")
+        name = known[written]
+        path = f"{SECTION_OF[name]}.{name}"
+        if name in values:
+            raise InputError(f"{path}: given twice on the command line; give it once")
+        values[name] = _parsed(path, text)
+    return by_section(values)
 
 
 def _parsed(path: str, text: str) -> Any:
@@ -296,7 +266,7 @@ def _parsed(path: str, text: str) -> Any:
     """
     import yaml
 
-    from warpchain.inputs.parameters import InputError, shown
+    from warpchain.inputs.validation import InputError, shown
     from warpchain.inputs.yaml_files import Loader
 
     try:
@@ -311,31 +281,30 @@ def _setup(config: Path | None, preset: str | None, given: Sections, seed: int |
     Raises:
         InputError: something is refused; one line with the field's path and the remedy.
     """
-    from warpchain.inputs.parameters import InputError
+    from warpchain.inputs.distributions import random_generator, sampled
     from warpchain.inputs.setup import read_setup, resolve
-    from warpchain.run.single_walk import setup_walk
+    from warpchain.inputs.validation import InputError
 
-    file_preset, sections = read_setup(config) if config is not None else ("paper", {name: {} for name in given})
+    file_preset, sections = read_setup(config) if config is not None else ("paper", {section: {} for section in given})
     preset = file_preset if preset is None else preset
     if preset is None:
         raise InputError("preset: missing; name the parameters to start from, such as preset: paper")
     for section, values in given.items():
-        if isinstance(sections[section], Mapping):  # what is none is left for `resolve` to refuse
+        if isinstance(sections[section], Mapping):  # `resolve` refuses anything else
             sections[section] = {**sections[section], **values}
-    resolve(preset, **sections)  # setup_walk knows names only; here a field in the wrong section is refused
-    flat = {name: value for values in sections.values() for name, value in values.items()}
-    return setup_walk(preset, flat, seed)
+    setup = resolve(preset, **sections)
+    return setup if seed is None else sampled(setup, random_generator(seed), kept=sections["scene"])
 
 
 def _frame_interval(output: Path | None, animation: str | None, text: str | None) -> float | None:
-    """Time between two frames [s], None if nobody wants frames.
+    """Time between two frames [s]; None without a folder to write them to.
 
     Raises:
-        InputError: an option needs a folder, a length of time is no such thing, or MP4 cannot be written.
+        InputError: an option needs a folder, the time is not a positive number, or MP4 cannot be written.
     """
     from importlib.util import find_spec
 
-    from warpchain.inputs.parameters import InputError, shown
+    from warpchain.inputs.validation import InputError, checked_positive
 
     for option, value in (("--animate", animation), ("--frame-interval", text)):
         if value is not None and output is None:
@@ -343,6 +312,4 @@ def _frame_interval(output: Path | None, animation: str | None, text: str | None
     if animation == "mp4" and find_spec("imageio_ffmpeg") is None:
         raise InputError("--animate mp4: imageio-ffmpeg is not installed; pip install 'warpchain[video]'")
     interval = 2e-3 if text is None else _parsed("--frame-interval", text)
-    if isinstance(interval, bool) or not isinstance(interval, int | float) or not 0 < interval <= sys.float_info.max:
-        raise InputError(f"--frame-interval: {shown(interval)} is not a positive time in s; give one, as in 0.002")
-    return float(interval) if output is not None else None
+    return float(checked_positive(interval, "--frame-interval", "time in s")) if output is not None else None

@@ -51,8 +51,8 @@ def bench(
         return
     from warpchain.cli.terminal import status_line
     from warpchain.inputs.options import Options
-    from warpchain.inputs.parameters import InputError, validated
     from warpchain.inputs.scene import Scene, check_links_on_gpu
+    from warpchain.inputs.validation import InputError, validated
 
     where = validated(Options, {"device": device}, "bench").device
     lengths = [validated(Scene, {"links": count}, "bench").links for count in links or ()]
@@ -99,7 +99,7 @@ def _bench_cpu(
     """
     from importlib.util import find_spec
 
-    from warpchain.inputs.parameters import InputError
+    from warpchain.inputs.validation import InputError
 
     if find_spec("scipy") is None:
         raise InputError("bench: SciPy is not installed; pip install 'warpchain[scipy]'")

@@ -1,7 +1,6 @@
 """The commands of the command line that are about sweeps: sweep, info, plot, report, merge."""
 
 import contextlib
-import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 if TYPE_CHECKING:
-    from warpchain.run.sweep_run import Executor, SweepProgress
+    from warpchain.run.sweep_run import Executor
     from warpchain.store.sweep_result import SweepResult
 
 FAILED: Final = 1
+"""Exit status of a command whose walks failed."""
 
 SweepFile = Annotated[
     Path, typer.Argument(metavar="FILE.yaml", help="The sweep, as those in sweeps/.", show_default=False)
@@ -48,31 +48,37 @@ def sweep(
     as_json: AsJson = False,
 ) -> None:
     """Run a sweep, or what is left of it: many walks over a grid, with random samples in each cell."""
-    from warpchain.cli.terminal import status_line
+    from warpchain.cli.terminal import print_sweep, status_line, sweep_progress_text
+    from warpchain.inputs.validation import InputError
     from warpchain.run.sweep_run import sweep as run
 
     if gpus is not None:
-        device = _device_of_gpus(scheduler, workers, device)
-    with status_line() as show, _gpus(gpus) if gpus is not None else _dask(scheduler) as cluster:
-        executor, threads = cluster
+        for name, value in (("--scheduler", scheduler), ("--workers", workers)):
+            if value is not None:
+                raise InputError(f"{name}: given together with --gpus; leave one out")
+        if device not in (None, "cuda"):
+            raise InputError(f"--device: {device} is given together with --gpus; give cuda, or leave one out")
+        device = "cuda"
+    with status_line() as show, _executor(gpus, scheduler) as (executor, count):
         result = run(
             source,
             output,
             device=device,
             executor=executor,
-            workers=workers or threads,
+            workers=workers or count,
             fresh=fresh,
-            on_progress=lambda progress: show(_progress_text(progress)),
+            on_progress=lambda progress: show(sweep_progress_text(progress)),
         )
-    _print_result(result, as_json)
+    print_sweep(result, as_json)
     _note_failures(result)
 
 
 def info(directory: Folder, as_json: AsJson = False) -> None:
     """Show how far a sweep is and what it has found so far."""
+    from warpchain.cli.terminal import print_sweep
     from warpchain.store.sweep_result import load
 
-    _print_result(load(directory), as_json)
+    print_sweep(load(directory), as_json)
 
 
 def plot(
@@ -123,7 +129,7 @@ def report(
     ] = None,
 ) -> None:
     """Write one self-contained HTML page: figures, table, parameters, provenance, failed walks, a walk in motion."""
-    from warpchain.inputs.parameters import InputError
+    from warpchain.inputs.validation import InputError
     from warpchain.reports.sweep_page import write_report
 
     if device is not None and walk is None:
@@ -150,120 +156,36 @@ def add_commands(app: typer.Typer) -> None:
         app.command()(command)
 
 
-def _device_of_gpus(scheduler: str | None, workers: int | None, device: str | None) -> str:
-    """The device of a sweep on several GPUs.
+@contextlib.contextmanager
+def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[tuple[Executor | None, int | None]]":
+    """An executor on GPUs or on a Dask cluster, and its number of workers; (None, None) if neither is asked for.
 
     Raises:
-        InputError: another option contradicts --gpus.
+        InputError: there are not so many GPUs, Dask is not installed, or the scheduler does not answer.
     """
-    from warpchain.inputs.parameters import InputError
-
-    for name, value in (("--scheduler", scheduler), ("--workers", workers)):
-        if value is not None:
-            raise InputError(f"{name}: given together with --gpus; leave one out")
-    if device not in (None, "cuda"):
-        raise InputError(f"--device: {device} is given together with --gpus; give cuda, or leave one out")
-    return "cuda"
-
-
-@contextlib.contextmanager
-def _gpus(count: int) -> "Iterator[tuple[Executor | None, int | None]]":
-    """An executor with a process for each GPU, and their number."""
     from warpchain.run.gpu_workers import gpu_workers
 
-    with gpu_workers(count) as executor:
-        yield executor, count
-
-
-@contextlib.contextmanager
-def _dask(address: str | None) -> "Iterator[tuple[Executor | None, int | None]]":
-    """An executor on a Dask cluster and its number of threads; (None, None) without an address.
-
-    Raises:
-        InputError: Dask is not installed, or the scheduler does not answer.
-    """
-    if address is None:
+    if gpus is not None:
+        with gpu_workers(gpus) as executor:
+            yield executor, gpus
+    elif scheduler is not None:
+        with _dask_client(scheduler) as client:
+            yield client.get_executor(), sum(client.nthreads().values())
+    else:
         yield None, None
-        return
-    from warpchain.inputs.parameters import InputError, shown
+
+
+def _dask_client(address: str) -> Any:
+    from warpchain.inputs.validation import InputError, shown
 
     try:
         from distributed import Client
     except ImportError:
         raise InputError("--scheduler: Dask is not installed; pip install 'warpchain[dask]'") from None
     try:
-        client: Any = Client(address, timeout=10)  # type: ignore[no-untyped-call]
+        return Client(address, timeout=10)  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
         raise InputError(f"--scheduler: {shown(address)}: {error}; give the address of a running scheduler") from None
-    with client:
-        yield client.get_executor(), sum(client.nthreads().values())
-
-
-def _progress_text(progress: "SweepProgress") -> str:
-    """How far a sweep is, in columns."""
-    if progress.compiling:
-        return "compiling kernels; later runs find them ready"
-    left = progress.time_left
-    counts = ", ".join(f"{count} {label}" for label, count in sorted(progress.statuses.items()))
-    remaining = "" if left is None else f"   {_duration(left)} left"
-    return f"{progress.done:,} of {progress.walks:,} walks   {progress.rate:.2f} a second{remaining}   {counts}"
-
-
-def _duration(seconds: float) -> str:
-    """Hours, minutes and seconds, as far as needed."""
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s" if minutes else f"{rest} s"
-
-
-def _print_result(result: "SweepResult", as_json: bool) -> None:
-    """Print the statuses and the mean Δx of each cell."""
-    if as_json:
-        print(json.dumps(_as_json(result), indent=2, allow_nan=False))
-        return
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console(highlight=False, markup=False)
-    counts = ", ".join(f"{count:,} {label}" for label, count in result.summary().items() if count or label == "at_rest")
-    console.print(f"{result.name}: {result.walk_count:,} walks, {counts}")
-    for name, block in result.blocks.items():
-        statistics = block.statistics()
-        table = Table(box=None, pad_edge=False, title=name if len(result.blocks) > 1 else None, title_justify="left")
-        for axis in statistics.axes:
-            table.add_column(axis, justify="right")
-        for heading in ("mean Δx / m", "s.d. / m", "at rest", "failed", "missing"):
-            table.add_column(heading, justify="right")
-        for cell in _cells(statistics.mean.shape):
-            place = [str(values[index]) for values, index in zip(statistics.axes.values(), cell, strict=True)]
-            numbers = [f"{statistics.mean[cell]:.4f}", f"{statistics.sd[cell]:.4f}"]
-            walks = [str(array[cell]) for array in (statistics.count, statistics.failed, statistics.missing)]
-            table.add_row(*place, *numbers, *walks)
-        console.print(table)
-
-
-def _cells(shape: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
-    """All places of an array of this shape."""
-    import numpy as np
-
-    return iter(np.ndindex(*shape))
-
-
-def _as_json(result: "SweepResult") -> dict[str, Any]:
-    """Statuses and cell statistics as JSON has them."""
-
-    def plain(array: Any) -> Any:
-        values = array.tolist() if hasattr(array, "tolist") else array
-        if isinstance(values, list):
-            return [plain(value) for value in values]
-        return None if isinstance(values, float) and values != values else values
-
-    blocks = {}
-    for name, block in result.blocks.items():
-        statistics = block.statistics()
-        numbers = {key: plain(getattr(statistics, key)) for key in ("mean", "sd", "count", "failed", "missing")}
-        blocks[name] = {"axes": {axis: plain(values) for axis, values in statistics.axes.items()}, "dx": numbers}
-    return {"name": result.name, "walks": result.walk_count, "statuses": result.summary(), "blocks": blocks}
 
 
 def _note_failures(result: "SweepResult") -> None:

@@ -1,5 +1,6 @@
 """What the command line shows and writes: progress, tables, and a folder with record and pictures."""
 
+import json
 import math
 import sys
 import tempfile
@@ -7,9 +8,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
-from warpchain.inputs.parameters import InputError
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from warpchain.inputs.validation import InputError
 from warpchain.walks.walk_result import LOST, WalkResult, replacing
 
 if TYPE_CHECKING:
@@ -17,14 +22,17 @@ if TYPE_CHECKING:
     from warpchain.bench.gpu_steps import GpuCost
     from warpchain.bench.scaling import Scaling
     from warpchain.run.single_walk import Progress
+    from warpchain.run.sweep_run import SweepProgress
+    from warpchain.store.sweep_result import SweepResult
 
 PICTURE_DPI: Final = 200
+COMPILING: Final = "compiling kernels; later runs find them ready"
 WIDE: Final = 110
 """Columns of a wide table where there is no terminal to ask."""
 
 
 def try_folder(folder: Path) -> None:
-    """Find out, before a long run, whether a folder can be written to; nothing is left there.
+    """Check before a long run that a folder can be written to; nothing is left there.
 
     Raises:
         InputError: it cannot.
@@ -46,12 +54,10 @@ def try_folder(folder: Path) -> None:
 
 @contextmanager
 def status_line() -> Iterator[Callable[[str], None]]:
-    """Yield what shows a changing line on a terminal; where there is none, nothing is shown."""
+    """Yield a function that shows a changing line on a terminal; without a terminal it shows nothing."""
     if not sys.stderr.isatty():
         yield lambda text: None
         return
-    from rich.console import Console
-
     with Console(stderr=True).status("starting") as line:
         yield line.update
 
@@ -59,16 +65,68 @@ def status_line() -> Iterator[Callable[[str], None]]:
 def progress_text(progress: "Progress") -> str:
     """Where a walk is, in columns."""
     if progress.phase == "compile":
-        return "compiling kernels; later runs find them ready"
+        return COMPILING
     where, speed = f"{progress.phase:8}{progress.time:8.3f} s", f"{progress.speed:9.3f} m/s"
     return f"{where}{speed}{progress.attempts:14,} steps"
 
 
-def print_walk(result: WalkResult) -> None:
-    """Print on standard output what one wants to know of a walk."""
-    from rich.console import Console
-    from rich.table import Table
+def sweep_progress_text(progress: "SweepProgress") -> str:
+    """How far a sweep is, in columns."""
+    if progress.compiling:
+        return COMPILING
+    left = "" if progress.time_left is None else f"   {_duration(progress.time_left)} left"
+    counts = ", ".join(f"{count} {label}" for label, count in sorted(progress.statuses.items()))
+    return f"{progress.done:,} of {progress.walks:,} walks   {progress.rate:.2f} a second{left}   {counts}"
 
+
+def _duration(seconds: float) -> str:
+    """Hours, minutes and seconds, as far as needed."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s" if minutes else f"{rest} s"
+
+
+def print_sweep(result: "SweepResult", as_json: bool) -> None:
+    """Print the statuses of a sweep and the mean Δx of each cell on standard output."""
+    summary = result.summary()
+    statistics = {name: block.statistics() for name, block in result.blocks.items()}
+    if as_json:
+        numbers = ("mean", "sd", "count", "failed", "missing")
+        blocks = {
+            name: {
+                "axes": {axis: _plain(values) for axis, values in of_block.axes.items()},
+                "dx": {key: _plain(getattr(of_block, key)) for key in numbers},
+            }
+            for name, of_block in statistics.items()
+        }
+        whole = {"name": result.name, "walks": result.walk_count, "statuses": summary, "blocks": blocks}
+        print(json.dumps(whole, indent=2, allow_nan=False))
+        return
+    console = Console(highlight=False, markup=False)
+    counts = ", ".join(f"{count:,} {label}" for label, count in summary.items() if count or label == "at_rest")
+    console.print(f"{result.name}: {result.walk_count:,} walks, {counts}")
+    for name, of_block in statistics.items():
+        table = Table(box=None, pad_edge=False, title=name if len(statistics) > 1 else None, title_justify="left")
+        for heading in (*of_block.axes, "mean Δx / m", "s.d. / m", "at rest", "failed", "missing"):
+            table.add_column(heading, justify="right")
+        for cell in np.ndindex(*of_block.mean.shape):
+            place = [str(values[index]) for values, index in zip(of_block.axes.values(), cell, strict=True)]
+            lengths = [f"{array[cell]:.4f}" for array in (of_block.mean, of_block.sd)]
+            walks = [str(array[cell]) for array in (of_block.count, of_block.failed, of_block.missing)]
+            table.add_row(*place, *lengths, *walks)
+        console.print(table)
+
+
+def _plain(array: Any) -> Any:
+    """An array as JSON has it; a number that is NaN is null."""
+    values = array.tolist()
+    if isinstance(values, list):
+        return [_plain(part) for part in array]
+    return None if values != values else values
+
+
+def print_walk(result: WalkResult) -> None:
+    """Print the results of a walk on standard output."""
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="bold", no_wrap=True)
     table.add_column()

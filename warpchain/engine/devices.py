@@ -13,7 +13,8 @@ import warp as wp
 
 from warpchain.engine.kernel_choice import block_threads
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import InputError, Parameters
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.pair_list import list_layout
 from warpchain.kernels.cpu import functions as cpu_functions

@@ -1,22 +1,24 @@
 """Random samples of parameters and scenes, reproducible one by one.
 
-A sample is named by (seed, cell, sample). Its generator depends on nothing else, so neither the order nor the
-number of the other samples of a sweep changes it.
+The generator of a sample depends on (seed, cell, sample) only, so neither the order nor the number of the other
+samples of a sweep changes it.
 
 What is drawn is a mapping of names to distributions, in the order of drawing. A single walk with a seed uses
 `TABLE`; a sweep may state others.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import Final
 
 import numpy as np
 
-from warpchain.inputs.parameters import Bounds, InputError, Parameters, shown, validated
+from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
+from warpchain.inputs.setup import SECTION_OF, SECTIONS, Setup
+from warpchain.inputs.validation import DIMENSIONLESS, Bounds, InputError, checked_whole, field_bounds, field_unit
 
 CLEARANCE_RANGE: Final = (0.005, 0.015)
 """Interval of the release height that a sample draws from, in m."""
@@ -24,12 +26,22 @@ CLEARANCE_RANGE: Final = (0.005, 0.015)
 DRAW_LIMIT: Final = 1000
 """Draws of one quantity before giving up; a mean inside the bounds needs two on average at worst."""
 
+LARGEST_SEED: Final = 2**128 - 1
+_LARGEST: Final = 2**32 - 1
+"""Greatest cell or sample. A greater number, or seed, could repeat the stream of another sample."""
+
+DRAWABLE: Final = (
+    *Parameters.model_fields,
+    *(name for name, field in Scene.model_fields.items() if field.annotation is float),
+)
+"""Quantities that can have a distribution, in the order of drawing."""
+
 _STANDARD: Final = NormalDist()
 
 
 @dataclass(frozen=True)
 class Uniform:
-    """Equally likely values between two ends; what is not physical is drawn again.
+    """Equally likely values between two ends; an unphysical value is drawn again.
 
     Attributes:
         lower: lower end, in the unit of the quantity.
@@ -65,11 +77,10 @@ class Uniform:
 
 @dataclass(frozen=True)
 class Gaussian:
-    """A Gaussian cut off at the physical bounds; what lies outside is drawn again, never clipped.
+    """A Gaussian truncated at the physical bounds; a value outside is drawn again, never clipped.
 
     Attributes:
-        mean: mean of the whole Gaussian, in the unit of the quantity; None stands for the value that the
-            quantity has where it is drawn, see `placed`.
+        mean: mean of the whole Gaussian, in the unit of the quantity; None: the chain's own value, see `placed`.
         sigma: standard deviation of the whole Gaussian.
         bounds: the physical values.
     """
@@ -124,57 +135,35 @@ def _between(lower: float, upper: float, fraction: float) -> float:
     return _STANDARD.inv_cdf(first + (last - first) * fraction)
 
 
-def physical_values(name: str) -> Bounds:
-    """The physical values of a quantity that can be drawn: a field of `Parameters` or a number of `Scene`."""
-    quantities = Parameters.quantities()
-    if name in quantities:
-        return quantities[name].bounds
-    lower, upper, lower_included = -math.inf, math.inf, True
-    for limit in Scene.model_fields[name].metadata:
-        if hasattr(limit, "ge"):
-            lower = float(limit.ge)
-        if hasattr(limit, "gt"):
-            lower, lower_included = float(limit.gt), False
-        if hasattr(limit, "le"):
-            upper = float(limit.le)
-        if hasattr(limit, "lt"):
-            upper = math.nextafter(limit.lt, -math.inf)
-    return Bounds(lower, upper, lower_included)
-
-
-def _table() -> dict[str, Distribution]:
-    table: dict[str, Distribution] = {
+TABLE: Final[Mapping[str, Distribution]] = {
+    **{
         name: Gaussian(None, quantity.sigma, quantity.bounds)
         for name, quantity in Parameters.quantities().items()
         if quantity.sigma > 0
-    }
-    table["phase"] = Uniform(0.0, 1.0, physical_values("phase"))
-    table["clearance"] = Uniform(*CLEARANCE_RANGE, physical_values("clearance"))
-    return table
+    },
+    "phase": Uniform(0.0, 1.0, field_bounds(Scene.model_fields["phase"])),
+    "clearance": Uniform(*CLEARANCE_RANGE, field_bounds(Scene.model_fields["clearance"])),
+}
+"""Default of what a sample draws: the Gaussians of Table 1 in the order of the table, then phase and clearance of the
+release."""
 
 
-TABLE: Final[Mapping[str, Distribution]] = _table()
-"""What a sample draws unless told otherwise: the Gaussians of Table 1 in the order of the table, then phase and
-clearance of the release."""
-
-
-def placed(distributions: Mapping[str, Distribution], base: Parameters, scene: Scene) -> dict[str, Distribution]:
+def placed(distributions: Mapping[str, Distribution], setup: Setup) -> dict[str, Distribution]:
     """The distributions with means and bounds for one chain.
 
     A Gaussian without a mean gets the chain's value. A link length must leave room for its two circles.
 
     Args:
-        distributions: name → distribution, names of fields of `Parameters` or `Scene`.
-        base: the chain's parameters.
-        scene: the chain's scene.
+        distributions: name, one of `DRAWABLE` → distribution.
+        setup: the chain's values.
     """
     complete = {}
     for name, distribution in distributions.items():
         if isinstance(distribution, Gaussian) and distribution.mean is None:
-            model = base if name in Parameters.model_fields else scene
-            distribution = replace(distribution, mean=float(getattr(model, name)))
+            value = getattr(getattr(setup, SECTION_OF[name]), name)
+            distribution = replace(distribution, mean=float(value))
         if name == "link_length" and "circle_radius" not in distributions:
-            room = Bounds(2 * base.circle_radius, lower_included=False)
+            room = Bounds(2 * setup.parameters.circle_radius, lower_included=False)
             distribution = replace(distribution, bounds=room)
         complete[name] = distribution
     return complete
@@ -198,10 +187,11 @@ def _physical_draw(name: str, distribution: Distribution, rng: np.random.Generat
         value = distribution.draw(rng)
         if distribution.bounds.admit(value):
             return value
-    quantity = Parameters.quantities().get(name)
-    section, unit = ("parameters", f" {quantity.unit}") if quantity else ("scene", "")
+    section = SECTION_OF[name]
+    unit = field_unit(SECTIONS[section].model_fields[name])
+    described = distribution.described("" if unit == DIMENSIONLESS else f" {unit}")
     raise InputError(
-        f"{section}.{name}: {DRAW_LIMIT} draws {distribution.described(unit)} were all outside the physical "
+        f"{section}.{name}: {DRAW_LIMIT} draws {described} were all outside the physical "
         "bounds; give a mean inside them"
     )
 
@@ -210,45 +200,28 @@ def random_generator(seed: int, cell: int = 0, sample: int = 0) -> np.random.Gen
     """The random generator of one sample.
 
     Args:
-        seed: seed of the sweep, 0 … 2¹²⁸ − 1.
+        seed: seed of the sweep, 0 … `LARGEST_SEED`.
         cell: index of the sweep's cell (one combination of values), 0 … 2³² − 1.
         sample: index of the sample in its cell, 0 … 2³² − 1.
 
     Raises:
-        InputError: a number is no integer or out of range; a larger one could repeat another sample's stream.
+        InputError: a number is no integer or out of range.
     """
-    for name, number, bits in (("seed", seed, 128), ("cell", cell, 32), ("sample", sample, 32)):
-        if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < 2**bits:
-            raise InputError(f"{name}: {shown(number)} is no whole number from 0 to 2**{bits} - 1; give one")
+    for name, number, largest in (("seed", seed, LARGEST_SEED), ("cell", cell, _LARGEST), ("sample", sample, _LARGEST)):
+        checked_whole(number, name, 0, largest)
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(cell, sample)))
 
 
-def sample_parameters(base: Parameters, rng: np.random.Generator) -> Parameters:
-    """Draw every quantity that has an uncertainty from a truncated Gaussian.
-
-    The mean is the value in `base` and the standard deviation that of Table 1. The quantities are drawn in
-    the order of the table (the order of the fields of `Parameters`). A draw outside the physical bounds, or a
-    link length that leaves no room for its two circles, is drawn again from the same stream.
+def sampled(setup: Setup, rng: np.random.Generator, kept: Container[str] = ()) -> Setup:
+    """The setup with the quantities of `TABLE` drawn about its own values, in the order of the table.
 
     Args:
-        base: mean values; quantities without an uncertainty are taken over as they are.
+        setup: the means; a quantity without an uncertainty is taken over.
         rng: the stream to draw from, see `random_generator`.
+        kept: quantities that are drawn as well, so that the others stay what they are, but keep their value.
 
     Raises:
-        InputError: no draw was physical, which only a `base` that is itself unphysical can cause.
+        InputError: no draw of a quantity was physical, or the drawn values together make no possible walk.
     """
-    gaussians = {name: TABLE[name] for name in TABLE if name in Parameters.model_fields}
-    return base.with_values(draw(placed(gaussians, base, Scene()), rng))
-
-
-def sample_scene(base: Scene, rng: np.random.Generator) -> Scene:
-    """Draw the moment and the height of the release.
-
-    First the phase, uniform in [0, 1) of a loop period; then the clearance, uniform in `CLEARANCE_RANGE`.
-
-    Args:
-        base: scene whose other fields are taken over.
-        rng: the stream to draw from, see `random_generator`.
-    """
-    release = {name: TABLE[name] for name in TABLE if name in Scene.model_fields}
-    return validated(Scene, {**base.model_dump(), **draw(release, rng)}, "scene")
+    drawn = draw(placed(TABLE, setup), rng)
+    return setup.with_drawn({name: value for name, value in drawn.items() if name not in kept})

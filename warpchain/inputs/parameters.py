@@ -1,81 +1,60 @@
 """Physical parameters of a roller chain: Table 1 of the paper, each quantity declared once.
 
-Every field of `Parameters` carries a `Quantity`: symbol, unit, value and uncertainty in Table 1, physical
-bounds and origin. Presets, error messages and the random samples of `warpchain.inputs.distributions` all read it.
+Every field of `Parameters` carries a `Quantity`: symbol, unit, value and uncertainty in Table 1, physical bounds and
+origin. Presets, error messages and the samples of `warpchain.inputs.distributions` are derived from it.
 
 Source: "A walking roller chain", Table 1, unless a quantity says otherwise.
 """
 
-import difflib
-import math
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Final, Literal, Self, TypeVar, get_args
+from typing import Any, Final, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError, model_validator
-from pydantic.fields import FieldInfo
-from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError, core_schema
+from pydantic import BaseModel, model_validator
+
+from warpchain.inputs.validation import (
+    DIMENSIONLESS,
+    STRICT,
+    Bounds,
+    InputError,
+    field_bounds,
+    number_field,
+    refusal,
+    shown,
+    validated,
+)
 
 Source = Literal["measured", "looked up", "adjusted", "assumed"]
 
-STRICT: Final = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-"""Of models that hold a user's values."""
+Limits = Mapping[str, float]
 
-DIMENSIONLESS: Final = "1"
-
-
-class InputError(ValueError):
-    """Input that the user can correct; its text is one line: `path.of.field: what is wrong; what to do`."""
-
-
-@dataclass(frozen=True)
-class Bounds:
-    """An interval of physical values.
-
-    Attributes:
-        lower: lower end, in the unit of the quantity.
-        upper: upper end; included when finite.
-        lower_included: whether the lower end itself is physical.
-    """
-
-    lower: float
-    upper: float = math.inf
-    lower_included: bool = True
-
-    def admit(self, value: float) -> bool:
-        """Whether `value` is finite and inside the interval."""
-        above = value >= self.lower if self.lower_included else value > self.lower
-        return math.isfinite(value) and above and value <= self.upper
-
-
-FRACTION: Final = Bounds(0.0, 1.0)
-SIGNED_FRACTION: Final = Bounds(-1.0, 1.0)
-LENGTH: Final = Bounds(1e-9, 1e3)
+FRACTION: Final[Limits] = {"ge": 0.0, "le": 1.0}
+SIGNED_FRACTION: Final[Limits] = {"ge": -1.0, "le": 1.0}
+LENGTH: Final[Limits] = {"ge": 1e-9, "le": 1e3}
 """From a few atoms to a kilometre: like the next ones far beyond any chain, and small enough for squares and ratios."""
-MASS: Final = Bounds(0.0, 1e6, lower_included=False)
-INERTIA: Final = Bounds(0.0, 1e12, lower_included=False)
-"""That of the greatest mass at the greatest length."""
-TORQUE: Final = Bounds(0.0, 1e9)
-GRAVITY: Final = Bounds(0.0, 1e6)
+MASS: Final[Limits] = {"gt": 0.0, "le": 1e6}
+INERTIA: Final[Limits] = {"gt": 0.0, "le": 1e12}
+"""Up to that of the greatest mass at the greatest length."""
+TORQUE: Final[Limits] = {"ge": 0.0, "le": 1e9}
+GRAVITY: Final[Limits] = {"ge": 0.0, "le": 1e6}
 """Up to that of a white dwarf."""
-STIFFNESS: Final = Bounds(0.0, 1e12, lower_included=False)
-DAMPING: Final = Bounds(0.0, 1e12)
-TURNING: Final = Bounds(0.0, 1e6, lower_included=False)
-"""Up to what no joint reaches at the highest frequency of a scene."""
+STIFFNESS: Final[Limits] = {"gt": 0.0, "le": 1e12}
+DAMPING: Final[Limits] = {"ge": 0.0, "le": 1e12}
+TURNING: Final[Limits] = {"gt": 0.0, "le": 1e6}
+"""Up to a speed that no joint reaches at the highest frequency of a scene."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """One row of the parameter table; as metadata of a pydantic field it also enforces its bounds.
+    """One row of Table 1.
 
     Attributes:
         symbol: symbol in the paper's equations.
         unit: SI unit, `DIMENSIONLESS` for pure numbers.
         value: value in Table 1, in `unit`.
         sigma: standard deviation in Table 1, in `unit`; 0 when the table gives none.
-        bounds: the physical values, in `unit`.
         source: how the value was obtained; "assumed" when it is not in the paper.
+        bounds: the physical values, in `unit`.
         meaning: one line saying what the quantity is.
     """
 
@@ -83,25 +62,14 @@ class Quantity:
     unit: str
     value: float
     sigma: float
-    bounds: Bounds
     source: Source
+    bounds: Bounds
     meaning: str
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """The same bounds as a pydantic schema: a finite number, never text or a truth value."""
-        bounds = self.bounds
-        return core_schema.float_schema(
-            strict=True,
-            allow_inf_nan=False,
-            ge=bounds.lower if bounds.lower_included else None,
-            gt=None if bounds.lower_included else bounds.lower,
-            le=bounds.upper if math.isfinite(bounds.upper) else None,
-        )
 
-
-def circles_fit(link_length: float, circle_radius: float) -> bool:
-    """Whether the two circles of a link are apart: `circle_radius < link_length / 2` (both in m)."""
-    return circle_radius < link_length / 2
+def _row(symbol: str, unit: str, value: float, sigma: float, limits: Limits, source: Source, meaning: str) -> Any:
+    """A required field that carries a row of the table, see `Parameters.quantities`."""
+    return number_field(..., unit, meaning, symbol=symbol, value=value, sigma=sigma, source=source, **limits)
 
 
 class Parameters(BaseModel):
@@ -117,89 +85,51 @@ class Parameters(BaseModel):
 
     model_config = STRICT
 
-    link_length: Annotated[
-        float,
-        Quantity("ℓ", "m", 1.268e-2, 1e-5, LENGTH, "measured", "distance between the two joints of a link"),
-    ]
-    sprocket_radius: Annotated[
-        float, Quantity("R", "m", 5.56e-2, 5e-4, LENGTH, "measured", "sprocket radius, see Scene")
-    ]
-    inner_mass: Annotated[float, Quantity("m_inner", "kg", 3.700e-3, 2e-6, MASS, "measured", "mass of an inner link")]
-    outer_mass: Annotated[float, Quantity("m_outer", "kg", 3.147e-3, 2e-6, MASS, "measured", "mass of an outer link")]
-    inner_inertia: Annotated[
-        float,
-        Quantity("I_inner", "kg m²", 1.69e-7, 1e-9, INERTIA, "measured", "moment of inertia of an inner link"),
-    ]
-    outer_inertia: Annotated[
-        float,
-        Quantity("I_outer", "kg m²", 1.292e-7, 9e-10, INERTIA, "measured", "moment of inertia of an outer link"),
-    ]
-    viscous_friction: Annotated[
-        float,
-        Quantity("β", "N m s", 9e-5, 1e-5, TORQUE, "measured", "joint torque per angular velocity"),
-    ]
-    coulomb_friction: Annotated[
-        float,
-        Quantity("τ_c", "N m", 1.10e-4, 9e-6, TORQUE, "measured", "joint torque at speeds above ω_c"),
-    ]
-    floor_restitution: Annotated[
-        float,
-        Quantity("e_fc", DIMENSIONLESS, 0.018, 0.004, FRACTION, "measured", "normal restitution, floor and chain"),
-    ]
-    floor_friction: Annotated[
-        float,
-        Quantity("μ_fc", DIMENSIONLESS, 0.27, 0.02, FRACTION, "measured", "friction coefficient, floor and chain"),
-    ]
-    gravity: Annotated[
-        float,
-        Quantity("g", "m/s²", 9.809, 0.0, GRAVITY, "looked up", "gravitational acceleration, along −y"),
-    ]
-    chain_restitution: Annotated[
-        float,
-        Quantity("e_cc", DIMENSIONLESS, 0.80, 0.0, FRACTION, "looked up", "normal restitution, two links"),
-    ]
-    chain_friction: Annotated[
-        float,
-        Quantity("μ_cc", DIMENSIONLESS, 0.62, 0.0, FRACTION, "looked up", "friction coefficient, two links"),
-    ]
-    sprocket_restitution: Annotated[
-        float,
-        Quantity("e_sc", DIMENSIONLESS, 0.01, 0.0, FRACTION, "adjusted", "normal restitution, sprocket and chain"),
-    ]
-    sprocket_friction: Annotated[
-        float,
-        Quantity("μ_sc", DIMENSIONLESS, 0.99, 0.0, FRACTION, "adjusted", "friction coefficient, sprocket and chain"),
-    ]
-    joint_stiffness: Annotated[
-        float, Quantity("k", "N/m", 1e9, 0.0, STIFFNESS, "adjusted", "stiffness of a joint's spring")
-    ]
-    joint_damping: Annotated[
-        float, Quantity("b", "N s/m", 1e3, 0.0, DAMPING, "adjusted", "damping of a joint's spring")
-    ]
-    friction_smoothing: Annotated[
-        float,
-        Quantity(
-            "ω_c",
-            "rad/s",
-            1e-3,
-            0.0,
-            TURNING,
-            "adjusted",
-            "width of Coulomb friction's sign change, tanh(ω/ω_c)",
-        ),
-    ]
-    tangential_restitution: Annotated[
-        float,
-        Quantity("e_t", DIMENSIONLESS, 0.0, 0.0, SIGNED_FRACTION, "adjusted", "tangential restitution, all pairs"),
-    ]
-    circle_radius: Annotated[
-        float, Quantity("r", "m", 4.2e-3, 0.0, LENGTH, "assumed", "radius of the circle at a link end")
-    ]
+    link_length: float = _row("ℓ", "m", 1.268e-2, 1e-5, LENGTH, "measured", "distance between the two joints of a link")
+    sprocket_radius: float = _row("R", "m", 5.56e-2, 5e-4, LENGTH, "measured", "sprocket radius, see Scene")
+    inner_mass: float = _row("m_inner", "kg", 3.700e-3, 2e-6, MASS, "measured", "mass of an inner link")
+    outer_mass: float = _row("m_outer", "kg", 3.147e-3, 2e-6, MASS, "measured", "mass of an outer link")
+    inner_inertia: float = _row(
+        "I_inner", "kg m²", 1.69e-7, 1e-9, INERTIA, "measured", "moment of inertia of an inner link"
+    )
+    outer_inertia: float = _row(
+        "I_outer", "kg m²", 1.292e-7, 9e-10, INERTIA, "measured", "moment of inertia of an outer link"
+    )
+    viscous_friction: float = _row("β", "N m s", 9e-5, 1e-5, TORQUE, "measured", "joint torque per angular velocity")
+    coulomb_friction: float = _row("τ_c", "N m", 1.10e-4, 9e-6, TORQUE, "measured", "joint torque at speeds above ω_c")
+    floor_restitution: float = _row(
+        "e_fc", DIMENSIONLESS, 0.018, 0.004, FRACTION, "measured", "normal restitution, floor and chain"
+    )
+    floor_friction: float = _row(
+        "μ_fc", DIMENSIONLESS, 0.27, 0.02, FRACTION, "measured", "friction coefficient, floor and chain"
+    )
+    gravity: float = _row("g", "m/s²", 9.809, 0.0, GRAVITY, "looked up", "gravitational acceleration, along −y")
+    chain_restitution: float = _row(
+        "e_cc", DIMENSIONLESS, 0.80, 0.0, FRACTION, "looked up", "normal restitution, two links"
+    )
+    chain_friction: float = _row(
+        "μ_cc", DIMENSIONLESS, 0.62, 0.0, FRACTION, "looked up", "friction coefficient, two links"
+    )
+    sprocket_restitution: float = _row(
+        "e_sc", DIMENSIONLESS, 0.01, 0.0, FRACTION, "adjusted", "normal restitution, sprocket and chain"
+    )
+    sprocket_friction: float = _row(
+        "μ_sc", DIMENSIONLESS, 0.99, 0.0, FRACTION, "adjusted", "friction coefficient, sprocket and chain"
+    )
+    joint_stiffness: float = _row("k", "N/m", 1e9, 0.0, STIFFNESS, "adjusted", "stiffness of a joint's spring")
+    joint_damping: float = _row("b", "N s/m", 1e3, 0.0, DAMPING, "adjusted", "damping of a joint's spring")
+    friction_smoothing: float = _row(
+        "ω_c", "rad/s", 1e-3, 0.0, TURNING, "adjusted", "width of Coulomb friction's sign change, tanh(ω/ω_c)"
+    )
+    tangential_restitution: float = _row(
+        "e_t", DIMENSIONLESS, 0.0, 0.0, SIGNED_FRACTION, "adjusted", "tangential restitution, all pairs"
+    )
+    circle_radius: float = _row("r", "m", 4.2e-3, 0.0, LENGTH, "assumed", "radius of the circle at a link end")
     """Not in the paper: between the roller (3.9 mm) and the plates (about 5 mm) of a half-inch chain."""
 
     @model_validator(mode="after")
     def _circles_apart(self) -> Self:
-        if not circles_fit(self.link_length, self.circle_radius):
+        if not self.circle_radius < self.link_length / 2:
             raise refusal(
                 "circle_radius",
                 f"{self.circle_radius} is not smaller than half the link length {self.link_length / 2}; "
@@ -211,10 +141,8 @@ class Parameters(BaseModel):
     def quantities(cls) -> dict[str, Quantity]:
         """The parameter table: name of each field → its `Quantity`, in the order of declaration."""
         return {
-            name: metadata
+            name: Quantity(bounds=field_bounds(field), meaning=field.description, **field.json_schema_extra)  # type: ignore
             for name, field in cls.model_fields.items()
-            for metadata in field.metadata
-            if isinstance(metadata, Quantity)
         }
 
     def with_values(self, values: Mapping[str, object]) -> Self:
@@ -227,130 +155,6 @@ class Parameters(BaseModel):
             InputError: a name is unknown, or the new set is not physical.
         """
         return validated(type(self), {**self.model_dump(), **values}, "parameters")
-
-
-def refusal(field: str, message: str) -> PydanticCustomError:
-    """An error for a pydantic validator to raise; `validated` turns it into `….field: message`."""
-    return PydanticCustomError("refusal", message, {"field": field})
-
-
-ModelT = TypeVar("ModelT", bound=BaseModel)
-
-
-def validated(model: type[ModelT], values: Mapping[str, object], path: str) -> ModelT:
-    """Build a pydantic model, with errors as one line that names the field and the remedy.
-
-    Args:
-        model: `Parameters`, or another model whose fields carry a unit.
-        values: name → value.
-        path: where the values were given, such as `scene`; the error's field path starts with it.
-
-    Raises:
-        InputError: some value is refused; the first is described, the others are counted.
-    """
-    try:
-        return model.model_validate(dict(values))
-    except ValidationError as error:
-        first, *others = error.errors()
-        count = f" (and {len(others)} more)" if others else ""
-        raise InputError(_described(first, model, path) + count) from None
-
-
-def suggestion(given: object, known: Iterable[str]) -> str:
-    """The remedy for an unknown name: the closest known one, or all of them."""
-    names = list(known)
-    close = difflib.get_close_matches(str(given), names, n=1)
-    return f"did you mean {close[0]}?" if close else f"give one of {', '.join(names)}"
-
-
-def shown(value: object) -> str:
-    """A value as an error message shows it: one line of at most 60 characters."""
-    text = str(value) if isinstance(value, int | float) else repr(value)
-    text = " ".join(text.split())
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-def _described(error: ErrorDetails, model: type[BaseModel], path: str) -> str:
-    """One line for one of pydantic's errors: the field's path, the problem and the remedy."""
-    key = error.get("ctx", {}).get("field", error["loc"][0] if error["loc"] else "")
-    name = str(key)
-    where = f"{path}.{name if name.isidentifier() else shown(key)}"
-    if error["type"] in ("extra_forbidden", "invalid_key"):
-        return f"{where}: unknown key; {suggestion(name, model.model_fields)}"
-    if error["type"] == "refusal" or name not in model.model_fields:
-        return f"{where}: {error['msg']}"
-    return f"{where}: {_problem(error, model.model_fields[name], name)}"
-
-
-_LIMITS: Final = {
-    "greater_than": ("gt", "not greater than", "a greater value"),
-    "greater_than_equal": ("ge", "less than", "{limit} or more"),
-    "less_than": ("lt", "not less than", "a smaller value"),
-    "less_than_equal": ("le", "greater than", "{limit} or less"),
-}
-"""Kind of pydantic's error → its key for the limit, how a value breaks it, and what to give."""
-
-
-def _problem(error: ErrorDetails, field: FieldInfo, name: str) -> str:
-    """What is wrong with the value of a known field, in the words of the field's own unit, and the remedy."""
-    kind, given, value = error["type"], error["input"], shown(error["input"])
-    unit = _unit(field)
-    in_unit = "" if unit == DIMENSIONLESS else f" {unit}"
-    number = "whole number" if field.annotation is int else "plain number"
-    number += f" in{in_unit}" if in_unit else ""
-    if kind in _LIMITS:
-        key, breach, remedy = _LIMITS[kind]
-        limit = f"{error['ctx'][key]:.12g}"
-        if kind == "greater_than" and limit == "0":
-            remedy = f"a positive {name.rpartition('_')[2]}"
-        return f"{value} is {breach} {limit}{in_unit}; give {remedy.format(limit=limit)}"
-    match kind:
-        case "missing":
-            return f"missing; give a {number}"
-        case "finite_number":
-            return f"{value} is not finite; give a {number}"
-        case "float_type" | "int_type":
-            return _not_a_number(given, number, unit)
-        case "literal_error":
-            return f"{value} is unknown; {suggestion(given, get_args(field.annotation))}"
-        case "bool_type":
-            return f"{value} is not a truth value; give true or false"
-        case "string_type":
-            return f"{value} is not text; give a name"
-        case _:
-            return str(error["msg"])
-
-
-def _unit(field: FieldInfo) -> str:
-    """Unit of a field: of its `Quantity`, or `unit` in its JSON schema extra."""
-    for metadata in field.metadata:
-        if isinstance(metadata, Quantity):
-            return metadata.unit
-    extra = field.json_schema_extra
-    return str(extra["unit"]) if isinstance(extra, dict) else DIMENSIONLESS
-
-
-_NUMBER_IN_TEXT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\W\d_].*|[%°].*)?", re.DOTALL)
-
-
-def _not_a_number(value: object, number: str, unit: str) -> str:
-    """Why `value` is no number, and what to give; text such as "15 Hz" gets advice about units."""
-    if value is None:
-        return f"empty; give a {number}"
-    if isinstance(value, str):
-        match = _NUMBER_IN_TEXT.fullmatch(value)
-        if match is None:
-            return f"{shown(value)} is text; give a {number}"
-        digits, written = match.groups()
-        if written is None:
-            return f"{shown(value)} is text; give a {number}, without quotes or leading zeros"
-        if written.strip() == unit:
-            return f"{shown(value)} has its unit written with it; give a {number}: {digits}"
-        remedy = "give a plain number" if unit == DIMENSIONLESS else f"convert it and give a {number}"
-        return f"{shown(value)} has a unit written with it; {remedy}"
-    if isinstance(value, int) and not isinstance(value, bool):
-        return f"{shown(value)} is too large; give a {number}"
-    return f"{shown(value)} is of type {type(value).__name__}; give a {number}"
 
 
 _TABLE_1: Final = Parameters.model_validate({name: q.value for name, q in Parameters.quantities().items()})

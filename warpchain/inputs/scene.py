@@ -5,16 +5,17 @@ from typing import Final, Literal, Self
 
 from pydantic import BaseModel, Field, field_validator, model_validator
 
-from warpchain.inputs.parameters import STRICT, InputError, Parameters, refusal
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.validation import STRICT, InputError, number_field, refusal
 
 MOST_LINKS: Final = 100_000
-"""A chain of so many takes 0.4 GB, and kernels of its own."""
+"""A chain of so many links takes 0.4 GB, and kernels of its own."""
 MOST_LINKS_ON_GPU: Final = 1024
 """A chain is a block of threads there, one for each link, and CUDA has no larger blocks."""
 HIGHEST_FREQUENCY: Final = 1e4
-"""Where Table 1's chain passes at 3.8 km/s, under a tension that stretches its joints by a third of a link [Hz]."""
+"""There Table 1's chain moves at 3.8 km/s, under a tension that stretches its joints by a third of a link [Hz]."""
 LEAST_SPROCKET: Final = 1e-3
-"""Least distance of the joints from the sprocket's centre, in links; far smaller ones are lost in rounding."""
+"""Least distance of the joints from the sprocket's centre, in link lengths; far smaller ones are lost in rounding."""
 HIGHEST: Final = 1e6
 """Greatest height, where numbers still tell a nanometre [m]."""
 HIGHEST_LOAD: Final = 1e4
@@ -26,7 +27,7 @@ LONGEST: Final = 1e6
 
 
 class Scene(BaseModel):
-    """What one walk does, from hanging on the sprocket to the end.
+    """What happens in one walk, from hanging on the sprocket to the end.
 
     Raises:
         pydantic.ValidationError: a value is unknown or out of bounds, `links` is odd, or the clearance is
@@ -35,37 +36,19 @@ class Scene(BaseModel):
 
     model_config = STRICT
 
-    links: int = Field(
-        default=60,
-        ge=4,
-        le=MOST_LINKS,
-        description="number of links around the loop, even: inner and outer links alternate",
-        json_schema_extra={"unit": "1"},
+    links: int = number_field(
+        60, "1", "number of links around the loop, even: inner and outer links alternate", ge=4, le=MOST_LINKS
     )
-    frequency: float = Field(
-        default=15.0,
-        ge=0,
-        le=HIGHEST_FREQUENCY,
-        description="turns of the sprocket per second at the release",
-        json_schema_extra={"unit": "Hz"},
+    frequency: float = number_field(
+        15.0, "Hz", "turns of the sprocket per second at the release", ge=0, le=HIGHEST_FREQUENCY
     )
     start: Literal["rest", "spinning", "ellipse"] = Field(
         default="rest",
         description="at rest on the sprocket, circulating on it, or a circulating ellipse without sprocket",
     )
-    phase: float = Field(
-        default=0.0,
-        ge=0,
-        lt=1,
-        description="moment of the release as a fraction of a loop period",
-        json_schema_extra={"unit": "1"},
-    )
-    clearance: float = Field(
-        default=0.01,
-        ge=0,
-        le=HIGHEST,
-        description="height of the lowest circle above the floor, of the chain that clearance_of names",
-        json_schema_extra={"unit": "m"},
+    phase: float = number_field(0.0, "1", "moment of the release as a fraction of a loop period", ge=0, lt=1)
+    clearance: float = number_field(
+        0.01, "m", "height of the lowest circle above the floor, of the chain that clearance_of names", ge=0, le=HIGHEST
     )
     clearance_of: Literal["spinning", "hanging"] = Field(
         default="spinning",
@@ -75,70 +58,42 @@ class Scene(BaseModel):
         default="contact",
         description="what sprocket_radius measures: where circles touch (contact) or joints ride (pitch)",
     )
-    ellipse_aspect: float = Field(
-        default=1.5,
-        ge=0.05,
-        le=20,
-        description="height over width of the starting ellipse",
-        json_schema_extra={"unit": "1"},
+    ellipse_aspect: float = number_field(1.5, "1", "height over width of the starting ellipse", ge=0.05, le=20)
+    settle_time: float = number_field(
+        0.5, "s", "time for the chain to settle on the sprocket at rest", ge=0, le=LONGEST
     )
-    settle_time: float = Field(
-        default=0.5,
-        ge=0,
-        le=LONGEST,
-        description="time for the chain to settle on the sprocket at rest",
-        json_schema_extra={"unit": "s"},
-    )
-    spin_up_time: float = Field(
-        default=2.0,
-        gt=0,
-        le=LONGEST,
-        description="time in which the sprocket reaches its frequency",
-        json_schema_extra={"unit": "s"},
-    )
-    load_factor: float | None = Field(
-        default=None,
+    spin_up_time: float = number_field(2.0, "s", "time in which the sprocket reaches its frequency", gt=0, le=LONGEST)
+    load_factor: float | None = number_field(
+        None,
+        "1",
+        "by which gravity, joint friction and rotary inertia are multiplied while the loop becomes "
+        "stationary; null: as many times as suits the chain, at most 50; 1: not at all",
         ge=1,
         le=HIGHEST_LOAD,
-        description="by which gravity, joint friction and rotary inertia are multiplied while the loop becomes "
-        "stationary; null: as many times as suits the chain, at most 50; 1: not at all",
-        json_schema_extra={"unit": "1"},
     )
-    steady_time: float | None = Field(
-        default=None,
+    steady_time: float | None = number_field(
+        None,
+        "s",
+        "the loop is steady once it has kept shape and speed under its own loads for this long; null: a "
+        "loop period or, if its loads were never multiplied, as long as slow waves need to cross it",
         ge=0,
         le=LONGEST,
-        description="the loop is steady once it has kept shape and speed under its own loads for this long; null: a "
-        "loop period or, if its loads were never multiplied, as long as slow waves need to cross it",
-        json_schema_extra={"unit": "s"},
     )
-    steady_tolerance: float = Field(
-        default=0.01,
+    steady_tolerance: float = number_field(
+        0.01,
+        "1",
+        "change of the loop's height, width and place, relative to height or width, that counts as kept",
         gt=0,
         le=1,
-        description="change of the loop's height, width and place, relative to height or width, that counts as kept",
-        json_schema_extra={"unit": "1"},
     )
-    further_hold: float = Field(
-        default=0.0,
-        ge=0,
-        le=LONGEST,
-        description="time for which a loop that is steady is held on before its release",
-        json_schema_extra={"unit": "s"},
+    further_hold: float = number_field(
+        0.0, "s", "time for which a loop that is steady is held on before its release", ge=0, le=LONGEST
     )
-    hold_limit: float = Field(
-        default=30.0,
-        gt=0,
-        le=LONGEST,
-        description="longest time at full frequency to become steady; then the walk ends as not_steady",
-        json_schema_extra={"unit": "s"},
+    hold_limit: float = number_field(
+        30.0, "s", "longest time at full frequency to become steady; then the walk ends as not_steady", gt=0, le=LONGEST
     )
-    walk_limit: float = Field(
-        default=20.0,
-        gt=0,
-        le=LONGEST,
-        description="longest time from the release to rest; then the walk ends as time_limit",
-        json_schema_extra={"unit": "s"},
+    walk_limit: float = number_field(
+        20.0, "s", "longest time from the release to rest; then the walk ends as time_limit", gt=0, le=LONGEST
     )
 
     @field_validator("links")

@@ -1,7 +1,7 @@
 """The one door through which a user's values come in: scene, options and parameters of a walk, checked together.
 
-Whether they were given as keyword arguments, on the command line or in a YAML file, which `read_setup` reads, `resolve`
-checks them all. Both raise only `InputError`.
+Keyword arguments, the command line and YAML files (`read_setup`) all go through `resolve`. Both raise only
+`InputError`.
 """
 
 import os
@@ -9,21 +9,65 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from pydantic import BaseModel
+
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options
-from warpchain.inputs.parameters import InputError, Parameters, shown, suggestion, validated
+from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import Scene, check_links_on_gpu, check_scene
+from warpchain.inputs.validation import InputError, shown, suggestion, validated
 from warpchain.inputs.yaml_files import read_yaml
+
+SECTIONS: Final[Mapping[str, type[BaseModel]]] = {"scene": Scene, "options": Options, "parameters": Parameters}
+"""Sections of a user's values, and the models that hold their fields."""
+SECTION_OF: Final = {name: section for section, model in SECTIONS.items() for name in model.model_fields}
+"""Section of each field; no name is in two."""
 
 
 @dataclass(frozen=True)
 class Setup:
-    """Everything that says what one walk is: checked, complete, and named by the preset it started from."""
+    """Everything that says what one walk is, checked and complete.
+
+    Attributes:
+        preset: name of the parameter preset that it started from.
+        parameters: of the chain, its sprocket and the floor.
+        scene: what happens.
+        options: how it is computed.
+    """
 
     preset: str
     parameters: Parameters
     scene: Scene
     options: Options
+
+    def with_drawn(self, drawn: Mapping[str, float]) -> "Setup":
+        """A copy with drawn values in place of its own.
+
+        Args:
+            drawn: fields of `Parameters` or `Scene` → value.
+
+        Raises:
+            InputError: the values together make no possible walk.
+        """
+        sections = by_section(drawn)
+        parameters = self.parameters.with_values(sections["parameters"])
+        scene = validated(Scene, {**self.scene.model_dump(), **sections["scene"]}, "scene")
+        check_scene(scene, parameters)
+        return Setup(self.preset, parameters, scene, self.options)
+
+
+def by_section(settings: Mapping[str, object]) -> dict[str, dict[str, object]]:
+    """Values by the names of their fields, sorted into `SECTIONS`; not checked.
+
+    Raises:
+        InputError: there is no such field.
+    """
+    sections: dict[str, dict[str, object]] = {section: {} for section in SECTIONS}
+    for name, value in settings.items():
+        if name not in SECTION_OF:
+            raise InputError(f"{shown(name)}: unknown name; {suggestion(name, SECTION_OF)}")
+        sections[SECTION_OF[name]][name] = value
+    return sections
 
 
 def resolve(
@@ -64,11 +108,8 @@ def resolve(
     return setup
 
 
-_SECTIONS: Final = ("scene", "options", "parameters")
-
-
 def read_setup(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
-    """Preset, None if there is none, and sections of a YAML file, as they are there: `resolve` checks them.
+    """Preset (None if there is none) and sections of a YAML file, not yet checked by `resolve`.
 
     `1e9` is a number, as in YAML 1.2, and so is `1_000`; `060` and `1:30`, which the versions of YAML read
     differently, are text and therefore refused.
@@ -78,9 +119,9 @@ def read_setup(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
     """
     content = read_yaml(path)
     if not isinstance(content, dict):
-        raise InputError(f"{path}: no mapping at the top; give the keys preset, {', '.join(_SECTIONS)}")
+        raise InputError(f"{path}: no mapping at the top; give the keys preset, {', '.join(SECTIONS)}")
     for key in content:
-        if key != "preset" and key not in _SECTIONS:
-            raise InputError(f"{shown(key)}: unknown key; {suggestion(key, ('preset', *_SECTIONS))}")
+        if key != "preset" and key not in SECTIONS:
+            raise InputError(f"{shown(key)}: unknown key; {suggestion(key, ('preset', *SECTIONS))}")
     # A section with nothing under it is read as None; it changes nothing.
-    return content.get("preset"), {name: {} if content.get(name) is None else content[name] for name in _SECTIONS}
+    return content.get("preset"), {name: {} if content.get(name) is None else content[name] for name in SECTIONS}

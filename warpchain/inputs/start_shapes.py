@@ -1,8 +1,8 @@
 """Closed chains of rigid links laid along a curve, at rest or circulating.
 
-Joints must close the loop to rounding: at k = 1e9 N/m an opening of 0.1 mm holds 5 J. So the joints' places on the
-curve and the curve's size are solved for together (Newton), and the circulating velocities are the exact rigid motion
-that carries the joints along the curve: the derivative of that solution with respect to the first joint's place.
+Joints must close the loop to rounding: at k = 1e9 N/m an opening of 0.1 mm holds 5 J. So Newton's method solves for the
+joints' places on the curve together with the curve's size. The circulating velocities are the exact rigid motion along
+the curve: the derivative of that solution with respect to the first joint's place.
 """
 
 from collections.abc import Callable
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class CurvePoints:
-    """Points of a family of closed curves P(s, size), which are run through clockwise.
+    """Points of a family of closed curves P(s, size), clockwise in s.
 
     Attributes:
         point: P, shape (m, 2) [m].
@@ -34,9 +34,9 @@ class Curve:
     """A family of closed curves.
 
     Attributes:
-        points: Maps (s, size) to points; s of shape (m,), any real number before ``period``.
-        period: Length of the parameter's period as a function of size, and its derivative.
-        first_size: A starting value for Newton's method, given the chain's length [m].
+        points: Maps (s, size) to points; s of shape (m,).
+        period: Period of s as a function of size, and its derivative.
+        first_size: Starting value of size for Newton's method, given the chain's length [m].
     """
 
     points: Callable[[Array, float], CurvePoints]
@@ -47,24 +47,25 @@ class Curve:
 def stadium(radius: float) -> Curve:
     """Upper half circle about the origin, two vertical straights, lower half circle: a chain hung on a sprocket.
 
+    Its size is the length of a straight [m], s the arc length from the top [m].
+
     Args:
-        radius: Radius of both half circles [m]. The curve's size is the length of a straight [m], s its arc length
-            from the top.
+        radius: Radius of both half circles [m].
     """
     quarter = np.pi * radius / 2
 
     def points(s: Array, size: float) -> CurvePoints:
         turn = 4 * quarter + 2 * size
         laps, s = np.divmod(s, turn)
-        down = np.clip(s - quarter, 0.0, size)  # ways along the two straights
+        down = np.clip(s - quarter, 0.0, size)  # distances along the two straights
         up = np.clip(s - 3 * quarter - size, 0.0, size)
         angle = (s - down - up) / radius
         sine, cosine = np.sin(angle), np.cos(angle)
         along = np.stack([cosine, -sine], axis=1)
-        # what a longer straight changes at the same s: where it ends on the right, where it begins and ends on the left
+        # A longer straight moves points at the same s: past its end on the right, past its start and end on the left.
         down_growth = np.where(s > quarter + size, 1.0, 0.0)
         up_growth = np.where(s > 3 * quarter + size, np.where(s > turn - quarter, 1.0, -1.0), 0.0)
-        growth = -(down_growth + up_growth + 2 * laps)[:, None] * along  # every lap before grows, too
+        growth = -(down_growth + up_growth + 2 * laps)[:, None] * along  # every lap before grows as well
         growth[:, 1] += up_growth - down_growth
         point = np.stack([radius * sine, radius * cosine - down + up], axis=1)
         return CurvePoints(point=point, along=along, growth=growth)
@@ -79,9 +80,10 @@ def stadium(radius: float) -> Curve:
 def ellipse(aspect: float) -> Curve:
     """An ellipse about the origin.
 
+    Its size is the geometric mean of the semi-axes [m], s the angle of the parametric form from the top [rad].
+
     Args:
-        aspect: Height over width. The curve's size is the geometric mean of its semi-axes [m], s the angle of its
-            parametric form from the top [rad].
+        aspect: Height over width.
     """
     wide, high = 1 / np.sqrt(aspect), np.sqrt(aspect)
 
@@ -115,7 +117,7 @@ def lay_chain(
     """
     size = curve.first_size(links * link_length)
     s = curve.period(size)[0] * (phase + np.arange(links) / links)
-    if curve.period(size)[1] == 0.0:  # equal steps of the parameter are not equal chords: even them out first
+    if curve.period(size)[1] == 0.0:  # s is no arc length: even the chords out first
         s = _spread_evenly(curve, size, s)
     worst = np.inf
     for _ in range(50):
@@ -127,7 +129,7 @@ def lay_chain(
         to_here = -2 * np.sum(chord * here.along, axis=1)
         to_following = 2 * np.sum(chord * following.along, axis=1)
         to_size = 2 * np.sum(chord * (following.growth - here.growth), axis=1)
-        # the first joint moves with the period, the last chord ends on it one period later
+        # The first joint moves with the period; the last chord ends on it one period later.
         to_size[0] += to_here[0] * phase * period_growth
         to_size[-1] += to_following[-1] * (1 + phase) * period_growth
         last, worst = worst, float(np.max(np.abs(residual)))
@@ -142,7 +144,7 @@ def lay_chain(
     closed = np.linalg.norm(joints.point - np.roll(joints.point, 1, axis=0), axis=1)
     if not np.allclose(closed, link_length, rtol=1e-9, atol=0.0):
         raise ValueError(f"a closed chain of {links} links of {link_length} m does not fit this curve")
-    # rigid motion along the curve: s[0] moves at unit rate, the chords keep their lengths
+    # Rigid motion along the curve: s[0] moves at unit rate, the chords keep their lengths.
     drive = np.zeros(links)
     drive[0] = -to_here[0]
     drive[-1] -= to_following[-1]
@@ -160,7 +162,7 @@ def _solve_loop(to_here: Array, to_following: Array, to_size: Array, right: Arra
     From the first chord on, each gives the next δs as a + b δsize; the last one then gives δsize.
     """
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a singular loop gives no finite change
-        scale = np.cumprod(np.append(1.0, -to_here[:-1] / to_following[:-1]))  # what a change of the first δs becomes
+        scale = np.cumprod(np.append(1.0, -to_here[:-1] / to_following[:-1]))  # of each δs per first δs
         constant, slope = (
             scale * np.append(0.0, np.cumsum(side[:-1] / (to_following[:-1] * scale[1:]))) for side in (right, -to_size)
         )

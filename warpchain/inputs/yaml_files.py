@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import yaml
 
-from warpchain.inputs.parameters import InputError, shown
+from warpchain.inputs.validation import InputError, shown
 
 
 def read_yaml(path: str | os.PathLike[str]) -> object:

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.distributions import random_generator
-from warpchain.inputs.parameters import DIMENSIONLESS, Parameters
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.validation import DIMENSIONLESS
 from warpchain.status import Status
 from warpchain.sweeps.designs import saltelli_outputs, sobol_indices, walks_per_sample
 from warpchain.walks.rows import field_column

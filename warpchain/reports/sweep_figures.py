@@ -17,7 +17,8 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from warpchain.inputs.parameters import DIMENSIONLESS, Parameters
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.validation import DIMENSIONLESS
 from warpchain.pictures.walk_figures import FAINT, GROUND, INK, LINE_COLORS, _tidy
 from warpchain.reports.figure5 import sweep_figure5
 from warpchain.reports.kink_figure import sweep_kink

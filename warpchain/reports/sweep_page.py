@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import yaml
 
-from warpchain.inputs.parameters import DIMENSIONLESS, InputError
+from warpchain.inputs.setup import SECTIONS
+from warpchain.inputs.validation import DIMENSIONLESS, InputError
 from warpchain.reports.html_page import page, picture, table
 from warpchain.reports.statistics import axis_symbol, cell_text, number_text
 from warpchain.status import Status
@@ -24,7 +25,6 @@ from warpchain.store.shards import Folder, check_not_own
 from warpchain.store.sweep_result import BlockResult, SweepResult, load
 from warpchain.sweeps.plan import load_sweep
 from warpchain.sweeps.recording import Recording
-from warpchain.sweeps.sweep_file import SECTIONS
 from warpchain.walks.rows import MISSING, field_column
 from warpchain.walks.walk_result import replacing
 

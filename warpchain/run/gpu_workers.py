@@ -10,7 +10,7 @@ from multiprocessing.queues import SimpleQueue
 from multiprocessing.synchronize import Barrier
 from typing import Any, TypeVar
 
-from warpchain.inputs.parameters import InputError
+from warpchain.inputs.validation import InputError
 
 Answer = TypeVar("Answer")
 

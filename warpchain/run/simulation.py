@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import InputError, Parameters, preset, shown, validated
+from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import check_links_on_gpu
+from warpchain.inputs.validation import InputError, shown, validated
 from warpchain.status import Status
 from warpchain.walks.walk_result import Trajectory
 
@@ -50,7 +51,7 @@ def simulate(
         floor: Whether there is a floor at y = 0.
         gravity: Whether gravity acts.
         self_contact: Whether links touch one another.
-        method: ``"rkf78"``, ``"dp5"``, ``"bs32"``, ``"os32"``, ``"rodas5p"`` or ``"hybrid"``.
+        method: A key of ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
         tolerance: See :func:`walk`.
         device: ``"cpu"``, ``"cuda"`` (the first GPU) or ``"cuda:N"``.
         settings: Any other field of :class:`Options` by its name.

@@ -7,15 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel
 
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import versions
-from warpchain.inputs.distributions import random_generator, sample_parameters, sample_scene
+from warpchain.inputs.distributions import random_generator, sampled
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import InputError, Parameters, shown, suggestion, validated
-from warpchain.inputs.scene import Scene, check_scene, contact_radius
-from warpchain.inputs.setup import Setup, resolve
+from warpchain.inputs.scene import contact_radius
+from warpchain.inputs.setup import Setup, by_section, resolve
+from warpchain.inputs.validation import InputError, shown
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.walks.recorder import EVERYTHING
@@ -72,8 +71,7 @@ def walk(
         preset: ``"paper"`` (Table 1) or ``"soft"`` (softer joints, 10 to 15 times fewer steps).
         method: ``"standard"`` (``"hybrid"`` at 1e-3, with joints softened on the sprocket and in the pile; on a GPU
             the next), ``"explicit"`` (``"os32"`` at 1e-3, softened likewise), ``"reference"`` (``"rkf78"`` at 1e-6, as
-            in the paper), or an integrator: ``"rkf78"``, ``"dp5"``, ``"bs32"``, ``"os32"``,
-            ``"rodas5p"`` or ``"hybrid"``.
+            in the paper), or an integrator: a key of ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
         tolerance: Error allowed in a step, absolute (SI units) and relative alike; None: the method's, 1e-6 for an
             integrator, 1e-4 for ``"hybrid"``, and of ``"standard"`` and ``"explicit"`` 3e-3 while joints are soft.
         start: ``"rest"``, ``"spinning"`` or ``"ellipse"``.
@@ -109,23 +107,9 @@ def setup_walk(preset: str, settings: Mapping[str, object], seed: int | None) ->
     Raises:
         InputError: A name is unknown or a value is refused.
     """
-    models: dict[str, type[BaseModel]] = {"parameters": Parameters, "scene": Scene, "options": Options}
-    sections: dict[str, dict[str, object]] = {name: {} for name in models}
-    for name, value in settings.items():
-        section = next((key for key, model in models.items() if name in model.model_fields), None)
-        if section is None:
-            known = [field for model in models.values() for field in model.model_fields]
-            raise InputError(f"{shown(name)}: unknown name; {suggestion(name, known)}")
-        sections[section][name] = value
-    setup = resolve(preset, scene=sections["scene"], options=sections["options"], parameters=sections["parameters"])
-    if seed is None:
-        return setup
-    rng = random_generator(seed)
-    parameters = sample_parameters(setup.parameters, rng)
-    drawn = sample_scene(setup.scene, rng).model_dump() | sections["scene"]
-    scene = validated(Scene, drawn, "scene")
-    check_scene(scene, parameters)
-    return Setup(preset=setup.preset, parameters=parameters, scene=scene, options=setup.options)
+    sections = by_section(settings)
+    setup = resolve(preset, **sections)
+    return setup if seed is None else sampled(setup, random_generator(seed), kept=sections["scene"])
 
 
 def run_walk(

@@ -17,8 +17,8 @@ from typing import Any, Protocol
 from warpchain.engine.kernel_choice import shared_threads
 from warpchain.engine.processors import processors
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import InputError, validated
 from warpchain.inputs.setup import Setup
+from warpchain.inputs.validation import InputError, validated
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder, empty_rows, read_shard, write_shard
 from warpchain.store.shards import shard_name
@@ -142,7 +142,7 @@ def on_device(planned: Sweep, device: str) -> Sweep:
     canonical = planned.canonical()
     for block, content in zip(planned.blocks, canonical["blocks"], strict=True):
         first = {name: values[0] for name, values in block.axes.items() if name in Options.model_fields}
-        given = {**block.plan.sections["options"], **first, "device": device}
+        given = {**block.sections["options"], **first, "device": device}
         options = validated(Options, given, "options").model_dump()
         content["options"] = {name: options[name] for name in content["options"]}
     return load_sweep(canonical)
@@ -150,7 +150,7 @@ def on_device(planned: Sweep, device: str) -> Sweep:
 
 def _is_on_gpu(planned: Sweep) -> bool:
     """Whether all walks go to a GPU."""
-    return all(str(block.plan.sections["options"].get("device", "cpu")).startswith("cuda") for block in planned.blocks)
+    return all(str(block.sections["options"].get("device", "cpu")).startswith("cuda") for block in planned.blocks)
 
 
 def shard_size(walks: int) -> int:

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Final, Self
 import numpy as np
 import yaml
 
-from warpchain.inputs.parameters import InputError
+from warpchain.inputs.validation import InputError
 from warpchain.store.shards import (
     NUMERICS_VERSION,
     OWN,

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.inputs.parameters import InputError
+from warpchain.inputs.validation import InputError
 from warpchain.store.shards import (
     Folder,
     check_not_own,

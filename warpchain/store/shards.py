@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
-from warpchain.inputs.parameters import InputError
+from warpchain.inputs.validation import InputError
 from warpchain.status import Status
 from warpchain.sweeps.recording import Recording
 from warpchain.walks.motion import Motion, read_motion, write_motions

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.inputs.parameters import InputError, Parameters, shown, suggestion
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.validation import InputError, shown, suggestion
 from warpchain.status import Status
 from warpchain.store.folder import read_rows
 from warpchain.store.shards import FORMAT_VERSION, Folder, Manifest, read_manifest

@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpchain.inputs.parameters import InputError
+from warpchain.inputs.validation import InputError
 
 Array = NDArray[np.float64]
 

@@ -1,110 +1,37 @@
 """Sweeps: many walks from one file, each planned by its index when it is asked for.
 
 A sweep is a list of blocks, a block a grid of cells, a cell a number of samples. Walks are numbered through all of
-them, the sample fastest. What walk `index` is depends on the sweep and the index only: no table of walks exists, and
-neither the order in which walks are asked for nor who asks changes them.
+them, the sample fastest. Walk `index` depends on the sweep and the index only: no table of walks exists, and neither
+the order in which walks are asked for nor who asks changes them.
 
-Which file keys exist is said in `warpchain.sweeps.sweep_file`, how samples are designed in `warpchain.sweeps.designs`.
+`warpchain.sweeps.sweep_file` defines the keys of a file, `warpchain.sweeps.designs` the designed samples.
 """
 
 import bisect
 import hashlib
-import itertools
 import json
-import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, Gaussian, draw, placed, random_generator
-from warpchain.inputs.parameters import PRESETS, InputError, validated
-from warpchain.inputs.scene import Scene, check_scene
-from warpchain.inputs.setup import Setup, resolve
+import numpy as np
+
+from warpchain.inputs.distributions import DRAW_LIMIT, draw, random_generator
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import PRESETS
+from warpchain.inputs.setup import Setup
+from warpchain.inputs.validation import InputError
+from warpchain.sweeps.block import Block
 from warpchain.sweeps.designs import design_points, saltelli_points, walks_per_sample
 from warpchain.sweeps.recording import Keep, Recording
-from warpchain.sweeps.sweep_file import SECTIONS, VERSION, BlockPlan, Value, read_sweep
-
-CELL_LIMIT: Final = 100_000
-"""Most cells of a sweep, because each is checked when the sweep is loaded. There is no such limit of samples."""
+from warpchain.sweeps.sweep_file import VERSION, read_sweep
 
 Point = dict[str, float]
 """Drawn values by name."""
 
 LEAST_SHARE: Final = 0.05
 """Least share of a distribution that must be physical; where less is, redrawing would take too long."""
-
-_SCENE: Final = frozenset(Scene.model_fields)
-
-
-@dataclass(frozen=True)
-class Block:
-    """One block of a sweep.
-
-    Attributes:
-        name: its name, unique in the sweep.
-        axes: name of each axis, a field or `preset` → its values.
-        samples: walks in each cell; for `saltelli` all walks of all samples.
-        first: index of the block's first walk.
-        drawn: names of the quantities that samples draw, in the order of drawing.
-        sampler: one of `warpchain.sweeps.designs.SAMPLERS`.
-        first_stream: number of the block's first stream of random numbers.
-        plan: what the file says.
-    """
-
-    name: str
-    axes: dict[str, tuple[Value, ...]]
-    samples: int
-    first: int
-    drawn: tuple[str, ...]
-    sampler: str
-    first_stream: int
-    plan: BlockPlan
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Number of values of each axis, then walks per cell."""
-        return (*(len(values) for values in self.axes.values()), self.samples)
-
-    @property
-    def walk_count(self) -> int:
-        """Number of walks."""
-        return math.prod(self.shape)
-
-    def cells(self) -> Iterator[tuple[int, ...]]:
-        """All cells, each as its place along every axis, in the order of their walks."""
-        return itertools.product(*(range(len(values)) for values in self.axes.values()))
-
-    def fixed(self, cell: tuple[int, ...]) -> Setup:
-        """The setup of a cell before anything is drawn: the values that Gaussians are centred on.
-
-        Raises:
-            InputError: the values of the cell contradict one another.
-        """
-        plan = self.plan
-        at = {name: values[place] for (name, values), place in zip(self.axes.items(), cell, strict=True)}
-        sections = {
-            section: {**plan.sections[section], **{name: at[name] for name in at if name in model.model_fields}}
-            for section, model in SECTIONS.items()
-        }
-        try:
-            return resolve(str(at.get("preset", plan.preset)), **sections)
-        except InputError as error:
-            raise InputError(self._blamed(error, cell)) from None
-
-    def placed(self, fixed: Setup) -> dict[str, Distribution]:
-        """The distributions of a cell, given its `fixed` setup."""
-        return placed(self.plan.distributions, fixed.parameters, fixed.scene)
-
-    def _blamed(self, error: InputError, cell: tuple[int, ...]) -> str:
-        """An error about a cell with the path of the value that it names."""
-        where, _, problem = str(error).partition(": ")
-        name = where.rpartition(".")[2]
-        at = dict(zip(self.axes, cell, strict=True))
-        if name in at:
-            return f"{self.plan.path}.grid.{name}[{at[name]}]: {problem}"
-        place = ", ".join(f"{name} {self.axes[name][number]}" for name, number in at.items())
-        return f"{self.plan.path}.{where}: {problem}" + (f" (in the cell {place})" if place else "")
 
 
 @dataclass(frozen=True)
@@ -171,15 +98,11 @@ class Sweep:
         if not block.drawn:
             return PlannedWalk(index, number, cell, sample, fixed, {})
         row, member = divmod(sample, walks_per_sample(block.sampler, len(block.drawn)))
-        distributions, stream = block.placed(fixed), self._stream(block, cell)
-        candidates = self._random(block, stream, row, distributions)
-        if block.sampler != "random":
-            candidates = itertools.chain([self._designed(block, stream, row, distributions)], candidates)
-        points, setups = _first_possible(block, fixed, candidates)
+        points, setups = self._first_possible(block, cell, fixed, row, designed=block.sampler != "random")
         return PlannedWalk(index, number, cell, sample, setups[member], points[member])
 
     def undrawn(self, indices: Iterable[int]) -> Iterator[PlannedWalk]:
-        """Walks before anything is drawn for them, which takes most of the time: options and links are theirs already.
+        """Walks without their draws, which take most of the time; options and number of links never depend on them.
 
         Raises:
             IndexError: there is no such walk.
@@ -197,12 +120,8 @@ class Sweep:
             raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
         number = bisect.bisect_right(self.blocks, index, key=lambda block: block.first) - 1
         block = self.blocks[number]
-        rest, sample = divmod(index - block.first, block.samples)
-        places = []
-        for values in reversed(block.axes.values()):
-            rest, place = divmod(rest, len(values))
-            places.append(place)
-        return number, tuple(reversed(places)), sample
+        *cell, sample = (int(place) for place in np.unravel_index(index - block.first, block.shape))
+        return number, tuple(cell), sample
 
     def keep(self, walk: PlannedWalk) -> Keep:
         """What is kept of the motion of a walk."""
@@ -228,43 +147,56 @@ class Sweep:
                     f"give numbers from 0 to {most - 1}"
                 )
         for block in self.blocks:
-            shared = block.fixed((0,) * len(block.axes)).options.model_dump(exclude=set(block.axes))
-            for cell in block.cells():
+            first: Options | None = None
+            for cell in np.ndindex(block.shape[:-1]):
                 fixed = block.fixed(cell)
-                for name, value in shared.items():
-                    if getattr(fixed.options, name) != value:
+                first = first or fixed.options
+                for name in Options.model_fields:
+                    here, there = getattr(first, name), getattr(fixed.options, name)
+                    if here != there and name not in block.axes:
                         raise InputError(
-                            f"{block.plan.path}.grid: {name} is {value!r} in one cell and "
-                            f"{getattr(fixed.options, name)!r} in another, as methods or devices have it; give {name} "
-                            "once for all, or each such method, and each kind of device, a block of its own"
+                            f"{block.path}.grid: {name} is {here!r} in one cell and {there!r} in another, as methods "
+                            f"or devices have it; give {name} once for all, or each such method, and each kind of "
+                            "device, a block of its own"
                         )
                 for name, choice in self.recording.choices.items():
                     choice.steps(fixed.options, f"sweep.record.{name}")
-                distributions = block.placed(fixed)
-                for name, distribution in distributions.items():
+                for name, distribution in block.placed(fixed).items():
                     if distribution.share() < LEAST_SHARE:
                         raise InputError(
-                            f"{block.plan.path}.distributions.{name}: less than {LEAST_SHARE:.0%} of the draws "
+                            f"{block.path}.distributions.{name}: less than {LEAST_SHARE:.0%} of the draws "
                             f"{distribution.described('')} are physical; give a uniform distribution"
                         )
-                _first_possible(block, fixed, self._random(block, self._stream(block, cell), 0, distributions))
+                self._first_possible(block, cell, fixed, 0, designed=False)
 
-    def _designed(self, block: Block, stream: int, row: int, distributions: Mapping[str, Distribution]) -> list[Point]:
-        """The designed sample `row` of a cell: a point for each of its walks."""
-        matrix = design_points(block.sampler, self.seed, stream, block.plan.samples, len(distributions))
-        fractions = iter(matrix[row].tolist())
-        return _walks_of(
-            block,
-            lambda: {name: spread.quantile(next(fractions)) for name, spread in distributions.items()},
-        )
+    def _first_possible(
+        self, block: Block, cell: tuple[int, ...], fixed: Setup, row: int, *, designed: bool
+    ) -> tuple[list[Point], list[Setup]]:
+        """The first candidate for sample `row` of a cell all of whose walks are possible, and their setups.
 
-    def _random(
-        self, block: Block, stream: int, row: int, distributions: Mapping[str, Distribution]
+        Raises:
+            InputError: there is none.
+        """
+        problem = ""
+        for points in self._candidates(block, cell, fixed, row, designed):
+            try:
+                return points, [fixed.with_drawn(point) for point in points]
+            except InputError as error:
+                problem = str(error)
+        raise InputError(f"{block.path}.distributions: {DRAW_LIMIT} samples made no possible walk; the last: {problem}")
+
+    def _candidates(
+        self, block: Block, cell: tuple[int, ...], fixed: Setup, row: int, designed: bool
     ) -> Iterator[list[Point]]:
-        """Random samples for the place of sample `row` of a cell, each a point for each of its walks."""
+        """Candidates for sample `row` of a cell, a point for each of its walks: the designed one, then random ones."""
+        distributions, stream = block.placed(fixed), self._stream(block, cell)
+        if designed:
+            matrix = design_points(block.sampler, self.seed, stream, block.samples_given, len(distributions))
+            fractions = iter(matrix[row].tolist())
+            yield _points(block, lambda: {name: each.quantile(next(fractions)) for name, each in distributions.items()})
         rng = random_generator(self.seed, stream, row)
         for _ in range(DRAW_LIMIT):
-            yield _walks_of(block, lambda: draw(distributions, rng))
+            yield _points(block, lambda: draw(distributions, rng))
 
     def _stream(self, block: Block, cell: tuple[int, ...]) -> int:
         """Number of a cell's stream: cells are counted through all blocks, without the axes of equal samples."""
@@ -285,7 +217,7 @@ class Sweep:
             "seed": self.seed,
             "same_samples_along": list(self.same_samples_along),
             "record": self.recording.canonical(),
-            "blocks": [_canonical(block) for block in self.blocks],
+            "blocks": [block.canonical() for block in self.blocks],
         }
 
     def digest(self) -> str:
@@ -314,111 +246,11 @@ def load_sweep(source: "str | os.PathLike[str] | Mapping[str, object] | Sweep") 
     """
     if isinstance(source, Sweep):
         return source
-    plan = read_sweep(source)
-    blocks: list[Block] = []
-    first = first_stream = cells = 0
-    for given in plan.blocks:
-        block = Block(
-            name=given.name,
-            axes=dict(given.axes),
-            samples=given.samples * walks_per_sample(given.sampler, len(given.distributions)),
-            first=first,
-            drawn=tuple(given.distributions),
-            sampler=given.sampler,
-            first_stream=first_stream,
-            plan=given,
-        )
-        blocks.append(block)
-        cells += math.prod(block.shape[:-1])
-        if cells > CELL_LIMIT:
-            raise InputError(f"{given.path}.grid: the sweep has more than {CELL_LIMIT} cells; give fewer values")
-        first += block.walk_count
-        first_stream += math.prod(
-            len(values) for name, values in block.axes.items() if name not in plan.same_samples_along
-        )
-    sweep = Sweep(plan.name, plan.seed, plan.same_samples_along, tuple(blocks), plan.recording)
+    sweep = Sweep(*read_sweep(source))
     sweep.check()
     return sweep
 
 
-def _walks_of(block: Block, point: Callable[[], Point]) -> list[Point]:
-    """The points of a sample's walks; `point` makes the next one."""
+def _points(block: Block, point: Callable[[], Point]) -> list[Point]:
+    """The points of a sample's walks; `point` makes the next independent one."""
     return saltelli_points(point(), point()) if block.sampler == "saltelli" else [point()]
-
-
-def _first_possible(block: Block, fixed: Setup, candidates: Iterable[list[Point]]) -> tuple[list[Point], list[Setup]]:
-    """The first candidate for a sample all of whose walks are possible, and their setups.
-
-    Raises:
-        InputError: there is none.
-    """
-    problem = ""
-    for points in candidates:
-        try:
-            return points, [_with_drawn(fixed, point) for point in points]
-        except InputError as error:
-            problem = str(error)
-    raise InputError(
-        f"{block.plan.path}.distributions: {DRAW_LIMIT} samples made no possible walk; the last: {problem}"
-    )
-
-
-def _with_drawn(fixed: Setup, drawn: Point) -> Setup:
-    """A cell's setup with what was drawn in its place.
-
-    Raises:
-        InputError: together the values make no possible walk.
-    """
-    scene = {name: value for name, value in drawn.items() if name in _SCENE}
-    parameters = {name: value for name, value in drawn.items() if name not in _SCENE}
-    setup = Setup(
-        preset=fixed.preset,
-        parameters=fixed.parameters.with_values(parameters),
-        scene=validated(Scene, {**fixed.scene.model_dump(), **scene}, "scene"),
-        options=fixed.options,
-    )
-    check_scene(setup.scene, setup.parameters)
-    return setup
-
-
-def _canonical(block: Block) -> dict[str, Any]:
-    """A block of `Sweep.canonical`.
-
-    A value that a distribution or an axis replaces is left out. With the preset as an axis, only the parameters that
-    differ from it can be written out.
-    """
-    plan = block.plan
-    first = block.fixed((0,) * len(block.axes))
-    parameters = first.parameters.model_dump()
-    if plan.preset is None:
-        parameters = {name: value for name, value in parameters.items() if name in plan.sections["parameters"]}
-    sections = {
-        "scene": first.scene.model_dump(),
-        "options": first.options.model_dump(),
-        "parameters": parameters,
-    }
-    replaced = {
-        name
-        for name, distribution in plan.distributions.items()
-        if not (isinstance(distribution, Gaussian) and distribution.mean is None)
-    } | set(plan.axes)
-    return {
-        "name": block.name,
-        **({} if plan.preset is None else {"preset": plan.preset}),
-        "samples": plan.samples,
-        "sampler": plan.sampler,
-        **{
-            section: {name: value for name, value in values.items() if name not in replaced}
-            for section, values in sections.items()
-        },
-        "distributions": {"all": "fixed"}
-        | {name: _canonical_distribution(distribution) for name, distribution in plan.distributions.items()},
-        "grid": {name: list(values) for name, values in plan.axes.items()},
-    }
-
-
-def _canonical_distribution(distribution: Distribution) -> dict[str, Any]:
-    if isinstance(distribution, Gaussian):
-        mean = {} if distribution.mean is None else {"mean": distribution.mean}
-        return {"gaussian": {**mean, "sigma": distribution.sigma}}
-    return {"uniform": [distribution.lower, distribution.upper]}

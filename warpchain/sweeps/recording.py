@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import InputError
+from warpchain.inputs.validation import InputError
 
 SERIES_INTERVAL: Final = 1e-3
 """Default time [s] between two samples of a series."""
@@ -15,12 +15,12 @@ FRAME_INTERVAL: Final = 2e-3
 
 @dataclass(frozen=True)
 class Choice:
-    """One thing that is kept, of which samples and how often.
+    """How often a series or frames are kept, and for which samples of each cell.
 
     Attributes:
-        interval: time [s] between two of them.
-        samples: numbers of the samples, sorted, the same in each cell; None: all.
-        before: time [s] before the release in which it is kept as well, with the loads of the joints; 0: none.
+        interval: time [s] between two.
+        samples: numbers of the samples, sorted; None: all.
+        before: time [s] before the release in which they are kept as well, with the loads of the joints; 0: none.
     """
 
     interval: float
@@ -28,22 +28,18 @@ class Choice:
     before: float = 0.0
 
     def includes(self, sample: int) -> bool:
-        """Whether it is kept of a sample."""
+        """Whether a sample is chosen."""
         return self.samples is None or sample in self.samples
 
     def covers(self, other: "Choice") -> bool:
-        """Whether it is kept of every sample of which another thing is."""
+        """Whether every sample of another choice is chosen."""
         return self.samples is None or (other.samples is not None and set(other.samples) <= set(self.samples))
 
     def steps(self, options: Options, path: str) -> int:
-        """Time between two in units of the time between two looks at a chain.
-
-        Args:
-            options: of the walk.
-            path: where the choice was given, for the error.
+        """The interval in units of `options.record_interval`.
 
         Raises:
-            InputError: the time is no whole number of them.
+            InputError: it is no whole multiple; the message begins with `path`, where the choice was given.
         """
         ratio = self.interval / options.record_interval
         steps = round(ratio)
@@ -55,7 +51,7 @@ class Choice:
         return steps
 
     def canonical(self) -> dict[str, Any]:
-        """As in a sweep file."""
+        """Its form in a sweep file."""
         before = {"before": self.before} if self.before > 0 else {}
         return {"interval": self.interval, "samples": "all" if self.samples is None else list(self.samples), **before}
 
@@ -74,28 +70,22 @@ class Recording:
 
     @property
     def choices(self) -> dict[str, Choice]:
-        """What is kept, by its key in a sweep file."""
+        """The choices that are made, by their keys in a sweep file."""
         given = {"series": self.series, "frames": self.frames}
         return {name: choice for name, choice in given.items() if choice is not None}
 
     def canonical(self) -> dict[str, Any]:
-        """As in a sweep file."""
+        """Its form in a sweep file."""
         return {"series": False} | {name: choice.canonical() for name, choice in self.choices.items()}
 
     @classmethod
     def of(cls, canonical: Mapping[str, Any]) -> "Recording":
-        """The recording that has a canonical form; for what this package has written, unchecked."""
-        return cls(
-            **{
-                name: Choice(
-                    given["interval"],
-                    None if given["samples"] == "all" else tuple(given["samples"]),
-                    given.get("before", 0.0),
-                )
-                for name, given in canonical.items()
-                if given is not False
-            }
-        )
+        """The recording of a canonical form that this package has written; not checked."""
+        choices = {name: given for name, given in canonical.items() if given is not False}
+        for name, given in choices.items():
+            samples = None if given["samples"] == "all" else tuple(given["samples"])
+            choices[name] = Choice(**{**given, "samples": samples})
+        return cls(**choices)
 
 
 @dataclass(frozen=True)

@@ -1,30 +1,39 @@
 """What a sweep file says, checked and completed, before any walk is planned.
 
-`read_sweep` turns the content of a YAML file into a `SweepPlan` of `BlockPlan`s: every value converted by the
-model it belongs to, every range written out, every distribution resolved. An error is one line that begins with
-the path of the offending value, such as `sweep.blocks[0].grid.frequency[3]`.
+`read_sweep` turns the content of a YAML file into `Block`s: every value converted by its model, every range written
+out, every distribution resolved. An error is one line that begins with the path of the offending value, such as
+`sweep.blocks[0].grid.frequency[3]`.
 """
 
 import math
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from decimal import Decimal
 from typing import Any, Final
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
-from warpchain.inputs.distributions import TABLE, Distribution, Gaussian, Uniform, physical_values
-from warpchain.inputs.options import METHODS_BY_NEED, Options
-from warpchain.inputs.parameters import InputError, Parameters, preset, shown, suggestion, validated
+from warpchain.inputs.distributions import DRAWABLE, LARGEST_SEED, TABLE, Distribution, Gaussian, Uniform
+from warpchain.inputs.methods import METHODS_BY_NEED
+from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene
+from warpchain.inputs.setup import SECTION_OF, SECTIONS
+from warpchain.inputs.validation import (
+    Bounds,
+    InputError,
+    checked_positive,
+    checked_whole,
+    field_bounds,
+    shown,
+    suggestion,
+    validated,
+)
 from warpchain.inputs.yaml_files import read_yaml
+from warpchain.sweeps.block import Block, Value
 from warpchain.sweeps.designs import SAMPLERS, check_design
 from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL, Choice, Recording
-
-Value = float | int | str
-"""A value of a field; truth values are integers to Python."""
 
 VERSION: Final = 1
 """Version of the file format."""
@@ -32,72 +41,20 @@ VERSION: Final = 1
 AXIS_LIMIT: Final = 10_000
 """Most values of one axis."""
 
-SECTIONS: Final[Mapping[str, type[BaseModel]]] = {
-    "scene": Scene,
-    "options": Options,
-    "parameters": Parameters,
-}
-"""Sections of a sweep file and the models whose fields they hold."""
-
-DRAWABLE: Final = (
-    *Parameters.model_fields,
-    *(name for name, field in Scene.model_fields.items() if field.annotation is float),
-)
-"""Quantities that can have a distribution, in the order of drawing."""
+CELL_LIMIT: Final = 100_000
+"""Most cells of a sweep, because each is checked when the sweep is loaded. Samples have no such limit."""
 
 _BLOCK_KEYS: Final = ("name", "preset", "samples", "sampler", *SECTIONS, "distributions", "grid")
 _TOP_KEYS: Final = ("version", "seed", "blocks", "same_samples_along", "record", *_BLOCK_KEYS)
-_HOMES: Final = {name: section for section, model in SECTIONS.items() for name in model.model_fields}
-"""Name of a field → the section it belongs to."""
 
 
-@dataclass(frozen=True)
-class BlockPlan:
-    """One block of a sweep: a grid of cells and what is drawn in each.
-
-    Attributes:
-        path: where the block was given, for errors.
-        name: its name.
-        preset: name of the parameter preset; None when the preset is an axis.
-        sections: `scene`, `options` and `parameters` → values that differ from the defaults or the preset, axes
-            apart.
-        axes: name of a field, or `preset` → its values; the last one varies fastest.
-        distributions: name → distribution, in the order of drawing.
-        sampler: one of `warpchain.sweeps.designs.SAMPLERS`.
-        samples: samples per cell.
-    """
-
-    path: str
-    name: str
-    preset: str | None
-    sections: Mapping[str, Mapping[str, Value]]
-    axes: Mapping[str, tuple[Value, ...]]
-    distributions: Mapping[str, Distribution]
-    sampler: str
-    samples: int
-
-
-@dataclass(frozen=True)
-class SweepPlan:
-    """A whole sweep file.
-
-    Attributes:
-        name: name of the sweep.
-        seed: seed of all random numbers.
-        same_samples_along: axes along which the same samples are used, sorted.
-        blocks: at least one.
-        recording: what is kept of the motion of walks.
-    """
-
-    name: str
-    seed: int
-    same_samples_along: tuple[str, ...]
-    blocks: tuple[BlockPlan, ...]
-    recording: Recording
-
-
-def read_sweep(source: str | os.PathLike[str] | Mapping[str, object]) -> SweepPlan:
+def read_sweep(
+    source: str | os.PathLike[str] | Mapping[str, object],
+) -> tuple[str, int, tuple[str, ...], tuple[Block, ...], Recording]:
     """Read a sweep file, or take its content as a mapping.
+
+    Returns:
+        Name, seed, axes of equal samples, blocks and recording: the fields of `warpchain.sweeps.plan.Sweep`.
 
     Raises:
         InputError: the file cannot be read, or something in it is refused.
@@ -111,9 +68,10 @@ def read_sweep(source: str | os.PathLike[str] | Mapping[str, object]) -> SweepPl
         raise InputError(f"sweep.version: {shown(version)} is not supported; give {VERSION}")
     recording = _recording(top.get("record"))
     name = _text(_needed(top, "name", "sweep", "give the sweep a name"), "sweep.name")
-    seed = _whole(_needed(top, "seed", "sweep", "give a whole number"), "sweep.seed", 0, 2**128 - 1)
+    seed = checked_whole(_needed(top, "seed", "sweep", "give a whole number"), "sweep.seed", 0, LARGEST_SEED)
     blocks = tuple(_blocks(top))
-    return SweepPlan(name, seed, _same_samples_along(top.get("same_samples_along"), blocks), blocks, recording)
+    same = _same_samples_along(top.get("same_samples_along"), blocks)
+    return name, seed, same, tuple(_numbered(blocks, same)), recording
 
 
 def _recording(content: object) -> Recording:
@@ -129,7 +87,7 @@ def _recording(content: object) -> Recording:
 
 
 def _choice(content: object, path: str, interval: float, more: tuple[str, ...] = ()) -> Choice | None:
-    """Of which samples something is kept, and how often; None for none. `more` are keys that only some things have."""
+    """The samples that something is kept of, and how often; None: not at all. `more` are further keys."""
     if content is False:
         return None
     if not (content is True or isinstance(content, Mapping)):
@@ -139,39 +97,22 @@ def _choice(content: object, path: str, interval: float, more: tuple[str, ...] =
     samples = None
     if chosen != "all":
         numbers = _sequence(chosen, f"{path}.samples", "give all, or a list such as [0, 1]")
-        samples = tuple(_whole(item, f"{path}.samples[{place}]", 0, 2**30) for place, item in enumerate(numbers))
+        samples = tuple(checked_whole(item, f"{path}.samples[{place}]", 0, 2**30) for place, item in enumerate(numbers))
         if len(set(samples)) < len(samples):
             raise InputError(f"{path}.samples: a number is given twice; leave one out")
         samples = tuple(sorted(samples))
-    before = float(_positive(keys["before"], f"{path}.before")) if "before" in keys else 0.0
-    return Choice(float(_positive(keys.get("interval", interval), f"{path}.interval")), samples, before)
+    before = float(checked_positive(keys["before"], f"{path}.before")) if "before" in keys else 0.0
+    return Choice(float(checked_positive(keys.get("interval", interval), f"{path}.interval")), samples, before)
 
 
-@dataclass(frozen=True)
-class _Level:
-    """What one level of the file says, the top or a block, value by value.
-
-    Attributes:
-        path: where it is in the file.
-        keys: its keys as given.
-        sections: section → values by name.
-        distributions: name, or `all` → where it was given, and what: a distribution, `table` or `fixed`.
-    """
-
-    path: str = "sweep"
-    keys: Mapping[str, Any] = field(default_factory=dict)
-    sections: Mapping[str, Mapping[str, Value]] = field(default_factory=lambda: {section: {} for section in SECTIONS})
-    distributions: Mapping[str, tuple[str, Distribution | str]] = field(default_factory=dict)
-
-
-def _blocks(top: Mapping[str, Any]) -> Iterator[BlockPlan]:
+def _blocks(top: Mapping[str, Any]) -> Iterator[Block]:
     """The blocks of a file; a file without the key `blocks` is itself one."""
+    outer = _level(top, "sweep")
     if "blocks" not in top:
-        yield _block("main", _Level(), _level(top, "sweep"))
+        yield _block("main", "sweep", {}, outer)
         return
     if "grid" in top:
         raise InputError("sweep.grid: given together with blocks; move it into a block")
-    outer = _level(top, "sweep")
     names: set[str] = set()
     for number, content in enumerate(_sequence(top["blocks"], "sweep.blocks", "give a list of blocks")):
         path = f"sweep.blocks[{number}]"
@@ -185,35 +126,34 @@ def _blocks(top: Mapping[str, Any]) -> Iterator[BlockPlan]:
         if name in names:
             raise InputError(f"{path}.name: {shown(name)} is given twice; give another name")
         names.add(name)
-        yield _block(name, outer, _level(keys, path))
+        yield _block(name, path, outer, _level(keys, path))
 
 
-def _level(keys: Mapping[str, Any], path: str) -> _Level:
-    """Check the values of one level, each by itself."""
-    sections: dict[str, dict[str, Value]] = {}
+def _level(keys: Mapping[str, Any], path: str) -> dict[str, Any]:
+    """The keys of one level, the top or a block, with the values of its sections and distributions checked one by one.
+
+    Behind each name of a distribution stand the path where it was given, and a distribution, `table` or `fixed`.
+    """
+    level = dict(keys)
     for section, model in SECTIONS.items():
         where = f"{path}.{section}"
         values = _mapping(keys.get(section), where, tuple(model.model_fields))
-        sections[section] = {name: _checked(name, value, f"{where}.{name}") for name, value in values.items()}
+        level[section] = {name: _checked(name, value, f"{where}.{name}") for name, value in values.items()}
     where = f"{path}.distributions"
     given = _mapping(keys.get("distributions"), where, ("all", *DRAWABLE))
-    distributions = {
+    level["distributions"] = {
         name: (f"{where}.{name}", _distribution(name, value, f"{where}.{name}")) for name, value in given.items()
     }
-    return _Level(path, keys, sections, distributions)
+    return level
 
 
-def _block(name: str, outer: _Level, inner: _Level) -> BlockPlan:
-    """A block: what it says, and for the rest what the top level says."""
-    path, keys = inner.path, {**outer.keys, **inner.keys}
-    axes = _axes(inner)
+def _block(name: str, path: str, outer: Mapping[str, Any], inner: Mapping[str, Any]) -> Block:
+    """A block: its own keys and values, and those of the top level that it does not give."""
+    merged = {key: {**outer.get(key, {}), **inner[key]} for key in (*SECTIONS, "distributions")}
+    keys = {**outer, **inner}
+    axes = _axes(inner, path)
     sections = {
-        section: {
-            key: value
-            for key, value in {**outer.sections[section], **inner.sections[section]}.items()
-            if key not in axes
-        }
-        for section in SECTIONS
+        section: {key: value for key, value in merged[section].items() if key not in axes} for section in SECTIONS
     }
     chosen = None
     if "preset" not in axes:
@@ -223,10 +163,26 @@ def _block(name: str, outer: _Level, inner: _Level) -> BlockPlan:
     if sampler not in SAMPLERS:
         raise InputError(f"{path}.sampler: {shown(sampler)} is unknown; {suggestion(sampler, SAMPLERS)}")
     samples = _needed(keys, "samples", path, "give the number of samples per cell")
-    samples = _whole(samples, f"{path}.samples", 1, 2**30)
-    drawn = _drawn({**outer.distributions, **inner.distributions}, sections, axes)
+    samples = checked_whole(samples, f"{path}.samples", 1, 2**30)
+    drawn = _drawn(merged["distributions"], sections, axes)
     check_design(sampler, samples, len(drawn), path)
-    return BlockPlan(path, name, chosen, sections, axes, drawn, sampler, samples)
+    return Block(path, name, chosen, sections, axes, drawn, sampler, samples)
+
+
+def _numbered(blocks: Iterable[Block], same_samples_along: Collection[str]) -> Iterator[Block]:
+    """The blocks with their first walks and streams, numbered through all of them.
+
+    Raises:
+        InputError: there are too many cells.
+    """
+    first = first_stream = cells = 0
+    for block in blocks:
+        yield replace(block, first=first, first_stream=first_stream)
+        cells += math.prod(block.shape[:-1])
+        if cells > CELL_LIMIT:
+            raise InputError(f"{block.path}.grid: the sweep has more than {CELL_LIMIT} cells; give fewer values")
+        first += block.walk_count
+        first_stream += math.prod(len(values) for name, values in block.axes.items() if name not in same_samples_along)
 
 
 def _checked(name: str, value: object, path: str) -> Value:
@@ -244,7 +200,7 @@ def _checked(name: str, value: object, path: str) -> Value:
         if name == "preset":
             preset(value)  # type: ignore[arg-type]
             return str(value)
-        model = SECTIONS[_HOMES[name]]
+        model = SECTIONS[SECTION_OF[name]]
         values = {**(preset("paper").model_dump() if model is Parameters else {}), name: value}
         try:
             result: Value = getattr(model.model_validate(values), name)
@@ -252,22 +208,22 @@ def _checked(name: str, value: object, path: str) -> Value:
         except ValidationError as error:
             if any(problem["loc"] for problem in error.errors()):
                 validated(model, values, "")
-        # Refused only beside default values, which may be those of no walk: left to the check of the cells.
+        # Refused only beside the defaults of other fields: the check of the cells decides.
         result = float(value) if model.model_fields[name].annotation is float else value  # type: ignore
         return result
     except InputError as error:
         raise InputError(path + str(error).removeprefix(".").removeprefix(name)) from None
 
 
-def _axes(level: _Level) -> dict[str, tuple[Value, ...]]:
-    """The axes of a level's grid, none of whose names is also given a fixed value there."""
-    where = f"{level.path}.grid"
+def _axes(level: Mapping[str, Any], level_path: str) -> dict[str, tuple[Value, ...]]:
+    """The axes of a level's grid; an axis whose name also has a fixed value there is refused."""
+    where = f"{level_path}.grid"
     axes = {}
-    for name, content in _mapping(level.keys.get("grid"), where, ("preset", *_HOMES)).items():
+    for name, content in _mapping(level.get("grid"), where, ("preset", *SECTION_OF)).items():
         path = f"{where}.{name}"
-        home = _HOMES.get(name, name)
-        if name in level.sections.get(home, level.keys):
-            raise InputError(f"{path}: also given in {level.path}.{home}; leave one out")
+        home = SECTION_OF.get(name, name)
+        if name in (level if home == "preset" else level[home]):
+            raise InputError(f"{path}: also given in {level_path}.{home}; leave one out")
         if isinstance(content, Mapping):
             content = _range(name, content, path)
         values: list[Value] = []
@@ -286,7 +242,7 @@ def _range(name: str, content: Mapping[object, object], path: str) -> list[Value
 
     They are computed in decimals, so that three steps of 0.1 from 0 lead to 0.3 and to no other number.
     """
-    kind = None if name == "preset" else SECTIONS[_HOMES[name]].model_fields[name].annotation
+    kind = None if name == "preset" else SECTIONS[SECTION_OF[name]].model_fields[name].annotation
     if kind not in (int, float):
         raise InputError(f"{path}: {name} is no number and has no range; give a list of values")
     keys = _keys(content, path, ("from", "to", "step", "count"))
@@ -300,10 +256,10 @@ def _range(name: str, content: Mapping[object, object], path: str) -> list[Value
     if ("step" in keys) == ("count" in keys):
         raise InputError(f"{path}: a range needs either step or count; give one of them")
     if "count" in keys:
-        intervals = _whole(keys["count"], f"{path}.count", 2, AXIS_LIMIT) - 1
+        intervals = checked_whole(keys["count"], f"{path}.count", 2, AXIS_LIMIT) - 1
         step = (last - first) / intervals
     else:
-        step = Decimal(str(_positive(keys["step"], f"{path}.step")))
+        step = Decimal(str(checked_positive(keys["step"], f"{path}.step")))
         if (last - first) / step >= AXIS_LIMIT:
             raise InputError(f"{path}.step: gives more than {AXIS_LIMIT} values; give a larger step")
         intervals = int((last - first) / step)
@@ -340,31 +296,32 @@ def _distribution(name: str, content: object, path: str) -> Distribution | str:
             f"{path}: {shown(content)} is no distribution; "
             "give table, fixed, {uniform: [lower, upper]} or {gaussian: {mean: …, sigma: …}}"
         )
-    bounds = physical_values(name)
+    bounds = field_bounds(SECTIONS[SECTION_OF[name]].model_fields[name])
     if "uniform" in forms:
         path += ".uniform"
         ends = forms["uniform"]
         if not isinstance(ends, Sequence) or isinstance(ends, str) or len(ends) != 2:
             raise InputError(f"{path}: {shown(ends)} is no interval; give [lower, upper]")
-        lower, upper = (_end(name, end, f"{path}[{number}]", number == 0) for number, end in enumerate(ends))
+        lower = _end(name, ends[0], f"{path}[0]", bounds, inwards=math.inf)
+        upper = _end(name, ends[1], f"{path}[1]", bounds, inwards=-math.inf)
         if lower >= upper:
             raise InputError(f"{path}[1]: {upper} is not greater than {lower}; give a greater value")
         return Uniform(lower, upper, bounds)
     path += ".gaussian"
     gaussian = _keys(forms["gaussian"], path, ("mean", "sigma"))
     mean = float(_checked(name, gaussian["mean"], f"{path}.mean")) if "mean" in gaussian else None
-    sigma = _positive(_needed(gaussian, "sigma", path, "give the standard deviation"), f"{path}.sigma")
+    sigma = checked_positive(_needed(gaussian, "sigma", path, "give the standard deviation"), f"{path}.sigma")
     return Gaussian(mean, sigma, bounds)
 
 
-def _end(name: str, value: object, path: str, is_lower: bool) -> float:
+def _end(name: str, value: object, path: str, bounds: Bounds, inwards: float) -> float:
     """An end of an interval; it may be a bound that is itself not physical, as 1 is for a phase."""
     try:
         return float(_checked(name, value, path))
     except InputError:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise
-        if not physical_values(name).admit(math.nextafter(value, math.inf if is_lower else -math.inf)):
+        if not bounds.admit(math.nextafter(value, inwards)):
             raise
         return float(value)
 
@@ -376,13 +333,13 @@ def _drawn(
 ) -> dict[str, Distribution]:
     """What a block draws, in the order of drawing.
 
-    A parameter with a given value is drawn about it. Phase and clearance with a given value are not drawn, and a
-    distribution with a mean or ends of its own contradicts a given value.
+    A parameter with a given value is drawn about it, phase and clearance are then not drawn. A given value beside a
+    distribution with a mean or ends of its own is refused.
     """
     _, default = given.get("all", ("", "table"))
     drawn: dict[str, Distribution] = {}
     for name in DRAWABLE:
-        home = "grid" if name in axes else _HOMES[name] if name in sections[_HOMES[name]] else None
+        home = "grid" if name in axes else SECTION_OF[name] if name in sections[SECTION_OF[name]] else None
         path, choice = given.get(name, ("", None))
         if choice is None:
             is_set = home is not None and name in Scene.model_fields
@@ -396,7 +353,7 @@ def _drawn(
     return drawn
 
 
-def _same_samples_along(content: object, blocks: Sequence[BlockPlan]) -> tuple[str, ...]:
+def _same_samples_along(content: object, blocks: Sequence[Block]) -> tuple[str, ...]:
     """The axes along which the same samples are used, sorted."""
     if content is None:
         return ()
@@ -446,19 +403,6 @@ def _sequence(content: object, path: str, remedy: str) -> Sequence[object]:
     if len(content) > AXIS_LIMIT:
         raise InputError(f"{path}: {len(content)} items; give at most {AXIS_LIMIT}")
     return content
-
-
-def _whole(value: object, path: str, least: int, most: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-        limit = f"2**{most.bit_length()} - 1" if most > 2**64 else str(most)
-        raise InputError(f"{path}: {shown(value)} is no whole number from {least} to {limit}; give one")
-    return value
-
-
-def _positive(value: object, path: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
-        raise InputError(f"{path}: {shown(value)} is no positive number; give one")
-    return value
 
 
 def _text(value: object, path: str) -> str:

@@ -10,9 +10,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import Scene
+from warpchain.inputs.distributions import DRAWABLE
+from warpchain.inputs.setup import SECTION_OF, SECTIONS
+from warpchain.inputs.validation import field_unit
 from warpchain.walks.walk_result import CONTACTS, ENERGIES, LOST, STORED
 
 Rows = NDArray[np.void]
@@ -70,10 +70,6 @@ exist (the distance of a walk that failed), is NaN in a column of floats and −
 ROW: Final = np.dtype([(name, column.kind) for name, column in COLUMNS.items()])
 """Type of a row of a sweep that draws nothing."""
 
-_FIELDS: Final = {
-    name: model for model in (Parameters, Scene, Options) for name in model.model_fields
-}  # also the order of the drawn columns, whatever the order in the sweep file
-
 
 def field_column(name: str) -> Column:
     """Unit and meaning of a field of `Parameters`, `Scene` or `Options`, or of `preset`, as a column of floats.
@@ -83,11 +79,8 @@ def field_column(name: str) -> Column:
     """
     if name == "preset":
         return Column("<f8", "1", "named set of parameters that others are changed from")
-    field = _FIELDS[name].model_fields[name]
-    if (quantity := Parameters.quantities().get(name)) is not None:
-        return Column("<f8", quantity.unit, quantity.meaning)
-    extra = field.json_schema_extra
-    return Column("<f8", str(extra["unit"]) if isinstance(extra, dict) else "1", field.description or name)
+    field = SECTIONS[SECTION_OF[name]].model_fields[name]
+    return Column("<f8", field_unit(field), field.description or name)
 
 
 def row_type(drawn: Sequence[str]) -> np.dtype[np.void]:
@@ -96,7 +89,7 @@ def row_type(drawn: Sequence[str]) -> np.dtype[np.void]:
     Args:
         drawn: quantities that some block of the sweep draws, in any order.
     """
-    ordered = [name for name in _FIELDS if name in drawn]
+    ordered = [name for name in DRAWABLE if name in drawn]
     return np.dtype([*((name, column.kind) for name, column in COLUMNS.items()), *((n, "<f8") for n in ordered)])
 
 

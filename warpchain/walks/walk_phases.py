@@ -21,10 +21,11 @@ from warpchain.engine.control import (
     push_rate,
     suitable_load,
 )
-from warpchain.inputs.parameters import InputError, Parameters
+from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import contact_radius, joint_radius, loop_speed
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
+from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status

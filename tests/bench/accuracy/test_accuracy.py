@@ -32,7 +32,8 @@ from warpchain.bench.problems.work_precision import (
     methods,
     points,
 )
-from warpchain.inputs.options import METHODS_BY_NEED, Options
+from warpchain.inputs.methods import METHODS_BY_NEED
+from warpchain.inputs.options import Options
 from warpchain.kernels.methods.method import find_method
 from warpchain.oracle import motion_equations
 from warpchain.status import Status

@@ -10,7 +10,7 @@ from tests.support.hard_runs import METHODS, every_method
 from warpchain import Status
 from warpchain.bench.problems.hard_cases import HARD_CASES
 from warpchain.bench.problems.hard_starts import SOFT, UNDISSIPATIVE
-from warpchain.inputs.options import METHODS_BY_NEED
+from warpchain.inputs.methods import METHODS_BY_NEED
 
 every_method_walks = pytest.mark.parametrize(
     "method",

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from warpchain.bench.accuracy.method_settings import LOOSE, TIGHT, MethodSetting
 from warpchain.bench.accuracy.two_samples import bootstrap_interval, kolmogorov_smirnov, means, standard_deviations
 from warpchain.bench.problems.work_precision import methods
-from warpchain.inputs.options import METHODS_BY_NEED
+from warpchain.inputs.methods import METHODS_BY_NEED
 from warpchain.run.sweep_run import SweepProgress, sweep
 from warpchain.status import Status
 from warpchain.store.sweep_result import SweepResult, load

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from typing import Final, Self
 
 from warpchain.bench.problems.work_precision import methods
-from warpchain.inputs.options import METHODS_BY_NEED, Options
-from warpchain.inputs.parameters import InputError, shown, suggestion, validated
+from warpchain.inputs.methods import METHODS_BY_NEED
+from warpchain.inputs.options import Options
+from warpchain.inputs.validation import InputError, shown, suggestion, validated
+from warpchain.kernels.methods.method import find_method
 
 SWITCHES: Final = tuple(
     name for name, field in Options.model_fields.items() if field.annotation is bool and field.default is False
@@ -140,10 +142,11 @@ TIGHT: Final = MethodSetting("rkf78", 1e-9)
 
 
 def default_method_settings(device: str = "cpu") -> tuple[MethodSetting, ...]:
-    """The words, and every method with the settings of `explicit`, each once.
+    """The words, and every method of the device with the settings of `explicit`, each once.
 
     At 1e-6 and without softer joints the implicit method and those of low order walk for half a minute and longer.
     """
     words = [MethodSetting.parse(word, device) for word in METHODS_BY_NEED]
-    alike = [MethodSetting.of({**METHODS_BY_NEED["explicit"], "method": method}) for method in methods()]
+    there = (method for method in methods() if device == "cpu" or find_method(method).runs_on_gpus)
+    alike = [MethodSetting.of({**METHODS_BY_NEED["explicit"], "method": method}) for method in there]
     return tuple(dict.fromkeys((*words, *alike)))

@@ -30,8 +30,9 @@ from warpchain.bench.problems.work_precision import (
 )
 from warpchain.engine.devices import start_device
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import InputError, preset, shown, suggestion, validated
+from warpchain.inputs.parameters import preset
 from warpchain.inputs.scene import Scene, check_scene
+from warpchain.inputs.validation import InputError, shown, suggestion, validated
 from warpchain.sweeps.plan import load_sweep
 from warpchain.walks.walk_result import replacing
 

@@ -30,7 +30,8 @@ from warpchain.bench.problems.hard_starts import (
 )
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import InputError, Parameters, validated
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.validation import InputError, validated
 from warpchain.oracle import motion_equations
 from warpchain.run.simulation import simulate
 from warpchain.run.single_walk import run_walk, setup_walk

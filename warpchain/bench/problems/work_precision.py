@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import Parameters, preset, validated
+from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene, check_scene, joint_radius
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
+from warpchain.inputs.validation import validated
 from warpchain.kernels.methods.method import find_method, method_names
 from warpchain.oracle import motion_equations
 from warpchain.status import Status
@@ -165,7 +166,7 @@ class Point:
 
 def methods() -> tuple[str, ...]:
     """Every method that the options know, the reference first."""
-    return tuple(get_args(Options.model_fields["method"].annotation))
+    return method_names()
 
 
 def make_problem(name: str, links: int) -> Problem:

@@ -1,0 +1,42 @@
+"""What a user may write for `method`: an integrator, or one word for an integrator with its settings.
+
+The integrators are those of `warpchain.kernels`. Nothing heavy is imported here, because help texts need the names.
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+from warpchain.kernels.methods.method import find_method, method_names
+
+METHODS: Final[Mapping[str, str]] = MappingProxyType({name: find_method(name).title for name in method_names()})
+"""Integrators, each described in a few words."""
+
+FORMER_METHODS: Final[Mapping[str, str]] = MappingProxyType({"rodas4p": "rodas5p"})
+"""Integrators that were removed → what to write instead."""
+
+BURST_TOLERANCE: Final = 1e-4
+"""Default of `hybrid`: its bursts are of order 3, and at 1e-6 slower than `rkf78`.
+
+1e-3 is enough for ensembles of walks and takes half the time, but without any dissipation energy drifts.
+"""
+
+_LOOSE: Final = {
+    "tolerance": 1e-3,
+    "soft_tolerance": 3e-3,
+    "controller": "pi",
+    "soften_pile": True,
+    "soften_drive": True,
+}
+METHODS_BY_NEED: Final[Mapping[str, Mapping[str, object]]] = MappingProxyType(
+    {
+        "standard": MappingProxyType({"method": "hybrid", **_LOOSE}),
+        "explicit": MappingProxyType({"method": "os32", **_LOOSE}),
+        "reference": MappingProxyType({"method": "rkf78", "tolerance": 1e-6}),
+    }
+)
+"""One word for an integrator and its settings.
+
+The ensembles of `standard` and `explicit` could not be told from those of `reference`, which is the paper's. `standard`
+is the cheapest on a CPU; on a GPU, where `hybrid` does not run, it means `explicit`.
+"""

@@ -1,0 +1,130 @@
+"""One block of a sweep: a grid of cells, and what the samples of a cell draw."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from warpchain.inputs.distributions import Distribution, Gaussian, placed
+from warpchain.inputs.setup import SECTION_OF, SECTIONS, Setup, resolve
+from warpchain.inputs.validation import InputError
+from warpchain.sweeps.designs import walks_per_sample
+
+Value = float | int | str
+"""A value of a field; truth values are integers to Python."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """One block of a sweep.
+
+    Attributes:
+        path: where the block was given, for errors.
+        name: its name, unique in the sweep.
+        preset: name of the parameter preset; None when the preset is an axis.
+        sections: `scene`, `options` and `parameters` → values that differ from the defaults or the preset, axes apart.
+        axes: name of each axis, a field or `preset` → its values; the last one varies fastest.
+        distributions: name → distribution, in the order of drawing.
+        sampler: one of `warpchain.sweeps.designs.SAMPLERS`.
+        samples_given: samples per cell, as the file says.
+        first: index of the block's first walk.
+        first_stream: number of the block's first stream of random numbers.
+    """
+
+    path: str
+    name: str
+    preset: str | None
+    sections: Mapping[str, Mapping[str, Value]]
+    axes: dict[str, tuple[Value, ...]]
+    distributions: Mapping[str, Distribution]
+    sampler: str
+    samples_given: int
+    first: int = 0
+    first_stream: int = 0
+
+    @property
+    def drawn(self) -> tuple[str, ...]:
+        """Names of the quantities that samples draw, in the order of drawing."""
+        return tuple(self.distributions)
+
+    @property
+    def samples(self) -> int:
+        """Walks in each cell; for `saltelli` all walks of all samples."""
+        return self.samples_given * walks_per_sample(self.sampler, len(self.distributions))
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values of each axis, then walks per cell."""
+        return (*(len(values) for values in self.axes.values()), self.samples)
+
+    @property
+    def walk_count(self) -> int:
+        """Number of walks."""
+        return math.prod(self.shape)
+
+    def fixed(self, cell: tuple[int, ...]) -> Setup:
+        """The setup of a cell before anything is drawn: the values that Gaussians are centred on.
+
+        Raises:
+            InputError: the values of the cell contradict one another.
+        """
+        at = {name: values[place] for (name, values), place in zip(self.axes.items(), cell, strict=True)}
+        preset = str(at.pop("preset", self.preset))
+        sections = {section: dict(values) for section, values in self.sections.items()}
+        for name, value in at.items():
+            sections[SECTION_OF[name]][name] = value
+        try:
+            return resolve(preset, **sections)
+        except InputError as error:
+            raise InputError(self._located(error, cell)) from None
+
+    def _located(self, error: InputError, cell: tuple[int, ...]) -> str:
+        """The text of an error about a cell, with the path of the value that it names."""
+        where, _, problem = str(error).partition(": ")
+        name = where.rpartition(".")[2]
+        at = dict(zip(self.axes, cell, strict=True))
+        if name in at:
+            return f"{self.path}.grid.{name}[{at[name]}]: {problem}"
+        place = ", ".join(f"{name} {self.axes[name][number]}" for name, number in at.items())
+        return f"{self.path}.{where}: {problem}" + (f" (in the cell {place})" if place else "")
+
+    def placed(self, fixed: Setup) -> dict[str, Distribution]:
+        """The distributions of a cell, given its `fixed` setup."""
+        return placed(self.distributions, fixed)
+
+    def canonical(self) -> dict[str, Any]:
+        """The block as JSON-able content of a file, with every default and range written out.
+
+        A value that a distribution or an axis replaces is left out. With the preset as an axis, only the parameters
+        that differ from it can be written out.
+        """
+        first = self.fixed((0,) * len(self.axes))
+        replaced = {
+            name
+            for name, distribution in self.distributions.items()
+            if not (isinstance(distribution, Gaussian) and distribution.mean is None)
+        } | self.axes.keys()
+        if self.preset is None:
+            replaced |= first.parameters.model_dump().keys() - self.sections["parameters"].keys()
+        return {
+            "name": self.name,
+            **({} if self.preset is None else {"preset": self.preset}),
+            "samples": self.samples_given,
+            "sampler": self.sampler,
+            **{
+                section: {
+                    name: value for name, value in getattr(first, section).model_dump().items() if name not in replaced
+                }
+                for section in SECTIONS
+            },
+            "distributions": {"all": "fixed"}
+            | {name: _canonical(distribution) for name, distribution in self.distributions.items()},
+            "grid": {name: list(values) for name, values in self.axes.items()},
+        }
+
+
+def _canonical(distribution: Distribution) -> dict[str, Any]:
+    if isinstance(distribution, Gaussian):
+        mean = {} if distribution.mean is None else {"mean": distribution.mean}
+        return {"gaussian": {**mean, "sigma": distribution.sigma}}
+    return {"uniform": [distribution.lower, distribution.upper]}
