@@ -25,20 +25,15 @@ The links' own inertia resists being turned; their length does the opposite.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.engine.control import control_of
-from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import joint_radius
 from warpchain.inputs.setup import Setup
 from warpchain.loop.before_release import BeforeRelease
-
-if TYPE_CHECKING:
-    from warpchain.store.walk_motion import WalkMotion
-    from warpchain.walks.walk_result import WalkResult
 
 Array = NDArray[np.float64]
 
@@ -157,25 +152,35 @@ class StationaryLoop:
         return float(np.interp(0.0, self.s, self.curvature))
 
 
-def average_loop(walk: "WalkResult | WalkMotion") -> StationaryLoop:
+@dataclass(frozen=True, kw_only=True)  # frozen: its attributes are only read
+class HeldWalk(Protocol):
+    """What a mean loop needs of a walk, whichever class holds it.
+
+    Attributes:
+        setup: parameters, scene and options.
+        sprocket_center: centre of the sprocket x, y at the release [m], shape (2,); None without one.
+        before_release: the motion on the sprocket just before the release; None if it was not kept.
+    """
+
+    setup: Setup
+    sprocket_center: Array | None
+    before_release: BeforeRelease | None
+
+
+def average_loop(walk: HeldWalk) -> StationaryLoop:
     """The mean loop of a walk in the last moments before its release.
 
     Raises:
         ValueError: the walk has kept nothing of that time, or too little.
     """
-    before = walk.before_release
+    before, setup = walk.before_release, walk.setup
     if before is None or walk.sprocket_center is None:
         raise ValueError("walk: nothing was kept of the time before its release; run it again with record_before")
-    setup = walk.setup
-    smoothing = drive_smoothing(setup)
+    smoothing = setup.parameters.friction_smoothing
+    if setup.options.soften_drive:
+        smoothing = max(smoothing, preset("soft").friction_smoothing)  # of joints that are softened on the sprocket
     parameters = LoopParameters.of(setup.parameters, smoothing)
     return average_frames(before, parameters, walk.sprocket_center, joint_radius(setup.scene, setup.parameters))
-
-
-def drive_smoothing(setup: Setup) -> float:
-    """Smoothing ω_c [rad/s] of joint friction in the last moments on the sprocket, where joints may be softened."""
-    own = setup.parameters.friction_smoothing
-    return max(own, float(control_of(setup.options).soft_smoothing)) if setup.options.soften_drive else own
 
 
 def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Array, radius: float) -> StationaryLoop:
