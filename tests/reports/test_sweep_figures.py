@@ -14,7 +14,6 @@ from matplotlib.patches import Rectangle
 
 from tests.support.made_sweeps import FIGURE_6, SENSITIVITY, TOLERANCE, distance, make_sweep
 from warpchain.pictures.style import GREEN, RED, NothingToShow, Picture
-from warpchain.reports.labels import cell_text, number_text
 from warpchain.reports.statistics import sensitivities, tolerance_agreement
 from warpchain.reports.sweep_figures import (
     figure6,
@@ -411,22 +410,6 @@ def test_figures_are_those_that_a_sweep_has_something_for(
         assert [picture.name for picture in pictures] == names
         assert all(picture.caption.endswith((".", "%")) and "\n" not in picture.caption for picture in pictures)
         pictures[0].figure.savefig(tmp_path / "picture.png", dpi=40)
-
-
-@pytest.mark.parametrize(
-    ("value", "text"), [(1e-6, "1e-6"), (3e7, "3e7"), (1e-10, "1e-10"), (0.27, "0.27"), (60, "60"), (1e100, "1e100")]
-)
-def test_number_text(value: float, text: str) -> None:
-    """Numbers are written as people write them."""
-    assert number_text(value) == text
-
-
-def test_cell_text() -> None:
-    """Cells are named by symbols, values and units."""
-    text = cell_text({"links": np.int64(60), "frequency": np.float64(7.5), "start": "rest", "self_contact": np.True_})
-    assert text == "n = 60, ν = 7.5 Hz, start = rest, self contact = True"
-    assert cell_text({"coulomb_friction": 1.1e-4, "tolerance": 1e-9}) == "τ_c = 0.00011 N m, tolerance = 1e-9"
-    assert cell_text({}) == ""
 
 
 def test_light_import() -> None:

@@ -58,8 +58,9 @@ def figure5(walks: Sequence[Walk], *, labels: Sequence[str] | None = None, figur
     """Height and horizontal speed of the centre of mass against time since the release, as in Figure 5.
 
     Args:
-        walks: one line each in both panels.
-        labels: a legend entry for each walk; by default links and frequency, if the walks differ in them.
+        walks: the walks, one line for each in both panels.
+        labels: legend entries, one for each walk; walks of one label have the same colour. By default links and
+            frequency, without a legend if they are the same for all walks.
         figure: an empty figure to draw into; by default a new one.
 
     Raises:
@@ -108,10 +109,11 @@ def check_frames(walk: Walk) -> None:
 
 
 def film_strip(walk: Walk, *, count: int | None = None, figure: Figure | None = None) -> Figure:
-    """The chain along its walk, drawn to scale, and close-ups of it at the moments that matter.
+    """The chain along its walk, drawn to scale, and close-ups of up to four moments.
 
-    The strip shows the chain at instants between which its centre of mass moves equally far. Colour is time;
-    outer links are darker than inner ones. The close-ups are described at `_close_ups`.
+    In the strip the centre of mass moves equally far from each instant to the next. Colour is time; outer links are
+    darker than inner ones. The close-ups show the first touch of the floor, the first self-contact, the collapse and
+    the end.
 
     Args:
         walk: a walk with frames.

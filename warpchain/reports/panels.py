@@ -46,10 +46,10 @@ def panels(result: SweepResult, quantity: str) -> Picture:
         mean, error = (table.transpose(order) for table in (found.mean, found.standard_error))
         values = np.asarray(block.axes[quantity], dtype=float)
         for row, number in enumerate(block.axes["links"]):
-            look = {"color": color_of[int(number)], "linestyle": style, "linewidth": 1.2}
+            line = {"color": color_of[int(number)], "linestyle": style, "linewidth": 1.2}
             for column, frequency in enumerate(block.axes["frequency"]):
                 axes_at[float(frequency)].errorbar(
-                    values, mean[row, column], 2 * error[row, column], elinewidth=0.8, marker="o", markersize=3, **look
+                    values, mean[row, column], 2 * error[row, column], elinewidth=0.8, marker="o", markersize=3, **line
                 )
     for frequency, axes in axes_at.items():
         axes.set_title(f"$ν$ = {frequency:g} Hz", fontsize="medium", loc="left")

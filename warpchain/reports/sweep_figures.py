@@ -1,7 +1,7 @@
 """Figures of sweeps: the paper's Figures 6 and 5, maps, tolerances compared, sensitivity, how walks ended.
 
-Means and spreads are of the walks that came to rest. Walks that failed, or have not been run yet, are counted on the
-figure.
+Means and standard deviations are those of the walks that came to rest. The number of walks that failed, or have not
+been run yet, is on the figure.
 """
 
 from collections.abc import Callable, Iterator, Sequence
