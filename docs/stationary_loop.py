@@ -76,7 +76,7 @@ def show(name: str, walk: WalkResult) -> None:
     kink = find_kink(loop)
     print(f"{name}: v = {loop.speed:.3f} m/s, held for {walk.hold_time:.2f} s, drift {100 * walk.drift:.2f} %")
     print(
-        f"  {'simulation':22} bottom {np.interp(0, loop.s, loop.curvature):6.2f} 1/m, "
+        f"  {'simulation':22} bottom {loop.bottom_curvature:6.2f} 1/m, "
         f"greatest {kink.peak:6.2f} at {100 * kink.peak_at:5.1f} cm, "
         f"least {kink.dip:6.2f} at {100 * kink.dip_at:5.1f} cm; "
         f"joints within {1e3 * loop.spread.max():.3f} mm"

@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 from warpchain import preset
 from warpchain.inputs.start_shapes import CurvePoints, ellipse, lay_chain, links_between, stadium
 from warpchain.oracle import motion_equations
+from warpchain.oracle.circular_loop import circular_loop
 
 PAPER = preset("paper")
 LENGTH = PAPER.link_length
@@ -132,7 +133,7 @@ def test_circle_is_the_regular_polygon():
     """An ellipse of aspect 1 is the regular polygon of the closed form, turning at its rate."""
     links, speed = 20, 2.0
     position, velocity = lay_chain(ellipse(1.0), links, LENGTH, speed)
-    polygon, turning = motion_equations.circular_loop(links, PAPER, -speed)
+    polygon, turning = circular_loop(links, PAPER, -speed)
     assert_allclose(np.hypot(*position[:, :2].T), np.hypot(*polygon[:, :2].T), rtol=1e-12)
     assert_allclose(velocity[:, 2], turning[:, 2], rtol=1e-10)
 

@@ -199,9 +199,9 @@ def test_a_sweep_keeps_them(tmp_path: Path) -> None:
     warpchain.sweep(content, tmp_path / "two", workers=2)
     for path in (tmp_path / "one/shards").glob("[0-9]*.h5"):
         assert path.read_bytes() == (tmp_path / "two/shards" / path.name).read_bytes()
-    figure, text = sweep_kink(result)
-    assert "2 walks" in text
-    assert [line.get_xdata().tolist() for line in figure.axes[1].lines] == [[12.0, 14.0]]
+    picture = sweep_kink(result)
+    assert "2 walks" in picture.caption
+    assert [line.get_xdata().tolist() for line in picture.figure.axes[1].lines] == [[12.0, 14.0]]
     with pytest.raises(InputError, match=r"sweep\.record\.series\.before: unknown key"):
         warpchain.sweep(content | {"record": {"series": {"before": 0.1}}}, tmp_path / "three")
     with pytest.raises(InputError, match=r"sweep\.record\.frames\.before: -1"):

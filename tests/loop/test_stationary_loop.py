@@ -245,10 +245,9 @@ def test_the_figure_of_a_loop() -> None:
 
 def test_without_scipy_the_figure_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is drawn without theory, with a note; the theory itself is refused with the remedy."""
-    monkeypatch.setattr("warpchain.pictures.loop_figure.find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "scipy.integrate", None)
     _, bend, pull = held_walk().plot("loop").axes
     assert bend.get_legend().get_title().get_text() == WITHOUT_SCIPY
     assert len(bend.lines) == 3 and len(pull.lines) == 2
-    monkeypatch.setitem(sys.modules, "scipy.integrate", None)
     with pytest.raises(ModuleNotFoundError, match=r"pip install 'warpchain\[scipy\]'"):
         predict(average_loop(held_walk()))

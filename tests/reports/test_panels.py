@@ -4,11 +4,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 from tests.support.made_sweeps import distance, make_sweep
-from warpchain.reports.panels import sweep_panels, third_axis
-from warpchain.reports.statistics import NothingToShow
+from warpchain.reports.panels import panels, third_axis, third_quantities
 from warpchain.reports.sweep_figures import figures
 from warpchain.status import Status
 from warpchain.sweeps.plan import PlannedWalk
@@ -32,8 +30,9 @@ SWEEP: dict[str, Any] = {
 def test_a_panel_for_each_frequency_and_a_line_for_each_number_of_links_and_block(tmp_path: Path) -> None:
     """Lines pass through the means of the cells; blocks with other axes are left out."""
     result = make_sweep(tmp_path, SWEEP)
-    ((quantity, figure),) = sweep_panels(result, {"floor_friction": "friction of the floor"})
-    assert quantity == "floor_friction"
+    assert third_quantities(result) == ["floor_friction"]
+    figure = panels(result, "floor_friction").figure
+    assert figure.get_supxlabel() == "floor friction $μ_\\mathrm{fc}$"
     assert [axes.get_title(loc="left") for axes in figure.axes] == [f"$ν$ = {f} Hz" for f in (10, 20, 30)]
     means = result.blocks["rest"].statistics().mean
     for column, axes in enumerate(figure.axes):
@@ -52,7 +51,7 @@ def test_lost_walks_are_counted_on_panels(tmp_path: Path) -> None:
     def flawed(walk: PlannedWalk) -> float | Status:
         return Status.TIME_LIMIT if walk.index == 0 else distance(walk)
 
-    ((_, figure),) = sweep_panels(make_sweep(tmp_path, SWEEP, flawed), {})
+    figure = panels(make_sweep(tmp_path, SWEEP, flawed), "floor_friction").figure
     assert "1 of 144 walks failed" in figure.get_supxlabel()
 
 
@@ -67,5 +66,4 @@ def test_what_is_no_third_quantity(tmp_path: Path) -> None:
     blocks = [{"name": f"b{number}", "grid": grid} for number, grid in enumerate(grids)]
     result = make_sweep(tmp_path, SWEEP | {"blocks": blocks, "distributions": {"all": "fixed", "phase": "table"}})
     assert [third_axis(block) for block in result.blocks.values()] == [None] * 4
-    with pytest.raises(NothingToShow):
-        sweep_panels(result, {})
+    assert third_quantities(result) == []

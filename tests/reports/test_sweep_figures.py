@@ -9,18 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from tests.support.made_sweeps import FIGURE_6, SENSITIVITY, TOLERANCE, distance, make_sweep
-from warpchain.reports.statistics import (
-    NothingToShow,
-    cell_text,
-    number_text,
-    sensitivities,
-    tolerance_agreement,
-)
+from warpchain.pictures.style import GREEN, RED, NothingToShow, Picture
+from warpchain.reports.statistics import sensitivities, tolerance_agreement
 from warpchain.reports.sweep_figures import (
     figure6,
     figures,
@@ -30,7 +24,6 @@ from warpchain.reports.sweep_figures import (
     status_counts,
     tolerance,
 )
-from warpchain.reports.sweep_series import GREEN, RED
 from warpchain.status import Status
 from warpchain.store.sweep_result import SweepResult
 from warpchain.sweeps.plan import PlannedWalk
@@ -74,9 +67,9 @@ def saltelli(tmp_path_factory: pytest.TempPathFactory) -> SweepResult:
     return make_sweep(tmp_path_factory.mktemp("saltelli"), SENSITIVITY)
 
 
-def panels(figure: Figure) -> list[Axes]:
-    """The axes of a figure that hold data, in order."""
-    return [axes for axes in figure.axes if axes.has_data() and axes.axison]
+def panels(picture: Picture) -> list[Axes]:
+    """The axes of a picture that hold data, in order."""
+    return [axes for axes in picture.figure.axes if axes.has_data() and axes.axison]
 
 
 def means(axes: Axes, color: str) -> dict[float, tuple[float, str]]:
@@ -90,12 +83,12 @@ def means(axes: Axes, color: str) -> dict[float, tuple[float, str]]:
 
 def test_figure6_has_a_panel_for_each_number_of_links(sweep6: SweepResult) -> None:
     """One panel for each n, with common axes, and nothing else but a legend that explains all signs."""
-    figure = figure6(sweep6)
-    drawn = panels(figure)
+    picture = figure6(sweep6)
+    drawn = panels(picture)
     assert [axes.get_title(loc="left") for axes in drawn] == [f"$n$ = {n}" for n in (60, 90, 120, 150, 180)]
     assert len({(axes.get_xlim(), axes.get_ylim()) for axes in drawn}) == 1
     assert drawn[0].get_ylim()[0] == 0.0
-    legend = next(axes.get_legend() for axes in figure.axes if axes.get_legend())
+    legend = next(axes.get_legend() for axes in picture.figure.axes if axes.get_legend())
     texts = [text.get_text() for text in legend.get_texts()]
     assert texts[:2] == ["started at rest", "started as an ellipse"] and "2 standard" in texts[-1]
 
@@ -148,7 +141,7 @@ def test_figure6_tells_blocks_of_one_start_apart(tmp_path: Path) -> None:
         {"name": "paper", "preset": "paper", "grid": {"frequency": [10, 20]}},
         {"name": "other", "grid": {"frequency": [10, 20], "floor_friction": [0.2, 0.3]}},
     ]
-    figure = figure6(make_sweep(tmp_path, one_block(blocks=blocks, samples=2)))
+    figure = figure6(make_sweep(tmp_path, one_block(blocks=blocks, samples=2))).figure
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
     assert texts[:3] == ["started at rest", "started as an ellipse", "paper, started at rest"] and len(texts) == 5
     handles = [handle for handle in figure.legends[0].legend_handles if isinstance(handle, Line2D)][:3]
@@ -170,7 +163,7 @@ def test_figure6_needs_walks(tmp_path: Path) -> None:
 
 def test_heat_map_shows_the_statistics(flawed6: SweepResult) -> None:
     """Maps hold mean and standard deviation of each cell, holes where there are none, and counts of what is lost."""
-    figure = heat_map(flawed6)
+    figure = heat_map(flawed6).figure
     mean, sd = (axes for axes in figure.axes if axes.images and axes.get_ylim()[1] == 1.5)
     found = flawed6.blocks["rest"].statistics()
     np.testing.assert_array_equal(np.ma.filled(mean.images[0].get_array(), np.nan), found.mean)
@@ -186,8 +179,8 @@ def test_heat_map_shows_the_statistics(flawed6: SweepResult) -> None:
 
 def test_heat_map_of_any_quantity(sweep6: SweepResult) -> None:
     """Any column can be mapped, in its unit; an unknown one is refused."""
-    assert "mean walk time / s" in [axes.get_ylabel() for axes in heat_map(sweep6, "walk_time").axes]
-    assert "mean bounces" in [axes.get_ylabel() for axes in heat_map(sweep6, "bounces").axes]
+    assert "mean walk time / s" in [axes.get_ylabel() for axes in heat_map(sweep6, "walk_time").figure.axes]
+    assert "mean bounces" in [axes.get_ylabel() for axes in heat_map(sweep6, "bounces").figure.axes]
     with pytest.raises(KeyError, match="bounces"):
         heat_map(sweep6, "bouncs")
 
@@ -195,7 +188,7 @@ def test_heat_map_of_any_quantity(sweep6: SweepResult) -> None:
 def test_heat_map_of_many_cells(tmp_path: Path) -> None:
     """A large map has no numbers in it, and no more ticks than there is room for."""
     grid = {"links": [60, 80, 100, 120, 140], "frequency": {"from": 5, "to": 34, "step": 1}}
-    axes = heat_map(make_sweep(tmp_path, one_block(samples=2, grid=grid))).axes[0]
+    axes = heat_map(make_sweep(tmp_path, one_block(samples=2, grid=grid))).figure.axes[0]
     assert not axes.texts and len(axes.get_xticks()) <= 16
     assert [text.get_text() for text in axes.get_xticklabels()][:2] == ["5", "7"]
 
@@ -206,7 +199,7 @@ def test_heat_map_of_many_cells(tmp_path: Path) -> None:
 def test_tolerance_numbers(tmp_path: Path) -> None:
     """Single walks and means of cells are compared with their partners at the other tolerance."""
     result = make_sweep(tmp_path, TOLERANCE)
-    figure, agreement = tolerance(result)
+    agreement = tolerance_agreement(result)
     loose, tight = result.dx[:, :, 0].reshape(4, 12), result.dx[:, :, 1].reshape(4, 12)
     assert (agreement.loose, agreement.tight, agreement.lost) == (1e-6, 1e-9, 0)
     np.testing.assert_allclose(agreement.differences, (loose / tight - 1).ravel())
@@ -216,10 +209,11 @@ def test_tolerance_numbers(tmp_path: Path) -> None:
     errors = (loose - tight).std(axis=1, ddof=1) / 12**0.5 / tight.mean(axis=1)
     np.testing.assert_allclose([cell.standard_error for cell in agreement.cells], errors)
     assert agreement.worst_cell.difference == pytest.approx(ratios[np.abs(ratios).argmax()])
-    left, right = figure.axes
+    picture = tolerance(result)
+    left, right = picture.figure.axes
     np.testing.assert_array_equal(left.collections[1].get_offsets(), np.stack([tight.ravel(), loose.ravel()], 1))
     assert right.get_yticklabels()[0].get_text() == "n = 60, ν = 10 Hz"
-    assert "48 walks at tolerances 1e-6 and 1e-9" in str(agreement)
+    assert picture.caption == str(agreement) and "48 walks at tolerances 1e-6 and 1e-9" in picture.caption
 
 
 def test_tolerance_leaves_out_incomplete_pairs(tmp_path: Path) -> None:
@@ -232,11 +226,12 @@ def test_tolerance_leaves_out_incomplete_pairs(tmp_path: Path) -> None:
         )
 
     result = make_sweep(tmp_path, content, outcome)
-    figure, agreement = tolerance(result)
+    agreement = tolerance_agreement(result)
     assert agreement.lost == 3 and len(agreement.differences) == 1
     assert agreement.greatest == abs(result.dx[2, 3] / result.dx[0, 3] - 1)
     assert math.isnan(agreement.cells[0].standard_error) and agreement.cells[0].cell == "main"
-    assert "3 pairs are not complete" in figure.axes[1].get_xlabel() and "3 more pairs" in str(agreement)
+    assert "3 pairs are not complete" in tolerance(result).figure.axes[1].get_xlabel()
+    assert "3 more pairs" in str(agreement)
 
 
 @pytest.mark.parametrize(
@@ -316,9 +311,8 @@ def test_sensitivity_finds_what_matters(tmp_path: Path) -> None:
 
 def test_sensitivity_figure(saltelli: SweepResult) -> None:
     """A panel for each cell, quantities in a common order with their symbols, two bars for each; always the same."""
-    figure, cells = sensitivity(saltelli)
+    cells, drawn = sensitivities(saltelli), panels(sensitivity(saltelli))
     assert [cell.cell for cell in cells] == ["ν = 10 Hz", "ν = 20 Hz"]
-    drawn = panels(figure)
     assert [axes.get_title(loc="left") for axes in drawn] == ["ν = 10 Hz", "ν = 20 Hz"]
     assert drawn[0].get_yticklabels()[0].get_text() == "floor friction $μ_\\mathrm{fc}$"
     assert len(drawn[0].patches) == 2 * len(saltelli.drawn)
@@ -335,9 +329,10 @@ def test_sensitivity_leaves_out_incomplete_samples(tmp_path: Path) -> None:
     def outcome(walk: PlannedWalk) -> float | Status:
         return Status.TIME_LIMIT if walk.index in (3, 5) or walk.cell == (1,) else distance(walk)
 
-    figure, (cell,) = sensitivity(make_sweep(tmp_path, content, outcome))
+    result = make_sweep(tmp_path, content, outcome)
+    (cell,) = sensitivities(result)
     assert (cell.samples, cell.lost, cell.cell) == (6, 2, "ν = 10 Hz")
-    assert panels(figure)[0].get_xlabel() == "2 of 8 samples are not complete"
+    assert panels(sensitivity(result))[0].get_xlabel() == "2 of 8 samples are not complete"
     with pytest.raises(NothingToShow, match="complete samples"):
         sensitivities(make_sweep(tmp_path / "none", content, lambda walk: Status.TIME_LIMIT))
     with pytest.raises(NothingToShow, match="sampler: saltelli"):
@@ -372,7 +367,7 @@ def test_responses_show_what_a_block_varies(tmp_path: Path) -> None:
 
 def test_status_counts(flawed6: SweepResult, sweep6: SweepResult) -> None:
     """Every end of every block has a bar as long as its count, which stands beside it."""
-    axes = status_counts(flawed6).axes[0]
+    axes = status_counts(flawed6).figure.axes[0]
     bars = dict(
         zip(
             [text.get_text() for text in axes.get_yticklabels()],
@@ -388,13 +383,13 @@ def test_status_counts(flawed6: SweepResult, sweep6: SweepResult) -> None:
         "ellipse: not run yet": 3,
     }
     assert " 1 (8.33%)" in [text.get_text() for text in axes.texts]
-    assert [text.get_text() for text in status_counts(sweep6).axes[0].texts] == [" 360", " 120"]
+    assert [text.get_text() for text in status_counts(sweep6).figure.axes[0].texts] == [" 360", " 120"]
 
 
 def test_status_counts_of_many_blocks(tmp_path: Path) -> None:
     """Many blocks are counted together."""
     blocks = [{"name": f"b{number}", "grid": {"frequency": [10]}} for number in range(8)]
-    axes = status_counts(make_sweep(tmp_path, one_block(blocks=blocks))).axes[0]
+    axes = status_counts(make_sweep(tmp_path, one_block(blocks=blocks))).figure.axes[0]
     assert [text.get_text() for text in axes.get_yticklabels()] == ["at rest"]
     assert [patch.get_width() for patch in axes.patches] == [32]
 
@@ -415,22 +410,6 @@ def test_figures_are_those_that_a_sweep_has_something_for(
         assert [picture.name for picture in pictures] == names
         assert all(picture.caption.endswith((".", "%")) and "\n" not in picture.caption for picture in pictures)
         pictures[0].figure.savefig(tmp_path / "picture.png", dpi=40)
-
-
-@pytest.mark.parametrize(
-    ("value", "text"), [(1e-6, "1e-6"), (3e7, "3e7"), (1e-10, "1e-10"), (0.27, "0.27"), (60, "60"), (1e100, "1e100")]
-)
-def test_number_text(value: float, text: str) -> None:
-    """Numbers are written as people write them."""
-    assert number_text(value) == text
-
-
-def test_cell_text() -> None:
-    """Cells are named by symbols, values and units."""
-    text = cell_text({"links": np.int64(60), "frequency": np.float64(7.5), "start": "rest", "self_contact": np.True_})
-    assert text == "n = 60, ν = 7.5 Hz, start = rest, self contact = True"
-    assert cell_text({"coulomb_friction": 1.1e-4, "tolerance": 1e-9}) == "τ_c = 0.00011 N m, tolerance = 1e-9"
-    assert cell_text({}) == ""
 
 
 def test_light_import() -> None:

@@ -10,10 +10,10 @@ from warpchain import InputError, Status
 from warpchain.engine.batch import Batch
 from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.parameters import preset
-from warpchain.oracle import motion_equations
+from warpchain.oracle.circular_loop import circular_loop
 
 SOFT = preset("soft")
-POSITION, VELOCITY = motion_equations.circular_loop(8, SOFT, 1.0)
+POSITION, VELOCITY = circular_loop(8, SOFT, 1.0)
 
 
 class ComputedError(Exception):

@@ -21,8 +21,8 @@ import warpchain
 from tests.run.test_sweep_run import BRIEF, TINY, brief_setup, data_of
 from warpchain.engine.devices import CAPACITY_SAMPLES
 from warpchain.inputs.validation import InputError
+from warpchain.pictures.style import NothingToShow
 from warpchain.reports.figure5 import MOST_CELLS, sweep_figure5
-from warpchain.reports.statistics import NothingToShow
 from warpchain.reports.sweep_page import write_report
 from warpchain.run.sweep_run import sweep
 from warpchain.store.folder import SweepFolder
@@ -324,8 +324,8 @@ def test_a_merge_with_motions_that_fails_leaves_the_older_file(kept: Path, tmp_p
 def test_figure5_of_a_sweep_shows_the_kept_series(kept: Path) -> None:
     """Both panels have a line for each shown walk, with its numbers; a colour is a cell."""
     result = load(kept)
-    figure, text = sweep_figure5(result)
-    height, speed = figure.axes
+    picture = sweep_figure5(result)
+    height, speed = picture.figure.axes
     walks = [
         result.series(links=links, frequency=frequency, sample=sample)
         for links in (30, 44)
@@ -341,7 +341,7 @@ def test_figure5_of_a_sweep_shows_the_kept_series(kept: Path) -> None:
             np.testing.assert_array_equal(line.get_xdata(), walk.time)
             np.testing.assert_array_equal(line.get_ydata(), numbers)
     assert len({line.get_color() for line in speed.lines}) == 4
-    assert "8 walks in 4 of 4 cells" in text
+    assert "8 walks in 4 of 4 cells" in picture.caption
     names = [entry.get_text() for entry in height.get_legend().get_texts()]
     assert names[0] == "n = 30, ν = 5 Hz" and len(names) == 4
 
@@ -350,10 +350,10 @@ def test_figure5_of_many_cells_shows_some_from_first_to_last(tmp_path: Path) -> 
     """Of many cells as many are shown as there are colours, the first and the last among them."""
     grid = {"frequency": {"from": 1, "to": 20, "step": 1}}
     content = KEPT | {"samples": 1, "grid": grid, "scene": BRIEF | {"links": 30}, "record": {"series": True}}
-    figure, text = sweep_figure5(sweep(content, tmp_path))
-    names = [entry.get_text() for entry in figure.axes[0].get_legend().get_texts()]
+    picture = sweep_figure5(sweep(content, tmp_path))
+    names = [entry.get_text() for entry in picture.figure.axes[0].get_legend().get_texts()]
     assert len(names) == MOST_CELLS and (names[0], names[-1]) == ("ν = 1 Hz", "ν = 20 Hz")
-    assert f"{MOST_CELLS} of 20 cells" in text
+    assert f"{MOST_CELLS} of 20 cells" in picture.caption
 
 
 def test_report_and_pictures_use_kept_frames(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -89,11 +89,10 @@ def plot(
     ] = None,
 ) -> None:
     """Draw every figure that the sweep has something for: Figures 6 and 5, maps, tolerance, sensitivity, statuses."""
-    from warpchain.cli.terminal import PICTURE_DPI, try_folder
+    from warpchain.cli.terminal import try_folder
     from warpchain.reports.sweep_figures import figures
     from warpchain.store.shards import check_not_own
     from warpchain.store.sweep_result import load
-    from warpchain.walks.walk_result import replacing
 
     result = load(directory)
     folder = output or directory
@@ -101,10 +100,7 @@ def plot(
     try_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
     for picture in figures(result):
-        path = folder / f"{picture.name}.png"
-        with replacing(path) as part:
-            picture.figure.savefig(part, dpi=PICTURE_DPI)
-        print(path)
+        print(picture.save(folder))
 
 
 def report(

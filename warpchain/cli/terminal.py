@@ -15,7 +15,8 @@ from rich.console import Console
 from rich.table import Table
 
 from warpchain.inputs.validation import InputError
-from warpchain.walks.walk_result import LOST, WalkResult, replacing
+from warpchain.pictures.style import save_figure
+from warpchain.walks.walk_result import LOST, WalkResult
 
 if TYPE_CHECKING:
     from warpchain.bench.cpu_steps import BroadPhaseCost, StepCost
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from warpchain.run.sweep_run import SweepProgress
     from warpchain.store.sweep_result import SweepResult
 
-PICTURE_DPI: Final = 200
 COMPILING: Final = "compiling kernels; later runs find them ready"
 WIDE: Final = 110
 """Columns of a wide table where there is no terminal to ask."""
@@ -281,6 +281,4 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
 
 
 def _draw(kind: Literal["figure5", "film_strip", "loop"], result: WalkResult, path: Path) -> None:
-    figure = result.plot(kind)
-    with replacing(path) as part:
-        figure.savefig(part, dpi=PICTURE_DPI)
+    save_figure(result.plot(kind), path)

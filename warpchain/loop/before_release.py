@@ -1,4 +1,4 @@
-"""The motion of a chain on its sprocket in the last moments before its release, and the loads of its joints there."""
+"""The motion of a chain on its sprocket just before its release, and the forces and moments in its joints."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -26,22 +26,14 @@ FIELDS: Final[Mapping[str, tuple[str, str]]] = {
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class BeforeRelease:
-    """A chain of n links on its sprocket: t instants and f frames of the last moments before its release.
+    """A chain of n links on its sprocket: t instants and f frames just before its release.
 
-    Coordinates are those of the walk: the chain is shown as high as it hangs at the release. The link after a joint
-    feels the opposite of its force and moment. Forces are those of the joints as they were then, perhaps softened.
-
-    Attributes:
-        time: time since the release [s], negative, shape (t,).
-        center: centre of mass x, y [m], shape (t, 2).
-        center_velocity: its velocity [m/s], shape (t, 2).
-        frame_time: times of the frames [s], negative, shape (f,).
-        frame_joints: joints x, y [m], shape (f, n, 2).
-        frame_forces: force F = k C + b dC/dt in each joint [N], on the link that it ends, shape (f, n, 2).
-        frame_moments: friction moment in each joint [N m], counter-clockwise on the link that it ends, shape (f, n).
+    `FIELDS` has unit, meaning and shape of each array. Coordinates are those of the walk, with the sprocket at its
+    height at the release. Forces are F = k C + b dC/dt with the stiffness and damping that the joints had then: they
+    may be softened. Moments are positive counter-clockwise. On the link after a joint both act with the opposite sign.
 
     Raises:
-        ValueError: an array has another shape than stands beside it, or a time is not negative.
+        ValueError: an array does not have its shape, or a time is not negative.
     """
 
     time: Array
@@ -71,7 +63,7 @@ class BeforeRelease:
             raise ValueError("before_release: a time is not negative; give times before the release")
 
     def as_type(self, joints: type[np.floating[Any]]) -> "BeforeRelease":
-        """The same with joints, forces and moments in another precision."""
+        """A copy with joints, forces and moments in another precision."""
         names = ("frame_joints", "frame_forces", "frame_moments")
         return replace(self, **{name: getattr(self, name).astype(joints) for name in names})
 
@@ -82,7 +74,7 @@ class BeforeRelease:
 
 
 def write_before_release(before: BeforeRelease, group: "h5py.Group") -> None:
-    """Put the arrays into a group, with their units; gzip adds checksums."""
+    """Write the arrays and their units into a group; gzip adds checksums."""
     for name, (unit, meaning) in FIELDS.items():
         value = getattr(before, name)
         filters = {"compression": "gzip", "shuffle": True} if value.size else {}
@@ -92,11 +84,10 @@ def write_before_release(before: BeforeRelease, group: "h5py.Group") -> None:
 
 
 def read_before_release(group: "h5py.Group") -> BeforeRelease:
-    """What `write_before_release` has put into a group.
+    """Read what `write_before_release` wrote into a group.
 
     Raises:
         KeyError: an array is missing.
         ValueError: the arrays do not fit together.
     """
-    values: dict[str, Any] = {name: group[name][()] for name in FIELDS}
-    return BeforeRelease(**values)
+    return BeforeRelease(**{name: group[name][()] for name in FIELDS})

@@ -1,77 +1,71 @@
-"""The loop of a chain that runs stationarily on its sprocket: its mean shape, what it carries, whether that balances.
+"""The stationary loop of a chain on its sprocket: its mean shape, the forces in it, and their balances.
 
-In a stationary loop every joint follows the same path at the same speed. Frames of all joints are therefore samples of
-one periodic function of q = i + o(t), where i is the joint's number and o(t), in links, how far the chain has moved on;
-o(t) is read off each frame, from the phase of its first harmonic. Averages over frames at equal q are averages in the
-frame of the room. They are made into functions of the arc length s, measured along the motion from the lowest point.
+In a stationary loop every joint follows the same path at the same speed. All joints in all frames are therefore samples
+of one periodic function of q = i + o(t), where i is the number of the joint and o(t) the distance, in links, that the
+chain has moved along the loop. The phase of the first harmonic of each frame gives o(t). Averages over frames at equal
+q are functions in space, expressed by the arc length s from the lowest point along the motion.
 
-Signs. The loop runs clockwise: down on the right of the sprocket, along the bottom to the left, up again. The angle φ
-of its tangent is measured from there, clockwise: t = (−cos φ, sin φ), so that it is 0 at the lowest point and grows
-along the motion. n = (sin φ, cos φ) is the normal towards the inside, κ = φ' the curvature, positive where the loop
-bends inwards. Force and moment are those of the part ahead on the part behind, the moment positive where it turns
-clockwise.
+Signs. The loop runs clockwise: down on the right of the sprocket, along the bottom to the left, up again. The tangent
+is t = (−cos φ, sin φ): its angle φ is measured clockwise, is 0 at the lowest point and grows along the motion.
+n = (sin φ, cos φ) is the normal towards the inside, κ = φ' the curvature, positive where the loop bends inwards. Force
+and moment are those of the part ahead on the part behind, the moment positive clockwise.
 
-Balances. With the line density ρ = m̄/ℓ and the speed v, tension and shear are counted less what bends the momentum
-round the curve,
+Balances. With the line density ρ = m̄/ℓ and the speed v, effective tension and shear are the force less what changes the
+direction of the momentum,
 
     T_e t + N n = F − ρ v² (t + ℓ²/12 t''),
 
-the second term because rigid links cut the corners: F_{i+1} − F_i = m (dV/dt + g ŷ) for plane waves e^{iκ q} that stand
-still, with (κ/2) cot(κ/2) = 1 − κ²/12 expanded. Then, to order ℓ²,
+with a second term because rigid links take short cuts: F_{i+1} − F_i = m (dV/dt + g ŷ) for plane waves e^{iκ q} that
+are at rest in space, with the expansion (κ/2) cot(κ/2) = 1 − κ²/12. Then, to order ℓ²,
 
     (T_e t + N n)' = ρ g ŷ        M' + N = j v² κ'        j = (Ī − m̄ ℓ²/6) / ℓ.
 
-The links' own inertia resists being turned; their length does the opposite.
+The inertia of the links resists changes of their direction; their length has the opposite effect.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.engine.control import control_of
-from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import joint_radius
 from warpchain.inputs.setup import Setup
 from warpchain.loop.before_release import BeforeRelease
 
-if TYPE_CHECKING:
-    from warpchain.store.walk_motion import WalkMotion
-    from warpchain.walks.walk_result import WalkResult
-
 Array = NDArray[np.float64]
 
 FEWEST_FRAMES: Final = 8
-"""Fewer frames make no average."""
+"""Number of frames that an average needs."""
 LEAST_WAY: Final = 4.0
-"""Nor do frames in which the loop has moved on by fewer links."""
+"""Distance that the loop must move in all frames together [links]."""
 POINTS_PER_LINK: Final = 6
-"""Points of the mean curve in a link's length."""
+"""Points of the mean curve per link."""
 WHOLE_WAVES: Final = 5.0
-"""Waves of so many links and more are in the averages whole …"""
+"""Waves at least this long [links] are fully in the averages …"""
 NO_WAVES: Final = 2.0
-"""… and of so many and less not at all: joints are a link apart, and the mean loop has corners at the sprocket."""
+"""… and waves up to this long not at all: joints are a link apart, and the mean loop has corners at the sprocket."""
 OFF_SPROCKET: Final = 5e-4
-"""The loop is free where its joints ride this much [m] farther out than on the sprocket."""
+"""The loop is free where its joints are this much [m] farther from the centre than on the sprocket."""
 EDGE: Final = 4.0
-"""So many links at both ends of the free part are no part of a check of balances: averages mix in what touches."""
+"""Links at either end of the free part that balances leave out: averages there include links on the sprocket."""
 KINK_REACH: Final = 0.35
-"""Part of the free length, before and after the lowest point, in which the kink is looked for."""
+"""Part of the free length, before and after the lowest point, in which the kink is searched for."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LoopParameters:
-    """What the balances of a loop need to know of its chain.
+    """The quantities of a chain in the balances of its loop.
 
     Attributes:
         link_length: ℓ [m].
         density: ρ = m̄/ℓ, mass per length [kg/m].
-        inertia: j = (Ī − m̄ ℓ²/6)/ℓ [kg m], see above; may be negative.
+        inertia: j = (Ī − m̄ ℓ²/6)/ℓ [kg m]; may be negative.
         gravity: g [m/s²].
         viscous_friction: β of a joint [N m s].
         coulomb_friction: τ_c of a joint [N m].
-        friction_smoothing: ω_c of a joint [rad/s], as it was on the sprocket.
+        friction_smoothing: ω_c of a joint on the sprocket [rad/s].
     """
 
     link_length: float
@@ -84,13 +78,12 @@ class LoopParameters:
 
     def moment(self, spin: Array) -> Array:
         """Friction moment f(w) = β w + τ_c tanh(w / ω_c) [N m] of a joint that turns at w [rad/s]."""
-        stick = self.coulomb_friction * np.tanh(spin / self.friction_smoothing)
-        moment: Array = self.viscous_friction * spin + stick
-        return moment
+        coulomb: Array = self.coulomb_friction * np.tanh(spin / self.friction_smoothing)
+        return self.viscous_friction * spin + coulomb
 
     @classmethod
     def of(cls, parameters: Parameters, friction_smoothing: float | None = None) -> "LoopParameters":
-        """Those of a chain; `friction_smoothing` may be another than its own."""
+        """Take them from the parameters of a chain; `friction_smoothing` replaces the chain's own."""
         mass = (parameters.inner_mass + parameters.outer_mass) / 2
         inertia = (parameters.inner_inertia + parameters.outer_inertia) / 2
         length = parameters.link_length
@@ -107,21 +100,21 @@ class LoopParameters:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StationaryLoop:
-    """The mean loop, as functions of the arc length s at g points; signs as above.
+    """The mean loop, as functions of the arc length s at g points; signs as in the module's docstring.
 
     Attributes:
-        parameters: of the chain.
+        parameters: parameters of the chain.
         speed: v along the loop [m/s].
-        length: of the mean loop [m].
-        radius: distance of the joints from the sprocket's centre where they lie on it [m].
+        length: length of the mean loop [m].
+        radius: distance of joints on the sprocket from its centre [m].
         center: the sprocket's centre x, y [m], shape (2,).
         s: arc length from the lowest point along the motion [m], shape (g,), from about −length/2 to length/2.
         position: x, y [m], shape (g, 2).
-        spread: standard deviation of joints from the mean curve, across it [m], shape (g,).
+        spread: standard deviation of the joints across the mean curve [m], shape (g,).
         angle: φ [rad], shape (g,).
         curvature: κ [1/m], shape (g,).
         bending: κ' [1/m²], shape (g,).
-        tension: T [N], the whole of it, shape (g,).
+        tension: T = F · t [N], shape (g,).
         effective_tension: T_e [N], shape (g,).
         shear: N [N], shape (g,).
         moment: M [N m], shape (g,).
@@ -157,25 +150,35 @@ class StationaryLoop:
         return float(np.interp(0.0, self.s, self.curvature))
 
 
-def average_loop(walk: "WalkResult | WalkMotion") -> StationaryLoop:
+@dataclass(frozen=True, kw_only=True)  # frozen: its attributes are only read
+class HeldWalk(Protocol):
+    """What a mean loop needs of a walk, whichever class holds it.
+
+    Attributes:
+        setup: parameters, scene and options.
+        sprocket_center: centre of the sprocket x, y at the release [m], shape (2,); None without one.
+        before_release: the motion on the sprocket just before the release; None if it was not kept.
+    """
+
+    setup: Setup
+    sprocket_center: Array | None
+    before_release: BeforeRelease | None
+
+
+def average_loop(walk: HeldWalk) -> StationaryLoop:
     """The mean loop of a walk in the last moments before its release.
 
     Raises:
         ValueError: the walk has kept nothing of that time, or too little.
     """
-    before = walk.before_release
+    before, setup = walk.before_release, walk.setup
     if before is None or walk.sprocket_center is None:
         raise ValueError("walk: nothing was kept of the time before its release; run it again with record_before")
-    setup = walk.setup
-    smoothing = drive_smoothing(setup)
+    smoothing = setup.parameters.friction_smoothing
+    if setup.options.soften_drive:
+        smoothing = max(smoothing, preset("soft").friction_smoothing)  # of joints that are softened on the sprocket
     parameters = LoopParameters.of(setup.parameters, smoothing)
     return average_frames(before, parameters, walk.sprocket_center, joint_radius(setup.scene, setup.parameters))
-
-
-def drive_smoothing(setup: Setup) -> float:
-    """Smoothing ω_c [rad/s] of joint friction in the last moments on the sprocket, where joints may be softened."""
-    own = setup.parameters.friction_smoothing
-    return max(own, float(control_of(setup.options).soft_smoothing)) if setup.options.soften_drive else own
 
 
 def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Array, radius: float) -> StationaryLoop:
@@ -183,9 +186,9 @@ def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Ar
 
     Args:
         before: frames of a loop that runs clockwise.
-        parameters: of its chain.
+        parameters: parameters of the chain.
         center: the sprocket's centre x, y [m].
-        radius: distance of the joints from it where they lie on the sprocket [m].
+        radius: distance of joints on the sprocket from its centre [m].
 
     Raises:
         ValueError: there are too few frames, or the loop does not run clockwise.
@@ -243,49 +246,49 @@ def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Ar
 
 @dataclass(frozen=True)
 class Kink:
-    """Where the curvature overshoots.
+    """The extreme curvatures near the lowest point.
 
     Attributes:
-        peak: greatest curvature near the lowest point [1/m] …
-        peak_at: … and where it is, s [m].
-        dip: least curvature on the side of the kink [1/m], negative if the loop bulges …
-        dip_at: … and where it is, s [m]: after the lowest point along the motion where positive.
-        opposite_dip: least curvature as far on the other side of the lowest point [1/m].
+        peak: greatest curvature [1/m].
+        peak_at: its place s [m].
+        dip: least curvature [1/m], negative if the loop bulges.
+        dip_at: its place s [m], positive after the lowest point along the motion.
     """
 
     peak: float
     peak_at: float
     dip: float
     dip_at: float
-    opposite_dip: float
 
 
 def find_kink(loop: StationaryLoop) -> Kink:
-    """The kink of a loop: on one side of the lowest point its curvature swings below zero before it settles."""
+    """The kink of a loop, beside its lowest point, where the curvature has its least value."""
     reach = KINK_REACH * (loop.free[1] - loop.free[0])
     before = np.flatnonzero((loop.s > -reach) & (loop.s < 0))
     after = np.flatnonzero((loop.s > 0) & (loop.s < reach))
     near = np.concatenate([before, after])
     peak_at, peak = _vertex(loop.s, loop.curvature, int(near[np.argmax(loop.curvature[near])]))
     dips = [_vertex(loop.s, loop.curvature, int(side[np.argmin(loop.curvature[side])])) for side in (before, after)]
-    (dip_at, dip), (_, opposite) = sorted(dips, key=lambda place: place[1])
-    return Kink(peak=peak, peak_at=peak_at, dip=dip, dip_at=dip_at, opposite_dip=opposite)
+    dip_at, dip = min(dips, key=lambda place: place[1])
+    return Kink(peak=peak, peak_at=peak_at, dip=dip, dip_at=dip_at)
 
 
 @dataclass(frozen=True)
 class Imbalance:
-    """What is left of a balance, relative to the greatest of its terms: root mean square and greatest value."""
+    """The error of a balance relative to its greatest term: root mean square and greatest value."""
 
     rms: float
     greatest: float
 
 
 def imbalances(loop: StationaryLoop) -> dict[str, Imbalance]:
-    """How well the balances of the mean loop close on its free part, but for its ends.
+    """The errors of the balances of the mean loop on its free part, `EDGE` links at its ends left out.
 
-    Keys: `force` compares (T_e t + N n)(s) with what it is at the lowest point and the weight in between, ρ g ŷ s;
-    `normal` is N' + T_e κ − ρ g cos φ; `moment` is M' + N − j v² κ'; `friction` compares M with f(ℓ v κ'), the moment
-    of joints that all turn as the mean curve does.
+    Returns:
+        `force`: (T_e t + N n)(s), less its value at the lowest point and the weight in between, ρ g ŷ s.
+        `normal`: N' + T_e κ − ρ g cos φ.
+        `moment`: M' + N − j v² κ'.
+        `friction`: M − f(ℓ v κ'), where f is the moment of joints that turn like the mean curve.
     """
     p, edge = loop.parameters, EDGE * loop.parameters.link_length
     inside = (loop.s > loop.free[0] + edge) & (loop.s < loop.free[1] - edge)
@@ -314,7 +317,7 @@ def imbalances(loop: StationaryLoop) -> dict[str, Imbalance]:
 
 
 def periodic_slope(values: Array, period: float) -> Array:
-    """Derivative of a periodic function, sampled evenly over one period, shape (g,) or (g, c)."""
+    """Derivative of a periodic function from even samples of one period, shape (g,) or (g, c)."""
     waves = 2j * np.pi * np.fft.rfftfreq(len(values), period / len(values))
     if len(values) % 2 == 0:
         waves[-1] = 0.0
@@ -324,10 +327,9 @@ def periodic_slope(values: Array, period: float) -> Array:
 
 
 def _moved(joints: Array) -> Array:
-    """How far the loop has moved on in each frame, o(t) in links, (f,).
+    """Distance o(t) that the loop has moved until each frame [links], shape (f,).
 
-    Of X(q) = Σ c_m e^{2πi m q/n}, x + i y taken together, the harmonic m = −1 is what makes the loop go round
-    clockwise; in the joints i of a frame its phase is −2π o/n.
+    With X = x + i y = Σ c_m e^{2πi m q/n}, the harmonic m = −1 runs round clockwise; its phase in a frame is −2π o/n.
     """
     links = joints.shape[1]
     turning = np.exp(2j * np.pi * np.arange(links) / links)
@@ -339,12 +341,12 @@ def _moved(joints: Array) -> Array:
 class _Harmonics:
     """The mean over frames of a quantity of the joints as a function of q, by its harmonics.
 
-    The joints of a frame are samples a link apart, and give the harmonics of less than half a wave a link exactly. What
-    shorter waves would add has the phase 2π o(t), and goes as frames are averaged.
+    The joints of a frame are samples one link apart, which give waves longer than two links exactly. Shorter waves add
+    an error of phase 2π o(t) to them, which vanishes in the average over frames.
     """
 
     def __init__(self, values: Array, moved: Array) -> None:
-        """Average values (f, n, c) of frames in which the loop has moved on by (f,) links."""
+        """Average values of shape (f, n, c) over f frames, until which the loop has `moved` [links], shape (f,)."""
         self._links = values.shape[1]
         self._waves = np.fft.rfftfreq(self._links)  # waves a link
         back = np.exp(-2j * np.pi * self._waves * moved[:, None])
@@ -353,7 +355,7 @@ class _Harmonics:
         self._spectrum = np.mean(np.fft.rfft(values, axis=1) * back[..., None], axis=0) * kept[:, None]
 
     def at(self, order: int, points: int = POINTS_PER_LINK) -> Array:
-        """A derivative with respect to q at so many points in a link, q = 0, 1/points …, (points n, c)."""
+        """The derivative of some order with respect to q, at q = 0, 1/points …, shape (points n, c)."""
         factor = (2j * np.pi * self._waves[:, None]) ** order
         values: Array = points * np.fft.irfft(self._spectrum * factor, points * self._links, axis=0)
         return values
@@ -377,13 +379,13 @@ def _spread(joints: Array, moved: Array, place: Array, normal: Array) -> Array:
 
 
 def _vertex(s: Array, values: Array, middle: int, period: float | None = None) -> tuple[float, float]:
-    """Where the parabola through a point and its two neighbours has its vertex, and how high it is.
+    """Place and value of the vertex of the parabola through a point and its two neighbours.
 
     Args:
         s: arc length [m].
-        values: at s.
-        middle: index of an extreme value; if it is at an end, or not extreme, it is taken as it is.
-        period: of s [m], if the values go round.
+        values: values at s.
+        middle: index of an extreme value; if it is at an end, or not extreme, the point itself is returned.
+        period: period of s [m], if the values are periodic.
     """
     around = np.arange(middle - 1, middle + 2)
     if period is None and (around[0] < 0 or around[-1] >= len(s)):
@@ -399,17 +401,17 @@ def _vertex(s: Array, values: Array, middle: int, period: float | None = None) -
 
 
 def _angle(cosine: Array, sine: Array) -> Array:
-    """Angle φ of tangents t = (cosine, sine) along the loop, 0 in the middle of the arrays where s is 0."""
+    """Angle φ of tangents t = (cosine, sine) along the loop, near 0 in the middle of the arrays, where s = 0."""
     angle: Array = np.unwrap(np.arctan2(sine, -cosine))
     angle -= 2 * np.pi * np.round(angle[len(angle) // 2] / (2 * np.pi))
     return angle
 
 
 def _free_part(s: Array, distance: Array, least: float) -> tuple[float, float]:
-    """Where the part round s = 0 begins and ends that is farther from the sprocket's centre than `least` [m].
+    """Both ends s [m] of the part round s = 0 whose distance from the sprocket's centre exceeds `least` [m].
 
     Raises:
-        ValueError: there is none, or it has no end.
+        ValueError: there is no such part, or it is the whole loop.
     """
     middle, touching = len(s) // 2, np.flatnonzero(distance <= least)
     before, after = touching[touching < middle], touching[touching > middle]

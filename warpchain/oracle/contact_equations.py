@@ -4,20 +4,14 @@ Sources: "A walking roller chain", section 2.2; A. Chatterjee and A. Ruina, "A n
 based on impulse space considerations", Journal of Applied Mechanics 65 (1998) 939-951.
 """
 
-from __future__ import annotations
-
+from collections.abc import Iterator
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.inputs.parameters import Parameters
 from warpchain.oracle.motion_equations import cross, link_ends, link_inertias, link_masses, turned
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from warpchain.inputs.parameters import Parameters
 
 Array = NDArray[np.float64]
 Sprocket = tuple[Array, float, float]

@@ -1,6 +1,6 @@
-"""The model in plain NumPy, written from its equations: the oracle that the tests hold the kernels against.
+"""Equations of motion, energies and momenta of a chain, and its flight by SciPy.
 
-Nothing here is fast, and nothing here is shared with the kernels. Conventions of all functions:
+Conventions of all functions:
 
 - A chain of n links (n even, at least 4) has `position` (n, 3): x, y (m) and angle θ (rad) of each link's centre
   of mass, and `velocity` (n, 3): their time derivatives (m/s, rad/s). Even indices are inner links.
@@ -8,19 +8,15 @@ Nothing here is fast, and nothing here is shared with the kernels. Conventions o
   the right end of link i to the left end of link i+1 (mod n).
 - `parameters` gives the values by the names of `warpchain.inputs.parameters.Parameters`. SI units, y upwards.
 
-Source: "A walking roller chain", section 2.1. Contacts are in :mod:`warpchain.oracle.contact_equations`.
+Source: "A walking roller chain", section 2.1.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.parameters import Parameters
 
 Array = NDArray[np.float64]
 
@@ -37,7 +33,7 @@ def link_inertias(n: int, parameters: Parameters) -> Array:
 
 def link_ends(position: Array, parameters: Parameters) -> tuple[Array, Array]:
     """Left and right end of each link, X ∓ a u, (n, 2) each, m."""
-    offset = parameters.link_length / 2 * _direction(position[:, 2])
+    offset = parameters.link_length / 2 * direction(position[:, 2])
     return position[:, :2] - offset, position[:, :2] + offset
 
 
@@ -49,7 +45,7 @@ def joint_opening(position: Array, parameters: Parameters) -> Array:
 
 def joint_opening_rate(position: Array, velocity: Array, parameters: Parameters) -> Array:
     """Time derivative of `joint_opening`, (n, 2), m/s."""
-    offset_rate = parameters.link_length / 2 * velocity[:, 2:] * turned(_direction(position[:, 2]))
+    offset_rate = parameters.link_length / 2 * velocity[:, 2:] * turned(direction(position[:, 2]))
     return np.roll(velocity[:, :2] - offset_rate, -1, axis=0) - (velocity[:, :2] + offset_rate)
 
 
@@ -78,7 +74,7 @@ def acceleration(position: Array, velocity: Array, parameters: Parameters, *, gr
     here = joint_force(position, velocity, parameters)
     before = np.roll(here, 1, axis=0)
     spin = velocity[:, 2]
-    lever = parameters.link_length / 2 * turned(_direction(position[:, 2]))
+    lever = parameters.link_length / 2 * turned(direction(position[:, 2]))
     torque = np.sum(lever * (here + before), axis=1)
     torque -= friction_torque(spin - np.roll(spin, 1), parameters)
     torque -= friction_torque(spin - np.roll(spin, -1), parameters)
@@ -202,101 +198,19 @@ def solve_flight(
     return states[:, 0], states[:, 1], evaluations
 
 
-def circular_loop(n: int, parameters: Parameters, speed: float, *, stretched: bool = False) -> tuple[Array, Array]:
-    """A loop that turns like a rigid body about the origin, numbered anticlockwise.
-
-    Closed joints (the default): a regular n-gon of side ℓ whose joints move at `speed`. With half the angle
-    between links α = π/n, the joints lie at ℓ/(2 sin α) from the centre, the centres of mass at ℓ/(2 tan α), and
-    the loop turns at Ω = speed · 2 sin α/ℓ.
-
-    `stretched=True`: the springs' exact equilibrium at the same Ω, for b = 0. All links stay tangential, inner ones
-    at distance ρ₁ from the centre and outer ones at ρ₂. A joint's opening after an inner link is then
-    C = ((ρ₂ − ρ₁) cos α, (ρ₁ + ρ₂) sin α − ℓ cos α) in the radial and tangential direction midway between the
-    two links, after an outer link its mirror image. Mirror symmetry about each link cancels all torques, and the
-    forces k C supply the centripetal forces if
-
-        (m₁Ω²/k − 2) ρ₁ + 2 cos 2α ρ₂ = −ℓ sin 2α,    2 cos 2α ρ₁ + (m₂Ω²/k − 2) ρ₂ = −ℓ sin 2α.
-
-    Joint friction is silent, as links don't turn relative to each other. A damper is not: the model damps Ċ = Ω ẑ × C
-    of the turning opening, so for b > 0 the loop loses the power n b Ω² |C|² and only nearly keeps its shape.
-
-    Args:
-        n: number of links, even, at least 4.
-        parameters: the chain.
-        speed: speed of the joints of the closed loop, m/s; anticlockwise if positive.
-        stretched: whether the springs are in equilibrium with the rotation.
-
-    Returns:
-        position (n, 3), velocity (n, 3).
-
-    Raises:
-        ValueError: n is odd or less than 4, or the springs can't hold the stretched loop at this speed.
-    """
-    mass = link_masses(n, parameters)
-    length = parameters.link_length
-    alpha = np.pi / n
-    spin = speed * 2 * np.sin(alpha) / length
-    distance = np.full(n, length / (2 * np.tan(alpha)))
-    if stretched:
-        inner, outer = mass[:2] * spin**2 / parameters.joint_stiffness
-        coupling = 2 * np.cos(2 * alpha)
-        balance = np.array([[inner - 2, coupling], [coupling, outer - 2]])
-        if inner >= 2 or np.linalg.det(balance) <= 0:
-            raise ValueError(f"joint_stiffness {parameters.joint_stiffness} N/m can't hold {speed} m/s")
-        distance = np.tile(np.linalg.solve(balance, np.full(2, -length * np.sin(2 * alpha))), n // 2)
-    angle = np.linspace(0.0, 2 * np.pi, n, endpoint=False, dtype=np.float64)
-    centre = distance[:, None] * _direction(angle)
-    position = np.column_stack([centre, angle + np.pi / 2])
-    return position, np.column_stack([spin * turned(centre), np.full(n, spin)])
-
-
-def circular_loop_force(n: int, parameters: Parameters, speed: float) -> tuple[float, float]:
-    """Tangential and radial component of the force in the joints of the closed `circular_loop`, N.
-
-    Exact for rigid joints, unequal masses included, and independent of the moments of inertia. With ρ the distance of
-    the centres of mass, mirror symmetry about a link makes the force on it at its two ends mirror images. So the
-    tangential component T (a pull on both links of a joint) is the same in all joints, the radial one ±S (on an
-    inner link S, outwards if positive, on an outer link −S), and no torque is left: the regular polygon is an
-    equilibrium even for alternating masses. The centripetal forces are
-
-        inner: 2 (T sin α − S cos α) = m₁ Ω² ρ,    outer: 2 (T sin α + S cos α) = m₂ Ω² ρ,    α = π/n,
-
-    and with v = Ω ℓ/(2 sin α) the speed of the joints and m̄ = (m₁ + m₂)/2
-
-        T = m̄ v² cos α/ℓ,    S = (m₂ − m₁) v² sin α/(2ℓ),    |S/T| = |m₂ − m₁| tan α/(2 m̄).
-
-    T is m̄ v²/ℓ to leading order in 1/n. Springs open by these forces divided by k, to leading order in T/(k ℓ).
-
-    Args:
-        n: number of links, even, at least 4.
-        parameters: the chain.
-        speed: v, m/s.
-
-    Returns:
-        T and S, N.
-
-    Raises:
-        ValueError: n is odd or less than 4.
-    """
-    inner, outer = link_masses(n, parameters)[:2]
-    alpha = np.pi / n
-    dynamic = speed**2 / parameters.link_length
-    tangential = (inner + outer) / 2 * dynamic * np.cos(alpha)
-    return float(tangential), float((outer - inner) / 2 * dynamic * np.sin(alpha))
-
-
 def _alternating(n: int, inner: float, outer: float) -> Array:
     if n < 4 or n % 2:
         raise ValueError(f"a chain has an even number of links, at least 4; got {n}")
     return np.tile([inner, outer], n // 2)
 
 
-def _direction(angle: Array) -> Array:
+def direction(angle: Array) -> Array:
+    """(cos, sin) of angles [rad], shape (…, 2)."""
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
 def turned(vector: Array) -> Array:
-    """ẑ × vector."""
+    """ẑ × vector, for vectors of shape (…, 2)."""
     return np.stack([-vector[..., 1], vector[..., 0]], axis=-1)
 
 

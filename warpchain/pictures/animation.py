@@ -14,47 +14,49 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.pictures.walk_figures import FAINT, GROUND, INK, LINE_COLORS, link_outlines
-from warpchain.walks.walk_result import replacing
+from warpchain.files import replacing
+from warpchain.pictures.style import BLUE, FAINT, GROUND, INK
+from warpchain.pictures.walk_figures import center_at, check_frames, extent, link_outlines, setting
+from warpchain.pictures.walk_shape import Walk
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-    from warpchain.pictures.walk_figures import Walk
-
 Array = NDArray[np.float64]
 
-# Pixels of GIF and MP4. Pictures are drawn enlarged and averaged down: Pillow does not smooth edges.
 _WIDTH: Final = 960
 _TALLEST: Final = 560
+"""Greatest width and height of GIF and MP4 [pixels]."""
 _ENLARGEMENT: Final = 3
+"""Pictures are drawn this many times larger and averaged down, because Pillow does not smooth edges."""
 
-_OUTER: Final = LINE_COLORS[0]
+_OUTER: Final = BLUE
 _INNER: Final = "#9CCBE6"
 _EDGE: Final = "#00385A"
 
-# How long GIF and MP4 show their last picture [s]; most pictures in a GIF, all of which are in memory at once
-# (0.5 MB each); most frames in a page (then about 1 MB with 60 links).
 _HOLD: Final = 1.5
+"""Time for which GIF and MP4 show their last picture [s]."""
 _GIF_PICTURES: Final = 1200
+"""Most pictures of a GIF: all are in memory at once, 0.5 MB each."""
 _PLAYER_FRAMES: Final = 2000
+"""Most frames of a page, which then has about 1 MB with 60 links."""
 
 
-def animate(walk: "Walk", path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
-    """Write a moving picture of a walk; the suffix of `path` says which kind: .gif, .mp4 or .html.
+def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
+    """Write a moving picture of a walk; the suffix of `path` gives the format: .gif, .mp4 or .html.
 
-    Where frames were recorded less often than pictures are wanted, a frame is shown until the next one.
+    If there are more pictures than frames, each frame is shown until the next one.
 
     Args:
         walk: a walk with frames.
-        path: the file to write, whole or not at all; an older one is replaced. A .html file is complete in
-            itself: it loads nothing, and has play, pause, speed and a slider.
+        path: the file to write, whole or not at all; an older one is replaced. A .html file loads nothing else, and
+            has play, pause, speed and a slider.
         fps: pictures per second of playing time; in a .html file the browser decides.
-        slow: how many times slower than life; in a .html file the speed at first.
+        slow: playing time per simulated time; in a .html file the value at the start.
 
     Raises:
-        ValueError: the suffix is unknown, the walk has no frames or broken ones, fps or slow is not positive,
-            or a GIF would have over 50 pictures per second, which viewers slow down, or too many in all.
+        ValueError: the suffix is unknown, the walk has no frames or broken ones, fps or slow is not positive, or a
+            GIF would have too many pictures, in all or per second: viewers slow down over 50.
         ImportError: an .mp4 is asked for and `imageio-ffmpeg` is not installed.
         OSError: the file cannot be written.
     """
@@ -67,23 +69,20 @@ def animate(walk: "Walk", path: str | os.PathLike[str], *, fps: float = 30.0, sl
             raise ValueError(f"{name}: {value} is not a positive number; give one such as 30")
     if suffix == ".gif" and fps > 50:
         raise ValueError(f"fps: {fps} is too fast for a GIF; give at most 50")
-    if len(walk.frame_time) == 0:
-        raise ValueError(f"walk: it has no frames ({walk.status.label}); run it again with a frame_interval")
-    if not np.all(np.isfinite(walk.frame_joints)):
-        raise ValueError(f"walk: its frames are not all finite numbers. {walk.status.sentence}")
+    check_frames(walk)
     writers[suffix](walk, Path(path), fps, slow)
 
 
-def _chosen_frames(walk: "Walk", fps: float, slow: float) -> list[int]:
-    """The frame for each picture, at a constant rate: the latest that is not later than the picture."""
+def _chosen_frames(walk: Walk, fps: float, slow: float) -> list[int]:
+    """Number of the frame that each picture shows: the last one recorded by then. Pictures come at a constant rate."""
     start, end = walk.frame_time[0], walk.frame_time[-1]
     marks = start + np.arange(math.floor((end - start) * fps * slow + 1e-6) + 1) / (fps * slow)
     chosen: list[int] = (np.searchsorted(walk.frame_time, marks + 1e-9, side="right") - 1).tolist()
     return chosen if chosen[-1] == len(walk.frame_time) - 1 else [*chosen, len(walk.frame_time) - 1]
 
 
-def _write_gif(walk: "Walk", path: Path, fps: float, slow: float) -> None:
-    """One picture per different frame; times are hundredths of a second, rounded without drift."""
+def _write_gif(walk: Walk, path: Path, fps: float, slow: float) -> None:
+    """Write each frame once; durations are hundredths of a second, rounded so that errors do not add up."""
     from PIL import Image
 
     chosen = _chosen_frames(walk, fps, slow)
@@ -95,7 +94,7 @@ def _write_gif(walk: "Walk", path: Path, fps: float, slow: float) -> None:
     durations = [int(hundredths) * 10 for hundredths in np.diff(ends)]
     durations[-1] = int(_HOLD * 1000)
     stage = _Stage(walk)
-    # One palette for all, from pictures at both ends and between: otherwise every picture brings its own.
+    # One palette for all, from the first, the middle and the last picture; otherwise each picture has its own.
     samples = [np.asarray(stage.picture(pictures[round(part * (len(pictures) - 1))])) for part in (0, 0.5, 1)]
     palette = Image.fromarray(np.concatenate(samples)).quantize(48, dither=Image.Dither.NONE)
     reduced = (stage.picture(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in pictures)
@@ -104,7 +103,7 @@ def _write_gif(walk: "Walk", path: Path, fps: float, slow: float) -> None:
         first.save(part, format="GIF", save_all=True, append_images=reduced, duration=durations, loop=0)
 
 
-def _write_mp4(walk: "Walk", path: Path, fps: float, slow: float) -> None:
+def _write_mp4(walk: Walk, path: Path, fps: float, slow: float) -> None:
     try:
         ffmpeg = importlib.import_module("imageio_ffmpeg")
     except ImportError:
@@ -123,7 +122,7 @@ def _write_mp4(walk: "Walk", path: Path, fps: float, slow: float) -> None:
 
 @dataclass(frozen=True)
 class _View:
-    """What the camera sees [m], and where the floor is marked [m]."""
+    """The part of the plane that is shown, and the marks on the floor [m]."""
 
     left: float
     right: float
@@ -132,11 +131,9 @@ class _View:
     marks: tuple[float, ...]
 
 
-def _view(walk: "Walk") -> _View:
+def _view(walk: Walk) -> _View:
     """The whole walk, with a strip of floor for the marks."""
-    x, y = walk.frame_joints[:, :, 0], walk.frame_joints[:, :, 1]
-    margin = 3 * walk.setup.parameters.circle_radius
-    left, right, top = float(x.min()) - margin, float(x.max()) + margin, float(y.max()) + margin
+    left, right, top = extent(walk)
     spacing = next((step for step in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0) if (right - left) / step <= 9), 10.0)
     numbers = range(math.ceil(left / spacing), math.floor(right / spacing) + 1)
     bottom = -0.045 * max(right - left, top)
@@ -144,13 +141,13 @@ def _view(walk: "Walk") -> _View:
 
 
 class _Stage:
-    """Draws the frames of one walk for a camera that stands still.
+    """Draws the frames of one walk, all to the same scale.
 
     Attributes:
-        size: width and height of a picture in pixels, even as video wants them.
+        size: width and height of a picture in pixels, even numbers for video.
     """
 
-    def __init__(self, walk: "Walk") -> None:
+    def __init__(self, walk: Walk) -> None:
         from PIL import ImageFont
 
         view = _view(walk)
@@ -213,19 +210,16 @@ class _Stage:
         return image
 
 
-def _write_html(walk: "Walk", path: Path, fps: float, slow: float) -> None:
-    """A page with the data in it, lengths in whole tenths of a millimetre, times in microseconds."""
+def _write_html(walk: Walk, path: Path, fps: float, slow: float) -> None:
+    """Write a page that contains the frames: lengths in whole tenths of a millimetre, times in microseconds."""
     count = min(len(walk.frame_time), _PLAYER_FRAMES)
     frames = np.rint(np.linspace(0, len(walk.frame_time) - 1, count)).astype(int)
-    center = [np.interp(walk.frame_time[frames], walk.time, walk.center[:, axis]) for axis in (0, 1)]
-    scene, view, sprocket = walk.setup.scene, _view(walk), walk.sprocket_center
-    title = f"{scene.links} links, {scene.frequency:g} Hz"
-    if math.isfinite(walk.dx):
-        title += f": \u0394x = {walk.dx:.3f} m"
+    times, view, sprocket = walk.frame_time[frames], _view(walk), walk.sprocket_center
+    title = setting(walk) + (f": \u0394x = {walk.dx:.3f} m" if math.isfinite(walk.dx) else "")
     data: dict[str, Any] = {
-        "time": np.rint(walk.frame_time[frames] * 1e6).astype(int).tolist(),
+        "time": np.rint(times * 1e6).astype(int).tolist(),
         "joints": _tenths(walk.frame_joints[frames].reshape(count, -1)),
-        "center": _tenths(np.stack(center, axis=1)),
+        "center": _tenths(center_at(walk, times)),
         "radius": walk.setup.parameters.circle_radius * 1e4,
         "sprocket": None if sprocket is None else _tenths(np.array([*sprocket, walk.sprocket_radius])),
         "view": _tenths(np.array([view.left, view.right, view.bottom, view.top])),

@@ -5,46 +5,40 @@ Figures are made without pyplot: nothing is global, no display is needed, the ca
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
+from typing import Any, Final, Literal
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import Colormap, ListedColormap, Normalize
+from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
+from warpchain.pictures.style import DASHES, FAINT, GROUND, INK, LINE_COLORS, tidy
+from warpchain.pictures.walk_shape import Walk
 from warpchain.status import Status
-
-if TYPE_CHECKING:
-    from warpchain.store.walk_motion import WalkMotion
-    from warpchain.walks.walk_result import WalkResult
-
-    Walk: TypeAlias = WalkResult | WalkMotion
 
 Array = NDArray[np.float64]
 
-LINE_COLORS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008)."""
-
-# Text and lines, what stands back, the floor.
-INK: Final = "#222222"
-FAINT: Final = "#777777"
-GROUND: Final = "#E3E3E3"
-
-# A film strip: inches, and close-ups so many links wide, this many times wider than high.
+# A film strip: width and greatest height [inches], width of a close-up [links] and its ratio of width to height.
 _WIDTH: Final = 10.0
 _TALLEST_STRIP: Final = 4.6
 _CLOSE_UP_LINKS: Final = 9
 _CLOSE_UP_ASPECT: Final = 1.5
 
 
-def draw(walk: "Walk", kind: Literal["figure5", "film_strip", "loop"], *, figure: Figure | None = None) -> Figure:
-    """Draw a walk, see `WalkResult.plot`.
+def draw(walk: Walk, kind: Literal["figure5", "film_strip", "loop"], *, figure: Figure | None = None) -> Figure:
+    """Draw a walk.
+
+    Args:
+        walk: what to draw.
+        kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself, `loop` for its
+            loop on the sprocket just before the release.
+        figure: an empty figure to draw into; by default a new one.
 
     Raises:
         ValueError: the kind is unknown, or the walk does not have what it shows.
@@ -60,12 +54,13 @@ def draw(walk: "Walk", kind: Literal["figure5", "film_strip", "loop"], *, figure
     raise ValueError(f"kind: {kind!r} is unknown; give 'figure5', 'film_strip' or 'loop'")
 
 
-def figure5(walks: "Sequence[Walk]", *, labels: Sequence[str] | None = None, figure: Figure | None = None) -> Figure:
+def figure5(walks: Sequence[Walk], *, labels: Sequence[str] | None = None, figure: Figure | None = None) -> Figure:
     """Height and horizontal speed of the centre of mass against time since the release, as in Figure 5.
 
     Args:
-        walks: one line each in both panels.
-        labels: a legend entry for each walk; by default links and frequency, if the walks differ in them.
+        walks: the walks, one line for each in both panels.
+        labels: legend entries, one for each walk; walks of one label have the same colour. By default links and
+            frequency, without a legend if they are the same for all walks.
         figure: an empty figure to draw into; by default a new one.
 
     Raises:
@@ -81,22 +76,19 @@ def figure5(walks: "Sequence[Walk]", *, labels: Sequence[str] | None = None, fig
     figure = Figure(figsize=(6.4, 5.0), layout="constrained") if figure is None else figure
     height, speed = figure.subplots(2, 1, sharex=True)
     settings = [f"n = {walk.setup.scene.links}, ν = {walk.setup.scene.frequency:g} Hz" for walk in walks]
-    groups = list(dict.fromkeys(labels or settings))
-    seen = set()
-    for index, (walk, name) in enumerate(zip(walks, labels or settings, strict=True)):
+    names = list(labels or settings)
+    groups = list(dict.fromkeys(names))
+    for index, (walk, name) in enumerate(zip(walks, names, strict=True)):
         order = index if len(groups) == 1 else groups.index(name)
         style = {"color": LINE_COLORS[order % len(LINE_COLORS)], "linewidth": 1.4}
-        height.plot(walk.time, walk.center[:, 1], label="_" if name in seen else name, **style)
+        height.plot(walk.time, walk.center[:, 1], label="_" if name in names[:index] else name, **style)
         speed.plot(walk.time, walk.center_velocity[:, 0], **style)
-        seen.add(name)
     height.set_ylabel("height $y^\\mathrm{cm}$ / m")
-    speed.set_ylabel("speed $v_x^\\mathrm{cm}$ / (m/s)")
-    speed.set_xlabel("time since release $t$ / s")
+    speed.set(xlabel="time since release $t$ / s", ylabel="speed $v_x^\\mathrm{cm}$ / (m/s)")
     height.set_ylim(bottom=0.0)
     speed.set_xlim(0.0, max(float(walk.time[-1]) for walk in walks))
     for axes in (height, speed):
-        _tidy(axes)
-        axes.grid(color="#E6E6E6", linewidth=0.6)
+        tidy(axes, grid="both")
     if len(groups) > 1 or labels is not None:
         height.legend(frameon=False)
     else:
@@ -104,11 +96,24 @@ def figure5(walks: "Sequence[Walk]", *, labels: Sequence[str] | None = None, fig
     return figure
 
 
-def film_strip(walk: "Walk", *, count: int | None = None, figure: Figure | None = None) -> Figure:
-    """The chain along its walk, drawn to scale, and close-ups of it at the moments that matter.
+def check_frames(walk: Walk) -> None:
+    """Refuse a walk that cannot be drawn.
 
-    The strip shows the chain at instants between which its centre of mass moves equally far. Colour is time;
-    outer links are darker than inner ones. The close-ups are described at `_close_ups`.
+    Raises:
+        ValueError: the walk has no frames or broken ones.
+    """
+    if len(walk.frame_time) == 0:
+        raise ValueError(f"walk: it has no frames ({walk.status.label}); run it again with a frame_interval")
+    if not np.all(np.isfinite(walk.frame_joints)):
+        raise ValueError(f"walk: its frames are not all finite numbers. {walk.status.sentence}")
+
+
+def film_strip(walk: Walk, *, count: int | None = None, figure: Figure | None = None) -> Figure:
+    """The chain along its walk, drawn to scale, and close-ups of up to four moments.
+
+    In the strip the centre of mass moves equally far from each instant to the next. Colour is time; outer links are
+    darker than inner ones. The close-ups show the first touch of the floor, the first self-contact, the collapse and
+    the end.
 
     Args:
         walk: a walk with frames.
@@ -118,10 +123,7 @@ def film_strip(walk: "Walk", *, count: int | None = None, figure: Figure | None 
     Raises:
         ValueError: the walk has no frames or broken ones, or fewer than 2 instants are asked for.
     """
-    if len(walk.frame_time) == 0:
-        raise ValueError(f"walk: it has no frames ({walk.status.label}); run it again with a frame_interval")
-    if not np.all(np.isfinite(walk.frame_joints)):
-        raise ValueError(f"walk: its frames are not all finite numbers. {walk.status.sentence}")
+    check_frames(walk)
     if count is not None and count < 2:
         raise ValueError(f"count: {count} is too few; give 2 or more")
     close_ups = _close_ups(walk)
@@ -129,34 +131,37 @@ def film_strip(walk: "Walk", *, count: int | None = None, figure: Figure | None 
     corners = [close_up.spot - size / 2 for close_up in close_ups]
     for corner in corners:
         corner[1] = max(corner[1], -0.1 * size[1])
-    left, right, top = _extent(walk, [corner[0] for corner in corners], size[0])
+    left, right, top = extent(walk, *(corner[0] + offset for corner in corners for offset in (0.0, size[0])))
     # The layout is computed in inches: constrained layout clips labels of axes with a fixed aspect.
-    scale = min((_WIDTH - 1.6) / (right - left), _TALLEST_STRIP / top)
+    inner_width = _WIDTH - 1.6
+    scale = min(inner_width / (right - left), _TALLEST_STRIP / top)
     depth = 0.4 / scale
     strip_width, strip_height = scale * (right - left), scale * (top + depth)
     close_up_width = min((_WIDTH - 0.3) / len(close_ups), _WIDTH / 3)
     close_up_height = (close_up_width - 0.1) / _CLOSE_UP_ASPECT
     paper = np.array([_WIDTH, strip_height + close_up_height + 1.1])
     figure = Figure(tuple(paper)) if figure is None else figure
-    ends = float(walk.frame_time[0]), float(walk.frame_time[-1])
-    color_of = ScalarMappable(Normalize(*ends), _time_colors())
+    # Viridis without its palest end, which can hardly be seen on white paper.
+    colors = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)), name="time")
+    color_of = ScalarMappable(Normalize(float(walk.frame_time[0]), float(walk.frame_time[-1])), colors)
 
-    inner_width = _WIDTH - 1.6
-    place = (0.65 + (inner_width - strip_width) / 2, close_up_height + 0.95, strip_width, strip_height)
-    strip = figure.add_axes(tuple(np.array(place) / np.tile(paper, 2)))
+    def shares(left: float, bottom: float, width: float, height: float) -> tuple[float, float, float, float]:
+        return left / paper[0], bottom / paper[1], width / paper[0], height / paper[1]
+
+    strip_left = 0.65 + (inner_width - strip_width) / 2
+    strip = figure.add_axes(shares(strip_left, close_up_height + 0.95, strip_width, strip_height))
     _draw_ground(strip, left, right, -depth)
     for frame in _instants(walk, count):
         _draw_chain(strip, walk, frame, color_of, edge=0.25)
     _annotate_strip(strip, walk, -0.5 * depth)
     strip.set(xlim=(left, right), ylim=(-depth, top), aspect="equal", xlabel="$x$ / m", ylabel="$y$ / m")
-    _tidy(strip)
+    tidy(strip)
     bar_axes = strip.inset_axes((1.0 + 0.12 / strip_width, 0.0, 0.14 / strip_width, 1.0))
     figure.colorbar(color_of, cax=bar_axes, label="time since release / s").outline.set_visible(False)
 
     for column, (close_up, corner) in enumerate(zip(close_ups, corners, strict=True)):
         letter = f"$\\mathbf{{{'abcd'[column]}}}$"
-        place = (0.2 + column * close_up_width, 0.1, close_up_width - 0.1, close_up_height)
-        axes = figure.add_axes(tuple(np.array(place) / np.tile(paper, 2)))
+        axes = figure.add_axes(shares(0.2 + column * close_up_width, 0.1, close_up_width - 0.1, close_up_height))
         (x, y), (width, height) = corner, size
         _draw_ground(axes, x, x + width, min(y, 0.0))
         _draw_chain(axes, walk, close_up.frame, color_of, edge=0.6)
@@ -164,11 +169,16 @@ def film_strip(walk: "Walk", *, count: int | None = None, figure: Figure | None 
         title = f"{letter}  {close_up.title}, {walk.frame_time[close_up.frame]:.3f} s"
         axes.set_title(title, fontsize="medium", loc="left")
         strip.add_patch(Rectangle((x, y), width, height, fill=False, edgecolor=INK, linewidth=0.8, zorder=5))
-        # Neighbouring boxes often overlap: their letters stand at alternate corners.
+        # Neighbouring boxes often overlap, so their letters are at alternate corners.
         side = {"ha": "right", "x": x + width} if column % 2 else {"ha": "left", "x": x}
         halo = [withStroke(linewidth=3.0, foreground="white")]
         strip.text(y=y + height, s=letter, va="bottom", zorder=5, path_effects=halo, **side)
     return figure
+
+
+def setting(walk: Walk) -> str:
+    """Links and frequency, as a title."""
+    return f"{walk.setup.scene.links} links, {walk.setup.scene.frequency:g} Hz"
 
 
 def link_outlines(joints: Array, radius: float) -> Array:
@@ -200,18 +210,18 @@ def link_outlines(joints: Array, radius: float) -> Array:
 
 @dataclass(frozen=True)
 class _CloseUp:
-    """A moment worth a closer look: frame number, and the place to look at [m], shape (2,)."""
+    """Title, number of the frame, and middle of the picture [m], shape (2,)."""
 
     title: str
     frame: int
     spot: Array
 
 
-def _close_ups(walk: "Walk") -> list[_CloseUp]:
-    """At most four moments, in order of time and each frame once.
+def _close_ups(walk: Walk) -> list[_CloseUp]:
+    """At most four moments in order of time, no frame twice.
 
-    First touch of the floor; first self-contact; collapse, when the top of the chain is for the last time
-    half as high as at the release; the end. What never happens is left out.
+    They are the first touch of the floor, the first self-contact, the collapse and the end, as far as they happen. The
+    collapse is the last time at which the top of the chain is half as high as at the release.
     """
     joints, radius = walk.frame_joints, walk.setup.parameters.circle_radius
     height, last = joints[:, :, 1].max(axis=1), len(joints) - 1
@@ -246,34 +256,33 @@ def _first_meeting(joints: Array, distance: float) -> tuple[int, Array] | None:
 
 
 def _sharpest_bend(joints: Array) -> int:
-    """The joint about which the chain turns most over three links."""
+    """Number of the joint at which the chain turns most over three links."""
     step = joints - np.roll(joints, 1, axis=0)
     direction = np.arctan2(step[:, 1], step[:, 0])
     turn = np.angle(np.exp(1j * (np.roll(direction, -2) - np.roll(direction, 1))))
     return int(np.argmax(np.abs(turn)))
 
 
-def _instants(walk: "Walk", count: int | None) -> list[int]:
+def _instants(walk: Walk, count: int | None) -> list[int]:
     """Frames between which the centre of mass moves equally far, the first and the last among them."""
-    columns = [np.interp(walk.frame_time, walk.time, walk.center[:, axis]) for axis in (0, 1)]
-    path = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(columns, axis=1)))])
+    path = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(center_at(walk, walk.frame_time), axis=0).T))])
     if count is None:
         count = int(np.clip(1 + path[-1] / (0.6 * np.ptp(walk.frame_joints[0, :, 0])), 6, 12))
     marks = np.linspace(0.0, path[-1], count)[1:-1]
     return sorted({0, *(int(np.argmin(np.abs(path - mark))) for mark in marks), len(path) - 1})
 
 
-def _extent(walk: "Walk", boxes: list[float], width: float) -> tuple[float, float, float]:
-    """Left and right end and top of all that the strip shows, boxes with their left ends included [m]."""
+def extent(walk: Walk, *others: float) -> tuple[float, float, float]:
+    """Left and right end and top of the whole walk, with a margin [m]; `others` are x of what else is to be seen."""
     x, y = walk.frame_joints[:, :, 0], walk.frame_joints[:, :, 1]
     margin = 3 * walk.setup.parameters.circle_radius
-    left, right = min(float(x.min()), *boxes), max(float(x.max()), *(box + width for box in boxes))
+    left, right = min([float(x.min()), *others]), max([float(x.max()), *others])
     return left - margin, right + margin, float(y.max()) + margin
 
 
-def _time_colors() -> Colormap:
-    """Viridis less its palest end, which white paper swallows."""
-    return ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)), name="time")
+def center_at(walk: Walk, times: Array) -> Array:
+    """Centre of mass x, y [m] at t times [s], shape (t, 2)."""
+    return np.stack([np.interp(times, walk.time, walk.center[:, axis]) for axis in (0, 1)], axis=1)
 
 
 def _draw_ground(axes: Axes, left: float, right: float, bottom: float) -> None:
@@ -281,8 +290,8 @@ def _draw_ground(axes: Axes, left: float, right: float, bottom: float) -> None:
     axes.plot([left, right], [0.0, 0.0], color=INK, linewidth=1.0, zorder=3)
 
 
-def _draw_chain(axes: Axes, walk: "Walk", frame: int, color_of: ScalarMappable, edge: float) -> None:
-    """One chain: a white halo that parts it from those behind it, inner links, outer links over them."""
+def _draw_chain(axes: Axes, walk: Walk, frame: int, color_of: ScalarMappable, edge: float) -> None:
+    """One chain: a white halo over the chains behind it, then inner links, then outer links."""
     outlines = link_outlines(walk.frame_joints[frame], walk.setup.parameters.circle_radius)
     color = np.array(color_of.to_rgba(walk.frame_time[frame])[:3])
     pale, dark = 1 - 0.45 * (1 - color), 0.6 * color
@@ -295,20 +304,18 @@ def _draw_chain(axes: Axes, walk: "Walk", frame: int, color_of: ScalarMappable, 
         )
 
 
-def _annotate_strip(axes: Axes, walk: "Walk", depth: float) -> None:
+def _annotate_strip(axes: Axes, walk: Walk, depth: float) -> None:
     """The sprocket, the path of the centre of mass, and the distance walked, at height `depth` [m]."""
     if walk.sprocket_center is not None:
         x, y = walk.sprocket_center
-        angle, dashes = np.linspace(0.0, 2 * np.pi, 100), (0, (4, 3))
-        style: dict[str, Any] = {"color": FAINT, "linewidth": 1.0, "linestyle": dashes, "zorder": 1.5}
+        angle = np.linspace(0.0, 2 * np.pi, 100)
+        style: dict[str, Any] = {"color": FAINT, "linewidth": 1.0, "linestyle": DASHES, "zorder": 1.5}
         circle = walk.sprocket_radius * np.array([np.cos(angle), np.sin(angle)])
         axes.plot(x + circle[0], y + circle[1], label="sprocket until release", **style)
         axes.plot([x, x], [0.0, y], **style)
     dots = (0, (1, 1.5))
     axes.plot(*walk.center.T, color=INK, linewidth=1.4, linestyle=dots, label="centre of mass", zorder=4)
-    scene = walk.setup.scene
-    title = f"{scene.links} links, {scene.frequency:g} Hz"
-    axes.legend(loc="upper right", frameon=False, title=title, alignment="left")
+    axes.legend(loc="upper right", frameon=False, title=setting(walk), alignment="left")
     if not np.isfinite(walk.dx):
         return
     end = float(walk.center[-1, 0])
@@ -320,8 +327,3 @@ def _annotate_strip(axes: Axes, walk: "Walk", depth: float) -> None:
     box = {"facecolor": GROUND, "edgecolor": "none", "pad": 2.0}
     text = f"$\\Delta x$ = {walk.dx:.3f} m"
     axes.text((start + end) / 2, depth, text, ha="center", va="center", bbox=box, zorder=4)
-
-
-def _tidy(axes: Axes) -> None:
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.tick_params(color=FAINT)

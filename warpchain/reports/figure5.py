@@ -1,28 +1,27 @@
-"""The paper's Figure 5 for a sweep: height and speed of the centre of mass, of walks whose series were kept."""
+"""The paper's Figure 5 for a sweep: height and speed of the centre of mass of walks with recorded series."""
 
-from typing import TYPE_CHECKING, Final
+from itertools import islice
+from typing import Final
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from warpchain.pictures.walk_figures import LINE_COLORS, figure5
-from warpchain.reports.statistics import NothingToShow, cell_text
-
-if TYPE_CHECKING:
-    from warpchain.store.sweep_result import SweepResult
-    from warpchain.store.walk_motion import WalkMotion
+from warpchain.pictures.style import LINE_COLORS, NothingToShow, Picture
+from warpchain.pictures.walk_figures import figure5
+from warpchain.reports.labels import cell_text, cell_values
+from warpchain.store.sweep_result import SweepResult
+from warpchain.store.walk_motion import WalkMotion
 
 MOST_CELLS: Final = len(LINE_COLORS) - 1
-"""Most cells shown: one colour each."""
+"""Greatest number of cells that are shown, each in its own colour."""
 MOST_SAMPLES: Final = 3
-"""Most walks shown of each."""
+"""Greatest number of walks shown of each cell."""
 
 
-def sweep_figure5(result: "SweepResult") -> tuple[Figure, str]:
-    """Figure 5 with a colour for each cell, and what stands below it.
+def sweep_figure5(result: SweepResult) -> Picture:
+    """Figure 5 with a colour for each cell.
 
-    Of many cells those are shown that are spread evenly over all, in the order of their walks; of each its first
-    samples.
+    If there are many cells, those shown are spread evenly over all, in the order of their walks. Of each cell the first
+    samples are shown.
 
     Raises:
         NothingToShow: there is no series of any walk that was released.
@@ -33,20 +32,17 @@ def sweep_figure5(result: "SweepResult") -> tuple[Figure, str]:
         for place in np.ndindex(*block.shape[:-1])
         if block.kept[place].any()
     ]
-    shown = (
-        [cells[i] for i in np.unique(np.linspace(0, len(cells) - 1, MOST_CELLS).round().astype(int))] if cells else []
-    )
+    chosen = np.unique(np.linspace(0, len(cells) - 1, MOST_CELLS).round().astype(int)) if cells else ()
     walks: list[WalkMotion] = []
     labels: list[str] = []
-    for block, place, samples in shown:
+    for block, place, samples in (cells[number] for number in chosen):
         released = (walk for sample in samples if len((walk := block.walk_motion((*place, int(sample)))).time))
-        found = [walk for walk, _ in zip(released, range(MOST_SAMPLES), strict=False)]
-        at = {name: values[i] for (name, values), i in zip(block.axes.items(), place, strict=True)}
-        name = ", ".join(filter(None, [block.name if len(result.blocks) > 1 else "", cell_text(at)]))
+        found = list(islice(released, MOST_SAMPLES))
+        names = [block.name] * (len(result.blocks) > 1) + [cell_text(cell_values(block, place))] * bool(place)
         walks += found
-        labels += [name or result.name] * len(found)
+        labels += [", ".join(names) or result.name] * len(found)
     if not walks:
         raise NothingToShow("Figure 5 takes walks whose series were kept (record: {series: true})")
-    text = "Height and speed of the centre of mass against time since the release, as in the paper's Figure 5: "
-    text += f"{len(walks)} walks in {len(set(labels))} of {len(cells)} cells whose series were kept."
-    return figure5(walks, labels=labels), text
+    caption = "Height and speed of the centre of mass against time since the release, as in the paper's Figure 5: "
+    caption += f"{len(walks)} walks in {len(set(labels))} of {len(cells)} cells whose series were kept."
+    return Picture("figure5", caption, figure5(walks, labels=labels))

@@ -1,9 +1,10 @@
-"""Building blocks of the HTML pages: one page that holds everything and loads nothing."""
+"""Building blocks of HTML pages that contain everything and load nothing."""
 
 import base64
 import io
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
+from itertools import chain, repeat
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ def page(title: str, tiles: Mapping[str, tuple[int, str]], sections: Mapping[str
 
     Args:
         title: heading of the page.
-        tiles: what the numbers at the top count → the number, and ``"bad"`` if it needs attention.
+        tiles: numbers at the top of the page: label → number, and ``"bad"`` if it needs attention or else ``""``.
         sections: heading → content in HTML.
     """
     numbers = [
@@ -37,7 +38,7 @@ def page(title: str, tiles: Mapping[str, tuple[int, str]], sections: Mapping[str
 
 
 def picture(figure: "Figure", caption: str) -> str:
-    """A figure in the page itself."""
+    """A figure with its caption; the image is part of the HTML."""
     content = io.BytesIO()
     figure.savefig(content, format="png", dpi=_DPI, metadata={"Software": None})
     data = base64.b64encode(content.getvalue()).decode()
@@ -50,19 +51,20 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], *, numbers_from: i
     """A table of texts.
 
     Args:
-        head: one text for each column; nothing is above columns without texts.
-        rows: the same number of texts each.
-        numbers_from: first of the columns that hold numbers.
-        marked: rows to draw attention to.
+        head: one text for each column; if all are empty, the table has no head.
+        rows: as many texts each.
+        numbers_from: number of the first column with numbers; all columns after it have numbers, too.
+        marked: whether a row needs attention; none by default.
     """
-    kinds = ["" if column < numbers_from else ' class="number"' for column in range(len(head))]
-    lines = [f"<th{kind}>{escape(text)}</th>" for text, kind in zip(head, kinds, strict=True)]
-    top = f"<thead><tr>{''.join(lines)}</tr></thead>" if any(head) else ""
-    body = []
-    for number, row in enumerate(rows):
-        cells = "".join(f"<td{kind}>{escape(text)}</td>" for text, kind in zip(row, kinds, strict=True))
-        body.append(f"<tr{' class=bad' if number < len(marked) and marked[number] else ''}>{cells}</tr>")
-    return f'<div class="wide"><table>{top}<tbody>\n' + "\n".join(body) + "\n</tbody></table></div>"
+
+    def cells(tag: str, texts: Sequence[str]) -> str:
+        kinds = ["" if column < numbers_from else ' class="number"' for column in range(len(head))]
+        return "".join(f"<{tag}{kind}>{escape(text)}</{tag}>" for text, kind in zip(texts, kinds, strict=True))
+
+    top = f"<thead><tr>{cells('th', head)}</tr></thead>" if any(head) else ""
+    kinds = (" class=bad" if bad else "" for bad in chain(marked, repeat(False)))
+    body = "\n".join(f"<tr{kind}>{cells('td', row)}</tr>" for row, kind in zip(rows, kinds, strict=False))
+    return f'<div class="wide"><table>{top}<tbody>\n{body}\n</tbody></table></div>'
 
 
 _STYLE: Final = """
@@ -102,7 +104,7 @@ pre { max-height: 30rem; overflow: auto; padding: 1rem; background: #f3f4f5; fon
 }
 """
 
-# The policy makes the browser refuse whatever might be loaded, should a page ever ask for it.
+# The policy makes the browser refuse to load anything.
 _PAGE: Final = """<!DOCTYPE html>
 <html lang="en">
 <head>

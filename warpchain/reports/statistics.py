@@ -1,36 +1,28 @@
-"""Numbers about a sweep beyond the means of its cells: tolerances compared, and what the distance is sensitive to.
+"""Tolerances compared, and the sensitivity of the distance to what is drawn.
 
-Only walks that came to rest count; what is left out for another end is said beside every number.
+Only walks that came to rest are used; the number of the others is given with every result.
 """
 
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.distributions import random_generator
-from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.validation import DIMENSIONLESS
+from warpchain.pictures.style import NothingToShow
+from warpchain.reports.labels import cell_text, cell_values, number_text
 from warpchain.status import Status
+from warpchain.store.sweep_result import BlockResult, SweepResult
 from warpchain.sweeps.designs import saltelli_outputs, sobol_indices, walks_per_sample
-from warpchain.walks.rows import field_column
-
-if TYPE_CHECKING:
-    from warpchain.store.sweep_result import BlockResult, SweepResult
 
 Array = NDArray[np.float64]
 
 CONFIDENCE: Final = 0.95
-"""Of bootstrap intervals."""
+"""Confidence level of bootstrap intervals."""
 
 _RESAMPLES: Final = 1000
-
-
-class NothingToShow(ValueError):  # noqa: N818 - no error of the program: the sweep was made for something else
-    """A sweep has not the blocks, or not yet the walks, that a figure or a number is about."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +30,9 @@ class PairedCell:
     """A cell at two tolerances.
 
     Attributes:
-        cell: what the cell is, such as ``n = 60, ν = 15 Hz``.
+        cell: description of the cell, such as ``n = 60, ν = 15 Hz``.
         distances: Δx [m] of the same walks at the loose and at the tight tolerance, shape (2, pairs).
-        lost: number of pairs left out, because one of the two failed or has not been run yet.
+        lost: number of pairs left out, because one of the two walks failed or has not been run yet.
     """
 
     cell: str
@@ -49,20 +41,14 @@ class PairedCell:
 
     @property
     def differences(self) -> Array:
-        """Differences of the walks, loose less tight, relative to tight, shape (pairs,)."""
+        """Relative differences of the walks, (loose − tight) / tight, shape (pairs,)."""
         relative: Array = self.distances[0] / self.distances[1] - 1
         return relative
 
     @property
-    def means(self) -> Array:
-        """Mean distance [m] at the loose and at the tight tolerance, shape (2,)."""
-        means: Array = self.distances.mean(axis=1)
-        return means
-
-    @property
     def difference(self) -> float:
-        """Difference of the means, loose less tight, relative to tight."""
-        loose, tight = self.means
+        """Relative difference of the means, (loose − tight) / tight."""
+        loose, tight = self.distances.mean(axis=1)
         return float(loose / tight - 1)
 
     @property
@@ -97,12 +83,12 @@ class ToleranceAgreement:
 
     @property
     def greatest(self) -> float:
-        """Greatest difference of a walk, without its sign."""
+        """Greatest absolute difference of a walk."""
         return float(np.abs(self.differences).max())
 
     @property
     def median(self) -> float:
-        """Median difference of a walk, without its sign."""
+        """Median absolute difference of a walk."""
         return float(np.median(np.abs(self.differences)))
 
     @property
@@ -111,7 +97,7 @@ class ToleranceAgreement:
         return max(self.cells, key=lambda cell: abs(cell.difference))
 
     def __str__(self) -> str:
-        """The numbers in a sentence or two."""
+        """The numbers in one or two sentences."""
         worst, loose, tight = self.worst_cell, number_text(self.loose), number_text(self.tight)
         text = (
             f"The same {len(self.differences)} walks at tolerances {loose} and {tight}: distances of single walks "
@@ -127,12 +113,12 @@ class Sensitivity:
     """Sobol' indices of the distance in one cell, for d drawn quantities, the greatest total index first.
 
     Attributes:
-        cell: what the cell is.
+        cell: description of the cell.
         names: names of the quantities.
         first_order: share of the variance that a quantity causes by itself, shape (d,).
-        total_order: share that it takes part in, shape (d,).
+        total_order: share that it causes by itself and together with others, shape (d,).
         first_order_interval: bootstrap interval of `first_order`, shape (d, 2).
-        total_order_interval: that of `total_order`, shape (d, 2).
+        total_order_interval: bootstrap interval of `total_order`, shape (d, 2).
         samples: number of samples, of d + 2 walks each.
         lost: number of samples left out, because one of their walks failed or has not been run yet.
     """
@@ -147,7 +133,7 @@ class Sensitivity:
     lost: int
 
 
-def tolerance_agreement(result: "SweepResult") -> ToleranceAgreement:
+def tolerance_agreement(result: SweepResult) -> ToleranceAgreement:
     """Compare the loosest with the tightest tolerance of a sweep, walk by walk and cell by cell.
 
     Raises:
@@ -167,30 +153,31 @@ def tolerance_agreement(result: "SweepResult") -> ToleranceAgreement:
     return ToleranceAgreement(*ends.pop(), kept, sum(cell.lost for cell in cells))
 
 
-def _paired_cells(block: "BlockResult", *, several: bool) -> Iterator[PairedCell]:
-    """The cells of one of several blocks, or of the only one, that has tolerances as an axis.
+def _paired_cells(block: BlockResult, *, several: bool) -> Iterator[PairedCell]:
+    """The cells of a block with tolerances as an axis; `several`: whether there is another such block.
 
     Raises:
         NothingToShow: the samples of the two tolerances are not the same.
     """
-    others = list(block.axes)
-    axis = others.index("tolerance")
-    others.remove("tolerance")
-    values = block.axes["tolerance"]
-    ends = int(np.argmax(values)), int(np.argmin(values))
-    rested = np.all([block.columns["status"].take(end, axis) == Status.AT_REST for end in ends], axis=0)
+    axis, values = list(block.axes).index("tolerance"), block.axes["tolerance"]
+
+    def at_ends(name: str) -> Array:
+        return np.stack([block.columns[name].take(end(values), axis) for end in (np.argmax, np.argmin)])
+
+    rested = np.all(at_ends("status") == Status.AT_REST, axis=0)
     for name in block.drawn:
-        loose, tight = (block.columns[name].take(end, axis)[rested] for end in ends)
-        if not np.array_equal(loose, tight):
+        if not np.array_equal(*at_ends(name)[:, rested]):
             raise NothingToShow(f"the samples of block {block.name} differ; give same_samples_along: [tolerance]")
-    distances = np.stack([block.columns["dx"].take(end, axis) for end in ends])
+    distances = at_ends("dx")
     for place in np.ndindex(*rested.shape[:-1]):
         kept = rested[place]
-        text = cell_text({name: block.axes[name][i] for name, i in zip(others, place, strict=True)})
-        yield PairedCell(_named(block, text, several), distances[(slice(None), *place)][:, kept], int((~kept).sum()))
+        cell = cell_values(block, (*place[:axis], 0, *place[axis:]))
+        del cell["tolerance"]
+        text = _named(block, cell_text(cell), several)
+        yield PairedCell(text, distances[(slice(None), *place)][:, kept], int((~kept).sum()))
 
 
-def sensitivities(result: "SweepResult") -> tuple[Sensitivity, ...]:
+def sensitivities(result: SweepResult) -> tuple[Sensitivity, ...]:
     """Sobol' indices of the distance in each cell that was sampled by ``saltelli``.
 
     The intervals are percentiles of 1000 bootstrap resamples of the samples, from a fixed stream of random numbers.
@@ -207,7 +194,7 @@ def sensitivities(result: "SweepResult") -> tuple[Sensitivity, ...]:
     return found
 
 
-def _sensitivities(block: "BlockResult", *, several: bool) -> Iterator[Sensitivity]:
+def _sensitivities(block: BlockResult, *, several: bool) -> Iterator[Sensitivity]:
     """The cells of a block sampled by ``saltelli`` that have two complete samples of different distances."""
     per_sample = walks_per_sample("saltelli", len(block.drawn))
     for place in np.ndindex(*block.shape[:-1]):
@@ -221,12 +208,11 @@ def _sensitivities(block: "BlockResult", *, several: bool) -> Iterator[Sensitivi
         draws = (rng.integers(0, samples, samples) for _ in range(_RESAMPLES))
         resampled = [sobol_indices({name: values[..., draw] for name, values in outputs.items()}) for draw in draws]
         tails = 50 * (1 - CONFIDENCE), 50 * (1 + CONFIDENCE)
-        # A resample of one sample again and again has no variance.
+        # The indices are NaN for a resample without variance, which repeats a single sample.
         intervals = np.nanpercentile(resampled, tails, axis=0).transpose(1, 2, 0)
         order = np.argsort(-total, kind="stable")
-        text = cell_text({name: values[i] for (name, values), i in zip(block.axes.items(), place, strict=True)})
         yield Sensitivity(
-            cell=_named(block, text, several),
+            cell=_named(block, cell_text(cell_values(block, place)), several),
             names=tuple(block.drawn[number] for number in order),
             first_order=first[order],
             total_order=total[order],
@@ -237,32 +223,6 @@ def _sensitivities(block: "BlockResult", *, several: bool) -> Iterator[Sensitivi
         )
 
 
-def _named(block: "BlockResult", cell: str, several: bool) -> str:
-    """What a cell is, with the name of its block if there are several or nothing else to say."""
+def _named(block: BlockResult, cell: str, several: bool) -> str:
+    """Description of a cell, with the name of its block if there are several blocks or the block has one cell."""
     return ": ".join([block.name] * (several or not cell) + [cell] * bool(cell))
-
-
-def cell_text(values: Mapping[str, Any]) -> str:
-    """What a cell is, such as ``n = 60, ν = 15 Hz``.
-
-    Args:
-        values: name of an axis → value.
-    """
-    parts = []
-    for name, value in values.items():
-        unit = field_column(name).unit
-        number = str(value) if isinstance(value, str | bool | np.bool_) else number_text(value)
-        parts.append(f"{axis_symbol(name)} = {number}" + ("" if unit == DIMENSIONLESS else f" {unit}"))
-    return ", ".join(parts)
-
-
-def number_text(value: float) -> str:
-    """A number as people write it: 1e-6 and 1e7, not 1e-06 and 1e+07."""
-    return re.sub(r"e\+?(-?)0*(?=\d)", r"e\1", f"{value:g}")
-
-
-def axis_symbol(name: str) -> str:
-    """Symbol of a field of `Parameters`, n and ν, and of other fields the name."""
-    if name in Parameters.model_fields:
-        return Parameters.quantities()[name].symbol
-    return {"links": "n", "frequency": "ν"}.get(name, name.replace("_", " "))

@@ -1,13 +1,13 @@
 """Figures of sweeps: the paper's Figures 6 and 5, maps, tolerances compared, sensitivity, how walks ended.
 
-Means and spreads are of the walks that came to rest. Walks that failed, or have not been run yet, are counted on the
-figure.
+Means and standard deviations are those of the walks that came to rest. The number of walks that failed, or have not
+been run yet, is on the figure.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from functools import partial
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,113 +17,64 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.validation import DIMENSIONLESS
-from warpchain.pictures.walk_figures import FAINT, GROUND, INK, LINE_COLORS, _tidy
+from warpchain.pictures.style import BLUE, FAINT, GROUND, INK, LINE_COLORS, RED, NothingToShow, Picture, tidy
 from warpchain.reports.figure5 import sweep_figure5
 from warpchain.reports.kink_figure import sweep_kink
-from warpchain.reports.panels import sweep_panels
-from warpchain.reports.statistics import (
-    CONFIDENCE,
-    NothingToShow,
-    Sensitivity,
-    ToleranceAgreement,
+from warpchain.reports.labels import (
+    DISTANCE,
+    FREQUENCY,
     number_text,
-    sensitivities,
-    tolerance_agreement,
+    quantity_label,
+    quantity_text,
+    value_text,
+    with_unit,
 )
-from warpchain.reports.sweep_series import BLUE, RED, Cell, Series, all_series, lost_note
+from warpchain.reports.panels import panels, third_quantities
+from warpchain.reports.statistics import CONFIDENCE, sensitivities, tolerance_agreement
+from warpchain.reports.sweep_series import Series, all_series, lost_note
 from warpchain.status import Status
-
-if TYPE_CHECKING:
-    from warpchain.store.sweep_result import BlockResult, SweepResult
+from warpchain.store.sweep_result import SweepResult
 
 Array = NDArray[np.float64]
 
-_GRID: Final = {"color": "#E6E6E6", "linewidth": 0.6}
-_FREQUENCY: Final = "frequency of the sprocket $ν$ / Hz"
-
 _EVENLY: Final = 6
-"""Most values of a quantity that are set out evenly, whatever they are."""
+"""Up to so many values of a quantity are spaced evenly, whatever they are."""
 
 _MOST_BLOCKS: Final = 6
-"""Most blocks whose walks are counted one by one."""
+"""Greatest number of blocks whose walks are counted separately."""
 
 _MOST_NUMBERS: Final = 120
-"""Most cells of a map that numbers are written into."""
+"""Greatest number of cells of a map with numbers in them."""
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A figure with what stands below it.
-
-    Attributes:
-        name: short name, good for a file.
-        caption: one or two sentences.
-        figure: the figure.
-    """
-
-    name: str
-    caption: str
-    figure: Figure
+def figures(result: SweepResult) -> Iterator[Picture]:
+    """Every figure that the sweep has the walks for, the paper's Figures 6 and 5 first."""
+    against = [partial(panels, quantity=quantity) for quantity in third_quantities(result)]
+    draws: list[Callable[[SweepResult], Picture]] = [figure6, sweep_figure5, sweep_kink, heat_map, *against]
+    for draw in (*draws, tolerance, sensitivity, responses, status_counts):
+        with suppress(NothingToShow):
+            yield draw(result)
 
 
-def figures(result: "SweepResult") -> Iterator[Picture]:
-    """Every figure that a sweep has something for, the paper's Figures 6 and 5 first."""
-    with suppress(NothingToShow):
-        if any(len(item.cells) > 1 for item in all_series(result)):
-            text = "Distance walked against the frequency of the sprocket, as in the paper's Figure 6: mean, "
-            yield Picture("figure6", text + "box of one and bar of two standard deviations.", figure6(result))
-    with suppress(NothingToShow):
-        figure, text = sweep_figure5(result)
-        yield Picture("figure5", text, figure)
-    with suppress(NothingToShow):
-        figure, text = sweep_kink(result)
-        yield Picture("kink", text, figure)
-    with suppress(NothingToShow):
-        text = "Mean and standard deviation of the distance walked, over the walks at rest in each cell."
-        yield Picture("heat_map", text, heat_map(result))
-    with suppress(NothingToShow):
-        labels = {name: _axis_label(block, name) for block in result.blocks.values() for name in block.axes}
-        for quantity, figure in sweep_panels(result, labels):
-            text = f"Distance walked against {quantity.replace('_', ' ')}, by links and frequency: means with two "
-            yield Picture(f"against_{quantity}", text + "standard errors.", figure)
-    with suppress(NothingToShow):
-        figure, agreement = tolerance(result)
-        yield Picture("tolerance", str(agreement), figure)
-    with suppress(NothingToShow):
-        figure, cells = sensitivity(result)
-        text = "Sobol indices: the share of the variance of the distance walked that a quantity causes by itself "
-        text += f"(first order) and takes part in (total); lines are {CONFIDENCE:.0%} bootstrap intervals. Walks are "
-        text += "chaotic: changing anything a little scatters them, which all total indices contain alike. "
-        yield Picture("sensitivity", f"{text}Samples: {', '.join(f'{cell.samples}' for cell in cells)}.", figure)
-    with suppress(NothingToShow):
-        text = "Distance walked in the blocks that vary one quantity: means with one standard deviation (bar) and two "
-        yield Picture("responses", text + "standard errors of the mean (box).", responses(result))
-    yield Picture("status_counts", "How the walks ended.", status_counts(result))
-
-
-def figure6(result: "SweepResult") -> Figure:
+def figure6(result: SweepResult) -> Picture:
     """Distance walked against frequency with a panel for each number of links, as in Figure 6.
 
-    A dot is the mean, a box the range of one standard deviation, a bar that of two; red starts at rest, green as an
-    ellipse. Blocks with other axes than links, frequency and start are left out.
+    A dot is the mean, a box the range of one standard deviation, a bar the range of two. Walks that start at rest are
+    red, ellipses green. Blocks with other axes than links, frequency and start are left out.
 
     Raises:
-        NothingToShow: no walk of such a block has come to rest.
+        NothingToShow: no walk of such a block has come to rest, or none of the blocks has several cells.
     """
     series = all_series(result)
     drawn = [cell for item in series for cell in item.cells.values() if cell.count]
-    if not drawn:
+    if not drawn or all(len(item.cells) == 1 for item in series):
         raise NothingToShow("Figure 6 takes walks at rest in a block with nothing but links and frequency as axes")
-    panels = sorted({links for item in series for links, _ in item.cells})
+    numbers = sorted({links for item in series for links, _ in item.cells})
     frequencies = sorted({frequency for item in series for _, frequency in item.cells})
     gap = float(np.diff(frequencies).min()) if len(frequencies) > 1 else 1.0
-    columns = {1: 1, 2: 2, 4: 2}.get(len(panels), 3)
-    rows = -(-len(panels) // columns)
-    figure = Figure(figsize=(max(3.1 * columns, 4.2), 2.6 * rows + 1.0), layout="constrained")
-    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    for axes, links in zip(grid.flat, panels, strict=False):
+    columns = {1: 1, 2: 2, 4: 2}.get(len(numbers), 3)
+    figure, used, empty = _grid(len(numbers), columns, (3.1, 2.6), (0.0, 1.0), sharex=True)
+    for axes, links in zip(used, numbers, strict=True):
         here = [item for item in series if any(key[0] == links for key in item.cells)]
         for place, item in enumerate(here):
             # Boxes of several series stand side by side about their frequency.
@@ -132,25 +83,20 @@ def figure6(result: "SweepResult") -> Figure:
         axes.set_title(f"$n$ = {links}", fontsize="medium", loc="left")
         note = lost_note([cell for item in here for key, cell in item.cells.items() if key[0] == links])
         axes.set_xlabel(note, color=RED, fontsize="small")
-        axes.grid(axis="y", **_GRID)
-        _tidy(axes)
-    first = grid.flat[0]
+        tidy(axes, grid="y")
+    first = used[0]
     if len(frequencies) <= 8:
         first.set_xticks(frequencies, [f"{frequency:g}" for frequency in frequencies])
     first.set_xlim(frequencies[0] - 0.6 * gap, frequencies[-1] + 0.6 * gap)
     first.set_ylim(bottom=min(0.0, *(1.05 * (cell.mean - 2 * np.nan_to_num(cell.sd)) for cell in drawn)))
-    empty = grid.flat[len(panels) :]
-    for axes in empty:
-        axes.set_axis_off()
-    for axes in grid.flat[len(panels) - columns : len(panels)]:
-        axes.tick_params(labelbottom=True)
-    figure.supxlabel(_FREQUENCY, fontsize="medium")
-    figure.supylabel("distance walked $Δx$ / m", fontsize="medium")
-    _draw_legend(figure, empty[-1] if len(empty) else None, series)
-    return figure
+    figure.supxlabel(FREQUENCY, fontsize="medium")
+    figure.supylabel(DISTANCE, fontsize="medium")
+    _draw_legend(figure, empty[-1] if empty else None, series)
+    caption = "Distance walked against the frequency of the sprocket, as in the paper's Figure 6: mean, box of one and "
+    return Picture("figure6", caption + "bar of two standard deviations.", figure)
 
 
-def heat_map(result: "SweepResult", quantity: str = "dx") -> Figure:
+def heat_map(result: SweepResult, quantity: str = "dx") -> Picture:
     """Mean and standard deviation of a quantity over links and frequency, two maps for each block and start.
 
     Args:
@@ -168,8 +114,7 @@ def heat_map(result: "SweepResult", quantity: str = "dx") -> Figure:
         )
     links = sorted({key[0] for item in series for key in item.cells})
     frequencies = sorted({key[1] for item in series for key in item.cells})
-    unit = "" if series[0].unit == DIMENSIONLESS else f" / {series[0].unit}"
-    name = "$Δx$" if quantity == "dx" else quantity.replace("_", " ")
+    name, symbol = ("distance walked", "$Δx$") if quantity == "dx" else (quantity.replace("_", " "),) * 2
     numbers = len(links) * len(frequencies) <= _MOST_NUMBERS
     width, height = (0.6, 0.42) if numbers else (0.24, 0.24)
     width, height = max(3.8, 1.5 + width * len(frequencies)), max(1.6, 0.4 + height * len(links))
@@ -191,17 +136,19 @@ def heat_map(result: "SweepResult", quantity: str = "dx") -> Figure:
             axes.tick_params(color=FAINT)
             if numbers:
                 _write_numbers(axes, item, table, links, frequencies, image)
-        figure.colorbar(image, ax=list(grid[:, column]), label=f"{title} {name}{unit}").outline.set_visible(False)
-    figure.supxlabel(_FREQUENCY, fontsize="medium")
+        label = with_unit(f"{title} {symbol}", series[0].unit)
+        figure.colorbar(image, ax=list(grid[:, column]), label=label).outline.set_visible(False)
+    figure.supxlabel(FREQUENCY, fontsize="medium")
     figure.supylabel("number of links $n$", fontsize="medium")
-    return figure
+    caption = f"Mean and standard deviation of the {name}, over the walks at rest in each cell."
+    return Picture("heat_map", caption, figure)
 
 
-def tolerance(result: "SweepResult") -> tuple[Figure, ToleranceAgreement]:
-    """The same walks at the loosest and the tightest tolerance of a sweep, and the numbers.
+def tolerance(result: SweepResult) -> Picture:
+    """The same walks at the loosest and the tightest tolerance of a sweep.
 
-    On the left the distances of single walks against each other; on the right relative differences, of single walks
-    and of the means of each cell.
+    The left panel shows the distances of single walks against each other, the right one relative differences of single
+    walks and of the means of each cell.
 
     Raises:
         NothingToShow: see `tolerance_agreement`.
@@ -237,15 +184,15 @@ def tolerance(result: "SweepResult") -> tuple[Figure, ToleranceAgreement]:
     lost = f"\n{agreement.lost} pairs are not complete" if agreement.lost else ""
     right.set_xlabel(f"difference of $Δx$ ({loose} less {tight}) / %{lost}")
     right.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, columnspacing=1.0)
-    for axes in (left, right):
-        _tidy(axes)
-    return figure, agreement
+    tidy(left)
+    tidy(right)
+    return Picture("tolerance", str(agreement), figure)
 
 
-def sensitivity(result: "SweepResult") -> tuple[Figure, tuple[Sensitivity, ...]]:
-    """Sobol' indices of the distance with a panel for each cell, and the numbers.
+def sensitivity(result: SweepResult) -> Picture:
+    """Sobol' indices of the distance with a panel for each cell.
 
-    Panels share the order of the quantities: the greatest mean of the total indices is at the top.
+    All panels have the quantities in the same order, by the mean of their total indices, the greatest at the top.
 
     Raises:
         NothingToShow: see `sensitivities`.
@@ -256,12 +203,8 @@ def sensitivity(result: "SweepResult") -> tuple[Figure, tuple[Sensitivity, ...]]
         for name, total in zip(cell.names, cell.total_order, strict=True):
             totals.setdefault(name, []).append(total)
     names = sorted(totals, key=lambda name: -float(np.mean(totals[name])))
-    columns = min(len(cells), 3)
-    rows = -(-len(cells) // columns)
-    size = (2.4 + 3.2 * columns, 0.9 + rows * (0.6 + 0.36 * len(names)))
-    figure = Figure(figsize=size, layout="constrained")
-    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    for axes, cell in zip(grid.flat, cells, strict=False):
+    figure, used, _ = _grid(len(cells), 3, (3.2, 0.6 + 0.36 * len(names)), (2.4, 0.9), sharex=True)
+    for axes, cell in zip(used, cells, strict=True):
         places = np.array([names.index(name) for name in cell.names])
         for shift, color, label, values, interval in (
             (-0.2, BLUE, "total", cell.total_order, cell.total_order_interval),
@@ -274,44 +217,40 @@ def sensitivity(result: "SweepResult") -> tuple[Figure, tuple[Sensitivity, ...]]
         if cell.lost:
             note = f"{cell.lost} of {cell.samples + cell.lost} samples are not complete"
             axes.set_xlabel(note, color=RED, fontsize="small")
-        axes.grid(axis="x", **_GRID)
-        axes.set_axisbelow(True)
-        _tidy(axes)
-    for axes in grid.flat[len(cells) :]:
-        axes.set_visible(False)
-    for axes in grid.flat[len(cells) - columns : len(cells)]:
-        axes.tick_params(labelbottom=True)
-    grid[0, 0].set_yticks(range(len(names)), [_quantity_text(name) for name in names])
-    grid[0, 0].set_ylim(len(names) - 0.4, -0.6)
+        tidy(axes, grid="x")
+    used[0].set_yticks(range(len(names)), [quantity_text(name) for name in names])
+    used[0].set_ylim(len(names) - 0.4, -0.6)
     figure.supxlabel(f"share of the variance of $Δx$, with {CONFIDENCE:.0%} intervals", fontsize="medium")
-    figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper right", frameon=False, ncols=2)
-    return figure, cells
+    figure.legend(*used[0].get_legend_handles_labels(), loc="outside upper right", frameon=False, ncols=2)
+    caption = (
+        "Sobol indices: the share of the variance of the distance walked that a quantity causes by itself (first "
+        f"order) and takes part in (total); lines are {CONFIDENCE:.0%} bootstrap intervals. Walks are chaotic: "
+        "changing anything a little scatters them, which all total indices contain alike. "
+        f"Samples: {', '.join(f'{cell.samples}' for cell in cells)}."
+    )
+    return Picture("sensitivity", caption, figure)
 
 
-def responses(result: "SweepResult") -> Figure:
+def responses(result: SweepResult) -> Picture:
     """Distance against the one quantity that a block varies, with a panel for each such block.
 
-    A dot is the mean, a box the range of two standard errors of the mean, a bar that of one standard deviation. Up to
-    six values, which often span decades, stand evenly.
+    A dot is the mean, a box the range of two standard errors of the mean, a bar the range of one standard deviation. Up
+    to six values, which often span decades, are spaced evenly.
 
     Raises:
         NothingToShow: no walk has come to rest in a block that varies one quantity other than links and frequency.
     """
-    panels = []
+    varied = []
     for block in result.blocks.values():
         several = [name for name, values in block.axes.items() if len(values) > 1]
         if len(several) == 1 and several[0] not in ("links", "frequency", "tolerance"):
             found = block.statistics("dx")
             if found.count.any():
-                panels.append((several[0], block, found))
-    if not panels:
+                varied.append((several[0], block.axes[several[0]], found))
+    if not varied:
         raise NothingToShow("responses take walks at rest in a block that varies one quantity")
-    columns = min(len(panels), 4)
-    rows = -(-len(panels) // columns)
-    figure = Figure(figsize=(max(4.2, 1.0 + 2.3 * columns), 0.4 + 2.4 * rows), layout="constrained")
-    grid = figure.subplots(rows, columns, sharey=True, squeeze=False)
-    for axes, (name, block, found) in zip(grid.flat, panels, strict=False):
-        values = block.axes[name]
+    figure, used, _ = _grid(len(varied), 4, (2.3, 2.4), (1.0, 0.4), sharex=False)
+    for axes, (name, values, found) in zip(used, varied, strict=True):
         evenly = values.dtype.kind in "Ub" or len(values) <= _EVENLY
         places = np.arange(len(values)) if evenly else values
         means, spread, error = (table.ravel() for table in (found.mean, found.sd, found.standard_error))
@@ -319,24 +258,20 @@ def responses(result: "SweepResult") -> Figure:
         axes.errorbar(places, means, spread, fmt="o", color=BLUE, markersize=4, linewidth=1.2, zorder=3)
         axes.errorbar(places, means, 2 * error, fmt="none", ecolor=(BLUE, 0.35), elinewidth=7, zorder=2)
         if evenly:
-            texts = [number_text(value) if values.dtype.kind in "if" else str(value) for value in values]
-            axes.set_xticks(places, texts)
+            axes.set_xticks(places, [value_text(value) for value in values])
         axes.margins(x=0.15)
-        counts = Cell(np.nan, np.nan, *(int(table.sum()) for table in (found.count, found.failed, found.missing)))
-        note = lost_note([counts])
-        axes.set_xlabel(_axis_label(block, name) + (f"\n{note}" if note else ""), fontsize="small")
+        note = lost_note([found])
+        axes.set_xlabel(quantity_label(name) + (f"\n{note}" if note else ""), fontsize="small")
         axes.tick_params(axis="x", labelsize="small")
-        axes.grid(axis="y", **_GRID)
-        _tidy(axes)
-    for axes in grid.flat[len(panels) :]:
-        axes.set_axis_off()
-    grid[0, 0].set_ylim(bottom=min(0.0, grid[0, 0].get_ylim()[0]))
-    figure.supylabel("distance walked $Δx$ / m", fontsize="medium")
-    return figure
+        tidy(axes, grid="y")
+    used[0].set_ylim(bottom=min(0.0, used[0].get_ylim()[0]))
+    figure.supylabel(DISTANCE, fontsize="medium")
+    caption = "Distance walked in the blocks that vary one quantity: means with one standard deviation (bar) and two "
+    return Picture("responses", caption + "standard errors of the mean (box).", figure)
 
 
-def status_counts(result: "SweepResult") -> Figure:
-    """How many walks of each block ended how, and how many have not been run yet; of all together if it has many."""
+def status_counts(result: SweepResult) -> Picture:
+    """Number of walks by status, missing ones included, of each block; of the whole sweep if it has many blocks."""
     summaries = {name: block.summary() for name, block in result.blocks.items()}
     if not 1 < len(summaries) <= _MOST_BLOCKS:
         summaries = {"": result.summary()}
@@ -362,8 +297,35 @@ def status_counts(result: "SweepResult") -> Figure:
     axes.set_xlim(0, 1.22 * max(1, *(count for _, _, count in rows)))
     axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
     axes.set_xlabel("walks")
-    _tidy(axes)
-    return figure
+    tidy(axes)
+    return Picture("status_counts", "How the walks ended.", figure)
+
+
+def _grid(
+    count: int, most: int, panel: tuple[float, float], margin: tuple[float, float], *, sharex: bool
+) -> tuple[Figure, list[Axes], list[Axes]]:
+    """A figure with `count` panels in at most `most` columns.
+
+    Args:
+        count: number of panels.
+        most: greatest number of columns.
+        panel: width and height that each panel adds to the figure [inches].
+        margin: width and height beside the panels [inches].
+        sharex: whether the panels have a common x axis; they always have a common y axis.
+
+    Returns:
+        The figure, its panels by rows, and the axes that stay empty, which show nothing.
+    """
+    columns = min(count, most)
+    rows = -(-count // columns)
+    size = max(4.2, margin[0] + panel[0] * columns), margin[1] + panel[1] * rows
+    figure = Figure(figsize=size, layout="constrained")
+    grid = list(figure.subplots(rows, columns, sharex=sharex, sharey=True, squeeze=False).flat)
+    for axes in grid[count:]:
+        axes.set_axis_off()
+    for axes in grid[count - columns : count]:
+        axes.tick_params(labelbottom=True)
+    return figure, grid[:count], grid[count:]
 
 
 def _draw_boxes(axes: Axes, series: Series, links: int, shift: float, width: float) -> None:
@@ -381,7 +343,7 @@ def _draw_boxes(axes: Axes, series: Series, links: int, shift: float, width: flo
 
 
 def _draw_legend(figure: Figure, empty: Axes | None, series: Sequence[Series]) -> None:
-    """What colours and signs mean, in the place of axes that stay empty, or else above."""
+    """Explain colours and markers, in the place of an empty panel or else above the panels."""
     handles: list[Any] = [
         Line2D([], [], color=item.color, marker=item.marker, linestyle="", label=item.label) for item in series
     ]
@@ -399,7 +361,7 @@ def _draw_legend(figure: Figure, empty: Axes | None, series: Sequence[Series]) -
 def _write_numbers(
     axes: Axes, series: Series, table: Array, links: Sequence[int], frequencies: Sequence[float], image: Any
 ) -> None:
-    """The value in each cell of a map, and how many of its walks are not in it."""
+    """The value in each cell of a map, and how many of its walks are not part of it."""
     for (row, column), value in np.ndenumerate(table):
         cell = series.cells.get((links[row], frequencies[column]))
         if cell is None:
@@ -411,18 +373,3 @@ def _write_numbers(
         axes.text(column, row, text, ha="center", va="bottom" if parts else "center", color=color, fontsize="small")
         if parts:
             axes.text(column, row, "\n".join(parts), ha="center", va="top", color=color, fontsize="xx-small")
-
-
-def _axis_label(block: "BlockResult", name: str) -> str:
-    """Name, symbol and unit of an axis of a grid."""
-    unit = "" if block.unit(name) == DIMENSIONLESS else f" / {block.unit(name)}"
-    return _quantity_text(name) + unit
-
-
-def _quantity_text(name: str) -> str:
-    """Name of a drawn quantity, with its symbol if it has one."""
-    text = name.replace("_", " ").replace("coulomb", "Coulomb")
-    if name not in Parameters.model_fields:
-        return text
-    base, _, index = Parameters.quantities()[name].symbol.partition("_")
-    return f"{text} ${base}" + (f"_\\mathrm{{{index}}}$" if index else "$")

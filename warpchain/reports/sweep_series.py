@@ -1,21 +1,17 @@
-"""What a figure of a sweep shows: the cells of a block and a start, how they look, and which walks are not in them."""
+"""The cells of a sweep that a figure shows together, with their colour and marker."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.pictures.walk_figures import INK, LINE_COLORS
-
-if TYPE_CHECKING:
-    from warpchain.store.sweep_result import SweepResult
+from warpchain.pictures.style import BLUE, GREEN, INK, LINE_COLORS, RED
+from warpchain.reports.labels import cell_values
+from warpchain.store.sweep_result import CellStatistics, SweepResult
 
 Array = NDArray[np.float64]
-
-BLUE, RED, GREEN = LINE_COLORS[:3]
-"""A red and a green that people with any kind of colour vision can tell apart; markers differ as well."""
 
 _STARTS: Final = {
     "rest": ("started at rest", RED, "o"),
@@ -42,7 +38,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Series:
-    """Cells that belong together in a figure: those of one block and start, by links and frequency [Hz]."""
+    """The cells of one block and start, by links and frequency [Hz]."""
 
     label: str
     color: str
@@ -62,8 +58,8 @@ class Series:
         return np.array([[getattr(cell, name) for cell in row] for row in cells])
 
 
-def all_series(result: "SweepResult", quantity: str = "dx") -> list[Series]:
-    """Every block that has nothing but links, frequency and start as axes of several values, by its starts."""
+def all_series(result: SweepResult, quantity: str = "dx") -> list[Series]:
+    """The series of every block in which nothing but links, frequency and start varies."""
     series: list[Series] = []
     for block, given in zip(result.blocks.values(), result.sweep["blocks"], strict=True):
         several = {name for name, values in block.axes.items() if len(values) > 1}
@@ -72,7 +68,7 @@ def all_series(result: "SweepResult", quantity: str = "dx") -> list[Series]:
         found = block.statistics(quantity)
         by_start: dict[str, dict[tuple[int, float], Cell]] = {}
         for place in np.ndindex(*block.shape[:-1]):
-            at = given["scene"] | {name: block.axes[name][i] for name, i in zip(block.axes, place, strict=True)}
+            at = given["scene"] | cell_values(block, place)
             cells = by_start.setdefault(str(at["start"]), {})
             cells[int(at["links"]), float(at["frequency"])] = Cell(
                 mean=float(found.mean[place]),
@@ -84,7 +80,7 @@ def all_series(result: "SweepResult", quantity: str = "dx") -> list[Series]:
         for start, cells in by_start.items():
             label, color, marker = _STARTS[start]
             if any(item.color == color for item in series):
-                # A start that has been drawn already: the name of the block, and a look that is still free.
+                # Another block has this start: this one gets its name in the legend, another colour and marker.
                 label, number = f"{block.name}, {label}", len(series)
                 marker = _OTHER_MARKERS[number % len(_OTHER_MARKERS)]
                 color = next((other for other in _OTHER_COLORS if all(other != item.color for item in series)), INK)
@@ -92,10 +88,9 @@ def all_series(result: "SweepResult", quantity: str = "dx") -> list[Series]:
     return series
 
 
-def lost_note(cells: Sequence[Cell]) -> str:
-    """How many walks are not in the means; empty if all are."""
-    walks = sum(cell.count + cell.failed + cell.missing for cell in cells)
-    failed, missing = sum(cell.failed for cell in cells), sum(cell.missing for cell in cells)
-    parts = [f"{failed} of {walks} walks failed"] * (failed > 0)
-    parts += [f"{missing} of {walks} not run yet"] * (missing > 0)
-    return ", ".join(parts)
+def lost_note(cells: Sequence[Cell | CellStatistics]) -> str:
+    """Number of walks that are not in the means of some cells; empty if all are."""
+    failed, missing = sum(int(np.sum(cell.failed)) for cell in cells), sum(int(np.sum(cell.missing)) for cell in cells)
+    walks = failed + missing + sum(int(np.sum(cell.count)) for cell in cells)
+    texts = {f"{failed} of {walks} walks failed": failed, f"{missing} of {walks} not run yet": missing}
+    return ", ".join(text for text, count in texts.items() if count)

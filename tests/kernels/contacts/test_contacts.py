@@ -8,6 +8,7 @@ from tests.support.folded_chains import chain_of_angles, folded_chain
 from tests.support.kernels_under_test import ALL_PAIRS, FLOOR, GRID, SELF, SPROCKET, ContactPass, Placed
 from warpchain.inputs.parameters import preset
 from warpchain.oracle import contact_equations, motion_equations
+from warpchain.oracle.circular_loop import circular_loop
 
 PAPER = preset("paper")
 TURNING = -90.0
@@ -239,7 +240,7 @@ def test_left_circle_goes_first():
 def test_circles_almost_as_wide_as_links_meet_past_one_link(seed):
     """If r is close to ℓ/2, circles at both ends of one link, of the links before and after it, can touch."""
     wide = PAPER.with_values({"circle_radius": 0.4999 * PAPER.link_length})
-    position, velocity = motion_equations.circular_loop(20, PAPER, 5.0)
+    position, velocity = circular_loop(20, PAPER, 5.0)
     generator = np.random.default_rng(seed)
     position[:, :2] += generator.normal(size=(20, 2)) * 1e-5
     velocity += generator.normal(size=(20, 3))
@@ -319,7 +320,7 @@ def test_self_contacts_keep_momenta():
 
 def test_chain_in_the_air_is_left_alone():
     """A chain that touches nothing keeps its velocities to the bit, lists no pair and loses no energy."""
-    position, velocity = motion_equations.circular_loop(60, PAPER, 5.0)
+    position, velocity = circular_loop(60, PAPER, 5.0)
     position[:, 1] += 1.0
     contact_pass = ContactPass([Placed(position, velocity, PAPER)], sprocket_speed=TURNING)
     (result,) = contact_pass.run(GRID | FLOOR | SPROCKET | SELF)

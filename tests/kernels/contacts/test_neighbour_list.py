@@ -16,6 +16,7 @@ from warpchain.inputs.parameters import preset
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.pair_list import list_layout
 from warpchain.oracle import contact_equations, motion_equations
+from warpchain.oracle.circular_loop import circular_loop
 
 PAPER = preset("paper")
 SOFT = preset("soft")
@@ -66,7 +67,7 @@ def straight_heap(n, angle):
 
 LENGTHS = (4, 6, 8, 20, 60, 150, 1000)
 STATES = {
-    "loop": lambda n: motion_equations.circular_loop(n, PAPER, 0.0)[0],
+    "loop": lambda n: circular_loop(n, PAPER, 0.0)[0],
     "crumpled": lambda n: folded_chain(n, n, LENGTH)[0],
     "flat pile": lambda n: folded_chain(n, n, LENGTH, tilt=0.1 if n <= 60 else 0.6)[0],
     "doubled line": doubled_line,

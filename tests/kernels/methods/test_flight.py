@@ -12,6 +12,7 @@ from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.oracle import motion_equations
+from warpchain.oracle.circular_loop import circular_loop, circular_loop_force
 
 METHODS = ("rkf78", "dp5", "bs32", "os32", "rodas5p")
 PAPER, SOFT = preset("paper"), preset("soft")
@@ -247,13 +248,13 @@ def test_energy_falls_by_what_the_ledger_says(parameters):
 @pytest.mark.parametrize("speed", [2.0, -5.0])
 def test_circular_loop_settles_at_its_tension(speed):
     """A closed loop stretches until every joint force is the formula's, for alternating masses; C is that over k."""
-    position, velocity = motion_equations.circular_loop(LINKS, PAPER, speed)
+    position, velocity = circular_loop(LINKS, PAPER, speed)
     flight = warpchain.simulate(PAPER, position + HIGH, velocity, 1.5e-3, times=[1.5e-3], gravity=False, tolerance=1e-9)
     place = flight.position[-1][:, :2] - HIGH[:2]
     midway = place + np.roll(place, -1, axis=0)
     outwards = midway / np.linalg.norm(midway, axis=1)[:, None]
     tangent = np.column_stack([-outwards[:, 1], outwards[:, 0]])
-    pull, across = motion_equations.circular_loop_force(LINKS, PAPER, speed)
+    pull, across = circular_loop_force(LINKS, PAPER, speed)
     force = motion_equations.joint_force(flight.position[-1], flight.velocity[-1], PAPER)
     alternating = across * np.tile([1, -1], LINKS // 2)
     assert abs(across) > 0.02 * pull
@@ -269,7 +270,7 @@ def test_circular_loop_settles_at_its_tension(speed):
 def test_stretched_circular_loop_stays_circular(parameters):
     """A loop that starts in its springs' equilibrium turns as a rigid body: shape to rounding, angle by Ω t."""
     chain = parameters.with_values({"joint_damping": 0.0})
-    position, velocity = motion_equations.circular_loop(LINKS, chain, 3.0, stretched=True)
+    position, velocity = circular_loop(LINKS, chain, 3.0, stretched=True)
     duration = 2e-3
     position += HIGH
     flight = warpchain.simulate(chain, position, velocity, duration, gravity=False, tolerance=1e-9)
@@ -278,7 +279,7 @@ def test_stretched_circular_loop_stays_circular(parameters):
     assert np.abs(distance - distance[0]).max() < 1e-13
     turned = flight.position[:, :, 2] - position[:, 2]
     assert np.abs(turned - spin * flight.time[:, None]).max() < 1e-10
-    pull, across = motion_equations.circular_loop_force(LINKS, chain, 3.0)
+    pull, across = circular_loop_force(LINKS, chain, 3.0)
     assert flight.greatest_opening == pytest.approx(np.hypot(pull, across) / chain.joint_stiffness, rel=1e-3)
 
 

@@ -13,14 +13,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from warpchain.pictures.walk_figures import FAINT, GROUND, INK, LINE_COLORS, _tidy
-from warpchain.reports.sweep_figures import Picture
+from warpchain.pictures.style import FAINT, GROUND, INK, LINE_COLORS, Picture, tidy
 from warpchain.status import Status
 
 Row = dict[str, Any]
 
 _MARKERS: Final = "osDvP*Xp"
-_GRID: Final = {"color": "#E6E6E6", "linewidth": 0.6}
 _SCIPY: Final = {"DOP853 (SciPy)": "s", "Radau (SciPy)": "^"}
 """Solvers of SciPy, all in black, and their markers."""
 _FIRST: Final = ("rkf78", "dp5", "bs32", "os32", "rodas5p", "hybrid")
@@ -113,13 +111,12 @@ def work_precision(true: Row, rows: Sequence[Row]) -> Figure:
                 if drawn:
                     _draw_line(axes, np.array(drawn), colors[method], _marker(method, chosen))
             if true[error]:
-                axes.axhline(true[error], color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)), zorder=1)
+                axes.axhline(true[error], color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)), zorder=0.4)
             axes.set_xscale("log")
             axes.set_yscale("log")
             for axis in (axes.xaxis, axes.yaxis):
                 _thin_out(axis)
-            axes.grid(**_GRID)
-            _tidy(axes)
+            tidy(axes, grid="both")
         grid[line, 0].set_ylabel(label)
     grid[1, 0].set_xlabel("seconds of one core per simulated second")
     grid[1, 1].set_xlabel("evaluations per simulated second")
@@ -158,8 +155,7 @@ def walk_costs(rows: Sequence[Row]) -> Figure:
     left.set_ylim(len(ordered) - 0.4, -0.6)
     for axes in (left, right):
         axes.set_xscale("log")
-        axes.grid(axis="x", **_GRID)
-        _tidy(axes)
+        tidy(axes, grid="x")
         _thin_out(axes.xaxis)
     left.set_xlim(right=3.5 * left.get_xlim()[1])
     right.tick_params(left=False)
@@ -182,7 +178,7 @@ def ensemble(row: Row) -> Figure:
         left.axvspan(*true["mean_interval"], color=GROUND, zorder=0)
     if true["mean"] is not None:
         for factor in (0.99, 1.01):
-            left.axvline(factor * true["mean"], color=FAINT, linewidth=0.9, linestyle=(0, (1, 2)), zorder=1)
+            left.axvline(factor * true["mean"], color=FAINT, linewidth=0.9, linestyle=(0, (1, 2)), zorder=0.4)
     on_gpu = row["device"].startswith("cuda")
     cost = "walks_per_second" if on_gpu else "seconds_per_walk"
     for place, one in enumerate(methods):
@@ -205,9 +201,8 @@ def ensemble(row: Row) -> Figure:
     right.set_xlabel("walks per second" if on_gpu else "seconds of one core per walk")
     right.set_xlim(0, 1.25 * max([one[cost] for one in methods if one[cost] is not None], default=1.0))
     left.set_title(row["title"], fontsize="medium", loc="left")
-    left.grid(axis="x", **_GRID)
-    for axes in (left, right):
-        _tidy(axes)
+    tidy(left, grid="x")
+    tidy(right)
     return figure
 
 

@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from warpchain.bench.accuracy.figures import figures
-from warpchain.cli.terminal import PICTURE_DPI
+from warpchain.files import replacing
+from warpchain.pictures.style import Picture
 from warpchain.reports.html_page import page, picture, table
-from warpchain.reports.sweep_figures import Picture
-from warpchain.walks.walk_result import replacing
 
 PAGE: Final = "accuracy.html"
 
@@ -26,15 +25,10 @@ def write_pictures_and_page(folder: Path, document: dict[str, Any]) -> list[Path
         OSError: A file cannot be written.
     """
     pictures = list(figures(document))
-    paths = []
-    for drawn in pictures:
-        paths.append(folder / f"{drawn.name}.png")
-        with replacing(paths[-1]) as part:
-            drawn.figure.savefig(part, dpi=PICTURE_DPI)
-    paths.append(folder / PAGE)
-    with replacing(paths[-1]) as part:
+    paths = [drawn.save(folder) for drawn in pictures]
+    with replacing(folder / PAGE) as part:
         part.write_text(_page(document, pictures), encoding="utf-8")
-    return paths
+    return [*paths, folder / PAGE]
 
 
 def _page(document: dict[str, Any], pictures: Sequence[Picture]) -> str:

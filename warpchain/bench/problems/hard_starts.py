@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain, links_between
 from warpchain.oracle import motion_equations
+from warpchain.oracle.circular_loop import circular_loop
 from warpchain.walks.walk_result import Trajectory
 
 Array = NDArray[np.float64]
@@ -43,7 +44,7 @@ def dropped(links: int = 8, speed: float = 2.0, fall: float = 1.0, gap: float = 
 
 def dropped_circle(links: int) -> State:
     """A circulating circle just above the floor, falling."""
-    position, velocity = motion_equations.circular_loop(links, SOFT, -3.0)
+    position, velocity = circular_loop(links, SOFT, -3.0)
     return set_down(position), velocity - [0.0, 1.0, 0.0]
 
 
@@ -77,7 +78,7 @@ def overlapping() -> State:
 
 def turning_joints() -> State:
     """A circulating octagon whose neighbours turn against each other by 0.02 rad/s."""
-    position, velocity = motion_equations.circular_loop(8, PAPER.with_values({"gravity": 0.0}), 1.0)
+    position, velocity = circular_loop(8, PAPER.with_values({"gravity": 0.0}), 1.0)
     position[:, 1] += 0.1
     velocity[:, 2] += 0.01 * np.array([1, -1] * 4)
     return position, velocity

@@ -1,0 +1,22 @@
+"""Texts on figures and in tables."""
+
+import numpy as np
+import pytest
+
+from warpchain.reports.labels import cell_text, number_text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(1e-6, "1e-6"), (3e7, "3e7"), (1e-10, "1e-10"), (0.27, "0.27"), (60, "60"), (1e100, "1e100")]
+)
+def test_number_text(value: float, text: str) -> None:
+    """Numbers are written as people write them."""
+    assert number_text(value) == text
+
+
+def test_cell_text() -> None:
+    """Cells are named by symbols, values and units."""
+    text = cell_text({"links": np.int64(60), "frequency": np.float64(7.5), "start": "rest", "self_contact": np.True_})
+    assert text == "n = 60, ν = 7.5 Hz, start = rest, self contact = True"
+    assert cell_text({"coulomb_friction": 1.1e-4, "tolerance": 1e-9}) == "τ_c = 0.00011 N m, tolerance = 1e-9"
+    assert cell_text({}) == ""

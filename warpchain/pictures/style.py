@@ -1,0 +1,77 @@
+"""How all figures look: colours, axes, resolution; and a figure with its caption."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+from warpchain.files import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+LINE_COLORS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+"""Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008)."""
+BLUE, RED, GREEN = LINE_COLORS[:3]
+
+INK: Final = "#222222"
+"""Text and lines."""
+FAINT: Final = "#777777"
+"""Lines in the background."""
+GROUND: Final = "#E3E3E3"
+"""The floor, and shaded areas."""
+
+DASHES: Final[Any] = (0, (4, 3))
+"""A dashed line, as matplotlib takes it."""
+
+PICTURE_DPI: Final = 200
+"""Resolution of a figure in a file of its own [dots per inch]."""
+
+
+class NothingToShow(ValueError):  # noqa: N818 - no error of the program: the sweep was made for something else
+    """A sweep lacks the blocks, or does not have the walks yet, that a figure or a number needs."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure with its caption.
+
+    Attributes:
+        name: short name, used as the name of a file.
+        caption: one or more sentences.
+        figure: the figure.
+    """
+
+    name: str
+    caption: str
+    figure: "Figure"
+
+    def save(self, folder: Path) -> Path:
+        """Write the figure into a folder as a PNG named after it, and return the path of the file.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        path = folder / f"{self.name}.png"
+        save_figure(self.figure, path)
+        return path
+
+
+def save_figure(figure: "Figure", path: str | os.PathLike[str]) -> None:
+    """Write a figure, whole or not at all; the suffix of `path` gives the format.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    with replacing(path) as part:
+        figure.savefig(part, dpi=PICTURE_DPI)
+
+
+def tidy(axes: "Axes", *, grid: Literal["x", "y", "both"] | None = None) -> None:
+    """Leave out the upper and right border; draw a faint grid across one axis or both."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(color=FAINT)
+    if grid is not None:
+        axes.grid(axis=grid, color="#E6E6E6", linewidth=0.6)
+        axes.set_axisbelow(True)

@@ -1,0 +1,37 @@
+"""What figures need of a walk, whichever class holds it."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.loop.stationary_loop import HeldWalk
+from warpchain.status import Status
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)  # frozen: its attributes are only read
+class Walk(HeldWalk, Protocol):
+    """A walk with t instants and f frames of a chain of n links.
+
+    Attributes:
+        status: how it ended.
+        dx: distance walked [m]; NaN unless the chain came to rest.
+        time: time since the release [s], shape (t,).
+        center: centre of mass x, y [m], shape (t, 2).
+        center_velocity: its velocity [m/s], shape (t, 2).
+        frame_time: times of the frames [s], shape (f,).
+        frame_joints: joints x, y [m], shape (f, n, 2); joint i ends link i.
+        sprocket_radius: radius of the sprocket that links touch [m]; NaN without one.
+    """
+
+    status: Status
+    dx: float
+    time: Array
+    center: Array
+    center_velocity: Array
+    frame_time: Array
+    frame_joints: Array
+    sprocket_radius: float
