@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from warpchain.engine.tallies import CONTACTS
 from warpchain.inputs.setup import resolve
 from warpchain.loop.before_release import BeforeRelease
 from warpchain.status import Status
-from warpchain.walks.walk_result import CONTACTS, ENERGIES, STORED, WalkResult
+from warpchain.walks.walk_result import ENERGIES, STORED, WalkResult
 
 
 def make_walk(links: int = 30, **changes: Any) -> WalkResult:

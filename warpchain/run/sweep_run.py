@@ -20,14 +20,13 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, validated
 from warpchain.status import Status
-from warpchain.store.folder import SweepFolder, empty_rows, read_shard, write_shard
-from warpchain.store.shards import shard_name
+from warpchain.store.folder import SweepFolder
+from warpchain.store.shards import empty_rows, read_shard, shard_name, write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
 from warpchain.walks.motion import Motion
+from warpchain.walks.rows import fill_row
 from warpchain.walks.scheduler import compile_kernels, run_setups
-from warpchain.walks.walk_phases import WalkRun
-from warpchain.walks.walk_result import LOST
 
 SHARD_WALKS = 256
 """Most walks in a shard."""
@@ -119,11 +118,12 @@ def sweep(
         before = planned.walk_count - sum(len(shard) for shard in missing)
         progress = SweepProgress(walks=planned.walk_count, done=before, before=before)
         store.log(f"{len(missing)} shards to do, {before} of {planned.walk_count} walks done")
+        report = on_progress or (lambda progress: None)
         if missing:
             if executor is None:
-                _run_in_threads(planned, store, missing, at_once, progress, on_progress)
+                _run_in_threads(planned, store, missing, at_once, progress, report)
             else:
-                _run(executor, (), planned, store, missing, at_once, progress, on_progress)
+                _run(executor, None, planned, store, missing, at_once, progress, report)
         store.log(f"complete after {progress.seconds:.1f} s: " + _counts(progress.statuses))
     return load(out)
 
@@ -159,73 +159,48 @@ def shard_size(walks: int) -> int:
 
 
 def run_shards(
-    sweep: Mapping[str, Any],
+    planned: Sweep,
     directory: str,
-    shards: Sequence[tuple[int, int]],
+    shards: Sequence[range],
+    threads: int | None = None,
     stop: threading.Event | None = None,
 ) -> list[str]:
     """Run the walks of some shards and write each shard as soon as its walks are over; what a worker does.
 
     Args:
-        sweep: Canonical form of the sweep.
+        planned: The sweep.
         directory: The sweep's folder.
-        shards: First walk, and the one after the last, of each shard.
+        shards: The walks of each shard.
+        threads: Of every block on a GPU; None: as many as its chain needs.
         stop: When set, the work is abandoned: unfinished shards are not written.
 
     Returns:
         Keys of the shards written.
     """
-    planned = load_sweep(sweep)
     digest = planned.digest()
-    undrawn = list(planned.undrawn(index for first, last in shards for index in range(first, last)))
+    walks = list(planned.undrawn(index for shard in shards for index in shard))
     under_way: dict[int, PlannedWalk] = {}
-    shard_of = {index: shard for shard in shards for index in range(*shard)}
-    rows = {shard: empty_rows(planned, range(*shard)) for shard in shards}
-    left = {shard: shard[1] - shard[0] for shard in shards}
-    motions: dict[tuple[int, int], dict[int, Motion]] = {shard: {} for shard in shards}
-    keeps = [planned.keep(walk) for walk in undrawn]
+    shard_of = {index: shard for shard in shards for index in shard}
+    rows = {shard: empty_rows(planned, shard) for shard in shards}
+    left = {shard: len(shard) for shard in shards}
+    motions: dict[range, dict[int, Motion]] = {shard: {} for shard in shards}
+    setups, keeps = [walk.setup for walk in walks], [planned.keep(walk) for walk in walks]
     keys = []
 
     def draw(place: int) -> Setup:
-        under_way[place] = planned.planned(undrawn[place].index)
+        under_way[place] = planned.drawn(walks[place])
         return under_way[place].setup
 
-    setups, threads = [walk.setup for walk in undrawn], _shared_threads(planned)
     for place, run in run_setups(setups, draw=draw, keeps=keeps, threads=threads, stop=stop):
         walk = under_way.pop(place)
         shard = shard_of[walk.index]
-        _fill(rows[shard][walk.index - shard[0]], walk, run)
+        fill_row(rows[shard][walk.index - shard.start], run.outcome(), walk.drawn)
         if keeps[place].series_every is not None:
             motions[shard][walk.index] = run.motion
         left[shard] -= 1
         if left[shard] == 0:
-            keys.append(write_shard(directory, digest, range(*shard), rows.pop(shard), motions.pop(shard)))
+            keys.append(write_shard(directory, digest, shard, rows.pop(shard), motions.pop(shard)))
     return keys
-
-
-def _fill(row: Any, walk: PlannedWalk, run: WalkRun) -> None:
-    """Write what is kept of a walk into its row."""
-    counts, extremes, energy = run.counts, run.extremes, run.energy()
-    row["status"] = int(run.status)
-    row["dx"] = run.dx
-    row["walk_time"] = run.walk_time
-    row["simulated_time"] = run.simulated_time
-    row["hold_time"] = run.hold_time
-    row["drift"] = run.drift
-    row["softened_at"] = run.softened_at
-    row["bounces"] = counts["bounces"]
-    row["steps_accepted"] = counts["accepted"]
-    row["steps_rejected"] = counts["rejected"]
-    row["greatest_opening"] = extremes["opening"]
-    for kind in ("floor", "sprocket", "self"):
-        row[f"impulses_{kind}"] = counts[kind]
-        row[f"penetration_{kind}"] = extremes[kind]
-    row["energy_at_release"] = energy["kinetic_at_release"] + energy["potential_at_release"]
-    for loss in LOST:
-        row[f"loss_{loss}"] = energy[loss]
-    row["energy_residual"] = energy["residual"]
-    for name, value in walk.drawn.items():
-        row[name] = value
 
 
 def _run_in_threads(
@@ -234,30 +209,24 @@ def _run_in_threads(
     missing: Sequence[range],
     workers: int,
     progress: SweepProgress,
-    on_progress: Callable[[SweepProgress], None] | None,
+    report: Callable[[SweepProgress], None],
 ) -> None:
     """Run shards in threads of this process; launches run outside of Python's lock."""
     progress.compiling = True
-    if on_progress is not None:
-        on_progress(progress)
+    report(progress)
     prepare(planned)
     progress.compiling = False
     stop = threading.Event()
     with concurrent.futures.ThreadPoolExecutor(workers) as threads:
         try:
-            _run(threads, (stop,), planned, store, missing, workers, progress, on_progress)
+            _run(threads, stop, planned, store, missing, workers, progress, report)
         except BaseException:
             stop.set()
             raise
 
 
-def prepare(source: Mapping[str, Any] | Sweep) -> None:
-    """Load every kernel that the walks of a sweep need into this process, compiled if need be.
-
-    Args:
-        source: The sweep, or its canonical form.
-    """
-    planned = load_sweep(source)
+def prepare(planned: Sweep) -> None:
+    """Load every kernel that the walks of a sweep need into this process, compiled if need be."""
     compile_kernels(one_of_each_cell(planned), _shared_threads(planned))
 
 
@@ -282,20 +251,18 @@ def _shared_threads(planned: Sweep) -> int | None:
 
 def _run(
     executor: Executor,
-    more: tuple[Any, ...],
+    stop: threading.Event | None,
     planned: Sweep,
     store: SweepFolder,
     missing: Sequence[range],
     workers: int,
     progress: SweepProgress,
-    on_progress: Callable[[SweepProgress], None] | None,
+    report: Callable[[SweepProgress], None],
 ) -> None:
     """Keep the workers busy with two tasks each; memory does not grow with the sweep."""
-    if on_progress is not None:
-        on_progress(progress)
+    report(progress)
     began = time.perf_counter()
-    canonical, digest = planned.canonical(), planned.digest()
-    waiting = _tasks(planned, missing, workers)
+    threads, waiting = _shared_threads(planned), _tasks(planned, missing, workers)
     folder = store.directory / "shards"
     pending: dict[concurrent.futures.Future[list[str]], list[range]] = {}  # with the shards still to be counted
 
@@ -303,14 +270,8 @@ def _run(
         task = next(waiting, None)
         if task is None:
             return False
-        shards = [(shard.start, shard.stop) for shard in task]
-        pending[executor.submit(run_shards, canonical, str(store.directory), shards, *more)] = task
+        pending[executor.submit(run_shards, planned, str(store.directory), tuple(task), threads, stop)] = task
         return True
-
-    def count(shard: range) -> None:
-        statuses = read_shard(store.directory, digest, shard)["status"]
-        progress.statuses.update(Status(int(code)).label for code in statuses)
-        progress.done += len(shard)
 
     while len(pending) < 2 * workers and submit():
         pass
@@ -327,10 +288,12 @@ def _run(
                 task[:] = [shard for shard in task if shard not in there]
                 written += there
             for shard in written:
-                count(shard)
+                statuses = read_shard(store.directory, store.manifest, shard)["status"]
+                progress.statuses.update(Status(int(code)).label for code in statuses)
+                progress.done += len(shard)
             progress.seconds = time.perf_counter() - began
-            if written and on_progress is not None:
-                on_progress(progress)
+            if written:
+                report(progress)
     finally:
         for future in pending:
             future.cancel()

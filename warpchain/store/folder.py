@@ -16,37 +16,20 @@ import re
 import secrets
 import shutil
 import socket
-from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Self
+from types import TracebackType
+from typing import Final, Self
 
 import numpy as np
 import yaml
 
 from warpchain.inputs.validation import InputError
-from warpchain.store.shards import (
-    NUMERICS_VERSION,
-    OWN,
-    Folder,
-    Manifest,
-    empty_rows,
-    present_shards,
-    put_file,
-    read_manifest,
-    read_shard,
-    unwritable,
-    write_shard,
-)
-from warpchain.walks.motion import SERIES, Motion
+from warpchain.store.manifest import NUMERICS_VERSION, OWN, Folder, Manifest, read_manifest
+from warpchain.store.shards import present_shards, put_file, read_shard, unwritable
+from warpchain.sweeps.plan import Sweep
+from warpchain.walks.motion import SERIES
 from warpchain.walks.rows import Rows
-
-if TYPE_CHECKING:
-    from types import TracebackType
-
-    from warpchain.sweeps.plan import Sweep
-
-__all__ = ["SweepFolder", "empty_rows", "read_rows", "read_shard", "write_shard"]
 
 SHARD_OVERHEAD: Final = 16 * 1024
 """Bytes that a shard takes at most beside its rows."""
@@ -82,7 +65,7 @@ class SweepFolder:
         self._lock = lock
 
     @classmethod
-    def open(cls, directory: Folder, sweep: "Sweep", *, fresh: bool = False, shard_size: int) -> Self:
+    def open(cls, directory: Folder, sweep: Sweep, *, fresh: bool = False, shard_size: int) -> Self:
         """Begin a sweep in a folder, or go on with it.
 
         Args:
@@ -140,19 +123,6 @@ class SweepFolder:
         present = present_shards(self.directory, self.manifest)
         return [walks for walks in self.manifest.shards if walks not in present]
 
-    def write(self, walks: range, rows: Rows, motions: Mapping[int, Motion] | None = None) -> str:
-        """Write a shard, see `write_shard`, and return its key."""
-        return write_shard(self.directory, self.manifest.digest, walks, rows, motions)
-
-    def rows(self) -> Rows:
-        """Rows of all walks that are there, in order.
-
-        Raises:
-            OSError: the folder or a shard cannot be read.
-            InputError: a shard is damaged or foreign.
-        """
-        return read_rows(self.directory, self.manifest)
-
     def close(self) -> None:
         """Let other processes have the folder."""
         _unlock(self._lock)
@@ -162,16 +132,10 @@ class SweepFolder:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: "TracebackType | None"
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Close."""
         self.close()
-
-    @property
-    def _series_bytes(self) -> float:
-        """What the series of a short walk takes; frames are not in it."""
-        series = self.manifest.recording.series
-        return 0.0 if series is None else SHORT_WALK / series.interval * SAMPLE_BYTES
 
     def _check(self) -> None:
         """Refuse what would fail later: bad shards, a folder that cannot be written, a disk too full."""
@@ -179,7 +143,7 @@ class SweepFolder:
         problems = []
         for walks in present:
             try:
-                _read(self.directory, self.manifest, walks)
+                read_shard(self.directory, self.manifest, walks)
             except InputError as error:
                 problems.append(str(error))
         if problems:
@@ -195,9 +159,11 @@ class SweepFolder:
             free = shutil.disk_usage(shards).free
         except OSError as error:
             raise unwritable(shards, error) from error
-        row = self.manifest.row_type.itemsize
-        need = sum(len(walks) * row + SHARD_OVERHEAD for walks in left)
-        need += round(sum(map(len, left)) / self.manifest.walk_count * self.manifest.kept_count * self._series_bytes)
+        manifest, series = self.manifest, self.manifest.recording.series
+        need = sum(len(walks) * manifest.row_type.itemsize + SHARD_OVERHEAD for walks in left)
+        if series is not None:  # of short walks, and without frames
+            kept = sum(map(len, left)) / manifest.walk_count * manifest.kept_count
+            need += round(kept * SHORT_WALK / series.interval * SAMPLE_BYTES)
         if need > free:
             raise OSError(
                 f"{self.directory}: the rest of the sweep takes {need / 1e6:.3g} MB, but {free / 1e6:.3g} MB are "
@@ -212,13 +178,8 @@ def read_rows(directory: Folder, manifest: Manifest) -> Rows:
         OSError: the folder or a shard cannot be read.
         InputError: a shard is damaged or foreign.
     """
-    shards = present_shards(directory, manifest)
-    parts = [_read(directory, manifest, walks) for walks in shards]
+    parts = [read_shard(directory, manifest, walks) for walks in present_shards(directory, manifest)]
     return np.concatenate([np.empty(0, manifest.row_type), *parts])
-
-
-def _read(directory: Folder, manifest: Manifest, walks: range) -> Rows:
-    return read_shard(directory, manifest.digest, walks, numerics_version=manifest.numerics_version)
 
 
 def _prepared(folder: Path, manifest: Manifest, fresh: bool) -> Manifest:

@@ -17,7 +17,7 @@ from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError, shown, suggestion
 from warpchain.status import Status
 from warpchain.store.folder import read_rows
-from warpchain.store.shards import FORMAT_VERSION, Folder, Manifest, read_manifest
+from warpchain.store.manifest import FORMAT_VERSION, Folder, Manifest, read_manifest
 from warpchain.store.walk_motion import MotionReader, WalkMotion, motion_reader
 from warpchain.walks.rows import COLUMNS, MISSING, Column, Rows, field_column, missing_rows
 

@@ -15,15 +15,14 @@ from warpchain.inputs.scene import contact_radius
 from warpchain.inputs.setup import Setup
 from warpchain.loop.before_release import BeforeRelease
 from warpchain.status import Status
-from warpchain.store.shards import Manifest, read_motions
-from warpchain.sweeps.plan import load_sweep
+from warpchain.store.manifest import Manifest
+from warpchain.store.shards import read_motions
+from warpchain.sweeps.plan import Sweep, load_sweep
 from warpchain.walks.motion import Motion
 from warpchain.walks.walk_result import STORED, Stored
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from warpchain.sweeps.plan import Sweep
 
 Array = NDArray[np.float64]
 
@@ -116,7 +115,7 @@ class MotionReader:
     manifest: Manifest
 
     @cached_property
-    def sweep(self) -> "Sweep":
+    def sweep(self) -> Sweep:
         """The sweep itself, planned."""
         return load_sweep(self.manifest.sweep)
 

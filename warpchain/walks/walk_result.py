@@ -10,17 +10,16 @@ import dataclasses
 import json
 import math
 import os
-import secrets
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
+from warpchain.files import reason, replacing, version_refusal
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
@@ -35,34 +34,19 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 FORMAT: Final = "warpchain walk"
-FORMAT_VERSION: Final = 3
+FORMAT_VERSION: Final = 4
 
 BEFORE: Final = "before_release"
-
-CONTACTS: Final = {
-    "floor": "between links and floor",
-    "sprocket": "between links and sprocket",
-    "self": "between links of the chain",
-}
-"""Kinds of contact: keys of `WalkResult.impulses` and `WalkResult.greatest_penetration`."""
 
 ENERGIES: Final = {
     "kinetic_at_release": "kinetic energy at release",
     "potential_at_release": "energy of gravity and joint springs at release",
     "kinetic_at_end": "kinetic energy at the end",
     "potential_at_end": "energy of gravity and joint springs at the end",
-    "joint_friction": "energy lost to joint friction, viscous and Coulomb",
-    "joint_damping": "energy lost to the damping of the joint springs",
-    "floor": "energy lost in impacts on the floor",
-    "self_contact": "energy lost in impacts of links on one another",
-    "softening": "energy taken out of the joint springs by softening them in the pile",
-    "joint_switch": "energy lost where joints go from springs to rigid, less that gained where they go back",
+    **LOST,
     "residual": "energy at release, less that at the end and all losses: the error of the integration",
 }
 """Keys of `WalkResult.energy`. Losses count as positive."""
-
-LOST: Final = ("joint_friction", "joint_damping", "floor", "self_contact", "softening", "joint_switch")
-"""Those of them that are losses of the walk."""
 
 
 @dataclass(frozen=True)
@@ -121,15 +105,17 @@ class WalkResult:
         Stored("summary/softened_at", "s", "from the release to the softening of the joints; NaN if they were not"),
     ]
     wall_time: Annotated[float, Stored("summary/wall_time", "s", "that the computer took")]
-    bounces: Annotated[int, Stored("summary/bounces", "1", "number of bounces off the floor")]
-    steps_accepted: Annotated[int, Stored("summary/steps_accepted", "1", "accepted steps, all phases")]
-    steps_rejected: Annotated[int, Stored("summary/steps_rejected", "1", "rejected steps, all phases")]
-    impulses: Annotated[dict[str, int], Stored("summary/impulses", "1", "number of impulses", CONTACTS)]
-    greatest_opening: Annotated[
-        float, Stored("summary/greatest_opening", "m", "greatest distance between two joined link ends")
+    bounces: Annotated[int, Stored("summary/bounces", "1", COUNTS["bounces"])]
+    steps_accepted: Annotated[int, Stored("summary/steps_accepted", "1", COUNTS["accepted"])]
+    steps_rejected: Annotated[int, Stored("summary/steps_rejected", "1", COUNTS["rejected"])]
+    impulses: Annotated[
+        dict[str, int],
+        Stored("summary/impulses", "1", "by kind of contact", {kind: COUNTS[kind] for kind in CONTACTS}),
     ]
+    greatest_opening: Annotated[float, Stored("summary/greatest_opening", "m", EXTREMES["opening"])]
     greatest_penetration: Annotated[
-        dict[str, float], Stored("summary/greatest_penetration", "m", "greatest overlap", CONTACTS)
+        dict[str, float],
+        Stored("summary/greatest_penetration", "m", "by kind of contact", {kind: EXTREMES[kind] for kind in CONTACTS}),
     ]
     energy: Annotated[dict[str, float], Stored("summary/energy", "J", "ledger of the walk", ENERGIES)]
     sprocket_center: Annotated[
@@ -286,7 +272,7 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
         with open(path, "rb") as content:
             content.read(1)
     except OSError as error:
-        raise OSError(f"{path}: {_reason(error)}; give the path of a readable walk file") from None
+        raise OSError(f"{path}: {reason(error)}; give the path of a readable walk file") from None
     if not h5py.is_hdf5(path):
         raise ValueError(f"{path}: not an HDF5 file; give a file written by WalkResult.save")
     try:
@@ -300,38 +286,6 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
     except (OSError, RuntimeError, KeyError, TypeError, ValueError):
         refusal = "damaged or cut short; fetch another copy of the file or run the walk again"
     raise ValueError(f"{path}: {refusal}")
-
-
-@contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary path in the same folder, which becomes `path` if the block ends without an error.
-
-    The data reach the disk before the name changes hands. So `path` is at any moment, even after a power
-    cut, either what it was or the whole new file.
-
-    Raises:
-        OSError: the file cannot be written; one line that names it. No temporary file is left.
-    """
-    target = Path(path)
-    part = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.part{target.suffix}")
-    try:
-        os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
-        yield part
-        with open(part, "r+b") as content:
-            os.fsync(content.fileno())
-        os.replace(part, target)
-    except OSError as error:
-        raise OSError(
-            f"{target}: cannot be written ({_reason(error)}); give a path in a folder that can take it"
-        ) from error
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
-
-
-def _reason(error: OSError) -> str:
-    """What went wrong in the system's few words; HDF5 buries them in a paragraph."""
-    return os.strerror(error.errno) if error.errno else " ".join(str(error).split())
 
 
 def _setup_as_dict(setup: Setup) -> dict[str, Any]:
@@ -363,7 +317,7 @@ def _write(walk: WalkResult, file: "h5py.File") -> None:
         value = getattr(walk, name)
         if stored.keys:
             for key, meaning in stored.keys.items():
-                _put(file, f"{stored.path}/{key}", value[key], stored.unit, f"{stored.meaning}: {meaning}")
+                _put(file, f"{stored.path}/{key}", value[key], stored.unit, meaning)
         elif value is not None:
             _put(file, stored.path, value, stored.unit, stored.meaning)
     for name, quantity in Parameters.quantities().items():
@@ -385,12 +339,9 @@ def _put(file: "h5py.File", path: str, value: float | Array, unit: str, meaning:
 
 def _refusal(file: "h5py.File") -> str | None:
     """Why this file cannot be a walk for us, or None."""
-    version = file.attrs.get("format_version")
     if file.attrs.get("format") != FORMAT:
         return "HDF5, but not a walk; give a file written by WalkResult.save"
-    if version != FORMAT_VERSION:
-        return f"format version {version}, but this warpchain reads {FORMAT_VERSION}; update warpchain"
-    return None
+    return version_refusal(file.attrs["format_version"], FORMAT_VERSION, "run the walk again")
 
 
 def _read(file: "h5py.File") -> WalkResult:
