@@ -328,11 +328,11 @@ def test_a_merge_that_fails_leaves_the_older_file(
     merge(single, path)
     older = path.read_bytes()
 
-    def write_bytes(path: Path, content: bytes) -> int:
+    def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patched:
-        patched.setattr(Path, "write_bytes", write_bytes)
+        patched.setattr(os, "posix_fallocate", full)
         with pytest.raises(OSError, match=r"merged\.h5: cannot be written \(No space left on device\); make room"):
             merge(folder, path)
     assert path.read_bytes() == older and len(list(tmp_path.iterdir())) == 1

@@ -63,7 +63,7 @@ def make_walk(links: int = 30, **changes: Any) -> WalkResult:
 
 def make_unreleased() -> WalkResult:
     """A walk that ended on the sprocket: no series, no frames, no distance."""
-    names = [name for name, stored in STORED.items() if stored.path.startswith("series/")]
+    names = [name for name, stored in STORED.items() if stored.group == "series"]
     empty: dict[str, Any] = {name: np.empty(0) for name in names}
     empty |= {"center": np.empty((0, 2)), "center_velocity": np.empty((0, 2)), "frame_time": np.empty(0)}
     energy = dict.fromkeys(ENERGIES, math.nan)

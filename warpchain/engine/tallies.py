@@ -8,22 +8,20 @@ CONTACTS: Final = {
     "self": "between links of the chain",
 }
 """Kinds of contact."""
-
+IMPULSES: Final = {kind: f"number of impulses: {between}" for kind, between in CONTACTS.items()}
+"""Impulses by kind of contact."""
+DEPTHS: Final = {kind: f"greatest overlap: {between}" for kind, between in CONTACTS.items()}
+"""Greatest overlaps [m] by kind of contact."""
 COUNTS: Final = {
     "accepted": "accepted steps, all phases",
     "rejected": "rejected steps, all phases",
-    **{kind: f"number of impulses: {between}" for kind, between in CONTACTS.items()},
+    **IMPULSES,
     "bounces": "number of bounces off the floor",
     "list_builds": "number of neighbour lists built",
 }
 """Counters."""
-
-EXTREMES: Final = {
-    "opening": "greatest distance between two joined link ends",
-    **{kind: f"greatest overlap: {between}" for kind, between in CONTACTS.items()},
-}
+EXTREMES: Final = {"opening": "greatest distance between two joined link ends", **DEPTHS}
 """Greatest lengths [m]."""
-
 LOSSES: Final = {
     "joint_friction": "energy lost to joint friction, viscous and Coulomb",
     "joint_damping": "energy lost to the damping of the joint springs",
@@ -34,6 +32,5 @@ LOSSES: Final = {
     "joint_switch": "energy lost where joints go from springs to rigid, less that gained where they go back",
 }
 """Losses of energy [J], positive."""
-
 LOST: Final = {name: meaning for name, meaning in LOSSES.items() if name != "sprocket"}
 """Losses [J] that a chain without sprocket can have."""

@@ -3,7 +3,9 @@
 import errno
 import importlib.metadata
 import json
+import math
 import os
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final, Self
@@ -31,7 +33,7 @@ OWN: Final = ("sweep.json", "sweep.yaml", "shards", "log.txt")
 
 @dataclass(frozen=True)
 class BlockLayout:
-    """Where the walks of a block are: C order over the axes, then samples, from walk `first` on.
+    """Which walks a block has: from `first` on, in C order over the axes and then the samples.
 
     Attributes:
         name: name of the block.
@@ -55,7 +57,7 @@ class BlockLayout:
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a folder belongs to and how its walks are laid out: all that a reader needs beside the shards.
+    """What a folder belongs to and how its walks are laid out: what a reader needs beside the shards.
 
     Attributes:
         name: name of the sweep.
@@ -112,29 +114,26 @@ class Manifest:
         """What is kept of the motion of walks."""
         return Recording.of(self.sweep.get("record", {}))
 
-    def kept(self, walks: range) -> list[int]:
-        """Those of some walks whose motion is kept."""
+    def _kept_samples(self, block: BlockLayout) -> Sequence[int]:
+        """Samples of each cell of a block whose motion is kept."""
         series = self.recording.series
         if series is None:
-            return []
+            return ()
+        return range(block.samples) if series.samples is None else [n for n in series.samples if n < block.samples]
+
+    def kept(self, walks: range) -> list[int]:
+        """Those of some walks whose motion is kept."""
         found = []
         for block in self.blocks:
-            last = block.first + int(np.prod(block.shape))
+            samples, last = self._kept_samples(block), block.first + math.prod(block.shape)
             part = range(max(walks.start, block.first), min(walks.stop, last))
-            found += [walk for walk in part if series.includes((walk - block.first) % block.samples)]
+            found += [walk for walk in part if (walk - block.first) % block.samples in samples]
         return found
 
     @property
     def kept_count(self) -> int:
         """Number of walks whose motion is kept."""
-        series = self.recording.series
-        if series is None:
-            return 0
-        return sum(
-            int(np.prod(block.shape[:-1]))
-            * (block.samples if series.samples is None else sum(sample < block.samples for sample in series.samples))
-            for block in self.blocks
-        )
+        return sum(math.prod(block.shape[:-1]) * len(self._kept_samples(block)) for block in self.blocks)
 
     def shard_of(self, walk: int) -> range:
         """The walks of the shard that a walk is in."""
@@ -179,7 +178,7 @@ def read_manifest(directory: Folder) -> Manifest:
 
 
 def check_not_own(directory: Folder, path: Path) -> None:
-    """Check that a file or folder to be written is none that a sweep has in its folder.
+    """Refuse to write a file or folder over one that a sweep has in its folder.
 
     Raises:
         InputError: it is one of them, or lies among the shards.

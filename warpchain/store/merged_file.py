@@ -21,7 +21,7 @@ from warpchain.files import replacing
 from warpchain.inputs.validation import InputError
 from warpchain.store.manifest import Folder, check_not_own, read_manifest
 from warpchain.store.motion_arrays import ARRAYS, count, flat_arrays
-from warpchain.store.shards import hdf5_image, open_new_hdf5, present_shards, put_file, read_motions, unwritable
+from warpchain.store.shards import open_new_hdf5, present_shards, read_motions, writing
 from warpchain.store.sweep_result import FORMAT, BlockResult, SweepResult, load
 from warpchain.walks.motion import Motion
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _AXES: Final = {"series": "instant", "frame": "frame", "joint": "joint"}
 """What is counted of a walk, see `ARRAYS` → name of the axis that it is along."""
 _ROOM: Final = 2**20
-"""Bytes that a merged file takes at most beyond its shards: their frames, and the tables of axes."""
+"""Most bytes that a merged file takes beyond its shards, for the tables of axes."""
 _NO_VARIABLE: Final = "This is a netCDF dimension but not a netCDF variable."
 
 
@@ -48,20 +48,13 @@ def merge(directory: Folder, path: str | os.PathLike[str]) -> None:
     check_not_own(directory, target)
     if os.path.lexists(target) and not _is_merged(target):
         raise InputError(f"{target}: is there and is no merged sweep; give another name")
-    if not any(block.kept.any() for block in result.blocks.values()):
-        put_file(target, hdf5_image(lambda file: _fill(file, result)))
-        return
-    # Motions may not fit into memory: this file grows on the disk.
     most = _ROOM + sum(path.stat().st_size for path in present_shards(directory, read_manifest(directory)).values())
-    try:
-        with replacing(target) as part, open_new_hdf5(part, most) as file:
-            _fill(file, result)
-    except OSError as error:
-        raise unwritable(target, error) from error
+    with writing(target), replacing(target) as part, open_new_hdf5(part, most) as file:
+        _fill(file, result)
 
 
 def _is_merged(path: Path) -> bool:
-    """Whether this is a file that `merge` has written."""
+    """Whether `merge` has written this file."""
     import h5py
 
     if not path.is_file():  # opening a pipe would wait for ever

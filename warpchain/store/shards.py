@@ -57,10 +57,9 @@ def _key(manifest: Manifest, walks: range) -> str:
 def write_shard(
     directory: Folder, digest: str, walks: range, rows: Rows, motions: Mapping[int, Motion] | None = None
 ) -> str:
-    """Write the rows of a shard; needs no lock and no `SweepFolder`, so that the workers of a sweep can call it.
+    """Write the rows of a shard; needs no lock, so that workers can call it.
 
-    Two workers may write the same shard at the same time: both have the same bytes, and one replaces the
-    other's.
+    Two workers may write the same shard at the same time: both write the same bytes, and one file replaces the other.
 
     Args:
         directory: folder of the sweep, opened before by the process that runs the sweep.
@@ -74,25 +73,25 @@ def write_shard(
 
     Raises:
         OSError: the file cannot be written; the folder is as it was.
-        InputError: the folder is not that of the sweep, perhaps not any more.
+        InputError: the folder is not, or no longer, that of the sweep.
         ValueError: the rows or the motions are not those of the walks.
     """
-    manifest = read_manifest(directory)
+    manifest, name = read_manifest(directory), f"walks {walks.start} to {walks.stop - 1}"
     if (manifest.digest, manifest.numerics_version) != (digest, NUMERICS_VERSION):
         raise InputError(f"{directory}: belongs to another sweep now; these walks were not written")
     if walks != manifest.shard_of(walks.start):
-        raise ValueError(f"walks {walks.start} to {walks.stop - 1} are no shard of this sweep")
+        raise ValueError(f"{name} are no shard of this sweep")
     if rows.dtype != manifest.row_type or not np.array_equal(rows["index"], walks):
-        raise ValueError(f"the rows are not those of walks {walks.start} to {walks.stop - 1}, all in order")
+        raise ValueError(f"the rows are not those of {name}, all in order")
     if not np.isin(rows["status"], [status for status in Status if status != Status.RUNNING]).all():
-        raise ValueError(f"a walk of {walks.start} to {walks.stop - 1} has no status that ends a walk")
+        raise ValueError(f"one of {name} has no status that ends a walk")
     motions = motions or {}
     if sorted(motions) != manifest.kept(walks):
-        raise ValueError(f"the motions are not those that are kept of walks {walks.start} to {walks.stop - 1}")
+        raise ValueError(f"the motions are not those that are kept of {name}")
     rows = rows.copy()
-    for name in rows.dtype.names or ():  # there are many NaNs, and which one may depend on the batch
-        if rows[name].dtype.kind == "f":
-            rows[name][np.isnan(rows[name])] = np.nan
+    for column in rows.dtype.names or ():  # there are many NaNs, and which one may depend on the batch
+        if rows[column].dtype.kind == "f":
+            rows[column][np.isnan(rows[column])] = np.nan
     key = _key(manifest, walks)
 
     def fill(file: "h5py.File") -> None:
@@ -115,7 +114,7 @@ def read_shard(directory: Folder, manifest: Manifest, walks: range) -> Rows:
     Args:
         directory: folder of the sweep.
         manifest: its manifest.
-        walks: indices of the walks of the shard.
+        walks: indices of all walks of the shard.
 
     Raises:
         OSError: the file cannot be read.
@@ -146,7 +145,7 @@ def read_motions(directory: Folder, manifest: Manifest, walks: range) -> dict[in
 
 @contextmanager
 def _opened(directory: Folder, manifest: Manifest, walks: range) -> "Iterator[h5py.File]":
-    """The file of a shard; whatever goes wrong while it is read means that it is damaged."""
+    """The file of a shard; an error while it is read means that it is damaged."""
     import h5py
 
     path = Path(directory) / "shards" / shard_name(walks)
@@ -174,7 +173,7 @@ def _checksum(rows: Rows) -> str:
 
 
 def present_shards(directory: Folder, manifest: Manifest) -> dict[range, Path]:
-    """The shards that are there, by their walks and in order; hidden files are passed over.
+    """The shards that are there, by their walks and in order; hidden files are ignored.
 
     Raises:
         OSError: the folder cannot be read.
@@ -195,13 +194,9 @@ def present_shards(directory: Folder, manifest: Manifest) -> dict[range, Path]:
 
 
 def hdf5_image(fill: "Callable[[h5py.File], None]") -> bytes:
-    """The bytes of an HDF5 file.
+    """The bytes of an HDF5 file that `fill` fills; equal content gives equal bytes.
 
-    The file is made in memory, because HDF5 on a full disk neither says what is wrong nor lets go of the
-    file. Version bounds and times are fixed: equal content gives equal bytes.
-
-    Args:
-        fill: fills the empty file.
+    The file is made in memory, because HDF5 on a full disk neither says what is wrong nor closes the file.
     """
     import h5py
 
@@ -213,9 +208,9 @@ def hdf5_image(fill: "Callable[[h5py.File], None]") -> bytes:
 
 @contextmanager
 def open_new_hdf5(path: Path, most: int) -> "Iterator[h5py.File]":
-    """A new HDF5 file that is too large for `hdf5_image`, with the same bytes.
+    """A new HDF5 file that may be too large for `hdf5_image`, with the same bytes.
 
-    Its room is taken beforehand, for the reason given there; what is left over is given back.
+    Its space on the disk is reserved first, for the reason given there; what is left over is given back.
 
     Args:
         path: the file, which may be there.
@@ -232,11 +227,7 @@ def open_new_hdf5(path: Path, most: int) -> "Iterator[h5py.File]":
 
 
 def _take_room(descriptor: int, size: int) -> None:
-    """Take room for a file on the disk, so that a full one is found now; what is in the file stays.
-
-    Raises:
-        OSError: there is not enough room.
-    """
+    """Reserve space for a file, whose content stays; an `OSError` if the disk has too little."""
     if hasattr(os, "posix_fallocate"):
         os.posix_fallocate(descriptor, 0, size)
         return
@@ -246,8 +237,7 @@ def _take_room(descriptor: int, size: int) -> None:
 
 
 _FIXED: Final[dict[str, Any]] = {"libver": ("v108", "v108"), "track_order": True}
-"""What equal bytes take."""
-
+"""Version bounds without which equal content would not give equal bytes; they also leave out times."""
 
 _REMEDIES: Final = {
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "make room"),
@@ -256,13 +246,17 @@ _REMEDIES: Final = {
 }
 
 
-def unwritable(path: Path, error: OSError) -> OSError:
-    """One line for what the system refused, and the remedy."""
-    number = error.errno or getattr(error.__cause__, "errno", None) or errno.EIO
-    remedy = _REMEDIES.get(number, "see to the disk")
-    return OSError(
-        f"{path}: cannot be written ({os.strerror(number)}); {remedy} and start again, shards written are kept"
-    )
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn an `OSError` of the block into one of one line, with the remedy, which says that this cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        number = error.errno or getattr(error.__cause__, "errno", None) or errno.EIO
+        remedy = _REMEDIES.get(number, "see to the disk")
+        raise OSError(
+            f"{path}: cannot be written ({os.strerror(number)}); {remedy} and start again, shards written are kept"
+        ) from error
 
 
 def put_file(path: Path, content: bytes) -> None:
@@ -271,7 +265,7 @@ def put_file(path: Path, content: bytes) -> None:
     Raises:
         OSError: the file cannot be written; one line that names it and the remedy.
     """
-    try:
+    with writing(path):
         with replacing(path) as part:
             part.write_bytes(content)
         folder = os.open(path.parent, os.O_RDONLY)
@@ -279,5 +273,3 @@ def put_file(path: Path, content: bytes) -> None:
             os.fsync(folder)  # the new name, too
         finally:
             os.close(folder)
-    except OSError as error:
-        raise unwritable(path, error) from error

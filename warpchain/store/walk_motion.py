@@ -5,8 +5,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,27 +17,17 @@ from warpchain.status import Status
 from warpchain.store.manifest import Manifest
 from warpchain.store.shards import read_motions
 from warpchain.sweeps.plan import Sweep, load_sweep
-from warpchain.walks.motion import Motion
-from warpchain.walks.walk_result import STORED, Stored
+from warpchain.walks.walk_result import STORED
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
-FIELDS: Final[Mapping[str, Stored]] = {
-    name: STORED[name]
-    for name in ("time", "center", "center_velocity", "frame_time", "frame_joints", "sprocket_center")
-}
-"""Arrays of a kept walk: name → unit and meaning, those of a `WalkResult`."""
-
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class WalkMotion:
-    """The motion of one walk of a sweep: t instants and f frames of a chain of n links.
-
-    Time counts from the release, x from wherever the release put it, y from the floor upwards. A walk that was never
-    released has no instants and no frames.
+    """The motion of one walk of a sweep: t instants and f frames of a chain of n links; none if it was never released.
 
     Attributes:
         index: number of the walk in its sweep.
@@ -46,7 +35,7 @@ class WalkMotion:
         dx: distance walked [m]; NaN unless it came to rest.
         setup: what it is.
         time: time since the release [s], shape (t,).
-        center: centre of mass x, y [m], shape (t, 2).
+        center: centre of mass x, y [m], shape (t, 2), where x is as in `WalkResult`.
         center_velocity: its velocity [m/s], shape (t, 2).
         frame_time: times of the frames [s], shape (f,).
         frame_joints: joints x, y [m], shape (f, n, 2); kept to single precision.
@@ -74,20 +63,12 @@ class WalkMotion:
         return f"<WalkMotion {self.index} {self.status.label}: dx {self.dx:.4g} m, {counts}>"
 
     def unit(self, name: str) -> str:
-        """SI unit of an array.
-
-        Raises:
-            KeyError: there is none of that name.
-        """
-        return FIELDS[name].unit
+        """SI unit of an array; a `KeyError` if there is none of that name."""
+        return STORED[name].unit
 
     def meaning(self, name: str) -> str:
-        """One line saying what an array is.
-
-        Raises:
-            KeyError: there is none of that name.
-        """
-        return FIELDS[name].meaning
+        """One line saying what an array is; a `KeyError` if there is none of that name."""
+        return STORED[name].meaning
 
     def plot(
         self, kind: Literal["figure5", "film_strip", "loop"] = "figure5", *, figure: "Figure | None" = None
@@ -104,10 +85,10 @@ class WalkMotion:
 
 @dataclass(frozen=True)
 class MotionReader:
-    """Where the motions of a sweep are.
+    """Reads the motions of a sweep.
 
     Attributes:
-        directory: folder of the sweep.
+        directory: absolute path of the sweep's folder.
         manifest: its manifest.
     """
 
@@ -116,7 +97,7 @@ class MotionReader:
 
     @cached_property
     def sweep(self) -> Sweep:
-        """The sweep itself, planned."""
+        """The sweep, checked."""
         return load_sweep(self.manifest.sweep)
 
     def walk(self, index: int, row: Mapping[str, Any]) -> WalkMotion:
@@ -130,7 +111,7 @@ class MotionReader:
             OSError: its shard cannot be read.
             InputError: its shard is damaged or foreign.
         """
-        motion: Motion = read_motions(self.directory, self.manifest, range(index, index + 1))[index]
+        motion = read_motions(self.directory, self.manifest, range(index, index + 1))[index]
         setup = self.sweep.planned(index).setup
         has_sprocket = not math.isnan(motion.sprocket_height)
         return WalkMotion(
@@ -147,10 +128,3 @@ class MotionReader:
             sprocket_radius=contact_radius(setup.scene, setup.parameters) if has_sprocket else math.nan,
             before_release=None if motion.before_release is None else motion.before_release.as_type(np.float64),
         )
-
-
-def motion_reader(directory: str | os.PathLike[str], manifest: Manifest) -> MotionReader | None:
-    """Where the motions of a sweep are; None if it keeps none."""
-    if manifest.recording.series is None:
-        return None
-    return MotionReader(Path(directory).absolute(), manifest)

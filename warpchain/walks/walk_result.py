@@ -1,9 +1,8 @@
 """What a run returns, and the HDF5 file that keeps a walk.
 
-Unit and meaning of every field stand beside it, once; the file repeats them on each dataset. A saved walk
-has the groups `series` (time series), `frames` (joint positions), `summary` (numbers) and `parameters` (the
-chain's quantities with their symbols), and `before_release` if that was kept; its attributes `setup`, `seed`
-and `versions`, in JSON, say how to make it again.
+A saved walk has the groups `series` (time series), `frames` (joint positions), `summary` (numbers), `parameters` (the
+chain's quantities with their symbols) and, if that was kept, `before_release`; every dataset has its unit and meaning.
+The attributes `setup`, `seed` and `versions`, in JSON, say how to make the walk again.
 """
 
 import dataclasses
@@ -18,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
+from warpchain.engine.tallies import COUNTS, DEPTHS, EXTREMES, IMPULSES, LOST
 from warpchain.files import reason, replacing, version_refusal
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
@@ -54,13 +53,13 @@ class Stored:
     """Annotation of a field that a file keeps.
 
     Attributes:
-        path: dataset in the file, or group when the field is a dictionary.
+        group: of the file.
         unit: SI unit, "1" for pure numbers.
         meaning: one line saying what the numbers are.
-        keys: for a dictionary, its keys and their meanings.
+        keys: for a dictionary, which is a group of its own, its keys and their meanings.
     """
 
-    path: str
+    group: str
     unit: str
     meaning: str
     keys: Mapping[str, str] = field(default_factory=dict)
@@ -70,78 +69,60 @@ class Stored:
 class WalkResult:
     """One walk, from the release to its end: t instants and f frames of a chain of n links.
 
-    Time counts from the release, x from wherever the release put it, y from the floor upwards. The other
-    fields say their units and shapes themselves. `setup` is complete; `seed` is that of the parameters'
-    random draw, None if nothing was drawn; `versions` names the software. `before_release` is the motion on the
-    sprocket just before the release, None if it was not kept.
+    Time counts from the release, x from the centre of sprocket or ellipse, y up from the floor. Units, meanings and
+    shapes stand beside the fields. `setup` is complete; `seed` is that of the random draw, None if nothing was drawn;
+    `versions` names the software. `before_release` is the motion on the sprocket just before the release, None if it
+    was not kept.
 
     Raises:
         ValueError: an array has another shape, or a dictionary other keys, than stands beside its field.
     """
 
     status: Status
-    dx: Annotated[
-        float,
-        Stored("summary/dx", "m", "x of the centre of mass less x of the sprocket; NaN unless at rest"),
-    ]
-    walk_time: Annotated[float, Stored("summary/walk_time", "s", "from the release to the end")]
-    simulated_time: Annotated[
-        float, Stored("summary/simulated_time", "s", "simulated, the phases before the release included")
-    ]
+    dx: Annotated[float, Stored("summary", "m", "x of the centre of mass less x of the sprocket; NaN unless at rest")]
+    walk_time: Annotated[float, Stored("summary", "s", "from the release to the end")]
+    simulated_time: Annotated[float, Stored("summary", "s", "simulated, the phases before the release included")]
     hold_time: Annotated[
-        float, Stored("summary/hold_time", "s", "for which the loop was held at full frequency; NaN without a sprocket")
+        float, Stored("summary", "s", "for which the loop was held at full frequency; NaN without a sprocket")
     ]
     drift: Annotated[
         float,
         Stored(
-            "summary/drift",
+            "summary",
             "1",
             "greatest change of the held loop's mean height, width or place, relative to height or width, while it was "
             "last watched; NaN if it never was",
         ),
     ]
     softened_at: Annotated[
-        float,
-        Stored("summary/softened_at", "s", "from the release to the softening of the joints; NaN if they were not"),
+        float, Stored("summary", "s", "from the release to the softening of the joints; NaN if they were not")
     ]
-    wall_time: Annotated[float, Stored("summary/wall_time", "s", "that the computer took")]
-    bounces: Annotated[int, Stored("summary/bounces", "1", COUNTS["bounces"])]
-    steps_accepted: Annotated[int, Stored("summary/steps_accepted", "1", COUNTS["accepted"])]
-    steps_rejected: Annotated[int, Stored("summary/steps_rejected", "1", COUNTS["rejected"])]
-    impulses: Annotated[
-        dict[str, int],
-        Stored("summary/impulses", "1", "by kind of contact", {kind: COUNTS[kind] for kind in CONTACTS}),
-    ]
-    greatest_opening: Annotated[float, Stored("summary/greatest_opening", "m", EXTREMES["opening"])]
-    greatest_penetration: Annotated[
-        dict[str, float],
-        Stored("summary/greatest_penetration", "m", "by kind of contact", {kind: EXTREMES[kind] for kind in CONTACTS}),
-    ]
-    energy: Annotated[dict[str, float], Stored("summary/energy", "J", "ledger of the walk", ENERGIES)]
+    wall_time: Annotated[float, Stored("summary", "s", "that the computer took")]
+    bounces: Annotated[int, Stored("summary", "1", COUNTS["bounces"])]
+    steps_accepted: Annotated[int, Stored("summary", "1", COUNTS["accepted"])]
+    steps_rejected: Annotated[int, Stored("summary", "1", COUNTS["rejected"])]
+    impulses: Annotated[dict[str, int], Stored("summary", "1", "by kind of contact", IMPULSES)]
+    greatest_opening: Annotated[float, Stored("summary", "m", EXTREMES["opening"])]
+    greatest_penetration: Annotated[dict[str, float], Stored("summary", "m", "by kind of contact", DEPTHS)]
+    energy: Annotated[dict[str, float], Stored("summary", "J", "ledger of the walk", ENERGIES)]
     sprocket_center: Annotated[
-        Array | None,
-        Stored("summary/sprocket_center", "m", "centre of the sprocket, shape (2,); absent without one"),
+        Array | None, Stored("summary", "m", "centre of the sprocket, shape (2,); absent without one")
     ]
-    sprocket_radius: Annotated[float, Stored("summary/sprocket_radius", "m", "radius of the sprocket that links touch")]
+    sprocket_radius: Annotated[float, Stored("summary", "m", "radius of the sprocket that links touch")]
     setup: Setup
     seed: int | None
     versions: dict[str, str]
-    time: Annotated[Array, Stored("series/time", "s", "time since the release, shape (t,)")]
-    center: Annotated[Array, Stored("series/center", "m", "centre of mass x, y, shape (t, 2)")]
-    center_velocity: Annotated[
-        Array, Stored("series/center_velocity", "m/s", "velocity of the centre of mass x, y, shape (t, 2)")
-    ]
-    kinetic_energy: Annotated[Array, Stored("series/kinetic_energy", "J", "kinetic energy, shape (t,)")]
-    gravitational_energy: Annotated[
-        Array, Stored("series/gravitational_energy", "J", "energy in the field of gravity, shape (t,)")
-    ]
-    spring_energy: Annotated[Array, Stored("series/spring_energy", "J", "energy of the joint springs, shape (t,)")]
-    lowest: Annotated[Array, Stored("series/lowest", "m", "height of the lowest point of all circles, shape (t,)")]
-    rms_speed: Annotated[Array, Stored("series/rms_speed", "m/s", "root mean square speed of the links, shape (t,)")]
-    frame_time: Annotated[Array, Stored("frames/time", "s", "time since the release, shape (f,)")]
+    time: Annotated[Array, Stored("series", "s", "time since the release, shape (t,)")]
+    center: Annotated[Array, Stored("series", "m", "centre of mass x, y, shape (t, 2)")]
+    center_velocity: Annotated[Array, Stored("series", "m/s", "velocity of the centre of mass x, y, shape (t, 2)")]
+    kinetic_energy: Annotated[Array, Stored("series", "J", "kinetic energy, shape (t,)")]
+    gravitational_energy: Annotated[Array, Stored("series", "J", "energy in the field of gravity, shape (t,)")]
+    spring_energy: Annotated[Array, Stored("series", "J", "energy of the joint springs, shape (t,)")]
+    lowest: Annotated[Array, Stored("series", "m", "height of the lowest point of all circles, shape (t,)")]
+    rms_speed: Annotated[Array, Stored("series", "m/s", "root mean square speed of the links, shape (t,)")]
+    frame_time: Annotated[Array, Stored("frames", "s", "time since the release, shape (f,)")]
     frame_joints: Annotated[
-        Array,
-        Stored("frames/joints", "m", "joints x, y, shape (f, n, 2); joint i ends link i, even links inner"),
+        Array, Stored("frames", "m", "joints x, y, shape (f, n, 2); joint i ends link i, even links inner")
     ]
     before_release: BeforeRelease | None = None
 
@@ -149,14 +130,13 @@ class WalkResult:
         """Check that arrays and dictionaries fit together."""
         instants, frames = len(self.time), len(self.frame_time)
         shapes: dict[str, tuple[int, ...]] = {
-            name: (instants,) for name, stored in STORED.items() if stored.path.startswith("series/")
+            name: (instants,) for name, stored in STORED.items() if stored.group == "series"
         }
         shapes["center"] = shapes["center_velocity"] = (instants, 2)
         shapes["frame_time"] = (frames,)
         shapes["frame_joints"] = (frames, self.setup.scene.links, 2)
-        before = self.before_release
-        if before is not None and before.frame_joints.shape[1] != self.setup.scene.links:
-            links = self.setup.scene.links
+        links, before = self.setup.scene.links, self.before_release
+        if before is not None and before.frame_joints.shape[1] != links:
             raise ValueError(f"before_release: its frames are not of {links} links; give those of this walk")
         if self.sprocket_center is not None:
             shapes["sprocket_center"] = (2,)
@@ -169,7 +149,7 @@ class WalkResult:
                 raise ValueError(f"{name}: wrong keys; give exactly {', '.join(stored.keys)}")
 
     def __repr__(self) -> str:
-        """One line with what one wants to know first."""
+        """One line with the most important numbers."""
         scene = self.setup.scene
         return (
             f"<WalkResult {self.status.label}: dx {self.dx:.4g} m in {self.walk_time:.4g} s, "
@@ -177,8 +157,8 @@ class WalkResult:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything but time series and frames, as JSON has it; a number that is not finite is None."""
-        summary = {name: getattr(self, name) for name, stored in STORED.items() if stored.path.startswith("summary/")}
+        """Everything but time series and frames, for JSON; a number that is not finite is None."""
+        summary = {name: getattr(self, name) for name, stored in STORED.items() if stored.group == "summary"}
         plain: dict[str, Any] = _plain(
             {
                 "dx": summary.pop("dx"),
@@ -257,6 +237,7 @@ STORED: Final[dict[str, Stored]] = {
     if isinstance(note, Stored)
 }
 """Fields of `WalkResult` that a file keeps as datasets: name → where, in which unit, what."""
+_PATHS: Final = {name: f"{stored.group}/{name.removeprefix('frame_')}" for name, stored in STORED.items()}
 
 
 def load_walk(path: str | os.PathLike[str]) -> WalkResult:
@@ -277,9 +258,12 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
         raise ValueError(f"{path}: not an HDF5 file; give a file written by WalkResult.save")
     try:
         with h5py.File(path, "r") as file:
-            refusal = _refusal(file)
-            if refusal is None:
+            if file.attrs.get("format") != FORMAT:
+                refusal = "HDF5, but not a walk; give a file written by WalkResult.save"
+            elif (found := version_refusal(file.attrs["format_version"], FORMAT_VERSION, "run the walk again")) is None:
                 return _read(file)
+            else:
+                refusal = found
     except ValidationError as error:
         first = ".".join(str(part) for part in error.errors()[0]["loc"])
         refusal = f"this warpchain refuses its setup ({first}); read it with the version that wrote it"
@@ -294,7 +278,7 @@ def _setup_as_dict(setup: Setup) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """The same value made of what JSON knows."""
+    """A value as JSON has it."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):
@@ -317,9 +301,9 @@ def _write(walk: WalkResult, file: "h5py.File") -> None:
         value = getattr(walk, name)
         if stored.keys:
             for key, meaning in stored.keys.items():
-                _put(file, f"{stored.path}/{key}", value[key], stored.unit, meaning)
+                _put(file, f"{_PATHS[name]}/{key}", value[key], stored.unit, meaning)
         elif value is not None:
-            _put(file, stored.path, value, stored.unit, stored.meaning)
+            _put(file, _PATHS[name], value, stored.unit, stored.meaning)
     for name, quantity in Parameters.quantities().items():
         value = getattr(walk.setup.parameters, name)
         dataset = _put(file, f"parameters/{name}", value, quantity.unit, quantity.meaning)
@@ -337,13 +321,6 @@ def _put(file: "h5py.File", path: str, value: float | Array, unit: str, meaning:
     return dataset
 
 
-def _refusal(file: "h5py.File") -> str | None:
-    """Why this file cannot be a walk for us, or None."""
-    if file.attrs.get("format") != FORMAT:
-        return "HDF5, but not a walk; give a file written by WalkResult.save"
-    return version_refusal(file.attrs["format_version"], FORMAT_VERSION, "run the walk again")
-
-
 def _read(file: "h5py.File") -> WalkResult:
     """The walk in a file of our format."""
     setup = json.loads(file.attrs["setup"])
@@ -358,13 +335,13 @@ def _read(file: "h5py.File") -> WalkResult:
         "seed": json.loads(file.attrs["seed"]),
         "versions": json.loads(file.attrs["versions"]),
     }
-    for name, stored in STORED.items():
-        if stored.keys:
-            values[name] = {key: file[f"{stored.path}/{key}"][()].item() for key in stored.keys}
-        elif name == "sprocket_center" and stored.path not in file:
+    for name, path in _PATHS.items():
+        if keys := STORED[name].keys:
+            values[name] = {key: file[f"{path}/{key}"][()].item() for key in keys}
+        elif name == "sprocket_center" and path not in file:
             values[name] = None
         else:
-            number = file[stored.path][()]
+            number = file[path][()]
             values[name] = number if number.shape else number.item()
     if BEFORE in file:
         values["before_release"] = read_before_release(file[BEFORE])
