@@ -70,8 +70,8 @@ def walk(
             integrator, 1e-4 for ``"hybrid"``, and of ``"standard"`` and ``"explicit"`` 3e-3 while joints are soft.
         start: ``"rest"``, ``"spinning"`` or ``"ellipse"``.
         seed: Draw parameters, phase and clearance from their distributions; None: Table 1's means, phase 0.
-        frame_interval: Time between kept frames of all joints [s], to whole samples; None keeps none. Neither frames
-            nor samples change the walk: they are taken at the first step's end after their time.
+        frame_interval: Time between kept frames of all joints [s], rounded to whole samples; None keeps none. Frames
+            and samples do not change the walk: they are taken at the end of the first step after their time.
         record_before: Time [s] before the release of which frames and samples are kept as well, as ``before_release``
             of the result, with the forces in the joints; None: 0.5 s if frames are kept; 0: none. Nothing is kept of
             a loop under multiplied loads; ``further_hold`` makes room for more.
@@ -114,15 +114,7 @@ def run_walk(
     record_before: float | None = None,
     on_progress: OnProgress | None = None,
 ) -> WalkResult:
-    """Run a walk that is set up completely; arguments and result as of :func:`walk`.
-
-    Args:
-        setup: Everything that says what the walk is, samples drawn.
-        seed: Only noted in the result.
-        frame_interval: See :func:`walk`.
-        record_before: See :func:`walk`.
-        on_progress: See :func:`walk`.
-    """
+    """Run a walk whose setup is complete, samples drawn; the seed is only noted. The rest is as of :func:`walk`."""
     started = time.perf_counter()
     frame_every = None if frame_interval is None else _samples_per_frame(frame_interval, setup.options)
     before = _time_before(record_before, frame_every) if setup.scene.start != "ellipse" else 0.0
@@ -149,11 +141,7 @@ def run_walk(
 
 
 def _samples_per_frame(frame_interval: float, options: Options) -> int:
-    """Whole samples between two kept frames.
-
-    Raises:
-        InputError: The interval is no time, or shorter than that between samples.
-    """
+    """Whole samples between two kept frames, or an `InputError`."""
     if not (_is_number(frame_interval) and 0 < frame_interval < math.inf):
         raise InputError(f"frame_interval: {shown(frame_interval)} is not a positive time in s; give one, or None")
     samples = frame_interval / options.record_interval if frame_interval < LONGEST_FRAME_INTERVAL else math.inf
@@ -166,11 +154,7 @@ def _samples_per_frame(frame_interval: float, options: Options) -> int:
 
 
 def _time_before(record_before: float | None, frame_every: int | None) -> float:
-    """Time [s] before the release that is kept.
-
-    Raises:
-        InputError: It is no time, or no frames are kept.
-    """
+    """Time [s] before the release that is kept, or an `InputError`."""
     if record_before is None:
         return RECORD_BEFORE if frame_every is not None else 0.0
     if not (_is_number(record_before) and 0 <= record_before < math.inf):

@@ -1,10 +1,11 @@
-"""Runs a sweep: hands its shards to workers, follows their progress, and survives being killed.
+"""Runs a sweep: hands its shards to workers and follows their progress; a sweep that was killed can go on.
 
-A worker runs the walks of a shard and writes them to an immutable file; what it returns is only the shard's key. So
+A worker runs the walks of shards, writes each shard to an immutable file and returns only the keys of the shards. So
 any executor in the style of ``concurrent.futures`` will do, on this machine or another that sees the same folder.
 """
 
 import concurrent.futures
+import contextlib
 import os
 import threading
 import time
@@ -31,17 +32,17 @@ from warpchain.walks.scheduler import compile_kernels, run_setups
 SHARD_WALKS = 256
 """Most walks in a shard."""
 GPU_TASK_WALKS = 65536
-"""About the most walks that a GPU is given at a time: while the last of them come to rest it runs dry."""
+"""Upper bound on the walks of a GPU's task, about; the GPU idles while the last walks finish."""
 POLL = 1.0
-"""Time [s] between two looks for shards that tasks under way have written."""
+"""Time [s] between two checks for shards that tasks under way have written."""
 GPU_WORKERS = 2
 """Tasks at a time on a GPU: while the last walks of one come to rest, the other fills the device."""
 SHARDS = 128
-"""A sweep has at least about this many shards, as far as it has walks: the grain of progress and of a restart."""
+"""Least number of shards of a sweep, about, if it has as many walks: the grain of progress and of a restart."""
 
 
 class Executor(Protocol):
-    """What is needed of an executor: ``concurrent.futures``, ``mpi4py.futures``, Dask's ``get_executor()``."""
+    """An executor such as those of ``concurrent.futures``, ``mpi4py.futures`` and Dask's ``get_executor()``."""
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any) -> "concurrent.futures.Future[Any]":
         """Run ``function(*arguments)`` somewhere."""
@@ -50,7 +51,7 @@ class Executor(Protocol):
 
 @dataclass
 class SweepProgress:
-    """How far a sweep is.
+    """Progress of a sweep.
 
     Attributes:
         walks: Walks of the sweep.
@@ -93,14 +94,13 @@ def sweep(
 
     Args:
         source: A sweep file (YAML), its content, or a :class:`Sweep`.
-        out: Folder of the results. A sweep that was killed goes on where it was; the data come out the same, to the
-            byte.
+        out: Folder of the results. A sweep that was killed goes on where it was, and leaves the same bytes.
         device: ``"cpu"``, ``"cuda"`` or ``"cuda:N"`` instead of what the sweep says. Method ``standard`` is then what
             it means there; the ``sweep.yaml`` of a folder names the method that was run, which stays.
-        executor: Where shards are run; it must see ``out``. Default: threads of this process.
-        workers: Tasks in work at the same time; default: processors of this machine, and on a GPU two, each of which
-            keeps thousands of walks going. With an executor, at least the number of its workers.
-        fresh: Discard what another sweep left in the folder.
+        executor: Where shards are run; its workers must see ``out``. Default: threads of this process.
+        workers: Number of tasks at a time. Default: the processors of this machine, and two on a GPU, each of which
+            runs thousands of walks. With an executor, at least the number of its workers.
+        fresh: Delete what another sweep left in the folder.
         on_progress: Called before kernels are compiled, when the walks begin and after each shard.
 
     Raises:
@@ -120,10 +120,15 @@ def sweep(
         store.log(f"{len(missing)} shards to do, {before} of {planned.walk_count} walks done")
         report = on_progress or (lambda progress: None)
         if missing:
-            if executor is None:
-                _run_in_threads(planned, store, missing, at_once, progress, report)
-            else:
+            if executor is not None:
                 _run(executor, None, planned, store, missing, at_once, progress, report)
+            else:
+                progress.compiling = True
+                report(progress)
+                prepare(planned)
+                progress.compiling = False
+                with _threads(at_once) as (threads, stop):
+                    _run(threads, stop, planned, store, missing, at_once, progress, report)
         store.log(f"complete after {progress.seconds:.1f} s: " + _counts(progress.statuses))
     return load(out)
 
@@ -131,8 +136,8 @@ def sweep(
 def on_device(planned: Sweep, device: str) -> Sweep:
     """The same sweep on another device; a method that was named by need is what this means there.
 
-    The canonical form, in which a folder keeps its sweep, names the method itself: what was run once is run again, on
-    whatever device, and does not change with the meaning of a word.
+    The canonical form, in which a folder keeps its sweep, names the method itself, so that the sweep is run again with
+    the same method on any device.
 
     Raises:
         InputError: The sweep's grid goes over devices.
@@ -154,7 +159,7 @@ def _is_on_gpu(planned: Sweep) -> bool:
 
 
 def shard_size(walks: int) -> int:
-    """Walks per shard; it depends on the sweep only, so that the files do not depend on who works on them."""
+    """Walks per shard; it depends on the sweep only, so that equal sweeps leave equal files."""
     return max(1, min(SHARD_WALKS, walks // SHARDS))
 
 
@@ -203,23 +208,13 @@ def run_shards(
     return keys
 
 
-def _run_in_threads(
-    planned: Sweep,
-    store: SweepFolder,
-    missing: Sequence[range],
-    workers: int,
-    progress: SweepProgress,
-    report: Callable[[SweepProgress], None],
-) -> None:
-    """Run shards in threads of this process; launches run outside of Python's lock."""
-    progress.compiling = True
-    report(progress)
-    prepare(planned)
-    progress.compiling = False
+@contextlib.contextmanager
+def _threads(count: int) -> Iterator[tuple[Executor, threading.Event]]:
+    """Threads of this process, and what stops their tasks; launches run outside of Python's lock."""
     stop = threading.Event()
-    with concurrent.futures.ThreadPoolExecutor(workers) as threads:
+    with concurrent.futures.ThreadPoolExecutor(count) as threads:
         try:
-            _run(threads, stop, planned, store, missing, workers, progress, report)
+            yield threads, stop
         except BaseException:
             stop.set()
             raise
@@ -231,7 +226,7 @@ def prepare(planned: Sweep) -> None:
 
 
 def one_of_each_cell(planned: Sweep) -> list[Setup]:
-    """Options and links of every cell."""
+    """Setups with the options and links of every cell."""
     firsts = (
         first for block in planned.blocks for first in range(block.first, block.first + block.walk_count, block.samples)
     )
@@ -239,7 +234,7 @@ def one_of_each_cell(planned: Sweep) -> list[Setup]:
 
 
 def _shared_threads(planned: Sweep) -> int | None:
-    """Threads of every block of the walks of a sweep on a GPU, all of one method; None: as many as a chain needs."""
+    """Threads of every block if the sweep runs on a GPU with one method; None: as many as a chain needs."""
     if not _is_on_gpu(planned):
         return None
     cells = one_of_each_cell(planned)
@@ -259,7 +254,7 @@ def _run(
     progress: SweepProgress,
     report: Callable[[SweepProgress], None],
 ) -> None:
-    """Keep the workers busy with two tasks each; memory does not grow with the sweep."""
+    """Give each worker two tasks at a time, so that memory does not grow with the sweep."""
     report(progress)
     began = time.perf_counter()
     threads, waiting = _shared_threads(planned), _tasks(planned, missing, workers)
@@ -300,10 +295,10 @@ def _run(
 
 
 def _tasks(planned: Sweep, missing: Sequence[range], workers: int) -> Iterator[list[range]]:
-    """What is handed to a worker at a time: a shard, or for a GPU enough shards to fill it, if there are enough.
+    """The shards of each task: one on a CPU; on a GPU enough to fill it, if there are enough.
 
-    Shards that follow one another are alike and a GPU's tasks are few: each takes every so many-th, so that all tasks
-    take as long.
+    Neighbouring shards are alike, and a GPU has few tasks. So each task takes every n-th shard, and all take equally
+    long.
     """
     on_gpu: list[range] = []
     firsts = planned.undrawn(shard.start for shard in missing)

@@ -4,6 +4,7 @@ import threading
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
 
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import most_worlds, start_device
@@ -46,16 +47,16 @@ def run_setups(
 ) -> Iterator[tuple[int, WalkRun]]:
     """Run walks and yield each when it is over, as (place in ``setups``, run).
 
-    A run must be read before the next one is asked for: its world is used again. What a walk gives does not depend,
-    to the bit, on the others or on the number of slots.
+    A run must be read before the next one is asked for: its world is used again. No bit of a walk depends on the others
+    or on the number of slots.
 
     Args:
         setups: The walks, samples drawn; with ``draw``, options and links suffice.
         draw: Asked for a walk, by its place, when it begins; its options and links are those of ``setups``.
         keeps: What is kept of the motion of each, for ``run.recorder``; None: nothing. Walks of equal options keep
             frames equally often.
-        slots: Chains that are carried on together in one launch. Default: on a GPU as many as fill it, on a CPU, where
-            a launch is one core's work, one at a time, which stays in the cache.
+        slots: Number of chains that run at the same time. Default: on a GPU as many as fill it; on a CPU, where one
+            core does a launch, one, which stays in the cache.
         threads: Of every block on a GPU, see `warpchain.engine.kernel_choice.shared_threads`; no bit depends on it.
         stop: When set, the walks are abandoned after the launch that is under way.
         watch: For progress; kernels are then loaded one by one when they are needed, and said to be.
@@ -80,36 +81,26 @@ def run_setups(
 def _batches(
     options: Options, links: Sequence[int], keeps: Sequence[Keep], slots: int | None, threads: int | None
 ) -> list[Batch]:
-    """Room for walks: on a CPU one batch, on a GPU several, with as many worlds in all as are of use and fit."""
-    longest = max(links)
+    """Batches for walks: on a CPU one, on a GPU several, with as many worlds in all as are of use and fit."""
+    longest, on_gpu = max(links), options.device.startswith("cuda")
     # Every batch keeps what any walk wants, although most may want nothing: others would wait for two slowest walks.
-    keeps_samples = any(keep.series_every for keep in keeps)
+    samples, loads = any(keep.series_every for keep in keeps), any(keep.before > 0 for keep in keeps)
     frame_every = next((keep.frame_every for keep in keeps if keep.frame_every), None)
-    keeps_loads = any(keep.before > 0 for keep in keeps)
-    on_gpu = options.device.startswith("cuda")
-    if slots is None:
-        fitting = 1
-        if on_gpu:
-            kept = {"keeps_samples": keeps_samples, "keeps_frames": frame_every is not None, "keeps_loads": keeps_loads}
-            fitting = most_worlds(longest, options, **kept)
-        slots = min(fitting, len(links))
+    if slots is None and on_gpu:
+        frames = frame_every is not None
+        slots = most_worlds(longest, options, keeps_samples=samples, keeps_frames=frames, keeps_loads=loads)
+        slots = min(slots, len(links))
+    slots = slots or 1
     worlds = -(-slots // BATCHES_PER_GPU) if on_gpu else slots
+    kept: dict[str, Any] = {"keeps_samples": samples, "frame_every": frame_every, "keeps_loads": loads}
     return [
-        Batch(
-            min(worlds, slots - first),
-            longest,
-            options,
-            keeps_samples=keeps_samples,
-            frame_every=frame_every,
-            keeps_loads=keeps_loads,
-            threads=threads,
-        )
+        Batch(min(worlds, slots - first), longest, options, threads=threads, **kept)
         for first in range(0, slots, worlds)
     ]
 
 
 def compile_kernels(setups: Iterable[Setup], threads: int | None = None) -> None:
-    """Make sure that every kernel these walks need is ready, before threads or processes ask for it at once.
+    """Compile every kernel that these walks need, before several threads or processes ask for it at once.
 
     Args:
         setups: The walks.

@@ -1,8 +1,8 @@
-"""The run of one walk on one world of a batch: which phase follows which, and what remains in the end.
+"""The run of one walk on one world of a batch: its phases, and its outcome.
 
 The drive (settle, spin-up, hold until steady) needs a sprocket and no floor, the walk a floor and no sprocket. The
-equations do not know where the floor is, so the chain is driven about the origin and raised to its clearance at the
-release.
+equations of the drive do not contain the floor, so the chain is driven about the origin and raised to its clearance at
+the release.
 """
 
 import math
@@ -37,11 +37,11 @@ from warpchain.walks.recorder import Recorder
 Array = NDArray[np.float64]
 
 STILL_PERIOD = 0.25
-"""What counts as the loop period [s] when the sprocket stands still."""
+"""Loop period [s] that is assumed when the sprocket stands still."""
 SHORTEST_WINDOW, LONGEST_WINDOW = 0.05, 0.25
-"""Bounds of the time [s] over which means are taken of a loop under its own loads; between them half a loop period."""
+"""Bounds of the time [s] over which a loop under its own loads is averaged; between them half a loop period."""
 BY_ITSELF = -1.0
-"""A time that the kernel sets, see :mod:`warpchain.kernels.events.release`."""
+"""Stands for a time that the kernel sets, see :mod:`warpchain.kernels.events.release`."""
 
 
 class Phase(Enum):
@@ -54,13 +54,13 @@ class Phase(Enum):
 
 
 class WalkRun:
-    """One walk: loads a world, and takes it into its next phase whenever it has stopped.
+    """One walk: loads a world, and starts its next phase whenever it has stopped.
 
     Attributes:
         setup: What the walk is.
         status: RUNNING until the run is over.
-        raised: Height [m] by which the chain was raised at the release, where the sprocket's centre was then; NaN
-            before the release.
+        raised: Height [m] by which the chain was raised at the release, and of the sprocket's centre then; NaN before
+            the release.
         drive_time: Simulated time [s] before the release.
         drift: How far the loop moved while it was last watched on its sprocket, relative to its height or width; NaN if
             it was not watched.
@@ -218,7 +218,7 @@ class WalkRun:
         return ledger if self._released else dict.fromkeys(ledger, math.nan)
 
     def outcome(self) -> dict[str, Any]:
-        """What the walk gave beside its motion, by the names of the fields of `WalkResult`."""
+        """Results of the walk apart from its motion, by the names of the fields of `WalkResult`."""
         setup, counts, extremes = self.setup, self.counts, self.extremes
         is_at_rest = self.status == Status.AT_REST
         return {
@@ -246,11 +246,11 @@ class WalkRun:
         return self.recorder.motion(self.raised if self._has_sprocket else math.nan)
 
     def drain(self) -> None:
-        """Take what a launch has recorded; to be called after each, before the next phase."""
+        """Take what a launch has recorded; to be called after each launch, before the next phase."""
         self.recorder.drain(self._released)
 
     def next_phase(self) -> bool:
-        """Take a world that has stopped into its next phase; False if the run is over."""
+        """Start the next phase of a world that has stopped; False if the run is over."""
         status = self._batch.status(self._world)
         if not self._released:
             self.drift = self._batch.drift(self._world)
