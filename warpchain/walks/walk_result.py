@@ -7,7 +7,6 @@ The attributes `setup`, `seed` and `versions`, in JSON, say how to make the walk
 
 import dataclasses
 import json
-import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
+from pydantic_core import to_jsonable_python
 
 from warpchain.engine.tallies import COUNTS, DEPTHS, EXTREMES, IMPULSES, LOST
 from warpchain.files import reason, replacing, version_refusal
@@ -279,13 +279,7 @@ def _setup_as_dict(setup: Setup) -> dict[str, Any]:
 
 def _plain(value: Any) -> Any:
     """A value as JSON has it."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return to_jsonable_python(value, inf_nan_mode="null", fallback=lambda array: array.tolist())
 
 
 def _write(walk: WalkResult, file: "h5py.File") -> None:
