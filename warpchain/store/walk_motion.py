@@ -5,7 +5,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,16 +17,13 @@ from warpchain.status import Status
 from warpchain.store.manifest import Manifest
 from warpchain.store.shards import read_motions
 from warpchain.sweeps.plan import Sweep, load_sweep
-from warpchain.walks.walk_result import STORED
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from warpchain.walks.walk_result import STORED, Drawn
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class WalkMotion:
+class WalkMotion(Drawn):
     """The motion of one walk of a sweep: t instants and f frames of a chain of n links; none if it was never released.
 
     Attributes:
@@ -69,18 +66,6 @@ class WalkMotion:
     def meaning(self, name: str) -> str:
         """One line saying what an array is; a `KeyError` if there is none of that name."""
         return STORED[name].meaning
-
-    def plot(
-        self, kind: Literal["figure5", "film_strip", "loop"] = "figure5", *, figure: "Figure | None" = None
-    ) -> "Figure":
-        """Draw the walk, see `WalkResult.plot`.
-
-        Raises:
-            ValueError: the kind is unknown, or what it shows was not kept.
-        """
-        from warpchain.pictures.walk_figures import draw
-
-        return draw(self, kind, figure=figure)
 
 
 @dataclass(frozen=True)

@@ -65,8 +65,29 @@ class Stored:
     keys: Mapping[str, str] = field(default_factory=dict)
 
 
+class Drawn:
+    """A walk that can draw itself."""
+
+    def plot(
+        self: Any, kind: Literal["figure5", "film_strip", "loop"] = "figure5", *, figure: "Figure | None" = None
+    ) -> "Figure":
+        """Draw the walk.
+
+        Args:
+            kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself, `loop` for
+                its loop on the sprocket just before the release.
+            figure: an empty matplotlib figure to draw into; by default a new one.
+
+        Raises:
+            ValueError: the kind is unknown, or the walk does not have what it shows: frames, or `before_release`.
+        """
+        from warpchain.pictures.walk_figures import draw
+
+        return draw(self, kind, figure=figure)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class WalkResult:
+class WalkResult(Drawn):
     """One walk, from the release to its end: t instants and f frames of a chain of n links.
 
     Time counts from the release, x from the centre of sprocket or ellipse, y up from the floor. Units, meanings and
@@ -171,23 +192,6 @@ class WalkResult:
             }
         )
         return plain
-
-    def plot(
-        self, kind: Literal["figure5", "film_strip", "loop"] = "figure5", *, figure: "Figure | None" = None
-    ) -> "Figure":
-        """Draw the walk.
-
-        Args:
-            kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself, `loop` for
-                its loop on the sprocket just before the release.
-            figure: an empty matplotlib figure to draw into; by default a new one.
-
-        Raises:
-            ValueError: the kind is unknown, or the walk does not have what it shows: frames, or `before_release`.
-        """
-        from warpchain.pictures.walk_figures import draw
-
-        return draw(self, kind, figure=figure)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the walk to an HDF5 file, whole or not at all; an older file of that name is replaced.
