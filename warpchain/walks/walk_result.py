@@ -24,6 +24,7 @@ from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.setup import Setup
 from warpchain.loop.before_release import BeforeRelease, read_before_release, write_before_release
+from warpchain.pictures.walk_shape import Walk
 from warpchain.status import Status
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ class Drawn:
     """A walk that can draw itself."""
 
     def plot(
-        self: Any, kind: Literal["figure5", "film_strip", "loop"] = "figure5", *, figure: "Figure | None" = None
+        self: Walk, kind: Literal["figure5", "film_strip", "loop"] = "figure5", *, figure: "Figure | None" = None
     ) -> "Figure":
         """Draw the walk.
 
