@@ -37,3 +37,18 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
 def reason(error: OSError) -> str:
     """The system's short text for an error; HDF5 hides it in a paragraph."""
     return os.strerror(error.errno) if error.errno else " ".join(str(error).split())
+
+
+def version_refusal(found: int, known: int, remedy: str) -> str | None:
+    """Why a file of one format version is refused where another is known; None if they are equal.
+
+    Args:
+        found: version of the file.
+        known: version that this warpchain reads.
+        remedy: how to get an older file's content in this version.
+    """
+    if found == known:
+        return None
+    if found > known:
+        return f"format version {found}, but this warpchain reads {known}; update warpchain"
+    return f"format version {found}, but this warpchain reads {known}; {remedy}, or use the warpchain that wrote it"

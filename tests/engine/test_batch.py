@@ -1,7 +1,9 @@
 """Batches side by side, their memory, and the copies of their arrays on the host; what of it needs no GPU."""
 
 import threading
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,14 +16,11 @@ from warpchain.engine.devices import CAPACITY_FRAMES, CAPACITY_SAMPLES, start_de
 from warpchain.engine.kernel_choice import block_threads, features_of, kernels_of, shared_threads
 from warpchain.engine.mirror import Mirror
 from warpchain.inputs.options import Options
-from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
-from warpchain.run import sweep_run
-from warpchain.run.sweep_run import SweepProgress, prepare, run_shards
-from warpchain.sweeps.plan import load_sweep
+from warpchain.run.sweep_run import SweepProgress, prepare, sweep
+from warpchain.sweeps.plan import Sweep, load_sweep
 from warpchain.walks import scheduler
-from warpchain.walks.walk_phases import WalkRun
 
 FEW = {"version": 1, "name": "few", "seed": 1, "preset": "soft", "samples": 2, "grid": {"links": [60, 150]}}
 """Content of a sweep of two lengths."""
@@ -127,26 +126,29 @@ def test_kernels_of_a_sweep_are_those_that_its_walks_ask_for(monkeypatch: pytest
 
     monkeypatch.setattr(scheduler, "load_kernels", note)
     monkeypatch.setattr(scheduler, "start_device", lambda _: None)
-    prepare(FEW | {"options": {"device": "cuda"}})
+    prepare(load_sweep(FEW | {"options": {"device": "cuda"}}))
     assert loaded == {("os32", "floor", 160), ("os32", "sprocket", 160)}
     loaded.clear()
-    prepare(FEW | {"samples": 2000, "options": {"device": "cuda"}})
+    prepare(load_sweep(FEW | {"samples": 2000, "options": {"device": "cuda"}}))
     assert loaded == {("os32", body, threads) for body in ("floor", "sprocket") for threads in (64, 160)}
 
 
-def test_every_task_of_a_sweep_runs_in_the_blocks_that_are_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A shard that has chains of one length only runs in blocks of the whole sweep; on a CPU there are none."""
+def test_tasks_of_a_sweep_run_in_the_blocks_that_are_compiled(tmp_path: Path) -> None:
+    """A task that has chains of one length only runs in blocks of the whole sweep; on a CPU there are none."""
     asked: list[tuple[set[int], int | None]] = []
 
-    def note(setups: Sequence[Setup], *, threads: int | None, **_: object) -> Iterator[tuple[int, WalkRun]]:
-        asked.append(({setup.scene.links for setup in setups}, threads))
-        return iter(())
+    class Executor:
+        """Notes the first task and does none."""
 
-    monkeypatch.setattr(sweep_run, "run_setups", note)
+        def submit(self, function: object, planned: Sweep, folder: str, shards: Sequence[range], *how: Any) -> Any:
+            asked.append(({planned.planned(index).setup.scene.links for shard in shards for index in shard}, how[0]))
+            raise InterruptedError
+
     for device, samples in (("cuda", 2), ("cuda", 2000), ("cpu", 2)):
-        planned = load_sweep(FEW | {"samples": samples, "options": {"device": device, "method": "explicit"}})
-        run_shards(planned.canonical(), "nowhere", [(0, 1)])
-    assert asked == [({60}, 160), ({60}, None), ({60}, None)]
+        content = FEW | {"samples": samples, "options": {"device": device, "method": "explicit"}}
+        with pytest.raises(InterruptedError):
+            sweep(content, tmp_path / f"{device}{samples}", executor=Executor(), workers=4)
+    assert asked == [({60}, 160), ({60, 150}, None), ({60}, None)]
 
 
 def test_progress_says_when_kernels_are_compiled() -> None:

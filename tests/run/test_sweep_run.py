@@ -139,8 +139,8 @@ def test_progress_shows_the_shards_of_a_task_under_way(tmp_path, monkeypatch, un
 def test_walks_are_drawn_when_they_begin(tmp_path, monkeypatch):
     """A task asks for the draw of a walk when the one before it is over, and for no walk twice."""
     planned, events = load_sweep(TINY), []
-    draw, write = type(planned).planned, runner.write_shard
-    monkeypatch.setattr(type(planned), "planned", lambda self, index: events.append(index) or draw(self, index))
+    draw, write = type(planned).drawn, runner.write_shard
+    monkeypatch.setattr(type(planned), "drawn", lambda self, walk: events.append(walk.index) or draw(self, walk))
     monkeypatch.setattr(runner, "write_shard", lambda *given: events.append("written") or write(*given))
     monkeypatch.setattr(runner, "_tasks", lambda planned, missing, workers: iter([list(missing)]))
     monkeypatch.setattr(runner, "prepare", lambda planned: None)

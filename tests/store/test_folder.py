@@ -19,12 +19,13 @@ import pytest
 import yaml
 
 from tests.support import synthetic_sweep
-from tests.support.synthetic_sweep import LONG_SWEEP, SHARD_SIZE, SWEEP, content, run, synthetic_rows
+from tests.support.synthetic_sweep import LONG_SWEEP, SHARD_SIZE, SWEEP, content, run, synthetic_rows, write
 from warpchain.inputs.validation import InputError
 from warpchain.status import Status
-from warpchain.store import folder, shards
-from warpchain.store.folder import SweepFolder, empty_rows, read_rows, read_shard, write_shard
-from warpchain.store.shards import NUMERICS_VERSION, read_manifest, shard_name
+from warpchain.store import folder, manifest, shards
+from warpchain.store.folder import SweepFolder, read_rows
+from warpchain.store.manifest import FORMAT_VERSION, NUMERICS_VERSION, read_manifest
+from warpchain.store.shards import empty_rows, read_shard, shard_name, write_shard
 from warpchain.walks.rows import ROW
 
 FIRST, SECOND = range(20), range(20, 40)
@@ -74,13 +75,15 @@ def test_a_sweep_is_written_and_read(tmp_path: Path) -> None:
     """All rows come back to the bit; nothing is missing, and nothing else is in the folder."""
     with open_folder(tmp_path / "new" / "folder") as opened:
         folder = opened.directory
-        assert opened.missing() == [range(i, i + 20) for i in range(0, 160, 20)] and len(opened.rows()) == 0
+        assert opened.missing() == [range(i, i + 20) for i in range(0, 160, 20)]
+        assert len(read_rows(folder, opened.manifest)) == 0
         for walks in reversed(opened.missing()):
-            key = opened.write(walks, synthetic_rows(SWEEP, walks))
+            key = write(opened, walks, synthetic_rows(SWEEP, walks))
             assert len(key) == 64 and walks not in opened.missing()
         opened.log("ended")
         expected = synthetic_rows(SWEEP, range(160))
-        assert opened.rows().dtype == expected.dtype and opened.rows().tobytes() == expected.tobytes()
+        rows = read_rows(folder, opened.manifest)
+        assert rows.dtype == expected.dtype and rows.tobytes() == expected.tobytes()
     assert sorted(os.listdir(folder)) == ["lock", "log.txt", "shards", "sweep.json", "sweep.yaml"]
     assert len(os.listdir(folder / "shards")) == 8
     assert yaml.safe_load((folder / "sweep.yaml").read_text()) == SWEEP.canonical()
@@ -91,7 +94,7 @@ def test_the_last_shard_has_what_is_left(tmp_path: Path) -> None:
     """A number of walks that is no multiple of the shard size leaves a shorter shard; a folder keeps its size."""
     with open_folder(tmp_path, shard_size=150) as opened:
         assert opened.missing() == [range(150), range(150, 160)]
-        opened.write(range(150, 160), synthetic_rows(SWEEP, range(150, 160)))
+        write(opened, range(150, 160), synthetic_rows(SWEEP, range(150, 160)))
     with open_folder(tmp_path, shard_size=10) as opened:
         assert opened.manifest.shard_size == 150 and opened.missing() == [range(150)]
     with pytest.raises(ValueError, match="shard_size: 0 is not positive"):
@@ -105,7 +108,7 @@ def test_equal_sweeps_leave_equal_files(tmp_path: Path) -> None:
         for walks in sorted(opened.missing(), key=lambda walks: walks.start % 7):
             rows = synthetic_rows(SWEEP, walks)
             rows["greatest_opening"] = -rows["greatest_opening"]  # the same NaN to a reader, but other bits
-            opened.write(walks, rows)
+            write(opened, walks, rows)
     assert content(tmp_path / "one") == content(tmp_path / "two")
 
 
@@ -207,7 +210,7 @@ def test_workers_may_write_the_same_shard(tmp_path: Path) -> None:
     assert play("race", tmp_path / "race") == [0, 0, 0, 0]
     with open_folder(tmp_path / "threads") as opened, ThreadPoolExecutor(4) as threads:
         shards = opened.missing()[:2] * 20
-        keys = list(threads.map(lambda walks: opened.write(walks, synthetic_rows(SWEEP, walks)), shards))
+        keys = list(threads.map(lambda walks: write(opened, walks, synthetic_rows(SWEEP, walks)), shards))
     assert len(set(keys)) == 2
     assert content(tmp_path / "race") == content(tmp_path / "threads")
     assert read_rows(tmp_path / "race", read_manifest(tmp_path / "race"))["index"].tolist() == list(range(40))
@@ -233,7 +236,7 @@ def test_a_changed_sweep_is_refused(tmp_path: Path) -> None:
 def test_other_numerics_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Walks of another version of the numerics are not gone on with, but still read."""
     run(tmp_path)
-    for module in (shards, folder):
+    for module in (manifest, shards, folder):
         monkeypatch.setattr(module, "NUMERICS_VERSION", 99)
     with refused(InputError, tmp_path, f"numerics {NUMERICS_VERSION}, but this warpchain has 99", "--fresh"):
         open_folder(tmp_path)
@@ -287,7 +290,7 @@ def test_a_truncated_shard_is_refused(tmp_path: Path, part: float) -> None:
     path.unlink()
     with open_folder(tmp_path) as opened:
         assert opened.missing() == [FIRST]
-        opened.write(FIRST, synthetic_rows(SWEEP, FIRST))
+        write(opened, FIRST, synthetic_rows(SWEEP, FIRST))
     assert content(tmp_path) == before
 
 
@@ -296,12 +299,13 @@ def test_damage_is_seen(tmp_path: Path) -> None:
     run(tmp_path)
     path = tmp_path / "shards" / shard_name(FIRST)
     whole = path.read_bytes()
-    rows = read_shard(tmp_path, SWEEP.digest(), FIRST)
+    manifest = read_manifest(tmp_path)
+    rows = read_shard(tmp_path, manifest, FIRST)
     start = whole.index(rows.tobytes())
     for place in (*range(0, len(whole), 97), start, start + rows.nbytes - 1):
         path.write_bytes(whole[:place] + bytes([whole[place] ^ 0x10]) + whole[place + 1 :])
         try:
-            read = read_shard(tmp_path, SWEEP.digest(), FIRST)
+            read = read_shard(tmp_path, manifest, FIRST)
         except InputError:
             continue
         assert not start <= place < start + rows.nbytes
@@ -314,7 +318,10 @@ def test_damage_is_seen(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["", "[]", "3", '{"format": "other"}', '{"format": "warpchain sweep", "format_version": 2}', "\xff", "{" * 2000],
+    [
+        *("", "[]", "3", "\xff", "{" * 2000, '{"format": "other"}'),
+        *(f'{{"format": "warpchain sweep", "format_version": {version}}}' for version in ('"3"', FORMAT_VERSION)),
+    ],
 )
 def test_a_damaged_manifest_is_refused(tmp_path: Path, text: str) -> None:
     """A manifest that is none is named, and nothing is begun over it."""
@@ -324,13 +331,27 @@ def test_a_damaged_manifest_is_refused(tmp_path: Path, text: str) -> None:
         open_folder(tmp_path)
 
 
-def test_a_later_format_is_refused(tmp_path: Path) -> None:
-    """A folder of another version of the format says so."""
+@pytest.mark.parametrize(
+    ("version", "remedy"), [(2, "run it again in another folder, or use the warpchain that wrote it"), (4, "update")]
+)
+def test_other_formats_are_refused(tmp_path: Path, version: int, remedy: str) -> None:
+    """A folder of an older or later version of the format says so, and what to do; starting anew spares it, too."""
     run(tmp_path)
     path = tmp_path / "sweep.json"
-    path.write_text(path.read_text().replace('"format_version": 2', '"format_version": 3'))
-    with refused(InputError, tmp_path, "format version 3, not 2"):
-        read_manifest(tmp_path)
+    path.write_text(path.read_text().replace('"format_version": 3', f'"format_version": {version}'))
+    message = f"{path}: format version {version}, but this warpchain reads 3; {remedy}"
+    for attempt in (read_manifest, open_folder, lambda place: open_folder(place, fresh=True)):
+        with refused(InputError, tmp_path, message):
+            attempt(tmp_path)
+
+
+def test_a_shard_of_another_format_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A shard that an older warpchain wrote for the same sweep is not read as one of this."""
+    with monkeypatch.context() as patched:
+        patched.setattr(shards, "FORMAT_VERSION", 2)
+        run(tmp_path)
+    with refused(InputError, tmp_path, "a shard of another sweep; move it"):
+        open_folder(tmp_path)
 
 
 def test_workers_need_the_folder(tmp_path: Path) -> None:
@@ -356,11 +377,11 @@ def test_wrong_rows_are_refused(tmp_path: Path) -> None:
             (FIRST, empty_rows(SWEEP, FIRST), "no status that ends"),
         ):
             with refused(ValueError, tmp_path, word):
-                opened.write(walks, rows)
+                write(opened, walks, rows)
         running = good.copy()
         running["status"][2] = Status.RUNNING
         with refused(ValueError, tmp_path, "no status that ends"):
-            opened.write(FIRST, running)
+            write(opened, FIRST, running)
 
 
 # What the system refuses
@@ -386,13 +407,13 @@ def test_a_failed_write_leaves_no_trace(
 ) -> None:
     """A shard that cannot be written is named with reason and remedy; the folder is as before and can go on."""
     with open_folder(tmp_path) as opened:
-        opened.write(FIRST, synthetic_rows(SWEEP, FIRST))
+        write(opened, FIRST, synthetic_rows(SWEEP, FIRST))
         name = f"{shard_name(SECOND)}: cannot be written ({os.strerror(number)})"
         with monkeypatch.context() as patched, refused(OSError, tmp_path, name, remedy, "kept"):
             fail_with(number, patched)
-            opened.write(SECOND, synthetic_rows(SWEEP, SECOND))
-        opened.write(SECOND, synthetic_rows(SWEEP, SECOND))
-        assert len(opened.rows()) == 40
+            write(opened, SECOND, synthetic_rows(SWEEP, SECOND))
+        write(opened, SECOND, synthetic_rows(SWEEP, SECOND))
+        assert len(read_rows(opened.directory, opened.manifest)) == 40
 
 
 def test_a_disk_too_small_is_said_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -411,7 +432,7 @@ def test_shards_take_no_more_room_than_said(tmp_path: Path) -> None:
     """The room that is asked for is enough."""
     with open_folder(tmp_path, shard_size=40) as opened:
         walks = opened.missing()[0]
-        opened.write(walks, synthetic_rows(SWEEP, walks))
+        write(opened, walks, synthetic_rows(SWEEP, walks))
         size = (tmp_path / "shards" / shard_name(walks)).stat().st_size
         most = 40 * opened.manifest.row_type.itemsize + folder.SHARD_OVERHEAD
     assert size + 4096 <= most <= 4 * size and math.isfinite(size)

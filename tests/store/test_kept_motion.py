@@ -26,13 +26,13 @@ from warpchain.reports.figure5 import MOST_CELLS, sweep_figure5
 from warpchain.reports.sweep_page import write_report
 from warpchain.run.sweep_run import sweep
 from warpchain.store.folder import SweepFolder
+from warpchain.store.manifest import read_manifest
 from warpchain.store.merged_file import merge
-from warpchain.store.shards import read_manifest, read_shard, write_shard
+from warpchain.store.shards import read_shard, write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.store.walk_motion import WalkMotion
 from warpchain.sweeps.plan import load_sweep
-from warpchain.sweeps.recording import Keep
-from warpchain.walks.motion import SERIES
+from warpchain.walks.motion import SERIES, Keep
 from warpchain.walks.scheduler import run_setups
 
 OFTEN = {"method": "dp5", "record_interval": 1e-4}
@@ -73,7 +73,7 @@ def test_kept_is_what_the_walk_itself_gives(tmp_path: Path) -> None:
 
 
 def test_a_coarser_interval_keeps_the_first_of_each_and_the_last() -> None:
-    """Kept are the first look in each interval, so none is farther from its mark than a fine one, and the last look."""
+    """Kept are the first sample in each interval, no later after its mark than a fine one, and the last sample."""
     setup = brief_setup(3, record_interval=1e-4)
     ((_, fine),) = run_setups([setup], keeps=[Keep(series_every=1)])
     ((_, coarse),) = run_setups([setup], keeps=[Keep(series_every=7)])
@@ -93,8 +93,8 @@ def test_motions_do_not_depend_on_their_batch() -> None:
 
     def run(order: list[int], slots: int) -> list[tuple[bytes, float]]:
         found = {}
-        courses = run_setups([setups[i] for i in order], keeps=[keeps[i] for i in order], slots=slots)
-        for place, run in courses:
+        runs = run_setups([setups[i] for i in order], keeps=[keeps[i] for i in order], slots=slots)
+        for place, run in runs:
             found[order[place]] = (run.motion.checksum(), run.energy()["joint_friction"])
         return [found[i] for i in range(len(setups))]
 
@@ -106,8 +106,8 @@ def test_motions_do_not_depend_on_their_batch() -> None:
 
 
 def test_long_motions_are_drained_between_launches() -> None:
-    """A series longer than the device's record has every look, in order and without a gap."""
-    setup = brief_setup(1, record_interval=1e-6, walk_limit=0.04)  # a look after each step
+    """A series longer than the device's record has every sample, in order and without a gap."""
+    setup = brief_setup(1, record_interval=1e-6, walk_limit=0.04)  # a sample after each step
     ((_, run),) = run_setups([setup], keeps=[Keep(series_every=1, frame_every=10)])
     time = run.motion.series[:, 0]
     skipped = 1 + run.counts["accepted"] - len(time)
@@ -240,9 +240,9 @@ def test_a_shard_without_its_motions_is_not_written(kept: Path, tmp_path: Path) 
     manifest = read_manifest(kept)
     assert [manifest.kept(walks) for walks in manifest.shards[:5]] == [[0], [], [], [3], []]
     with SweepFolder.open(tmp_path, load_sweep(KEPT), shard_size=manifest.shard_size) as store:
-        rows = read_shard(kept, manifest.digest, manifest.shards[0])
+        rows = read_shard(kept, manifest, manifest.shards[0])
         with pytest.raises(ValueError, match="motions are not those that are kept of walks 0 to 0"):
-            store.write(manifest.shards[0], rows)
+            write_shard(tmp_path, manifest.digest, manifest.shards[0], rows)
         assert store.missing() == manifest.shards
 
 

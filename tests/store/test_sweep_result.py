@@ -15,14 +15,15 @@ import numpy as np
 import pytest
 import xarray
 
-from tests.support.synthetic_sweep import SWEEP, SyntheticSweep, run, synthetic_rows
+from tests.support.synthetic_sweep import SWEEP, SyntheticSweep, run, synthetic_rows, write
 from warpchain.cli.main import main
 from warpchain.inputs.validation import InputError
 from warpchain.reports.sweep_page import write_report
 from warpchain.status import Status
-from warpchain.store.folder import SweepFolder, empty_rows
+from warpchain.store.folder import SweepFolder
+from warpchain.store.manifest import NUMERICS_VERSION, BlockLayout
 from warpchain.store.merged_file import merge
-from warpchain.store.shards import NUMERICS_VERSION, BlockLayout, shard_name
+from warpchain.store.shards import empty_rows, shard_name
 from warpchain.store.sweep_result import BlockResult, SweepResult, load
 from warpchain.sweeps.plan import load_sweep
 from warpchain.walks.rows import COLUMNS
@@ -98,7 +99,7 @@ def test_the_layout_is_that_of_the_sweep(tmp_path: Path) -> None:
             for row, index in zip(rows, walks, strict=True):
                 for name, value in sweep.planned(index).drawn.items():
                     row[name] = value
-            store.write(walks, rows)
+            write(store, walks, rows)
     result = load(tmp_path)
     for index in range(sweep.walk_count):
         walk = sweep.planned(index)
@@ -179,7 +180,7 @@ def test_statistics_are_over_walks_at_rest(tmp_path: Path) -> None:
             rows = synthetic_rows(sweep, walks)
             rows["status"] = status[cell]
             rows["dx"] = np.where(rows["status"] == 1, [1.0, 2.0, 4.0, 5.0], np.nan)
-            store.write(walks, rows)
+            write(store, walks, rows)
     found = load(tmp_path).statistics()
     assert found.unit == "m" and found.axes["links"].tolist() == [10, 20, 30, 40, 50]
     assert found.count.tolist() == [4, 2, 1, 0, 0]
@@ -327,11 +328,11 @@ def test_a_merge_that_fails_leaves_the_older_file(
     merge(single, path)
     older = path.read_bytes()
 
-    def write_bytes(path: Path, content: bytes) -> int:
+    def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patched:
-        patched.setattr(Path, "write_bytes", write_bytes)
+        patched.setattr(os, "posix_fallocate", full)
         with pytest.raises(OSError, match=r"merged\.h5: cannot be written \(No space left on device\); make room"):
             merge(folder, path)
     assert path.read_bytes() == older and len(list(tmp_path.iterdir())) == 1
@@ -369,9 +370,9 @@ def test_nothing_is_written_over_the_sweep(name: str, tmp_path: Path, monkeypatc
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     monkeypatch.chdir(folder)
     for target in (Path(name), folder / "shards/.." / name):
-        for write in (merge, write_report):
+        for make in (merge, write_report):
             with pytest.raises(InputError, match=rf"{name}: belongs to the sweep itself; give another path$"):
-                write(folder, target)
+                make(folder, target)
     with pytest.raises(SystemExit, match="2"):
         main(["plot", ".", "-o", name])
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before

@@ -9,7 +9,7 @@ import numpy as np
 
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
-from warpchain.store.shards import empty_rows
+from warpchain.store.shards import empty_rows, write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, load_sweep
 from warpchain.walks.rows import Rows
@@ -95,5 +95,5 @@ def make_sweep(folder: Path, content: Mapping[str, object], outcome: Outcome = d
                 if (given := outcomes[index]) is not None:
                     fill_row(walks[index], given, rows[place : place + 1])
             if outcomes[shard.start] is not None:
-                store.write(shard, rows)
+                write_shard(store.directory, store.manifest.digest, shard, rows)
     return load(folder)

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from warpchain.engine.tallies import CONTACTS
 from warpchain.inputs.setup import resolve
 from warpchain.loop.before_release import BeforeRelease
 from warpchain.status import Status
-from warpchain.walks.walk_result import CONTACTS, ENERGIES, STORED, WalkResult
+from warpchain.walks.walk_result import ENERGIES, STORED, WalkResult
 
 
 def make_walk(links: int = 30, **changes: Any) -> WalkResult:
@@ -62,7 +63,7 @@ def make_walk(links: int = 30, **changes: Any) -> WalkResult:
 
 def make_unreleased() -> WalkResult:
     """A walk that ended on the sprocket: no series, no frames, no distance."""
-    names = [name for name, stored in STORED.items() if stored.path.startswith("series/")]
+    names = [name for name, stored in STORED.items() if stored.group == "series"]
     empty: dict[str, Any] = {name: np.empty(0) for name in names}
     empty |= {"center": np.empty((0, 2)), "center_velocity": np.empty((0, 2)), "frame_time": np.empty(0)}
     energy = dict.fromkeys(ENERGIES, math.nan)

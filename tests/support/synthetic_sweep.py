@@ -20,8 +20,9 @@ import h5py  # noqa: F401 - before the forks below, or each would read it anew
 import numpy as np
 
 from warpchain.status import Status
-from warpchain.store.folder import SweepFolder, empty_rows
-from warpchain.store.shards import BlockLayout
+from warpchain.store.folder import SweepFolder
+from warpchain.store.manifest import BlockLayout
+from warpchain.store.shards import empty_rows, write_shard
 from warpchain.store.sweep_result import load
 from warpchain.walks.rows import Rows
 
@@ -85,11 +86,16 @@ def synthetic_rows(sweep: Any, walks: range) -> Rows:
     return rows
 
 
+def write(store: SweepFolder, walks: range, rows: Rows) -> str:
+    """Write a shard as a worker does; its key."""
+    return write_shard(store.directory, store.manifest.digest, walks, rows)
+
+
 def run(directory: Path | str, sweep: Any = SWEEP, *, shard_size: int = SHARD_SIZE, **settings: Any) -> None:
     """Begin or go on with a sweep, to its end."""
     with SweepFolder.open(directory, sweep, shard_size=shard_size, **settings) as store:
         for walks in store.missing():
-            store.write(walks, synthetic_rows(sweep, walks))
+            write(store, walks, synthetic_rows(sweep, walks))
 
 
 def content(directory: Path) -> dict[str, bytes]:
@@ -143,7 +149,7 @@ def play_race(directory: Path) -> None:
             children.append(os.fork())
             if not children[-1]:
                 for _, walks in itertools.product(range(10), store.manifest.shards[:2]):
-                    store.write(walks, synthetic_rows(SWEEP, walks))
+                    write(store, walks, synthetic_rows(SWEEP, walks))
                 os._exit(0)
         print(json.dumps([os.waitpid(child, 0)[1] for child in children]))
 
@@ -155,7 +161,7 @@ def play_full_disk(directory: Path) -> None:
     messages = []
     with SweepFolder.open(directory, SWEEP, shard_size=40) as store:
         first, second, *_ = store.missing()
-        store.write(first, synthetic_rows(SWEEP, first))
+        write(store, first, synthetic_rows(SWEEP, first))
         before = content(directory)
         filler = directory / "filler"
         try:
@@ -163,7 +169,7 @@ def play_full_disk(directory: Path) -> None:
         except OSError:
             pass
         try:
-            store.write(second, synthetic_rows(SWEEP, second))
+            write(store, second, synthetic_rows(SWEEP, second))
         except OSError as error:
             messages.append(str(error))
         assert {name: old for name, old in content(directory).items() if name != "filler"} == before

@@ -160,7 +160,7 @@ def test_provenance(tmp_path: Path) -> None:
     walk = make_walk()
     walk.save(tmp_path / "walk.h5")
     with h5py.File(tmp_path / "walk.h5") as file:
-        assert file.attrs["format"] == "warpchain walk" and file.attrs["format_version"] == 3
+        assert file.attrs["format"] == "warpchain walk" and file.attrs["format_version"] == 4
         assert file.attrs["status"] == "at_rest"
         setup = json.loads(file.attrs["setup"])
         assert json.loads(file.attrs["seed"]) == walk.seed
@@ -233,7 +233,7 @@ def _refused(path: Path) -> str:
 
 
 def test_foreign_files_are_refused(tmp_path: Path) -> None:
-    """Text, an empty file, other HDF5, and walks of another format version are told apart."""
+    """Text, an empty file, other HDF5, and walks of older and later format versions are told apart."""
     path = tmp_path / "walk.h5"
     path.write_text("dx = 0.6\n")
     assert "not an HDF5 file" in _refused(path)
@@ -243,9 +243,10 @@ def test_foreign_files_are_refused(tmp_path: Path) -> None:
         file["x"] = 1.0
     assert "HDF5, but not a walk" in _refused(path)
     make_walk().save(path)
-    with h5py.File(path, "a") as file:
-        file.attrs["format_version"] = 4
-    assert "format version 4" in _refused(path)
+    for version, remedy in ((3, "run the walk again, or use the warpchain that wrote it"), (5, "update warpchain")):
+        with h5py.File(path, "a") as file:
+            file.attrs["format_version"] = version
+        assert f"format version {version}, but this warpchain reads 4; {remedy}" in _refused(path)
 
 
 def test_setup_of_another_version_is_refused(tmp_path: Path) -> None:

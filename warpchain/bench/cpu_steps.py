@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.engine.batch import COUNTS, Batch
+from warpchain.engine.batch import Batch
 from warpchain.engine.devices import versions
+from warpchain.engine.tallies import COUNTS
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain

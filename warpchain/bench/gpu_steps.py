@@ -26,7 +26,7 @@ from warpchain.inputs.validation import InputError, shown
 from warpchain.kernels import layout
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 from warpchain.status import Status
-from warpchain.walks.scheduler import CREWS
+from warpchain.walks.scheduler import BATCHES_PER_GPU
 
 LINKS: Final = (60, 90, 120, 150, 180)
 CHAINS: Final = (1, 132, 400, 1000, 4000)
@@ -246,7 +246,7 @@ class Crowd:
     def __init__(self, parameters: Parameters, options: Options, position: Array, velocity: Array, chains: int) -> None:
         """Put so many chains into one state; position (n, 3) and velocity (n, 3)."""
         self.links, self.chains = len(position), chains
-        worlds = -(-chains // CREWS)
+        worlds = -(-chains // BATCHES_PER_GPU)
         self.batches = [Batch(min(worlds, chains - first), self.links, options) for first in range(0, chains, worlds)]
         for batch in self.batches:
             batch.control.rest_speed = 0.0  # a pile is at rest, and goes on

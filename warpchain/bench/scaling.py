@@ -24,16 +24,17 @@ from warpchain.bench.cpu_steps import machine
 from warpchain.bench.gpu_steps import gpu_machine
 from warpchain.bench.places import Place
 from warpchain.engine.processors import processors
+from warpchain.engine.tallies import CONTACTS
+from warpchain.files import replacing
 from warpchain.inputs.validation import InputError
 from warpchain.run.gpu_workers import GpuWorkers, gpu_workers
 from warpchain.run.sweep_run import SweepProgress, one_of_each_cell, prepare
 from warpchain.run.sweep_run import sweep as run_sweep
 from warpchain.status import Status
 from warpchain.store.folder import read_rows
-from warpchain.store.shards import read_manifest
+from warpchain.store.manifest import read_manifest
 from warpchain.sweeps.plan import Sweep, load_sweep
 from warpchain.walks.rows import Rows
-from warpchain.walks.walk_result import CONTACTS, replacing
 
 FILE: Final = "scaling.json"
 COMPARED: Final = ("status", "dx", "steps_accepted", "steps_rejected", *(f"impulses_{kind}" for kind in CONTACTS))
@@ -181,7 +182,7 @@ def measure_once(place: Place, sweep: Sweep, folder: Path, report: Callable[[str
     prepare(sweep)  # also before workers start: one of them would compile what another one does
     with _workers(place) as workers:
         if workers is not None:
-            workers.in_each(prepare, sweep.canonical())
+            workers.in_each(prepare, sweep)
         loading = time.perf_counter() - began
         clock = _Clock(report)
         before = _processor_seconds(workers)

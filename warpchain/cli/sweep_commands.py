@@ -91,7 +91,7 @@ def plot(
     """Draw every figure that the sweep has something for: Figures 6 and 5, maps, tolerance, sensitivity, statuses."""
     from warpchain.cli.terminal import try_folder
     from warpchain.reports.sweep_figures import figures
-    from warpchain.store.shards import check_not_own
+    from warpchain.store.manifest import check_not_own
     from warpchain.store.sweep_result import load
 
     result = load(directory)

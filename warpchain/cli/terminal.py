@@ -14,9 +14,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from warpchain.engine.tallies import LOST
 from warpchain.inputs.validation import InputError
 from warpchain.pictures.style import save_figure
-from warpchain.walks.walk_result import LOST, WalkResult
+from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
     from warpchain.bench.cpu_steps import BroadPhaseCost, StepCost

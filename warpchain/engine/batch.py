@@ -15,6 +15,7 @@ from warpchain.engine.control import control_of
 from warpchain.engine.devices import CAPACITY_FRAMES, CAPACITY_SAMPLES, scratch_rows, start_device
 from warpchain.engine.kernel_choice import block_kernel, block_threads, features_of, kernels_of
 from warpchain.engine.mirror import Mirror
+from warpchain.engine.tallies import COUNTS, EXTREMES, LOSSES
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
@@ -41,13 +42,6 @@ UNSET_WATCHES = (
     *(layout.REST_SINCE, layout.SOFTENED_AT),
 )
 """Moments of :attr:`State.watch` that are negative until they come."""
-
-COUNTS = ("accepted", "rejected", "floor", "sprocket", "self", "bounces", "list_builds")
-"""Counters of a world, in the order of :mod:`warpchain.kernels.layout`."""
-EXTREMES = ("opening", "floor", "sprocket", "self")
-"""Greatest joint opening and depths of a world, likewise."""
-LOSSES = ("joint_friction", "joint_damping", "floor", "sprocket", "self_contact", "softening", "joint_switch")
-"""Losses of energy of a world, likewise."""
 
 
 class Batch:

@@ -23,7 +23,7 @@ from warpchain.pictures.walk_shape import Walk
 from warpchain.reports.html_page import page, picture, table
 from warpchain.reports.labels import axis_symbol, cell_text, cell_values, number_text, unit_text, with_unit
 from warpchain.status import Status
-from warpchain.store.shards import Folder, check_not_own
+from warpchain.store.manifest import Folder, check_not_own
 from warpchain.store.sweep_result import BlockResult, SweepResult, load
 from warpchain.sweeps.plan import load_sweep
 from warpchain.sweeps.recording import Recording

@@ -16,10 +16,10 @@ Answer = TypeVar("Answer")
 
 
 class GpuWorkers(ProcessPoolExecutor):
-    """Worker processes of which each sees one GPU only."""
+    """Worker processes, each of which sees only one GPU."""
 
     def __init__(self, gpus: Sequence[str]) -> None:
-        """Prepare a process for each of these values of CUDA_VISIBLE_DEVICES; they start with their first task."""
+        """Prepare a process for each of these values of CUDA_VISIBLE_DEVICES; it starts with its first task."""
         context = multiprocessing.get_context("spawn")  # CUDA does not survive a fork
         free = context.SimpleQueue()
         for gpu in gpus:
@@ -29,12 +29,12 @@ class GpuWorkers(ProcessPoolExecutor):
         super().__init__(self.count, mp_context=context, initializer=_take_gpu, initargs=(free, meeting))
 
     def in_each(self, function: Callable[..., Answer], /, *arguments: Any) -> list[Answer]:
-        """Run ``function(*arguments)`` once in every worker, when nothing else is running; what they returned.
+        """Run ``function(*arguments)`` once in every worker, while nothing else is running; what they returned.
 
         Raises:
             Exception: What one of them raised; the workers can then only be shut down.
         """
-        # one that is done waits for the others, so that none runs it twice
+        # a worker that is done waits for the others, so that none runs it twice
         futures = [self.submit(_meet_after, function, *arguments) for _ in range(self.count)]
         errors = [error for future in futures if (error := future.exception()) is not None]
         for error in sorted(errors, key=lambda error: isinstance(error, threading.BrokenBarrierError)):
@@ -42,16 +42,16 @@ class GpuWorkers(ProcessPoolExecutor):
         return [future.result() for future in futures]
 
     def stop(self) -> None:
-        """End the processes at once; shards that they have written are whole."""
+        """End the processes at once; the shards that they have written are whole."""
         for process in list((self._processes or {}).values()):  # Python has a public name for this from 3.14 on
             process.terminate()
 
 
 @contextlib.contextmanager
 def gpu_workers(count: int) -> Iterator[GpuWorkers]:
-    """As many worker processes, each of which sees one GPU only and runs a sweep with the device ``cuda``.
+    """Worker processes, each of which sees only one GPU and runs a sweep with the device ``cuda``.
 
-    An exception, such as by Ctrl-C, ends them in the middle of what they do: a task may be minutes of work.
+    An exception, such as that of Ctrl-C, ends them at once, for a task may take minutes.
 
     Args:
         count: Number of GPUs; the first ones, in the order of CUDA_VISIBLE_DEVICES if that is set.
@@ -68,10 +68,10 @@ def gpu_workers(count: int) -> Iterator[GpuWorkers]:
 
 
 def visible_gpus(count: int) -> Sequence[str]:
-    """What CUDA_VISIBLE_DEVICES must be for each of the first GPUs that this process may use.
+    """Value of CUDA_VISIBLE_DEVICES for each of the first GPUs that this process may use.
 
     Raises:
-        InputError: there are fewer.
+        InputError: There are fewer.
     """
     listed = os.environ.get("CUDA_VISIBLE_DEVICES")
     if listed is None:
@@ -87,7 +87,7 @@ _meeting: "Barrier | None" = None
 
 
 def _take_gpu(free: "SimpleQueue[str]", meeting: "Barrier") -> None:
-    """Let this process see just one GPU; at its start, for CUDA looks once, when a sweep's first walk starts Warp."""
+    """Let this process see only one GPU; at its start, because CUDA reads the variable only once, when Warp starts."""
     global _meeting
     os.environ["CUDA_VISIBLE_DEVICES"] = free.get()
     _meeting = meeting

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.engine.batch import Batch
+from warpchain.engine.tallies import LOST
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import check_links_on_gpu
@@ -17,8 +18,6 @@ Array = NDArray[np.float64]
 
 LONGEST = 1e9
 """Durations [s] from here on are refused."""
-
-
 _UNSOFTENED = {"soften_pile": False, "soften_drive": False}
 """A given chain has no phases in which joints soften."""
 
@@ -72,10 +71,14 @@ def simulate(
     for name, switch in (("floor", floor), ("gravity", gravity)):
         if not isinstance(switch, bool):
             raise InputError(f"{name}: {shown(switch)} is not a truth value; give True or False")
-    chain = _chain_parameters(parameters)
+    chain = parameters if isinstance(parameters, Parameters) else preset(parameters)
     if not gravity:
         chain = chain.with_values({"gravity": 0.0})
-    start, rates = _checked_state(position, velocity)
+    start, rates = _checked_state("position", position), _checked_state("velocity", velocity)
+    if len(rates) != len(start):
+        raise InputError(f"velocity: {len(rates)} rows, but position has {len(start)}; give one row per link each")
+    if len(start) < 4 or len(start) % 2:
+        raise InputError(f"position: {len(start)} links; a closed chain has an even number of at least 4")
     check_links_on_gpu(len(start), options.device, "position")
     instants = _checked_times(duration, times)
     batch = Batch(1, len(start), options)
@@ -104,47 +107,24 @@ def simulate(
         steps_accepted=counts["accepted"],
         steps_rejected=counts["rejected"],
         impulses={kind: counts[kind] for kind in kinds},
-        losses={name: loss for name, loss in losses.items() if name != "sprocket"},
+        losses={name: losses[name] for name in LOST},
         greatest_opening=extremes["opening"],
         greatest_penetration={kind: extremes[kind] for kind in kinds},
     )
 
 
-def _chain_parameters(parameters: Parameters | str) -> Parameters:
-    """Parameters, given themselves or by the name of a preset."""
-    if isinstance(parameters, Parameters):
-        return parameters
-    return preset(parameters)
-
-
-def _checked_state(position: Array, velocity: Array) -> tuple[Array, Array]:
-    """The state as float64 arrays of one shape (n, 3).
-
-    Raises:
-        InputError: Shapes, n or values are unusable.
-    """
-    checked = []
-    for name, given in (("position", position), ("velocity", velocity)):
-        array = _real_array(name, given, "shape (n, 3)")
-        if array.ndim != 2 or array.shape[1] != 3:
-            raise InputError(f"{name}: its shape is {array.shape}; give (n, 3), one row x, y, θ per link")
-        if not np.all(np.isfinite(array)):
-            raise InputError(f"{name}: holds a number that is not finite; give finite numbers")
-        checked.append(array)
-    links = len(checked[0])
-    if len(checked[1]) != links:
-        raise InputError(f"velocity: {len(checked[1])} rows, but position has {links}; give one row per link each")
-    if links < 4 or links % 2:
-        raise InputError(f"position: {links} links; a closed chain has an even number of at least 4")
-    return checked[0], checked[1]
+def _checked_state(name: str, given: Array) -> Array:
+    """Positions or velocities as a float64 array of shape (n, 3), or an `InputError`."""
+    array = _real_array(name, given, "shape (n, 3)")
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise InputError(f"{name}: its shape is {array.shape}; give (n, 3), one row x, y, θ per link")
+    if not np.all(np.isfinite(array)):
+        raise InputError(f"{name}: holds a number that is not finite; give finite numbers")
+    return array
 
 
 def _checked_times(duration: float, times: Sequence[float] | Array | None) -> Array:
-    """Instants of a trajectory.
-
-    Raises:
-        InputError: The duration is not a time, or the instants do not rise within it.
-    """
+    """Instants of a trajectory, which rise within the duration, or an `InputError`."""
     if isinstance(duration, bool) or not isinstance(duration, (int, float, np.integer, np.floating)):
         raise InputError(f"duration: {shown(duration)} is not a number; give seconds")
     if not 0 <= duration < LONGEST:
@@ -154,18 +134,13 @@ def _checked_times(duration: float, times: Sequence[float] | Array | None) -> Ar
     instants = _real_array("times", times, "rising instants in s")
     if instants.ndim != 1 or len(instants) == 0:
         raise InputError(f"times: its shape is {instants.shape}; give a row of at least one instant")
-    in_range = np.all((instants >= 0) & (instants <= duration))
-    if not in_range or np.any(np.diff(instants) <= 0):
+    if not np.all((instants >= 0) & (instants <= duration)) or np.any(np.diff(instants) <= 0):
         raise InputError(f"times: give rising instants between 0 and the duration of {duration} s")
     return instants
 
 
 def _real_array(name: str, given: object, remedy: str) -> Array:
-    """Anything like an array of real numbers as a new float64 array.
-
-    Raises:
-        InputError: It is not.
-    """
+    """Anything like an array of real numbers as a new float64 array, or an `InputError`."""
     try:
         if np.array(given).dtype.kind in "cSU":  # complex numbers and text would be converted without a word
             raise TypeError

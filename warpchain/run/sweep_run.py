@@ -1,10 +1,11 @@
-"""Runs a sweep: hands its shards to workers, follows their progress, and survives being killed.
+"""Runs a sweep: hands its shards to workers and follows their progress; a sweep that was killed can go on.
 
-A worker runs the walks of a shard and writes them to an immutable file; what it returns is only the shard's key. So
+A worker runs the walks of shards, writes each shard to an immutable file and returns only the keys of the shards. So
 any executor in the style of ``concurrent.futures`` will do, on this machine or another that sees the same folder.
 """
 
 import concurrent.futures
+import contextlib
 import os
 import threading
 import time
@@ -20,29 +21,28 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, validated
 from warpchain.status import Status
-from warpchain.store.folder import SweepFolder, empty_rows, read_shard, write_shard
-from warpchain.store.shards import shard_name
+from warpchain.store.folder import SweepFolder
+from warpchain.store.shards import empty_rows, read_shard, shard_name, write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
 from warpchain.walks.motion import Motion
+from warpchain.walks.rows import fill_row
 from warpchain.walks.scheduler import compile_kernels, run_setups
-from warpchain.walks.walk_phases import WalkRun
-from warpchain.walks.walk_result import LOST
 
 SHARD_WALKS = 256
 """Most walks in a shard."""
 GPU_TASK_WALKS = 65536
-"""About the most walks that a GPU is given at a time: while the last of them come to rest it runs dry."""
+"""Upper bound on the walks of a GPU's task, about; the GPU idles while the last walks finish."""
 POLL = 1.0
-"""Time [s] between two looks for shards that tasks under way have written."""
+"""Time [s] between two checks for shards that tasks under way have written."""
 GPU_WORKERS = 2
 """Tasks at a time on a GPU: while the last walks of one come to rest, the other fills the device."""
 SHARDS = 128
-"""A sweep has at least about this many shards, as far as it has walks: the grain of progress and of a restart."""
+"""Least number of shards of a sweep, about, if it has as many walks: the grain of progress and of a restart."""
 
 
 class Executor(Protocol):
-    """What is needed of an executor: ``concurrent.futures``, ``mpi4py.futures``, Dask's ``get_executor()``."""
+    """An executor such as those of ``concurrent.futures``, ``mpi4py.futures`` and Dask's ``get_executor()``."""
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any) -> "concurrent.futures.Future[Any]":
         """Run ``function(*arguments)`` somewhere."""
@@ -51,7 +51,7 @@ class Executor(Protocol):
 
 @dataclass
 class SweepProgress:
-    """How far a sweep is.
+    """Progress of a sweep.
 
     Attributes:
         walks: Walks of the sweep.
@@ -94,14 +94,13 @@ def sweep(
 
     Args:
         source: A sweep file (YAML), its content, or a :class:`Sweep`.
-        out: Folder of the results. A sweep that was killed goes on where it was; the data come out the same, to the
-            byte.
+        out: Folder of the results. A sweep that was killed goes on where it was, and leaves the same bytes.
         device: ``"cpu"``, ``"cuda"`` or ``"cuda:N"`` instead of what the sweep says. Method ``standard`` is then what
             it means there; the ``sweep.yaml`` of a folder names the method that was run, which stays.
-        executor: Where shards are run; it must see ``out``. Default: threads of this process.
-        workers: Tasks in work at the same time; default: processors of this machine, and on a GPU two, each of which
-            keeps thousands of walks going. With an executor, at least the number of its workers.
-        fresh: Discard what another sweep left in the folder.
+        executor: Where shards are run; its workers must see ``out``. Default: threads of this process.
+        workers: Number of tasks at a time. Default: the processors of this machine, and two on a GPU, each of which
+            runs thousands of walks. With an executor, at least the number of its workers.
+        fresh: Delete what another sweep left in the folder.
         on_progress: Called before kernels are compiled, when the walks begin and after each shard.
 
     Raises:
@@ -119,11 +118,17 @@ def sweep(
         before = planned.walk_count - sum(len(shard) for shard in missing)
         progress = SweepProgress(walks=planned.walk_count, done=before, before=before)
         store.log(f"{len(missing)} shards to do, {before} of {planned.walk_count} walks done")
+        report = on_progress or (lambda progress: None)
         if missing:
-            if executor is None:
-                _run_in_threads(planned, store, missing, at_once, progress, on_progress)
+            if executor is not None:
+                _run(executor, None, planned, store, missing, at_once, progress, report)
             else:
-                _run(executor, (), planned, store, missing, at_once, progress, on_progress)
+                progress.compiling = True
+                report(progress)
+                prepare(planned)
+                progress.compiling = False
+                with _threads(at_once) as (threads, stop):
+                    _run(threads, stop, planned, store, missing, at_once, progress, report)
         store.log(f"complete after {progress.seconds:.1f} s: " + _counts(progress.statuses))
     return load(out)
 
@@ -131,8 +136,8 @@ def sweep(
 def on_device(planned: Sweep, device: str) -> Sweep:
     """The same sweep on another device; a method that was named by need is what this means there.
 
-    The canonical form, in which a folder keeps its sweep, names the method itself: what was run once is run again, on
-    whatever device, and does not change with the meaning of a word.
+    The canonical form, in which a folder keeps its sweep, names the method itself, so that the sweep is run again with
+    the same method on any device.
 
     Raises:
         InputError: The sweep's grid goes over devices.
@@ -154,115 +159,74 @@ def _is_on_gpu(planned: Sweep) -> bool:
 
 
 def shard_size(walks: int) -> int:
-    """Walks per shard; it depends on the sweep only, so that the files do not depend on who works on them."""
+    """Walks per shard; it depends on the sweep only, so that equal sweeps leave equal files."""
     return max(1, min(SHARD_WALKS, walks // SHARDS))
 
 
 def run_shards(
-    sweep: Mapping[str, Any],
+    planned: Sweep,
     directory: str,
-    shards: Sequence[tuple[int, int]],
+    shards: Sequence[range],
+    threads: int | None = None,
     stop: threading.Event | None = None,
 ) -> list[str]:
     """Run the walks of some shards and write each shard as soon as its walks are over; what a worker does.
 
     Args:
-        sweep: Canonical form of the sweep.
+        planned: The sweep.
         directory: The sweep's folder.
-        shards: First walk, and the one after the last, of each shard.
+        shards: The walks of each shard.
+        threads: Of every block on a GPU; None: as many as its chain needs.
         stop: When set, the work is abandoned: unfinished shards are not written.
 
     Returns:
         Keys of the shards written.
     """
-    planned = load_sweep(sweep)
     digest = planned.digest()
-    undrawn = list(planned.undrawn(index for first, last in shards for index in range(first, last)))
+    walks = list(planned.undrawn(index for shard in shards for index in shard))
     under_way: dict[int, PlannedWalk] = {}
-    shard_of = {index: shard for shard in shards for index in range(*shard)}
-    rows = {shard: empty_rows(planned, range(*shard)) for shard in shards}
-    left = {shard: shard[1] - shard[0] for shard in shards}
-    motions: dict[tuple[int, int], dict[int, Motion]] = {shard: {} for shard in shards}
-    keeps = [planned.keep(walk) for walk in undrawn]
+    shard_of = {index: shard for shard in shards for index in shard}
+    rows = {shard: empty_rows(planned, shard) for shard in shards}
+    left = {shard: len(shard) for shard in shards}
+    motions: dict[range, dict[int, Motion]] = {shard: {} for shard in shards}
+    setups, keeps = [walk.setup for walk in walks], [planned.keep(walk) for walk in walks]
     keys = []
 
     def draw(place: int) -> Setup:
-        under_way[place] = planned.planned(undrawn[place].index)
+        under_way[place] = planned.drawn(walks[place])
         return under_way[place].setup
 
-    setups, threads = [walk.setup for walk in undrawn], _shared_threads(planned)
     for place, run in run_setups(setups, draw=draw, keeps=keeps, threads=threads, stop=stop):
         walk = under_way.pop(place)
         shard = shard_of[walk.index]
-        _fill(rows[shard][walk.index - shard[0]], walk, run)
+        fill_row(rows[shard][walk.index - shard.start], run.outcome(), walk.drawn)
         if keeps[place].series_every is not None:
             motions[shard][walk.index] = run.motion
         left[shard] -= 1
         if left[shard] == 0:
-            keys.append(write_shard(directory, digest, range(*shard), rows.pop(shard), motions.pop(shard)))
+            keys.append(write_shard(directory, digest, shard, rows.pop(shard), motions.pop(shard)))
     return keys
 
 
-def _fill(row: Any, walk: PlannedWalk, run: WalkRun) -> None:
-    """Write what is kept of a walk into its row."""
-    counts, extremes, energy = run.counts, run.extremes, run.energy()
-    row["status"] = int(run.status)
-    row["dx"] = run.dx
-    row["walk_time"] = run.walk_time
-    row["simulated_time"] = run.simulated_time
-    row["hold_time"] = run.hold_time
-    row["drift"] = run.drift
-    row["softened_at"] = run.softened_at
-    row["bounces"] = counts["bounces"]
-    row["steps_accepted"] = counts["accepted"]
-    row["steps_rejected"] = counts["rejected"]
-    row["greatest_opening"] = extremes["opening"]
-    for kind in ("floor", "sprocket", "self"):
-        row[f"impulses_{kind}"] = counts[kind]
-        row[f"penetration_{kind}"] = extremes[kind]
-    row["energy_at_release"] = energy["kinetic_at_release"] + energy["potential_at_release"]
-    for loss in LOST:
-        row[f"loss_{loss}"] = energy[loss]
-    row["energy_residual"] = energy["residual"]
-    for name, value in walk.drawn.items():
-        row[name] = value
-
-
-def _run_in_threads(
-    planned: Sweep,
-    store: SweepFolder,
-    missing: Sequence[range],
-    workers: int,
-    progress: SweepProgress,
-    on_progress: Callable[[SweepProgress], None] | None,
-) -> None:
-    """Run shards in threads of this process; launches run outside of Python's lock."""
-    progress.compiling = True
-    if on_progress is not None:
-        on_progress(progress)
-    prepare(planned)
-    progress.compiling = False
+@contextlib.contextmanager
+def _threads(count: int) -> Iterator[tuple[Executor, threading.Event]]:
+    """Threads of this process, and what stops their tasks; launches run outside of Python's lock."""
     stop = threading.Event()
-    with concurrent.futures.ThreadPoolExecutor(workers) as threads:
+    with concurrent.futures.ThreadPoolExecutor(count) as threads:
         try:
-            _run(threads, (stop,), planned, store, missing, workers, progress, on_progress)
+            yield threads, stop
         except BaseException:
             stop.set()
             raise
 
 
-def prepare(source: Mapping[str, Any] | Sweep) -> None:
-    """Load every kernel that the walks of a sweep need into this process, compiled if need be.
-
-    Args:
-        source: The sweep, or its canonical form.
-    """
-    planned = load_sweep(source)
+def prepare(planned: Sweep) -> None:
+    """Load every kernel that the walks of a sweep need into this process, compiled if need be."""
     compile_kernels(one_of_each_cell(planned), _shared_threads(planned))
 
 
 def one_of_each_cell(planned: Sweep) -> list[Setup]:
-    """Options and links of every cell."""
+    """Setups with the options and links of every cell."""
     firsts = (
         first for block in planned.blocks for first in range(block.first, block.first + block.walk_count, block.samples)
     )
@@ -270,7 +234,7 @@ def one_of_each_cell(planned: Sweep) -> list[Setup]:
 
 
 def _shared_threads(planned: Sweep) -> int | None:
-    """Threads of every block of the walks of a sweep on a GPU, all of one method; None: as many as a chain needs."""
+    """Threads of every block if the sweep runs on a GPU with one method; None: as many as a chain needs."""
     if not _is_on_gpu(planned):
         return None
     cells = one_of_each_cell(planned)
@@ -282,20 +246,18 @@ def _shared_threads(planned: Sweep) -> int | None:
 
 def _run(
     executor: Executor,
-    more: tuple[Any, ...],
+    stop: threading.Event | None,
     planned: Sweep,
     store: SweepFolder,
     missing: Sequence[range],
     workers: int,
     progress: SweepProgress,
-    on_progress: Callable[[SweepProgress], None] | None,
+    report: Callable[[SweepProgress], None],
 ) -> None:
-    """Keep the workers busy with two tasks each; memory does not grow with the sweep."""
-    if on_progress is not None:
-        on_progress(progress)
+    """Give each worker two tasks at a time, so that memory does not grow with the sweep."""
+    report(progress)
     began = time.perf_counter()
-    canonical, digest = planned.canonical(), planned.digest()
-    waiting = _tasks(planned, missing, workers)
+    threads, waiting = _shared_threads(planned), _tasks(planned, missing, workers)
     folder = store.directory / "shards"
     pending: dict[concurrent.futures.Future[list[str]], list[range]] = {}  # with the shards still to be counted
 
@@ -303,14 +265,8 @@ def _run(
         task = next(waiting, None)
         if task is None:
             return False
-        shards = [(shard.start, shard.stop) for shard in task]
-        pending[executor.submit(run_shards, canonical, str(store.directory), shards, *more)] = task
+        pending[executor.submit(run_shards, planned, str(store.directory), tuple(task), threads, stop)] = task
         return True
-
-    def count(shard: range) -> None:
-        statuses = read_shard(store.directory, digest, shard)["status"]
-        progress.statuses.update(Status(int(code)).label for code in statuses)
-        progress.done += len(shard)
 
     while len(pending) < 2 * workers and submit():
         pass
@@ -327,20 +283,22 @@ def _run(
                 task[:] = [shard for shard in task if shard not in there]
                 written += there
             for shard in written:
-                count(shard)
+                statuses = read_shard(store.directory, store.manifest, shard)["status"]
+                progress.statuses.update(Status(int(code)).label for code in statuses)
+                progress.done += len(shard)
             progress.seconds = time.perf_counter() - began
-            if written and on_progress is not None:
-                on_progress(progress)
+            if written:
+                report(progress)
     finally:
         for future in pending:
             future.cancel()
 
 
 def _tasks(planned: Sweep, missing: Sequence[range], workers: int) -> Iterator[list[range]]:
-    """What is handed to a worker at a time: a shard, or for a GPU enough shards to fill it, if there are enough.
+    """The shards of each task: one on a CPU; on a GPU enough to fill it, if there are enough.
 
-    Shards that follow one another are alike and a GPU's tasks are few: each takes every so many-th, so that all tasks
-    take as long.
+    Neighbouring shards are alike, and a GPU has few tasks. So each task takes every n-th shard, and all take equally
+    long.
     """
     on_gpu: list[range] = []
     firsts = planned.undrawn(shard.start for shard in missing)

@@ -16,37 +16,20 @@ import re
 import secrets
 import shutil
 import socket
-from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Self
+from typing import Final, Self
 
 import numpy as np
 import yaml
 
 from warpchain.inputs.validation import InputError
-from warpchain.store.shards import (
-    NUMERICS_VERSION,
-    OWN,
-    Folder,
-    Manifest,
-    empty_rows,
-    present_shards,
-    put_file,
-    read_manifest,
-    read_shard,
-    unwritable,
-    write_shard,
-)
-from warpchain.walks.motion import SERIES, Motion
+from warpchain.store.manifest import NUMERICS_VERSION, OWN, Folder, Manifest, read_manifest
+from warpchain.store.shards import present_shards, put_file, read_shard, writing
+from warpchain.sweeps.plan import Sweep
+from warpchain.walks.motion import SERIES
 from warpchain.walks.rows import Rows
-
-if TYPE_CHECKING:
-    from types import TracebackType
-
-    from warpchain.sweeps.plan import Sweep
-
-__all__ = ["SweepFolder", "empty_rows", "read_rows", "read_shard", "write_shard"]
 
 SHARD_OVERHEAD: Final = 16 * 1024
 """Bytes that a shard takes at most beside its rows."""
@@ -67,30 +50,29 @@ _YAML_HEAD: Final = """\
 """
 
 
-class SweepFolder:
+@dataclass(frozen=True)
+class SweepFolder(AbstractContextManager["SweepFolder"]):
     """The folder of a sweep, locked against other processes until `close` or the end of this process.
 
     Attributes:
         directory: the folder.
         manifest: what it belongs to, and how its walks are laid out in shards.
+        lock: descriptor of the lock.
     """
 
-    def __init__(self, directory: Path, manifest: Manifest, lock: int) -> None:
-        """For `SweepFolder.open`, which prepares and checks the folder."""
-        self.directory = directory
-        self.manifest = manifest
-        self._lock = lock
+    directory: Path
+    manifest: Manifest
+    lock: int
 
     @classmethod
-    def open(cls, directory: Folder, sweep: "Sweep", *, fresh: bool = False, shard_size: int) -> Self:
+    def open(cls, directory: Folder, sweep: Sweep, *, fresh: bool = False, shard_size: int) -> Self:
         """Begin a sweep in a folder, or go on with it.
 
         Args:
             directory: the folder; made if need be.
             sweep: the sweep that is to be in it.
-            fresh: throw away what a sweep has left in the folder, and begin.
-            shard_size: number of walks in a shard, for a new folder; a folder that goes on keeps its own, which
-                `manifest.shard_size` says.
+            fresh: delete what a sweep has left in the folder, and begin.
+            shard_size: number of walks in a shard of a new folder; a folder that goes on keeps its own.
 
         Raises:
             OSError: the folder cannot be made, locked, read or written, or the disk is too full for the rest of
@@ -101,103 +83,62 @@ class SweepFolder:
         """
         if shard_size < 1:
             raise ValueError(f"shard_size: {shard_size} is not positive; give 1 or more")
-        folder = Path(directory)
+        path = Path(directory)
+        with writing(path):
+            path.mkdir(parents=True, exist_ok=True)
+            lock = _locked(path)
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            lock = _locked(folder)
-        except OSError as error:
-            raise unwritable(folder, error) from error
-        try:
-            manifest = _prepared(folder, Manifest.of(sweep, shard_size), fresh)
-            store = cls(folder, manifest, lock)
-            store._check()
+            folder = cls(path, _prepared(path, Manifest.of(sweep, shard_size), fresh), lock)
+            folder._check()
         except BaseException:
             _unlock(lock)
             raise
-        return store
+        return folder
 
     def log(self, text: str) -> None:
-        """Add a line with the time to log.txt.
-
-        Raises:
-            OSError: the file cannot be written.
-        """
+        """Add a line with the time to log.txt; an `OSError` if it cannot be written."""
         path = self.directory / "log.txt"
         now = datetime.datetime.now().astimezone().isoformat(timespec="seconds")
-        try:
-            with path.open("a", encoding="utf-8") as file:
-                file.write(f"{now}  {text}\n")
-        except OSError as error:
-            raise unwritable(path, error) from error
+        with writing(path), path.open("a", encoding="utf-8") as file:
+            file.write(f"{now}  {text}\n")
 
     def missing(self) -> list[range]:
-        """The walks of each shard that is not there yet, in order.
-
-        Raises:
-            OSError: the folder cannot be read.
-            InputError: a file in it is no shard of this sweep.
-        """
+        """The walks of each shard that is not there yet, in order; errors as of `present_shards`."""
         present = present_shards(self.directory, self.manifest)
         return [walks for walks in self.manifest.shards if walks not in present]
 
-    def write(self, walks: range, rows: Rows, motions: Mapping[int, Motion] | None = None) -> str:
-        """Write a shard, see `write_shard`, and return its key."""
-        return write_shard(self.directory, self.manifest.digest, walks, rows, motions)
-
-    def rows(self) -> Rows:
-        """Rows of all walks that are there, in order.
-
-        Raises:
-            OSError: the folder or a shard cannot be read.
-            InputError: a shard is damaged or foreign.
-        """
-        return read_rows(self.directory, self.manifest)
-
     def close(self) -> None:
         """Let other processes have the folder."""
-        _unlock(self._lock)
+        _unlock(self.lock)
 
-    def __enter__(self) -> Self:
-        """The store itself; closed at the end of the block."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: "TracebackType | None"
-    ) -> None:
+    def __exit__(self, *problem: object) -> None:
         """Close."""
         self.close()
 
-    @property
-    def _series_bytes(self) -> float:
-        """What the series of a short walk takes; frames are not in it."""
-        series = self.manifest.recording.series
-        return 0.0 if series is None else SHORT_WALK / series.interval * SAMPLE_BYTES
-
     def _check(self) -> None:
         """Refuse what would fail later: bad shards, a folder that cannot be written, a disk too full."""
-        present = present_shards(self.directory, self.manifest)
         problems = []
-        for walks in present:
+        for walks in present_shards(self.directory, self.manifest):
             try:
-                _read(self.directory, self.manifest, walks)
+                read_shard(self.directory, self.manifest, walks)
             except InputError as error:
                 problems.append(str(error))
         if problems:
             raise InputError(problems[0] + (f" (and {len(problems) - 1} more)" if problems[1:] else ""))
-        left = [walks for walks in self.manifest.shards if walks not in present]
+        left = self.missing()
         if not left:
             return
         shards = self.directory / "shards"
         probe = shards / f".{'0' * 9}-{'0' * 9}.{secrets.token_hex(4)}.part.h5"
-        try:
+        with writing(shards):
             probe.touch()
             probe.unlink()
             free = shutil.disk_usage(shards).free
-        except OSError as error:
-            raise unwritable(shards, error) from error
-        row = self.manifest.row_type.itemsize
-        need = sum(len(walks) * row + SHARD_OVERHEAD for walks in left)
-        need += round(sum(map(len, left)) / self.manifest.walk_count * self.manifest.kept_count * self._series_bytes)
+        manifest, series = self.manifest, self.manifest.recording.series
+        need = sum(len(walks) * manifest.row_type.itemsize + SHARD_OVERHEAD for walks in left)
+        if series is not None:  # of short walks, and without frames
+            kept = sum(map(len, left)) / manifest.walk_count * manifest.kept_count
+            need += round(kept * SHORT_WALK / series.interval * SAMPLE_BYTES)
         if need > free:
             raise OSError(
                 f"{self.directory}: the rest of the sweep takes {need / 1e6:.3g} MB, but {free / 1e6:.3g} MB are "
@@ -212,17 +153,12 @@ def read_rows(directory: Folder, manifest: Manifest) -> Rows:
         OSError: the folder or a shard cannot be read.
         InputError: a shard is damaged or foreign.
     """
-    shards = present_shards(directory, manifest)
-    parts = [_read(directory, manifest, walks) for walks in shards]
+    parts = [read_shard(directory, manifest, walks) for walks in present_shards(directory, manifest)]
     return np.concatenate([np.empty(0, manifest.row_type), *parts])
 
 
-def _read(directory: Folder, manifest: Manifest, walks: range) -> Rows:
-    return read_shard(directory, manifest.digest, walks, numerics_version=manifest.numerics_version)
-
-
 def _prepared(folder: Path, manifest: Manifest, fresh: bool) -> Manifest:
-    """Make everything but the shards, in an order that leaves no moment at which a kill does harm."""
+    """Make everything but the shards, in an order in which a kill at any moment does no harm."""
     _clear_leftovers(folder)
     named = folder / "sweep.json"
     if not named.exists():
@@ -239,10 +175,8 @@ def _prepared(folder: Path, manifest: Manifest, fresh: bool) -> Manifest:
     if not (folder / "sweep.yaml").exists():
         text = yaml.safe_dump(manifest.sweep, sort_keys=False, allow_unicode=True)
         put_file(folder / "sweep.yaml", (_YAML_HEAD + text).encode())
-    try:
+    with writing(folder / "shards"):
         (folder / "shards").mkdir(exist_ok=True)
-    except OSError as error:
-        raise unwritable(folder / "shards", error) from error
     return manifest
 
 
@@ -263,33 +197,29 @@ def _continued(folder: Path, manifest: Manifest) -> Manifest:
 
 
 def _discard(folder: Path, manifest: Manifest) -> None:
-    """Take away what a sweep left, the shards in one step; nothing if there is a file of somebody else."""
+    """Delete what a sweep left, the shards in one step; nothing if there is a foreign file among them."""
     present_shards(folder, manifest)
-    try:
+    with writing(folder):
         with suppress(FileNotFoundError):
             os.rename(folder / "shards", folder / f".discarded-{secrets.token_hex(4)}")
         for name in ("sweep.yaml", "log.txt"):
             (folder / name).unlink(missing_ok=True)
-    except OSError as error:
-        raise unwritable(folder, error) from error
 
 
 def _clear_leftovers(folder: Path) -> None:
-    """Delete what a killed process had not finished: parts of files, and shards on their way out."""
-    try:
+    """Delete what a killed process left unfinished: parts of files, and shards that it was deleting."""
+    with writing(folder):
         for place in (folder, folder / "shards"):
             for path in place.iterdir() if place.is_dir() else ():
                 if _PART.fullmatch(path.name):
                     path.unlink(missing_ok=True)
                 elif _DISCARDED.fullmatch(path.name) and place == folder:
                     shutil.rmtree(path)
-    except OSError as error:
-        raise unwritable(folder, error) from error
 
 
 _held: set[int] = set()
-"""Descriptors of the locks of this process. A forked child shares them, and a worker that outlives a killed
-run would keep its folder locked; so a child gives them up at once."""
+"""Descriptors of the locks of this process. A forked child shares them, and would keep the folder of a killed run
+locked; so a child closes them at once."""
 
 
 def _give_up() -> None:

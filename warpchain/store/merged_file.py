@@ -13,34 +13,25 @@ import os
 from collections.abc import Iterator
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpchain.files import replacing
 from warpchain.inputs.validation import InputError
-from warpchain.store.shards import (
-    Folder,
-    check_not_own,
-    hdf5_image,
-    open_new_hdf5,
-    present_shards,
-    put_file,
-    read_manifest,
-    read_motions,
-    unwritable,
-)
+from warpchain.store.manifest import Folder, check_not_own, read_manifest
+from warpchain.store.motion_arrays import ARRAYS, count, flat_arrays
+from warpchain.store.shards import open_new_hdf5, present_shards, read_motions, writing
 from warpchain.store.sweep_result import FORMAT, BlockResult, SweepResult, load
-from warpchain.walks.motion import FRAMES, SERIES, Motion
-from warpchain.walks.walk_result import replacing
+from warpchain.walks.motion import Motion
 
 if TYPE_CHECKING:
     import h5py
 
-_DIMENSIONS: Final = {"series": "instant", "frame": "frame", "joint": "joint"}
-"""What is counted of a walk → name of the axis that it is along."""
+_AXES: Final = {"series": "instant", "frame": "frame", "joint": "joint"}
+"""What is counted of a walk, see `ARRAYS` → name of the axis that it is along."""
 _ROOM: Final = 2**20
-"""Bytes that a merged file takes at most beyond its shards: their frames, and the tables of axes."""
+"""Most bytes that a merged file takes beyond its shards, for the tables of axes."""
 _NO_VARIABLE: Final = "This is a netCDF dimension but not a netCDF variable."
 
 
@@ -57,20 +48,13 @@ def merge(directory: Folder, path: str | os.PathLike[str]) -> None:
     check_not_own(directory, target)
     if os.path.lexists(target) and not _is_merged(target):
         raise InputError(f"{target}: is there and is no merged sweep; give another name")
-    if not any(block.kept.any() for block in result.blocks.values()):
-        put_file(target, hdf5_image(lambda file: _fill(file, result)))
-        return
-    # Motions may not fit into memory: this file grows on the disk.
     most = _ROOM + sum(path.stat().st_size for path in present_shards(directory, read_manifest(directory)).values())
-    try:
-        with replacing(target) as part, open_new_hdf5(part, most) as file:
-            _fill(file, result)
-    except OSError as error:
-        raise unwritable(target, error) from error
+    with writing(target), replacing(target) as part, open_new_hdf5(part, most) as file:
+        _fill(file, result)
 
 
 def _is_merged(path: Path) -> bool:
-    """Whether this is a file that `merge` has written."""
+    """Whether `merge` has written this file."""
     import h5py
 
     if not path.is_file():  # opening a pipe would wait for ever
@@ -113,65 +97,43 @@ def _write_rows(block: BlockResult, group: "h5py.Group") -> None:
 
 def _write_motions(block: BlockResult, group: "h5py.Group") -> None:
     """Add the motions of a block, one shard in memory at a time."""
-    counts = {kind: np.zeros(block.shape, np.int64) for kind in _DIMENSIONS}
+    counts = {kind: np.zeros(block.shape, np.int64) for kind in _AXES}
     for place, motion in _motions(block):
-        for kind, count in zip(counts, _counts(motion), strict=True):
-            counts[kind].ravel()[place] = count
-    starts = {kind: np.cumsum(count).reshape(block.shape) - count for kind, count in counts.items()}
-    totals = {dimension: int(counts[kind].sum()) for kind, dimension in _DIMENSIONS.items()}
-    for kind, dimension in _DIMENSIONS.items():
-        if not totals[dimension]:
-            continue
+        for kind, arrays in flat_arrays(motion).items():
+            counts[kind].ravel()[place] = count(arrays)
+    totals = {kind: total for kind, found in counts.items() if (total := int(found.sum()))}
+    for kind, total in totals.items():
         # As netCDF writes a dimension that has no coordinates.
-        scale = group.create_dataset(dimension, (totals[dimension],), ">f4")
-        scale.make_scale(f"{_NO_VARIABLE}{totals[dimension]:10d}")
+        group.create_dataset(_AXES[kind], (total,), ">f4").make_scale(f"{_NO_VARIABLE}{total:10d}")
+        starts = np.cumsum(counts[kind]).reshape(block.shape) - counts[kind]
         for name, values, notes in (
-            (f"{kind}_start", starts[kind], {"description": f"place of a walk's first one along {dimension}"}),
+            (f"{kind}_start", starts, {"description": f"place of a walk's first one along {_AXES[kind]}"}),
             (
                 f"{kind}_count",
                 counts[kind],
-                {"description": f"number of a walk's along {dimension}", "sample_dimension": dimension},
+                {"description": f"number of a walk's along {_AXES[kind]}", "sample_dimension": _AXES[kind]},
             ),
         ):
             dataset = group.create_dataset(name, data=values, compression="gzip", shuffle=True)
             dataset.attrs.update({"units": "1", **notes})
             _attach(dataset, group, block.dims)
-    columns = {name: dimension for name, (dimension, _) in _COLUMNS.items() if totals[dimension]}
-    for name, dimension in columns.items():
-        kind = "f4" if dimension == "joint" else "f8"
-        dataset = group.create_dataset(name, (totals[dimension],), kind)
-        unit, meaning = _COLUMNS[name][1]
-        dataset.attrs.update({"units": unit, "description": meaning})
-        _attach(dataset, group, (dimension,))
+    for kind, total in totals.items():
+        for name, (unit, meaning) in ARRAYS[kind].items():
+            dataset = group.create_dataset(_name(kind, name), (total,), "f4" if kind == "joint" else "f8")
+            dataset.attrs.update({"units": unit, "description": meaning})
+            _attach(dataset, group, (_AXES[kind],))
     ends = dict.fromkeys(totals, 0)
     for _, motion in _motions(block):
-        arrays = _arrays(motion)
-        for name, dimension in columns.items():
-            group[name][ends[dimension] : ends[dimension] + len(arrays[name])] = arrays[name]
-        for dimension, count in zip(ends, _counts(motion), strict=True):
-            ends[dimension] += count
+        for kind, arrays in flat_arrays(motion).items():
+            if kind in totals:
+                first, ends[kind] = ends[kind], ends[kind] + count(arrays)
+                for name, values in arrays.items():
+                    group[_name(kind, name)][first : ends[kind]] = values
 
 
-_COLUMNS: Final = {
-    **{f"series_{name}": ("instant", note) for name, note in SERIES.items()},
-    **{name: ("frame" if name == "frame_time" else "joint", note) for name, note in FRAMES.items()},
-}
-"""Flat arrays: name → axis; unit and meaning."""
-
-
-def _arrays(motion: Motion) -> dict[str, NDArray[Any]]:
-    """A motion's parts of the flat arrays."""
-    return {
-        **{f"series_{name}": motion.series[:, column] for column, name in enumerate(SERIES)},
-        "frame_time": motion.frame_time,
-        "joint_x": motion.frame_joints[..., 0].ravel(),
-        "joint_y": motion.frame_joints[..., 1].ravel(),
-    }
-
-
-def _counts(motion: Motion) -> tuple[int, int, int]:
-    """Numbers of samples, frames and joints in all frames."""
-    return len(motion.series), len(motion.frame_time), motion.frame_joints[..., 0].size
+def _name(kind: str, name: str) -> str:
+    """Name that a flat array has in the file."""
+    return f"series_{name}" if kind == "series" else name
 
 
 def _motions(block: BlockResult) -> Iterator[tuple[int, Motion]]:

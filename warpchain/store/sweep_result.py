@@ -1,12 +1,14 @@
 """Results of a sweep as arrays with named axes.
 
-A folder is read at any moment, also while its sweep runs: what is not there yet is missing and counted.
+A folder can be read while its sweep runs: walks that are not there yet are missing, and counted.
 """
 
 import importlib
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,9 +19,9 @@ from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError, shown, suggestion
 from warpchain.status import Status
 from warpchain.store.folder import read_rows
-from warpchain.store.shards import FORMAT_VERSION, Folder, Manifest, read_manifest
-from warpchain.store.walk_motion import MotionReader, WalkMotion, motion_reader
-from warpchain.walks.rows import COLUMNS, MISSING, Column, Rows, field_column, missing_rows
+from warpchain.store.manifest import FORMAT_VERSION, Folder, read_manifest
+from warpchain.store.walk_motion import MotionReader, WalkMotion
+from warpchain.walks.rows import COLUMNS, MISSING, Column, field_column, missing_rows
 
 if TYPE_CHECKING:
     import pandas
@@ -35,9 +37,7 @@ _Variables = dict[str, tuple[tuple[str, ...], Array, dict[str, Any]]]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CellStatistics:
-    """A quantity over the samples of each cell; arrays over the axes of the grid.
-
-    Only walks that came to rest are in the mean and the standard deviation; the others are counted.
+    """Statistics of a quantity over the walks of each cell that came to rest; arrays over the axes of the grid.
 
     Attributes:
         axes: name of each axis → its values.
@@ -67,15 +67,15 @@ class CellStatistics:
 class BlockResult:
     """A block of a sweep. Every column is an attribute, an array of shape `shape`: `block.dx`, `block.status`.
 
-    Columns are those of `warpchain.walks.rows.COLUMNS` and the drawn quantities. A missing walk has the status −1,
-    NaN in columns of floats and −1 in those of integers.
+    Columns are those of `warpchain.walks.rows.COLUMNS` and the drawn quantities. A missing walk has −1 in columns of
+    integers, `status` among them, and NaN in those of floats.
 
     Attributes:
         name: name of the block.
         axes: name of each axis of the grid → its values, in order; the samples are one more axis.
         drawn: names of the quantities that samples draw.
         columns: name → values.
-        motions: where the motions of the walks are; None if none was kept.
+        motions: reads the motions of walks; None if none was kept.
     """
 
     name: str
@@ -111,19 +111,11 @@ class BlockResult:
         return f"<BlockResult {self.name} ({sizes}): {_counts(self.summary())}>"
 
     def unit(self, name: str) -> str:
-        """SI unit of a column or an axis, "1" for pure numbers.
-
-        Raises:
-            KeyError: there is none of that name.
-        """
+        """SI unit of a column or an axis, "1" for pure numbers; a `KeyError` if there is none of that name."""
         return self._column(name).unit
 
     def meaning(self, name: str) -> str:
-        """One line saying what a column or an axis is.
-
-        Raises:
-            KeyError: there is none of that name.
-        """
+        """One line saying what a column or an axis is; a `KeyError` if there is none of that name."""
         return self._column(name).meaning
 
     def _column(self, name: str) -> Column:
@@ -136,11 +128,10 @@ class BlockResult:
     @property
     def kept(self) -> NDArray[np.bool_]:
         """Whether the motion of a walk was kept and is there, shape `shape`."""
-        recording = None if self.motions is None else self.motions.manifest.recording.series
-        numbers = range(self.shape[-1])
-        chosen = np.array([recording is not None and recording.includes(sample) for sample in numbers])
-        there: NDArray[np.bool_] = chosen & (self.columns["status"] != MISSING)
-        return there
+        series = None if self.motions is None else self.motions.manifest.recording.series
+        chosen = [series is not None and series.includes(sample) for sample in range(self.shape[-1])]
+        kept: NDArray[np.bool_] = np.array(chosen) & (self.columns["status"] != MISSING)
+        return kept
 
     def series(self, *, sample: int = 0, **at: float | str) -> WalkMotion:
         """The motion of one walk: `series(links=60, frequency=15, sample=2).time`.
@@ -154,17 +145,14 @@ class BlockResult:
             OSError: its shard cannot be read.
         """
         if unknown := [name for name in at if name not in self.axes]:
-            known = f"{suggestion(unknown[0], tuple(self.axes))}" if self.axes else "there are no axes"
+            known = suggestion(unknown[0], tuple(self.axes)) if self.axes else "there are no axes"
             raise InputError(f"{unknown[0]}: no axis of block {self.name}; {known}")
         place = []
         for name, values in self.axes.items():
-            if name not in at and len(values) > 1:
-                raise InputError(f"{name}: missing; give one of {', '.join(map(str, values))}")
             found = np.flatnonzero(values == at.get(name, values[0]))
-            if not len(found):
-                raise InputError(
-                    f"{name}: {shown(at[name])} is not on the axis; give one of {', '.join(map(str, values))}"
-                )
+            if not len(found) or (name not in at and len(values) > 1):
+                problem = f"{shown(at[name])} is not on the axis" if name in at else "missing"
+                raise InputError(f"{name}: {problem}; give one of {', '.join(map(str, values))}")
             place.append(int(found[0]))
         is_whole = isinstance(sample, (int, np.integer)) and not isinstance(sample, bool)
         if not is_whole or not 0 <= sample < self.shape[-1]:
@@ -186,12 +174,12 @@ class BlockResult:
         return _summary(self.columns["status"])
 
     def statistics(self, name: str = "dx") -> CellStatistics:
-        """Mean and standard deviation of a column in each cell, over the walks at rest, and what is not in them.
+        """Statistics of a column in each cell.
 
         Raises:
             KeyError: there is no such column.
         """
-        self._column(name)
+        unit = self.unit(name)
         status = self.columns["status"]
         rested = status == Status.AT_REST
         count = rested.sum(axis=-1)
@@ -202,7 +190,7 @@ class BlockResult:
             sd = np.sqrt((deviation**2).sum(axis=-1) / (count - 1))
         return CellStatistics(
             axes=self.axes,
-            unit=self.unit(name),
+            unit=unit,
             mean=mean,
             sd=np.where(count > 1, sd, np.nan),
             count=count,
@@ -305,9 +293,9 @@ class SweepResult:
         Raises:
             KeyError: there is none of that name.
         """
-        blocks = self.blocks.values()
-        owner = next((block for block in blocks if name in block.columns or name in block.dims), None)
-        return (owner or next(iter(blocks))).unit(name)
+        first, *others = self.blocks.values()
+        owner = next((block for block in others if name in block.columns or name in block.dims), first)
+        return owner.unit(name)
 
     def to_xarray(self) -> "xarray.Dataset | xarray.DataTree":
         """The only block as a data set, or several as a tree with one child each.
@@ -363,31 +351,26 @@ def load(directory: Folder) -> SweepResult:
     rows = missing_rows(manifest.row_type, range(manifest.walk_count))
     present = read_rows(directory, manifest)
     rows[present["index"]] = present
-    provenance = {name: getattr(manifest, name) for name in ("digest", "numerics_version", "versions")}
-    return SweepResult(
-        name=manifest.name,
-        seed=manifest.seed,
-        blocks=_blocks(manifest, rows, motion_reader(directory, manifest)),
-        sweep=manifest.sweep,
-        provenance=provenance,
-    )
-
-
-def _blocks(manifest: Manifest, rows: Rows, motions: MotionReader | None) -> dict[str, BlockResult]:
-    """The blocks of a sweep, from the rows of all of its walks."""
+    keeps_motions = manifest.recording.series is not None
+    motions = MotionReader(Path(directory).absolute(), manifest) if keeps_motions else None
     blocks = {}
-    for layout in manifest.blocks:
-        size = int(np.prod(layout.shape))
-        part = rows[layout.first : layout.first + size].reshape(layout.shape)
-        names = (*COLUMNS, *(name for name in rows.dtype.names or () if name in layout.drawn))
-        blocks[layout.name] = BlockResult(
-            name=layout.name,
-            axes={name: np.array(values) for name, values in layout.axes.items()},
-            drawn=layout.drawn,
+    for block in manifest.blocks:
+        part = rows[block.first : block.first + math.prod(block.shape)].reshape(block.shape)
+        names = (*COLUMNS, *(name for name in rows.dtype.names or () if name in block.drawn))
+        blocks[block.name] = BlockResult(
+            name=block.name,
+            axes={name: np.array(values) for name, values in block.axes.items()},
+            drawn=block.drawn,
             columns={name: np.ascontiguousarray(part[name]) for name in names},
             motions=motions,
         )
-    return blocks
+    return SweepResult(
+        name=manifest.name,
+        seed=manifest.seed,
+        blocks=blocks,
+        sweep=manifest.sweep,
+        provenance={name: getattr(manifest, name) for name in ("digest", "numerics_version", "versions")},
+    )
 
 
 def _summary(status: Array) -> dict[str, int]:

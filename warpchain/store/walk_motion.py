@@ -5,8 +5,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,31 +14,17 @@ from warpchain.inputs.scene import contact_radius
 from warpchain.inputs.setup import Setup
 from warpchain.loop.before_release import BeforeRelease
 from warpchain.status import Status
-from warpchain.store.shards import Manifest, read_motions
-from warpchain.sweeps.plan import load_sweep
-from warpchain.walks.motion import Motion
-from warpchain.walks.walk_result import STORED, Stored
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from warpchain.sweeps.plan import Sweep
+from warpchain.store.manifest import Manifest
+from warpchain.store.shards import read_motions
+from warpchain.sweeps.plan import Sweep, load_sweep
+from warpchain.walks.walk_result import STORED, Drawn
 
 Array = NDArray[np.float64]
 
-FIELDS: Final[Mapping[str, Stored]] = {
-    name: STORED[name]
-    for name in ("time", "center", "center_velocity", "frame_time", "frame_joints", "sprocket_center")
-}
-"""Arrays of a kept walk: name → unit and meaning, those of a `WalkResult`."""
-
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class WalkMotion:
-    """The motion of one walk of a sweep: t instants and f frames of a chain of n links.
-
-    Time counts from the release, x from wherever the release put it, y from the floor upwards. A walk that was never
-    released has no instants and no frames.
+class WalkMotion(Drawn):
+    """The motion of one walk of a sweep: t instants and f frames of a chain of n links; none if it was never released.
 
     Attributes:
         index: number of the walk in its sweep.
@@ -47,7 +32,7 @@ class WalkMotion:
         dx: distance walked [m]; NaN unless it came to rest.
         setup: what it is.
         time: time since the release [s], shape (t,).
-        center: centre of mass x, y [m], shape (t, 2).
+        center: centre of mass x, y [m], shape (t, 2), where x is as in `WalkResult`.
         center_velocity: its velocity [m/s], shape (t, 2).
         frame_time: times of the frames [s], shape (f,).
         frame_joints: joints x, y [m], shape (f, n, 2); kept to single precision.
@@ -75,40 +60,20 @@ class WalkMotion:
         return f"<WalkMotion {self.index} {self.status.label}: dx {self.dx:.4g} m, {counts}>"
 
     def unit(self, name: str) -> str:
-        """SI unit of an array.
-
-        Raises:
-            KeyError: there is none of that name.
-        """
-        return FIELDS[name].unit
+        """SI unit of an array; a `KeyError` if there is none of that name."""
+        return STORED[name].unit
 
     def meaning(self, name: str) -> str:
-        """One line saying what an array is.
-
-        Raises:
-            KeyError: there is none of that name.
-        """
-        return FIELDS[name].meaning
-
-    def plot(
-        self, kind: Literal["figure5", "film_strip", "loop"] = "figure5", *, figure: "Figure | None" = None
-    ) -> "Figure":
-        """Draw the walk, see `WalkResult.plot`.
-
-        Raises:
-            ValueError: the kind is unknown, or what it shows was not kept.
-        """
-        from warpchain.pictures.walk_figures import draw
-
-        return draw(self, kind, figure=figure)
+        """One line saying what an array is; a `KeyError` if there is none of that name."""
+        return STORED[name].meaning
 
 
 @dataclass(frozen=True)
 class MotionReader:
-    """Where the motions of a sweep are.
+    """Reads the motions of a sweep.
 
     Attributes:
-        directory: folder of the sweep.
+        directory: absolute path of the sweep's folder.
         manifest: its manifest.
     """
 
@@ -116,8 +81,8 @@ class MotionReader:
     manifest: Manifest
 
     @cached_property
-    def sweep(self) -> "Sweep":
-        """The sweep itself, planned."""
+    def sweep(self) -> Sweep:
+        """The sweep, checked."""
         return load_sweep(self.manifest.sweep)
 
     def walk(self, index: int, row: Mapping[str, Any]) -> WalkMotion:
@@ -131,7 +96,7 @@ class MotionReader:
             OSError: its shard cannot be read.
             InputError: its shard is damaged or foreign.
         """
-        motion: Motion = read_motions(self.directory, self.manifest, range(index, index + 1))[index]
+        motion = read_motions(self.directory, self.manifest, range(index, index + 1))[index]
         setup = self.sweep.planned(index).setup
         has_sprocket = not math.isnan(motion.sprocket_height)
         return WalkMotion(
@@ -148,10 +113,3 @@ class MotionReader:
             sprocket_radius=contact_radius(setup.scene, setup.parameters) if has_sprocket else math.nan,
             before_release=None if motion.before_release is None else motion.before_release.as_type(np.float64),
         )
-
-
-def motion_reader(directory: str | os.PathLike[str], manifest: Manifest) -> MotionReader | None:
-    """Where the motions of a sweep are; None if it keeps none."""
-    if manifest.recording.series is None:
-        return None
-    return MotionReader(Path(directory).absolute(), manifest)

@@ -12,7 +12,7 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -24,8 +24,9 @@ from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.block import Block
 from warpchain.sweeps.designs import design_points, saltelli_points, walks_per_sample
-from warpchain.sweeps.recording import Keep, Recording
+from warpchain.sweeps.recording import Recording
 from warpchain.sweeps.sweep_file import VERSION, read_sweep
+from warpchain.walks.motion import Keep
 
 Point = dict[str, float]
 """Drawn values by name."""
@@ -81,10 +82,6 @@ class Sweep:
     def planned(self, index: int) -> PlannedWalk:
         """The walk with a number.
 
-        A sample that makes no possible walk (a chain that with the drawn lengths does not reach round its sprocket,
-        say) is drawn again as a whole: from its own stream, which for a designed sample begins only then. In
-        `saltelli` the d + 2 walks of a sample go together.
-
         Args:
             index: number of the walk, 0 … `walk_count` − 1.
 
@@ -92,14 +89,25 @@ class Sweep:
             IndexError: there is no such walk.
             InputError: no draw made a possible walk.
         """
-        number, cell, sample = self._located(index)
-        block = self.blocks[number]
-        fixed = block.fixed(cell)
+        (walk,) = self.undrawn([index])
+        return self.drawn(walk)
+
+    def drawn(self, walk: PlannedWalk) -> PlannedWalk:
+        """A walk of `undrawn` with what is drawn for it.
+
+        A sample that makes no possible walk (a chain that with the drawn lengths does not reach round its sprocket,
+        say) is drawn again as a whole: from its own stream, which for a designed sample begins only then. In
+        `saltelli` the d + 2 walks of a sample go together.
+
+        Raises:
+            InputError: no draw made a possible walk.
+        """
+        block, fixed = self.blocks[walk.block], walk.setup
         if not block.drawn:
-            return PlannedWalk(index, number, cell, sample, fixed, {})
-        row, member = divmod(sample, walks_per_sample(block.sampler, len(block.drawn)))
-        points, setups = self._first_possible(block, cell, fixed, row, designed=block.sampler != "random")
-        return PlannedWalk(index, number, cell, sample, setups[member], points[member])
+            return walk
+        row, member = divmod(walk.sample, walks_per_sample(block.sampler, len(block.drawn)))
+        points, setups = self._first_possible(block, walk.cell, fixed, row, designed=block.sampler != "random")
+        return replace(walk, setup=setups[member], drawn=points[member])
 
     def undrawn(self, indices: Iterable[int]) -> Iterator[PlannedWalk]:
         """Walks without their draws, which take most of the time; options and number of links never depend on them.

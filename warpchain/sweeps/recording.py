@@ -86,22 +86,3 @@ class Recording:
             samples = None if given["samples"] == "all" else tuple(given["samples"])
             choices[name] = Choice(**{**given, "samples": samples})
         return cls(**choices)
-
-
-@dataclass(frozen=True)
-class Keep:
-    """What is kept of one walk.
-
-    Attributes:
-        series_every: every so many looks at the chain a sample is kept; None: no series.
-        frame_every: every so many looks a frame is kept; None: no frames.
-        before: time [s] before the release of which samples and frames are kept as well, with the joints' loads; 0:
-            none.
-    """
-
-    series_every: int | None = None
-    frame_every: int | None = None
-    before: float = 0.0
-
-
-NOTHING: Final = Keep()

@@ -1,8 +1,7 @@
 """Takes the time series and frames of a walk out of its world, between launches."""
 
-import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,14 +9,23 @@ from numpy.typing import NDArray
 from warpchain.engine.batch import Batch
 from warpchain.kernels import layout
 from warpchain.loop.before_release import BeforeRelease
-from warpchain.sweeps.recording import Keep
-from warpchain.walks.motion import Motion
+from warpchain.walks.motion import Keep, Motion
 
 Array = NDArray[np.float64]
 
-EVERYTHING: Final = Keep(series_every=1, frame_every=1)
-SERIES_COLUMNS: Final = [layout.TIME, layout.CENTER_X, layout.CENTER_Y, layout.CENTER_U, layout.CENTER_V]
+MOTION_COLUMNS: Final = [layout.TIME, layout.CENTER_X, layout.CENTER_Y, layout.CENTER_U, layout.CENTER_V]
 """Columns of a sample that are those of `warpchain.walks.motion.SERIES`."""
+RESULT_COLUMNS: Final[dict[str, int | list[int]]] = {
+    "time": layout.TIME,
+    "center": [layout.CENTER_X, layout.CENTER_Y],
+    "center_velocity": [layout.CENTER_U, layout.CENTER_V],
+    "kinetic_energy": layout.KINETIC,
+    "gravitational_energy": layout.GRAVITATIONAL,
+    "spring_energy": layout.SPRING,
+    "lowest": layout.LOWEST,
+    "rms_speed": layout.RMS_SPEED,
+}
+"""Time series of a `WalkResult` → columns of a sample."""
 
 
 @dataclass(frozen=True)
@@ -31,41 +39,39 @@ class _Piece:
 
 
 class Recorder:
-    """Samples and frames of one walk since its release, and of the last moments before if they are to be kept."""
+    """Samples and frames of one walk since its release, and of the last moments before if they are to be kept.
 
-    def __init__(self, batch: Batch, world: int, keep: Keep = EVERYTHING) -> None:
+    Attributes:
+        before: What is kept of the time before the release; None: nothing.
+    """
+
+    def __init__(self, batch: Batch, world: int, keep: Keep) -> None:
         """Begin with nothing.
 
         Args:
-            batch: Where the walk runs; whether there are samples and frames, and how often, is up to it.
+            batch: Where the walk runs; whether it takes samples and frames, and how often, was decided with it.
             world: Index.
             keep: Which of the samples are kept, and whether frames are.
         """
+        self.before: BeforeRelease | None = None
         self._batch, self._world, self._keep = batch, world, keep
         self._has_samples, self._has_frames = batch.record.samples.size > 0, batch.record.frames.size > 0
-        self._interval = (keep.series_every or 1) * batch.options.record_interval
         self._place = -1.0
         self._last: Array = np.empty((0, layout.SAMPLE_COLUMNS))
         self._samples: list[Array] = []
         self._frame_times: list[Array] = []
         self._frames: list[Array] = []
         self._drive: list[_Piece] = []
-        self._before: BeforeRelease | None = None
-
-    @property
-    def before(self) -> BeforeRelease | None:
-        """What is kept of the time before the release; None: nothing."""
-        return self._before
 
     def drain(self, released: bool) -> None:
-        """Take what the last launch wrote; what came before the release is forgotten but for what `release` wants."""
+        """Take what the last launch wrote; before the release only what `release` may want is kept."""
         if not released and self._keep.before > 0:
             self._drain_drive()
             return
         if self._has_samples:
             samples = self._batch.drain_samples(self._world)
             if released and self._keep.series_every is not None and len(samples):
-                self._samples.append(self._thinned(samples))
+                self._samples.append(self._thinned(samples, self._keep.series_every))
                 self._last = samples[-1:]
         if self._has_frames:
             times, frames = self._batch.drain_frames(self._world)
@@ -88,9 +94,9 @@ class Recorder:
         """Keep what was recorded in the last moments of the drive, all of which has been drained.
 
         Args:
-            moment: of the release, by the clock of the drive [s].
-            raised: height [m] by which the chain was raised at the release.
-            earliest: when the loop was last given its own loads [s]; nothing older is kept.
+            moment: Of the release, by the clock of the drive [s].
+            raised: Height [m] by which the chain was raised at the release.
+            earliest: When the loop was last given its own loads [s]; nothing older is kept.
         """
         pieces, self._drive = self._drive, []
         if not pieces:
@@ -101,10 +107,10 @@ class Recorder:
         )
         oldest = max(moment - self._keep.before, earliest)
         is_wanted = (samples[:, layout.TIME] >= oldest) & (samples[:, layout.TIME] < moment)
-        samples = samples[is_wanted][:, SERIES_COLUMNS]
+        samples = samples[is_wanted][:, MOTION_COLUMNS]
         wanted = (times >= oldest) & (times < moment)
         raise_by = np.array([0.0, raised])
-        self._before = BeforeRelease(
+        self.before = BeforeRelease(
             time=samples[:, 0] - moment,
             center=samples[:, 1:3] + raise_by,
             center_velocity=samples[:, 3:5],
@@ -114,32 +120,37 @@ class Recorder:
             frame_moments=loads[wanted, :, 2],
         )
 
-    def _thinned(self, samples: Array) -> Array:
-        """The first of the samples in each interval: steps may be longer than the time between two looks."""
-        if self._keep.series_every == 1:
+    def _thinned(self, samples: Array, every: int) -> Array:
+        """The first of the samples in each interval; a step may be longer than the time between two sample marks."""
+        if every == 1:
             return samples
-        places = np.floor(samples[:, layout.TIME] / self._interval)
+        places = np.floor(samples[:, layout.TIME] / (every * self._batch.options.record_interval))
         is_first = np.diff(places, prepend=self._place) > 0
         self._place = places[-1]
         return samples[is_first]
 
     def samples(self) -> Array:
-        """Samples (t, SAMPLE_COLUMNS), however few are kept the last one among them."""
+        """Samples (t, SAMPLE_COLUMNS) that are kept, and the last one in any case."""
         kept = np.concatenate([np.empty((0, layout.SAMPLE_COLUMNS)), *self._samples])
         is_there = len(kept) == 0 or kept[-1, layout.TIME] == self._last[0, layout.TIME]
         return kept if is_there else np.concatenate([kept, self._last])
 
-    def frames(self, links: int) -> tuple[Array, Array]:
+    def series(self) -> dict[str, Any]:
+        """Time series by the names of the fields of `WalkResult`."""
+        samples = self.samples()
+        return {name: samples[:, columns] for name, columns in RESULT_COLUMNS.items()}
+
+    def frames(self) -> tuple[Array, Array]:
         """Times of the frames (f,) [s], joint positions (f, n, 2) [m]."""
         return (
             np.concatenate([np.empty(0), *self._frame_times]),
-            np.concatenate([np.empty((0, links, 2)), *self._frames]),
+            np.concatenate([np.empty((0, self._batch.links[self._world], 2)), *self._frames]),
         )
 
-    def motion(self, links: int, sprocket_height: float = math.nan) -> Motion:
+    def motion(self, sprocket_height: float) -> Motion:
         """What a sweep keeps of the walk."""
-        times, frames = self.frames(links)
-        series, joints = self.samples()[:, SERIES_COLUMNS], frames.astype(np.float32)
+        times, frames = self.frames()
+        series, joints = self.samples()[:, MOTION_COLUMNS], frames.astype(np.float32)
         for array in (series, joints):  # which NaN a failed walk has may depend on the batch
             array[np.isnan(array)] = np.nan
         return Motion(
@@ -147,7 +158,7 @@ class Recorder:
             frame_time=times,
             frame_joints=joints,
             sprocket_height=sprocket_height,
-            before_release=None if self._before is None else self._before.as_type(np.float32),
+            before_release=None if self.before is None else self.before.as_type(np.float32),
         )
 
 

@@ -1,19 +1,17 @@
-"""Rows of a sweep: what one walk leaves, as a NumPy structure.
+"""Rows of a sweep: what one walk leaves, as a NumPy structure."""
 
-Unit and meaning of a column are those of the field of `WalkResult` that it comes from.
-"""
-
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.engine.tallies import CONTACTS, LOST
 from warpchain.inputs.distributions import DRAWABLE
 from warpchain.inputs.setup import SECTION_OF, SECTIONS
 from warpchain.inputs.validation import field_unit
-from warpchain.walks.walk_result import CONTACTS, ENERGIES, LOST, STORED
+from warpchain.walks.walk_result import STORED
 
 Rows = NDArray[np.void]
 
@@ -36,31 +34,35 @@ class Column:
     meaning: str
 
 
-def _of_walk(kind: str, name: str, meaning: str = "") -> Column:
-    """The column of a field of `WalkResult`; a meaning stands for one key of a dictionary."""
-    stored = STORED[name]
-    return Column(kind, stored.unit, f"{stored.meaning}: {meaning}" if meaning else stored.meaning)
+def _flat(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Something for each field of `WalkResult`, by names of columns: a column for each key of a dictionary."""
+    flat = dict(fields)
+    for prefix, name in (("impulses", "impulses"), ("penetration", "greatest_penetration")):
+        flat |= {f"{prefix}_{kind}": value for kind, value in fields[name].items()}
+    return flat | {f"{'loss' if key in LOST else 'energy'}_{key}": value for key, value in fields["energy"].items()}
 
 
-COLUMNS: Final[dict[str, Column]] = {
-    "index": Column("<i8", "1", "number of the walk in its sweep"),
-    "status": Column("<i1", "1", f"code of what ended the walk; {MISSING} while it is missing"),
-    "dx": _of_walk("<f8", "dx"),
-    "walk_time": _of_walk("<f8", "walk_time"),
-    "simulated_time": _of_walk("<f8", "simulated_time"),
-    "hold_time": _of_walk("<f8", "hold_time"),
-    "drift": _of_walk("<f8", "drift"),
-    "softened_at": _of_walk("<f8", "softened_at"),
-    "bounces": _of_walk("<i4", "bounces"),
-    "steps_accepted": _of_walk("<i8", "steps_accepted"),
-    "steps_rejected": _of_walk("<i8", "steps_rejected"),
-    **{f"impulses_{key}": _of_walk("<i8", "impulses", meaning) for key, meaning in CONTACTS.items()},
-    "greatest_opening": _of_walk("<f8", "greatest_opening"),
-    **{f"penetration_{key}": _of_walk("<f8", "greatest_penetration", meaning) for key, meaning in CONTACTS.items()},
-    "energy_at_release": Column("<f8", "J", "energy at release, kinetic and potential"),
-    **{f"loss_{key}": Column("<f8", "J", ENERGIES[key]) for key in LOST},
-    "energy_residual": Column("<f8", "J", ENERGIES["residual"]),
+_NOTES: Final = {
+    "index": ("1", "number of the walk in its sweep"),
+    "status": ("1", f"code of what ended the walk; {MISSING} while it is missing"),
+    "energy_at_release": ("J", "energy at release, kinetic and potential"),
+    **_flat(
+        {
+            name: {key: (stored.unit, meaning) for key, meaning in stored.keys.items()} or (stored.unit, stored.meaning)
+            for name, stored in STORED.items()
+        }
+    ),
 }
+_KINDS: Final = {
+    "index": "<i8",
+    "status": "<i1",
+    **dict.fromkeys(("dx", "walk_time", "simulated_time", "hold_time", "drift", "softened_at"), "<f8"),
+    "bounces": "<i4",
+    **dict.fromkeys(("steps_accepted", "steps_rejected", *(f"impulses_{kind}" for kind in CONTACTS)), "<i8"),
+    **dict.fromkeys(("greatest_opening", *(f"penetration_{kind}" for kind in CONTACTS)), "<f8"),
+    **dict.fromkeys(("energy_at_release", *(f"loss_{name}" for name in LOST), "energy_residual"), "<f8"),
+}
+COLUMNS: Final = {name: Column(kind, *_NOTES[name]) for name, kind in _KINDS.items()}
 """Columns of every sweep; behind them comes one for each quantity that the sweep draws.
 
 A number is the same however its walk was computed, so there is no wall time. What is missing, or does not
@@ -69,6 +71,22 @@ exist (the distance of a walk that failed), is NaN in a column of floats and −
 
 ROW: Final = np.dtype([(name, column.kind) for name, column in COLUMNS.items()])
 """Type of a row of a sweep that draws nothing."""
+
+
+def fill_row(row: Any, outcome: Mapping[str, Any], drawn: Mapping[str, float]) -> None:
+    """Write a walk into its row, which has its index already.
+
+    Args:
+        row: one of `missing_rows`.
+        outcome: of the walk, see `WalkRun.outcome`.
+        drawn: name → value of what was drawn for it.
+    """
+    energy = outcome["energy"]
+    values = _flat(outcome) | {"energy_at_release": energy["kinetic_at_release"] + energy["potential_at_release"]}
+    for name in COLUMNS.keys() - {"index"}:
+        row[name] = values[name]
+    for name, value in drawn.items():
+        row[name] = value
 
 
 def field_column(name: str) -> Column:
@@ -83,14 +101,14 @@ def field_column(name: str) -> Column:
     return Column("<f8", field_unit(field), field.description or name)
 
 
-def row_type(drawn: Sequence[str]) -> np.dtype[np.void]:
+def row_type(drawn: Iterable[str]) -> np.dtype[np.void]:
     """Type of a row.
 
     Args:
         drawn: quantities that some block of the sweep draws, in any order.
     """
-    ordered = [name for name in DRAWABLE if name in drawn]
-    return np.dtype([*((name, column.kind) for name, column in COLUMNS.items()), *((n, "<f8") for n in ordered)])
+    names = set(drawn)
+    return np.dtype([*ROW.descr, *((name, "<f8") for name in DRAWABLE if name in names)])
 
 
 def missing_rows(kind: np.dtype[np.void], walks: range) -> Rows:

@@ -3,7 +3,8 @@
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
 
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import most_worlds, start_device
@@ -13,19 +14,25 @@ from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
-from warpchain.sweeps.recording import NOTHING, Keep
+from warpchain.walks.motion import NOTHING, Keep
 from warpchain.walks.walk_phases import WalkRun
 
-ATTEMPTS = {"cpu": 20_000, "cuda": 200_000}
+ATTEMPTS = {"cpu": 5_000, "cuda": 200_000}
 """Most attempts of each chain per launch, by kind of device; what a walk gives does not depend on it.
 
-On a GPU a launch is cut by its time: attempts in a pile take three times as long as in flight, and with equal numbers
-of attempts every chain would wait for the slowest of its batch.
+On a CPU 5000 take 6 to 110 ms, which is the grain of progress and of Ctrl-C. On a GPU a launch is cut by its time:
+attempts in a pile take three times as long as in flight, and with equal numbers of attempts every chain would wait for
+the slowest of its batch.
 """
-CREWS = 4
-"""Batches that share a GPU: while the host looks after one of them, the others go on and fill the device."""
+BATCHES_PER_GPU = 4
+"""While the host looks after one of them, the others go on and fill the device."""
 NAP = 5e-4
-"""Pause [s] before looking again whether a batch is done."""
+"""Pause [s] before asking again whether a batch is done."""
+
+Begin = Callable[[int, Batch, int], WalkRun]
+"""Begins a walk: its place, and the batch and the world to run on."""
+Watch = Callable[[WalkRun, bool], None]
+"""Told of a run after each of its launches (False), and before a kernel that it needs is loaded (True)."""
 
 
 def run_setups(
@@ -36,72 +43,64 @@ def run_setups(
     slots: int | None = None,
     threads: int | None = None,
     stop: threading.Event | None = None,
+    watch: Watch | None = None,
 ) -> Iterator[tuple[int, WalkRun]]:
     """Run walks and yield each when it is over, as (place in ``setups``, run).
 
-    A run must be read before the next one is asked for: its world is used again. What a walk gives does not depend,
-    to the bit, on the others or on the number of slots.
+    A run must be read before the next one is asked for: its world is used again. No bit of a walk depends on the others
+    or on the number of slots.
 
     Args:
         setups: The walks, samples drawn; with ``draw``, options and links suffice.
         draw: Asked for a walk, by its place, when it begins; its options and links are those of ``setups``.
-        keeps: What is kept of the motion of each, for ``run.motion``; None: nothing. Walks of equal options keep
+        keeps: What is kept of the motion of each, for ``run.recorder``; None: nothing. Walks of equal options keep
             frames equally often.
-        slots: Chains that are carried on together in one launch. Default: on a GPU as many as fill it, on a CPU, where
-            a launch is one core's work, one at a time, which stays in the cache.
+        slots: Number of chains that run at the same time. Default: on a GPU as many as fill it; on a CPU, where one
+            core does a launch, one, which stays in the cache.
         threads: Of every block on a GPU, see `warpchain.engine.kernel_choice.shared_threads`; no bit depends on it.
         stop: When set, the walks are abandoned after the launch that is under way.
+        watch: For progress; kernels are then loaded one by one when they are needed, and said to be.
     """
     buckets: dict[tuple[Options, int], list[int]] = defaultdict(list)
     for place, setup in enumerate(setups):
         buckets[setup.options, layout.padded_width(setup.scene.links)].append(place)
+
+    def begin(place: int, batch: Batch, world: int) -> WalkRun:
+        setup = setups[place] if draw is None else draw(place)
+        return WalkRun(batch, world, setup, NOTHING if keeps is None else keeps[place])
+
     for (options, _), places in buckets.items():
-        wanted = {place: keeps[place] if keeps is not None else NOTHING for place in places}
+        # long chains take longest: begun first, they are not what is waited for in the end
+        places.sort(key=lambda place: -setups[place].scene.links)
         links = [setups[place].scene.links for place in places]
-        batches = _batches(options, links, list(wanted.values()), slots, threads)
-        yield from _run_bucket(setups, draw or setups.__getitem__, wanted, batches, stop)
+        wanted = [] if keeps is None else [keeps[place] for place in places]
+        batches = _batches(options, links, wanted, slots, threads)
+        yield from _run_batches(batches, iter(places), begin, stop, watch)
 
 
 def _batches(
     options: Options, links: Sequence[int], keeps: Sequence[Keep], slots: int | None, threads: int | None
 ) -> list[Batch]:
-    """Room for walks: on a CPU one batch, on a GPU several, with as many worlds in all as are of use and fit."""
-    longest = max(links)
+    """Batches for walks: on a CPU one, on a GPU several, with as many worlds in all as are of use and fit."""
+    longest, on_gpu = max(links), options.device.startswith("cuda")
     # Every batch keeps what any walk wants, although most may want nothing: others would wait for two slowest walks.
-    keeps_samples = any(keep.series_every for keep in keeps)
+    samples, loads = any(keep.series_every for keep in keeps), any(keep.before > 0 for keep in keeps)
     frame_every = next((keep.frame_every for keep in keeps if keep.frame_every), None)
-    keeps_loads = any(keep.before > 0 for keep in keeps)
-    on_gpu = options.device.startswith("cuda")
-    if slots is None:
-        fitting = (
-            most_worlds(
-                longest,
-                options,
-                keeps_samples=keeps_samples,
-                keeps_frames=frame_every is not None,
-                keeps_loads=keeps_loads,
-            )
-            if on_gpu
-            else 1
-        )
-        slots = min(fitting, len(links))
-    worlds = -(-slots // CREWS) if on_gpu else slots
+    if slots is None and on_gpu:
+        frames = frame_every is not None
+        slots = most_worlds(longest, options, keeps_samples=samples, keeps_frames=frames, keeps_loads=loads)
+        slots = min(slots, len(links))
+    slots = slots or 1
+    worlds = -(-slots // BATCHES_PER_GPU) if on_gpu else slots
+    kept: dict[str, Any] = {"keeps_samples": samples, "frame_every": frame_every, "keeps_loads": loads}
     return [
-        Batch(
-            min(worlds, slots - first),
-            longest,
-            options,
-            keeps_samples=keeps_samples,
-            frame_every=frame_every,
-            keeps_loads=keeps_loads,
-            threads=threads,
-        )
+        Batch(min(worlds, slots - first), longest, options, threads=threads, **kept)
         for first in range(0, slots, worlds)
     ]
 
 
 def compile_kernels(setups: Iterable[Setup], threads: int | None = None) -> None:
-    """Make sure that every kernel these walks need is ready, before threads or processes ask for it at once.
+    """Compile every kernel that these walks need, before several threads or processes ask for it at once.
 
     Args:
         setups: The walks.
@@ -118,35 +117,45 @@ def compile_kernels(setups: Iterable[Setup], threads: int | None = None) -> None
     load_kernels((start_device(device), features, size) for device, features, size in wanted)
 
 
-class _Crew:
+class BatchRun:
     """A batch and the walks on its worlds."""
 
-    def __init__(self, batch: Batch, draw: Callable[[int], Setup], wanted: Mapping[int, Keep]) -> None:
+    def __init__(self, batch: Batch, waiting: Iterator[int], begin: Begin, watch: Watch | None) -> None:
+        """Prepare to run waiting walks, by their places."""
         self.batch = batch
-        self._draw, self._wanted = draw, wanted
+        self._waiting, self._begin, self._watch = waiting, begin, watch
+        self._loaded: set[Features] = set()
         self._free = list(reversed(range(len(batch.links))))
         self._running: dict[int, tuple[int, WalkRun]] = {}
         self._features: dict[int, Features] = {}
 
-    def begin(self, waiting: Iterator[int]) -> bool:
+    def start(self) -> bool:
         """Give waiting walks the free worlds and begin a launch; False if there is nothing to carry on."""
-        while self._free and (place := next(waiting, None)) is not None:
+        while self._free and (place := next(self._waiting, None)) is not None:
             world = self._free.pop()
-            run = WalkRun(self.batch, world, self._draw(place), self._wanted[place])
+            run = self._begin(place, self.batch, world)
             self._running[world] = place, run
             self._features[world] = run.features
         together: dict[Features, list[int]] = defaultdict(list)
         for world, features in self._features.items():
             together[features].append(world)
+        if self._watch is not None:
+            for features in together.keys() - self._loaded:
+                for world in together[features]:
+                    self._watch(self._running[world][1], True)
+                self.batch.compile(features, [self.batch.links[world] for world in together[features]])
+                self._loaded.add(features)
         self.batch.start(together, ATTEMPTS["cuda" if self.batch.device.is_cuda else "cpu"])
         return bool(together)
 
-    def end(self) -> Iterator[tuple[int, WalkRun]]:
+    def finish(self) -> Iterator[tuple[int, WalkRun]]:
         """Wait for the launch, and yield every walk that is over as its world becomes free."""
         self.batch.finish()
         running = self.batch.statuses() == Status.RUNNING
         for world, (place, run) in list(self._running.items()):
             run.drain()
+            if self._watch is not None:
+                self._watch(run, False)
             if running[world]:
                 continue
             if run.next_phase():
@@ -157,28 +166,26 @@ class _Crew:
             self._free.append(world)
 
 
-def _run_bucket(
-    setups: Sequence[Setup],
-    draw: Callable[[int], Setup],
-    wanted: Mapping[int, Keep],
+def _run_batches(
     batches: Sequence[Batch],
+    waiting: Iterator[int],
+    begin: Begin,
     stop: threading.Event | None,
+    watch: Watch | None,
 ) -> Iterator[tuple[int, WalkRun]]:
     """Run walks, by place, that share options and the width of their arrays."""
-    # long chains take longest: begun first, they are not what is waited for in the end
-    waiting = iter(sorted(wanted, key=lambda place: -setups[place].scene.links))
-    crews = [_Crew(batch, draw, wanted) for batch in batches]
+    runs = [BatchRun(batch, waiting, begin, watch) for batch in batches]
     try:
-        under_way = [crew for crew in crews if crew.begin(waiting)]
+        under_way = [run for run in runs if run.start()]
         while under_way and not (stop is not None and stop.is_set()):
-            ready = next((crew for crew in under_way if crew.batch.is_done()), None)
+            ready = next((run for run in under_way if run.batch.is_done()), None)
             if ready is None:
                 time.sleep(NAP)
                 continue
-            yield from ready.end()
+            yield from ready.finish()
             under_way.remove(ready)
-            if ready.begin(waiting):
+            if ready.start():
                 under_way.append(ready)
     finally:
-        for crew in crews:
-            crew.batch.finish()
+        for run in runs:
+            run.batch.finish()

@@ -1,17 +1,18 @@
-"""The run of one walk on one world of a batch: which phase follows which, and what remains in the end.
+"""The run of one walk on one world of a batch: its phases, and its outcome.
 
 The drive (settle, spin-up, hold until steady) needs a sprocket and no floor, the walk a floor and no sprocket. The
-equations do not know where the floor is, so the chain is driven about the origin and raised to its clearance at the
-release.
+equations of the drive do not contain the floor, so the chain is driven about the origin and raised to its clearance at
+the release.
 """
 
 import math
 from enum import Enum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.engine.batch import COUNTS, EXTREMES, Batch
+from warpchain.engine.batch import Batch
 from warpchain.engine.control import (
     HOLD_STRAIN,
     LOADED_STRAIN,
@@ -21,6 +22,7 @@ from warpchain.engine.control import (
     push_rate,
     suitable_load,
 )
+from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import contact_radius, joint_radius, loop_speed
 from warpchain.inputs.setup import Setup
@@ -29,19 +31,17 @@ from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
-from warpchain.sweeps.recording import NOTHING, Keep
-from warpchain.walks.motion import Motion
+from warpchain.walks.motion import NOTHING, Keep, Motion
 from warpchain.walks.recorder import Recorder
-from warpchain.walks.walk_result import LOST
 
 Array = NDArray[np.float64]
 
 STILL_PERIOD = 0.25
-"""What counts as the loop period [s] when the sprocket stands still."""
+"""Loop period [s] that is assumed when the sprocket stands still."""
 SHORTEST_WINDOW, LONGEST_WINDOW = 0.05, 0.25
-"""Bounds of the time [s] over which means are taken of a loop under its own loads; between them half a loop period."""
+"""Bounds of the time [s] over which a loop under its own loads is averaged; between them half a loop period."""
 BY_ITSELF = -1.0
-"""A time that the kernel sets, see :mod:`warpchain.kernels.events.release`."""
+"""Stands for a time that the kernel sets, see :mod:`warpchain.kernels.events.release`."""
 
 
 class Phase(Enum):
@@ -54,17 +54,17 @@ class Phase(Enum):
 
 
 class WalkRun:
-    """One walk: loads a world, and takes it into its next phase whenever it has stopped.
+    """One walk: loads a world, and starts its next phase whenever it has stopped.
 
     Attributes:
         setup: What the walk is.
         status: RUNNING until the run is over.
-        raised: Height [m] by which the chain was raised at the release, where the sprocket's centre was then; NaN
-            before the release.
+        raised: Height [m] by which the chain was raised at the release, and of the sprocket's centre then; NaN before
+            the release.
         drive_time: Simulated time [s] before the release.
         drift: How far the loop moved while it was last watched on its sprocket, relative to its height or width; NaN if
             it was not watched.
-        drive_counts: Counters (:data:`warpchain.engine.batch.COUNTS`) of the time before the release.
+        drive_counts: Counters (:data:`warpchain.engine.tallies.COUNTS`) of the time before the release.
         drive_extremes: Greatest opening and depths [m] of the time before the release.
         recorder: What is kept of the motion since the release.
     """
@@ -82,11 +82,13 @@ class WalkRun:
         self._batch, self._world = batch, world
         self._hanging_lowest = math.nan
         self._released = False
+        self._hold_softness = 0.0
 
         scene, parameters = setup.scene, setup.parameters
+        self._has_sprocket = scene.start != "ellipse"
         from_rest = scene.start == "rest"
         speed = 2 * math.pi * scene.frequency * joint_radius(scene, parameters)
-        if scene.start == "ellipse":
+        if not self._has_sprocket:
             batch.set_chain(world, parameters, scene.links)
             try:
                 position, velocity = lay_chain(
@@ -97,7 +99,6 @@ class WalkRun:
                     f"scene.ellipse_aspect: {scene.links} links cannot follow an ellipse of aspect "
                     f"{scene.ellipse_aspect}; give one closer to 1, or more links"
                 ) from None
-            self._settled = self._at_full_speed = self._hold_softness = 0.0
             self._release(position, velocity)
             return
         radius = joint_radius(scene, parameters)
@@ -105,7 +106,6 @@ class WalkRun:
         weight = mean_weight(parameters, scene.links, radius)
         load_factor = scene.load_factor or suitable_load(parameters, setup.options, weight)
         loaded_softness = 0.0
-        self._hold_softness = 0.0
         if setup.options.soften_drive:
             self._hold_softness = hold_softness(parameters, tension, HOLD_STRAIN)
             loaded_softness = hold_softness(parameters, tension + load_factor * weight, LOADED_STRAIN)
@@ -114,20 +114,10 @@ class WalkRun:
         self._settled = scene.settle_time if from_rest else 0.0
         spin_up = scene.spin_up_time if from_rest and speed > 0 else 0.0
         self._at_full_speed = self._settled + spin_up
-        position, velocity = lay_chain(
-            stadium(radius),
-            scene.links,
-            parameters.link_length,
-            0.0 if from_rest else speed,
-        )
-        batch.load(
-            world,
-            position,
-            velocity,
-            stop_time=self._settled,
-            stop_status=Status.FINISHED,
-            softness=self._hold_softness,
-        )
+        start_speed = 0.0 if from_rest else speed
+        position, velocity = lay_chain(stadium(radius), scene.links, parameters.link_length, start_speed)
+        softness = self._hold_softness
+        batch.load(world, position, velocity, stop_time=self._settled, stop_status=Status.FINISHED, softness=softness)
         batch.set_drive(
             world,
             sprocket_speed=-2 * math.pi * scene.frequency,  # clockwise, so that the walk goes towards +x
@@ -167,26 +157,22 @@ class WalkRun:
         return self._batch.features(fixed_body="sprocket", watch="steady")
 
     @property
-    def attempts(self) -> int:
-        """Steps tried so far, accepted or not."""
-        counts = self.counts
-        return counts["accepted"] + counts["rejected"]
-
-    @property
     def counts(self) -> dict[str, int]:
         """Counters of all phases so far."""
-        if not self._released:
-            return self._batch.counts(self._world)
         now = self._batch.counts(self._world)
-        return {name: self.drive_counts[name] + now[name] for name in COUNTS}
+        return {name: self.drive_counts[name] + now[name] for name in COUNTS} if self._released else now
 
     @property
     def extremes(self) -> dict[str, float]:
         """Greatest opening and depths [m] of all phases so far."""
-        if not self._released:
-            return self._batch.extremes(self._world)
         now = self._batch.extremes(self._world)
-        return {name: max(self.drive_extremes[name], now[name]) for name in EXTREMES}
+        return {name: max(self.drive_extremes[name], now[name]) for name in EXTREMES} if self._released else now
+
+    @property
+    def attempts(self) -> int:
+        """Attempted steps so far."""
+        counts = self.counts
+        return counts["accepted"] + counts["rejected"]
 
     @property
     def walk_time(self) -> float:
@@ -194,40 +180,28 @@ class WalkRun:
         return self._batch.time(self._world) if self._released else 0.0
 
     @property
+    def simulated_time(self) -> float:
+        """Time [s] simulated so far."""
+        return self.drive_time + self._batch.time(self._world)
+
+    @property
     def hold_time(self) -> float:
         """Time [s] for which the loop was held at full frequency; NaN if it was not."""
-        if self.setup.scene.start == "ellipse":
+        if not self._has_sprocket:
             return math.nan
         end = self.drive_time if self._released else self._batch.time(self._world)
         return max(0.0, end - self._at_full_speed)
 
     @property
-    def simulated_time(self) -> float:
-        """Time [s] simulated so far."""
-        return self.drive_time + self.walk_time if self._released else self._batch.time(self._world)
-
-    @property
     def speed(self) -> float:
         """Speed [m/s] of the centre of mass in the walk, along the loop before."""
-        look = self._batch.last_sample(self._world)
+        sample = self._batch.last_sample(self._world)
         if self._released:
-            return math.hypot(look[layout.CENTER_U], look[layout.CENTER_V])
-        return float(look[layout.LOOP_SPEED])
-
-    @property
-    def dx(self) -> float:
-        """Δx [m]; NaN unless the chain is at rest."""
-        if self.status != Status.AT_REST:
-            return math.nan
-        return float(self._batch.last_sample(self._world)[layout.CENTER_X])
-
-    @property
-    def softened_at(self) -> float:
-        """Time [s] since the release at which the joints were softened in the pile; NaN if they were not."""
-        return self._batch.softened_at(self._world)
+            return math.hypot(sample[layout.CENTER_U], sample[layout.CENTER_V])
+        return float(sample[layout.LOOP_SPEED])
 
     def energy(self) -> dict[str, float]:
-        """Where the energy of the walk went [J]; NaN before the release. Keys: ``results.ENERGIES``."""
+        """Where the energy of the walk went [J]; NaN before the release. Keys: `walk_result.ENERGIES`."""
         first, last = self._batch.first_sample(self._world), self._batch.last_sample(self._world)
         losses = self._batch.losses(self._world)
         lost = {name: losses[name] for name in LOST}
@@ -243,18 +217,40 @@ class WalkRun:
         ledger["residual"] = at_release - at_end - sum(lost.values())
         return ledger if self._released else dict.fromkeys(ledger, math.nan)
 
+    def outcome(self) -> dict[str, Any]:
+        """Results of the walk apart from its motion, by the names of the fields of `WalkResult`."""
+        setup, counts, extremes = self.setup, self.counts, self.extremes
+        is_at_rest = self.status == Status.AT_REST
+        return {
+            "status": self.status,
+            "dx": float(self._batch.last_sample(self._world)[layout.CENTER_X]) if is_at_rest else math.nan,
+            "walk_time": self.walk_time,
+            "simulated_time": self.simulated_time,
+            "hold_time": self.hold_time,
+            "drift": self.drift,
+            "softened_at": self._batch.softened_at(self._world),
+            "bounces": counts["bounces"],
+            "steps_accepted": counts["accepted"],
+            "steps_rejected": counts["rejected"],
+            "impulses": {kind: counts[kind] for kind in CONTACTS},
+            "greatest_opening": extremes["opening"],
+            "greatest_penetration": {kind: extremes[kind] for kind in CONTACTS},
+            "energy": self.energy(),
+            "sprocket_center": np.array([0.0, self.raised]) if self._has_sprocket else None,
+            "sprocket_radius": contact_radius(setup.scene, setup.parameters) if self._has_sprocket else math.nan,
+        }
+
     @property
     def motion(self) -> Motion:
         """What is kept of the motion since the release."""
-        has_sprocket = self._released and self.setup.scene.start != "ellipse"
-        return self.recorder.motion(self.setup.scene.links, self.raised if has_sprocket else math.nan)
+        return self.recorder.motion(self.raised if self._has_sprocket else math.nan)
 
     def drain(self) -> None:
-        """Take what a launch has recorded; to be called after each, before the next phase."""
+        """Take what a launch has recorded; to be called after each launch, before the next phase."""
         self.recorder.drain(self._released)
 
     def next_phase(self) -> bool:
-        """Take a world that has stopped into its next phase; False if the run is over."""
+        """Start the next phase of a world that has stopped; False if the run is over."""
         status = self._batch.status(self._world)
         if not self._released:
             self.drift = self._batch.drift(self._world)

@@ -1,31 +1,30 @@
 """What a run returns, and the HDF5 file that keeps a walk.
 
-Unit and meaning of every field stand beside it, once; the file repeats them on each dataset. A saved walk
-has the groups `series` (time series), `frames` (joint positions), `summary` (numbers) and `parameters` (the
-chain's quantities with their symbols), and `before_release` if that was kept; its attributes `setup`, `seed`
-and `versions`, in JSON, say how to make it again.
+A saved walk has the groups `series` (time series), `frames` (joint positions), `summary` (numbers), `parameters` (the
+chain's quantities with their symbols) and, if that was kept, `before_release`; every dataset has its unit and meaning.
+The attributes `setup`, `seed` and `versions`, in JSON, say how to make the walk again.
 """
 
 import dataclasses
 import json
-import math
 import os
-import secrets
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
+from pydantic_core import to_jsonable_python
 
+from warpchain.engine.tallies import COUNTS, DEPTHS, EXTREMES, IMPULSES, LOST
+from warpchain.files import reason, replacing, version_refusal
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.setup import Setup
 from warpchain.loop.before_release import BeforeRelease, read_before_release, write_before_release
+from warpchain.pictures.walk_shape import Walk
 from warpchain.status import Status
 
 if TYPE_CHECKING:
@@ -35,34 +34,19 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 FORMAT: Final = "warpchain walk"
-FORMAT_VERSION: Final = 3
+FORMAT_VERSION: Final = 4
 
 BEFORE: Final = "before_release"
-
-CONTACTS: Final = {
-    "floor": "between links and floor",
-    "sprocket": "between links and sprocket",
-    "self": "between links of the chain",
-}
-"""Kinds of contact: keys of `WalkResult.impulses` and `WalkResult.greatest_penetration`."""
 
 ENERGIES: Final = {
     "kinetic_at_release": "kinetic energy at release",
     "potential_at_release": "energy of gravity and joint springs at release",
     "kinetic_at_end": "kinetic energy at the end",
     "potential_at_end": "energy of gravity and joint springs at the end",
-    "joint_friction": "energy lost to joint friction, viscous and Coulomb",
-    "joint_damping": "energy lost to the damping of the joint springs",
-    "floor": "energy lost in impacts on the floor",
-    "self_contact": "energy lost in impacts of links on one another",
-    "softening": "energy taken out of the joint springs by softening them in the pile",
-    "joint_switch": "energy lost where joints go from springs to rigid, less that gained where they go back",
+    **LOST,
     "residual": "energy at release, less that at the end and all losses: the error of the integration",
 }
 """Keys of `WalkResult.energy`. Losses count as positive."""
-
-LOST: Final = ("joint_friction", "joint_damping", "floor", "self_contact", "softening", "joint_switch")
-"""Those of them that are losses of the walk."""
 
 
 @dataclass(frozen=True)
@@ -70,144 +54,23 @@ class Stored:
     """Annotation of a field that a file keeps.
 
     Attributes:
-        path: dataset in the file, or group when the field is a dictionary.
+        group: of the file.
         unit: SI unit, "1" for pure numbers.
         meaning: one line saying what the numbers are.
-        keys: for a dictionary, its keys and their meanings.
+        keys: for a dictionary, which is a group of its own, its keys and their meanings.
     """
 
-    path: str
+    group: str
     unit: str
     meaning: str
     keys: Mapping[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class WalkResult:
-    """One walk, from the release to its end: t instants and f frames of a chain of n links.
-
-    Time counts from the release, x from wherever the release put it, y from the floor upwards. The other
-    fields say their units and shapes themselves. `setup` is complete; `seed` is that of the parameters'
-    random draw, None if nothing was drawn; `versions` names the software. `before_release` is the motion on the
-    sprocket just before the release, None if it was not kept.
-
-    Raises:
-        ValueError: an array has another shape, or a dictionary other keys, than stands beside its field.
-    """
-
-    status: Status
-    dx: Annotated[
-        float,
-        Stored("summary/dx", "m", "x of the centre of mass less x of the sprocket; NaN unless at rest"),
-    ]
-    walk_time: Annotated[float, Stored("summary/walk_time", "s", "from the release to the end")]
-    simulated_time: Annotated[
-        float, Stored("summary/simulated_time", "s", "simulated, the phases before the release included")
-    ]
-    hold_time: Annotated[
-        float, Stored("summary/hold_time", "s", "for which the loop was held at full frequency; NaN without a sprocket")
-    ]
-    drift: Annotated[
-        float,
-        Stored(
-            "summary/drift",
-            "1",
-            "greatest change of the held loop's mean height, width or place, relative to height or width, while it was "
-            "last watched; NaN if it never was",
-        ),
-    ]
-    softened_at: Annotated[
-        float,
-        Stored("summary/softened_at", "s", "from the release to the softening of the joints; NaN if they were not"),
-    ]
-    wall_time: Annotated[float, Stored("summary/wall_time", "s", "that the computer took")]
-    bounces: Annotated[int, Stored("summary/bounces", "1", "number of bounces off the floor")]
-    steps_accepted: Annotated[int, Stored("summary/steps_accepted", "1", "accepted steps, all phases")]
-    steps_rejected: Annotated[int, Stored("summary/steps_rejected", "1", "rejected steps, all phases")]
-    impulses: Annotated[dict[str, int], Stored("summary/impulses", "1", "number of impulses", CONTACTS)]
-    greatest_opening: Annotated[
-        float, Stored("summary/greatest_opening", "m", "greatest distance between two joined link ends")
-    ]
-    greatest_penetration: Annotated[
-        dict[str, float], Stored("summary/greatest_penetration", "m", "greatest overlap", CONTACTS)
-    ]
-    energy: Annotated[dict[str, float], Stored("summary/energy", "J", "ledger of the walk", ENERGIES)]
-    sprocket_center: Annotated[
-        Array | None,
-        Stored("summary/sprocket_center", "m", "centre of the sprocket, shape (2,); absent without one"),
-    ]
-    sprocket_radius: Annotated[float, Stored("summary/sprocket_radius", "m", "radius of the sprocket that links touch")]
-    setup: Setup
-    seed: int | None
-    versions: dict[str, str]
-    time: Annotated[Array, Stored("series/time", "s", "time since the release, shape (t,)")]
-    center: Annotated[Array, Stored("series/center", "m", "centre of mass x, y, shape (t, 2)")]
-    center_velocity: Annotated[
-        Array, Stored("series/center_velocity", "m/s", "velocity of the centre of mass x, y, shape (t, 2)")
-    ]
-    kinetic_energy: Annotated[Array, Stored("series/kinetic_energy", "J", "kinetic energy, shape (t,)")]
-    gravitational_energy: Annotated[
-        Array, Stored("series/gravitational_energy", "J", "energy in the field of gravity, shape (t,)")
-    ]
-    spring_energy: Annotated[Array, Stored("series/spring_energy", "J", "energy of the joint springs, shape (t,)")]
-    lowest: Annotated[Array, Stored("series/lowest", "m", "height of the lowest point of all circles, shape (t,)")]
-    rms_speed: Annotated[Array, Stored("series/rms_speed", "m/s", "root mean square speed of the links, shape (t,)")]
-    frame_time: Annotated[Array, Stored("frames/time", "s", "time since the release, shape (f,)")]
-    frame_joints: Annotated[
-        Array,
-        Stored("frames/joints", "m", "joints x, y, shape (f, n, 2); joint i ends link i, even links inner"),
-    ]
-    before_release: BeforeRelease | None = None
-
-    def __post_init__(self) -> None:
-        """Check that arrays and dictionaries fit together."""
-        instants, frames = len(self.time), len(self.frame_time)
-        shapes: dict[str, tuple[int, ...]] = {
-            name: (instants,) for name, stored in STORED.items() if stored.path.startswith("series/")
-        }
-        shapes["center"] = shapes["center_velocity"] = (instants, 2)
-        shapes["frame_time"] = (frames,)
-        shapes["frame_joints"] = (frames, self.setup.scene.links, 2)
-        before = self.before_release
-        if before is not None and before.frame_joints.shape[1] != self.setup.scene.links:
-            links = self.setup.scene.links
-            raise ValueError(f"before_release: its frames are not of {links} links; give those of this walk")
-        if self.sprocket_center is not None:
-            shapes["sprocket_center"] = (2,)
-        for name, shape in shapes.items():
-            given = np.shape(getattr(self, name))
-            if given != shape:
-                raise ValueError(f"{name}: its shape is {given}; give an array of shape {shape}")
-        for name, stored in STORED.items():
-            if stored.keys and set(getattr(self, name)) != set(stored.keys):
-                raise ValueError(f"{name}: wrong keys; give exactly {', '.join(stored.keys)}")
-
-    def __repr__(self) -> str:
-        """One line with what one wants to know first."""
-        scene = self.setup.scene
-        return (
-            f"<WalkResult {self.status.label}: dx {self.dx:.4g} m in {self.walk_time:.4g} s, "
-            f"{self.bounces} bounces, {scene.links} links at {scene.frequency:g} Hz, {self.setup.preset}>"
-        )
-
-    def to_dict(self) -> dict[str, Any]:
-        """Everything but time series and frames, as JSON has it; a number that is not finite is None."""
-        summary = {name: getattr(self, name) for name, stored in STORED.items() if stored.path.startswith("summary/")}
-        plain: dict[str, Any] = _plain(
-            {
-                "dx": summary.pop("dx"),
-                "status": self.status.label,
-                "status_sentence": self.status.sentence,
-                **summary,
-                **_setup_as_dict(self.setup),
-                "seed": self.seed,
-                "versions": self.versions,
-            }
-        )
-        return plain
+class Drawn:
+    """A walk that can draw itself."""
 
     def plot(
-        self, kind: Literal["figure5", "film_strip", "loop"] = "figure5", *, figure: "Figure | None" = None
+        self: Walk, kind: Literal["figure5", "film_strip", "loop"] = "figure5", *, figure: "Figure | None" = None
     ) -> "Figure":
         """Draw the walk.
 
@@ -222,6 +85,114 @@ class WalkResult:
         from warpchain.pictures.walk_figures import draw
 
         return draw(self, kind, figure=figure)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class WalkResult(Drawn):
+    """One walk, from the release to its end: t instants and f frames of a chain of n links.
+
+    Time counts from the release, x from the centre of sprocket or ellipse, y up from the floor. Units, meanings and
+    shapes stand beside the fields. `setup` is complete; `seed` is that of the random draw, None if nothing was drawn;
+    `versions` names the software. `before_release` is the motion on the sprocket just before the release, None if it
+    was not kept.
+
+    Raises:
+        ValueError: an array has another shape, or a dictionary other keys, than stands beside its field.
+    """
+
+    status: Status
+    dx: Annotated[float, Stored("summary", "m", "x of the centre of mass less x of the sprocket; NaN unless at rest")]
+    walk_time: Annotated[float, Stored("summary", "s", "from the release to the end")]
+    simulated_time: Annotated[float, Stored("summary", "s", "simulated, the phases before the release included")]
+    hold_time: Annotated[
+        float, Stored("summary", "s", "for which the loop was held at full frequency; NaN without a sprocket")
+    ]
+    drift: Annotated[
+        float,
+        Stored(
+            "summary",
+            "1",
+            "greatest change of the held loop's mean height, width or place, relative to height or width, while it was "
+            "last watched; NaN if it never was",
+        ),
+    ]
+    softened_at: Annotated[
+        float, Stored("summary", "s", "from the release to the softening of the joints; NaN if they were not")
+    ]
+    wall_time: Annotated[float, Stored("summary", "s", "that the computer took")]
+    bounces: Annotated[int, Stored("summary", "1", COUNTS["bounces"])]
+    steps_accepted: Annotated[int, Stored("summary", "1", COUNTS["accepted"])]
+    steps_rejected: Annotated[int, Stored("summary", "1", COUNTS["rejected"])]
+    impulses: Annotated[dict[str, int], Stored("summary", "1", "by kind of contact", IMPULSES)]
+    greatest_opening: Annotated[float, Stored("summary", "m", EXTREMES["opening"])]
+    greatest_penetration: Annotated[dict[str, float], Stored("summary", "m", "by kind of contact", DEPTHS)]
+    energy: Annotated[dict[str, float], Stored("summary", "J", "ledger of the walk", ENERGIES)]
+    sprocket_center: Annotated[
+        Array | None, Stored("summary", "m", "centre of the sprocket, shape (2,); absent without one")
+    ]
+    sprocket_radius: Annotated[float, Stored("summary", "m", "radius of the sprocket that links touch")]
+    setup: Setup
+    seed: int | None
+    versions: dict[str, str]
+    time: Annotated[Array, Stored("series", "s", "time since the release, shape (t,)")]
+    center: Annotated[Array, Stored("series", "m", "centre of mass x, y, shape (t, 2)")]
+    center_velocity: Annotated[Array, Stored("series", "m/s", "velocity of the centre of mass x, y, shape (t, 2)")]
+    kinetic_energy: Annotated[Array, Stored("series", "J", "kinetic energy, shape (t,)")]
+    gravitational_energy: Annotated[Array, Stored("series", "J", "energy in the field of gravity, shape (t,)")]
+    spring_energy: Annotated[Array, Stored("series", "J", "energy of the joint springs, shape (t,)")]
+    lowest: Annotated[Array, Stored("series", "m", "height of the lowest point of all circles, shape (t,)")]
+    rms_speed: Annotated[Array, Stored("series", "m/s", "root mean square speed of the links, shape (t,)")]
+    frame_time: Annotated[Array, Stored("frames", "s", "time since the release, shape (f,)")]
+    frame_joints: Annotated[
+        Array, Stored("frames", "m", "joints x, y, shape (f, n, 2); joint i ends link i, even links inner")
+    ]
+    before_release: BeforeRelease | None = None
+
+    def __post_init__(self) -> None:
+        """Check that arrays and dictionaries fit together."""
+        instants, frames = len(self.time), len(self.frame_time)
+        shapes: dict[str, tuple[int, ...]] = {
+            name: (instants,) for name, stored in STORED.items() if stored.group == "series"
+        }
+        shapes["center"] = shapes["center_velocity"] = (instants, 2)
+        shapes["frame_time"] = (frames,)
+        shapes["frame_joints"] = (frames, self.setup.scene.links, 2)
+        links, before = self.setup.scene.links, self.before_release
+        if before is not None and before.frame_joints.shape[1] != links:
+            raise ValueError(f"before_release: its frames are not of {links} links; give those of this walk")
+        if self.sprocket_center is not None:
+            shapes["sprocket_center"] = (2,)
+        for name, shape in shapes.items():
+            given = np.shape(getattr(self, name))
+            if given != shape:
+                raise ValueError(f"{name}: its shape is {given}; give an array of shape {shape}")
+        for name, stored in STORED.items():
+            if stored.keys and set(getattr(self, name)) != set(stored.keys):
+                raise ValueError(f"{name}: wrong keys; give exactly {', '.join(stored.keys)}")
+
+    def __repr__(self) -> str:
+        """One line with the most important numbers."""
+        scene = self.setup.scene
+        return (
+            f"<WalkResult {self.status.label}: dx {self.dx:.4g} m in {self.walk_time:.4g} s, "
+            f"{self.bounces} bounces, {scene.links} links at {scene.frequency:g} Hz, {self.setup.preset}>"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but time series and frames, for JSON; a number that is not finite is None."""
+        summary = {name: getattr(self, name) for name, stored in STORED.items() if stored.group == "summary"}
+        plain: dict[str, Any] = _plain(
+            {
+                "dx": summary.pop("dx"),
+                "status": self.status.label,
+                "status_sentence": self.status.sentence,
+                **summary,
+                **_setup_as_dict(self.setup),
+                "seed": self.seed,
+                "versions": self.versions,
+            }
+        )
+        return plain
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the walk to an HDF5 file, whole or not at all; an older file of that name is replaced.
@@ -271,6 +242,7 @@ STORED: Final[dict[str, Stored]] = {
     if isinstance(note, Stored)
 }
 """Fields of `WalkResult` that a file keeps as datasets: name → where, in which unit, what."""
+_PATHS: Final = {name: f"{stored.group}/{name.removeprefix('frame_')}" for name, stored in STORED.items()}
 
 
 def load_walk(path: str | os.PathLike[str]) -> WalkResult:
@@ -286,14 +258,17 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
         with open(path, "rb") as content:
             content.read(1)
     except OSError as error:
-        raise OSError(f"{path}: {_reason(error)}; give the path of a readable walk file") from None
+        raise OSError(f"{path}: {reason(error)}; give the path of a readable walk file") from None
     if not h5py.is_hdf5(path):
         raise ValueError(f"{path}: not an HDF5 file; give a file written by WalkResult.save")
     try:
         with h5py.File(path, "r") as file:
-            refusal = _refusal(file)
-            if refusal is None:
+            if file.attrs.get("format") != FORMAT:
+                refusal = "HDF5, but not a walk; give a file written by WalkResult.save"
+            elif (found := version_refusal(file.attrs["format_version"], FORMAT_VERSION, "run the walk again")) is None:
                 return _read(file)
+            else:
+                refusal = found
     except ValidationError as error:
         first = ".".join(str(part) for part in error.errors()[0]["loc"])
         refusal = f"this warpchain refuses its setup ({first}); read it with the version that wrote it"
@@ -302,52 +277,14 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
     raise ValueError(f"{path}: {refusal}")
 
 
-@contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary path in the same folder, which becomes `path` if the block ends without an error.
-
-    The data reach the disk before the name changes hands. So `path` is at any moment, even after a power
-    cut, either what it was or the whole new file.
-
-    Raises:
-        OSError: the file cannot be written; one line that names it. No temporary file is left.
-    """
-    target = Path(path)
-    part = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.part{target.suffix}")
-    try:
-        os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
-        yield part
-        with open(part, "r+b") as content:
-            os.fsync(content.fileno())
-        os.replace(part, target)
-    except OSError as error:
-        raise OSError(
-            f"{target}: cannot be written ({_reason(error)}); give a path in a folder that can take it"
-        ) from error
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
-
-
-def _reason(error: OSError) -> str:
-    """What went wrong in the system's few words; HDF5 buries them in a paragraph."""
-    return os.strerror(error.errno) if error.errno else " ".join(str(error).split())
-
-
 def _setup_as_dict(setup: Setup) -> dict[str, Any]:
     models = {name: getattr(setup, name).model_dump() for name in ("parameters", "scene", "options")}
     return {"preset": setup.preset, **models}
 
 
 def _plain(value: Any) -> Any:
-    """The same value made of what JSON knows."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    """A value as JSON has it."""
+    return to_jsonable_python(value, inf_nan_mode="null", fallback=lambda array: array.tolist())
 
 
 def _write(walk: WalkResult, file: "h5py.File") -> None:
@@ -363,9 +300,9 @@ def _write(walk: WalkResult, file: "h5py.File") -> None:
         value = getattr(walk, name)
         if stored.keys:
             for key, meaning in stored.keys.items():
-                _put(file, f"{stored.path}/{key}", value[key], stored.unit, f"{stored.meaning}: {meaning}")
+                _put(file, f"{_PATHS[name]}/{key}", value[key], stored.unit, meaning)
         elif value is not None:
-            _put(file, stored.path, value, stored.unit, stored.meaning)
+            _put(file, _PATHS[name], value, stored.unit, stored.meaning)
     for name, quantity in Parameters.quantities().items():
         value = getattr(walk.setup.parameters, name)
         dataset = _put(file, f"parameters/{name}", value, quantity.unit, quantity.meaning)
@@ -383,16 +320,6 @@ def _put(file: "h5py.File", path: str, value: float | Array, unit: str, meaning:
     return dataset
 
 
-def _refusal(file: "h5py.File") -> str | None:
-    """Why this file cannot be a walk for us, or None."""
-    version = file.attrs.get("format_version")
-    if file.attrs.get("format") != FORMAT:
-        return "HDF5, but not a walk; give a file written by WalkResult.save"
-    if version != FORMAT_VERSION:
-        return f"format version {version}, but this warpchain reads {FORMAT_VERSION}; update warpchain"
-    return None
-
-
 def _read(file: "h5py.File") -> WalkResult:
     """The walk in a file of our format."""
     setup = json.loads(file.attrs["setup"])
@@ -407,13 +334,13 @@ def _read(file: "h5py.File") -> WalkResult:
         "seed": json.loads(file.attrs["seed"]),
         "versions": json.loads(file.attrs["versions"]),
     }
-    for name, stored in STORED.items():
-        if stored.keys:
-            values[name] = {key: file[f"{stored.path}/{key}"][()].item() for key in stored.keys}
-        elif name == "sprocket_center" and stored.path not in file:
+    for name, path in _PATHS.items():
+        if keys := STORED[name].keys:
+            values[name] = {key: file[f"{path}/{key}"][()].item() for key in keys}
+        elif name == "sprocket_center" and path not in file:
             values[name] = None
         else:
-            number = file[stored.path][()]
+            number = file[path][()]
             values[name] = number if number.shape else number.item()
     if BEFORE in file:
         values["before_release"] = read_before_release(file[BEFORE])

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from warpchain.bench.accuracy.method_settings import LOOSE, TIGHT, MethodSetting
 from warpchain.bench.accuracy.two_samples import bootstrap_interval, kolmogorov_smirnov, means, standard_deviations
 from warpchain.bench.problems.work_precision import methods
+from warpchain.files import replacing
 from warpchain.inputs.methods import METHODS_BY_NEED
 from warpchain.run.sweep_run import SweepProgress, sweep
 from warpchain.status import Status
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import load_sweep
 from warpchain.walks.scheduler import compile_kernels
-from warpchain.walks.walk_result import replacing
 
 Array = NDArray[np.float64]
 SEED: Final = 20180602

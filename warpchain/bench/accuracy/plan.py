@@ -29,12 +29,12 @@ from warpchain.bench.problems.work_precision import (
     points,
 )
 from warpchain.engine.devices import start_device
+from warpchain.files import replacing
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.scene import Scene, check_scene
 from warpchain.inputs.validation import InputError, shown, suggestion, validated
 from warpchain.sweeps.plan import load_sweep
-from warpchain.walks.walk_result import replacing
 
 PARTS: Final = ("work-precision", "walks", "ensembles", "hard-cases")
 FILE: Final = "accuracy.json"

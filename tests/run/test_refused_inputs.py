@@ -139,6 +139,12 @@ def test_simulate_refuses_chains_that_cannot_be(links):
     assert told == f"position: {links} links; a closed chain has an even number of at least 4"
 
 
+def test_simulate_refuses_chains_too_long_for_a_gpu():
+    """On a GPU a block has a thread for each link."""
+    told = refused(warpchain.simulate, "soft", np.zeros((1026, 3)), np.zeros((1026, 3)), 1.0, device="cuda")
+    assert told.startswith("position: ")
+
+
 def test_simulate_refuses_states_of_different_length():
     """Position and velocity have one row per link each."""
     told = refused(warpchain.simulate, "soft", POSITION, VELOCITY[:6], 1.0)
@@ -272,6 +278,40 @@ def test_good_walk_is_computed():
 def test_walk_refuses(settings, message):
     """What a walk can't use is refused by its name, with a remedy."""
     assert re.fullmatch(message, refused(warpchain.walk, **settings))
+
+
+@pytest.mark.parametrize(
+    ("settings", "field"),
+    [
+        ({"links": 0}, "scene.links"),
+        ({"links": 10**8}, "scene.links"),
+        ({"links": 99999999999999999998}, "scene.links"),
+        ({"links": 1026, "device": "cuda"}, "scene.links"),
+        ({"sprocket_radius": 0.5}, "scene.links"),
+        ({"sprocket_radius": 1e300}, "parameters.sprocket_radius"),
+        ({"sprocket_radius": 1e-9, "circle_radius": 1e-9}, "parameters.sprocket_radius"),
+        ({"circle_radius": 6.34e-3}, "parameters.circle_radius"),
+        ({"link_length": 8.4e-3}, "parameters.circle_radius"),
+        ({"link_length": 1e300}, "parameters.link_length"),
+        ({"link_length": 1e-300, "circle_radius": 1e-301}, "parameters.link_length"),
+        ({"inner_mass": 1e300}, "parameters.inner_mass"),
+        ({"outer_inertia": 0.0}, "parameters.outer_inertia"),
+        ({"gravity": float("nan")}, "parameters.gravity"),
+        ({"joint_stiffness": 0.0}, "parameters.joint_stiffness"),
+        ({"friction_smoothing": 0.0}, "parameters.friction_smoothing"),
+        ({"floor_restitution": 1.1}, "parameters.floor_restitution"),
+        ({"frequency": 1e200}, "scene.frequency"),
+        ({"frequency": 1e308}, "scene.frequency"),
+        ({"walk_limit": 1e300}, "scene.walk_limit"),
+        ({"clearance": 1e300}, "scene.clearance"),
+        ({"smallest_step": 1e-4}, "options.smallest_step"),
+    ],
+    ids=brief,
+)
+def test_walk_refuses_what_cannot_be(settings, field):
+    """Extreme values, and values that contradict one another, are refused by the field's name, with a remedy."""
+    told = refused(warpchain.walk, **settings)
+    assert told.startswith(f"{field}: ") and ";" in told
 
 
 @pytest.mark.parametrize(("aspect", "links"), [(1e6, 6), (1e12, 60), (1e-12, 180), (1e300, 60)])

@@ -1,0 +1,98 @@
+"""The motions of walks inside a shard: flat arrays, in which one walk follows the other.
+
+motion/walk            indices of the walks, ascending
+motion/series_start    where the samples of each walk begin, and where the last one's end
+motion/time …          the samples, see `SERIES`
+motion/frame_start     likewise of the frames
+motion/frame_time      times of the frames [s]
+motion/joint_start     likewise of the joints
+motion/joint_x, _y     joints of all frames, frame by frame [m]
+motion/sprocket_height height of the sprocket's centre at the release [m]; NaN without a sprocket
+motion/before_release/ a group for each walk of which that was kept, named by its number, see `before_release`
+motion/checksum        SHA-256 of each walk's motion
+"""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.loop.before_release import read_before_release, write_before_release
+from warpchain.walks.motion import SERIES, Motion
+
+if TYPE_CHECKING:
+    import h5py
+
+ARRAYS: Final = {
+    "series": SERIES,
+    "frame": {"frame_time": ("s", "time of a frame since the release")},
+    "joint": {
+        "joint_x": ("m", "x of a joint in a frame"),
+        "joint_y": ("m", "height of a joint in a frame above the floor"),
+    },
+}
+"""Flat arrays: what is counted → name → unit and meaning. Joints are in single precision (6e-8 of their distance)."""
+
+GROUP: Final = "motion"
+BEFORE: Final = "before_release"
+
+
+def flat_arrays(motion: Motion) -> dict[str, dict[str, NDArray[Any]]]:
+    """The numbers of one walk in the order of `ARRAYS`: what is counted → name → array of that length."""
+    joints = motion.frame_joints.reshape(-1, 2)
+    return {
+        "series": {name: motion.series[:, column] for column, name in enumerate(SERIES)},
+        "frame": {"frame_time": motion.frame_time},
+        "joint": {"joint_x": joints[:, 0], "joint_y": joints[:, 1]},
+    }
+
+
+def count(arrays: Mapping[str, NDArray[Any]]) -> int:
+    """Length that some flat arrays have in common."""
+    return len(next(iter(arrays.values())))
+
+
+def write_motions(motions: Mapping[int, Motion], file: "h5py.File") -> None:
+    """Put the motions of walks, by index, into a shard."""
+    walks = sorted(motions)
+    flat = [flat_arrays(motions[walk]) for walk in walks]
+    group = file.create_group(GROUP, track_order=True)
+    group["walk"] = np.array(walks, np.int64)
+    for kind, columns in ARRAYS.items():
+        group[f"{kind}_start"] = np.cumsum([0, *(count(arrays[kind]) for arrays in flat)], dtype=np.int64)
+        for name, (unit, meaning) in columns.items():
+            dataset = group.create_dataset(name, data=np.concatenate([arrays[kind][name] for arrays in flat]))
+            dataset.attrs["unit"], dataset.attrs["description"] = unit, meaning
+    group["sprocket_height"] = np.array([motions[walk].sprocket_height for walk in walks])
+    for walk in walks:
+        if (before := motions[walk].before_release) is not None:
+            write_before_release(before, group.create_group(f"{BEFORE}/{walk}", track_order=True))
+    checksums = b"".join(motions[walk].checksum() for walk in walks)
+    group["checksum"] = np.frombuffer(checksums, np.uint8).reshape(-1, 32)
+
+
+def read_motion(file: "h5py.File", walk: int) -> Motion:
+    """The motion of a walk, out of its shard.
+
+    Raises:
+        KeyError: the shard does not have it.
+        ValueError: it is damaged.
+    """
+    group = file[GROUP]
+    (place,) = np.flatnonzero(group["walk"][()] == walk)
+    series, (frame_time,), joints = (
+        [group[name][slice(*group[f"{kind}_start"][place : place + 2])] for name in columns]
+        for kind, columns in ARRAYS.items()
+    )
+    shape = (len(frame_time), -1, 2) if len(frame_time) else (0, 0, 2)
+    motion = Motion(
+        series=np.stack(series, axis=-1),
+        frame_time=frame_time,
+        frame_joints=np.stack(joints, axis=-1).reshape(shape),
+        sprocket_height=float(group["sprocket_height"][place]),
+        before_release=read_before_release(group[f"{BEFORE}/{walk}"]) if f"{BEFORE}/{walk}" in group else None,
+    )
+    if motion.checksum() != group["checksum"][place].tobytes():
+        raise ValueError(f"motion of walk {walk}")
+    return motion
