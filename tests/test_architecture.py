@@ -1,8 +1,11 @@
-"""The arrows between the modules, and what the repository may hold."""
+"""The arrows between wings and modules, and what the repository may hold; the rules stand in docs/architecture.md."""
 
 import ast
+import graphlib
+import re
 import subprocess
 import sys
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import pytest
@@ -12,15 +15,48 @@ import warpchain
 ROOT = Path(__file__).parents[1]
 HOST = sorted(path for path in (ROOT / "warpchain").rglob("*.py") if "kernels" not in path.parts)
 KERNELS = sorted((ROOT / "kernels").rglob("*.py"))
-LAUNCHERS = {"batch.py", "cpu_steps.py"}
+LONGEST_FILE = 450
+
+STOREYS = (
+    ("cli",),
+    ("bench",),
+    ("reports",),
+    ("run",),
+    ("store",),
+    ("sweeps",),
+    ("walks",),
+    ("engine", "pictures", "oracle"),
+    ("loop",),
+    ("inputs",),
+    ("files", "status"),
+    ("kernels",),
+)
+"""Wings of warpchain/, from top to bottom: imports go downwards only."""
+KERNEL_STOREYS = (
+    ("cpu", "gpu"),
+    ("events",),
+    ("contacts", "methods"),
+    ("physics",),
+    ("types",),
+    ("layout", "codes", "features"),
+)
+"""The same of kernels/."""
+ONLY_FOR = {"oracle": {"bench"}, "bench": {"cli"}}
+"""Wings that only some others may import."""
+KERNELS_FOR_ALL = {"codes", "features", "layout", "methods"}
+"""Wings of kernels/ that hold data; all others are for engine/ alone …"""
+LAUNCHERS = {"warpchain.engine.batch", "warpchain.bench.cpu_steps"}
+"""… which launches kernels. The benchmark of one core launches what it times."""
 LAUNCHES = ("launch", "launch_tiled", "capture_launch")
-LONGEST_FILE = 600
 TOP_LEVEL = {
     ".ci",
     ".gitignore",
+    ".mkdocs.yml",
     ".pre-commit-config.yaml",
     ".readme",
     "CHANGELOG.md",
+    "CITATION.cff",
+    "CONTRIBUTING.md",
     "LICENSE",
     "README.md",
     "docs",
@@ -31,19 +67,107 @@ TOP_LEVEL = {
     "warpchain",
 }
 
+Graph = Mapping[str, Iterable[str]]
+"""What each module imports."""
 
-def imports(path: Path) -> set[str]:
-    """Absolute names of all modules that a file imports, wherever in it; of a relative import, `.` and name."""
+
+def module_of(path: Path) -> str:
+    """Dotted name of a file's module."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    dotted = ".".join(("warpchain", *parts) if parts[0] == "kernels" else parts)
+    return dotted.removesuffix(".__init__")
+
+
+MODULES = {module_of(path): path for path in (*HOST, *KERNELS)}
+
+
+def imports(source: str) -> set[str]:
+    """Absolute names of all that a text imports, wherever in it: modules, and names out of modules."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.level:
-            found.add("." * node.level + (node.module or ""))
         elif isinstance(node, ast.ImportFrom):
-            found.add(node.module or "")
+            assert node.level == 0, "relative import"
             found |= {f"{node.module}.{alias.name}" for alias in node.names}
     return found
+
+
+def imported_modules(source: str) -> set[str]:
+    """Modules of this project among what a text imports."""
+    names = {name if name in MODULES else name.rpartition(".")[0] for name in imports(source)}
+    return {name for name in names if name in MODULES}
+
+
+def real_graph() -> dict[str, set[str]]:
+    """All modules and what they import."""
+    return {name: imported_modules(path.read_text(encoding="utf-8")) for name, path in MODULES.items()}
+
+
+def wing_of(module: str) -> str:
+    """Wing of a module; of the package itself the empty name."""
+    return [*module.split("."), ""][1]
+
+
+def kernel_wing_of(module: str) -> str:
+    """Wing of a module in kernels/; of others the empty name."""
+    return [*module.split("."), "", ""][2] if wing_of(module) == "kernels" else ""
+
+
+def arrows(graph: Graph) -> set[tuple[str, str]]:
+    """Imports between wings, those of kernels/ as kernels/NAME."""
+    found = set()
+    for module, targets in graph.items():
+        for target in targets:
+            wings = [
+                f"kernels/{kernel_wing_of(name)}" if wing_of(name) == "kernels" else wing_of(name)
+                for name in (module, target)
+            ]
+            if wings[0] != wings[1] and "" not in wings and "kernels/" not in wings:
+                found.add((wings[0], wings[1]))
+    return found
+
+
+def violations(graph: Graph) -> list[str]:
+    """Imports that break a rule, each with the rule."""
+    level = {wing: number for number, storey in enumerate(STOREYS) for wing in storey}
+    kernel_level = {wing: number for number, storey in enumerate(KERNEL_STOREYS) for wing in storey}
+    found = []
+    for module, targets in graph.items():
+        wing, own = wing_of(module), kernel_wing_of(module)
+        for target in targets:
+            other, inner = wing_of(target), kernel_wing_of(target)
+            if wing == other == "kernels":
+                if own and inner and own != inner and kernel_level[inner] <= kernel_level[own]:
+                    found.append(f"{module} imports {target}: not downwards")
+            elif wing in level and other in level and wing != other and level[other] <= level[wing]:
+                found.append(f"{module} imports {target}: not downwards")
+            elif other in ONLY_FOR and wing not in {other, *ONLY_FOR[other]}:
+                found.append(f"{module} imports {target}: only {', '.join(ONLY_FOR[other])} may")
+            elif other == "kernels" and inner not in {"", *KERNELS_FOR_ALL} and wing not in ("kernels", "engine"):
+                found.append(f"{module} imports {target}: only engine may")
+    return found
+
+
+def circle(graph: Graph) -> list[str]:
+    """Modules that import one another in a circle; empty if there is none."""
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def launches(source: str) -> set[str]:
+    """Calls in a text that launch kernels."""
+    calls = {ast.unparse(node.func) for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)}
+    return calls & {f"{prefix}{name}" for prefix in ("wp.", "warp.", "") for name in LAUNCHES}
+
+
+def foreign(source: str) -> list[str]:
+    """What a kernel module imports beside Warp, the standard library and its siblings."""
+    tops = {name.partition(".")[0] for name in imports(source) if not f"{name}.".startswith("warpchain.kernels.")}
+    return sorted(top for top in tops if top != "warp" and top not in sys.stdlib_module_names)
 
 
 def tracked() -> list[str]:
@@ -56,52 +180,92 @@ def tracked() -> list[str]:
 
 
 def test_there_is_something_to_check() -> None:
-    """The lists below are not empty, and the package finds its kernels at the top level."""
-    assert len(HOST) > 5 and len(KERNELS) > 5
+    """The lists are not empty, every module has a wing, and the package finds its kernels at the top level."""
+    assert len(HOST) > 50 and len(KERNELS) > 30
     assert (ROOT / "warpchain/kernels").resolve() == ROOT / "kernels"
+    known = {wing for storey in STOREYS for wing in storey} | {"", "__main__"}
+    assert {wing_of(name) for name in MODULES} <= known
+    assert {kernel_wing_of(name) for name in MODULES} <= {wing for storey in KERNEL_STOREYS for wing in storey} | {""}
 
 
-@pytest.mark.parametrize("path", KERNELS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_imports_go_downwards() -> None:
+    """No wing imports one above it, none what is not for it, and there is no circle."""
+    graph = real_graph()
+    assert violations(graph) == []
+    assert circle(graph) == []
+
+
+@pytest.mark.parametrize(
+    ("module", "target", "rule"),
+    [
+        ("walks.walk_phases", "run.single_walk", "not downwards"),
+        ("pictures.style", "walks.walk_result", "not downwards"),
+        ("engine.batch", "pictures.style", "not downwards"),
+        ("reports.panels", "bench.places", "not downwards"),
+        ("run.single_walk", "oracle.motion_equations", "only bench may"),
+        ("walks.scheduler", "kernels.cpu.loop", "only engine may"),
+        ("kernels.cpu.loop", "kernels.gpu.stage", "not downwards"),
+        ("kernels.contacts.impulse", "kernels.methods.controller", "not downwards"),
+        ("kernels.physics.joint", "kernels.events.sample", "not downwards"),
+    ],
+)
+def test_a_planted_import_is_found(module: str, target: str, rule: str) -> None:
+    """Each rule, broken by one import."""
+    (found,) = violations({f"warpchain.{module}": [f"warpchain.{target}"]})
+    assert found.endswith(rule)
+
+
+def test_planted_sins_are_found() -> None:
+    """A circle, a launch, a foreign import and a lazy one are seen."""
+    assert set(circle({"a": ["b"], "b": ["c"], "c": ["a"], "d": ["a"]})) == {"a", "b", "c"}
+    assert launches("def f(): wp.launch(kernel, dim=1)") == {"wp.launch"}
+    assert foreign("import warp as wp, numpy\nfrom warpchain.engine import batch") == ["numpy", "warpchain"]
+    assert imported_modules("def f():\n    from warpchain.run import single_walk") == {"warpchain.run.single_walk"}
+
+
+def test_the_drawing_shows_the_arrows() -> None:
+    """Arrows between wings in docs/architecture.md are those of the code, no more and no fewer."""
+    text = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+    drawn = set()
+    for block in re.findall(r"```mermaid\n(.*?)```", text, flags=re.DOTALL):
+        for left, right in re.findall(r"^ *([\w/ &]+?) *--> *([\w/ &]+?) *$", block, flags=re.MULTILINE):
+            drawn |= {(one.strip(), other.strip()) for one in left.split("&") for other in right.split("&")}
+    assert drawn == arrows(real_graph())
+
+
+@pytest.mark.parametrize("path", KERNELS, ids=module_of)
 def test_kernels_know_only_warp_and_their_siblings(path: Path) -> None:
     """Kernels import warp, the standard library and one another: no NumPy, nothing of the host."""
-    for name in imports(path):
-        top = name.partition(".")[0]
-        sibling = (name + ".").startswith("warpchain.kernels.")
-        assert sibling or top == "warp" or top in sys.stdlib_module_names, name
+    assert foreign(path.read_text(encoding="utf-8")) == []
 
 
-@pytest.mark.parametrize("path", [*HOST, *KERNELS], ids=lambda path: str(path.relative_to(ROOT)))
-def test_only_the_engine_launches(path: Path) -> None:
-    """One host module launches kernels; the benchmark may, to time them."""
-    calls = {
-        ast.unparse(node.func)
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Call)
-    }
-    launches = {f"{module}{name}" for module in ("wp.", "warp.", "") for name in LAUNCHES}
-    assert not calls & launches or path.name in LAUNCHERS
-
-
-@pytest.mark.parametrize("path", [*HOST, *KERNELS], ids=lambda path: str(path.relative_to(ROOT)))
-def test_no_file_is_too_long(path: Path) -> None:
-    """A file is one concept, which fits in so many lines."""
-    assert len(path.read_text(encoding="utf-8").splitlines()) <= LONGEST_FILE
+@pytest.mark.parametrize("path", [*HOST, *KERNELS], ids=module_of)
+def test_a_file_is_short_and_does_not_launch(path: Path) -> None:
+    """A file is one concept, which fits in so many lines; only the engine launches, and what times it."""
+    text = path.read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= LONGEST_FILE
+    assert not launches(text) or module_of(path) in LAUNCHERS
 
 
 def test_the_package_exports_little() -> None:
-    """At most a dozen public names, each of them there."""
-    assert len(warpchain.__all__) == len(set(warpchain.__all__)) <= 12
+    """At most sixteen public names, each of them there."""
+    assert len(warpchain.__all__) == len(set(warpchain.__all__)) <= 16
     for name in warpchain.__all__:
         assert getattr(warpchain, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'wlak'"):
         _ = warpchain.wlak
 
 
+def test_all_packages_are_installed() -> None:
+    """The list of packages in pyproject.toml names every folder with modules."""
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    listed = set(re.findall(r'^    "(warpchain[\w.]*)",$', text, flags=re.MULTILINE))
+    assert listed == {name for name, path in MODULES.items() if path.name == "__init__.py"}
+
+
 def test_public_names_survive_the_import_of_modules() -> None:
     """Importing a submodule does not put it in the place of a public function or class."""
-    modules = [
-        ".".join(path.relative_to(ROOT).with_suffix("").parts) for path in HOST if not path.stem.startswith("__")
-    ]
+    modules = [module_of(path) for path in HOST if not path.stem.startswith("__")]
     program = (
         "import types, warpchain\n"
         f"import {', '.join(modules)}\n"

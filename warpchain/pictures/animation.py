@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from warpchain.files import replacing
 from warpchain.pictures.style import BLUE, FAINT, GROUND, INK
-from warpchain.pictures.walk_figures import center_at, check_frames, extent, link_outlines, setting
-from warpchain.pictures.walk_shape import Walk
+from warpchain.pictures.walk_figures import center_at, check_frames, extent, link_outlines
+from warpchain.pictures.walk_shape import Walk, setting
 
 if TYPE_CHECKING:
     from PIL.Image import Image

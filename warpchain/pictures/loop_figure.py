@@ -12,8 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from warpchain.loop.stationary_loop import Kink, StationaryLoop, average_loop, find_kink
 from warpchain.loop.theory import NoSolutionError, TheoreticalLoop, catenary, predict
 from warpchain.pictures.style import BLUE, DASHES, FAINT, GREEN, GROUND, INK, RED, tidy
-from warpchain.pictures.walk_figures import setting
-from warpchain.pictures.walk_shape import Walk
+from warpchain.pictures.walk_shape import Walk, setting
 
 SIMULATED: Final[dict[str, Any]] = {"color": BLUE, "linewidth": 2.2}
 PREDICTED: Final[dict[str, Any]] = {"color": RED, "linewidth": 1.3, "linestyle": DASHES}

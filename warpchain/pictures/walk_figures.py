@@ -18,8 +18,9 @@ from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
+from warpchain.pictures.loop_figure import loop_figure
 from warpchain.pictures.style import DASHES, FAINT, GROUND, INK, LINE_COLORS, tidy
-from warpchain.pictures.walk_shape import Walk
+from warpchain.pictures.walk_shape import Walk, setting
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
@@ -48,8 +49,6 @@ def draw(walk: Walk, kind: Literal["figure5", "film_strip", "loop"], *, figure: 
     if kind == "film_strip":
         return film_strip(walk, figure=figure)
     if kind == "loop":
-        from warpchain.pictures.loop_figure import loop_figure
-
         return loop_figure(walk, figure=figure)
     raise ValueError(f"kind: {kind!r} is unknown; give 'figure5', 'film_strip' or 'loop'")
 
@@ -174,11 +173,6 @@ def film_strip(walk: Walk, *, count: int | None = None, figure: Figure | None = 
         halo = [withStroke(linewidth=3.0, foreground="white")]
         strip.text(y=y + height, s=letter, va="bottom", zorder=5, path_effects=halo, **side)
     return figure
-
-
-def setting(walk: Walk) -> str:
-    """Links and frequency, as a title."""
-    return f"{walk.setup.scene.links} links, {walk.setup.scene.frequency:g} Hz"
 
 
 def link_outlines(joints: Array, radius: float) -> Array:

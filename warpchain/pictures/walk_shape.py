@@ -35,3 +35,8 @@ class Walk(HeldWalk, Protocol):
     frame_time: Array
     frame_joints: Array
     sprocket_radius: float
+
+
+def setting(walk: Walk) -> str:
+    """Links and frequency, as a title."""
+    return f"{walk.setup.scene.links} links, {walk.setup.scene.frequency:g} Hz"
