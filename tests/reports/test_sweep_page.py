@@ -226,7 +226,7 @@ def test_walk_is_run_again(folder: Path, tmp_path: Path, monkeypatch: pytest.Mon
     (player,) = document.frames
     assert player.startswith("<!DOCTYPE html>") and "getElementById" in player
     drawn = {row[0]: row[1:] for row in document.rows["one-walk"]}
-    assert drawn["gravity"] == [f"{result.blocks['ellipse'].gravity[0, 1, 0]:g}", "m/s²"]
+    assert drawn["gravity"] == [f"{result.blocks['ellipse'].gravity_drawn[0, 1, 0]:g}", "m/s²"]
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ from warpchain.store.merged_file import merge
 from warpchain.store.shards import empty_rows, shard_name
 from warpchain.store.sweep_result import BlockResult, SweepResult, load
 from warpchain.sweeps.plan import load_sweep
-from warpchain.walks.rows import COLUMNS
+from warpchain.walks.rows import COLUMNS, drawn_column
 
 SINGLE: Any = SyntheticSweep(
     blocks=(
@@ -69,11 +69,11 @@ def test_arrays_have_named_axes(folder: Path) -> None:
     assert rest.axes["links"].tolist() == [60, 90, 120] and rest.axes["links"].dtype == np.int64
     assert rest.axes["frequency"].tolist() == [5.0, 12.5]
     assert rest.index[2, 1, 3] == (2 * 2 + 1) * 20 + 3 and ellipse.index[4, 7] == 159
-    for name in (*COLUMNS, *rest.drawn):
+    for name in (*COLUMNS, *map(drawn_column, rest.drawn)):
         assert getattr(rest, name).tobytes() == np.ascontiguousarray(rows[name][:120]).tobytes(), name
         assert getattr(rest, name).dtype == rows.dtype[name]
-    assert set(rest.columns) == {*COLUMNS, "phase", "floor_friction", "clearance"}
-    assert set(ellipse.columns) == {*COLUMNS, "phase", "link_length"}
+    assert set(rest.columns) == {*COLUMNS, "phase_drawn", "floor_friction_drawn", "clearance_drawn"}
+    assert set(ellipse.columns) == {*COLUMNS, "phase_drawn", "link_length_drawn"}
     assert result.walk_count == 160 and result.missing_count == 0
 
 
@@ -98,7 +98,7 @@ def test_the_layout_is_that_of_the_sweep(tmp_path: Path) -> None:
             rows["status"] = Status.TIME_LIMIT
             for row, index in zip(rows, walks, strict=True):
                 for name, value in sweep.planned(index).drawn.items():
-                    row[name] = value
+                    row[drawn_column(name)] = value
             write(store, walks, rows)
     result = load(tmp_path)
     for index in range(sweep.walk_count):
@@ -106,7 +106,7 @@ def test_the_layout_is_that_of_the_sweep(tmp_path: Path) -> None:
         block = result.blocks[sweep.blocks[walk.block].name]
         place = (*walk.cell, walk.sample)
         assert block.index[place] == index
-        assert {name: block.columns[name][place] for name in block.drawn} == walk.drawn
+        assert {name: block.columns[f"{name}_drawn"][place] for name in block.drawn} == walk.drawn
         fields = {"preset": walk.setup.preset}
         for part in (walk.setup.parameters, walk.setup.scene, walk.setup.options):
             fields |= part.model_dump()
@@ -123,9 +123,9 @@ def test_the_layout_is_that_of_the_sweep(tmp_path: Path) -> None:
 def test_units_and_meanings(folder: Path) -> None:
     """Columns, drawn quantities and axes of any block have units; an unknown name gets a suggestion."""
     result = load(folder)
-    assert [result.unit(name) for name in ("dx", "links", "frequency", "phase", "link_length", "gravity")] == [
-        *("m", "1", "Hz", "1", "m", "m/s²")
-    ]
+    assert [
+        result.unit(name) for name in ("dx", "links", "frequency", "phase_drawn", "link_length_drawn", "gravity")
+    ] == [*("m", "1", "Hz", "1", "m", "m/s²")]
     assert result.unit("sample") == "1" and result.unit("loss_floor") == "J"
     assert result.blocks["ellipse"].meaning("gravity") == "gravitational acceleration, along −y"
     with pytest.raises(KeyError, match="did you mean walk_time"):
@@ -148,8 +148,8 @@ def test_missing_walks_are_counted(single: Path) -> None:
     missing = (result.index >= 20) & (result.index < 40)
     assert result.shape == (2, 2, 2, 2, 6) and result.index.ravel().tolist() == list(range(96))
     assert ((result.status == -1) == missing).all() and np.isnan(result.dx[missing]).all()
-    assert (result.steps_accepted[missing] == -1).all() and np.isnan(result.phase[missing]).all()
-    assert np.isfinite(result.phase[~missing]).all()
+    assert (result.steps_accepted[missing] == -1).all() and np.isnan(result.phase_drawn[missing]).all()
+    assert np.isfinite(result.phase_drawn[~missing]).all()
     failed = int((result.status == Status.TIME_LIMIT).sum())
     assert 0 < failed < 30
     assert result.summary() == {"at_rest": 76 - failed, "time_limit": failed, "missing": 20}
@@ -159,7 +159,7 @@ def test_missing_walks_are_counted(single: Path) -> None:
         "  <BlockResult main (links: 2, start: 2, self_contact: 2, frequency: 2, sample: 6): "
         f"{76 - failed} at_rest, {failed} time_limit, 20 missing>",
     ]
-    assert {"dx", "phase", "statistics", "summary", "blocks"} <= set(dir(result))
+    assert {"dx", "phase_drawn", "statistics", "summary", "blocks"} <= set(dir(result))
 
 
 def test_a_sweep_just_begun_is_all_missing(tmp_path: Path) -> None:
@@ -242,7 +242,7 @@ def test_several_blocks_as_a_tree(folder: Path) -> None:
     tree = result.to_xarray()
     assert set(tree.children) == {"rest", "ellipse"} and tree.attrs["title"] == "synthetic"
     assert tree["ellipse"].to_dataset().identical(result.blocks["ellipse"].to_xarray())
-    assert tree["rest"]["floor_friction"].attrs["symbol"] == "μ_fc"
+    assert tree["rest"]["floor_friction_drawn"].attrs["symbol"] == "μ_fc"
 
 
 def test_walks_as_a_table(folder: Path) -> None:
@@ -252,7 +252,7 @@ def test_walks_as_a_table(folder: Path) -> None:
     assert table["index"].tolist() == list(range(160))
     row = table[table["index"] == 95].iloc[0]
     assert (row.block, row.links, row.frequency, row["sample"]) == ("rest", 120, 5.0, 15)
-    assert row.phase == load(folder).blocks["rest"].phase[2, 0, 15] and np.isnan(row.link_length)
+    assert row.phase_drawn == load(folder).blocks["rest"].phase_drawn[2, 0, 15] and np.isnan(row.link_length_drawn)
     assert table[table.block == "ellipse"].gravity.tolist() == np.repeat([1.6, 3.7, 9.8, 12.0, 24.8], 8).tolist()
 
 

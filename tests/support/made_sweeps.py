@@ -12,7 +12,7 @@ from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import empty_rows, write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, load_sweep
-from warpchain.walks.rows import Rows
+from warpchain.walks.rows import Rows, quantity_of
 
 Outcome = Callable[[PlannedWalk], "float | Status | None"]
 """What a walk gives: its distance [m], how it failed, or None if it has not been run yet."""
@@ -76,8 +76,8 @@ def fill_row(walk: PlannedWalk, outcome: "float | Status", rows: Rows) -> None:
     failed = isinstance(outcome, Status)
     rows["status"] = outcome if failed else Status.AT_REST
     for name in rows.dtype.names or ():
-        if name in walk.drawn:
-            rows[name] = walk.drawn[name]
+        if (quantity := quantity_of(name)) in walk.drawn:
+            rows[name] = walk.drawn[quantity]
         elif name not in ("index", "status", "dx"):
             rows[name] = 7
     rows["dx"] = math.nan if failed else outcome

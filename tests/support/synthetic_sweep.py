@@ -24,7 +24,7 @@ from warpchain.store.folder import SweepFolder
 from warpchain.store.manifest import BlockLayout
 from warpchain.store.shards import empty_rows, write_shard
 from warpchain.store.sweep_result import load
-from warpchain.walks.rows import Rows
+from warpchain.walks.rows import Rows, quantity_of
 
 SHARD_SIZE = 20
 
@@ -80,7 +80,7 @@ def synthetic_rows(sweep: Any, walks: range) -> Rows:
         for name in names:
             if rows.dtype[name].kind == "i":
                 row[name] = rng.integers(0, 1000)
-            elif name in block.drawn or name in ("walk_time", "energy_at_release"):
+            elif quantity_of(name) in block.drawn or name in ("walk_time", "energy_at_release"):
                 row[name] = rng.random()
         row["dx"] = np.nan if failed else rng.normal(1.0, 0.1)
     return rows

@@ -32,7 +32,7 @@ def test_columns_of_a_row() -> None:
     )
     assert ROW.itemsize == sum(ROW[name].itemsize for name in ROW.names)
     one, other = row_type(["clearance", "phase", "link_length"]), row_type(["link_length", "clearance", "phase"])
-    assert one == other and one.names == (*ROW.names, "link_length", "phase", "clearance")
+    assert one == other and one.names == (*ROW.names, "link_length_drawn", "phase_drawn", "clearance_drawn")
     assert COLUMNS["dx"].meaning == STORED["dx"].meaning and COLUMNS["loss_floor"].unit == "J"
 
 

@@ -16,6 +16,7 @@ from warpchain.reports.labels import cell_text, cell_values, number_text
 from warpchain.status import Status
 from warpchain.store.sweep_result import BlockResult, SweepResult
 from warpchain.sweeps.designs import saltelli_outputs, sobol_indices, walks_per_sample
+from warpchain.walks.rows import drawn_column
 
 Array = NDArray[np.float64]
 
@@ -166,7 +167,7 @@ def _paired_cells(block: BlockResult, *, several: bool) -> Iterator[PairedCell]:
 
     rested = np.all(at_ends("status") == Status.AT_REST, axis=0)
     for name in block.drawn:
-        if not np.array_equal(*at_ends(name)[:, rested]):
+        if not np.array_equal(*at_ends(drawn_column(name))[:, rested]):
             raise NothingToShow(f"the samples of block {block.name} differ; give same_samples_along: [tolerance]")
     distances = at_ends("dx")
     for place in np.ndindex(*rested.shape[:-1]):

@@ -21,7 +21,7 @@ from warpchain.status import Status
 from warpchain.store.folder import read_rows
 from warpchain.store.manifest import FORMAT_VERSION, Folder, read_manifest
 from warpchain.store.walk_motion import MotionReader, WalkMotion
-from warpchain.walks.rows import COLUMNS, MISSING, Column, field_column, missing_rows
+from warpchain.walks.rows import COLUMNS, MISSING, Column, drawn_column, field_column, missing_rows, quantity_of
 
 if TYPE_CHECKING:
     import pandas
@@ -67,13 +67,13 @@ class CellStatistics:
 class BlockResult:
     """A block of a sweep. Every column is an attribute, an array of shape `shape`: `block.dx`, `block.status`.
 
-    Columns are those of `warpchain.walks.rows.COLUMNS` and the drawn quantities. A missing walk has −1 in columns of
-    integers, `status` among them, and NaN in those of floats.
+    Columns are those of `warpchain.walks.rows.COLUMNS`, and NAME_drawn for each drawn quantity. A missing walk has −1
+    in columns of integers, `status` among them, and NaN in those of floats.
 
     Attributes:
         name: name of the block.
         axes: name of each axis of the grid → its values, in order; the samples are one more axis.
-        drawn: names of the quantities that samples draw.
+        drawn: names of the quantities that samples draw; the values are in the columns NAME_drawn.
         columns: name → values.
         motions: reads the motions of walks; None if none was kept.
     """
@@ -229,8 +229,8 @@ class BlockResult:
         """Attributes of a variable."""
         column = self._column(name)
         notes: dict[str, Any] = {"units": column.unit, "description": column.meaning}
-        if name in Parameters.model_fields:
-            notes["symbol"] = Parameters.quantities()[name].symbol
+        if quantity_of(name) in Parameters.model_fields:
+            notes["symbol"] = Parameters.quantities()[quantity_of(name)].symbol
         if name == "status":
             notes["flag_values"] = np.array([MISSING, *Status], np.int8)
             notes["flag_meanings"] = " ".join(["missing", *(status.label for status in Status)])
@@ -356,7 +356,7 @@ def load(directory: Folder) -> SweepResult:
     blocks = {}
     for block in manifest.blocks:
         part = rows[block.first : block.first + math.prod(block.shape)].reshape(block.shape)
-        names = (*COLUMNS, *(name for name in rows.dtype.names or () if name in block.drawn))
+        names = (*COLUMNS, *map(drawn_column, block.drawn))
         blocks[block.name] = BlockResult(
             name=block.name,
             axes={name: np.array(values) for name, values in block.axes.items()},

@@ -15,6 +15,8 @@ from warpchain.walks.walk_result import STORED
 
 Rows = NDArray[np.void]
 
+_DRAWN: Final = "_drawn"
+
 MISSING: Final = -1
 """Status of a walk that has not been computed yet; no code of `Status` is negative."""
 
@@ -63,7 +65,7 @@ _KINDS: Final = {
     **dict.fromkeys(("energy_at_release", *(f"loss_{name}" for name in LOST), "energy_residual"), "<f8"),
 }
 COLUMNS: Final = {name: Column(kind, *_NOTES[name]) for name, kind in _KINDS.items()}
-"""Columns of every sweep; behind them comes one for each quantity that the sweep draws.
+"""Columns of every sweep; behind them comes one for each quantity that the sweep draws, see `drawn_column`.
 
 A number is the same however its walk was computed, so there is no wall time. What is missing, or does not
 exist (the distance of a walk that failed), is NaN in a column of floats and −1 in one of integers.
@@ -86,17 +88,30 @@ def fill_row(row: Any, outcome: Mapping[str, Any], drawn: Mapping[str, float]) -
     for name in COLUMNS.keys() - {"index"}:
         row[name] = values[name]
     for name, value in drawn.items():
-        row[name] = value
+        row[drawn_column(name)] = value
+
+
+def drawn_column(name: str) -> str:
+    """Name of the column of a drawn quantity; its own name belongs to the axis that it may be drawn about."""
+    return f"{name}{_DRAWN}"
+
+
+def quantity_of(column: str) -> str:
+    """Field of `Parameters`, `Scene` or `Options` behind an axis or a column of a drawn quantity."""
+    return column.removesuffix(_DRAWN)
 
 
 def field_column(name: str) -> Column:
-    """Unit and meaning of a field of `Parameters`, `Scene` or `Options`, or of `preset`, as a column of floats.
+    """Unit and meaning of an axis or of the column of a drawn quantity, as a column of floats.
 
     Raises:
-        KeyError: there is no such field.
+        KeyError: there is no such field of `Parameters`, `Scene` or `Options`, and it is not `preset`.
     """
     if name == "preset":
         return Column("<f8", "1", "named set of parameters that others are changed from")
+    if name.endswith(_DRAWN):
+        own = field_column(quantity_of(name))
+        return Column(own.kind, own.unit, f"{own.meaning}; as drawn for the walk")
     field = SECTIONS[SECTION_OF[name]].model_fields[name]
     return Column("<f8", field_unit(field), field.description or name)
 
@@ -108,7 +123,7 @@ def row_type(drawn: Iterable[str]) -> np.dtype[np.void]:
         drawn: quantities that some block of the sweep draws, in any order.
     """
     names = set(drawn)
-    return np.dtype([*ROW.descr, *((name, "<f8") for name in DRAWABLE if name in names)])
+    return np.dtype([*ROW.descr, *((drawn_column(name), "<f8") for name in DRAWABLE if name in names)])
 
 
 def missing_rows(kind: np.dtype[np.void], walks: range) -> Rows:

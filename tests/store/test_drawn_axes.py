@@ -1,0 +1,72 @@
+"""A grid axis over a quantity that is drawn as well: the axis and what was drawn are two things everywhere."""
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+
+from tests.support.made_sweeps import distance, make_sweep
+from warpchain.inputs.distributions import DRAWABLE
+from warpchain.inputs.parameters import preset
+from warpchain.inputs.scene import Scene
+from warpchain.reports.sweep_figures import figures
+from warpchain.reports.sweep_page import write_report
+from warpchain.store.merged_file import merge
+from warpchain.store.sweep_result import SweepResult
+
+
+def value_of(name: str) -> float:
+    """What a quantity is if nobody says otherwise; of scenes a plain value."""
+    own = getattr(preset("soft"), name, None)
+    return float(own or getattr(Scene(), name, None) or 0.5)
+
+
+def swept(folder: Path, name: str) -> SweepResult:
+    """A made sweep with an axis over a quantity that is drawn about each of its values."""
+    value = value_of(name)
+    content: dict[str, Any] = {
+        "version": 1,
+        "name": "axis",
+        "seed": 4,
+        "preset": "soft",
+        "samples": 3,
+        "grid": {name: [value, 1.001 * value]},
+        "distributions": {"all": "fixed", name: {"gaussian": {"sigma": 1e-5 * value}}},
+    }
+    return make_sweep(folder, content, distance)
+
+
+@pytest.mark.parametrize("name", DRAWABLE)
+def test_an_axis_over_a_drawn_quantity_is_exported(name: str, tmp_path: Path) -> None:
+    """Arrays, xarray, pandas, the merged file, figures and the page hold both, each under a name of its own."""
+    result = swept(tmp_path / "sweep", name)
+    axis = np.array([value_of(name), 1.001 * value_of(name)])
+    drawn = getattr(result, f"{name}_drawn")
+    assert result.axes[name].tolist() == axis.tolist()
+    assert drawn.shape == (2, 3) and len(set(drawn.ravel())) == 6
+    np.testing.assert_allclose(drawn, axis[:, None] * np.ones(3), rtol=1e-4)  # centred on the grid value
+    assert result.unit(f"{name}_drawn") == result.unit(name)
+    assert result.meaning(f"{name}_drawn") != result.meaning(name)
+
+    data = result.to_xarray()
+    assert data[name].values.tolist() == axis.tolist() and data[name].dims == (name,)
+    assert data[f"{name}_drawn"].dims == (name, "sample")
+    np.testing.assert_array_equal(data[f"{name}_drawn"], drawn)
+
+    table = result.to_pandas()
+    assert table[name].tolist() == np.repeat(axis, 3).tolist()
+    assert table[f"{name}_drawn"].tolist() == drawn.ravel().tolist()
+
+    merge(tmp_path / "sweep", tmp_path / "merged.h5")
+    with xarray.open_dataset(tmp_path / "merged.h5", engine="h5netcdf") as merged:
+        assert merged[name].values.tolist() == axis.tolist()
+        np.testing.assert_array_equal(merged[f"{name}_drawn"], drawn)
+    with h5py.File(tmp_path / "merged.h5") as file:
+        assert {name, f"{name}_drawn"} <= set(file)
+
+    assert all(picture.name and picture.figure for picture in figures(result))
+    write_report(tmp_path / "sweep", tmp_path / "report.html")
+    assert name in (tmp_path / "report.html").read_text(encoding="utf-8")
