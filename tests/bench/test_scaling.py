@@ -11,9 +11,9 @@ import yaml
 from tests.run.test_sweep_run import TINY, data_of
 from warpchain.bench import scaling
 from warpchain.bench.places import Place, places_of
+from warpchain.bench.record import plain
 from warpchain.bench.scaling import Run, different_walks, measure
 from warpchain.cli.main import main
-from warpchain.cli.terminal import print_scaling
 from warpchain.engine.processors import processors
 from warpchain.inputs.validation import InputError
 from warpchain.run.sweep_run import sweep
@@ -127,7 +127,7 @@ def test_medians_and_changes_over_the_rounds(tmp_path: Path, monkeypatch: pytest
     assert (one.ratio, two.ratio, two.walks_per_second, two.simulated_per_second) == (1.0, 4.0, 80.0, 160.0)
     assert (two.processor_seconds, two.loading_seconds) == (3.0, 10.0)
     assert [(c.first, c.second, c.different) for c in found.comparisons] == [("2xcpu", "2xcpu", 3), ("cpu", "2xcpu", 2)]
-    assert json.loads((folder / "scaling.json").read_text()) == scaling.as_json(found)
+    assert json.loads((folder / "scaling.json").read_text()) == plain(found)
 
 
 @pytest.mark.parametrize("column", ["status", "dx", "steps_accepted", "steps_rejected", "impulses_self"])
@@ -143,21 +143,6 @@ def test_walks_differ_in_any_bit(column: str) -> None:
     else:
         other[column][7] += 1
         assert different_walks(rows, other) == 1
-
-
-def test_table_shows_places_and_comparisons(
-    measured: tuple[scaling.Scaling, Path], capsys: pytest.CaptureFixture[str]
-) -> None:
-    """The machine, a row for each place, a line for each comparison."""
-    print_scaling(measured[0])
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith("processor ")
-    rows = [line.split() for line in lines if "dp5" in line]
-    walks = ["80", "80", "80", "12"]
-    assert [row[:5] for row in rows] == [
-        [place.name, "dp5", "1e-06", count, count] for place, count in zip(PLACES, walks, strict=True)
-    ]
-    assert lines[-1] == "2xcpu and processes: all 80 walks equal, bit by bit"
 
 
 def test_places_are_read() -> None:
@@ -218,14 +203,21 @@ def test_a_sweep_that_cannot_be_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_command_prints_json(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """`--json` prints the very file, with machine and versions."""
+@pytest.mark.parametrize("json_wanted", [True, False])
+def test_command_prints_what_it_measured(tmp_path: Path, capfd: pytest.CaptureFixture[str], json_wanted: bool) -> None:
+    """`--json` prints the very file, with machine and versions; else a table says the same of each place."""
     source = tmp_path / "tiny.yaml"
     source.write_text(yaml.safe_dump(TINY, sort_keys=False))
     with pytest.raises(SystemExit) as caught:
-        main(["bench", "sweep", str(source), "-o", str(tmp_path / "out"), "--devices", "cpu@1", "--json"])
+        line = ["bench", "sweep", str(source), "-o", str(tmp_path / "out"), "--devices", "cpu@1,2xcpu@1"]
+        main([*line, "--json"] if json_wanted else line)
     assert not caught.value.code
-    content = json.loads(capfd.readouterr().out)
-    assert content == json.loads((tmp_path / "out" / "scaling.json").read_text())
+    printed, content = capfd.readouterr().out, json.loads((tmp_path / "out" / "scaling.json").read_text())
+    if json_wanted:
+        assert json.loads(printed) == content
+    else:
+        rows = [text.split()[:5] for text in printed.splitlines() if "dp5" in text]
+        assert rows == [[place, "dp5", "1e-06", "4", "4"] for place in ("cpu@1", "2xcpu@1")]
+        assert printed.endswith("cpu@1 and 2xcpu@1: all 4 walks equal, bit by bit\n")
     assert {"processor", "processors", "warpchain", "warp-lang"} <= set(content["machine"])
-    assert content["sweep"] == "tiny" and content["costs"][0]["walks"] == 4
+    assert content["sweep"] == "tiny" and [cost["walks"] for cost in content["costs"]] == [4, 4]

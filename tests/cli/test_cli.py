@@ -379,7 +379,7 @@ def test_a_defect_is_not_disguised_as_bad_input(monkeypatch: pytest.MonkeyPatch)
         ("--chains 4", "--chains: only measurements on a GPU can be restricted so; add --device cuda"),
         ("--device gpu", "bench.device: 'gpu' is no device"),
         ("--device cuda:99", "options.device: there is no cuda:99 on this machine"),
-        ("--device cuda:99 --method euler", "bench.method: 'euler' is unknown"),
+        ("--device cuda:99 --method euler", "bench.method: 'euler' is not measured on a GPU"),
     ],
 )
 def test_bad_input_of_bench_is_refused_in_one_line(command: Command, arguments: str, problem: str) -> None:

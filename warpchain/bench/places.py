@@ -1,4 +1,4 @@
-"""Places that a sweep can run on, named in a word: so many processor cores, a GPU, several GPUs."""
+"""Places where a sweep can run, each named by a word: a number of processor cores, a GPU, several GPUs."""
 
 import itertools
 import re
@@ -24,8 +24,8 @@ class Place:
     Attributes:
         name: As given on the command line.
         device: ``"cpu"``, ``"cuda"`` or ``"cuda:N"``.
-        threads: Threads of this process that run shards; None: as many as a sweep takes by itself, or processes.
-        processes: Worker processes, each with a GPU of its own; 0: none, this process does it.
+        threads: Threads of this process that run shards; None: the default of a sweep.
+        processes: Worker processes, each with a GPU of its own; 0: the sweep runs in this process.
         samples: Samples per cell; None: as the sweep says.
     """
 
@@ -61,8 +61,7 @@ class Place:
         if device == "cpu":
             if (count or 1) > (there := processors()):
                 raise InputError(f"--devices: {shown(text)}, but there are {there} processors; give no more")
-            name = text.removeprefix("1x")
-            return cls(name, device, threads=count or 1, samples=own)
+            return cls(text.removeprefix("1x"), device, threads=count or 1, samples=own)
         if (count or 1) > (gpus := wp.get_cuda_device_count()):
             raise InputError(f"--devices: {shown(text)}, but there are {gpus} GPUs; give no more")
         return cls(text, device, processes=count or 0, samples=own)
@@ -73,12 +72,12 @@ class Place:
         return self.name.replace(":", "-")
 
     def planned(self, source: Sweep) -> Sweep:
-        """The sweep as it runs here, by the method that a word in it means here.
+        """The sweep as it runs here; a word such as ``standard`` is the method that it means on this device.
 
         Raises:
             InputError: The sweep cannot have so many samples, or cannot run on this device.
         """
-        canonical = on_device(source, self.device).canonical()  # which names methods, no more words
+        canonical = on_device(source, self.device).canonical()  # with the names of methods instead of words
         for block in canonical["blocks"]:
             block["samples"] = self.samples or block["samples"]
         return load_sweep(canonical)

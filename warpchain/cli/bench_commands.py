@@ -1,13 +1,105 @@
-"""The commands `warpchain bench accuracy` and `warpchain bench sweep`."""
+"""The command `warpchain bench`: speed of steps, and its subcommands `accuracy` and `sweep`."""
 
+import json
+from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
 from warpchain.cli.sweep_commands import SweepFile
 
 bench_app = typer.Typer()
+
+
+@bench_app.callback(invoke_without_command=True)
+def bench(
+    context: typer.Context,
+    links: Annotated[
+        list[int] | None,
+        typer.Option(
+            metavar="N", help="Number of links; may be repeated. Default: 60 and 150, on a GPU 60 to 180 by 30."
+        ),
+    ] = None,
+    device: Annotated[
+        str, typer.Option(metavar="NAME", help="cpu, cuda or cuda:N: what one core takes, or many chains on a GPU.")
+    ] = "cpu",
+    methods: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--method",
+            metavar="NAME",
+            help="On a GPU, one integrator; may be repeated. Default: rkf78, dp5, bs32, os32.",
+        ),
+    ] = None,
+    chains: Annotated[
+        list[int] | None,
+        typer.Option(
+            metavar="N", min=1, help="On a GPU, chains at a time; may be repeated. Default: 1, 132, 400, 1000 and 4000."
+        ),
+    ] = None,
+    scenes: Annotated[
+        list[str] | None,
+        typer.Option("--scene", metavar="NAME", help="On a GPU, flight or pile; may be repeated. Default: both."),
+    ] = None,
+    rounds: Annotated[int, typer.Option(metavar="N", min=1, help="Measurements of each; medians are printed.")] = 7,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="Write what --json prints to this file, too.")
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object, units in its keys or in s, instead of tables.")
+    ] = False,
+) -> None:
+    """Measure what integration costs: µs a step on one core beside SciPy's DOP853, or of many chains on a GPU."""
+    if context.invoked_subcommand is not None:
+        return
+    from warpchain.bench.record import machine, plain
+    from warpchain.cli.bench_tables import print_bench
+    from warpchain.cli.terminal import status_line
+    from warpchain.inputs.options import Options
+    from warpchain.inputs.scene import Scene, check_links_on_gpu
+    from warpchain.inputs.validation import InputError, validated
+
+    where = validated(Options, {"device": device}, "bench").device
+    lengths = [validated(Scene, {"links": count}, "bench").links for count in links or ()]
+    tables: dict[str, Sequence[object]]
+    if where == "cpu":
+        for option, value in (("--method", methods), ("--chains", chains), ("--scene", scenes)):
+            if value:
+                raise InputError(f"{option}: only measurements on a GPU can be restricted so; add --device cuda")
+        if find_spec("scipy") is None:
+            raise InputError("bench: SciPy is not installed; pip install 'warpchain[scipy]'")
+        from warpchain.bench.cpu_steps import broad_phase_costs, step_costs
+
+        with status_line() as show:
+            steps = step_costs(lengths or (60, 150), rounds=rounds, report=show)
+            tables = {"steps": steps, "broad_phase": broad_phase_costs(rounds=rounds, report=show)}
+        about, more = machine(), {}
+    else:
+        from warpchain.bench import gpu_steps
+
+        for count in lengths:
+            check_links_on_gpu(count, where, "bench.links")
+        with status_line() as show:
+            costs = gpu_steps.gpu_costs(
+                where,
+                scenes=scenes or gpu_steps.SCENES,
+                methods=methods or gpu_steps.METHODS,
+                links=lengths or gpu_steps.LINKS,
+                chains=chains or gpu_steps.CHAINS,
+                rounds=rounds,
+                report=show,
+            )
+        tables, about = {"attempts": costs}, gpu_steps.gpu_machine(where)
+        more = {"flops_per_attempt": {name: gpu_steps.flops_per_attempt(name) for name in gpu_steps.METHODS}}
+    text = json.dumps(plain({"machine": about, **more, **tables}), indent=2, allow_nan=False)
+    if output is not None:
+        output.write_text(text + "\n", encoding="utf-8")
+    if as_json:
+        print(text)
+    else:
+        print_bench(about, *tables.items())
 
 
 @bench_app.command()
@@ -77,19 +169,15 @@ def accuracy(
     that are timed start as an ellipse at Table 1's values.
     """
     from warpchain.bench.accuracy.page import write_pictures_and_page
-    from warpchain.bench.accuracy.plan import make_plan, run_accuracy
+    from warpchain.bench.accuracy.plan import FILE, Plan, run_accuracy
     from warpchain.cli.terminal import status_line, try_folder
 
-    lists = {"parts": _words("--parts", parts), "problems": _words("--problems", problems)}
-    lists["presets"] = _words("--presets", presets)
-    if chosen is not None:
-        lists["method_settings"] = _words("--methods", chosen)
-    if cases is not None:
-        lists["cases"] = _words("--cases", cases)
-    numbers = {"tolerances": _numbers("--tolerances", tolerances)} if tolerances is not None else {}
-    plan = make_plan(
-        **lists,  # type: ignore[arg-type]
-        **numbers,  # type: ignore[arg-type]
+    texts = {"parts": parts, "problems": problems, "presets": presets, "methods": chosen, "cases": cases}
+    given: dict[str, Any] = {name: _words(f"--{name}", text) for name, text in texts.items() if text is not None}
+    if tolerances is not None:
+        given["tolerances"] = _numbers("--tolerances", tolerances)
+    plan = Plan(
+        **given,
         links=[int(number) for number in _numbers("--links", links, whole=True)],
         start=start,
         samples=samples,
@@ -104,9 +192,9 @@ def accuracy(
         show("drawing")
         paths = write_pictures_and_page(output, document)
     if as_json:
-        print((output / "accuracy.json").read_text(encoding="utf-8"))
+        print((output / FILE).read_text(encoding="utf-8"))
         return
-    for path in (output / "accuracy.json", *paths):
+    for path in (output / FILE, *paths):
         print(path)
 
 
@@ -143,7 +231,8 @@ def sweep(
     """
     from warpchain.bench.places import places_of
     from warpchain.bench.scaling import FILE, measure
-    from warpchain.cli.terminal import print_scaling, status_line, try_folder
+    from warpchain.cli.bench_tables import print_bench
+    from warpchain.cli.terminal import status_line, try_folder
 
     places = places_of(_words("--devices", devices), samples)
     try_folder(output)
@@ -152,7 +241,9 @@ def sweep(
     if as_json:
         print((output / FILE).read_text(encoding="utf-8"), end="")
     else:
-        print_scaling(scaling)
+        heading = f"{scaling.sweep}, medians of {scaling.rounds}, kernels loaded before"
+        comparisons = ["\n".join(map(str, scaling.comparisons))] if scaling.comparisons else []
+        print_bench(scaling.machine, heading, ("costs", scaling.costs), *comparisons)
 
 
 def _words(option: str, text: str) -> list[str]:

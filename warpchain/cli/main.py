@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NoReturn
 import typer
 
 from warpchain.cli.bench_commands import bench_app
-from warpchain.cli.speed_commands import bench
 from warpchain.cli.sweep_commands import FAILED, add_commands
 from warpchain.inputs.methods import METHODS
 
@@ -226,7 +225,6 @@ def walk(
 
 
 add_commands(app)
-bench_app.callback(invoke_without_command=True)(bench)
 app.add_typer(bench_app, name="bench")
 
 

@@ -4,7 +4,7 @@ import json
 import math
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -20,16 +20,11 @@ from warpchain.pictures.style import save_figure
 from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
-    from warpchain.bench.cpu_steps import BroadPhaseCost, StepCost
-    from warpchain.bench.gpu_steps import GpuCost
-    from warpchain.bench.scaling import Scaling
     from warpchain.run.single_walk import Progress
     from warpchain.run.sweep_run import SweepProgress
     from warpchain.store.sweep_result import SweepResult
 
 COMPILING: Final = "compiling kernels; later runs find them ready"
-WIDE: Final = 110
-"""Columns of a wide table where there is no terminal to ask."""
 
 
 def try_folder(folder: Path) -> None:
@@ -163,84 +158,6 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
     left = energy["kinetic_at_end"] + energy["potential_at_end"]
     yield "energy at the end", f"{left:.5f} J, kinetic {energy['kinetic_at_end']:.5f} J"
     yield "unaccounted for", f"{energy['residual']:.1e} J"
-
-
-def print_costs(
-    machine: Mapping[str, str], steps: "Sequence[StepCost]", broad_phase: "Sequence[BroadPhaseCost]"
-) -> None:
-    """Print on standard output what a bench measured; s/s is wall time per simulated time."""
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console(highlight=False, markup=False)
-    console.print(", ".join(f"{name} {value}" for name, value in machine.items()), "\n")
-    table = Table(box=None, pad_edge=False)
-    for heading in ("scene", "links", "method"):
-        table.add_column(heading)
-    for heading in ("µs/attempt", "ns/link/stage", "step µs", "rejected", "s/s"):
-        table.add_column(heading, justify="right")
-    for cost in sorted(steps, key=lambda cost: (cost.scene, cost.links)):
-        rejected = "" if math.isnan(cost.rejected) else f"{cost.rejected:.1%}"
-        per_stage = "" if math.isnan(cost.per_link_stage) else f"{cost.per_link_stage:.2f}"
-        times = f"{cost.microseconds:.2f}", per_stage, f"{1e6 * cost.step:.3g}"
-        last = rejected, f"{cost.wall_per_simulated:.3g}"
-        table.add_row(cost.scene, str(cost.links), cost.method, *times, *last)
-    console.print(table, "\n")
-    table = Table(box=None, pad_edge=False)
-    for heading in ("neighbour list: links", "pairs", "grid µs", "all pairs µs"):
-        table.add_column(heading, justify="right")
-    for list_cost in broad_phase:
-        builds = f"{list_cost.grid_microseconds:.1f}", f"{list_cost.all_pairs_microseconds:.1f}"
-        table.add_row(str(list_cost.links), str(list_cost.pairs), *builds)
-    console.print(table)
-
-
-def print_gpu_costs(machine: Mapping[str, str], costs: "Sequence[GpuCost]") -> None:
-    """Print on standard output what a bench of a GPU measured; /s is per second of wall time."""
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else WIDE)
-    console.print(", ".join(f"{name} {value}" for name, value in machine.items()), "\n")
-    table = Table(box=None, pad_edge=False)
-    for heading in ("scene", "links", "method"):
-        table.add_column(heading)
-    for heading in ("chains", "µs/attempt", "link stages/s", "chain·s/s", "rejected"):
-        table.add_column(heading, justify="right")
-    for heading in ("registers", "spilled B", "blocks", "of peak"):
-        table.add_column(heading, justify="right")
-    for cost in costs:
-        stages = "" if math.isnan(cost.link_stages) else f"{cost.link_stages:.2e}"
-        rates = f"{cost.microseconds:.2f}", stages, f"{cost.chain_seconds:.3g}", f"{cost.rejected:.1%}"
-        needs = str(cost.registers), str(cost.spilled), f"{cost.blocks} ({cost.occupancy:.0%})"
-        peak = "" if math.isnan(cost.peak) else f"{cost.peak:.0%}"
-        table.add_row(cost.scene, str(cost.links), cost.method, str(cost.chains), *rates, *needs, peak)
-    console.print(table)
-
-
-def print_scaling(scaling: "Scaling") -> None:
-    """Print on standard output what a sweep cost on several places; /s is per second of wall time."""
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else WIDE)
-    console.print(", ".join(f"{name} {value}" for name, value in scaling.machine.items()), "\n")
-    console.print(f"{scaling.sweep}, medians of {scaling.rounds}, kernels loaded before")
-    table = Table(box=None, pad_edge=False)
-    for heading in ("place", "methods"):
-        table.add_column(heading)
-    for heading in ("walks", "not at rest", "s", "walks/s", "simulated s/s", "processor s", "ratio", "loading s"):
-        table.add_column(heading, justify="right")
-    for cost in scaling.costs:
-        walks = f"{cost.walks:,}", f"{cost.walks - cost.statuses.get('at_rest', 0):,}"
-        rates = f"{cost.seconds:.1f}", f"{cost.walks_per_second:.3g}", f"{cost.simulated_per_second:.3g}"
-        others = f"{cost.processor_seconds:.1f}", f"{cost.ratio:.2f}", f"{cost.loading_seconds:.1f}"
-        table.add_row(cost.name, cost.methods, *walks, *rates, *others)
-    console.print(table, "\n")
-    for one in scaling.comparisons:
-        who = f"{one.first} and {one.second}" if one.first != one.second else f"{one.first}, one round and another"
-        equal = f"all {one.walks:,} walks equal, bit by bit" if not one.different else ""
-        console.print(f"{who}: {equal or f'{one.different:,} of {one.walks:,} walks differ'}")
 
 
 def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iterator[Path]:

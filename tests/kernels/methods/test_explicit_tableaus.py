@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from warpchain.bench.cpu_steps import flying
+from warpchain.bench.starts import flying
 from warpchain.inputs.parameters import preset
 from warpchain.kernels import layout
 from warpchain.kernels.cpu.loop import make_advance

@@ -1,25 +1,28 @@
-"""Ensembles of walks by method: whether their distances Δx can be told from the reference's, and what they cost.
+"""Ensembles of walks by method: whether their distances Δx differ from the reference's, and what they cost.
 
-Single walks are chaotic, so each method makes the same number of walks from the same samples, each ensemble a sweep in
-a folder of its own that can be killed and goes on. The tests take the ensembles for independent ones, which is right
-for walks that forget their beginnings and makes differences look less certain than they are if they don't.
+Single walks are chaotic, so distributions are compared: each method makes the same number of walks from the same
+samples. An ensemble is a sweep in a folder of its own; a killed one goes on. The tests take ensembles for independent:
+that is right for walks that forget how they began, and understates the differences of walks that do not.
 """
 
 import json
+import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.bench.accuracy.method_settings import LOOSE, TIGHT, MethodSetting
-from warpchain.bench.accuracy.two_samples import bootstrap_interval, kolmogorov_smirnov, means, standard_deviations
-from warpchain.bench.problems.work_precision import methods
+from warpchain.bench.accuracy.two_samples import bootstrap_interval, kolmogorov_smirnov
+from warpchain.bench.record import Column
 from warpchain.files import replacing
 from warpchain.inputs.methods import METHODS_BY_NEED
+from warpchain.kernels.methods.method import method_names
 from warpchain.run.sweep_run import SweepProgress, sweep
 from warpchain.status import Status
 from warpchain.store.sweep_result import SweepResult, load
@@ -34,21 +37,13 @@ LONG: Final = 100
 
 @dataclass(frozen=True)
 class Ensemble:
-    """What the walks of an ensemble are, method and tolerance apart.
+    """Scene and samples of an ensemble, which are the same for all methods; see `warpchain.inputs.scene.Scene`."""
 
-    Attributes:
-        links: n.
-        preset: Parameters that samples are drawn around.
-        start: See `warpchain.inputs.scene.Scene`.
-        samples: Number of walks.
-        device: Where they run.
-    """
-
-    links: int
-    preset: str
-    start: str = "spinning"
-    samples: int = 200
-    device: str = "cpu"
+    links: Annotated[int, Column("1", "number of links")]
+    preset: Annotated[str, Column("1", "parameters that samples are drawn around")]
+    start: Annotated[str, Column("1", "how the chain starts")] = "spinning"
+    samples: Annotated[int, Column("1", "walks of each method, the same samples for all")] = 200
+    device: Annotated[str, Column("1", "where they ran")] = "cpu"
 
     @property
     def frequency(self) -> float:
@@ -65,6 +60,11 @@ class Ensemble:
     def title(self) -> str:
         """For people."""
         return f"{self.links} links, {self.frequency:g} Hz, {self.preset}, {self.start}, {self.samples} walks"
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """The ensemble as columns of a table."""
+        return {"name": self.name, "title": self.title, "frequency": self.frequency, **asdict(self)}
 
     def content(self, method_setting: MethodSetting) -> dict[str, Any]:
         """The sweep of a method."""
@@ -85,19 +85,19 @@ def release_frequency(links: int) -> float:
 
 
 def default_samples(links: int) -> int:
-    """Number of walks unless one says otherwise."""
+    """Walks of an ensemble unless another number is given."""
     return 60 if links >= LONG else 200
 
 
 def run_ensemble(
     folder: Path, ensemble: Ensemble, method_setting: MethodSetting, report: Callable[[str], None]
 ) -> None:
-    """Make the walks of a method, or what is left of them, and note what they cost beside them.
+    """Make those walks of a method that are not there yet; their cost is kept in a file beside them.
 
     Args:
         folder: Of all ensembles.
-        ensemble: What the walks are.
-        method_setting: How they are computed.
+        ensemble: Scene and samples of the walks.
+        method_setting: How the walks are computed.
         report: Called with a line of progress.
 
     Raises:
@@ -127,16 +127,14 @@ def run_ensemble(
 
 
 def summary(folder: Path, ensemble: Ensemble) -> list[dict[str, Any]]:
-    """What the ensembles on disk say, one row for each method_setting; the references first.
+    """Statistics of the ensembles on disk, a row for each method setting; the references first.
 
-    Walks that did not come to rest are counted and in no mean. NaN stands for what cannot be known: intervals of fewer
-    than two walks, tests against a reference without walks, cost of walks made without a record of it.
+    Walks that did not come to rest are counted, and are in no mean. Unknown is NaN: intervals of fewer than two walks,
+    tests against a reference without walks, costs that were not recorded.
     """
-    found: dict[MethodSetting, SweepResult] = {}
-    for place in sorted((folder / ensemble.name).glob("*@*")):
-        if place.is_dir():
-            found[MethodSetting.parse(place.name)] = load(place)
-    ranks = {name: rank for rank, name in enumerate((*METHODS_BY_NEED, *methods()))}
+    places = sorted(place for place in (folder / ensemble.name).glob("*@*") if place.is_dir())
+    found = {MethodSetting.parse(place.name): load(place) for place in places}
+    ranks = {name: rank for rank, name in enumerate((*METHODS_BY_NEED, *method_names()))}
     ordered = sorted(
         found,
         key=lambda one: (
@@ -144,35 +142,28 @@ def summary(folder: Path, ensemble: Ensemble) -> list[dict[str, Any]]:
             one.name,
         ),
     )
-    distances = {one: _distances(result) for one, result in found.items()}
-    rows = []
+    walks = {one: _walks_at_rest(result) for one, result in found.items()}
+    rows: list[dict[str, Any]] = []
     for one in ordered:
-        at_rest = distances[one]
+        distances, ledgers = walks[one]
         counts = found[one].summary()
-        row: dict[str, Any] = {
-            "method": one.method,
-            "tolerance": one.tolerance,
-            "settings": dict(one.settings),
-            "title": one.title,
-            "at_rest": len(at_rest),
+        row = {
+            **one.columns,
+            "at_rest": len(distances),
             "missing": counts["missing"],
             "failed": {k: n for k, n in counts.items() if n and k not in (Status.AT_REST.label, "missing")},
-            "mean": float(at_rest.mean()) if len(at_rest) else float("nan"),
-            "mean_interval": bootstrap_interval(at_rest, means),
-            "sd": float(at_rest.std(ddof=1)) if len(at_rest) > 1 else float("nan"),
-            "sd_interval": bootstrap_interval(at_rest, standard_deviations),
-            **ledger_errors(_ledgers(found[one])),
-            "dx": at_rest.tolist(),
+            "mean": float(distances.mean()) if len(distances) else math.nan,
+            "mean_interval": bootstrap_interval(distances, np.mean),
+            "sd": float(distances.std(ddof=1)) if len(distances) > 1 else math.nan,
+            "sd_interval": bootstrap_interval(distances, partial(np.std, ddof=1)),
+            **ledger_columns(ledgers),
+            "dx": distances.tolist(),
+            **_cost(_place(folder, ensemble, one), ensemble.device),
         }
         for against, suffix in ((LOOSE, "loose"), (TIGHT, "tight")):
-            true = distances.get(against, np.empty(0))
-            both = len(true) > 0 and len(at_rest) > 0
-            row[f"ks_{suffix}"], row[f"p_{suffix}"] = kolmogorov_smirnov(at_rest, true) if both else (float("nan"),) * 2
-            row[f"difference_{suffix}"] = float(at_rest.mean() / true.mean() - 1) if both else float("nan")
-            row[f"errors_{suffix}"] = _in_standard_errors(at_rest, true)
-        rows.append(row | _cost(_place(folder, ensemble, one), ensemble.device))
-    for row in rows:
-        row["passes"] = _passes(row, rows[0])
+            agreement = _agreement(distances, walks[against][0] if against in walks else np.empty(0))
+            row |= {f"{name}_{suffix}": value for name, value in agreement.items()}
+        rows.append(row | {"passes": _passes(row, rows[0] if rows else row)})
     return rows
 
 
@@ -183,49 +174,47 @@ def _passes(row: dict[str, Any], true: dict[str, Any]) -> bool:
     return bool(close and row["missing"] == 0 and sum(row["failed"].values()) <= sum(true["failed"].values()))
 
 
-def _in_standard_errors(sample: Array, true: Array) -> float:
-    """Difference of two means in units of its standard error; NaN with fewer than two values."""
-    if min(len(sample), len(true)) < 2:
-        return float("nan")
-    error = (sample.var(ddof=1) / len(sample) + true.var(ddof=1) / len(true)) ** 0.5
-    difference = float(sample.mean() - true.mean())
-    return difference / float(error) if difference else 0.0
+def _agreement(sample: Array, true: Array) -> dict[str, float]:
+    """Test of Kolmogorov and Smirnov, and difference of the means: relative, and in units of its standard error."""
+    found = dict.fromkeys(("ks", "p", "difference", "errors"), math.nan)
+    if len(sample) and len(true):
+        found["ks"], found["p"] = kolmogorov_smirnov(sample, true)
+        found["difference"] = float(sample.mean() / true.mean() - 1)
+    if min(len(sample), len(true)) > 1:
+        error = (sample.var(ddof=1) / len(sample) + true.var(ddof=1) / len(true)) ** 0.5
+        difference = float(sample.mean() - true.mean())
+        found["errors"] = difference / float(error) if difference else 0.0
+    return found
 
 
-def _distances(result: SweepResult) -> Array:
-    """Δx [m] of the walks at rest."""
-    (block,) = result.blocks.values()
-    values: Array = block.columns["dx"][block.columns["status"] == Status.AT_REST]
-    return values
-
-
-def ledger_errors(errors: Array) -> dict[str, float]:
-    """Median and greatest error of energy ledgers (k,), under the names of the tables; NaN of none."""
-    if len(errors) == 0:
-        return {"ledger": float("nan"), "greatest_ledger": float("nan")}
-    return {"ledger": float(np.median(errors)), "greatest_ledger": float(errors.max())}
-
-
-def _ledgers(result: SweepResult) -> Array:
-    """What the energy ledgers of the walks at rest leave open, as fractions of the energy at release."""
+def _walks_at_rest(result: SweepResult) -> tuple[Array, Array]:
+    """Of the walks at rest: Δx [m], and what the energy ledger leaves open as a fraction of the energy at release."""
     (block,) = result.blocks.values()
     at_rest = block.columns["status"] == Status.AT_REST
-    errors: Array = np.abs(block.columns["energy_residual"] / block.columns["energy_at_release"])[at_rest]
-    return errors
+    ledgers = np.abs(block.columns["energy_residual"] / block.columns["energy_at_release"])
+    return block.columns["dx"][at_rest], ledgers[at_rest]
+
+
+def ledger_columns(errors: Sequence[float] | Array) -> dict[str, float]:
+    """Median and greatest of some errors of energy ledgers; NaN of none."""
+    if len(errors) == 0:
+        return {"ledger": math.nan, "greatest_ledger": math.nan}
+    return {"ledger": float(np.median(errors)), "greatest_ledger": float(np.max(errors))}
 
 
 def _cost(place: Path, device: str) -> dict[str, float]:
     """Seconds of one core per walk, or on a GPU walks per second of wall time; NaN for the other."""
-    nan = float("nan")
+    unknown = {"seconds_per_walk": math.nan, "walks_per_second": math.nan}
     if not _cost_file(place).exists():
-        return {"seconds_per_walk": nan, "walks_per_second": nan}
+        return unknown
     cost = json.loads(_cost_file(place).read_text(encoding="utf-8"))
     if device.startswith("cuda"):
-        return {"seconds_per_walk": nan, "walks_per_second": cost["walks"] / cost["wall_seconds"]}
-    return {"seconds_per_walk": cost["core_seconds"] / cost["walks"], "walks_per_second": nan}
+        return unknown | {"walks_per_second": cost["walks"] / cost["wall_seconds"]}
+    return unknown | {"seconds_per_walk": cost["core_seconds"] / cost["walks"]}
 
 
 def _place(folder: Path, ensemble: Ensemble, method_setting: MethodSetting) -> Path:
+    """Folder of the sweep of a method."""
     return folder / ensemble.name / method_setting.name
 
 

@@ -1,5 +1,6 @@
 """Figures of ``warpchain bench accuracy``: work–precision diagrams, ensembles by method, the table of hard cases."""
 
+import itertools
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -13,16 +14,21 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from warpchain.pictures.style import FAINT, GROUND, INK, LINE_COLORS, Picture, tidy
+from warpchain.kernels.methods.method import method_names
+from warpchain.pictures.style import DASHES, FAINT, GROUND, INK, LINE_COLORS, Picture, tidy
 from warpchain.status import Status
 
 Row = dict[str, Any]
 
-_MARKERS: Final = "osDvP*Xp"
+_DASHED: Final[dict[str, Any]] = {"color": FAINT, "linewidth": 0.9, "linestyle": DASHES}
 _SCIPY: Final = {"DOP853 (SciPy)": "s", "Radau (SciPy)": "^"}
 """Solvers of SciPy, all in black, and their markers."""
-_FIRST: Final = ("rkf78", "dp5", "bs32", "os32", "rodas5p", "hybrid")
-"""Methods that have the same colours in every figure, whichever others there are."""
+_COLORS: Final = {
+    **dict(zip(method_names(), itertools.cycle((*LINE_COLORS[:-1], FAINT)), strict=False)),
+    **dict.fromkeys(_SCIPY, LINE_COLORS[-1]),
+}
+"""Colour of each method in every figure."""
+_MARKERS: Final = dict(zip(method_names(), itertools.cycle("osDvP*Xp"), strict=False)) | _SCIPY
 
 _TITLES: Final = {
     "flight": "Free flight: a circulating ellipse, thrown",
@@ -36,12 +42,10 @@ _ERRORS: Final = {
 }
 """Errors that are drawn; single links' velocities after contacts depend on the steps and do not converge."""
 _ON_FIGURE: Final = {
-    "flight": "",
     "impact": "velocities of single links after impacts depend on the steps and are not drawn: the impulse converges",
     "sprocket": "velocities of single links depend on the steps and are not drawn: the angular momentum converges",
 }
 _NOTES: Final = {
-    "flight": "",
     "impact": " Over {starts} impacts of {milliseconds:g} ms that differ in where the links are: greatest error of a "
     "position, rms error of the floor's impulse. Contacts are looked for after each step, so it is the length of "
     "the steps near the floor, more than the tolerance, that sets these errors; velocities of single links just after "
@@ -55,7 +59,7 @@ def figures(document: dict[str, Any]) -> Iterator[Picture]:
     """Every figure that the document has something for."""
     for true in document["references"]:
         rows = [row for row in document["points"] if (row["problem"], row["links"]) == (true["problem"], true["links"])]
-        note = _NOTES[true["problem"]].format(starts=true["starts"], milliseconds=1e3 * true["duration"])
+        note = _NOTES.get(true["problem"], "").format(starts=true["starts"], milliseconds=1e3 * true["duration"])
         caption = (
             f"{_TITLES[true['problem']]}, {true['links']} links, {1e3 * true['duration']:.3g} ms at Table 1's values: "
             "greatest error over the links against rkf78 at 1e-12, by processor time and by evaluations of the "
@@ -97,7 +101,6 @@ def work_precision(true: Row, rows: Sequence[Row]) -> Figure:
     """
     shown = _ERRORS[true["problem"]]
     chosen = list(dict.fromkeys(row["method"] for row in rows))
-    colors = _colors(chosen)
     figure = Figure(figsize=(9.0, 6.2), layout="constrained")
     grid = figure.subplots(2, 2, sharex="col", sharey="row")
     for line, (error, label) in enumerate(shown.items()):
@@ -109,9 +112,9 @@ def work_precision(true: Row, rows: Sequence[Row]) -> Figure:
                     if row["method"] == method and row[cost] is not None and row[error]
                 ]
                 if drawn:
-                    _draw_line(axes, np.array(drawn), colors[method], _marker(method, chosen))
+                    _draw_line(axes, np.array(drawn), method)
             if true[error]:
-                axes.axhline(true[error], color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)), zorder=0.4)
+                axes.axhline(true[error], zorder=0.4, **_DASHED)
             axes.set_xscale("log")
             axes.set_yscale("log")
             for axis in (axes.xaxis, axes.yaxis):
@@ -121,14 +124,12 @@ def work_precision(true: Row, rows: Sequence[Row]) -> Figure:
     grid[1, 0].set_xlabel("seconds of one core per simulated second")
     grid[1, 1].set_xlabel("evaluations per simulated second")
     handles = [
-        Line2D([], [], color=colors[method], marker=_marker(method, chosen), markersize=4.5, label=method)
+        Line2D([], [], color=_COLORS[method], marker=_MARKERS[method], markersize=4.5, label=method)
         for method in chosen
     ]
-    handles.append(
-        Line2D([], [], color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)), label="references\ndiffer by this")
-    )
+    handles.append(Line2D([], [], label="references\ndiffer by this", **_DASHED))
     figure.legend(handles=handles, loc="outside right center", frameon=False)
-    if _ON_FIGURE[true["problem"]]:
+    if true["problem"] in _ON_FIGURE:
         figure.supxlabel(_ON_FIGURE[true["problem"]], fontsize="small", color=FAINT)
     figure.suptitle(f"{_TITLES[true['problem']]}, $n$ = {true['links']}", fontsize="medium", x=0.01, ha="left")
     return figure
@@ -139,9 +140,8 @@ def walk_costs(rows: Sequence[Row]) -> Figure:
     figure = Figure(figsize=(9.0, 1.4 + 0.42 * len(rows)), layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=(2.0, 1.0), sharey=True)
     ordered = sorted(rows, key=lambda row: -math.inf if row["seconds"] is None else -row["seconds"])
-    colors = _colors([row["method"] for row in rows])
     for place, row in enumerate(ordered):
-        color = colors[row["method"]]
+        color = _COLORS[row["method"]]
         left.plot(row["each"], [place] * len(row["each"]), "o", color=(color, 0.45), markersize=5, markeredgewidth=0)
         if row["seconds"] is not None:
             left.plot([row["seconds"]], [place], "|", color=INK, markersize=14, markeredgewidth=1.6, zorder=5)
@@ -151,7 +151,7 @@ def walk_costs(rows: Sequence[Row]) -> Figure:
             left.annotate(times, (max(row["each"]), place), (8, 0), textcoords="offset points", va="center", color=INK)
         if row["ledger"]:
             right.plot([row["ledger"]], [place], "o", color=color, markersize=6)
-    left.set_yticks(range(len(ordered)), _contestant_texts(figure, ordered))
+    left.set_yticks(range(len(ordered)), _setting_texts(figure, ordered))
     left.set_ylim(len(ordered) - 0.4, -0.6)
     for axes in (left, right):
         axes.set_xscale("log")
@@ -169,11 +169,10 @@ def walk_costs(rows: Sequence[Row]) -> Figure:
 
 def ensemble(row: Row) -> Figure:
     """Distances of one ensemble by method and tolerance, and the cost of a walk."""
-    methods = row["methods"]
-    figure = Figure(figsize=(9.0, 1.7 + 0.5 * len(methods)), layout="constrained")
+    rows = row["methods"]
+    figure = Figure(figsize=(9.0, 1.7 + 0.5 * len(rows)), layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=(2.4, 1.0), sharey=True)
-    true = methods[0]
-    colors = _colors([one["method"] for one in methods])
+    true = rows[0]
     if None not in true["mean_interval"]:
         left.axvspan(*true["mean_interval"], color=GROUND, zorder=0)
     if true["mean"] is not None:
@@ -181,8 +180,8 @@ def ensemble(row: Row) -> Figure:
             left.axvline(factor * true["mean"], color=FAINT, linewidth=0.9, linestyle=(0, (1, 2)), zorder=0.4)
     on_gpu = row["device"].startswith("cuda")
     cost = "walks_per_second" if on_gpu else "seconds_per_walk"
-    for place, one in enumerate(methods):
-        color = colors[one["method"]]
+    for place, one in enumerate(rows):
+        color = _COLORS[one["method"]]
         spread = np.random.default_rng(place).uniform(-0.3, 0.3, len(one["dx"]))
         left.plot(one["dx"], place + spread, ".", color=(color, 0.35), markersize=3.5, markeredgewidth=0, zorder=2)
         if one["sd"] is not None:
@@ -195,11 +194,11 @@ def ensemble(row: Row) -> Figure:
         if one[cost] is not None:
             right.barh(place, one[cost], 0.5, color=color)
             right.text(one[cost], place, f" {one[cost]:.3g}", va="center", color=INK)
-    left.set_yticks(range(len(methods)), _contestant_texts(figure, methods))
-    left.set_ylim(len(methods) - 0.4, -0.6)
+    left.set_yticks(range(len(rows)), _setting_texts(figure, rows))
+    left.set_ylim(len(rows) - 0.4, -0.6)
     left.set_xlabel("distance walked $Δx$ / m")
     right.set_xlabel("walks per second" if on_gpu else "seconds of one core per walk")
-    right.set_xlim(0, 1.25 * max([one[cost] for one in methods if one[cost] is not None], default=1.0))
+    right.set_xlim(0, 1.25 * max([one[cost] for one in rows if one[cost] is not None], default=1.0))
     left.set_title(row["title"], fontsize="medium", loc="left")
     tidy(left, grid="x")
     tidy(right)
@@ -253,32 +252,17 @@ def _decimal(value: float) -> str:
     return f"$10^{{{int(exponent)}}}$" if digit == "1" else f"${digit}\\cdot 10^{{{int(exponent)}}}$"
 
 
-def _draw_line(axes: Axes, drawn: Any, color: str, marker: str) -> None:
+def _draw_line(axes: Axes, drawn: Any, method: str) -> None:
     """One method: cost, error and tolerance in rows (p, 3); the first and the last tolerance are written beside it."""
-    axes.plot(drawn[:, 0], drawn[:, 1], color=color, marker=marker, markersize=4.5, linewidth=1.3, zorder=3)
+    color = _COLORS[method]
+    axes.plot(drawn[:, 0], drawn[:, 1], color=color, marker=_MARKERS[method], markersize=4.5, linewidth=1.3, zorder=3)
     for cost, error, tolerance in {tuple(drawn[0]), tuple(drawn[-1])}:
         text = f"{math.log10(tolerance):.3g}".replace("-", "−")
-        axes.annotate(
-            text, (cost, error), (4, 3), textcoords="offset points", color=color, fontsize="x-small", zorder=4
-        )
+        beside: dict[str, Any] = {"xytext": (4, 3), "textcoords": "offset points", "fontsize": "x-small", "zorder": 4}
+        axes.annotate(text, (cost, error), color=color, **beside)
 
 
-def _colors(chosen: Sequence[str]) -> dict[str, str]:
-    """A colour for each method; SciPy's are black."""
-    ours = [*_FIRST, *(method for method in chosen if method not in _FIRST and method not in _SCIPY)]
-    free = (*LINE_COLORS[:-1], FAINT)
-    return {method: free[k % len(free)] for k, method in enumerate(ours)} | dict.fromkeys(_SCIPY, LINE_COLORS[-1])
-
-
-def _marker(method: str, chosen: Sequence[str]) -> str:
-    """A marker for each method."""
-    if method in _SCIPY:
-        return _SCIPY[method]
-    ours = list(_colors(chosen))
-    return _MARKERS[ours.index(method) % len(_MARKERS)]
-
-
-def _contestant_texts(figure: Figure, rows: Sequence[Row]) -> list[str]:
+def _setting_texts(figure: Figure, rows: Sequence[Row]) -> list[str]:
     """Title of each method_setting, its settings in a line of their own, and how many of its walks are not drawn.
 
     The most common settings are written below the figure, and a star stands for them.

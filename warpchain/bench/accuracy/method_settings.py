@@ -2,26 +2,29 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final, Self
+from typing import Any, Final, Self
 
-from warpchain.bench.problems.work_precision import methods
+from warpchain.bench.record import Column
 from warpchain.inputs.methods import METHODS_BY_NEED
 from warpchain.inputs.options import Options
 from warpchain.inputs.validation import InputError, shown, suggestion, validated
-from warpchain.kernels.methods.method import find_method
+from warpchain.kernels.methods.method import find_method, method_names
 
-SWITCHES: Final = tuple(
-    name for name, field in Options.model_fields.items() if field.annotation is bool and field.default is False
-)
-"""Options that can be switched on beside a method."""
-NUMBERS: Final = tuple(
-    name
+_KINDS: Final[dict[object, str]] = {bool: "", float: "NUMBER", float | None: "NUMBER"}
+SETTINGS: Final = {
+    name: _KINDS.get(field.annotation, "WORD")
     for name, field in Options.model_fields.items()
-    if field.annotation in (float, float | None) and name != "tolerance"
-)
-"""Options that can be given a number beside a method."""
-CHOICES: Final = ("controller",)
-"""Options that can be given a word beside a method."""
+    if name == "controller" or (field.annotation in _KINDS and name not in ("tolerance", "self_contact"))
+}
+"""Options that can be given beside a method → kind of their value; nothing for those that are switched on."""
+
+SETTING_COLUMNS: Final = {
+    "method": Column("1", "method of the engine"),
+    "tolerance": Column("1", "its tolerance"),
+    "settings": Column("1", "other options that differ from their defaults, in SI units"),
+    "title": Column("1", "the same for people"),
+}
+"""Columns of tables whose rows are about a method setting."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +34,7 @@ class MethodSetting:
     Attributes:
         method: Name of the method.
         tolerance: Its tolerance.
-        settings: Options that differ from their defaults, in the order of `Options`: True for those of `SWITCHES`, a
-            number for those of `NUMBERS`, a word for those of `CHOICES`.
+        settings: Options of `SETTINGS` that differ from their defaults, in the order of `Options`.
     """
 
     method: str
@@ -41,23 +43,30 @@ class MethodSetting:
 
     @classmethod
     def of(cls, options: Mapping[str, object]) -> Self:
-        """The method_setting with these options; those that have their default values anyway are left out.
+        """The setting with these options; those that have their default values anyway are left out.
 
         Raises:
             InputError: One of them is unknown or impossible.
         """
         checked = validated(Options, options, "--methods")
-        settings = tuple(
-            (name, getattr(checked, name))
-            for name, field in Options.model_fields.items()
-            if name in (*SWITCHES, *NUMBERS, *CHOICES) and getattr(checked, name) != field.default
-        )
-        return cls(checked.method, checked.tolerance, settings)
+        values = {name: getattr(checked, name) for name in SETTINGS}
+        changed = {name: value for name, value in values.items() if value != Options.model_fields[name].default}
+        return cls(checked.method, checked.tolerance, tuple(changed.items()))
 
     @property
     def options(self) -> dict[str, object]:
         """As `Options` takes them."""
         return {"method": self.method, "tolerance": self.tolerance, **dict(self.settings)}
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """Values of `SETTING_COLUMNS`."""
+        return {
+            "method": self.method,
+            "tolerance": self.tolerance,
+            "settings": dict(self.settings),
+            "title": self.title,
+        }
 
     @property
     def name(self) -> str:
@@ -88,7 +97,7 @@ class MethodSetting:
         """
         start, *settings = text.split("+")
         method, at, tolerance = start.partition("@")
-        known = (*METHODS_BY_NEED, *methods())
+        known = (*METHODS_BY_NEED, *method_names())
         if method not in known:
             raise InputError(f"--methods: {shown(method)} is unknown; {suggestion(method, known)}")
         options: dict[str, object] = {"method": method, "device": device}
@@ -96,22 +105,16 @@ class MethodSetting:
             options["tolerance"] = _number(text, tolerance, f"after the @; write {method}@1e-6")
         for setting in settings:
             name, equals, value = setting.partition("=")
-            if equals and name in NUMBERS:
+            if name not in SETTINGS:
+                raise InputError(f"--methods: {shown(name)} is unknown; {suggestion(name, SETTINGS)}")
+            kind = SETTINGS[name]
+            if bool(equals) != bool(kind):
+                hint = f"has no value; write {name}={kind}" if kind else f"takes no value; write +{name} to set it"
+                raise InputError(f"--methods: {name} in {shown(text)} {hint}")
+            if kind == "NUMBER":
                 options[name] = _number(text, value, f"after {name}=; write one")
-            elif equals and name in CHOICES:
-                options[name] = value
-            elif name in SWITCHES and not equals:
-                options[name] = True
-            elif name in CHOICES:
-                raise InputError(f"--methods: {name} in {shown(text)} has no value; write {name}=WORD")
-            elif name in NUMBERS:
-                raise InputError(f"--methods: {name} in {shown(text)} has no value; write {name}=NUMBER")
-            elif name in SWITCHES:
-                raise InputError(f"--methods: {name} in {shown(text)} takes no value; write +{name} to switch it on")
             else:
-                raise InputError(
-                    f"--methods: {shown(name)} is unknown; {suggestion(name, (*SWITCHES, *NUMBERS, *CHOICES))}"
-                )
+                options[name] = value if kind else True
         return cls.of(options)
 
 
@@ -142,11 +145,11 @@ TIGHT: Final = MethodSetting("rkf78", 1e-9)
 
 
 def default_method_settings(device: str = "cpu") -> tuple[MethodSetting, ...]:
-    """The words, and every method of the device with the settings of `explicit`, each once.
+    """The words, and every method of a device with the settings of `explicit`, each once.
 
     At 1e-6 and without softer joints the implicit method and those of low order walk for half a minute and longer.
     """
     words = [MethodSetting.parse(word, device) for word in METHODS_BY_NEED]
-    there = (method for method in methods() if device == "cpu" or find_method(method).runs_on_gpus)
-    alike = [MethodSetting.of({**METHODS_BY_NEED["explicit"], "method": method}) for method in there]
+    there = [name for name in method_names() if device == "cpu" or find_method(name).runs_on_gpus]
+    alike = [MethodSetting.of({**METHODS_BY_NEED["explicit"], "method": name}) for name in there]
     return tuple(dict.fromkeys((*words, *alike)))

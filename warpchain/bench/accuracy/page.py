@@ -1,6 +1,7 @@
 """The page of ``warpchain bench accuracy``: figures, tables and machines in one HTML file that loads nothing."""
 
 from collections.abc import Sequence
+from fnmatch import fnmatch
 from html import escape
 from pathlib import Path
 from typing import Any, Final
@@ -32,10 +33,9 @@ def write_pictures_and_page(folder: Path, document: dict[str, Any]) -> list[Path
 
 
 def _page(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
-    """The whole page."""
-    methods = {row["method"] for row in (*document["points"], *document["hard_cases"])}
+    """The whole page; a part that has not been run has no section."""
     walks = [*document["walks"], *(one for row in document["ensembles"] for one in row["methods"])]
-    methods |= {one["method"] for one in walks}
+    methods = {row["method"] for row in (*document["points"], *document["hard_cases"], *walks)}
     bad = sum(not row["sound"] for row in document["hard_cases"])
     tiles = {
         "methods": (len({name for name in methods if "SciPy" not in name}), ""),
@@ -45,20 +45,17 @@ def _page(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
         "not sound": (bad, "bad" if bad else ""),
     }
     sections = {
-        "Work and precision": _work_precision(document, pictures),
-        "Whole walks": _walks(document, pictures),
-        "Ensembles": _ensembles(document, pictures),
-        "Hard cases": _hard_cases(document, pictures),
+        "Work and precision": _work_precision(document, pictures) if document["points"] else "",
+        "Whole walks": _walks(document["walks"], pictures) if document["walks"] else "",
+        "Ensembles": _ensembles(document["ensembles"], pictures) if document["ensembles"] else "",
+        "Hard cases": _hard_cases(document["hard_cases"], pictures) if document["hard_cases"] else "",
         "Machines": _machines(document["machines"]),
     }
     return page("Speed against error", tiles, {title: text for title, text in sections.items() if text})
 
 
 def _work_precision(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
-    if not document["points"]:
-        return ""
-    parts = [f"<p>{escape(note)}</p>" for note in document["notes"].values()]
-    parts += [picture(drawn.figure, drawn.caption) for drawn in pictures if drawn.name.startswith("work_precision")]
+    """Notes, diagrams and a table of all points."""
     points = _together(document["points"], "problem", "links", "method")
     head = ["problem", "n", "method", "tolerance", "position / m", "velocity / (m/s)", "momentum", "bias"]
     head += ["s / s", "speed", "evaluations / s", "rejected", "status"]
@@ -75,28 +72,28 @@ def _work_precision(document: dict[str, Any], pictures: Sequence[Picture]) -> st
         ]
         for row in points
     ]
-    marked = [row["status"] != "finished" for row in points]
     text = (
         "<h3>All points</h3><p>Errors as in the figures; momentum: relative error of the floor's impulse (rms) or of "
+        "the angular momentum about the sprocket, bias: its mean with sign. Processor time and evaluations are per "
+        "simulated second; speed: how many times faster than rkf78 at 1e-6.</p>"
     )
-    text += "the angular momentum about the sprocket, bias: its mean with sign. Processor time and evaluations are per "
-    text += "simulated second; speed: how many times faster than rkf78 at 1e-6.</p>"
-    return "\n".join([*parts, text, table(head, rows, numbers_from=3, marked=marked)])
+    notes = [f"<p>{escape(note)}</p>" for note in document["notes"].values()]
+    drawn = _drawn(pictures, "work_precision_*")
+    marked = [row["status"] != "finished" for row in points]
+    return "\n".join([*notes, *drawn, text, table(head, rows, numbers_from=3, marked=marked)])
 
 
-def _walks(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
-    rows = _together(document["walks"], "links")
-    if not rows:
-        return ""
+def _walks(walks: Sequence[Row], pictures: Sequence[Picture]) -> str:
+    """Figures and a table of the walks that were timed."""
     text = (
         "<p>Table 1's values, chains that start as an ellipse, the same drawn samples for every method and the methods "
         "in turn. Medians over the walks that came to rest: processor time of one core from the release to rest, "
         "time per simulated second, and what the energy ledger leaves open, as a fraction of the energy at release "
         "(and the greatest of that). Speed is how many times cheaper than rkf78 at 1e-6 in the same run.</p>"
     )
-    parts = [text, *(picture(drawn.figure, drawn.caption) for drawn in pictures if drawn.name.startswith("walks_"))]
+    ordered = _together(walks, "links")
     head = ["n", "method", "walks", "at rest", "s", "s / s", "speed", "attempts", "ledger", "greatest"]
-    lines = [
+    rows = [
         [
             *(f"{row['links']}", row["title"], f"{row['walks']}", f"{row['at_rest']}"),
             _number(row["seconds"], ".3g"),
@@ -105,15 +102,14 @@ def _walks(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
             _number(row["attempts"], ",.0f"),
             *(_number(row[name], ".1e") for name in ("ledger", "greatest_ledger")),
         ]
-        for row in rows
+        for row in ordered
     ]
-    marked = [row["at_rest"] < row["walks"] for row in rows]
-    return "\n".join([*parts, table(head, lines, numbers_from=2, marked=marked)])
+    marked = [row["at_rest"] < row["walks"] for row in ordered]
+    return "\n".join([text, *_drawn(pictures, "walks_*"), table(head, rows, numbers_from=2, marked=marked)])
 
 
-def _ensembles(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
-    if not document["ensembles"]:
-        return ""
+def _ensembles(ensembles: Sequence[Row], pictures: Sequence[Picture]) -> str:
+    """A figure and a table of each ensemble."""
     parts = [
         "<p>All methods walk from the same drawn samples; the tests treat their ensembles as independent. Intervals "
         "are 95 % bootstrap intervals, p is the exact two-sample Kolmogorov–Smirnov probability, Δ the difference of "
@@ -123,18 +119,17 @@ def _ensembles(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
         "time of one core, time on the sprocket included; on a GPU walks per second. Speed is how many times cheaper "
         "than rkf78 at 1e-6 that is.</p>"
     ]
-    with_tight = any(one["p_tight"] is not None for row in document["ensembles"] for one in row["methods"])
+    with_tight = any(one["p_tight"] is not None for row in ensembles for one in row["methods"])
     suffixes = ("loose", "tight") if with_tight else ("loose",)
-    by_name = {drawn.name: drawn for drawn in pictures}
     head = ["method", "at rest", "failed", "mean Δx / m", "s.d. / m"]
     head += ["Δ to 1e-6", "p to 1e-6", *(["Δ to 1e-9", "p to 1e-9"] if with_tight else [])]
     head += ["ledger", "cost", "speed", "passes"]
-    for row in document["ensembles"]:
-        drawn = by_name[f"ensemble_{row['name']}"]
-        parts += [f"<h3>{escape(row['title'])}, {escape(row['device'])}</h3>", picture(drawn.figure, drawn.caption)]
+    for row in ensembles:
+        true = row["methods"][0]
         rows = [
             [
-                *(one["title"], f"{one['at_rest']}", _failures(one)),
+                *(one["title"], f"{one['at_rest']}"),
+                ", ".join(f"{count} {label}" for label, count in one["failed"].items()) or "0",
                 _with_interval(one["mean"], one["mean_interval"]),
                 _number(one["sd"], ".4f"),
                 *(text for suffix in suffixes for text in _agreement(one, suffix)),
@@ -142,37 +137,48 @@ def _ensembles(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
                 f"{one['seconds_per_walk']:.3g} s"
                 if one["seconds_per_walk"] is not None
                 else f"{_number(one['walks_per_second'], '.3g')} 1/s",
-                _number(_walk_speed(one, row["methods"][0]), ".3g"),
+                _number(
+                    _ratio(true["seconds_per_walk"], one["seconds_per_walk"])
+                    or _ratio(one["walks_per_second"], true["walks_per_second"]),
+                    ".3g",
+                ),
                 "yes" if one["passes"] else "no",
             ]
             for one in row["methods"]
         ]
         marked = [not one["passes"] for one in row["methods"]]
-        parts.append(table(head, rows, numbers_from=1, marked=marked))
+        parts += [f"<h3>{escape(row['title'])}, {escape(row['device'])}</h3>"]
+        parts += _drawn(pictures, f"ensemble_{row['name']}")
+        parts += [table(head, rows, numbers_from=1, marked=marked)]
     return "\n".join(parts)
 
 
-def _hard_cases(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
-    rows = _together(document["hard_cases"], "case")
-    if not rows:
-        return ""
-    parts = [picture(drawn.figure, drawn.caption) for drawn in pictures if drawn.name == "hard_cases"]
+def _hard_cases(cases: Sequence[Row], pictures: Sequence[Picture]) -> str:
+    """The figure and a table of all cases."""
+    ordered = _together(cases, "case")
     head = ["kind", "case", "method", "status", "result", "s", "simulated s", "attempts", "energy error", "sound"]
-    lines = [
+    rows = [
         [
             *(row["group"], row["what"], row["method"], row["status"], row["result"]),
             *(f"{row['seconds']:.3g}", f"{row['simulated']:.3g}", f"{row['attempts']:,}"),
             *(_number(row["energy_error"], ".1e"), "yes" if row["sound"] else "no"),
         ]
-        for row in rows
+        for row in ordered
     ]
-    return "\n".join([*parts, table(head, lines, numbers_from=5, marked=[not row["sound"] for row in rows])])
+    marked = [not row["sound"] for row in ordered]
+    return "\n".join([*_drawn(pictures, "hard_cases"), table(head, rows, numbers_from=5, marked=marked)])
 
 
 def _machines(machines: Sequence[dict[str, str]]) -> str:
+    """What is known of each machine."""
     names = list(dict.fromkeys(name for machine in machines for name in machine))
     rows = [[name, *(machine.get(name, "–") for machine in machines)] for name in names]
     return table(["", *(f"machine {number}" for number in range(len(machines)))], rows, numbers_from=len(machines) + 1)
+
+
+def _drawn(pictures: Sequence[Picture], pattern: str) -> list[str]:
+    """Pictures with such names."""
+    return [picture(drawn.figure, drawn.caption) for drawn in pictures if fnmatch(drawn.name, pattern)]
 
 
 def _together(rows: Sequence[Row], *keys: str) -> list[Row]:
@@ -188,11 +194,10 @@ def _per_second(row: Row, cost: str) -> float | None:
 
 def _speed(row: Row, points: Sequence[Row]) -> float | None:
     """How many times faster a point is than rkf78 at 1e-6 in the same problem; None if that was not measured."""
-    for true in points:
-        if true["method"] == "rkf78" and true["tolerance"] == 1e-6:
-            seconds, own = _per_second(true, "seconds"), _per_second(row, "seconds")
-            if all(true[key] == row[key] for key in ("problem", "links")) and seconds and own:
-                return seconds / own
+    reference = {"problem": row["problem"], "links": row["links"], "method": "rkf78", "tolerance": 1e-6}
+    for point in points:
+        if reference.items() <= point.items():
+            return _ratio(_per_second(point, "seconds"), _per_second(row, "seconds"))
     return None
 
 
@@ -201,30 +206,16 @@ def _ratio(value: float | None, by: float | None) -> float | None:
     return value / by if value is not None and by else None
 
 
-def _walk_speed(row: Row, true: Row) -> float | None:
-    """How many times cheaper a walk is than one of the reference; None if one of the costs is not known."""
-    if row["seconds_per_walk"] and true["seconds_per_walk"]:
-        return float(true["seconds_per_walk"] / row["seconds_per_walk"])
-    if row["walks_per_second"] and true["walks_per_second"]:
-        return float(row["walks_per_second"] / true["walks_per_second"])
-    return None
-
-
-def _failures(row: Row) -> str:
-    return ", ".join(f"{count} {label}" for label, count in row["failed"].items()) or "0"
-
-
 def _with_interval(value: float | None, interval: Sequence[float | None]) -> str:
-    lower, upper = interval
-    if value is None or lower is None or upper is None:
-        return _number(value, ".4f")
-    return f"{value:.4f} ({lower:.4f} … {upper:.4f})"
+    """A number with an interval in brackets if that is known."""
+    ends = "" if None in interval else f" ({interval[0]:.4f} … {interval[1]:.4f})"
+    return _number(value, ".4f") + ends
 
 
 def _agreement(row: Row, suffix: str) -> tuple[str, str]:
     """Difference of the means with its standard errors, and the probability of the test."""
     difference, errors = row[f"difference_{suffix}"], row[f"errors_{suffix}"]
-    text = "–" if difference is None else f"{difference:+.2%}" + ("" if errors is None else f" ({errors:+.1f})")
+    text = _number(difference, "+.2%") + ("" if errors is None else f" ({errors:+.1f})")
     return text, _number(row[f"p_{suffix}"], ".2g")
 
 

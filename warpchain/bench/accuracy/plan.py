@@ -1,13 +1,13 @@
 """``warpchain bench accuracy``: error against cost of every method, its walks and ensembles of them, the hard cases.
 
-Four parts, each of which can be run by itself: what the others have left in the folder stays. Numbers are kept in one
-JSON file with the machine they were measured on, figures and a page are drawn from it.
+There are four parts, and each can be run by itself: what the others have left in the folder stays. Numbers are kept in
+one JSON file with the machine they were measured on; figures and a page are drawn from it.
 """
 
 import json
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,31 +17,35 @@ from warpchain.bench.accuracy.columns import COLUMNS
 from warpchain.bench.accuracy.ensembles import Ensemble, default_samples, run_ensemble, summary
 from warpchain.bench.accuracy.method_settings import LOOSE, TIGHT, MethodSetting, default_method_settings
 from warpchain.bench.accuracy.walk_costs import walk_costs
-from warpchain.bench.cpu_steps import machine
 from warpchain.bench.problems.hard_cases import HARD_CASES
-from warpchain.bench.problems.work_precision import (
-    PROBLEMS,
-    TOLERANCES,
-    Errors,
-    make_problem,
-    make_reference,
-    methods,
-    points,
-)
+from warpchain.bench.problems.scipy_solvers import PATIENCE, scipy_points
+from warpchain.bench.problems.work_precision import PROBLEMS, TOLERANCES, make_problem, make_reference, points
+from warpchain.bench.record import machine, plain
 from warpchain.engine.devices import start_device
 from warpchain.files import replacing
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.scene import Scene, check_scene
 from warpchain.inputs.validation import InputError, shown, suggestion, validated
+from warpchain.kernels.methods.method import method_names
 from warpchain.sweeps.plan import load_sweep
 
 PARTS: Final = ("work-precision", "walks", "ensembles", "hard-cases")
+CASES: Final = tuple(case.name for case in HARD_CASES)
 FILE: Final = "accuracy.json"
 FORMAT: Final = "warpchain accuracy"
-VERSION: Final = 2
+VERSION: Final = 3
 SCIPY_TOLERANCES: Final = (1e-3, 1e-6, 1e-9)
 """Those of the tolerances that SciPy's solvers, which take a minute each, are run at."""
+WITH_SCIPY: Final = (
+    f"SciPy's solvers run on the NumPy model, once each, {PATIENCE:g} s at most: what took longer is missing. "
+    "DOP853 does the flight and the impacts, Radau (with the pattern of its Jacobian) the flight; a turn of the "
+    "sprocket has 100,000 contacts, too many for Python."
+)
+WITHOUT_SCIPY: Final = (
+    "SciPy's solvers are missing: they were left out on demand, or SciPy is not installed "
+    "(pip install 'warpchain[scipy]')."
+)
 
 KEYS: Final = {
     "references": ("problem", "links"),
@@ -59,48 +63,12 @@ Document = dict[str, Any]
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """What is to be run, checked; see `make_plan`."""
+    """What is to be run, checked when it is made.
 
-    parts: tuple[str, ...]
-    method_settings: tuple[MethodSetting, ...]
-    tolerances: tuple[float, ...]
-    links: tuple[int, ...]
-    problems: tuple[str, ...]
-    ensembles: tuple[Ensemble, ...]
-    tight: bool
-    cases: tuple[str, ...]
-    rounds: int
-    scipy: bool
-
-    @property
-    def methods(self) -> tuple[str, ...]:
-        """Names of the methods, each once."""
-        chosen = {one.method for one in self.method_settings}
-        return tuple(name for name in methods() if name in chosen)
-
-
-def make_plan(
-    *,
-    parts: Sequence[str] = PARTS,
-    method_settings: Sequence[str] | None = None,
-    tolerances: Sequence[float] = TOLERANCES,
-    links: Sequence[int] = (60, 150),
-    problems: Sequence[str] = PROBLEMS,
-    presets: Sequence[str] = ("soft", "paper"),
-    start: str = "spinning",
-    samples: int | None = None,
-    device: str = "cpu",
-    tight: bool = False,
-    cases: Sequence[str] | None = None,
-    rounds: int = 5,
-    scipy: bool = True,
-) -> Plan:
-    """Check what is asked for, before anything is run.
-
-    Args:
+    Attributes:
         parts: Some of `PARTS`.
-        method_settings: Methods, each as `MethodSetting.parse` reads it; None: `default_method_settings`. Tolerances
-            and other settings are for walks and ensembles.
+        methods: Each as `MethodSetting.parse` reads it; None: `default_method_settings`. Tolerances and other options
+            in them are for walks and ensembles.
         tolerances: Of the work–precision diagrams.
         links: Numbers of links in the diagrams, the walks and the ensembles.
         problems: Some of `PROBLEMS`.
@@ -109,54 +77,75 @@ def make_plan(
         samples: Walks of each ensemble; None: 200, and 60 from 100 links on.
         device: Where the ensembles run; the other parts are measured on one CPU core.
         tight: Make the ensembles of `TIGHT` as well.
-        cases: Names of hard cases; None: all.
+        cases: Names of hard cases.
         rounds: Measurements of each run in the diagrams, and walks of each method that are timed.
-        scipy: Run SciPy's solvers as well.
+        scipy: Run SciPy's solvers as well, if SciPy is installed.
 
     Raises:
         InputError: Something is unknown or impossible.
     """
-    names = [case.name for case in HARD_CASES]
-    for option, given, known in (
-        ("--parts", parts, PARTS),
-        ("--problems", problems, PROBLEMS),
-        ("--cases", cases or (), names),
-    ):
-        for name in given:
-            if name not in known:
-                raise InputError(f"{option}: {shown(name)} is unknown; {suggestion(name, known)}")
-    for tolerance in tolerances:
-        validated(Options, {"tolerance": tolerance}, "--tolerances")
-    for name in presets:
-        preset(name)
-    validated(Options, {"device": device}, "options")
-    plan = Plan(
-        parts=tuple(parts),
-        method_settings=default_method_settings(device)
-        if method_settings is None
-        else tuple(MethodSetting.parse(text, device) for text in method_settings),
-        tolerances=tuple(tolerances),
-        links=tuple(validated(Scene, {"links": count}, "--links").links for count in links),
-        problems=tuple(problems),
-        ensembles=tuple(
-            Ensemble(count, name, start, default_samples(count) if samples is None else samples, device)
-            for count in links
-            for name in presets
-        ),
-        tight=tight,
-        cases=tuple(names if cases is None else cases),
-        rounds=rounds,
-        scipy=scipy,
-    )
-    if "work-precision" in parts and "sprocket" in problems:
-        for count in plan.links:
-            check_scene(Scene(links=count), preset("paper"))
-    if "ensembles" in parts:
-        start_device(validated(Options, {"device": device}, "options").device)
-        for ensemble in plan.ensembles:
-            for method_setting in plan.method_settings:
-                load_sweep(ensemble.content(method_setting))
-    return plan
+
+    parts: Sequence[str] = PARTS
+    methods: Sequence[str] | None = None
+    tolerances: Sequence[float] = TOLERANCES
+    links: Sequence[int] = (60, 150)
+    problems: Sequence[str] = PROBLEMS
+    presets: Sequence[str] = ("soft", "paper")
+    start: str = "spinning"
+    samples: int | None = None
+    device: str = "cpu"
+    tight: bool = False
+    cases: Sequence[str] = CASES
+    rounds: int = 5
+    scipy: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be run."""
+        for option, given, known in (
+            ("--parts", self.parts, PARTS),
+            ("--problems", self.problems, PROBLEMS),
+            ("--cases", self.cases, CASES),
+        ):
+            for name in given:
+                if name not in known:
+                    raise InputError(f"{option}: {shown(name)} is unknown; {suggestion(name, known)}")
+        for tolerance in self.tolerances:
+            validated(Options, {"tolerance": tolerance}, "--tolerances")
+        for name in self.presets:
+            preset(name)
+        device = validated(Options, {"device": self.device}, "options").device
+        for count in self.links:
+            scene = validated(Scene, {"links": count}, "--links")
+            if "work-precision" in self.parts and "sprocket" in self.problems:
+                check_scene(scene, preset("paper"))
+        method_settings = self.method_settings
+        if "ensembles" in self.parts:
+            start_device(device)
+            for ensemble in self.ensembles:
+                for one in method_settings:
+                    load_sweep(ensemble.content(one))
+
+    @cached_property
+    def method_settings(self) -> tuple[MethodSetting, ...]:
+        """How walks are computed."""
+        if self.methods is None:
+            return default_method_settings(self.device)
+        return tuple(MethodSetting.parse(text, self.device) for text in self.methods)
+
+    @property
+    def method_names(self) -> tuple[str, ...]:
+        """Of the method settings, each once."""
+        chosen = {one.method for one in self.method_settings}
+        return tuple(name for name in method_names() if name in chosen)
+
+    @property
+    def ensembles(self) -> tuple[Ensemble, ...]:
+        """Of every number of links with every preset."""
+        return tuple(
+            Ensemble(count, name, self.start, self.samples or default_samples(count), self.device)
+            for count in self.links
+            for name in self.presets
+        )
 
 
 def run_accuracy(folder: Path, plan: Plan, report: Report) -> Document:
@@ -179,34 +168,23 @@ def run_accuracy(folder: Path, plan: Plan, report: Report) -> Document:
     if find_spec("scipy") is not None:
         here["scipy"] = version("scipy")
     _record(folder, here, {})
-    if "work-precision" in plan.parts:
-        for links in plan.links:
-            for name in plan.problems:
-                _record(folder, here, _problem_rows(plan, name, links, report), _scipy_note(plan))
-    if "walks" in plan.parts:
-        for links in plan.links:
-            _record(folder, here, {"walks": walk_costs(links, plan.method_settings, plan.rounds, report)})
-    if "hard-cases" in plan.parts:
-        for case in HARD_CASES:
-            for method in plan.methods if case.name in plan.cases else ():
-                report(f"{case.what}, {method}")
-                outcome = asdict(_outcome(case, method))
-                row = {"group": case.group, "case": case.name, "what": case.what, "method": method, **outcome}
-                _record(folder, here, {"hard_cases": [row]})
-    if "ensembles" in plan.parts:
-        for ensemble in plan.ensembles:
-            on = here if ensemble.device == "cpu" else here | {"device": start_device(ensemble.device).name}
-            about = {
-                "name": ensemble.name,
-                "title": ensemble.title,
-                "frequency": ensemble.frequency,
-                **asdict(ensemble),
-            }
-            references = (LOOSE, TIGHT) if plan.tight else (LOOSE,)
-            for method_setting in dict.fromkeys((*references, *plan.method_settings)):
-                run_ensemble(folder / "ensembles", ensemble, method_setting, report)
-                row = about | {"methods": summary(folder / "ensembles", ensemble)}
-                _record(folder, on, {"ensembles": [row]})
+    for links in plan.links if "work-precision" in plan.parts else ():
+        for name in plan.problems:
+            _record(folder, here, _problem_rows(plan, name, links, report))
+    for links in plan.links if "walks" in plan.parts else ():
+        _record(folder, here, {"walks": walk_costs(links, plan.method_settings, plan.rounds, report)})
+    for case in HARD_CASES if "hard-cases" in plan.parts else ():
+        for method in plan.method_names if case.name in plan.cases else ():
+            report(f"{case.what}, {method}")
+            about = {"group": case.group, "case": case.name, "what": case.what, "method": method}
+            _record(folder, here, {"hard_cases": [about | asdict(case.outcome(method))]})
+    for ensemble in plan.ensembles if "ensembles" in plan.parts else ():
+        on = here if ensemble.device == "cpu" else here | {"device": start_device(ensemble.device).name}
+        references = (LOOSE, TIGHT) if plan.tight else (LOOSE,)
+        for one in dict.fromkeys((*references, *plan.method_settings)):
+            run_ensemble(folder / "ensembles", ensemble, one, report)
+            row = ensemble.columns | {"methods": summary(folder / "ensembles", ensemble)}
+            _record(folder, on, {"ensembles": [row]})
     return load_document(folder)
 
 
@@ -228,15 +206,13 @@ def load_document(folder: Path) -> Document:
 
 
 def _empty() -> Document:
-    columns = {
-        part: {name: {"unit": unit, "meaning": meaning} for name, (unit, meaning) in table.items()}
-        for part, table in COLUMNS.items()
-    }
+    """A document without rows."""
+    columns = {part: {name: column._asdict() for name, column in table.items()} for part, table in COLUMNS.items()}
     tables: Document = {table: [] for table in KEYS}
     return {"format": FORMAT, "version": VERSION, "machines": [], "notes": {}, "columns": columns, **tables}
 
 
-def _record(folder: Path, on: dict[str, str], tables: Mapping[str, Sequence[Row]], scipy_note: str = "") -> None:
+def _record(folder: Path, on: dict[str, str], tables: Mapping[str, Sequence[Row]]) -> None:
     """Put rows, measured on a machine, into the document of a folder; those with the same keys are replaced.
 
     The file is read again each time, so that another process that measures another part loses nothing.
@@ -244,17 +220,15 @@ def _record(folder: Path, on: dict[str, str], tables: Mapping[str, Sequence[Row]
     document = load_document(folder) if (folder / FILE).exists() else _empty()
     if on not in document["machines"]:
         document["machines"].append(on)
-    place = document["machines"].index(on)
     for table, rows in tables.items():
+        known = {tuple(row[key] for key in KEYS[table]): row for row in document[table]}
         for row in rows:
-            keys = [[other[key] for key in KEYS[table]] for other in document[table]]
-            own = [row[key] for key in KEYS[table]]
-            at = keys.index(own) if own in keys else len(keys)
-            document[table][at : at + 1] = [row | {"machine": place}]
-    if not any("SciPy" in row["method"] for row in document["points"]) or scipy_note.startswith("SciPy's solvers run"):
-        document["notes"] |= {"scipy": scipy_note} if scipy_note else {}
+            known[tuple(row[key] for key in KEYS[table])] = row | {"machine": document["machines"].index(on)}
+        document[table] = list(known.values())
+    has_scipy = any("SciPy" in row["method"] for row in document["points"])
+    document["notes"]["scipy"] = WITH_SCIPY if has_scipy else WITHOUT_SCIPY
     with replacing(folder / FILE) as part:
-        part.write_text(json.dumps(_plain(document), indent=1, allow_nan=False, ensure_ascii=False), encoding="utf-8")
+        part.write_text(json.dumps(plain(document), indent=1, allow_nan=False, ensure_ascii=False), encoding="utf-8")
 
 
 def _problem_rows(plan: Plan, name: str, links: int, report: Report) -> dict[str, list[Row]]:
@@ -262,54 +236,8 @@ def _problem_rows(plan: Plan, name: str, links: int, report: Report) -> dict[str
     report(f"{name}, {links} links: reference")
     problem = make_problem(name, links)
     true = make_reference(problem)
-    found = points(problem, true, plan.methods, plan.tolerances, plan.rounds, report)
+    found = points(problem, true, plan.method_names, plan.tolerances, plan.rounds, report)
     if plan.scipy and find_spec("scipy") is not None:
-        from warpchain.bench.problems.scipy_solvers import scipy_points
-
         found += scipy_points(problem, true, [x for x in plan.tolerances if x in SCIPY_TOLERANCES], report)
     row = {"problem": name, "links": links, "duration": problem.duration, "starts": len(problem.starts)}
-    return {"references": [row | _error_columns(true.trust)], "points": [asdict(point) for point in found]}
-
-
-def _error_columns(errors: Errors) -> dict[str, float]:
-    """Errors under the names that `Point` has for them."""
-    return {
-        "position_error": errors.position,
-        "velocity_error": errors.velocity,
-        "momentum_error": errors.momentum,
-        "momentum_bias": errors.bias,
-    }
-
-
-def _outcome(case: Any, method: str) -> Any:
-    """What a method makes of a hard case; one that refuses it says so in its own words."""
-    from warpchain.bench.problems.hard_cases import Outcome
-
-    try:
-        return case.subject.run(method)
-    except InputError as error:
-        return Outcome("refused", str(error), 0.0, 0.0, 0, math.nan, False)
-
-
-def _scipy_note(plan: Plan) -> str:
-    """What is there of SciPy and what is not."""
-    if not plan.scipy:
-        return "SciPy's solvers were left out on demand."
-    if find_spec("scipy") is None:
-        return "SciPy is not installed, so its solvers are missing: pip install 'warpchain[scipy]'."
-    from warpchain.bench.problems.scipy_solvers import PATIENCE
-
-    return (
-        f"SciPy's solvers run on the NumPy model, once each, {PATIENCE:g} s at most: what took longer is missing. "
-        "DOP853 does the flight and the impacts, Radau (with the pattern of its Jacobian) the flight; a turn of the "
-        "sprocket has 100,000 contacts, too many for Python."
-    )
-
-
-def _plain(value: Any) -> Any:
-    """As JSON has it: null for what is no finite number."""
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return {"references": [row | asdict(true.trust)], "points": [asdict(point) for point in found]}

@@ -1,7 +1,7 @@
 """How well two samples agree: bootstrap intervals, and the two-sample test of Kolmogorov and Smirnov."""
 
 from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,12 @@ _RESAMPLES: Final = 10_000
 _SEED: Final = 1979
 
 
-def bootstrap_interval(sample: Array, statistic: Callable[[Array], Array]) -> tuple[float, float]:
+def bootstrap_interval(sample: Array, statistic: Callable[..., Any]) -> tuple[float, float]:
     """Percentile interval of a statistic (B. Efron, Annals of Statistics 7 (1979) 1-26).
 
     Args:
         sample: Independent values, (k,).
-        statistic: Of each row of an array (resamples, k).
+        statistic: As `numpy.mean`, with the argument `axis`.
 
     Returns:
         Lower and upper end, the same ones each time; NaN with fewer than two values.
@@ -29,20 +29,8 @@ def bootstrap_interval(sample: Array, statistic: Callable[[Array], Array]) -> tu
         return float("nan"), float("nan")
     places = np.random.default_rng(_SEED).integers(len(sample), size=(_RESAMPLES, len(sample)))
     tail = (1 - CONFIDENCE) / 2
-    lower, upper = np.quantile(statistic(sample[places]), [tail, 1 - tail])
+    lower, upper = np.quantile(statistic(sample[places], axis=-1), [tail, 1 - tail])
     return float(lower), float(upper)
-
-
-def means(samples: Array) -> Array:
-    """Mean of each row."""
-    values: Array = samples.mean(axis=-1)
-    return values
-
-
-def standard_deviations(samples: Array) -> Array:
-    """Standard deviation of each row, divisor count − 1."""
-    values: Array = samples.std(axis=-1, ddof=1)
-    return values
 
 
 def kolmogorov_smirnov(first: Array, second: Array) -> tuple[float, float]:

@@ -6,15 +6,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.bench.starts import State
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain, links_between
 from warpchain.oracle import motion_equations
 from warpchain.oracle.circular_loop import circular_loop
-from warpchain.walks.walk_result import Trajectory
+from warpchain.walks.walk_result import Trajectory, WalkResult
 
 Array = NDArray[np.float64]
-State = tuple[Array, Array]
-"""Position (n, 3) and velocity (n, 3) of a chain."""
 
 PAPER: Final = preset("paper")
 SOFT: Final = preset("soft")
@@ -101,3 +100,8 @@ def energy_scale(parameters: Parameters, start: State) -> float:
         start[0], parameters
     )
     return moving + parameters.gravity * float(motion_equations.link_masses(len(start[0]), parameters).sum()) * 0.01
+
+
+def ledger_error(walk: WalkResult) -> float:
+    """What the energy ledger of a walk leaves open, relative to the energy at release; NaN if it was not released."""
+    return abs(walk.energy["residual"]) / (walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"])

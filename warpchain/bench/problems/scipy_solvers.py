@@ -4,15 +4,16 @@ SciPy is an extra; nothing here is imported without it. Radau gets the pattern o
 differences and its factorisation are sparse.
 """
 
-import math
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.bench.problems.work_precision import Errors, Point, Problem, Reference, State, errors
+from warpchain.bench.problems.work_precision import Point, Problem, Reference, make_point
+from warpchain.bench.starts import State
 from warpchain.inputs.options import Options
 from warpchain.oracle import contact_equations, motion_equations
 
@@ -43,23 +44,17 @@ def scipy_points(
             report(f"{problem.name}, {problem.links} links: SciPy's {solver} at {tolerance:g}")
             began = time.process_time()
             counts = {"evaluations": 0, "steps": 0}
-            try:
+            ends = None
+            with suppress(_OutOfPatienceError):
                 ends = [_run(problem, start, solver, tolerance, began + PATIENCE, counts) for start in problem.starts]
-                status, error = "finished", errors(problem, ends, true.ends)
-            except _OutOfPatienceError:
-                status, error = GAVE_UP, Errors(*[math.nan] * 4)
             found.append(
-                Point(
-                    problem=problem.name,
-                    links=problem.links,
-                    method=f"{solver} (SciPy)",
-                    tolerance=tolerance,
-                    status=status,
-                    position_error=error.position,
-                    velocity_error=error.velocity,
-                    momentum_error=error.momentum,
-                    momentum_bias=error.bias,
-                    simulated=problem.duration * len(problem.starts),
+                make_point(
+                    problem,
+                    true,
+                    ends,
+                    f"{solver} (SciPy)",
+                    tolerance,
+                    status=GAVE_UP if ends is None else "finished",
                     seconds=time.process_time() - began,
                     evaluations=counts["evaluations"],
                     accepted=counts["steps"],

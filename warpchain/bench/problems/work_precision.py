@@ -1,23 +1,27 @@
 """Error against cost of every method in a flight, an impact and a turn of the sprocket, each chain on one core.
 
-Errors are against a run of ``rkf78`` at tolerance 1e-12 whose steps near contacts are short; what another method at
-1e-11 with contact steps twice as long makes of the same says how far that reference can be trusted.
+Errors are against a run of ``rkf78`` at tolerance 1e-12 with short steps near contacts. How far ``dp5`` at 1e-11, with
+contact steps twice as long, is from that says how far the reference can be trusted.
 
-Contacts are looked for after each step and met by hundreds of small impulses, so single links never agree to better
-than about a percent of the speed at which they hit. What converges is kept beside them: the impulse of the whole
-impact, the chain's angular momentum about the sprocket.
+Contacts are looked for after each step and answered by hundreds of small impulses, so single links never agree to
+better than about a percent of the speed at which they hit. Two quantities that do converge are measured beside them:
+the impulse of the whole impact, and the chain's angular momentum about the sprocket.
 """
 
 import math
 import statistics
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, Final, Literal, get_args
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.bench.problems.hard_starts import set_down
+from warpchain.bench.record import Column
+from warpchain.bench.starts import State
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
@@ -29,11 +33,8 @@ from warpchain.oracle import motion_equations
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
-State = tuple[Array, Array]
-"""Position (n, 3) and velocity (n, 3) of a chain."""
 
-ProblemName = Literal["flight", "impact", "sprocket"]
-PROBLEMS: Final[tuple[str, ...]] = get_args(ProblemName)
+PROBLEMS: Final = ("flight", "impact", "sprocket")
 TOLERANCES: Final = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 
 FLIGHT_TIME: Final = 0.05
@@ -52,7 +53,7 @@ ENOUGH_SECONDS: Final = 2.0
 
 @dataclass(frozen=True)
 class Problem:
-    """Something short that every method has to do.
+    """A short simulation that every method has to do.
 
     Attributes:
         name: One of `PROBLEMS`.
@@ -94,19 +95,21 @@ class Problem:
 
 @dataclass(frozen=True)
 class Errors:
-    """Distance of the ends of a problem from those of its reference.
+    """Distance of the ends of a problem from those of its reference; NaN where there is no such distance."""
 
-    Attributes:
-        position: Greatest over links and starts [m].
-        velocity: Greatest over links and starts [m/s].
-        momentum: See `Problem.momenta`: rms over the starts relative to the rms of the reference; NaN for a flight.
-        bias: Mean of the last component of the momenta less the reference's, relative to the latter; NaN for a flight.
-    """
-
-    position: float
-    velocity: float
-    momentum: float
-    bias: float
+    position_error: Annotated[float, Column("m", "greatest error of the position of a link's centre at the end")]
+    velocity_error: Annotated[float, Column("m/s", "greatest error of the velocity of a link's centre at the end")]
+    momentum_error: Annotated[
+        float,
+        Column(
+            "1",
+            "impact: of the floor's impulse on the chain, rms over the impacts; sprocket: of the angular momentum "
+            "about its centre; relative to the reference's",
+        ),
+    ]
+    momentum_bias: Annotated[
+        float, Column("1", "mean relative error of the vertical impulse or the angular momentum, with its sign")
+    ]
 
 
 @dataclass(frozen=True)
@@ -114,59 +117,34 @@ class Reference:
     """What the errors of a problem are measured against.
 
     Attributes:
-        problem: Name of the problem.
-        links: n.
         ends: State at the end of each start.
         trust: How far another method at 1e-11 is from it.
     """
 
-    problem: str
-    links: int
     ends: tuple[State, ...]
     trust: Errors
 
 
 @dataclass(frozen=True)
-class Point:
-    """One point of a work–precision diagram.
+class Point(Errors):
+    """One point of a work–precision diagram; errors are NaN unless the run finished."""
 
-    Attributes:
-        problem: One of `PROBLEMS`.
-        links: n.
-        method: A method of the engine, or one of SciPy on the NumPy model.
-        tolerance: Asked for.
-        status: Label of how it ended; errors are NaN unless it is ``"finished"``.
-        position_error: See `Errors` [m].
-        velocity_error: See `Errors` [m/s].
-        momentum_error: See `Errors`, relative.
-        momentum_bias: See `Errors`, relative.
-        simulated: Simulated time of all starts together [s].
-        seconds: Processor time of the same [s], the median of several runs: the wall time of a core that does nothing
-            else.
-        evaluations: Evaluations of the chain's equations in it; None if the method does not count them.
-        accepted: Accepted steps in it.
-        rejected: Rejected steps in it; None if the solver does not tell.
-    """
-
-    problem: str
-    links: int
-    method: str
-    tolerance: float
-    status: str
-    position_error: float
-    velocity_error: float
-    momentum_error: float
-    momentum_bias: float
-    simulated: float
-    seconds: float
-    evaluations: int | None
-    accepted: int
-    rejected: int | None
-
-
-def methods() -> tuple[str, ...]:
-    """Every method that the options know, the reference first."""
-    return method_names()
+    problem: Annotated[
+        str, Column("1", "flight: a circulating ellipse thrown; impact: it hits the floor; sprocket: one turn at 15 Hz")
+    ]
+    links: Annotated[int, Column("1", "number of links")]
+    method: Annotated[str, Column("1", "method of the engine, or of SciPy on the NumPy model")]
+    tolerance: Annotated[float, Column("1", "tolerance asked for, absolute in SI units and relative alike")]
+    status: Annotated[str, Column("1", "how it ended")]
+    simulated: Annotated[float, Column("s", "simulated time of all starts together")]
+    seconds: Annotated[
+        float, Column("s", "processor time of that, median of the rounds; of a run that failed, up to then")
+    ]
+    evaluations: Annotated[
+        int | None, Column("1", "evaluations of the chain's equations in it; null if the method does not count them")
+    ]
+    accepted: Annotated[int, Column("1", "accepted steps in it")]
+    rejected: Annotated[int | None, Column("1", "rejected steps in it; null if the solver does not tell")]
 
 
 def make_problem(name: str, links: int) -> Problem:
@@ -184,34 +162,30 @@ def make_problem(name: str, links: int) -> Problem:
         radius, turning = joint_radius(scene, parameters), 2 * math.pi * FREQUENCY
         laid = lay_chain(stadium(radius), links, parameters.link_length, turning * radius)
         problem = Problem(name, links, parameters, (laid,), 1 / FREQUENCY, "sprocket", -turning)
-        end, _ = _run(problem, laid, "rkf78", 1e-9)
-        return Problem(name, links, parameters, (end,), problem.duration, "sprocket", -turning)
+        return replace(problem, starts=(_run(problem, laid, "rkf78", 1e-9).end,))
     count = IMPACTS if name == "impact" else 1
     starts = []
     for number in range(count):
         laid = lay_chain(ellipse(1.5), links, parameters.link_length, speed=5.0, phase=number / count / links)
         free = Problem("flight", links, parameters, (laid,), 2e-3, "none")
-        (position, velocity), _ = _run(free, laid, "rkf78", 1e-9)
+        position, velocity = _run(free, laid, "rkf78", 1e-9).end
         drift = (
             motion_equations.linear_momentum(velocity, parameters)
             / motion_equations.link_masses(links, parameters).sum()
         )
         velocity[:, :2] += np.array([0.0, -2.0] if name == "impact" else [2.0, 3.0]) - drift
-        ends = np.concatenate(motion_equations.link_ends(position, parameters))
-        position[:, 1] -= ends[:, 1].min() - parameters.circle_radius - 5e-4
-        starts.append((position, velocity))
-    if name == "impact":
-        return Problem(name, links, parameters, tuple(starts), IMPACT_TIME, "floor")
-    return Problem(name, links, parameters, tuple(starts), FLIGHT_TIME, "none")
+        starts.append((set_down(position, 5e-4, parameters), velocity))
+    duration, fixed_body = (IMPACT_TIME, "floor") if name == "impact" else (FLIGHT_TIME, "none")
+    return Problem(name, links, parameters, tuple(starts), duration, fixed_body)
 
 
 def make_reference(problem: Problem) -> Reference:
     """Run the reference of a problem, and another method to tell how far it can be trusted."""
     ends, others = (
-        tuple(_run(problem, start, method, tolerance, contact_step=step)[0] for start in problem.starts)
+        tuple(_run(problem, start, method, tolerance, contact_step=step).end for start in problem.starts)
         for method, tolerance, step in (("rkf78", 1e-12, CONTACT_STEP), ("dp5", 1e-11, 2 * CONTACT_STEP))
     )
-    return Reference(problem.name, problem.links, ends, errors(problem, others, ends))
+    return Reference(ends, errors(problem, others, ends))
 
 
 def errors(problem: Problem, ends: Sequence[State], true: Sequence[State]) -> Errors:
@@ -245,22 +219,14 @@ def points(
         rounds: Measurements of each; the median counts. What takes long is not repeated.
         report: Called with a line of progress.
     """
-    seconds: dict[tuple[str, float], list[float]] = {}
-    found: dict[tuple[str, float], Point] = {}
+    done: dict[tuple[str, float], list[list[_Run]]] = {(name, tol): [] for name in chosen for tol in tolerances}
     for turn in range(rounds):
-        for method in chosen:
-            for tolerance in tolerances:
-                key = method, tolerance
-                if sum(seconds.get(key, [])) > ENOUGH_SECONDS:
-                    continue
-                report(
-                    f"{problem.name}, {problem.links} links: round {turn + 1} of {rounds}, {method} at {tolerance:g}"
-                )
-                runs = [_run(problem, start, method, tolerance) for start in problem.starts]
-                seconds.setdefault(key, []).append(sum(cost["seconds"] for _, cost in runs))
-                if key not in found:
-                    found[key] = _point(problem, true, method, tolerance, runs)
-    return [Point(**{**vars(point), "seconds": statistics.median(seconds[key])}) for key, point in found.items()]
+        for (method, tolerance), runs in done.items():
+            if sum(run.seconds for once in runs for run in once) > ENOUGH_SECONDS:
+                continue
+            report(f"{problem.name}, {problem.links} links: round {turn + 1} of {rounds}, {method} at {tolerance:g}")
+            runs.append([_run(problem, start, method, tolerance) for start in problem.starts])
+    return [_engine_point(problem, true, *key, runs) for key, runs in done.items()]
 
 
 def evaluations(method: str, accepted: int, rejected: int, impulses: int) -> int | None:
@@ -273,43 +239,60 @@ def evaluations(method: str, accepted: int, rejected: int, impulses: int) -> int
     """
     if method not in method_names() or find_method(method).has_rigid_flight:
         return None
-    stages, attempts = find_method(method).stages, accepted + rejected
-    if find_method(method).reuses_last:
-        return attempts * (stages - 1) + 1 + min(impulses, accepted)
-    return attempts * (stages - 1) + accepted
+    facts, attempts = find_method(method), accepted + rejected
+    if facts.reuses_last:
+        return attempts * (facts.stages - 1) + 1 + min(impulses, accepted)
+    return attempts * (facts.stages - 1) + accepted
 
 
-def _point(
-    problem: Problem, true: Reference, method: str, tolerance: float, runs: Sequence[tuple[State, dict[str, Any]]]
+def make_point(
+    problem: Problem, true: Reference, ends: Sequence[State] | None, method: str, tolerance: float, **columns: Any
 ) -> Point:
-    ends, costs = zip(*runs, strict=True)
-    statuses = [cost["status"] for cost in costs]
-    worst = next((status for status in statuses if not status.ok), Status.FINISHED)
-    found = errors(problem, ends, true.ends) if worst.ok else Errors(*[math.nan] * 4)
-    accepted, rejected = (sum(cost[name] for cost in costs) for name in ("accepted", "rejected"))
-    impulses = sum(cost["impulses"] for cost in costs)
+    """The point of a run that ended in these states; None if it did not finish."""
     return Point(
+        **vars(errors(problem, ends, true.ends) if ends is not None else Errors(*[math.nan] * 4)),
         problem=problem.name,
         links=problem.links,
         method=method,
         tolerance=tolerance,
-        status=worst.label,
-        position_error=found.position,
-        velocity_error=found.velocity,
-        momentum_error=found.momentum,
-        momentum_bias=found.bias,
         simulated=problem.duration * len(problem.starts),
-        seconds=math.nan,
-        evaluations=evaluations(method, accepted, rejected, impulses),
+        **columns,
+    )
+
+
+class _Run(NamedTuple):
+    """A start of a problem that has been carried on: the state reached, processor time [s], counters of the engine."""
+
+    end: State
+    status: Status
+    seconds: float
+    counts: dict[str, int]
+
+
+def _engine_point(
+    problem: Problem, true: Reference, method: str, tolerance: float, rounds: Sequence[Sequence[_Run]]
+) -> Point:
+    """The point of a method of the engine; all rounds are alike but for their times."""
+    runs = rounds[0]
+    worst = next((run.status for run in runs if not run.status.ok), Status.FINISHED)
+    counts = sum((Counter(run.counts) for run in runs), Counter[str]())
+    accepted, rejected = counts["accepted"], counts["rejected"]
+    return make_point(
+        problem,
+        true,
+        [run.end for run in runs] if worst.ok else None,
+        method,
+        tolerance,
+        status=worst.label,
+        seconds=statistics.median(sum(run.seconds for run in once) for once in rounds),
+        evaluations=evaluations(method, accepted, rejected, counts["floor"] + counts["sprocket"]),
         accepted=accepted,
         rejected=rejected,
     )
 
 
-def _run(
-    problem: Problem, start: State, method: str, tolerance: float, **settings: float
-) -> tuple[State, dict[str, Any]]:
-    """Carry one start of a problem to its end: the state there, and status, seconds and counts."""
+def _run(problem: Problem, start: State, method: str, tolerance: float, **settings: float) -> _Run:
+    """Carry one start of a problem to its end."""
     given = {"method": method, "tolerance": tolerance, "flight_tolerance": tolerance, "self_contact": False, **settings}
     batch = Batch(1, problem.links, validated(Options, given, "options"))
     batch.set_chain(0, problem.parameters, problem.links)
@@ -320,15 +303,7 @@ def _run(
     began = time.process_time()
     batch.run([0], features)
     seconds = time.process_time() - began
-    counts = batch.counts(0)
-    cost = {
-        "status": batch.status(0),
-        "seconds": seconds,
-        "accepted": counts["accepted"],
-        "rejected": counts["rejected"],
-        "impulses": counts["floor"] + counts["sprocket"],
-    }
-    return (batch.position(0), batch.velocity(0)), cost
+    return _Run((batch.position(0), batch.velocity(0)), batch.status(0), seconds, batch.counts(0))
 
 
 def _angular_momentum(state: State, parameters: Parameters) -> float:
