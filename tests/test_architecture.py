@@ -45,8 +45,8 @@ ONLY_FOR = {"oracle": {"bench"}, "bench": {"cli"}}
 """Wings that only some others may import."""
 KERNELS_FOR_ALL = {"codes", "features", "layout", "methods"}
 """Wings of kernels/ that hold data; all others are for engine/ alone …"""
-LAUNCHERS = {"warpchain.engine.batch", "warpchain.bench.cpu_steps"}
-"""… which launches kernels. The benchmark of one core launches what it times."""
+LAUNCHERS = {"warpchain.engine.batch"}
+"""… which launches kernels."""
 LAUNCHES = ("launch", "launch_tiled", "capture_launch")
 TOP_LEVEL = {
     ".ci",
