@@ -53,7 +53,6 @@ TOP_LEVEL = {
     ".gitignore",
     ".mkdocs.yml",
     ".pre-commit-config.yaml",
-    ".readme",
     "CHANGELOG.md",
     "CITATION.cff",
     "CONTRIBUTING.md",

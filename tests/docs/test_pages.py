@@ -1,0 +1,81 @@
+"""What README, docs/ and CITATION.cff say of the project is so."""
+
+import importlib.util
+import re
+import tomllib
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+import yaml
+
+from tests.docs.code_blocks import PAGES, ROOT, name_of
+from warpchain.sweeps import sweep_file
+from warpchain.sweeps.designs import SAMPLERS
+
+
+@pytest.fixture(scope="module")
+def generator() -> ModuleType:
+    """The script that writes docs/reference/."""
+    spec = importlib.util.spec_from_file_location("generate_reference", ROOT / "docs/generate_reference.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_reference_is_that_of_the_code(generator: ModuleType) -> None:
+    """The committed pages are what `python docs/generate_reference.py` writes, and there are no others."""
+    pages = generator.pages()
+    assert {path.name for path in generator.FOLDER.iterdir()} == set(pages)
+    for name, text in pages.items():
+        committed = (generator.FOLDER / name).read_text(encoding="utf-8")
+        assert committed == text, f"{name} is out of date; run python docs/generate_reference.py"
+
+
+def test_reference_has_every_key_of_a_sweep_file(generator: ModuleType) -> None:
+    """The hand-written meanings of keys and samplers are of those that there are."""
+    assert set(generator.KEYS) == set(sweep_file._TOP_KEYS)
+    in_blocks = {key for key, (where, _) in generator.KEYS.items() if "block" in where}
+    assert in_blocks == set(sweep_file._BLOCK_KEYS)
+    assert set(generator.SAMPLER_MEANINGS) == set(SAMPLERS)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_links_lead_to_files_and_headings(page: Path) -> None:
+    """Each link to a file of the repository finds it, and the heading that it names."""
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+        path, _, anchor = target.partition("#")
+        if re.match(r"\w+:", target):
+            continue
+        file = (page.parent / path).resolve() if path else page
+        assert file.is_relative_to(ROOT) and file.exists(), target
+        assert not anchor or anchor in anchors(file), target
+
+
+def anchors(page: Path) -> set[str]:
+    """Anchors of a page's headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_readme_is_short() -> None:
+    """The README has at most 900 words; the rest is in docs/."""
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").split()) <= 900
+
+
+def test_ci_runs_the_command_of_the_readme() -> None:
+    """The README's test command is the one that .ci/run runs, but for the place of the environment."""
+    script = (ROOT / ".ci/run").read_text(encoding="utf-8")
+    run = next(line for line in script.splitlines() if line.startswith("python3 -m venv"))
+    assert run.replace('"$venv/', '"$venv"/').replace('"$venv"', ".venv-test").replace('"', "") in (
+        ROOT / "README.md"
+    ).read_text(encoding="utf-8")
+
+
+def test_citation_is_of_this_version() -> None:
+    """CITATION.cff has the version and the licence of the package, and refers to the paper."""
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert (citation["version"], citation["license"]) == (project["version"], project["license"])
+    assert citation["references"][0]["doi"] == "10.1051/emsci/2018005"
