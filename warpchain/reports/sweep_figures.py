@@ -17,21 +17,23 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from warpchain.pictures.style import BLUE, FAINT, GROUND, INK, LINE_COLORS, RED, NothingToShow, Picture, tidy
-from warpchain.reports.figure5 import sweep_figure5
-from warpchain.reports.kink_figure import sweep_kink
-from warpchain.reports.labels import (
+from warpchain.pictures.labels import (
     DISTANCE,
     FREQUENCY,
+    LINKS,
+    lost_note,
     number_text,
     quantity_label,
     quantity_text,
     value_text,
     with_unit,
 )
+from warpchain.pictures.style import BLUE, FAINT, GROUND, INK, LINE_COLORS, RED, NothingToShow, Picture, tidy
+from warpchain.reports.figure5 import sweep_figure5
+from warpchain.reports.kink_figure import sweep_kink
 from warpchain.reports.panels import panels, third_quantities
 from warpchain.reports.statistics import CONFIDENCE, sensitivities, tolerance_agreement
-from warpchain.reports.sweep_series import Series, all_series, lost_note
+from warpchain.reports.sweep_series import Series, all_series
 from warpchain.status import Status
 from warpchain.store.sweep_result import SweepResult
 
@@ -139,7 +141,7 @@ def heat_map(result: SweepResult, quantity: str = "dx") -> Picture:
         label = with_unit(f"{title} {symbol}", series[0].unit)
         figure.colorbar(image, ax=list(grid[:, column]), label=label).outline.set_visible(False)
     figure.supxlabel(FREQUENCY, fontsize="medium")
-    figure.supylabel("number of links $n$", fontsize="medium")
+    figure.supylabel(LINKS, fontsize="medium")
     caption = f"Mean and standard deviation of the {name}, over the walks at rest in each cell."
     return Picture("heat_map", caption, figure)
 

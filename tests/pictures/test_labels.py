@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from warpchain.reports.labels import cell_text, number_text
+from warpchain.pictures.labels import cell_text, number_text
 
 
 @pytest.mark.parametrize(
