@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from warpchain.pictures.labels import cell_text, number_text
+from warpchain.pictures.labels import cell_text, number_text, quantity_label, short_texts
 
 
 @pytest.mark.parametrize(
@@ -12,6 +12,31 @@ from warpchain.pictures.labels import cell_text, number_text
 def test_number_text(value: float, text: str) -> None:
     """Numbers are written as people write them."""
     assert number_text(value) == text
+
+
+@pytest.mark.parametrize(
+    ("values", "texts"),
+    [
+        (np.array([0.01268, 0.0254]), ["0.01268", "0.0254"]),
+        (np.logspace(-3, 0, 3), ["0.001", "0.0316", "1"]),
+        (np.array([1.0000001, 1.0000002]), ["1.0000001", "1.0000002"]),
+        (np.array(["rest", "ellipse"]), ["rest", "ellipse"]),
+        (np.array([True, False]), ["True", "False"]),
+        (np.array([None, 1.0, 10.0]), ["null", "1", "10"]),
+    ],
+)
+def test_short_texts(values: np.ndarray, texts: list[str]) -> None:
+    """Values are exact in six digits, or else as short as they can be told apart."""
+    assert short_texts(values) == texts
+
+
+def test_quantity_label() -> None:
+    """Quantities have the paper's symbols and units, others their names."""
+    assert quantity_label("floor_friction") == "floor friction $μ_\\mathrm{fc}$"
+    assert quantity_label("frequency") == "frequency of the sprocket $ν$ / Hz"
+    assert quantity_label("links") == "number of links $n$"
+    assert quantity_label("settle_time") == "settle time / s"
+    assert quantity_label("preset") == "preset"
 
 
 def test_cell_text() -> None:

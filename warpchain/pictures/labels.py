@@ -95,11 +95,15 @@ def math_symbol(name: str) -> str:
     return f"${base}" + (f"_\\mathrm{{{index}}}$" if index else "$")
 
 
+def quantity_name(name: str) -> str:
+    """A field or a column in words."""
+    return _NAMES.get(name, name.replace("_", " ").replace("coulomb", "Coulomb"))
+
+
 def quantity_text(name: str) -> str:
-    """Name of a field or a column, with its symbol if it has one, for a label of a figure."""
-    text = _NAMES.get(name, name.replace("_", " ").replace("coulomb", "Coulomb"))
+    """The same for a label of a figure, with the symbol if there is one."""
     symbol = math_symbol(name)
-    return f"{text} {symbol}" if symbol.startswith("$") else text
+    return f"{quantity_name(name)} {symbol}" if symbol.startswith("$") else quantity_name(name)
 
 
 def quantity_label(name: str) -> str:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from warpchain.pictures.labels import cell_values
 from warpchain.pictures.style import BLUE, GREEN, INK, LINE_COLORS, RED
-from warpchain.store.sweep_result import SweepResult
+from warpchain.store.sweep_result import BlockResult, SweepResult
 
 Array = NDArray[np.float64]
 
@@ -58,14 +58,28 @@ class Series:
         return np.array([[getattr(cell, name) for cell in row] for row in cells])
 
 
+def several(block: BlockResult) -> set[str]:
+    """The axes of a block that have several values."""
+    return {name for name, values in block.axes.items() if len(values) > 1}
+
+
+def has_series(block: BlockResult) -> bool:
+    """Whether nothing but links, frequency and start varies in a block."""
+    return several(block) <= {"links", "frequency", "start"} and "frequency" not in block.drawn
+
+
 def all_series(result: SweepResult, quantity: str = "dx") -> list[Series]:
-    """The series of every block in which nothing but links, frequency and start varies."""
+    """The series of every block in which nothing but links, frequency and start varies.
+
+    Raises:
+        InputError: there is no such column of numbers.
+    """
+    statistics = result.cell_statistics(quantity)
     series: list[Series] = []
     for block, given in zip(result.blocks.values(), result.sweep["blocks"], strict=True):
-        several = {name for name, values in block.axes.items() if len(values) > 1}
-        if not several <= {"links", "frequency", "start"} or "frequency" in block.drawn:
+        if block.name not in statistics or not has_series(block):
             continue
-        found = block.statistics(quantity)
+        found = statistics[block.name]
         by_start: dict[str, dict[tuple[int, float], Cell]] = {}
         for place in np.ndindex(*block.shape[:-1]):
             at = given["scene"] | cell_values(block.axes, place)
