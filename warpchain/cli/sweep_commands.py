@@ -87,8 +87,11 @@ def plot(
         Path | None,
         typer.Option("-o", "--output", metavar="DIR", help="Folder of the figures. Default: DIR."),
     ] = None,
+    quantity: Annotated[
+        str, typer.Option(metavar="NAME", help="Column to draw: dx, walk_time, bounces, hold_time ...")
+    ] = "dx",
 ) -> None:
-    """Draw every figure that the sweep has something for: Figures 6 and 5, maps, tolerance, sensitivity, statuses."""
+    """Draw every figure that the sweep has something for: Figures 6 and 5, grids, tolerance, sensitivity, statuses."""
     from warpchain.cli.terminal import try_folder
     from warpchain.reports.sweep_figures import figures
     from warpchain.store.manifest import check_not_own
@@ -99,7 +102,7 @@ def plot(
     check_not_own(directory, folder.resolve())
     try_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    for picture in figures(result):
+    for picture in figures(result, quantity):
         print(picture.save(folder))
 
 

@@ -1,6 +1,7 @@
 """How all figures look: colours, axes, resolution; and a figure with its caption."""
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -9,7 +10,7 @@ from warpchain.files import replacing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
 LINE_COLORS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008)."""
@@ -75,3 +76,36 @@ def tidy(axes: "Axes", *, grid: Literal["x", "y", "both"] | None = None) -> None
     if grid is not None:
         axes.grid(axis=grid, color="#E6E6E6", linewidth=0.6)
         axes.set_axisbelow(True)
+
+
+def panel_grid(
+    figure: "Figure | SubFigure", count: int, columns: int, *, sharex: bool, sharey: bool = True
+) -> "tuple[list[Axes], list[Axes]]":
+    """Put panels into a figure, by rows.
+
+    Args:
+        figure: an empty figure.
+        count: number of panels.
+        columns: number of columns.
+        sharex: whether the panels have a common x axis, with numbers below the lowest panel of each column.
+        sharey: whether they have a common y axis.
+
+    Returns:
+        The panels, and the axes that stay empty, which show nothing.
+    """
+    grid = list(figure.subplots(-(-count // columns), columns, sharex=sharex, sharey=sharey, squeeze=False).flat)
+    for axes in grid[count:]:
+        axes.set_axis_off()
+    for axes in grid[count - columns : count]:
+        axes.tick_params(labelbottom=True)
+    return grid[:count], grid[count:]
+
+
+def label_room(axes: "Axes", texts: Sequence[str]) -> tuple[float, float]:
+    """How many labels as wide as the widest text fit below a panel, and how many lines beside it.
+
+    The panel is measured before its layout, which changes its size little.
+    """
+    box, dpi = axes.get_window_extent(), axes.figure.dpi
+    character, line = 0.08, 0.16  # inches
+    return box.width / dpi / (character * (1 + max(map(len, texts)))), box.height / dpi / line

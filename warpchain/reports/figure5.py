@@ -5,9 +5,9 @@ from typing import Final
 
 import numpy as np
 
+from warpchain.pictures.labels import cell_text, cell_values
 from warpchain.pictures.style import LINE_COLORS, NothingToShow, Picture
 from warpchain.pictures.walk_figures import figure5
-from warpchain.reports.labels import cell_text, cell_values
 from warpchain.store.sweep_result import SweepResult
 from warpchain.store.walk_motion import WalkMotion
 
@@ -38,7 +38,7 @@ def sweep_figure5(result: SweepResult) -> Picture:
     for block, place, samples in (cells[number] for number in chosen):
         released = (walk for sample in samples if len((walk := block.walk_motion((*place, int(sample)))).time))
         found = list(islice(released, MOST_SAMPLES))
-        names = [block.name] * (len(result.blocks) > 1) + [cell_text(cell_values(block, place))] * bool(place)
+        names = [block.name] * (len(result.blocks) > 1) + [cell_text(cell_values(block.axes, place))] * bool(place)
         walks += found
         labels += [", ".join(names) or result.name] * len(found)
     if not walks:

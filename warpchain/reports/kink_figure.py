@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from warpchain.loop.stationary_loop import Kink, average_loop, find_kink
+from warpchain.pictures.labels import FREQUENCY
 from warpchain.pictures.style import LINE_COLORS, NothingToShow, Picture, tidy
-from warpchain.reports.labels import FREQUENCY
 from warpchain.store.sweep_result import SweepResult
 from warpchain.sweeps.recording import Recording
 

@@ -6,9 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from warpchain.pictures.labels import DISTANCE, lost_note, quantity_label
 from warpchain.pictures.style import FAINT, LINE_COLORS, Picture, tidy
-from warpchain.reports.labels import DISTANCE, quantity_label
-from warpchain.reports.sweep_series import lost_note
 from warpchain.store.sweep_result import BlockResult, SweepResult
 
 _AXES: Final = {"links", "frequency"}

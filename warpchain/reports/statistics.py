@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.distributions import random_generator
+from warpchain.pictures.labels import cell_text, cell_values, number_text
 from warpchain.pictures.style import NothingToShow
-from warpchain.reports.labels import cell_text, cell_values, number_text
 from warpchain.status import Status
 from warpchain.store.sweep_result import BlockResult, SweepResult
 from warpchain.sweeps.designs import saltelli_outputs, sobol_indices, walks_per_sample
@@ -172,7 +172,7 @@ def _paired_cells(block: BlockResult, *, several: bool) -> Iterator[PairedCell]:
     distances = at_ends("dx")
     for place in np.ndindex(*rested.shape[:-1]):
         kept = rested[place]
-        cell = cell_values(block, (*place[:axis], 0, *place[axis:]))
+        cell = cell_values(block.axes, (*place[:axis], 0, *place[axis:]))
         del cell["tolerance"]
         text = _named(block, cell_text(cell), several)
         yield PairedCell(text, distances[(slice(None), *place)][:, kept], int((~kept).sum()))
@@ -213,7 +213,7 @@ def _sensitivities(block: BlockResult, *, several: bool) -> Iterator[Sensitivity
         intervals = np.nanpercentile(resampled, tails, axis=0).transpose(1, 2, 0)
         order = np.argsort(-total, kind="stable")
         yield Sensitivity(
-            cell=_named(block, cell_text(cell_values(block, place)), several),
+            cell=_named(block, cell_text(cell_values(block.axes, place)), several),
             names=tuple(block.drawn[number] for number in order),
             first_order=first[order],
             total_order=total[order],

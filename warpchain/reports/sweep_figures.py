@@ -17,28 +17,40 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from warpchain.pictures.style import BLUE, FAINT, GROUND, INK, LINE_COLORS, RED, NothingToShow, Picture, tidy
-from warpchain.reports.figure5 import sweep_figure5
-from warpchain.reports.kink_figure import sweep_kink
-from warpchain.reports.labels import (
+from warpchain.pictures.labels import (
     DISTANCE,
     FREQUENCY,
+    LINKS,
+    lost_note,
     number_text,
-    quantity_label,
+    quantity_name,
     quantity_text,
-    value_text,
     with_unit,
 )
+from warpchain.pictures.maps import draw_map, write_values
+from warpchain.pictures.style import (
+    BLUE,
+    FAINT,
+    GROUND,
+    INK,
+    LINE_COLORS,
+    RED,
+    NothingToShow,
+    Picture,
+    panel_grid,
+    tidy,
+)
+from warpchain.reports.figure5 import sweep_figure5
+from warpchain.reports.grids import grid_pictures, named
+from warpchain.reports.kink_figure import sweep_kink
 from warpchain.reports.panels import panels, third_quantities
 from warpchain.reports.statistics import CONFIDENCE, sensitivities, tolerance_agreement
-from warpchain.reports.sweep_series import Series, all_series, lost_note
+from warpchain.reports.sweep_series import Series, all_series
 from warpchain.status import Status
 from warpchain.store.sweep_result import SweepResult
+from warpchain.walks.rows import quantity_of
 
 Array = NDArray[np.float64]
-
-_EVENLY: Final = 6
-"""Up to so many values of a quantity are spaced evenly, whatever they are."""
 
 _MOST_BLOCKS: Final = 6
 """Greatest number of blocks whose walks are counted separately."""
@@ -47,11 +59,24 @@ _MOST_NUMBERS: Final = 120
 """Greatest number of cells of a map with numbers in them."""
 
 
-def figures(result: SweepResult) -> Iterator[Picture]:
-    """Every figure that the sweep has the walks for, the paper's Figures 6 and 5 first."""
-    against = [partial(panels, quantity=quantity) for quantity in third_quantities(result)]
-    draws: list[Callable[[SweepResult], Picture]] = [figure6, sweep_figure5, sweep_kink, heat_map, *against]
-    for draw in (*draws, tolerance, sensitivity, responses, status_counts):
+def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
+    """Every figure that the sweep has the walks for, the paper's Figures 6 and 5 first.
+
+    Args:
+        result: a sweep.
+        quantity: a column of numbers; for any other than ``dx`` there are just its maps and its figures over grids.
+
+    Raises:
+        InputError: there is no such column.
+    """
+    result.cell_statistics(quantity)
+    draws: list[Callable[[SweepResult], Picture]] = [partial(heat_map, quantity=quantity)]
+    last: list[Callable[[SweepResult], Picture]] = []
+    if quantity == "dx":
+        against = [partial(panels, quantity=third) for third in third_quantities(result)]
+        draws = [figure6, sweep_figure5, sweep_kink, *draws, *against, tolerance, sensitivity]
+        last = [status_counts]
+    for draw in (*draws, *grid_pictures(result, quantity), *last):
         with suppress(NothingToShow):
             yield draw(result)
 
@@ -73,7 +98,7 @@ def figure6(result: SweepResult) -> Picture:
     frequencies = sorted({frequency for item in series for _, frequency in item.cells})
     gap = float(np.diff(frequencies).min()) if len(frequencies) > 1 else 1.0
     columns = {1: 1, 2: 2, 4: 2}.get(len(numbers), 3)
-    figure, used, empty = _grid(len(numbers), columns, (3.1, 2.6), (0.0, 1.0), sharex=True)
+    figure, used, empty = _grid(len(numbers), columns, (3.1, 2.6), (0.0, 1.0))
     for axes, links in zip(used, numbers, strict=True):
         here = [item for item in series if any(key[0] == links for key in item.cells)]
         for place, item in enumerate(here):
@@ -104,7 +129,7 @@ def heat_map(result: SweepResult, quantity: str = "dx") -> Picture:
         quantity: a column, such as ``dx``, ``walk_time`` or ``bounces``.
 
     Raises:
-        KeyError: there is no such column.
+        InputError: there is no such column.
         NothingToShow: no walk has come to rest in a block that has several links and frequencies, and no other axes.
     """
     series = [item for item in all_series(result, quantity) if item.is_map]
@@ -114,9 +139,10 @@ def heat_map(result: SweepResult, quantity: str = "dx") -> Picture:
         )
     links = sorted({key[0] for item in series for key in item.cells})
     frequencies = sorted({key[1] for item in series for key in item.cells})
-    name, symbol = ("distance walked", "$Δx$") if quantity == "dx" else (quantity.replace("_", " "),) * 2
-    numbers = len(links) * len(frequencies) <= _MOST_NUMBERS
-    width, height = (0.6, 0.42) if numbers else (0.24, 0.24)
+    name, symbol = ("distance walked", "$Δx$") if quantity == "dx" else (quantity_name(quantity_of(quantity)),) * 2
+    texts = [f"{frequency:g}" for frequency in frequencies]
+    has_numbers = len(links) * len(frequencies) <= _MOST_NUMBERS
+    width, height = (0.6, 0.42) if has_numbers else (0.24, 0.24)
     width, height = max(3.8, 1.5 + width * len(frequencies)), max(1.6, 0.4 + height * len(links))
     figure = Figure(figsize=(2 * width, 0.6 + (0.3 + height) * len(series)), layout="constrained")
     grid = figure.subplots(len(series), 2, sharex=True, sharey=True, squeeze=False)
@@ -125,23 +151,18 @@ def heat_map(result: SweepResult, quantity: str = "dx") -> Picture:
         known = np.concatenate([table[np.isfinite(table)] for table in tables])
         low, high = (known.min(), known.max()) if len(known) else (0.0, 1.0)
         for axes, item, table in zip(grid[:, column], series, tables, strict=True):
-            image = axes.imshow(table, cmap=colors, vmin=low, vmax=high, origin="lower", aspect="auto")
+            image = draw_map(axes, table, texts, [f"{number}" for number in links], cmap=colors, vmin=low, vmax=high)
             if len(series) > 1 and not column:
                 axes.set_title(item.label, fontsize="medium", loc="left")
-            every = slice(None, None, 1 + len(frequencies) // 16)
-            axes.set_xticks(range(len(frequencies))[every], [f"{frequency:g}" for frequency in frequencies[every]])
-            axes.set_yticks(range(len(links)), [f"{number}" for number in links])
-            axes.set_facecolor(GROUND)
-            axes.spines[:].set_visible(False)
-            axes.tick_params(color=FAINT)
-            if numbers:
-                _write_numbers(axes, item, table, links, frequencies, image)
+            if has_numbers:
+                walks = (item.table(name, links, frequencies) for name in ("count", "failed", "missing"))
+                write_values(axes, image, table, *walks)
         label = with_unit(f"{title} {symbol}", series[0].unit)
         figure.colorbar(image, ax=list(grid[:, column]), label=label).outline.set_visible(False)
     figure.supxlabel(FREQUENCY, fontsize="medium")
-    figure.supylabel("number of links $n$", fontsize="medium")
+    figure.supylabel(LINKS, fontsize="medium")
     caption = f"Mean and standard deviation of the {name}, over the walks at rest in each cell."
-    return Picture("heat_map", caption, figure)
+    return Picture(named("heat_map", quantity), caption, figure)
 
 
 def tolerance(result: SweepResult) -> Picture:
@@ -203,7 +224,7 @@ def sensitivity(result: SweepResult) -> Picture:
         for name, total in zip(cell.names, cell.total_order, strict=True):
             totals.setdefault(name, []).append(total)
     names = sorted(totals, key=lambda name: -float(np.mean(totals[name])))
-    figure, used, _ = _grid(len(cells), 3, (3.2, 0.6 + 0.36 * len(names)), (2.4, 0.9), sharex=True)
+    figure, used, _ = _grid(len(cells), 3, (3.2, 0.6 + 0.36 * len(names)), (2.4, 0.9))
     for axes, cell in zip(used, cells, strict=True):
         places = np.array([names.index(name) for name in cell.names])
         for shift, color, label, values, interval in (
@@ -229,45 +250,6 @@ def sensitivity(result: SweepResult) -> Picture:
         f"Samples: {', '.join(f'{cell.samples}' for cell in cells)}."
     )
     return Picture("sensitivity", caption, figure)
-
-
-def responses(result: SweepResult) -> Picture:
-    """Distance against the one quantity that a block varies, with a panel for each such block.
-
-    A dot is the mean, a box the range of two standard errors of the mean, a bar the range of one standard deviation. Up
-    to six values, which often span decades, are spaced evenly.
-
-    Raises:
-        NothingToShow: no walk has come to rest in a block that varies one quantity other than links and frequency.
-    """
-    varied = []
-    for block in result.blocks.values():
-        several = [name for name, values in block.axes.items() if len(values) > 1]
-        if len(several) == 1 and several[0] not in ("links", "frequency", "tolerance"):
-            found = block.statistics("dx")
-            if found.count.any():
-                varied.append((several[0], block.axes[several[0]], found))
-    if not varied:
-        raise NothingToShow("responses take walks at rest in a block that varies one quantity")
-    figure, used, _ = _grid(len(varied), 4, (2.3, 2.4), (1.0, 0.4), sharex=False)
-    for axes, (name, values, found) in zip(used, varied, strict=True):
-        evenly = values.dtype.kind in "Ub" or len(values) <= _EVENLY
-        places = np.arange(len(values)) if evenly else values
-        means, spread, error = (table.ravel() for table in (found.mean, found.sd, found.standard_error))
-        axes.plot(places, means, color=FAINT, linewidth=0.8)
-        axes.errorbar(places, means, spread, fmt="o", color=BLUE, markersize=4, linewidth=1.2, zorder=3)
-        axes.errorbar(places, means, 2 * error, fmt="none", ecolor=(BLUE, 0.35), elinewidth=7, zorder=2)
-        if evenly:
-            axes.set_xticks(places, [value_text(value) for value in values])
-        axes.margins(x=0.15)
-        note = lost_note([found])
-        axes.set_xlabel(quantity_label(name) + (f"\n{note}" if note else ""), fontsize="small")
-        axes.tick_params(axis="x", labelsize="small")
-        tidy(axes, grid="y")
-    used[0].set_ylim(bottom=min(0.0, used[0].get_ylim()[0]))
-    figure.supylabel(DISTANCE, fontsize="medium")
-    caption = "Distance walked in the blocks that vary one quantity: means with one standard deviation (bar) and two "
-    return Picture("responses", caption + "standard errors of the mean (box).", figure)
 
 
 def status_counts(result: SweepResult) -> Picture:
@@ -302,30 +284,23 @@ def status_counts(result: SweepResult) -> Picture:
 
 
 def _grid(
-    count: int, most: int, panel: tuple[float, float], margin: tuple[float, float], *, sharex: bool
+    count: int, most: int, panel: tuple[float, float], margin: tuple[float, float]
 ) -> tuple[Figure, list[Axes], list[Axes]]:
-    """A figure with `count` panels in at most `most` columns.
+    """A figure with `count` panels in at most `most` columns, with common axes.
 
     Args:
         count: number of panels.
         most: greatest number of columns.
         panel: width and height that each panel adds to the figure [inches].
         margin: width and height beside the panels [inches].
-        sharex: whether the panels have a common x axis; they always have a common y axis.
 
     Returns:
         The figure, its panels by rows, and the axes that stay empty, which show nothing.
     """
     columns = min(count, most)
-    rows = -(-count // columns)
-    size = max(4.2, margin[0] + panel[0] * columns), margin[1] + panel[1] * rows
+    size = max(4.2, margin[0] + panel[0] * columns), margin[1] + panel[1] * -(-count // columns)
     figure = Figure(figsize=size, layout="constrained")
-    grid = list(figure.subplots(rows, columns, sharex=sharex, sharey=True, squeeze=False).flat)
-    for axes in grid[count:]:
-        axes.set_axis_off()
-    for axes in grid[count - columns : count]:
-        axes.tick_params(labelbottom=True)
-    return figure, grid[:count], grid[count:]
+    return figure, *panel_grid(figure, count, columns, sharex=True)
 
 
 def _draw_boxes(axes: Axes, series: Series, links: int, shift: float, width: float) -> None:
@@ -356,20 +331,3 @@ def _draw_legend(figure: Figure, empty: Axes | None, series: Sequence[Series]) -
         figure.legend(handles=handles, loc="outside upper center", ncols=columns, frameon=False, fontsize="small")
         return
     empty.legend(handles=handles, loc="center", frameon=False)
-
-
-def _write_numbers(
-    axes: Axes, series: Series, table: Array, links: Sequence[int], frequencies: Sequence[float], image: Any
-) -> None:
-    """The value in each cell of a map, and how many of its walks are not part of it."""
-    for (row, column), value in np.ndenumerate(table):
-        cell = series.cells.get((links[row], frequencies[column]))
-        if cell is None:
-            continue
-        text = f"{value:.3g}" if np.isfinite(value) else "–"
-        parts = [f"{cell.failed} failed"] * (cell.failed > 0) + [f"{cell.missing} to run"] * (cell.missing > 0)
-        red, green, blue, _ = image.to_rgba(value) if np.isfinite(value) else (1.0, 1.0, 1.0, 1.0)
-        color = INK if 0.3 * red + 0.59 * green + 0.11 * blue > 0.5 else "white"
-        axes.text(column, row, text, ha="center", va="bottom" if parts else "center", color=color, fontsize="small")
-        if parts:
-            axes.text(column, row, "\n".join(parts), ha="center", va="top", color=color, fontsize="xx-small")

@@ -19,9 +19,9 @@ import yaml
 from warpchain.files import replacing
 from warpchain.inputs.setup import SECTIONS
 from warpchain.inputs.validation import InputError
+from warpchain.pictures.labels import axis_symbol, cell_text, cell_values, number_text, unit_text, with_unit
 from warpchain.pictures.walk_shape import Walk
 from warpchain.reports.html_page import page, picture, table
-from warpchain.reports.labels import axis_symbol, cell_text, cell_values, number_text, unit_text, with_unit
 from warpchain.status import Status
 from warpchain.store.manifest import Folder, check_not_own
 from warpchain.store.sweep_result import BlockResult, SweepResult, load
@@ -100,7 +100,7 @@ def _cells(result: SweepResult) -> str:
             head, counts = [*head, "not run yet"], [*counts, found.missing]
         rows = [
             [
-                *(_plain(value.item()) for value in cell_values(block, place).values()),
+                *(_plain(value.item()) for value in cell_values(block.axes, place).values()),
                 *(_meters(float(values[place])) for values in (found.mean, found.sd, found.standard_error)),
                 *(f"{values[place]}" for values in counts),
             ]
@@ -123,7 +123,7 @@ def _failed(result: SweepResult) -> str:
         rows = []
         for block in result.blocks.values():
             for *place, sample in np.argwhere(block.columns["status"] == status):
-                index, cell = block.columns["index"][(*place, sample)], cell_text(cell_values(block, place))
+                index, cell = block.columns["index"][(*place, sample)], cell_text(cell_values(block.axes, place))
                 rows.append([f"{index}", *[block.name] * several, cell or "–", f"{sample}"])
         if not rows:
             continue
@@ -145,7 +145,7 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
     block = list(result.blocks.values())[planned.block]
     place = (*planned.cell, planned.sample)
     names = [f"block {block.name}"] * (len(result.blocks) > 1)
-    names += [cell_text(cell_values(block, planned.cell))] * bool(planned.cell)
+    names += [cell_text(cell_values(block.axes, planned.cell))] * bool(planned.cell)
     names += [f"sample {planned.sample}"]
     frames = Recording.of(result.sweep.get("record", {})).frames
     walk: Walk

@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.pictures.labels import cell_values
 from warpchain.pictures.style import BLUE, GREEN, INK, LINE_COLORS, RED
-from warpchain.reports.labels import cell_values
-from warpchain.store.sweep_result import CellStatistics, SweepResult
+from warpchain.store.sweep_result import BlockResult, SweepResult
 
 Array = NDArray[np.float64]
 
@@ -58,17 +58,31 @@ class Series:
         return np.array([[getattr(cell, name) for cell in row] for row in cells])
 
 
+def several(block: BlockResult) -> set[str]:
+    """The axes of a block that have several values."""
+    return {name for name, values in block.axes.items() if len(values) > 1}
+
+
+def has_series(block: BlockResult) -> bool:
+    """Whether nothing but links, frequency and start varies in a block."""
+    return several(block) <= {"links", "frequency", "start"} and "frequency" not in block.drawn
+
+
 def all_series(result: SweepResult, quantity: str = "dx") -> list[Series]:
-    """The series of every block in which nothing but links, frequency and start varies."""
+    """The series of every block in which nothing but links, frequency and start varies.
+
+    Raises:
+        InputError: there is no such column of numbers.
+    """
+    statistics = result.cell_statistics(quantity)
     series: list[Series] = []
     for block, given in zip(result.blocks.values(), result.sweep["blocks"], strict=True):
-        several = {name for name, values in block.axes.items() if len(values) > 1}
-        if not several <= {"links", "frequency", "start"} or "frequency" in block.drawn:
+        if block.name not in statistics or not has_series(block):
             continue
-        found = block.statistics(quantity)
+        found = statistics[block.name]
         by_start: dict[str, dict[tuple[int, float], Cell]] = {}
         for place in np.ndindex(*block.shape[:-1]):
-            at = given["scene"] | cell_values(block, place)
+            at = given["scene"] | cell_values(block.axes, place)
             cells = by_start.setdefault(str(at["start"]), {})
             cells[int(at["links"]), float(at["frequency"])] = Cell(
                 mean=float(found.mean[place]),
@@ -86,11 +100,3 @@ def all_series(result: SweepResult, quantity: str = "dx") -> list[Series]:
                 color = next((other for other in _OTHER_COLORS if all(other != item.color for item in series)), INK)
             series.append(Series(label, color, marker, found.unit, cells))
     return series
-
-
-def lost_note(cells: Sequence[Cell | CellStatistics]) -> str:
-    """Number of walks that are not in the means of some cells; empty if all are."""
-    failed, missing = sum(int(np.sum(cell.failed)) for cell in cells), sum(int(np.sum(cell.missing)) for cell in cells)
-    walks = failed + missing + sum(int(np.sum(cell.count)) for cell in cells)
-    texts = {f"{failed} of {walks} walks failed": failed, f"{missing} of {walks} not run yet": missing}
-    return ", ".join(text for text, count in texts.items() if count)

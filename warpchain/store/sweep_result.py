@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ from warpchain.walks.rows import COLUMNS, MISSING, Column, drawn_column, field_c
 if TYPE_CHECKING:
     import pandas
     import xarray
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
 
 Array = NDArray[Any]
 
@@ -296,6 +298,46 @@ class SweepResult:
         first, *others = self.blocks.values()
         owner = next((block for block in others if name in block.columns or name in block.dims), first)
         return owner.unit(name)
+
+    def cell_statistics(self, quantity: str = "dx") -> dict[str, CellStatistics]:
+        """Name of each block that has a column of numbers → its statistics, see `BlockResult.statistics`.
+
+        Raises:
+            InputError: no block has such a column.
+        """
+        known = {name: None for block in self.blocks.values() for name in block.columns}
+        columns = [name for name in known if name not in ("index", "status")]
+        if quantity not in columns:
+            raise InputError(f"quantity: {shown(quantity)} is no column of numbers; {suggestion(quantity, columns)}")
+        blocks = self.blocks.items()
+        return {name: block.statistics(quantity) for name, block in blocks if quantity in block.columns}
+
+    def plot(
+        self,
+        kind: Literal["lines", "map"] | None = None,
+        quantity: str = "dx",
+        ax: "Axes | None" = None,
+        figure: "Figure | SubFigure | None" = None,
+    ) -> "Figure | SubFigure":
+        """Draw the mean of a quantity over the grids of all blocks, with its standard error.
+
+        Args:
+            kind: `lines` or `map`; None for lines, unless two axes have many values.
+            quantity: a column of numbers, such as `dx`, `walk_time`, `bounces` or a drawn quantity.
+            ax: where to draw a figure of one panel.
+            figure: an empty figure to draw into; by default a new one.
+
+        Returns:
+            The figure, that of `ax` if it is given.
+
+        Raises:
+            InputError: no block has such a column.
+            ValueError: the kind is unknown, `ax` is given together with `figure` or for several panels, or there is
+                nothing to show: no axis of several values, or no walk at rest.
+        """
+        from warpchain.pictures.grid_figure import draw_grid
+
+        return draw_grid(self.cell_statistics(quantity), quantity_of(quantity), kind, ax=ax, figure=figure)
 
     def to_xarray(self) -> "xarray.Dataset | xarray.DataTree":
         """The only block as a data set, or several as a tree with one child each.

@@ -1,0 +1,47 @@
+"""Texts on figures and in tables."""
+
+import numpy as np
+import pytest
+
+from warpchain.pictures.labels import cell_text, number_text, quantity_label, short_texts
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(1e-6, "1e-6"), (3e7, "3e7"), (1e-10, "1e-10"), (0.27, "0.27"), (60, "60"), (1e100, "1e100")]
+)
+def test_number_text(value: float, text: str) -> None:
+    """Numbers are written as people write them."""
+    assert number_text(value) == text
+
+
+@pytest.mark.parametrize(
+    ("values", "texts"),
+    [
+        (np.array([0.01268, 0.0254]), ["0.01268", "0.0254"]),
+        (np.logspace(-3, 0, 3), ["0.001", "0.0316", "1"]),
+        (np.array([1.0000001, 1.0000002]), ["1.0000001", "1.0000002"]),
+        (np.array(["rest", "ellipse"]), ["rest", "ellipse"]),
+        (np.array([True, False]), ["True", "False"]),
+        (np.array([None, 1.0, 10.0]), ["null", "1", "10"]),
+    ],
+)
+def test_short_texts(values: np.ndarray, texts: list[str]) -> None:
+    """Values are exact in six digits, or else as short as they can be told apart."""
+    assert short_texts(values) == texts
+
+
+def test_quantity_label() -> None:
+    """Quantities have the paper's symbols and units, others their names."""
+    assert quantity_label("floor_friction") == "floor friction $μ_\\mathrm{fc}$"
+    assert quantity_label("frequency") == "frequency of the sprocket $ν$ / Hz"
+    assert quantity_label("links") == "number of links $n$"
+    assert quantity_label("settle_time") == "settle time / s"
+    assert quantity_label("preset") == "preset"
+
+
+def test_cell_text() -> None:
+    """Cells are named by symbols, values and units."""
+    text = cell_text({"links": np.int64(60), "frequency": np.float64(7.5), "start": "rest", "self_contact": np.True_})
+    assert text == "n = 60, ν = 7.5 Hz, start = rest, self contact = True"
+    assert cell_text({"coulomb_friction": 1.1e-4, "tolerance": 1e-9}) == "τ_c = 0.00011 N m, tolerance = 1e-9"
+    assert cell_text({}) == ""

@@ -1,0 +1,414 @@
+"""Figures of a quantity over any grid."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tests.support.made_sweeps import TOLERANCE, distance, make_sweep
+from warpchain.cli.main import main
+from warpchain.inputs.validation import InputError
+from warpchain.pictures.grid_panels import MOST_PANELS
+from warpchain.pictures.labels import short_texts
+from warpchain.pictures.style import NothingToShow
+from warpchain.reports.sweep_figures import figures
+from warpchain.status import Status
+from warpchain.store.sweep_result import SweepResult
+from warpchain.sweeps.plan import PlannedWalk
+
+FRICTION = [0.4, 0.1, 0.2, 0.6]
+"""Not in order, as a sweep may give its values."""
+GRAVITY = [1.6, 3.7, 9.8]
+STARTS = ["rest", "spinning", "ellipse"]
+EIGHT = [5, 6, 7, 8, 9, 10, 11, 12]
+NINE = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]
+
+
+def sweep(grid: dict[str, Any] | None = None, **keys: Any) -> dict[str, Any]:
+    """A sweep that draws nothing but the phase; of one block, if a grid is given."""
+    content = {"version": 1, "name": "grids", "seed": 1, "preset": "soft", "samples": 3}
+    content |= {"distributions": {"all": "fixed", "phase": "table"}}
+    return content | ({} if grid is None else {"grid": grid}) | keys
+
+
+def flawed(walk: PlannedWalk) -> float | Status:
+    """All three walks of the second cell fail, one of the third."""
+    return Status.TIME_LIMIT if walk.index in (3, 4, 5, 8) else distance(walk)
+
+
+def panels(figure: Any) -> dict[str, Axes]:
+    """Title → panel."""
+    return {
+        axes.get_title(loc="left"): axes for axes in figure.axes if axes.axison and axes.get_label() != "<colorbar>"
+    }
+
+
+def lines(axes: Axes) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Places and means of the lines of a panel."""
+    return [(np.asarray(line.get_xdata()), np.asarray(line.get_ydata())) for line in axes.lines]
+
+
+def legend_texts(figure: Any) -> list[str]:
+    """Title and entries of the legend of a figure."""
+    (legend,) = figure.legends
+    return [legend.get_title().get_text(), *(text.get_text() for text in legend.get_texts())]
+
+
+# Lines
+
+
+def test_one_axis_is_a_line_with_two_bands(tmp_path: Path) -> None:
+    """The line passes through the means in the order of the values, within bands of standard error and deviation."""
+    result = make_sweep(tmp_path, sweep({"links": [60], "floor_friction": FRICTION}))
+    figure = result.plot()
+    (axes,) = panels(figure).values()
+    order = np.argsort(FRICTION)
+    found = result.statistics()
+    mean, sd, error = (table[0, order] for table in (found.mean, found.sd, found.standard_error))
+    ((places, drawn),) = lines(axes)
+    np.testing.assert_array_equal(places, np.sort(FRICTION))
+    np.testing.assert_array_equal(drawn, mean)
+    bands = [band for band in axes.collections if band.get_paths()]
+    for band, half in zip(bands, (sd, error), strict=True):
+        ends = band.get_paths()[0].vertices
+        for place, low, high in zip(places, mean - half, mean + half, strict=True):
+            here = ends[ends[:, 0] == place, 1]
+            np.testing.assert_allclose([here.min(), here.max()], [low, high])
+    assert figure.get_supxlabel() == "floor friction $μ_\\mathrm{fc}$"
+    assert figure.get_supylabel() == "distance walked $Δx$ / m"
+    assert legend_texts(figure) == ["", "± standard error", "± standard deviation"]
+    assert [text.get_text() for text in axes.get_xticklabels()] == ["0.1", "0.2", "0.4", "0.6"]
+    assert not axes.child_axes and axes.get_xscale() == "linear"
+
+
+def test_decades_are_drawn_on_a_logarithmic_axis(tmp_path: Path) -> None:
+    """Values that are evenly spaced in decades are so on the figure, with their own ticks."""
+    result = make_sweep(tmp_path, sweep({"joint_stiffness": [1e6, 1e7, 1e8]}))
+    (axes,) = panels(result.plot()).values()
+    assert axes.get_xscale() == "log"
+    assert [text.get_text() for text in axes.get_xticklabels()] == ["1e6", "1e7", "1e8"]
+
+
+def test_labels_do_not_cover_one_another(tmp_path: Path) -> None:
+    """Values that are too close for a label of their own have none."""
+    result = make_sweep(tmp_path, sweep({"floor_restitution": [0, 0.001, 0.1, 0.2]}))
+    (axes,) = panels(result.plot()).values()
+    assert [text.get_text() for text in axes.get_xticklabels()] == ["0", "0.1", "0.2"]
+
+
+def test_names_are_points_with_bars(tmp_path: Path) -> None:
+    """Names on the x axis keep their order, and no line connects them."""
+    result = make_sweep(tmp_path, sweep({"start": STARTS}), flawed)
+    (axes,) = panels(result.plot()).values()
+    assert [text.get_text() for text in axes.get_xticklabels()] == STARTS
+    (line,) = axes.lines
+    assert line.get_linestyle() == "None"
+    np.testing.assert_array_equal(line.get_ydata(), result.statistics().mean)
+
+
+def test_cells_without_walks_are_gaps_and_failures_a_strip(tmp_path: Path) -> None:
+    """No mean is drawn of a cell whose walks failed; a strip has the share of failures in each cell."""
+    result = make_sweep(tmp_path, sweep({"floor_friction": [0.1, 0.2, 0.3, 0.4]}), flawed)
+    figure = result.plot()
+    (axes,) = panels(figure).values()
+    ((_, drawn),) = lines(axes)
+    np.testing.assert_array_equal(np.isnan(drawn), [False, True, False, False])
+    np.testing.assert_array_equal(drawn, result.statistics().mean)
+    (strip,) = axes.child_axes
+    np.testing.assert_allclose(strip.lines[0].get_ydata(), [0, 1, 1 / 3, 0])
+    assert axes.get_xlabel() == "4 of 12 walks failed"
+    # The first point stands between gaps, where a band has no width: it has a bar for each.
+    bars = [path.vertices for item in axes.collections for path in item.get_paths() if len(path.vertices) == 2]
+    found = result.statistics()
+    np.testing.assert_allclose(
+        [bar[:, 1] for bar in bars],
+        [[found.mean[0] - half[0], found.mean[0] + half[0]] for half in (found.sd, found.standard_error)],
+    )
+
+
+@pytest.mark.parametrize(
+    ("grid", "along", "across", "title"),
+    [
+        ({"floor_friction": FRICTION, "gravity": GRAVITY}, "gravity", "floor_friction", "$g$ / m/s²"),
+        ({"gravity": GRAVITY, "floor_friction": FRICTION, "links": [60]}, "gravity", "floor_friction", "$g$ / m/s²"),
+        ({"links": [60, 90], "floor_friction": [0.1, 0.2]}, "links", "floor_friction", "$n$"),
+        ({"start": STARTS, "floor_friction": [0.2, 0.1]}, "start", "floor_friction", "start"),
+        ({"soften_drive": [True, False], "frequency": [10, 20]}, "soften_drive", "frequency", "soften drive"),
+        ({"links": [60, 90, 120], "frequency": [10, 20]}, "frequency", "links", "$ν$ / Hz"),
+    ],
+)
+def test_two_axes_are_lines(tmp_path: Path, grid: dict[str, Any], along: str, across: str, title: str) -> None:
+    """The shorter axis gives the lines, names always do; the legend has symbol, unit and short values."""
+    result = make_sweep(tmp_path, sweep(grid), flawed)
+    figure = result.plot()
+    (axes,) = panels(figure).values()
+    means = result.statistics().mean
+    rows, columns = (np.arange(len(grid[name])) for name in (along, across))
+    rows = rows if isinstance(grid[along][0], str | bool) else np.argsort(grid[along])
+    columns = np.argsort(grid[across])
+    table = means.squeeze()
+    expected = (table.T if list(grid).index(across) < list(grid).index(along) else table)[np.ix_(rows, columns)]
+    for (places, drawn), mean in zip(lines(axes), expected, strict=True):
+        np.testing.assert_array_equal(places, np.sort(grid[across]))
+        np.testing.assert_array_equal(drawn, mean)
+    assert legend_texts(figure) == [title, *short_texts(np.array(grid[along])[rows]), "± standard error"]
+    handles = figure.legends[0].legend_handles[:-1]
+    assert [handle.get_color() for handle in handles] == [line.get_color() for line in axes.lines]
+
+
+def test_two_axes_of_names_stand_side_by_side(tmp_path: Path) -> None:
+    """Points of several lines at one name do not cover one another."""
+    result = make_sweep(tmp_path, sweep({"start": STARTS, "soften_drive": [True, False]}))
+    (axes,) = panels(result.plot()).values()
+    drawn = lines(axes)
+    np.testing.assert_array_equal([mean for _, mean in drawn], result.statistics().mean.T)
+    np.testing.assert_allclose(np.mean([places for places, _ in drawn], axis=0), [0, 1, 2])
+    assert (drawn[0][0] < drawn[1][0]).all()
+
+
+def test_three_axes_are_small_multiples(tmp_path: Path) -> None:
+    """The shortest axis gives the panels; all have the same axes and colours."""
+    grid = {"floor_friction": FRICTION, "start": ["rest", "ellipse"], "gravity": GRAVITY}
+    result = make_sweep(tmp_path, sweep(grid), flawed)
+    figure = result.plot()
+    drawn = panels(figure)
+    assert list(drawn) == ["start = rest", "start = ellipse"]
+    means = result.statistics().mean[np.argsort(FRICTION)]
+    for number, axes in enumerate(drawn.values()):
+        np.testing.assert_array_equal([mean for _, mean in lines(axes)], means[:, number].T)
+    assert len({(axes.get_xlim(), axes.get_ylim()) for axes in drawn.values()}) == 1
+    lost = [axes.get_xlabel() for axes in drawn.values()]
+    assert lost == ["4 of 36 walks failed", ""]
+    assert legend_texts(figure) == ["$g$ / m/s²", "1.6", "3.7", "9.8", "± standard error"]
+
+
+def test_further_axes_are_panels(tmp_path: Path) -> None:
+    """Four axes give a panel for each pair of values of two of them; of very many, some are chosen and counted."""
+    grid = {"links": [60, 90], "start": ["rest", "ellipse"], "gravity": GRAVITY, "floor_friction": FRICTION}
+    drawn = panels(make_sweep(tmp_path / "four", sweep(grid)).plot())
+    assert list(drawn) == [f"$n$ = {n}, start = {start}" for n in (60, 90) for start in ("rest", "ellipse")]
+    grid = {name: list(range(1, 1 + MOST_PANELS + 2)) for name in ("gravity", "settle_time", "walk_limit")}
+    figure = make_sweep(tmp_path / "many", sweep(grid, samples=1), lambda walk: 1.0 + walk.index).plot()
+    assert len(panels(figure)) == MOST_PANELS
+    assert isinstance(figure, Figure) and figure.get_suptitle() == "24 of 26 panels, chosen evenly"
+
+
+# Maps
+
+
+def test_two_long_axes_are_a_map(tmp_path: Path) -> None:
+    """The longer axis runs along x; cells without walks are empty; dots and the legend tell of failures."""
+    result = make_sweep(tmp_path, sweep({"gravity": EIGHT, "floor_friction": NINE}), flawed)
+    figure = result.plot()
+    (axes,) = panels(figure).values()
+    found = result.statistics()
+    np.testing.assert_array_equal(np.ma.filled(axes.images[0].get_array(), np.nan), found.mean)
+    assert np.isnan(found.mean[0, 1])
+    assert (
+        figure.get_supxlabel() == "floor friction $μ_\\mathrm{fc}$" and figure.get_supylabel() == "gravity $g$ / m/s²"
+    )
+    (dots,) = axes.collections
+    np.testing.assert_array_equal(dots.get_offsets(), [[1, 0], [2, 0]])
+    areas = np.square(dots.get_widths())
+    assert areas[1] / areas[0] == pytest.approx(1 / 3)
+    assert legend_texts(figure) == ["", "share of walks failed"]
+    (bar,) = [axes for axes in figure.axes if axes.get_label() == "<colorbar>"]
+    assert bar.get_ylabel() == "distance walked $Δx$ / m"
+
+
+def test_a_third_axis_gives_maps_in_common_colours(tmp_path: Path) -> None:
+    """One map for each value of the shortest axis, and one scale of colours."""
+    result = make_sweep(tmp_path, sweep({"gravity": EIGHT, "floor_friction": NINE, "links": [60, 90]}))
+    drawn = panels(result.plot())
+    assert list(drawn) == ["$n$ = 60", "$n$ = 90"]
+    means = result.statistics().mean
+    for number, axes in enumerate(drawn.values()):
+        np.testing.assert_array_equal(axes.images[0].get_array(), means[:, :, number])
+        assert axes.images[0].get_clim() == (means.min(), means.max())
+
+
+def test_a_small_map_has_numbers(tmp_path: Path) -> None:
+    """A map may be asked for; with few cells it has means and failures in numbers."""
+    result = make_sweep(tmp_path, sweep({"gravity": GRAVITY, "floor_friction": [0.1, 0.2]}), flawed)
+    (axes,) = panels(result.plot("map")).values()
+    texts = [text.get_text() for text in axes.texts]
+    assert f"{result.statistics().mean[0, 0]:.3g}" in texts and "–" in texts and "3 failed" in texts
+
+
+def test_lines_may_be_asked_for(tmp_path: Path) -> None:
+    """More lines than usual have colours of their own."""
+    result = make_sweep(tmp_path, sweep({"gravity": EIGHT, "floor_friction": NINE}, samples=1))
+    (axes,) = panels(result.plot("lines")).values()
+    assert len({line.get_color() for line in axes.lines}) == len(axes.lines) == len(EIGHT)
+
+
+# Blocks, quantities, places to draw
+
+
+def test_blocks_are_panels(tmp_path: Path) -> None:
+    """Blocks of the same axes are named and have common colours, others are told apart by their axes."""
+    blocks = [
+        {"name": "rest", "grid": {"links": [60, 90], "frequency": [10, 20, 30]}},
+        {"name": "ellipse", "scene": {"start": "ellipse"}, "grid": {"links": [90], "frequency": [10, 20, 30]}},
+        {"name": "spinning", "scene": {"start": "spinning"}, "grid": {"links": [90, 120], "frequency": [10, 20, 30]}},
+        {"name": "one_cell"},
+    ]
+    result = make_sweep(tmp_path, sweep(blocks=blocks))
+    figure = result.plot()
+    drawn = panels(figure)
+    assert list(drawn) == ["rest", "", "spinning"]
+    for name, axes in (("rest", drawn["rest"]), ("spinning", drawn["spinning"])):
+        np.testing.assert_array_equal([mean for _, mean in lines(axes)], result.blocks[name].statistics().mean)
+    assert drawn["rest"].lines[1].get_color() == drawn["spinning"].lines[0].get_color()
+    assert legend_texts(figure)[:4] == ["$n$", "60", "90", "120"]
+
+
+def test_any_column_of_numbers(tmp_path: Path) -> None:
+    """Columns are drawn in their units; drawn quantities have the symbols of what is drawn."""
+    content = sweep({"gravity": GRAVITY}, distributions={"all": "fixed", "floor_friction": "table"})
+    result = make_sweep(tmp_path, content)
+    for quantity, label in (
+        ("walk_time", "walk time / s"),
+        ("bounces", "bounces"),
+        ("floor_friction_drawn", "floor friction $μ_\\mathrm{fc}$"),
+    ):
+        figure = result.plot(quantity=quantity)
+        assert figure.get_supylabel() == label
+        ((_, drawn),) = lines(*panels(figure).values())
+        np.testing.assert_array_equal(drawn, result.statistics(quantity).mean)
+    for name in ("status", "index", "gravity", "walk_tim"):
+        with pytest.raises(InputError, match=rf"^quantity: '{name}' is no column of numbers; "):
+            result.plot(quantity=name)
+
+
+def test_a_figure_or_axes_may_be_given(tmp_path: Path) -> None:
+    """A figure is drawn into given axes with labels and legend of their own, or into a given figure."""
+    result = make_sweep(tmp_path, sweep({"gravity": GRAVITY, "floor_friction": FRICTION}))
+    figure = Figure()
+    left, right = figure.subplots(1, 2)
+    assert result.plot(ax=right) is figure
+    assert not left.lines and len(right.lines) == 3 and right.get_legend() is not None
+    assert right.get_xlabel() == "floor friction $μ_\\mathrm{fc}$" and right.get_ylabel() == "distance walked $Δx$ / m"
+    other = Figure()
+    assert result.plot(figure=other) is other and other.axes
+
+
+def test_what_cannot_be_drawn_is_refused(tmp_path: Path) -> None:
+    """The reason is one line."""
+    one_axis = make_sweep(tmp_path / "a", sweep({"gravity": GRAVITY}))
+    one_cell = make_sweep(tmp_path / "b", sweep({"gravity": [9.8]}))
+    failed = make_sweep(tmp_path / "c", sweep({"gravity": GRAVITY}), lambda walk: Status.NOT_FINITE)
+    several = make_sweep(tmp_path / "d", sweep({"links": [60, 90], "gravity": GRAVITY, "floor_friction": FRICTION}))
+    for result, settings, reason in (
+        (one_axis, {"kind": "bars"}, "kind: 'bars' is unknown; give 'lines', 'map' or None"),
+        (one_axis, {"kind": "map"}, "a figure of a grid takes a block with two axes of several values"),
+        (one_cell, {}, "a figure of a grid takes a block with an axis of several values"),
+        (failed, {}, "no walk has come to rest"),
+        (several, {"ax": Figure().subplots()}, "ax: this figure has 2 panels; leave ax out, or give figure"),
+        (one_axis, {"ax": Figure().subplots(), "figure": Figure()}, "ax: given together with figure; leave one out"),
+    ):
+        with pytest.raises(ValueError) as problem:
+            result.plot(**settings)
+        assert str(problem.value) == reason
+    with pytest.raises(NothingToShow):
+        one_cell.plot()
+
+
+# All figures of a sweep
+
+
+@pytest.mark.parametrize(
+    ("grid", "names"),
+    [
+        ({"gravity": GRAVITY}, ["responses"]),
+        ({"start": STARTS}, ["responses"]),
+        ({"links": [60, 90]}, ["figure6", "responses"]),
+        ({"frequency": [10, 20]}, ["figure6"]),
+        ({"tolerance": [1e-6, 1e-9]}, ["responses"]),
+        ({"links": [60, 90], "start": ["rest", "ellipse"]}, ["figure6", "against_links_and_start"]),
+        ({"links": [60, 90], "frequency": [10, 20], "start": ["rest", "ellipse"]}, ["figure6", "heat_map"]),
+        ({"links": [60, 90], "frequency": [10, 20], "gravity": GRAVITY}, ["against_gravity"]),
+        (
+            {"links": [60, 90], "frequency": [10, 20], "soften_drive": [True, False]},
+            ["against_links_and_frequency_and_soften_drive"],
+        ),
+        ({"links": [60, 90], "floor_friction": FRICTION}, ["against_links_and_floor_friction"]),
+        ({"gravity": GRAVITY, "method": ["os32", "dp5"]}, ["against_gravity_and_method"]),
+        ({"gravity": EIGHT, "floor_friction": NINE}, ["against_gravity_and_floor_friction"]),
+    ],
+)
+def test_every_grid_has_a_figure(tmp_path: Path, grid: dict[str, Any], names: list[str]) -> None:
+    """What no special figure shows has a figure of its grid; all can be drawn."""
+    pictures = list(figures(make_sweep(tmp_path, sweep(grid), flawed)))
+    assert [picture.name for picture in pictures] == [*names, "status_counts"]
+    for picture in pictures:
+        picture.figure.savefig(tmp_path / "picture.png", dpi=40)
+
+
+def test_responses_are_panels_of_all_blocks_that_vary_one_quantity(tmp_path: Path) -> None:
+    """A panel for each such block, numbers or names, with its own x axis and its own lost walks."""
+    blocks = [
+        {"name": "friction", "grid": {"floor_friction": [0.135, 0.27, 0.54]}},
+        {"name": "stiffness", "grid": {"joint_stiffness": [1e6, 1e7]}},
+        {"name": "preset", "grid": {"preset": ["soft", "paper"]}},
+        {"name": "figure6", "grid": {"frequency": [10, 20]}},
+    ]
+
+    def outcome(walk: PlannedWalk) -> float | Status | None:
+        return {9: Status.NOT_FINITE, 10: None}.get(walk.index, distance(walk))
+
+    result = make_sweep(tmp_path, sweep(blocks=blocks), outcome)
+    (picture,) = [picture for picture in figures(result) if picture.name == "responses"]
+    friction, stiffness, presets = picture.figure.axes
+    assert friction.get_xlabel() == "floor friction $μ_\\mathrm{fc}$"
+    assert stiffness.get_xlabel() == "joint stiffness $k$ / N/m\n1 of 6 walks failed, 1 of 6 not run yet"
+    assert [text.get_text() for text in presets.get_xticklabels()] == ["soft", "paper"]
+    np.testing.assert_array_equal(lines(friction)[0][1], result.blocks["friction"].statistics().mean)
+    assert picture.caption.startswith("Distance walked against the one quantity that a block varies: means")
+
+
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a sweep over links, frequency and tolerance."""
+    folder = tmp_path_factory.mktemp("compared")
+    make_sweep(folder, TOLERANCE)
+    return folder
+
+
+def run_plot(*arguments: str | Path) -> int:
+    """`warpchain plot`; its exit status."""
+    with pytest.raises(SystemExit) as end:
+        main(["plot", *map(str, arguments)])
+    return int(end.value.code or 0)
+
+
+def test_plot_draws_another_quantity(compared: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Figures of another column have its name, and those of the distance alone are not written."""
+    assert run_plot(compared, "-o", tmp_path, "--quantity", "walk_time") == 0
+    written = capsys.readouterr().out.split()
+    assert written == [str(path) for path in tmp_path.iterdir()]
+    assert [Path(path).name for path in written] == ["against_links_and_frequency_and_tolerance_walk_time.png"]
+    assert run_plot(compared, "-o", tmp_path) == 0
+    assert [Path(path).name for path in capsys.readouterr().out.split()] == ["tolerance.png", "status_counts.png"]
+
+
+def test_plot_refuses_an_unknown_quantity(compared: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The reason is one line with the closest name; nothing is written."""
+    assert run_plot(compared, "-o", tmp_path, "--quantity", "bouncs") == 2
+    assert "quantity: 'bouncs' is no column of numbers; did you mean bounces?" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_results_have_statistics_of_all_blocks(tmp_path: Path) -> None:
+    """Blocks that do not draw a quantity have no statistics of it."""
+    blocks = [
+        {"name": "a", "grid": {"gravity": GRAVITY}},
+        {"name": "b", "distributions": {"floor_friction": "table"}, "grid": {"gravity": GRAVITY}},
+    ]
+    result: SweepResult = make_sweep(tmp_path, sweep(blocks=blocks))
+    assert list(result.cell_statistics()) == ["a", "b"]
+    assert list(result.cell_statistics("floor_friction_drawn")) == ["b"]
+    assert list(panels(result.plot(quantity="floor_friction_drawn"))) == [""]

@@ -1,0 +1,313 @@
+"""A quantity over a grid of any number of axes: lines with error bands, or maps; cells without walks are gaps."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import NullLocator, PercentFormatter
+from numpy.typing import NDArray
+
+from warpchain.pictures.grid_panels import MOST_LINES, Axis, Cells, Kind, Panel, grid_panels, line_values
+from warpchain.pictures.labels import (
+    lost_note,
+    math_symbol,
+    quantity_label,
+    quantity_text,
+    short_texts,
+    unit_text,
+    with_unit,
+)
+from warpchain.pictures.maps import draw_failed, draw_map, write_values
+from warpchain.pictures.style import BLUE, FAINT, LINE_COLORS, RED, label_room, panel_grid, tidy
+
+Array = NDArray[Any]
+
+_MOST_NUMBERS: Final = 60
+"""Greatest number of cells of a single map with numbers in them."""
+
+_MOST_TICKS: Final = 8
+"""Up to so many values have a tick each, as far as there is room."""
+
+_DECADES: Final = 30
+"""From such a ratio of the greatest value to the least on, an axis is logarithmic if its values are more even so."""
+
+_DEEP, _LIGHT = 0.35, 0.13
+"""Opacity of the bands of one standard error and one standard deviation."""
+
+_PANEL_SIZES: Final = {1: (5.2, 3.6), 2: (3.6, 2.9), 3: (3.0, 2.6), 4: (2.6, 2.4)}
+"""Number of columns → width and height of a panel [inches]."""
+
+
+def draw_grid(
+    blocks: Mapping[str, Cells],
+    quantity: str = "dx",
+    kind: Kind | None = None,
+    *,
+    ax: Axes | None = None,
+    figure: Figure | SubFigure | None = None,
+) -> Figure | SubFigure:
+    """Draw a quantity over the grids of one block or several.
+
+    Lines have a band of one standard error; a single line has a lighter one of one standard deviation, too. Names on
+    the x axis have bars instead. Where walks failed, a strip above the lines shows which share of them, in a map a dot.
+
+    Args:
+        blocks: name of each block → the statistics of its cells.
+        quantity: name of the quantity, for labels.
+        kind: `lines` or `map`; None for what shows a grid best.
+        ax: where to draw a figure of one panel.
+        figure: an empty figure to draw into; by default a new one.
+
+    Returns:
+        The figure.
+
+    Raises:
+        ValueError: the kind is unknown, or `ax` is given together with `figure` or for several panels.
+        NothingToShow: no block has an axis of several values, or two for a map, or no walk has come to rest.
+    """
+    if kind not in (None, "lines", "map"):
+        raise ValueError(f"kind: {kind!r} is unknown; give 'lines', 'map' or None")
+    if ax is not None and figure is not None:
+        raise ValueError("ax: given together with figure; leave one out")
+    panels, left_out = grid_panels(blocks, kind)
+    label = with_unit(quantity_text(quantity), next(iter(blocks.values())).unit)
+    if ax is not None:
+        if len(panels) > 1:
+            raise ValueError(f"ax: this figure has {len(panels)} panels; leave ax out, or give figure")
+        _draw_panels([ax], panels, label)
+        _label(None, [ax], panels, label)
+        _draw_legends(ax, [ax], panels)
+        return ax.figure
+    columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
+    figure = Figure(figsize=_size(panels, columns), layout="constrained") if figure is None else figure
+    alike = _are_alike(panels)
+    sharey = alike or all(panel.kind == "lines" for panel in panels)
+    areas, _ = panel_grid(figure, len(panels), columns, sharex=alike, sharey=sharey)
+    _draw_panels(areas, panels, label)
+    _set_limits(areas, panels)
+    _label(figure, areas, panels, label)
+    if left_out:
+        figure.suptitle(
+            f"{len(panels)} of {len(panels) + left_out} panels, chosen evenly", fontsize="medium", color=RED
+        )
+    beside = any(panel.along for panel in panels if panel.kind == "lines")
+    place = "outside right upper" if beside else "outside upper right"
+    _draw_legends(figure, areas, panels, loc=place, ncols=1 if beside else 2)
+    return figure
+
+
+def _draw_panels(areas: Sequence[Axes], panels: Sequence[Panel], label: str) -> None:
+    """Draw all panels; `label` is that of the colours of maps."""
+    values = line_values(panels)
+    most_failed = max(float(panel.failed_share.max()) for panel in panels)
+    maps = [(axes, panel) for axes, panel in zip(areas, panels, strict=True) if panel.kind == "map"]
+    for axes, panel in zip(areas, panels, strict=True):
+        axes.set_title(panel.title, fontsize="medium", loc="left")
+        if panel.kind == "lines":
+            colors = _colors(panel, values)
+            _draw_lines(axes, panel, colors)
+            _set_ticks(axes, panel.across, panels)
+            if panel.failed.any():
+                _draw_failed_strip(axes, panel, colors, most_failed)
+    if maps:
+        _draw_maps(maps, label, with_numbers=_has_numbers(panels))
+
+
+def _has_numbers(panels: Sequence[Panel]) -> bool:
+    """Whether there is just one map, with room for numbers."""
+    return len(panels) == 1 and panels[0].mean.size <= _MOST_NUMBERS
+
+
+def _size(panels: Sequence[Panel], columns: int) -> tuple[float, float]:
+    """Width and height of a figure [inches]."""
+    width, height = _PANEL_SIZES[columns]
+    beside = 1.3 if any(panel.along for panel in panels) else 0.0
+    above = 0.0 if beside else 0.3
+    return max(4.2, beside + width * columns), above + 0.3 + height * -(-len(panels) // columns)
+
+
+def _palette(count: int) -> list[str]:
+    """So many colours, from dark to light if there are more than can be told apart otherwise."""
+    if count <= MOST_LINES:
+        return list(LINE_COLORS[:count])
+    return [to_hex(color) for color in colormaps["viridis"](np.linspace(0.0, 0.95, count))]
+
+
+def _colors(panel: Panel, values: Mapping[str, Array]) -> list[str]:
+    """Colour of each line of a panel, given the values of all panels: each has the same colour everywhere."""
+    if panel.along is None:
+        return [BLUE]
+    shared = values[panel.along.name].tolist()
+    palette = _palette(len(shared))
+    return [palette[shared.index(value)] for value in panel.along.values.tolist()]
+
+
+def _places(panel: Panel) -> list[Array]:
+    """Places along x of each line; names have the points of several lines side by side."""
+    count = len(panel.mean)
+    shifts = np.zeros(count) if panel.across.is_numeric else (np.arange(count) - (count - 1) / 2) * 0.7 / count
+    return [panel.across.places + shift for shift in shifts]
+
+
+def _draw_lines(axes: Axes, panel: Panel, colors: Sequence[str]) -> None:
+    """The lines of a panel with their bands, or points with bars where x has names."""
+    is_numeric = panel.across.is_numeric
+    for places, color, mean, sd, error in zip(
+        _places(panel), colors, panel.mean, panel.sd, panel.standard_error, strict=True
+    ):
+        bands = [(error, _DEEP, 3.5)] if panel.along else [(sd, _LIGHT, 7.0), (error, _DEEP, 3.5)]
+        for half, opacity, width in bands:
+            style: dict[str, Any] = {"color": color, "alpha": opacity}
+            barred = np.isfinite(half)
+            if is_numeric:
+                axes.fill_between(places, mean - half, mean + half, linewidth=0, **style)
+                # A band between gaps has no width: such a point has a bar.
+                beside = np.pad(barred, 1)
+                barred &= ~beside[:-2] & ~beside[2:]
+            low, high = (mean - half)[barred], (mean + half)[barred]
+            axes.vlines(places[barred], low, high, linewidth=width, **style)
+        axes.plot(places, mean, "o-" if is_numeric else "o", markersize=3.5, linewidth=1.2, color=color)
+    tidy(axes, grid="y")
+
+
+def _set_ticks(axes: Axes, across: Axis, panels: Sequence[Panel]) -> None:
+    """Scale and ticks of the x axis, for the values that all panels have on this axis."""
+    if not across.is_numeric:
+        axes.set_xticks(across.places, across.texts)
+        axes.set_xlim(-0.6, len(across.values) - 0.4)
+        if len(across.values) > label_room(axes, across.texts)[0]:
+            axes.tick_params(axis="x", rotation=30)
+        return
+    values = np.unique(np.concatenate([item.across.values for item in panels if item.across.name == across.name]))
+    placed = values.astype(float)
+    if values[0] > 0 and values[-1] >= _DECADES * values[0] and _unevenness(np.log(placed)) <= _unevenness(placed):
+        axes.set_xscale("log")
+        placed = np.log(placed)
+    if len(values) <= _MOST_TICKS:
+        texts = short_texts(values)
+        needed = float(np.ptp(placed)) / label_room(axes, texts)[0]
+        last = len(values) - 1
+        shown = [0]
+        for number in range(1, last):
+            if placed[number] - placed[shown[-1]] >= needed <= placed[last] - placed[number]:
+                shown.append(number)
+        shown.append(last)
+        axes.set_xticks(values[shown], [texts[number] for number in shown])
+        axes.xaxis.set_minor_locator(NullLocator())
+    elif axes.get_xscale() == "linear":
+        axes.ticklabel_format(axis="x", scilimits=(-3, 4))
+
+
+def _unevenness(places: Array) -> float:
+    """Coefficient of variation of the gaps."""
+    gaps = np.diff(places)
+    return float(gaps.std() / gaps.mean())
+
+
+def _draw_failed_strip(axes: Axes, panel: Panel, colors: Sequence[str], most: float) -> None:
+    """A strip above a panel with the share of the walks that failed, up to the greatest of all panels."""
+    strip = axes.inset_axes((0.0, 1.04, 1.0, 0.16), sharex=axes)
+    line = "o-" if panel.across.is_numeric else "o"
+    for places, color, share in zip(_places(panel), colors, panel.failed_share, strict=True):
+        strip.plot(places, share, line, color=color if panel.along else RED, linewidth=0.8, markersize=2.5)
+    strip.set_ylim(-0.1 * most, 1.1 * most)
+    strip.set_yticks([0.0, most])
+    strip.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=None if most < 0.01 else 0))
+    strip.set_ylabel("failed", fontsize="small", color=RED)
+    strip.tick_params(labelbottom=False, labelsize="x-small")
+    tidy(strip)
+
+
+def _draw_maps(maps: Sequence[tuple[Axes, Panel]], label: str, *, with_numbers: bool) -> None:
+    """Maps in common colours, whose meaning is the label."""
+    known = np.concatenate([panel.mean[np.isfinite(panel.mean)] for _, panel in maps])
+    colors = {"vmin": known.min(), "vmax": known.max(), "cmap": "viridis"} if len(known) else {}
+    for axes, panel in maps:
+        assert panel.along is not None
+        image = draw_map(axes, panel.mean, panel.across.texts, panel.along.texts, **colors)
+        if with_numbers:
+            write_values(axes, image, panel.mean, panel.count, panel.failed, panel.missing)
+        else:
+            draw_failed(axes, panel.failed_share)
+    areas = [axes for axes, _ in maps]
+    areas[0].figure.colorbar(image, ax=areas, label=label).outline.set_visible(False)
+
+
+def _set_limits(areas: Sequence[Axes], panels: Sequence[Panel]) -> None:
+    """Give all lines the same y axis, from zero if the values need more than half of that."""
+    ends = [
+        [panel.mean - half, panel.mean + half]
+        for panel in panels
+        if panel.kind == "lines"
+        for half in (np.nan_to_num(panel.standard_error if panel.along else panel.sd),)
+    ]
+    if not ends or not np.isfinite(known := np.concatenate(ends, axis=None)).any():
+        return
+    low, high = np.nanmin(known), np.nanmax(known)
+    if 0 <= low < 0.5 * high:
+        low = 0.0
+    margin = 0.05 * (high - low)
+    for axes, panel in zip(areas, panels, strict=True):
+        if panel.kind == "lines" and margin > 0:
+            axes.set_ylim(low - margin * (low != 0), high + margin)
+
+
+def _label(figure: Figure | SubFigure | None, areas: Sequence[Axes], panels: Sequence[Panel], label: str) -> None:
+    """Label axes: common ones once for the figure, if there is one, others at each panel; say which walks are lost."""
+    alike = figure is not None and _are_alike(panels)
+    all_lines = figure is not None and all(panel.kind == "lines" for panel in panels)
+    for axes, panel in zip(areas, panels, strict=True):
+        across, note = quantity_label(panel.across.name), lost_note([panel])
+        rows = quantity_label(panel.along.name) if panel.kind == "map" and panel.along else label
+        if alike:
+            axes.set_xlabel(note, color=RED, fontsize="small")
+        else:
+            axes.set_xlabel(f"{across}\n{note}" if note else across)
+        if not alike and not all_lines:
+            axes.set_ylabel(rows)
+    if figure is not None and alike:
+        figure.supxlabel(across, fontsize="medium")
+    if figure is not None and (alike or all_lines):
+        figure.supylabel(rows, fontsize="medium")
+
+
+def _are_alike(panels: Sequence[Panel]) -> bool:
+    """Whether all panels have the same axes."""
+    return len({panel.signature for panel in panels}) == 1
+
+
+def _draw_legends(
+    owner: Axes | Figure | SubFigure, areas: Sequence[Axes], panels: Sequence[Panel], **place: Any
+) -> None:
+    """One legend of all panels; if their lines are of several axes, each panel has one of its own, too."""
+    values = line_values(panels)
+    settings: dict[str, Any] = {"frameon": False, "fontsize": "small"}
+    title, handles = _line_handles(*next(iter(values.items()))) if len(values) == 1 else (None, [])
+    for axes, panel in zip(areas, panels, strict=True):
+        if len(values) > 1 and panel.kind == "lines" and panel.along:
+            own, lines = _line_handles(panel.along.name, values[panel.along.name])
+            axes.legend(handles=lines, title=own, **settings)
+    if any(panel.kind == "lines" for panel in panels):
+        handles.append(Patch(color=(FAINT, _DEEP), linewidth=0, label="± standard error"))
+    if any(panel.along is None for panel in panels):
+        handles.append(Patch(color=(FAINT, _LIGHT), linewidth=0, label="± standard deviation"))
+    if not _has_numbers(panels) and any(panel.kind == "map" and panel.failed.any() for panel in panels):
+        handles.append(Line2D([], [], color=RED, marker="o", linestyle="", label="share of walks failed"))
+    if handles:
+        owner.legend(handles=handles, title=title, **settings, **place)
+
+
+def _line_handles(name: str, values: Array) -> tuple[str, list[Line2D | Patch]]:
+    """Title and entries of the legend of lines."""
+    handles: list[Line2D | Patch] = [
+        Line2D([], [], color=color, marker="o", markersize=3.5, label=text)
+        for color, text in zip(_palette(len(values)), short_texts(values), strict=True)
+    ]
+    return with_unit(math_symbol(name), unit_text(name)), handles

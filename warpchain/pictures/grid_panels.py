@@ -1,0 +1,190 @@
+"""How a grid of any number of axes becomes panels of lines or maps.
+
+The longest axis of numbers runs along x. The next one gives the lines, or the rows of a map if both have many values;
+all other axes give panels.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.pictures.labels import Counts, math_symbol, short_texts, unit_text
+from warpchain.pictures.style import LINE_COLORS, NothingToShow
+
+Array = NDArray[Any]
+
+Kind = Literal["lines", "map"]
+
+MOST_LINES: Final = len(LINE_COLORS)
+"""Greatest number of lines in a panel, unless lines are asked for."""
+
+MOST_PANELS: Final = 24
+"""Greatest number of panels of a block; of more, so many are chosen evenly."""
+
+
+@dataclass(frozen=True, match_args=False, kw_only=True)  # frozen: its attributes are only read
+class Cells(Counts, Protocol):
+    """Statistics of a quantity in each cell of a grid; arrays over its axes.
+
+    Attributes:
+        axes: name of each axis → its values.
+        unit: unit of the quantity.
+        mean: mean of the walks at rest; NaN without any.
+        sd: standard deviation; NaN with fewer than two.
+    """
+
+    axes: dict[str, Array]
+    unit: str
+    mean: Array
+    sd: Array
+
+    @property
+    def standard_error(self) -> Array:
+        """Standard error of the mean; NaN with fewer than two walks at rest."""
+        ...
+
+
+@dataclass(frozen=True)
+class Axis:
+    """An axis of a grid: numbers in rising order, or names in the order given."""
+
+    name: str
+    values: Array
+
+    @property
+    def is_numeric(self) -> bool:
+        """Whether the values are numbers."""
+        return self.values.dtype.kind in "if"
+
+    @property
+    def places(self) -> Array:
+        """Where the values are in a panel; names are spaced evenly."""
+        return self.values if self.is_numeric else np.arange(len(self.values))
+
+    @property
+    def texts(self) -> list[str]:
+        """The values, written short."""
+        return short_texts(self.values)
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One panel. Arrays have the shape (values of `along`, values of `across`), with one row if `along` is None.
+
+    Attributes:
+        kind: lines, or a map.
+        across: the x axis.
+        along: the axis of the lines, or the y axis of a map; None for a single line.
+        title: what else the cells have in common.
+        mean: see `Cells`, as the others.
+    """
+
+    kind: Kind
+    across: Axis
+    along: Axis | None
+    title: str
+    mean: Array
+    sd: Array
+    standard_error: Array
+    count: Array
+    failed: Array
+    missing: Array
+
+    @property
+    def failed_share(self) -> Array:
+        """Share of the walks of a cell that failed, of those that were run."""
+        share: Array = self.failed / np.maximum(self.count + self.failed, 1)
+        return share
+
+    @property
+    def signature(self) -> tuple[object, ...]:
+        """Equal for panels that can have common axes."""
+        axes = [axis for axis in (self.across, self.along) if axis is not None]
+        placed = [axis for axis in axes if self.kind == "map" or (axis is self.across and not axis.is_numeric)]
+        return self.kind, *(axis.name for axis in axes), *(tuple(axis.values.tolist()) for axis in placed)
+
+
+def grid_panels(blocks: Mapping[str, Cells], kind: Kind | None) -> tuple[list[Panel], int]:
+    """The panels of all blocks, and the number of those that are left out because there are too many.
+
+    Args:
+        blocks: name of each block → the statistics of its cells.
+        kind: of all panels; None for what shows a grid best.
+
+    Raises:
+        NothingToShow: no block has an axis of several values, or two for a map, or no walk has come to rest.
+    """
+    several = [frozenset(_axes(cells)) for cells in blocks.values()]
+    panels: list[Panel] = []
+    left_out = 0
+    for (name, cells), own in zip(blocks.items(), several, strict=True):
+        found = list(_panels(cells, kind, name if several.count(own) > 1 else ""))
+        if found:
+            chosen = np.unique(np.linspace(0, len(found) - 1, MOST_PANELS).round().astype(int))
+            panels += [found[number] for number in chosen]
+            left_out += len(found) - len(chosen)
+    if not panels:
+        axes = "two axes of several values" if kind == "map" else "an axis of several values"
+        raise NothingToShow(f"a figure of a grid takes a block with {axes}")
+    if not any(np.isfinite(panel.mean).any() for panel in panels):
+        raise NothingToShow("no walk has come to rest")
+    return panels, left_out
+
+
+def line_values(panels: Iterable[Panel]) -> dict[str, Array]:
+    """Each axis that gives lines → its values in all panels."""
+    found: dict[str, Array] = {}
+    for panel in panels:
+        if panel.along is not None and panel.kind == "lines":
+            earlier = found.get(panel.along.name, panel.along.values[:0])
+            values = dict.fromkeys([*earlier.tolist(), *panel.along.values.tolist()])
+            found[panel.along.name] = np.array(sorted(values) if panel.along.is_numeric else list(values))
+    return found
+
+
+def _axes(cells: Cells) -> dict[str, Axis]:
+    """The axes of several values, by name."""
+    axes = (Axis(name, np.asarray(values)) for name, values in cells.axes.items() if len(values) > 1)
+    return {axis.name: Axis(axis.name, np.sort(axis.values)) if axis.is_numeric else axis for axis in axes}
+
+
+def _panels(cells: Cells, kind: Kind | None, block: str) -> Iterator[Panel]:
+    """The panels of a block; titles begin with `block`, if it is not empty."""
+    axes = _axes(cells)
+    if len(axes) < (2 if kind == "map" else 1):
+        return
+    chosen, across, along, others = _roles(list(axes.values()), kind)
+    order = [list(axes).index(axis.name) for axis in (*others, along, across) if axis is not None]
+
+    def arranged(table: Array) -> Array:
+        for number, (name, values) in enumerate(cells.axes.items()):
+            if name in axes and axes[name].is_numeric:
+                table = table.take(np.argsort(values), number)
+        table = table.reshape([len(axis.values) for axis in axes.values()]).transpose(order)
+        return table[..., np.newaxis, :] if along is None else table
+
+    names = ("mean", "sd", "standard_error", "count", "failed", "missing")
+    tables = [arranged(getattr(cells, name)) for name in names]
+    for place in np.ndindex(*(len(axis.values) for axis in others)):
+        values = (
+            f"{math_symbol(axis.name)} = {axis.texts[number]} {unit_text(axis.name)}".rstrip()
+            for axis, number in zip(others, place, strict=True)
+        )
+        title = ", ".join([*[block] * bool(block), *values])
+        yield Panel(chosen, across, along, title, *(table[place] for table in tables))
+
+
+def _roles(axes: Sequence[Axis], kind: Kind | None) -> tuple[Kind, Axis, Axis | None, list[Axis]]:
+    """What the axes of a grid become: kind, x axis, lines or rows, panels."""
+    across = max(reversed(axes), key=lambda axis: (axis.is_numeric, len(axis.values)))
+    others = sorted((axis for axis in axes if axis is not across), key=lambda axis: len(axis.values))
+    along = others.pop() if others else None
+    if along is not None and len(along.values) > MOST_LINES:
+        is_short = len(across.values) <= MOST_LINES
+        kind = kind or ("lines" if is_short else "map")
+        if kind == "lines" and is_short:  # a long axis of names beside few numbers
+            across, along = along, across
+    return kind or "lines", across, along, [axis for axis in axes if axis in others]

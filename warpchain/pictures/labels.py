@@ -1,0 +1,141 @@
+"""Texts on figures and in tables: numbers, units, quantities, cells, and walks that are in no mean."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.setup import SECTION_OF, SECTIONS
+from warpchain.inputs.validation import DIMENSIONLESS, field_unit
+
+_SYMBOLS: Final = {"dx": "Δx", "links": "n", "frequency": "ν"}
+"""The paper's symbols of what is not in Table 1."""
+
+_NAMES: Final = {"dx": "distance walked", "links": "number of links", "frequency": "frequency of the sprocket"}
+"""Names that say more than those of the fields."""
+
+_MOST_DIGITS: Final = 6
+"""Up to so many significant digits, a number is written exactly."""
+
+_EXACT: Final = 17
+"""Significant digits that tell any two numbers apart."""
+
+
+@dataclass(frozen=True, match_args=False)  # frozen: its attributes are only read
+class Counts(Protocol):
+    """Numbers of walks of one cell or several.
+
+    Attributes:
+        count: walks at rest.
+        failed: walks that ended otherwise.
+        missing: walks not computed yet.
+    """
+
+    count: Any
+    failed: Any
+    missing: Any
+
+
+def number_text(value: float, digits: int = _MOST_DIGITS) -> str:
+    """A number in its shortest form, 1e-6 and 1e7, not 1e-06 and 1e+07, rounded to some significant digits."""
+    text = f"{float(f'{value:.{digits}g}'):.{max(digits, _MOST_DIGITS)}g}"
+    return re.sub(r"e\+?(-?)0*(?=\d)", r"e\1", text)
+
+
+def value_text(value: Any) -> str:
+    """A value of an axis: a number, a name, whether something is on, or null."""
+    if value is None:
+        return "null"
+    return str(value) if isinstance(value, str | bool | np.bool_) else number_text(value)
+
+
+def short_texts(values: Sequence[Any] | NDArray[Any]) -> list[str]:
+    """Values of an axis; numbers exactly in six digits or, where those don't do, in as few as tell them apart."""
+    texts = [value_text(value) for value in values]
+    if any(value is None or isinstance(value, str | bool | np.bool_) for value in values):
+        return texts
+    digits = 2
+    while any(float(text) != value for text, value in zip(texts, values, strict=True)) and digits < _EXACT:
+        digits += 1
+        texts = [number_text(value, digits) for value in values]
+        if len(set(texts)) == len(texts):
+            break
+    return texts
+
+
+def unit_text(name: str) -> str:
+    """Unit of a field of `Parameters`, `Scene` or `Options`; empty for pure numbers and `preset`."""
+    if name == "preset":
+        return ""
+    unit = field_unit(SECTIONS[SECTION_OF[name]].model_fields[name])
+    return "" if unit == DIMENSIONLESS else unit
+
+
+def with_unit(text: str, unit: str) -> str:
+    """A text and a unit as ``Δx / m``; without the unit if it is empty or that of pure numbers."""
+    return text if unit in ("", DIMENSIONLESS) else f"{text} / {unit}"
+
+
+def axis_symbol(name: str) -> str:
+    """The paper's symbol of a field, or else its name."""
+    if name in Parameters.model_fields:
+        return Parameters.quantities()[name].symbol
+    return _SYMBOLS.get(name, name.replace("_", " "))
+
+
+def math_symbol(name: str) -> str:
+    r"""The same for a figure: ``$μ_\mathrm{fc}$``."""
+    if name not in Parameters.model_fields and name not in _SYMBOLS:
+        return axis_symbol(name)
+    base, _, index = axis_symbol(name).partition("_")
+    return f"${base}" + (f"_\\mathrm{{{index}}}$" if index else "$")
+
+
+def quantity_name(name: str) -> str:
+    """A field or a column in words."""
+    return _NAMES.get(name, name.replace("_", " ").replace("coulomb", "Coulomb"))
+
+
+def quantity_text(name: str) -> str:
+    """The same for a label of a figure, with the symbol if there is one."""
+    symbol = math_symbol(name)
+    return f"{quantity_name(name)} {symbol}" if symbol.startswith("$") else quantity_name(name)
+
+
+def quantity_label(name: str) -> str:
+    """Name, symbol and unit of a field, for an axis of a figure."""
+    return with_unit(quantity_text(name), unit_text(name))
+
+
+DISTANCE: Final = with_unit(quantity_text("dx"), "m")
+FREQUENCY: Final = quantity_label("frequency")
+LINKS: Final = quantity_label("links")
+
+
+def cell_values(axes: Mapping[str, NDArray[Any]], place: Iterable[int]) -> dict[str, Any]:
+    """Value of each axis in the cell at a place along the axes."""
+    return {name: values[i] for (name, values), i in zip(axes.items(), place, strict=True)}
+
+
+def cell_text(values: Mapping[str, Any]) -> str:
+    """Describe a cell, as ``n = 60, ν = 15 Hz``.
+
+    Args:
+        values: name of an axis → value.
+    """
+    texts = (f"{axis_symbol(name)} = {value_text(value)} {unit_text(name)}" for name, value in values.items())
+    return ", ".join(text.rstrip() for text in texts)
+
+
+def lost_note(cells: Sequence[Counts]) -> str:
+    """Number of walks that are not in the means of some cells; empty if all are."""
+    rested, failed, missing = (
+        sum(int(np.sum(getattr(cell, name))) for cell in cells) for name in ("count", "failed", "missing")
+    )
+    walks = rested + failed + missing
+    texts = {f"{failed} of {walks} walks failed": failed, f"{missing} of {walks} not run yet": missing}
+    return ", ".join(text for text, count in texts.items() if count)
