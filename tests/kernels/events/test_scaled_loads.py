@@ -17,7 +17,7 @@ from warpchain.engine.devices import start_device
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
-from warpchain.kernels.physics.scaled_loads import crossing_time, drag_shape, write_inertias, under_load
+from warpchain.kernels.physics.scaled_loads import crossing_time, drag_shape, under_load, write_inertias
 from warpchain.kernels.types import Chain
 from warpchain.oracle.motion_equations import acceleration
 
