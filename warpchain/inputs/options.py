@@ -8,7 +8,8 @@ from pydantic import BaseModel, Field, field_validator, model_validator
 
 from warpchain.inputs.methods import BURST_TOLERANCE, FORMER_METHODS, METHODS, METHODS_BY_NEED
 from warpchain.inputs.validation import STRICT, number_field, refusal, shown, suggestion
-from warpchain.kernels.methods.method import HYBRID, find_method, method_names
+from warpchain.kernels.methods.explicit_tableaus import HYBRID
+from warpchain.kernels.methods.method import find_method, method_names
 
 LONGEST_DRIVE_INTERVAL: Final = 2e-3
 """Greatest time [s] between two of the small steps in which soft joints become stiff, or multiplied loads fall."""
