@@ -29,3 +29,8 @@ class Features:
     broad_phase: str
     watch: str
     softens: bool = False
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether the sprocket is driven, and loads and links may change at a sample."""
+        return self.watch == "steady"

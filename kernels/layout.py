@@ -4,17 +4,19 @@ One block of static shape per chain is what lets the CPU compiler vectorise: wit
 it would have to allow for aliasing. Joint i joins the right end of link i to the left end of link i + 1.
 """
 
+from itertools import accumulate
+
 # State at the start of the step.
-X, Y, THETA, U, V, OMEGA = 0, 1, 2, 3, 4, 5
+X, Y, THETA, U, V, OMEGA = range(6)
 COSINE, SINE = 6, 7
 # Constants of the links.
-MASS, INERTIA, INVERSE_MASS, INVERSE_INERTIA = 8, 9, 10, 11
+MASS, INERTIA, INVERSE_MASS, INVERSE_INERTIA = range(8, 12)
 # A stage: link ends (left rows are padded: column n repeats column 0), arm, spin (padded).
-LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y = 12, 13, 14, 15
-LEFT_U, LEFT_V, RIGHT_U, RIGHT_V = 16, 17, 18, 19
+LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y = range(12, 16)
+LEFT_U, LEFT_V, RIGHT_U, RIGHT_V = range(16, 20)
 STAGE_ARM_X, STAGE_ARM_Y, STAGE_SPIN = 20, 21, 22
 # A finished attempt: candidate state and its error ratio.
-NEW_X, NEW_Y, NEW_THETA, NEW_U, NEW_V, NEW_OMEGA = 23, 24, 25, 26, 27, 28
+NEW_X, NEW_Y, NEW_THETA, NEW_U, NEW_V, NEW_OMEGA = range(23, 29)
 ERROR = 29
 # Joint forces and torques, shifted by one: column i + 1 is joint i, column 0 repeats column n. At least three rows
 # from the stage rows they are made of: closer, clang fears that a load waits for the store of an earlier column and
@@ -31,67 +33,57 @@ STAGE_ROWS = 5
 # The block form keeps the first 16 rows above and the following ones on a board that all threads of the block see; the
 # scratch block keeps rows from BOARD_LOST_SELF up to BOARD_VALUES between launches. Every row less leaves a
 # multiprocessor more cache for what does not fit into registers.
-BOARD_LOST_SELF, BOARD_LOST_FRICTION, BOARD_LOST_DAMPING, BOARD_LOST_FIXED = 16, 17, 18, 19
+BOARD_LOST_SELF, BOARD_LOST_FRICTION, BOARD_LOST_DAMPING, BOARD_LOST_FIXED = range(16, 20)
 BOARD_LISTED_X, BOARD_LISTED_Y = 20, 21
 # First stage of the next step: accelerations, then the two powers (see STAGES).
 BOARD_FIRST = 22
 # Numbers of the chain rather than of its links, in the first columns of one more row.
 BOARD_VALUES = 27
-VALUE_OPENING, VALUE_FIXED_DEPTH, VALUE_LAST_IMPULSE, VALUE_STOP_TIME, VALUE_NEXT_SAMPLE = 0, 1, 2, 3, 4
-VALUE_STIFFNESS, VALUE_DAMPING, VALUE_VISCOUS, VALUE_COULOMB, VALUE_INVERSE_SMOOTHING = 5, 6, 7, 8, 9
-VALUE_GRAVITY, VALUE_CIRCLE_RADIUS, VALUE_SPROCKET_RADIUS, VALUE_TANGENTIAL = 10, 11, 12, 13
-VALUE_FLOOR_RESTITUTION, VALUE_FLOOR_FRICTION, VALUE_SPROCKET_RESTITUTION, VALUE_SPROCKET_FRICTION = 14, 15, 16, 17
+VALUE_OPENING, VALUE_FIXED_DEPTH, VALUE_LAST_IMPULSE, VALUE_STOP_TIME, VALUE_NEXT_SAMPLE = range(5)
+VALUE_STIFFNESS, VALUE_DAMPING, VALUE_VISCOUS, VALUE_COULOMB, VALUE_INVERSE_SMOOTHING = range(5, 10)
+VALUE_GRAVITY, VALUE_CIRCLE_RADIUS, VALUE_SPROCKET_RADIUS, VALUE_TANGENTIAL = range(10, 14)
+VALUE_FLOOR_RESTITUTION, VALUE_FLOOR_FRICTION, VALUE_SPROCKET_RESTITUTION, VALUE_SPROCKET_FRICTION = range(14, 18)
 VALUE_CHAIN_RESTITUTION, VALUE_CHAIN_FRICTION, VALUE_HALF_LENGTH = 18, 19, 20
 VALUE_DEADLINE, VALUE_CONTACT_STEP, VALUE_TOLERANCE = 21, 22, 23
 VALUES = 24
 BOARD_ROWS = 28
 
 # State.watch
-WINDOW_START, WINDOW_COUNT, SUM_HEIGHT, SUM_WIDTH, SUM_X, SUM_Y, SUM_SPEED = 0, 1, 2, 3, 4, 5, 6
-STEADY_SINCE, LEAST_HEIGHT, GREATEST_HEIGHT, LEAST_WIDTH, GREATEST_WIDTH = 7, 8, 9, 10, 11
-LEAST_X, GREATEST_X, LEAST_Y, GREATEST_Y = 12, 13, 14, 15
+WINDOW_START, WINDOW_COUNT, SUM_HEIGHT, SUM_WIDTH, SUM_X, SUM_Y, SUM_SPEED = range(7)
+STEADY_SINCE, LEAST_HEIGHT, GREATEST_HEIGHT, LEAST_WIDTH, GREATEST_WIDTH = range(7, 12)
+LEAST_X, GREATEST_X, LEAST_Y, GREATEST_Y = range(12, 16)
 LEAST_SPEED, GREATEST_SPEED = 16, 17
-HOLD_LOAD, LOADED_SINCE, UNLOADED_SINCE, DRIFT = 18, 19, 20, 21
+HOLD_LOAD, LOADED_SINCE, UNLOADED_SINCE, DRIFT = range(18, 22)
 REST_SINCE, LAST_FLOOR_IMPULSE = 22, 23
 SOFTENED_AT = 24
 WATCH_ROWS = 25
 
 # State.counts
-ACCEPTED, REJECTED, FLOOR_IMPULSES, SPROCKET_IMPULSES, SELF_IMPULSES, BOUNCES, LIST_BUILDS = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-    6,
-)
+ACCEPTED, REJECTED, FLOOR_IMPULSES, SPROCKET_IMPULSES, SELF_IMPULSES, BOUNCES, LIST_BUILDS = range(7)
 COUNT_ROWS = 7
 
 # State.extremes
-OPENING, FLOOR_DEPTH, SPROCKET_DEPTH, SELF_DEPTH = 0, 1, 2, 3
+OPENING, FLOOR_DEPTH, SPROCKET_DEPTH, SELF_DEPTH = range(4)
 EXTREME_ROWS = 4
 
 # State.losses
-LOSS_FRICTION, LOSS_DAMPING, LOSS_FLOOR, LOSS_SPROCKET, LOSS_SELF, LOSS_SOFTENING, LOSS_JOINT_SWITCH = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-    6,
-)
+LOSS_FRICTION, LOSS_DAMPING, LOSS_FLOOR, LOSS_SPROCKET, LOSS_SELF, LOSS_SOFTENING, LOSS_JOINT_SWITCH = range(7)
 LOSS_ROWS = 7
 
 # Record.samples, State.first_sample, State.last_sample
-TIME, CENTER_X, CENTER_Y, CENTER_U, CENTER_V = 0, 1, 2, 3, 4
-KINETIC, GRAVITATIONAL, SPRING, LOWEST, RMS_SPEED = 5, 6, 7, 8, 9
+TIME, CENTER_X, CENTER_Y, CENTER_U, CENTER_V = range(5)
+KINETIC, GRAVITATIONAL, SPRING, LOWEST, RMS_SPEED = range(5, 10)
 HEIGHT, WIDTH, LOOP_SPEED = 10, 11, 12
 SAMPLE_COLUMNS = 13
 
 # Capacity of the neighbour list, in pairs of joints per column.
 PAIRS_PER_LINK = 8
+
+
+def consecutive_offsets(start: int = 0, /, **sizes: int) -> dict[str, int]:
+    """Offsets of fields that lie one behind the other from ``start`` on, and as ``size`` the end of the last."""
+    offsets = dict(zip(sizes, accumulate(sizes.values(), initial=start), strict=False))
+    return offsets | {"size": start + sum(sizes.values())}
 
 
 def scratch_rows(stages: int) -> int:

@@ -8,10 +8,6 @@ from warpchain.kernels.types import Chain, Drive
 
 wp.set_module_options({"enable_backward": False})
 
-
-BOUNCE_PAUSE = wp.constant(wp.float64(0.01))
-"""A floor impulse this long [s] after the one before it begins a new bounce."""
-
 SMALLEST = wp.constant(wp.float64(1e-300))
 
 
@@ -27,33 +23,29 @@ def sprocket_turning(drive: Drive, world: int, time: wp.float64):
 
 
 @wp.func
-def meet_floor(
+def floor_circle(
     chain: Chain,
-    left_x: wp.float64,
-    left_y: wp.float64,
-    right_x: wp.float64,
-    right_y: wp.float64,
-    x: wp.float64,
-    y: wp.float64,
+    _surface_speed: wp.float64,
+    _push_rate: wp.float64,
+    _circle_x: wp.float64,
+    circle_y: wp.float64,
+    arm_x: wp.float64,
+    arm_y: wp.float64,
     inverse_mass: wp.float64,
     inverse_inertia: wp.float64,
     u: wp.float64,
     v: wp.float64,
     omega: wp.float64,
 ):
-    """One link against the floor y = 0 (body A; n̂ = ŷ), its left circle first.
-
-    Returns:
-        u, v, ω afterwards, energy lost [J] by the left and the right circle, number of impulses.
-    """
+    """One circle against the floor y = 0 (body A; n̂ = ŷ); ``arm`` leads from the link's centre to the circle's."""
     r = chain.circle_radius
-    u, v, omega, lost_left, hit_left = fixed_contact(
+    return fixed_contact(
         chain,
-        left_y - r,
+        circle_y - r,
         ZERO,
         ONE,
-        left_x - x,
-        left_y - y - r,
+        arm_x,
+        arm_y - r,
         ZERO,
         ZERO,
         inverse_mass,
@@ -64,24 +56,6 @@ def meet_floor(
         v,
         omega,
     )
-    u, v, omega, lost_right, hit_right = fixed_contact(
-        chain,
-        right_y - r,
-        ZERO,
-        ONE,
-        right_x - x,
-        right_y - y - r,
-        ZERO,
-        ZERO,
-        inverse_mass,
-        inverse_inertia,
-        chain.floor_restitution,
-        chain.floor_friction,
-        u,
-        v,
-        omega,
-    )
-    return u, v, omega, lost_left, lost_right, hit_left + hit_right
 
 
 @wp.func
@@ -134,53 +108,64 @@ def sprocket_circle(
     )
 
 
-@wp.func
-def meet_sprocket(
-    chain: Chain,
-    surface_speed: wp.float64,
-    push_rate: wp.float64,
-    left_x: wp.float64,
-    left_y: wp.float64,
-    right_x: wp.float64,
-    right_y: wp.float64,
-    x: wp.float64,
-    y: wp.float64,
-    inverse_mass: wp.float64,
-    inverse_inertia: wp.float64,
-    u: wp.float64,
-    v: wp.float64,
-    omega: wp.float64,
-):
-    """One link against the sprocket, otherwise as :func:`meet_floor`.
+def meeting(circle: wp.Function):
+    """Warp function ``meet`` of a link and a fixed body, whose contact with one circle is given."""
 
-    It turns at ``surface_speed`` [rad/s] and pushes out what has sunk in at ``push_rate`` [1/s].
-    """
-    u, v, omega, lost_left, hit_left = sprocket_circle(
-        chain,
-        surface_speed,
-        push_rate,
-        left_x,
-        left_y,
-        left_x - x,
-        left_y - y,
-        inverse_mass,
-        inverse_inertia,
-        u,
-        v,
-        omega,
-    )
-    u, v, omega, lost_right, hit_right = sprocket_circle(
-        chain,
-        surface_speed,
-        push_rate,
-        right_x,
-        right_y,
-        right_x - x,
-        right_y - y,
-        inverse_mass,
-        inverse_inertia,
-        u,
-        v,
-        omega,
-    )
-    return u, v, omega, lost_left, lost_right, hit_left + hit_right
+    @wp.func
+    def meet(
+        chain: Chain,
+        surface_speed: wp.float64,
+        push_rate: wp.float64,
+        left_x: wp.float64,
+        left_y: wp.float64,
+        right_x: wp.float64,
+        right_y: wp.float64,
+        x: wp.float64,
+        y: wp.float64,
+        inverse_mass: wp.float64,
+        inverse_inertia: wp.float64,
+        u: wp.float64,
+        v: wp.float64,
+        omega: wp.float64,
+    ):
+        """One link against the body, its left circle first.
+
+        The sprocket turns at ``surface_speed`` [rad/s] and pushes out circles that have sunk in at ``push_rate`` [1/s].
+
+        Returns:
+            u, v, ω afterwards, energy lost [J] by the left and the right circle, number of impulses.
+        """
+        u, v, omega, lost_left, hit_left = circle(
+            chain,
+            surface_speed,
+            push_rate,
+            left_x,
+            left_y,
+            left_x - x,
+            left_y - y,
+            inverse_mass,
+            inverse_inertia,
+            u,
+            v,
+            omega,
+        )
+        u, v, omega, lost_right, hit_right = circle(
+            chain,
+            surface_speed,
+            push_rate,
+            right_x,
+            right_y,
+            right_x - x,
+            right_y - y,
+            inverse_mass,
+            inverse_inertia,
+            u,
+            v,
+            omega,
+        )
+        return u, v, omega, lost_left, lost_right, hit_left + hit_right
+
+    return meet
+
+
+meet_floor, meet_sprocket = meeting(floor_circle), meeting(sprocket_circle)

@@ -1,10 +1,29 @@
 """The algebraic collision law of Chatterjee and Ruina (J. Appl. Mech. 65 (1998) 939-951), for circles of links.
 
+*Effective mass.* Bodies A and B touch at P, n̂ points from A to B, t̂ = ẑ × n̂, and r leads from a body's centre of mass
+to P. An impulse J on B, and −J on A, changes v = v_A − v_B at P to v' = v − W J, where
+
+    W = (1/m_A + 1/m_B) 1 + p_A p_Aᵀ/I_A + p_B p_Bᵀ/I_B,    p = ẑ × r.
+
+*Two impulses.* J₁ = v_n/W_nn n̂ alone ends the approach, J₂ = W⁻¹ v ends all relative motion. D = J₂ − J₁ turns the one
+into the other: W D has no normal component, so any multiple of D leaves v'_n to J₁.
+
+*The law.* J = (1 + e) J₁ + (1 + e_t) D if this lies in the friction cone |J_t| ≤ μ J_n (sticking). Otherwise the part
+of D is reduced to κ < 1 + e_t, for which J lies on the cone (sliding):
+
+    |κ D_t| = μ ((1 + e) J₁ₙ + κ D_n)    gives    κ = μ (1 + e) J₁ₙ / (|D_t| − μ D_n).
+
+The divisor is positive whenever the first J is outside the cone, for that is (1 + e_t)(|D_t| − μ D_n) > μ (1 + e) J₁ₙ.
+In both cases v'_n = −e v_n. As J₁ and D are orthogonal in W, with κ = 1 + e_t when sticking the kinetic energy changes
+by
+
+    ΔT = −½ (1 − e²) J₁ᵀ W J₁ − ½ κ (2 − κ) Dᵀ W D ≤ 0    for e in [0, 1], e_t in [−1, 1] and any μ ≥ 0.
+
 Two misprints of the roller-chain paper are corrected here:
 
-1. It prints J₁ = (v·n̂)/α(n̂,n̂) n̂. Its words ("the impulse necessary to bring the normal component of the relative
-   velocity to zero") need the whole diagonal element W_nn = 1/m_A + 1/m_B + α(n̂,n̂); as printed, a central impact,
-   where α = 0, divides by zero.
+1. It prints J₁ = (v·n̂)/α(n̂,n̂) n̂, with α the part of W without the masses. Its words ("the impulse necessary to bring
+   the normal component of the relative velocity to zero") need all of W_nn; as printed, a central impact, where α = 0,
+   divides by zero.
 2. Its J_ij = ∂C_j/∂q_i is the transpose of the Jacobian that its equation (1) uses.
 """
 
@@ -18,7 +37,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.func
 def inverse_masses(w_nn: wp.float64, w_nt: wp.float64, w_tt: wp.float64):
-    """1/W_nn [kg] and 1/det W [kg²]: what the law divides by that does not depend on velocities."""
+    """1/W_nn [kg] and 1/det W [kg²], the divisors of the law that do not depend on velocities."""
     return quotient(ONE, w_nn), quotient(ONE, w_nn * w_tt - w_nt * w_nt)
 
 
@@ -35,12 +54,10 @@ def collision_impulse(
     friction: wp.float64,
     tangential_restitution: wp.float64,
 ):
-    """Impulse (J_n, J_t) [N s] on body B for the relative velocity v = v_A − v_B [m/s] in the basis (n̂, t̂).
+    """Impulse (J_n, J_t) [N s] on body B from v = (normal_speed, tangential_speed) [m/s] and W [1/kg], see above.
 
-    ``w_nn``, ``w_nt``, ``w_tt`` [1/kg]: the inverse effective mass W with W J = v − v'; of it the caller has
-    :func:`inverse_masses` ready. The caller makes sure that the bodies approach (v·n̂ > 0). In the sliding case the
-    denominator of κ is positive, because |J_t| > μ J_n is the same as
-    (1 + e_t)(|J₂ₜ| − μ(J₂ₙ − J₁ₙ)) > μ (1 + e) J₁ₙ.
+    ``inverse_nn`` and ``inverse_determinant`` are those of :func:`inverse_masses`. The caller makes sure that the
+    bodies approach (v·n̂ > 0).
     """
     first = normal_speed * inverse_nn
     second_n = (w_tt * normal_speed - w_nt * tangential_speed) * inverse_determinant
@@ -74,10 +91,10 @@ def fixed_contact(
     v: wp.float64,
     omega: wp.float64,
 ):
-    """Velocities of a link after one of its circles met an immovable body, without branches.
+    """Velocities of a link (B) after one of its circles met an immovable body (A), without branches.
 
-    A is the body, B the link. ``lever`` [m] leads from the link's centre to the touching point, ``surface`` [m/s] is
-    the velocity of the body's surface there.
+    ``lever`` [m] leads from the link's centre to the touching point; ``surface`` [m/s] is the velocity of the body's
+    surface there.
 
     Returns:
         u, v, ω after the contact, the energy [J] that the link lost (negative if it gained), and 1 if there was an

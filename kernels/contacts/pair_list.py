@@ -12,107 +12,79 @@ from warpchain.kernels.types import Chain
 wp.set_module_options({"enable_backward": False})
 
 
+GEOMETRY_ROWS = 34
+"""Rows of the CPU's scratch for contacts, see :mod:`cpu.contacts.self_contacts`."""
+GEOMETRY_COLUMNS = 64
+"""Pairs of joints whose contacts are worked out together, a multiple of 8."""
+
+
 @dataclass(frozen=True)
 class ListLayout:
-    """Where the integers of a chain's neighbour list lie: offsets into one row of int32.
+    """Where a chain's neighbour list lies in one row of int32.
 
     Attributes:
         capacity: Greatest number of pairs; more is an overflow, which ends the walk with a status.
         table: Number of hash buckets, a power of two.
+        count: Offset of the number of pairs (one integer). All below are offsets, too.
+        first: Lower joint of each pair; on a CPU in the order of contact resolution.
+        second: Higher joint of each pair.
+        touching: GPU scratch: pairs that touch now, beyond those in shared memory.
+        found_first: CPU scratch: lower joints as found, ordered by (p, q); then those of the pairs that touch now.
+        found_second: CPU scratch: higher joints, likewise.
+        bucket: Scratch: last joint put into each bucket, −1 for none.
+        next_joint: Scratch: the joint put into the same bucket before this one.
+        cell_x: Scratch: cell of each joint.
+        cell_y: Scratch: cell of each joint.
+        owners: GPU scratch of chains too long for shared memory, see :mod:`gpu.contacts.self_contacts`.
+        geometry: CPU scratch for contacts: doubles, on whole cache lines.
+        size: Integers in all.
     """
 
-    columns: int
     capacity: int
     table: int
-
-    @property
-    def count(self) -> int:
-        """Number of pairs (one integer)."""
-        return 0
-
-    @property
-    def first(self) -> int:
-        """Lower joint of each pair, in the order of contact resolution."""
-        return 1
-
-    @property
-    def second(self) -> int:
-        """Higher joint of each pair."""
-        return self.first + self.capacity
-
-    @property
-    def touching(self) -> int:
-        """Scratch: indices of pairs that touch now."""
-        return self.second + self.capacity
-
-    @property
-    def found_first(self) -> int:
-        """Scratch: pairs as found, ordered by (p, q)."""
-        return self.touching + self.capacity + 1
-
-    @property
-    def found_second(self) -> int:
-        """Scratch: see ``found_first``."""
-        return self.found_first + self.capacity
-
-    @property
-    def bucket(self) -> int:
-        """Scratch: last joint put into each bucket, −1 for none."""
-        return self.found_second + self.capacity
-
-    @property
-    def next_joint(self) -> int:
-        """Scratch: the joint put into the same bucket before this one."""
-        return self.bucket + self.table
-
-    @property
-    def cell_x(self) -> int:
-        """Scratch: cell of each joint."""
-        return self.next_joint + self.columns
-
-    @property
-    def cell_y(self) -> int:
-        """Scratch: cell of each joint."""
-        return self.cell_x + self.columns
+    count: int
+    first: int
+    second: int
+    touching: int
+    found_first: int
+    found_second: int
+    bucket: int
+    next_joint: int
+    cell_x: int
+    cell_y: int
+    owners: int
+    geometry: int
+    size: int
 
     @property
     def pending(self) -> int:
-        """Scratch of the block form, over parts that serve at other times: which contacts have not gone yet."""
+        """GPU scratch: which contacts are still to be resolved; on the places of ``found_first`` and following."""
         return self.found_first
-
-    @property
-    def owners(self) -> int:
-        """Scratch of the block form for chains too long for shared memory, see :mod:`gpu.contacts.self_contacts`."""
-        return max(self.cell_y + self.columns, self.pending + 2 * self.capacity)
-
-    @property
-    def size(self) -> int:
-        """Integers in all."""
-        return self.geometry + 2 * self.geometry_rows * self.geometry_columns
-
-    @property
-    def geometry_rows(self) -> int:
-        """Rows of the CPU's scratch for contacts, see :mod:`cpu.contacts.self_contacts`."""
-        return 34
-
-    @property
-    def geometry_columns(self) -> int:
-        """Pairs of joints whose contacts are worked out together, a multiple of 8."""
-        return 64
-
-    @property
-    def geometry(self) -> int:
-        """That scratch: doubles, on whole cache lines."""
-        return -(-(self.owners + 3 * self.columns + 8) // 16) * 16
 
 
 @functools.cache
 def list_layout(columns: int) -> ListLayout:
     """Layout for chains in scratch blocks of this width."""
+    capacity = layout.PAIRS_PER_LINK * columns
     table = 1
     while table < 2 * columns:
         table *= 2
-    return ListLayout(columns=columns, capacity=layout.PAIRS_PER_LINK * columns, table=table)
+    integers = layout.consecutive_offsets(
+        count=1,
+        first=capacity,
+        second=capacity,
+        touching=capacity + 1,
+        found_first=capacity,
+        found_second=capacity,
+        bucket=table,
+        next_joint=columns,
+        cell_x=columns,
+        cell_y=columns,
+        owners=3 * columns + 8,
+    )
+    geometry = -(-integers["size"] // 16) * 16
+    size = geometry + 2 * GEOMETRY_ROWS * GEOMETRY_COLUMNS
+    return ListLayout(capacity, table, **integers | {"geometry": geometry, "size": size})
 
 
 @wp.func

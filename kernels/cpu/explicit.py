@@ -99,6 +99,34 @@ def begin_stages(K: wp.array2d(dtype=wp.float64), chain: Chain):
     K[STAGE_SPIN, n] = K[STAGE_SPIN, 0]
 
 
+def sums_over_stages(velocity: tuple[float, ...], position: tuple[float, ...]):
+    """Warp function ``sums(K, i)``: Σ w_j (ẍ, ÿ, θ̈)_j of link i over the stages, for either row of weights w.
+
+    One function of three sums for each row instead made clang fuse other products with sums: walks rounded otherwise.
+    """
+
+    @wp.func
+    def sums(K: wp.array2d(dtype=wp.float64), i: int):
+        du = ZERO
+        dv = ZERO
+        dw = ZERO
+        dx = ZERO
+        dy = ZERO
+        turn = ZERO
+        for j in range(wp.static(len(velocity))):
+            if wp.static(velocity[j] != 0.0):
+                du += wp.static(wp.float64(velocity[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
+                dv += wp.static(wp.float64(velocity[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                dw += wp.static(wp.float64(velocity[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+            if wp.static(position[j] != 0.0):
+                dx += wp.static(wp.float64(position[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
+                dy += wp.static(wp.float64(position[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
+                turn += wp.static(wp.float64(position[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+        return du, dv, dw, dx, dy, turn
+
+    return sums
+
+
 @functools.cache
 def explicit_method(name: str):
     """Warp functions of one tableau: (evaluate the first stage, attempt a step, commit it).
@@ -113,10 +141,10 @@ def explicit_method(name: str):
     tableau = TABLEAUS[name]
     stages = tableau.stages
     reuses_last = tableau.first_same_as_last
-    velocity, position = tableau.velocity, tableau.position
-    nodes = tableau.nodes
-    velocity_weights, position_weights = tableau.velocity_weights, tableau.position_weights
-    velocity_errors, position_errors = tableau.velocity_errors, tableau.position_errors
+    nodes, velocity_weights = tableau.nodes, tableau.velocity_weights
+    stage_sums = [sums_over_stages(*rows) for rows in zip(tableau.velocity, tableau.position, strict=True)]
+    new_state = sums_over_stages(velocity_weights, tableau.position_weights)
+    errors = sums_over_stages(tableau.velocity_errors, tableau.position_errors)
     last_row = STAGES + STAGE_ROWS * (stages - 1)
     power_needed = tuple(
         weight != 0.0 or (reuses_last and velocity_weights[0] != 0.0 and stage == stages - 1)
@@ -178,21 +206,7 @@ def explicit_method(name: str):
             ch = wp.static(wp.float64(nodes[s])) * h
             i = int(0)
             while i < n:
-                du = ZERO
-                dv = ZERO
-                dw = ZERO
-                dx = ZERO
-                dy = ZERO
-                turn = ZERO
-                for j in range(wp.static(s)):
-                    if wp.static(velocity[s][j] != 0.0):
-                        du += wp.static(wp.float64(velocity[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                        dv += wp.static(wp.float64(velocity[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                        dw += wp.static(wp.float64(velocity[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
-                    if wp.static(position[s][j] != 0.0):
-                        dx += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                        dy += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                        turn += wp.static(wp.float64(position[s][j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+                du, dv, dw, dx, dy, turn = wp.static(stage_sums[s])(K, i)
                 turn = ch * K[OMEGA, i] + hh * turn
                 arm_x, arm_y = turned(a * K[COSINE, i], a * K[SINE, i], turn)
                 x = K[X, i] + (ch * K[U, i] + hh * dx)
@@ -223,35 +237,8 @@ def explicit_method(name: str):
         # new state and error ratio
         i = int(0)
         while i < n:
-            du = ZERO
-            dv = ZERO
-            dw = ZERO
-            dx = ZERO
-            dy = ZERO
-            turn = ZERO
-            eu = ZERO
-            ev = ZERO
-            ew = ZERO
-            ex = ZERO
-            ey = ZERO
-            et = ZERO
-            for j in range(wp.static(stages)):
-                if wp.static(velocity_weights[j] != 0.0):
-                    du += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                    dv += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                    dw += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
-                if wp.static(position_weights[j] != 0.0):
-                    dx += wp.static(wp.float64(position_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                    dy += wp.static(wp.float64(position_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                    turn += wp.static(wp.float64(position_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
-                if wp.static(velocity_errors[j] != 0.0):
-                    eu += wp.static(wp.float64(velocity_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                    ev += wp.static(wp.float64(velocity_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                    ew += wp.static(wp.float64(velocity_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
-                if wp.static(position_errors[j] != 0.0):
-                    ex += wp.static(wp.float64(position_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j), i]
-                    ey += wp.static(wp.float64(position_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 1), i]
-                    et += wp.static(wp.float64(position_errors[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 2), i]
+            du, dv, dw, dx, dy, turn = new_state(K, i)
+            eu, ev, ew, ex, ey, et = errors(K, i)
             u = K[U, i]
             v = K[V, i]
             w = K[OMEGA, i]

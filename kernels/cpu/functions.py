@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import Any
 
-import warp as wp
-
 from warpchain.kernels import layout
 from warpchain.kernels.cpu.explicit import explicit_method
 from warpchain.kernels.cpu.implicit.joint_switch import joint_switch
@@ -71,10 +69,10 @@ def cpu_method(name: str, columns: int) -> CpuMethod:
     method = find_method(name)
     if method.kind == "rosenbrock":
         functions = rosenbrock_method(method.tableau, columns)
-        controller = implicit_controller(method.error_order, wp.float64)
+        controller = implicit_controller(method.error_order)
     else:
         functions = explicit_method(method.tableau)
-        controller = step_controller(method.order, method.error_order, wp.float64)
+        controller = step_controller(method.order, method.error_order)
     return CpuMethod(*functions, *controller, method.reuses_last)
 
 

@@ -11,64 +11,38 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.codes import LIST_OVERFLOW, NOT_FINITE, RUNNING, STEP_LIMIT, STEP_TOO_SMALL
-from warpchain.kernels.contacts.fixed_body import BOUNCE_PAUSE, sprocket_turning
+from warpchain.kernels.contacts.fixed_body import sprocket_turning
 from warpchain.kernels.contacts.pair_list import list_layout
 from warpchain.kernels.cpu.contacts.neighbour_list import list_slack, neighbour_list
 from warpchain.kernels.cpu.contacts.proximity import (
     floor_gap,
     greatest_opening,
-    greatest_speed,
     resolve_floor,
     resolve_sprocket,
     sprocket_gap,
 )
 from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
-from warpchain.kernels.cpu.contacts.time_to_contact import (
-    FLIGHT_SKIN,
-    LEAST_SLACK,
-    SMALLEST_GAP,
-    fastest_fall,
-    fastest_meeting,
-)
+from warpchain.kernels.cpu.contacts.time_to_contact import FLIGHT_SKIN, LEAST_SLACK, step_bound
 from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.functions import cpu_method, rigid_flight, scratch_rows
 from warpchain.kernels.cpu.implicit.joint_switch import QUIET_TIME
 from warpchain.kernels.events.present_chain import has_changed, present_chain
-from warpchain.kernels.events.record import record_is_full, write_sample
+from warpchain.kernels.events.record import lacks_last_sample, record_is_full, write_sample
 from warpchain.kernels.events.sample import sampling
 from warpchain.kernels.events.softening import book_softening, contact_step, spring_tolerance
 from warpchain.kernels.events.summary import summarise
-from warpchain.kernels.features import COMPILER_FLAGS, Features
-from warpchain.kernels.layout import (
-    ACCEPTED,
-    BOUNCES,
-    FLOOR_DEPTH,
-    FLOOR_IMPULSES,
-    INERTIA,
-    INVERSE_INERTIA,
-    INVERSE_MASS,
-    LAST_FLOOR_IMPULSE,
-    LIST_BUILDS,
-    LOSS_DAMPING,
-    LOSS_FRICTION,
-    LOSS_JOINT_SWITCH,
-    LOSS_SELF,
-    LOST_DAMPING,
-    LOST_FIXED,
-    LOST_FRICTION,
-    MASS,
-    OPENING,
-    REJECTED,
-    SELF_DEPTH,
-    SELF_IMPULSES,
-    SPROCKET_DEPTH,
-    SPROCKET_IMPULSES,
-    STAGES,
-    TIME,
+from warpchain.kernels.events.tallies import (
+    add_count,
+    attempts_made,
+    book_loss,
+    count_bounce,
+    of_fixed_body,
+    raise_extreme,
 )
-from warpchain.kernels.methods.controller import LEAST_SHRINKAGE
-from warpchain.kernels.physics.elementary import HALF, ONE, ZERO
-from warpchain.kernels.physics.scaled_loads import lay_inertias
+from warpchain.kernels.features import COMPILER_FLAGS, Features
+from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step
+from warpchain.kernels.physics.elementary import ONE, ZERO
+from warpchain.kernels.physics.scaled_loads import write_inertias
 from warpchain.kernels.types import Chain, Control, Drive, Model, Record, State
 
 wp.set_module_options({"enable_backward": False})
@@ -83,17 +57,14 @@ def load_state(K: wp.array2d(dtype=wp.float64), state: State, chain: Chain, worl
         while row < 6:
             K[row, i] = state.links[world, row, i]
             row += 1
-        inner = i % 2 == 0
-        mass = wp.where(inner, chain.inner_mass, chain.outer_mass)
-        inertia = wp.where(inner, chain.inner_inertia, chain.outer_inertia)
-        K[MASS, i] = mass
-        K[INERTIA, i] = inertia
-        K[INVERSE_MASS, i] = ONE / mass
-        K[INVERSE_INERTIA, i] = ONE / inertia
-        K[LOST_FRICTION, i] = ZERO
-        K[LOST_DAMPING, i] = ZERO
-        K[LOST_FIXED, i] = ZERO
+        mass = wp.where(i % 2 == 0, chain.inner_mass, chain.outer_mass)
+        K[layout.MASS, i] = mass
+        K[layout.INVERSE_MASS, i] = ONE / mass
+        K[layout.LOST_FRICTION, i] = ZERO
+        K[layout.LOST_DAMPING, i] = ZERO
+        K[layout.LOST_FIXED, i] = ZERO
         i += 1
+    write_inertias(K, chain)
 
 
 @wp.func
@@ -108,12 +79,12 @@ def store_state(K: wp.array2d(dtype=wp.float64), state: State, chain: Chain, wor
         while row < 6:
             state.links[world, row, i] = K[row, i]
             row += 1
-        friction += K[LOST_FRICTION, i]
-        damping += K[LOST_DAMPING, i]
-        fixed += K[LOST_FIXED, i]
+        friction += K[layout.LOST_FRICTION, i]
+        damping += K[layout.LOST_DAMPING, i]
+        fixed += K[layout.LOST_FIXED, i]
         i += 1
-    state.losses[world, LOSS_FRICTION] = friction
-    state.losses[world, LOSS_DAMPING] = damping
+    state.losses[world, layout.LOSS_FRICTION] = friction
+    state.losses[world, layout.LOSS_DAMPING] = damping
     state.losses[world, fixed_loss] = fixed
 
 
@@ -129,7 +100,7 @@ def state_is_finite(K: wp.array2d(dtype=wp.float64), chain: Chain):
             row += 1
         row = int(0)
         while row < 3:
-            finite = finite and wp.isfinite(K[STAGES + row, i])
+            finite = finite and wp.isfinite(K[layout.STAGES + row, i])
             row += 1
         i += 1
     return finite
@@ -152,11 +123,12 @@ def make_advance(features: Features):
     has_sprocket = features.fixed_body == "sprocket"
     has_fixed = has_floor or has_sprocket
     has_self = features.self_contact
-    fixed_loss = layout.LOSS_SPROCKET if has_sprocket else layout.LOSS_FLOOR
+    fixed_gap, resolve_fixed = (sprocket_gap, resolve_sprocket) if has_sprocket else (floor_gap, resolve_floor)
+    fixed_loss, fixed_depth, fixed_count = of_fixed_body(features.fixed_body)
     reuses_last = method.reuses_last
     softens = features.softens
-    is_driven = features.watch == "steady"
-    look = sampling(features.watch, softens)
+    is_driven = features.is_driven
+    sample = sampling(features.watch, softens)
     present = present_chain(softens, is_driven)
     first_stage, attempt, commit = method.first_stage, method.attempt, method.commit
     growth, shrinkage = method.growth, method.shrinkage
@@ -170,7 +142,7 @@ def make_advance(features: Features):
     build_by_grid, build_by_all_pairs = neighbour_list(columns)
     build_list = build_by_grid if features.broad_phase == "grid" else build_by_all_pairs
     resolve_self_contacts = self_contacts(columns)
-    meeting = fastest_meeting(columns)
+    bound_of_step = step_bound(features, has_flight)
 
     @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS})
     def advance(
@@ -201,10 +173,8 @@ def make_advance(features: Features):
         if state.is_fresh[world] != 0:
             load_state(K, state, chain, world)
             place_ends(K, chain)
-            if wp.static(has_floor):
-                state.gap[world] = floor_gap(K, chain)
-            if wp.static(has_sprocket):
-                state.gap[world] = sprocket_gap(K, chain)
+            if wp.static(has_fixed):
+                state.gap[world] = fixed_gap(K, chain)
             if wp.static(has_self):
                 if not build_list(K, L, chain, control.skin, greatest_opening(K, chain)):
                     status = int(LIST_OVERFLOW)
@@ -225,7 +195,7 @@ def make_advance(features: Features):
             if time >= wp.float64(state.next_sample[world]) * control.sample_interval:
                 softness = state.softness[world]
                 load_factor = state.load_factor[world]
-                status = look(K, chain, drive, state, record, control, world, time)
+                status = sample(K, chain, drive, state, record, control, world, time)
                 if wp.static(softens):
                     longest = contact_step(state, control, world, wp.static(is_driven))
                 if wp.static(softens or is_driven):
@@ -235,7 +205,7 @@ def make_advance(features: Features):
                         book_softening(chain, after, state, world)
                         chain = after
                         if wp.static(is_driven):
-                            lay_inertias(K, chain)
+                            write_inertias(K, chain)
                         has_first_stage = int(0)
                 if status != RUNNING:
                     break
@@ -254,38 +224,14 @@ def make_advance(features: Features):
                         step, other_step = other_step + ZERO, step + ZERO
                         last_error = ONE
                         place_ends(K, chain)
-                        state.losses[world, LOSS_JOINT_SWITCH] = state.losses[world, LOSS_JOINT_SWITCH] + lost
+                        book_loss(state, world, layout.LOSS_JOINT_SWITCH, lost)
             if is_rigid == 0 and has_first_stage == 0:
                 first_stage(K, chain)
                 has_first_stage = int(1)
 
-            # near contacts the step is bounded; far from them nothing may come through the skin unseen
-            h = step
-            if wp.static(has_fixed or has_self):
-                if is_rigid == 0:
-                    room = control.skin
-                    near = bool(False)
-                    if wp.static(has_fixed):
-                        near = gap < control.skin
-                        room = HALF * gap
-                    if wp.static(has_self):
-                        near = near or L[wp.static(list_count)] > 0
-                        room = wp.min(room, slack)
-                    if near:
-                        h = wp.min(h, longest)
-                    else:
-                        h = wp.min(h, wp.max(longest, room / greatest_speed(K, chain)))
-                if wp.static(has_flight):
-                    if is_rigid != 0:
-                        approach = ZERO
-                        if wp.static(has_floor):
-                            approach = fastest_fall(K, chain)
-                        if wp.static(has_self):
-                            approach = wp.max(approach, meeting(K, L, chain))
-                            approach = wp.max(approach, greatest_speed(K, chain) / wp.max(slack, SMALLEST_GAP))
-                        h = wp.min(h, wp.max(longest, ONE / approach))
-            lands = time + h >= stop_time
-            if lands:
+            h = wp.min(step, bound_of_step(K, L, chain, control, is_rigid != 0, gap, slack, longest))
+            reaches_stop = time + h >= stop_time
+            if reaches_stop:
                 h = stop_time - time
 
             error_bits = wp.int64(0)
@@ -297,7 +243,7 @@ def make_advance(features: Features):
             error = wp.cast(error_bits, wp.float64)
             attempts += 1
             if not (error <= ONE):
-                state.counts[world, REJECTED] = state.counts[world, REJECTED] + wp.int64(1)
+                add_count(state, world, layout.REJECTED, wp.int64(1))
                 if wp.isfinite(error):
                     factor = shrinkage(error)
                     if wp.static(has_flight):
@@ -319,35 +265,26 @@ def make_advance(features: Features):
                     if is_rigid != 0:
                         are_stiff = commit_flight(K, chain, h)
                         factor = flight_growth(error, last_error, control.proportional)
-                state.counts[world, ACCEPTED] = state.counts[world, ACCEPTED] + wp.int64(1)
-                time = wp.where(lands, stop_time, time + h)
-                proposal = h * factor
-                # a step that was cut short says nothing against the proposal that it was cut from
-                step = wp.where(h < step, wp.max(step, proposal), proposal)
+                add_count(state, world, layout.ACCEPTED, wp.int64(1))
+                time = wp.where(reaches_stop, stop_time, time + h)
+                step = next_step(step, h, factor)
                 last_error = wp.max(error, wp.float64(1e-4))
                 has_first_stage = int(wp.static(int(reuses_last)))
                 place_ends(K, chain)
                 opening = greatest_opening(K, chain)
-                state.extremes[world, OPENING] = wp.max(state.extremes[world, OPENING], opening)
+                raise_extreme(state, world, layout.OPENING, opening)
                 impulses = wp.int64(0)
-                if wp.static(has_floor):
-                    gap = floor_gap(K, chain)
+                if wp.static(has_fixed):
+                    gap = fixed_gap(K, chain)
                     if gap < ZERO:
-                        state.extremes[world, FLOOR_DEPTH] = wp.max(state.extremes[world, FLOOR_DEPTH], -gap)
-                        hits = resolve_floor(K, chain)
-                        if hits > wp.int64(0):
-                            impulses += hits
-                            state.counts[world, FLOOR_IMPULSES] = state.counts[world, FLOOR_IMPULSES] + hits
-                            if time - state.watch[world, LAST_FLOOR_IMPULSE] > BOUNCE_PAUSE:
-                                state.counts[world, BOUNCES] = state.counts[world, BOUNCES] + wp.int64(1)
-                            state.watch[world, LAST_FLOOR_IMPULSE] = time
-                if wp.static(has_sprocket):
-                    gap = sprocket_gap(K, chain)
-                    if gap < ZERO:
-                        state.extremes[world, SPROCKET_DEPTH] = wp.max(state.extremes[world, SPROCKET_DEPTH], -gap)
-                        hits = resolve_sprocket(K, chain, sprocket_turning(drive, world, time), drive.push_rate[world])
-                        state.counts[world, SPROCKET_IMPULSES] = state.counts[world, SPROCKET_IMPULSES] + hits
-                        impulses += hits
+                        raise_extreme(state, world, fixed_depth, -gap)
+                        turning = sprocket_turning(drive, world, time)
+                        impulses = resolve_fixed(K, chain, turning, drive.push_rate[world])
+                        add_count(state, world, fixed_count, impulses)
+                        if wp.static(has_floor):
+                            if impulses > wp.int64(0):
+                                count_bounce(state, world, time, state.watch[world, layout.LAST_FLOOR_IMPULSE])
+                                state.watch[world, layout.LAST_FLOOR_IMPULSE] = time
                 if wp.static(has_self):
                     skin = control.skin
                     least_slack = ZERO
@@ -358,15 +295,15 @@ def make_advance(features: Features):
                     if slack > ZERO:
                         slack = list_slack(K, chain, skin, opening)
                     if not slack > least_slack:
-                        state.counts[world, LIST_BUILDS] = state.counts[world, LIST_BUILDS] + wp.int64(1)
+                        add_count(state, world, layout.LIST_BUILDS, wp.int64(1))
                         if not build_list(K, L, chain, skin, opening):
                             status = int(LIST_OVERFLOW)
                         slack = list_slack(K, chain, skin, opening)
                     if L[wp.static(list_count)] > 0:
                         hits, lost, depth = resolve_self_contacts(K, L, chain, opening)
-                        state.counts[world, SELF_IMPULSES] = state.counts[world, SELF_IMPULSES] + hits
-                        state.extremes[world, SELF_DEPTH] = wp.max(state.extremes[world, SELF_DEPTH], depth)
-                        state.losses[world, LOSS_SELF] = state.losses[world, LOSS_SELF] + lost
+                        add_count(state, world, layout.SELF_IMPULSES, hits)
+                        raise_extreme(state, world, layout.SELF_DEPTH, depth)
+                        book_loss(state, world, layout.LOSS_SELF, lost)
                         impulses += hits
                 if impulses > wp.int64(0):
                     has_first_stage = int(0)
@@ -380,13 +317,10 @@ def make_advance(features: Features):
                             step, other_step = other_step + ZERO, step + ZERO
                             last_error = ONE
                             place_ends(K, chain)
-                            state.losses[world, LOSS_JOINT_SWITCH] = state.losses[world, LOSS_JOINT_SWITCH] + lost
-            if status == RUNNING:
-                total = state.attempts_before[world] + state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
-                if total >= control.step_limit:
-                    status = int(STEP_LIMIT)
-        if status != RUNNING and status != NOT_FINITE and state.last_sample[world, TIME] != time:
-            # the series ends with the state in which the run ends
+                            book_loss(state, world, layout.LOSS_JOINT_SWITCH, lost)
+            if status == RUNNING and attempts_made(state, world) >= control.step_limit:
+                status = int(STEP_LIMIT)
+        if lacks_last_sample(state, world, time, status):
             place_ends(K, chain)
             write_sample(state, record, world, time, summarise(K, chain))
         store_state(K, state, chain, world, wp.static(fixed_loss))

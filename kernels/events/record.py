@@ -2,31 +2,10 @@
 
 import warp as wp
 
+from warpchain.kernels import layout
+from warpchain.kernels.codes import NOT_FINITE, RUNNING
 from warpchain.kernels.events.summary import Summary
-from warpchain.kernels.layout import (
-    CENTER_U,
-    CENTER_V,
-    CENTER_X,
-    CENTER_Y,
-    COSINE,
-    GRAVITATIONAL,
-    HEIGHT,
-    KINETIC,
-    LEFT_X,
-    LEFT_Y,
-    LOOP_SPEED,
-    LOWEST,
-    OMEGA,
-    RIGHT_X,
-    RIGHT_Y,
-    RMS_SPEED,
-    SINE,
-    SPRING,
-    TIME,
-    WIDTH,
-    U,
-    V,
-)
+from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, SINE, TIME, U, V
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.joint import friction_torque, joint_force
 from warpchain.kernels.types import Chain, Record, State
@@ -38,18 +17,18 @@ wp.set_module_options({"enable_backward": False})
 def write_row(rows: wp.array2d(dtype=wp.float64), row: int, time: wp.float64, summary: Summary):
     """Writes a summary as one row of SAMPLE_COLUMNS numbers."""
     rows[row, TIME] = time
-    rows[row, CENTER_X] = summary.center_x
-    rows[row, CENTER_Y] = summary.center_y
-    rows[row, CENTER_U] = summary.center_u
-    rows[row, CENTER_V] = summary.center_v
-    rows[row, KINETIC] = summary.kinetic
-    rows[row, GRAVITATIONAL] = summary.gravitational
-    rows[row, SPRING] = summary.spring
-    rows[row, LOWEST] = summary.lowest
-    rows[row, RMS_SPEED] = summary.rms_speed
-    rows[row, HEIGHT] = summary.height
-    rows[row, WIDTH] = summary.width
-    rows[row, LOOP_SPEED] = summary.loop_speed
+    rows[row, layout.CENTER_X] = summary.center_x
+    rows[row, layout.CENTER_Y] = summary.center_y
+    rows[row, layout.CENTER_U] = summary.center_u
+    rows[row, layout.CENTER_V] = summary.center_v
+    rows[row, layout.KINETIC] = summary.kinetic
+    rows[row, layout.GRAVITATIONAL] = summary.gravitational
+    rows[row, layout.SPRING] = summary.spring
+    rows[row, layout.LOWEST] = summary.lowest
+    rows[row, layout.RMS_SPEED] = summary.rms_speed
+    rows[row, layout.HEIGHT] = summary.height
+    rows[row, layout.WIDTH] = summary.width
+    rows[row, layout.LOOP_SPEED] = summary.loop_speed
 
 
 @wp.func
@@ -95,6 +74,12 @@ def write_frame(record: Record, K: wp.array2d(dtype=wp.float64), chain: Chain, w
         i += 1
     record.frame_times[world, row] = time
     record.frame_count[world] = row + 1
+
+
+@wp.func
+def lacks_last_sample(state: State, world: int, time: wp.float64, status: int):
+    """True if a run has ended between two samples: the series then ends with one of the state in which it ended."""
+    return status != RUNNING and status != NOT_FINITE and state.last_sample[world, TIME] != time
 
 
 @wp.func

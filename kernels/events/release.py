@@ -1,69 +1,52 @@
 """The release rule: a loop is held on its sprocket until it is stationary, and released a drawn time later.
 
-A hold has two parts. *Under load* (see :mod:`physics.scaled_loads`) the loop is watched for as long as slow waves need
-to cross it there. Then its loads fall to its own within ``LOADING_TIME``, by equal factors in equal times, and *free*
-it is watched again, for ``steady_time``. Watched are means over windows of time of its height, its width and the place
-of its centre of mass. Stationary means that all windows of a watch agree to within ``steady_tolerance`` of the loop's
-height (vertical quantities) or width (horizontal ones), those of the free watch also with the last one under load, and
-that the loop runs as evenly. A loop that leaves its shape when it becomes free, or does not become stationary under
-load, is held under the square root of the factor, finally under its own loads: then, and whenever it slips on its
-sprocket by more than 0.6 %, it is watched free for as long as slow waves need, 5 to 10 s.
+A hold has two parts. First the loop is watched *under load* (see :mod:`physics.scaled_loads`), for as long as slow
+waves need to cross it there. Then its loads fall to its own within ``LOADING_TIME``, by equal factors in equal times,
+and it is watched *free*, for ``steady_time``. The watched quantities are its height, its width, the place of its centre
+of mass and its speed, each averaged over windows of time. The loop is stationary when
+
+- the averages of all windows agree to within ``steady_tolerance`` of its height (vertical quantities) or width
+  (horizontal ones); those of the free watch also agree with the last window under load;
+- the loop runs evenly, near the speed of its sprocket.
+
+A loop that changes its shape when it becomes free, or does not become stationary under load, is held again under the
+square root of the factor, finally under its own loads. A free watch lasts as long as slow waves need, 5 to 10 s, if the
+loop was held under its own loads only, or slips on its sprocket by more than 0.6 %.
 
 Loads that fall at once let the joints contract at once, which throws the loop off its sprocket: with λ = 80 by 25 mm
-(180 links, 30 Hz). Nothing of that is seen if they take 0.05 s; in 0.25 s the loop also follows the little that its
-curve under load differs by. Loads that fall to a smaller multiple do so at once: the loop has time to come back.
+(180 links, 30 Hz). If they take 0.05 s to fall, nothing of that is seen; in 0.25 s the loop also follows the small
+difference between its curves with and without load. Loads that fall to a smaller multiple do so at once: the loop has
+time to come back.
 """
 
 import warp as wp
 
+from warpchain.kernels import layout
 from warpchain.kernels.codes import FINISHED
 from warpchain.kernels.events.summary import Summary
-from warpchain.kernels.layout import (
-    DRIFT,
-    GREATEST_HEIGHT,
-    GREATEST_SPEED,
-    GREATEST_WIDTH,
-    GREATEST_X,
-    GREATEST_Y,
-    HOLD_LOAD,
-    LEAST_HEIGHT,
-    LEAST_SPEED,
-    LEAST_WIDTH,
-    LEAST_X,
-    LEAST_Y,
-    LOADED_SINCE,
-    STEADY_SINCE,
-    SUM_HEIGHT,
-    SUM_SPEED,
-    SUM_WIDTH,
-    SUM_X,
-    SUM_Y,
-    UNLOADED_SINCE,
-    WINDOW_COUNT,
-    WINDOW_START,
-)
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO
 from warpchain.kernels.physics.scaled_loads import DRAG_PER_CROSSING, DRAG_PER_TURN, crossing_time
 from warpchain.kernels.types import Chain, Drive, State
 
 wp.set_module_options({"enable_backward": False})
 
-"""Status of a drive whose end has been set, a code shared with warpchain.status."""
 LITTLE_SLIP = wp.constant(wp.float64(0.006))
-"""Loops of Table 1 slip on their sprocket by 0.1 to 0.6 % up to 45 Hz. One that slips more may do so now more, now
-less, so that it is watched for as long as slow waves need …"""
+"""Slip above which a free loop is watched for as long as slow waves need.
+
+Loops of Table 1 slip on their sprocket by 0.1 to 0.6 % up to 45 Hz. The slip of one that slips more may vary.
+"""
 MOST_SLIP = wp.constant(wp.float64(0.25))
-"""… and is never found stationary beyond this."""
+"""Slip above which a loop never counts as stationary."""
 LOADING_TIME = wp.constant(wp.float64(0.25))
 """Time [s] in which loads fall to the loop's own."""
 LEAST_LOAD = wp.constant(wp.float64(3.0))
 """Least factor under which a loop is held again."""
 MOST_CROSSINGS = wp.constant(wp.float64(8.0))
-"""Crossings of slow waves after which a loop that is not stationary under load is held under less; most take three."""
+"""Crossings of slow waves after which a loop that is not stationary under load is held under less. Most take three."""
 SLOWEST_STEADY = wp.constant(wp.float64(0.02))
-"""Unevenness [m/s] of the speed that always counts as even: of a sprocket that stands still."""
+"""Changes of the speed [m/s] that are always even enough: for sprockets that stand still."""
 SHORTEST_WINDOW = wp.constant(wp.float64(0.05))
-"""Least time [s] over which means are taken: links that pass make height and width ripple."""
+"""Shortest window [s]: passing links make height and width ripple."""
 
 
 @wp.func
@@ -73,37 +56,37 @@ def is_watched(state: State, drive: Drive, world: int, time: wp.float64):
 
 
 @wp.func
-def begin_window(state: State, world: int, time: wp.float64):
-    """Forgets the sums of the window before."""
-    state.watch[world, WINDOW_START] = time
-    state.watch[world, WINDOW_COUNT] = ZERO
-    state.watch[world, SUM_HEIGHT] = ZERO
-    state.watch[world, SUM_WIDTH] = ZERO
-    state.watch[world, SUM_X] = ZERO
-    state.watch[world, SUM_Y] = ZERO
-    state.watch[world, SUM_SPEED] = ZERO
+def begin_window(watch: wp.array(dtype=wp.float64), time: wp.float64):
+    """Resets the sums of a window."""
+    watch[layout.WINDOW_START] = time
+    watch[layout.WINDOW_COUNT] = ZERO
+    watch[layout.SUM_HEIGHT] = ZERO
+    watch[layout.SUM_WIDTH] = ZERO
+    watch[layout.SUM_X] = ZERO
+    watch[layout.SUM_Y] = ZERO
+    watch[layout.SUM_SPEED] = ZERO
 
 
 @wp.func
-def widen(state: State, world: int, least: int, greatest: int, mean: wp.float64, is_first: bool):
-    """Least and greatest mean of a watch with one more window, or one first; returns their difference."""
+def widen(watch: wp.array(dtype=wp.float64), least: int, greatest: int, mean: wp.float64, is_first: bool):
+    """Includes a window's mean in the range of a watch, or begins the range with it; returns the width of the range."""
     if is_first:
-        state.watch[world, least] = mean
-        state.watch[world, greatest] = mean
-    state.watch[world, least] = wp.min(state.watch[world, least], mean)
-    state.watch[world, greatest] = wp.max(state.watch[world, greatest], mean)
-    return state.watch[world, greatest] - state.watch[world, least]
+        watch[least] = mean
+        watch[greatest] = mean
+    watch[least] = wp.min(watch[least], mean)
+    watch[greatest] = wp.max(watch[greatest], mean)
+    return watch[greatest] - watch[least]
 
 
 @wp.func
 def load_at(state: State, drive: Drive, world: int, time: wp.float64):
     """Factor of the loads at this moment of the drive."""
-    if state.watch[world, HOLD_LOAD] < ONE:
-        state.watch[world, HOLD_LOAD] = wp.max(drive.load_factor[world], ONE)
+    if state.watch[world, layout.HOLD_LOAD] < ONE:
+        state.watch[world, layout.HOLD_LOAD] = wp.max(drive.load_factor[world], ONE)
     if time < drive.hold_start[world]:
         return ONE
-    load = state.watch[world, HOLD_LOAD]
-    since = state.watch[world, UNLOADED_SINCE]
+    load = state.watch[world, layout.HOLD_LOAD]
+    since = state.watch[world, layout.UNLOADED_SINCE]
     if since < ZERO:
         return load
     return wp.pow(load, wp.clamp(ONE - (time - since) / LOADING_TIME, ZERO, ONE))
@@ -112,7 +95,7 @@ def load_at(state: State, drive: Drive, world: int, time: wp.float64):
 @wp.func
 def drag_rate(chain: Chain, state: State, drive: Drive, world: int, height: wp.float64):
     """Rate γ [1/s] of the drag on the shape of a chain under its present loads."""
-    full = state.watch[world, HOLD_LOAD]
+    full = state.watch[world, layout.HOLD_LOAD]
     present = state.load_factor[world]
     gravity = chain.gravity * full / present
     crossing = crossing_time(drive.loop_speed[world], gravity, chain.sprocket_radius, height)
@@ -122,24 +105,25 @@ def drag_rate(chain: Chain, state: State, drive: Drive, world: int, height: wp.f
 
 @wp.func
 def watch_steadiness(chain: Chain, state: State, drive: Drive, world: int, time: wp.float64, summary: Summary):
-    """Ends a window if it is time to, and says what follows: loads fall, or the moment of the release is set."""
+    """Adds a sample to its window. At the end of a window loads may begin to fall, or the moment of release is set."""
     if not is_watched(state, drive, world, time):
         return
+    watch = state.watch[world]
     is_free = state.load_factor[world] == ONE
-    is_loaded = not is_free and state.watch[world, UNLOADED_SINCE] < ZERO
+    is_loaded = not is_free and watch[layout.UNLOADED_SINCE] < ZERO
     if not (is_free or is_loaded):
-        state.watch[world, WINDOW_START] = -ONE  # nothing is watched while loads fall
+        watch[layout.WINDOW_START] = -ONE  # nothing is watched while loads fall
         return
-    if state.watch[world, WINDOW_START] < ZERO:
-        begin_window(state, world, time)
-    if state.watch[world, LOADED_SINCE] < ZERO:
-        state.watch[world, LOADED_SINCE] = time
-    state.watch[world, WINDOW_COUNT] = state.watch[world, WINDOW_COUNT] + ONE
-    state.watch[world, SUM_HEIGHT] = state.watch[world, SUM_HEIGHT] + summary.height
-    state.watch[world, SUM_WIDTH] = state.watch[world, SUM_WIDTH] + summary.width
-    state.watch[world, SUM_X] = state.watch[world, SUM_X] + summary.center_x
-    state.watch[world, SUM_Y] = state.watch[world, SUM_Y] + summary.center_y
-    state.watch[world, SUM_SPEED] = state.watch[world, SUM_SPEED] + summary.loop_speed
+    if watch[layout.WINDOW_START] < ZERO:
+        begin_window(watch, time)
+    if watch[layout.LOADED_SINCE] < ZERO:
+        watch[layout.LOADED_SINCE] = time
+    watch[layout.WINDOW_COUNT] = watch[layout.WINDOW_COUNT] + ONE
+    watch[layout.SUM_HEIGHT] = watch[layout.SUM_HEIGHT] + summary.height
+    watch[layout.SUM_WIDTH] = watch[layout.SUM_WIDTH] + summary.width
+    watch[layout.SUM_X] = watch[layout.SUM_X] + summary.center_x
+    watch[layout.SUM_Y] = watch[layout.SUM_Y] + summary.center_y
+    watch[layout.SUM_SPEED] = watch[layout.SUM_SPEED] + summary.loop_speed
 
     crossing = crossing_time(drive.loop_speed[world], chain.gravity, chain.sprocket_radius, summary.height)
     window = drive.steady_window[world]
@@ -149,54 +133,54 @@ def watch_steadiness(chain: Chain, state: State, drive: Drive, world: int, time:
         wanted = crossing
     elif wanted < ZERO:
         slips = drive.loop_speed[world] - summary.loop_speed > LITTLE_SLIP * drive.loop_speed[world]
-        was_loaded = state.watch[world, HOLD_LOAD] > ONE
+        was_loaded = watch[layout.HOLD_LOAD] > ONE
         wanted = wp.where(was_loaded and not slips, drive.loop_period[world], crossing)
-    if time - state.watch[world, WINDOW_START] < window:
+    if time - watch[layout.WINDOW_START] < window:
         return
 
-    count = state.watch[world, WINDOW_COUNT]
-    height = state.watch[world, SUM_HEIGHT] / count
-    width = state.watch[world, SUM_WIDTH] / count
-    x = state.watch[world, SUM_X] / count
-    y = state.watch[world, SUM_Y] / count
-    speed = state.watch[world, SUM_SPEED] / count
-    begin_window(state, world, time)
-    is_first = state.watch[world, STEADY_SINCE] < ZERO
-    tall = widen(state, world, LEAST_HEIGHT, GREATEST_HEIGHT, height, is_first)
-    wide = widen(state, world, LEAST_WIDTH, GREATEST_WIDTH, width, is_first)
-    aside = widen(state, world, LEAST_X, GREATEST_X, x, is_first)
-    up = widen(state, world, LEAST_Y, GREATEST_Y, y, is_first)
+    count = watch[layout.WINDOW_COUNT]
+    height = watch[layout.SUM_HEIGHT] / count
+    width = watch[layout.SUM_WIDTH] / count
+    x = watch[layout.SUM_X] / count
+    y = watch[layout.SUM_Y] / count
+    speed = watch[layout.SUM_SPEED] / count
+    begin_window(watch, time)
+    is_first = watch[layout.STEADY_SINCE] < ZERO
+    tall = widen(watch, layout.LEAST_HEIGHT, layout.GREATEST_HEIGHT, height, is_first)
+    wide = widen(watch, layout.LEAST_WIDTH, layout.GREATEST_WIDTH, width, is_first)
+    aside = widen(watch, layout.LEAST_X, layout.GREATEST_X, x, is_first)
+    up = widen(watch, layout.LEAST_Y, layout.GREATEST_Y, y, is_first)
     drift = wp.max(wp.max(tall, up) / height, wp.max(wide, aside) / width)
-    state.watch[world, DRIFT] = drift
+    watch[layout.DRIFT] = drift
     target = drive.loop_speed[world]
-    uneven = widen(state, world, LEAST_SPEED, GREATEST_SPEED, speed, is_first)
+    uneven = widen(watch, layout.LEAST_SPEED, layout.GREATEST_SPEED, speed, is_first)
     tolerance = drive.steady_tolerance[world]
     is_fast_enough = wp.abs(speed - target) <= wp.max(MOST_SLIP * target, SLOWEST_STEADY)
     keeps_speed = is_fast_enough and uneven <= wp.max(tolerance * target, SLOWEST_STEADY)
     keeps_shape = drift <= tolerance
-    is_over = keeps_shape and keeps_speed and not is_first and time - state.watch[world, STEADY_SINCE] >= wanted
+    is_over = keeps_shape and keeps_speed and not is_first and time - watch[layout.STEADY_SINCE] >= wanted
     if is_first or not (keeps_shape and keeps_speed) or (is_over and is_loaded):
         # the next watch begins with this window
-        state.watch[world, STEADY_SINCE] = time
-        widen(state, world, LEAST_HEIGHT, GREATEST_HEIGHT, height, True)
-        widen(state, world, LEAST_WIDTH, GREATEST_WIDTH, width, True)
-        widen(state, world, LEAST_X, GREATEST_X, x, True)
-        widen(state, world, LEAST_Y, GREATEST_Y, y, True)
-        widen(state, world, LEAST_SPEED, GREATEST_SPEED, speed, True)
+        watch[layout.STEADY_SINCE] = time
+        widen(watch, layout.LEAST_HEIGHT, layout.GREATEST_HEIGHT, height, True)
+        widen(watch, layout.LEAST_WIDTH, layout.GREATEST_WIDTH, width, True)
+        widen(watch, layout.LEAST_X, layout.GREATEST_X, x, True)
+        widen(watch, layout.LEAST_Y, layout.GREATEST_Y, y, True)
+        widen(watch, layout.LEAST_SPEED, layout.GREATEST_SPEED, speed, True)
     if is_over and is_loaded:
-        state.watch[world, LEAST_SPEED] = wp.float64(wp.inf)  # a loaded loop slips more: its speed counts no longer
-        state.watch[world, GREATEST_SPEED] = -wp.float64(wp.inf)
-        state.watch[world, UNLOADED_SINCE] = time
-        state.watch[world, STEADY_SINCE] = time + LOADING_TIME
+        watch[layout.LEAST_SPEED] = wp.float64(wp.inf)  # under load it slipped more
+        watch[layout.GREATEST_SPEED] = -wp.float64(wp.inf)
+        watch[layout.UNLOADED_SINCE] = time
+        watch[layout.STEADY_SINCE] = time + LOADING_TIME
     elif is_over:
         wait = drive.further_hold[world] + drive.release_phase[world] * drive.loop_period[world]
         state.stop_time[world] = time + wait
         state.stop_status[world] = FINISHED
-    leaves_shape = is_free and state.watch[world, HOLD_LOAD] > ONE and not (is_first or keeps_shape)
-    loses_time = is_loaded and not is_over and time - state.watch[world, LOADED_SINCE] > MOST_CROSSINGS * crossing
+    leaves_shape = is_free and watch[layout.HOLD_LOAD] > ONE and not (is_first or keeps_shape)
+    loses_time = is_loaded and not is_over and time - watch[layout.LOADED_SINCE] > MOST_CROSSINGS * crossing
     if leaves_shape or loses_time:
-        root = wp.sqrt(state.watch[world, HOLD_LOAD])
-        state.watch[world, HOLD_LOAD] = wp.where(root < LEAST_LOAD, ONE, root)
-        state.watch[world, UNLOADED_SINCE] = -ONE
-        state.watch[world, LOADED_SINCE] = time
-        state.watch[world, STEADY_SINCE] = -ONE
+        root = wp.sqrt(watch[layout.HOLD_LOAD])
+        watch[layout.HOLD_LOAD] = wp.where(root < LEAST_LOAD, ONE, root)
+        watch[layout.UNLOADED_SINCE] = -ONE
+        watch[layout.LOADED_SINCE] = time
+        watch[layout.STEADY_SINCE] = -ONE

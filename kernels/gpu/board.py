@@ -2,47 +2,9 @@
 
 import warp as wp
 
+from warpchain.kernels import layout
 from warpchain.kernels.gpu.stage import Link, Place, read_link
-from warpchain.kernels.layout import (
-    BOARD_FIRST,
-    BOARD_LOST_DAMPING,
-    BOARD_LOST_FIXED,
-    BOARD_LOST_FRICTION,
-    BOARD_LOST_SELF,
-    BOARD_VALUES,
-    COSINE,
-    LEFT_X,
-    LEFT_Y,
-    LOSS_DAMPING,
-    LOSS_FRICTION,
-    LOSS_SELF,
-    MASS,
-    OMEGA,
-    RIGHT_X,
-    RIGHT_Y,
-    SINE,
-    THETA,
-    VALUE_CHAIN_FRICTION,
-    VALUE_CHAIN_RESTITUTION,
-    VALUE_CIRCLE_RADIUS,
-    VALUE_COULOMB,
-    VALUE_DAMPING,
-    VALUE_FLOOR_FRICTION,
-    VALUE_FLOOR_RESTITUTION,
-    VALUE_GRAVITY,
-    VALUE_HALF_LENGTH,
-    VALUE_INVERSE_SMOOTHING,
-    VALUE_SPROCKET_FRICTION,
-    VALUE_SPROCKET_RADIUS,
-    VALUE_SPROCKET_RESTITUTION,
-    VALUE_STIFFNESS,
-    VALUE_TANGENTIAL,
-    VALUE_VISCOUS,
-    U,
-    V,
-    X,
-    Y,
-)
+from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, MASS, OMEGA, RIGHT_X, RIGHT_Y, SINE, THETA, U, V, X, Y
 from warpchain.kernels.physics.elementary import ZERO, cos_sin
 from warpchain.kernels.physics.geometry import end_positions
 from warpchain.kernels.types import Chain, State
@@ -69,22 +31,22 @@ def place_of(chain: Chain, lane: int) -> Place:
 @wp.func
 def write_constants(K: wp.array2d(dtype=wp.float64), chain: Chain):
     """What stages and contacts need of a chain, onto the board."""
-    K[BOARD_VALUES, VALUE_HALF_LENGTH] = chain.half_length
-    K[BOARD_VALUES, VALUE_STIFFNESS] = chain.joint_stiffness
-    K[BOARD_VALUES, VALUE_DAMPING] = chain.joint_damping
-    K[BOARD_VALUES, VALUE_VISCOUS] = chain.viscous_friction
-    K[BOARD_VALUES, VALUE_COULOMB] = chain.coulomb_friction
-    K[BOARD_VALUES, VALUE_INVERSE_SMOOTHING] = chain.inverse_smoothing
-    K[BOARD_VALUES, VALUE_GRAVITY] = chain.gravity
-    K[BOARD_VALUES, VALUE_CIRCLE_RADIUS] = chain.circle_radius
-    K[BOARD_VALUES, VALUE_SPROCKET_RADIUS] = chain.sprocket_radius
-    K[BOARD_VALUES, VALUE_TANGENTIAL] = chain.tangential_restitution
-    K[BOARD_VALUES, VALUE_FLOOR_RESTITUTION] = chain.floor_restitution
-    K[BOARD_VALUES, VALUE_FLOOR_FRICTION] = chain.floor_friction
-    K[BOARD_VALUES, VALUE_SPROCKET_RESTITUTION] = chain.sprocket_restitution
-    K[BOARD_VALUES, VALUE_SPROCKET_FRICTION] = chain.sprocket_friction
-    K[BOARD_VALUES, VALUE_CHAIN_RESTITUTION] = chain.chain_restitution
-    K[BOARD_VALUES, VALUE_CHAIN_FRICTION] = chain.chain_friction
+    K[layout.BOARD_VALUES, layout.VALUE_HALF_LENGTH] = chain.half_length
+    K[layout.BOARD_VALUES, layout.VALUE_STIFFNESS] = chain.joint_stiffness
+    K[layout.BOARD_VALUES, layout.VALUE_DAMPING] = chain.joint_damping
+    K[layout.BOARD_VALUES, layout.VALUE_VISCOUS] = chain.viscous_friction
+    K[layout.BOARD_VALUES, layout.VALUE_COULOMB] = chain.coulomb_friction
+    K[layout.BOARD_VALUES, layout.VALUE_INVERSE_SMOOTHING] = chain.inverse_smoothing
+    K[layout.BOARD_VALUES, layout.VALUE_GRAVITY] = chain.gravity
+    K[layout.BOARD_VALUES, layout.VALUE_CIRCLE_RADIUS] = chain.circle_radius
+    K[layout.BOARD_VALUES, layout.VALUE_SPROCKET_RADIUS] = chain.sprocket_radius
+    K[layout.BOARD_VALUES, layout.VALUE_TANGENTIAL] = chain.tangential_restitution
+    K[layout.BOARD_VALUES, layout.VALUE_FLOOR_RESTITUTION] = chain.floor_restitution
+    K[layout.BOARD_VALUES, layout.VALUE_FLOOR_FRICTION] = chain.floor_friction
+    K[layout.BOARD_VALUES, layout.VALUE_SPROCKET_RESTITUTION] = chain.sprocket_restitution
+    K[layout.BOARD_VALUES, layout.VALUE_SPROCKET_FRICTION] = chain.sprocket_friction
+    K[layout.BOARD_VALUES, layout.VALUE_CHAIN_RESTITUTION] = chain.chain_restitution
+    K[layout.BOARD_VALUES, layout.VALUE_CHAIN_FRICTION] = chain.chain_friction
 
 
 @wp.func
@@ -92,15 +54,15 @@ def contact_constants(K: wp.array2d(dtype=wp.float64), n: int) -> Chain:
     """What contacts need of a chain, back from the board."""
     chain = Chain()
     chain.link_count = n
-    chain.circle_radius = K[BOARD_VALUES, VALUE_CIRCLE_RADIUS]
-    chain.sprocket_radius = K[BOARD_VALUES, VALUE_SPROCKET_RADIUS]
-    chain.tangential_restitution = K[BOARD_VALUES, VALUE_TANGENTIAL]
-    chain.floor_restitution = K[BOARD_VALUES, VALUE_FLOOR_RESTITUTION]
-    chain.floor_friction = K[BOARD_VALUES, VALUE_FLOOR_FRICTION]
-    chain.sprocket_restitution = K[BOARD_VALUES, VALUE_SPROCKET_RESTITUTION]
-    chain.sprocket_friction = K[BOARD_VALUES, VALUE_SPROCKET_FRICTION]
-    chain.chain_restitution = K[BOARD_VALUES, VALUE_CHAIN_RESTITUTION]
-    chain.chain_friction = K[BOARD_VALUES, VALUE_CHAIN_FRICTION]
+    chain.circle_radius = K[layout.BOARD_VALUES, layout.VALUE_CIRCLE_RADIUS]
+    chain.sprocket_radius = K[layout.BOARD_VALUES, layout.VALUE_SPROCKET_RADIUS]
+    chain.tangential_restitution = K[layout.BOARD_VALUES, layout.VALUE_TANGENTIAL]
+    chain.floor_restitution = K[layout.BOARD_VALUES, layout.VALUE_FLOOR_RESTITUTION]
+    chain.floor_friction = K[layout.BOARD_VALUES, layout.VALUE_FLOOR_FRICTION]
+    chain.sprocket_restitution = K[layout.BOARD_VALUES, layout.VALUE_SPROCKET_RESTITUTION]
+    chain.sprocket_friction = K[layout.BOARD_VALUES, layout.VALUE_SPROCKET_FRICTION]
+    chain.chain_restitution = K[layout.BOARD_VALUES, layout.VALUE_CHAIN_RESTITUTION]
+    chain.chain_friction = K[layout.BOARD_VALUES, layout.VALUE_CHAIN_FRICTION]
     return chain
 
 
@@ -141,15 +103,15 @@ def store_losses(K: wp.array2d(dtype=wp.float64), state: State, world: int, n: i
     between = ZERO
     i = int(0)
     while i < n:
-        friction += K[BOARD_LOST_FRICTION, i]
-        damping += K[BOARD_LOST_DAMPING, i]
-        fixed += K[BOARD_LOST_FIXED, i]
-        between += K[BOARD_LOST_SELF, i]
+        friction += K[layout.BOARD_LOST_FRICTION, i]
+        damping += K[layout.BOARD_LOST_DAMPING, i]
+        fixed += K[layout.BOARD_LOST_FIXED, i]
+        between += K[layout.BOARD_LOST_SELF, i]
         i += 1
-    state.losses[world, LOSS_FRICTION] = friction
-    state.losses[world, LOSS_DAMPING] = damping
+    state.losses[world, layout.LOSS_FRICTION] = friction
+    state.losses[world, layout.LOSS_DAMPING] = damping
     state.losses[world, fixed_loss] = fixed
-    state.losses[world, LOSS_SELF] = between
+    state.losses[world, layout.LOSS_SELF] = between
 
 
 @wp.func
@@ -190,8 +152,8 @@ def link_is_finite(K: wp.array2d(dtype=wp.float64), lane: int):
     while row < MASS:
         finite = finite and wp.isfinite(K[row, lane])
         row += 1
-    row = int(BOARD_FIRST)
-    while row < BOARD_FIRST + 3:
+    row = int(layout.BOARD_FIRST)
+    while row < layout.BOARD_FIRST + 3:
         finite = finite and wp.isfinite(K[row, lane])
         row += 1
     return finite

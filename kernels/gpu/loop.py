@@ -16,11 +16,11 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.codes import LIST_OVERFLOW, NOT_FINITE, RUNNING, STEP_LIMIT, STEP_TOO_SMALL
-from warpchain.kernels.contacts.fixed_body import BOUNCE_PAUSE
 from warpchain.kernels.contacts.pair_list import list_layout
 from warpchain.kernels.events.present_chain import has_changed, present_chain
-from warpchain.kernels.events.record import record_is_full, write_sample
+from warpchain.kernels.events.record import lacks_last_sample, record_is_full, write_sample
 from warpchain.kernels.events.summary import summarise
+from warpchain.kernels.events.tallies import add_count, attempts_made, count_bounce, of_fixed_body, raise_extreme
 from warpchain.kernels.features import COMPILER_FLAGS, Features
 from warpchain.kernels.gpu.board import (
     contact_constants,
@@ -48,47 +48,7 @@ from warpchain.kernels.gpu.stage import (
     write_first_stage,
 )
 from warpchain.kernels.gpu.threads import barrier, barrier_if_any, block_maxima, clock, tile_address, vec4i
-from warpchain.kernels.layout import (
-    ACCEPTED,
-    BOARD_LOST_DAMPING,
-    BOARD_LOST_FRICTION,
-    BOARD_LOST_SELF,
-    BOARD_VALUES,
-    BOUNCES,
-    COSINE,
-    FLOOR_DEPTH,
-    FLOOR_IMPULSES,
-    INERTIA,
-    INVERSE_INERTIA,
-    INVERSE_MASS,
-    LAST_FLOOR_IMPULSE,
-    LIST_BUILDS,
-    MASS,
-    OMEGA,
-    OPENING,
-    REJECTED,
-    SELF_DEPTH,
-    SELF_IMPULSES,
-    SINE,
-    SPROCKET_DEPTH,
-    SPROCKET_IMPULSES,
-    THETA,
-    TIME,
-    VALUE_CONTACT_STEP,
-    VALUE_DAMPING,
-    VALUE_DEADLINE,
-    VALUE_FIXED_DEPTH,
-    VALUE_LAST_IMPULSE,
-    VALUE_NEXT_SAMPLE,
-    VALUE_OPENING,
-    VALUE_STOP_TIME,
-    VALUE_TOLERANCE,
-    U,
-    V,
-    X,
-    Y,
-)
-from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, step_controller
+from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step, step_controller
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import ONE, ZERO
@@ -120,13 +80,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     columns = features.columns
     lists = list_layout(columns)
     has_floor = features.fixed_body == "floor"
-    has_sprocket = features.fixed_body == "sprocket"
-    has_fixed = has_floor or has_sprocket
+    has_fixed = features.fixed_body != "none"
     has_self = features.self_contact
     has_contacts = has_fixed or has_self
-    fixed_loss = layout.LOSS_SPROCKET if has_sprocket else layout.LOSS_FLOOR
-    fixed_depth = SPROCKET_DEPTH if has_sprocket else FLOOR_DEPTH
-    fixed_count = SPROCKET_IMPULSES if has_sprocket else FLOOR_IMPULSES
+    fixed_loss, fixed_depth, fixed_count = of_fixed_body(features.fixed_body)
     reuses_last = method.reuses_last
     needs_first_power = TABLEAUS[method.tableau].velocity_weights[0] != 0.0
     is_shared = shares_board(block_dim)
@@ -147,8 +104,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     growth, shrinkage = step_controller(method.order, method.error_order, wp.float32)
     build_list = block_list(columns, block_dim, features.broad_phase)
     clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, block_dim, touch)
+    values = layout.BOARD_VALUES
     softens = features.softens
-    is_driven = features.watch == "steady"
+    is_driven = features.is_driven
     present = present_chain(softens, is_driven)
     take_sample = block_sample(features, touch)
 
@@ -159,7 +117,13 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         """Works out the first stage of the next step; ``next_end``: left end of the next link."""
         column = place.column
         first = stage(
-            forces, K, place, next_end, read_link(K, place.lane), K[INVERSE_MASS, column], K[INVERSE_INERTIA, column]
+            forces,
+            K,
+            place,
+            next_end,
+            read_link(K, place.lane),
+            K[layout.INVERSE_MASS, column],
+            K[layout.INVERSE_INERTIA, column],
         )
         write_first_stage(K, place.lane, first, wp.static(needs_first_power))
 
@@ -229,11 +193,11 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         is_fresh = state.is_fresh[world] != 0
         if lane < n:
             inner = lane % 2 == 0
-            K[MASS, lane] = wp.where(inner, chain.inner_mass, chain.outer_mass)
-            K[INERTIA, lane] = wp.where(inner, chain.inner_inertia, chain.outer_inertia)
-            K[INVERSE_MASS, lane] = ONE / K[MASS, lane]
-            K[INVERSE_INERTIA, lane] = ONE / K[INERTIA, lane]
-            row = int(BOARD_LOST_SELF)
+            K[layout.MASS, lane] = wp.where(inner, chain.inner_mass, chain.outer_mass)
+            K[layout.INERTIA, lane] = wp.where(inner, chain.inner_inertia, chain.outer_inertia)
+            K[layout.INVERSE_MASS, lane] = ONE / K[layout.MASS, lane]
+            K[layout.INVERSE_INERTIA, lane] = ONE / K[layout.INERTIA, lane]
+            row = int(layout.BOARD_LOST_SELF)
             while row < wp.static(layout.BOARD_VALUES):
                 K[row, lane] = wp.where(is_fresh, ZERO, kept[row, lane])
                 row += 1
@@ -242,17 +206,17 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 chain = softened(chain, control, state.softness[world])
             write_constants(K, chain)
             write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
-            K[BOARD_VALUES, VALUE_OPENING] = state.extremes[world, OPENING]
-            K[BOARD_VALUES, VALUE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
-            K[BOARD_VALUES, VALUE_LAST_IMPULSE] = state.watch[world, LAST_FLOOR_IMPULSE]
-            K[BOARD_VALUES, VALUE_STOP_TIME] = state.stop_time[world]
-            K[BOARD_VALUES, VALUE_NEXT_SAMPLE] = wp.float64(state.next_sample[world]) * control.sample_interval
+            K[values, layout.VALUE_OPENING] = state.extremes[world, layout.OPENING]
+            K[values, layout.VALUE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
+            K[values, layout.VALUE_LAST_IMPULSE] = state.watch[world, layout.LAST_FLOOR_IMPULSE]
+            K[values, layout.VALUE_STOP_TIME] = state.stop_time[world]
+            K[values, layout.VALUE_NEXT_SAMPLE] = wp.float64(state.next_sample[world]) * control.sample_interval
             T[wp.static(touch.fixed_hits)] = 0
             T[wp.static(touch.self_hits)] = 0
             T[wp.static(touch.deepest)] = 0
             T[wp.static(touch.is_late)] = 0
             T[wp.static(touch.votes)] = 0
-            K[BOARD_VALUES, VALUE_DEADLINE] = clock() + control.launch_time
+            K[values, layout.VALUE_DEADLINE] = clock() + control.launch_time
         barrier()  # the chain's constants are on the board
         publish(K, place)
         barrier()
@@ -277,7 +241,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         time = state.time[world]
         step = state.step[world]
         last_error = wp.float32(state.last_error[world])
-        attempts_before = state.attempts_before[world] + state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
+        attempts_before = attempts_made(state, world)
         attempts_left = int(wp.min(wp.int64(control.attempts), control.step_limit - attempts_before))
         if record_is_full(record, world):
             attempts_left = 0
@@ -285,7 +249,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         accepted = int(0)
         barrier()
         while status == RUNNING and attempts < attempts_left:
-            if time >= K[BOARD_VALUES, VALUE_NEXT_SAMPLE]:
+            if time >= K[values, layout.VALUE_NEXT_SAMPLE]:
                 softness = state.softness[world]
                 load_factor = state.load_factor[world]
                 publish(K, place)
@@ -302,19 +266,19 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                         evaluate_first_stage(forces, K, place, next_end)
                 if pauses or status != RUNNING:
                     break
-            stop_time = K[BOARD_VALUES, VALUE_STOP_TIME]
+            stop_time = K[values, layout.VALUE_STOP_TIME]
             if time >= stop_time:
                 status = state.stop_status[world]
                 break
 
             h = step
             if wp.static(has_contacts):
-                h = wp.min(h, wp.max(K[BOARD_VALUES, VALUE_CONTACT_STEP], wp.float64(reach)))
-            lands = time + h >= stop_time
-            if lands:
+                h = wp.min(h, wp.max(K[values, layout.VALUE_CONTACT_STEP], wp.float64(reach)))
+            reaches_stop = time + h >= stop_time
+            if reaches_stop:
                 h = stop_time - time
 
-            tolerance = K[BOARD_VALUES, VALUE_TOLERANCE]
+            tolerance = K[values, layout.VALUE_TOLERANCE]
             result = attempt(ends, forces, maxima_start, K, place, h)
             own_error = int(0)
             if lane < n:
@@ -335,23 +299,21 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             else:
                 accepted += 1
                 if lane < n:
-                    K[BOARD_LOST_FRICTION, lane] = K[BOARD_LOST_FRICTION, lane] + h * result.friction
-                    dissipation = K[BOARD_VALUES, VALUE_DAMPING] * result.damping
-                    K[BOARD_LOST_DAMPING, lane] = K[BOARD_LOST_DAMPING, lane] + h * dissipation
-                    K[X, lane] = result.x
-                    K[Y, lane] = result.y
-                    K[THETA, lane] = result.theta
-                    K[U, lane] = result.u
-                    K[V, lane] = result.v
-                    K[OMEGA, lane] = result.omega
-                    K[COSINE, lane] = result.cosine
-                    K[SINE, lane] = result.sine
+                    K[layout.BOARD_LOST_FRICTION, lane] = K[layout.BOARD_LOST_FRICTION, lane] + h * result.friction
+                    dissipation = K[values, layout.VALUE_DAMPING] * result.damping
+                    K[layout.BOARD_LOST_DAMPING, lane] = K[layout.BOARD_LOST_DAMPING, lane] + h * dissipation
+                    K[layout.X, lane] = result.x
+                    K[layout.Y, lane] = result.y
+                    K[layout.THETA, lane] = result.theta
+                    K[layout.U, lane] = result.u
+                    K[layout.V, lane] = result.v
+                    K[layout.OMEGA, lane] = result.omega
+                    K[layout.COSINE, lane] = result.cosine
+                    K[layout.SINE, lane] = result.sine
                     if wp.static(reuses_last):
                         write_first_stage(K, lane, result.last, wp.static(needs_first_power))
-                time = wp.where(lands, stop_time, time + h)
-                proposal = h * wp.float64(growth(error, last_error, control.proportional))
-                # a step that was cut short says nothing against the proposal that it was cut from
-                step = wp.where(h < step, wp.max(step, proposal), proposal)
+                time = wp.where(reaches_stop, stop_time, time + h)
+                step = next_step(step, h, wp.float64(growth(error, last_error, control.proportional)))
                 last_error = wp.max(error, wp.float32(1e-4))
                 proximity = result.proximity
                 if wp.static(not reuses_last):
@@ -359,7 +321,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 opening = proximity.opening
                 gap = proximity.gap
                 if lane == 0:
-                    K[BOARD_VALUES, VALUE_OPENING] = wp.max(K[BOARD_VALUES, VALUE_OPENING], wp.float64(opening))
+                    K[values, layout.VALUE_OPENING] = wp.max(K[values, layout.VALUE_OPENING], wp.float64(opening))
                 is_hit = bool(False)
                 is_near = bool(False)
                 is_stale = bool(False)
@@ -382,18 +344,17 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
                 if wp.static(has_fixed):
                     if gap < wp.float32(0.0) and lane == 0:
-                        K[BOARD_VALUES, VALUE_FIXED_DEPTH] = wp.max(
-                            K[BOARD_VALUES, VALUE_FIXED_DEPTH], wp.float64(-gap)
+                        K[values, layout.VALUE_FIXED_DEPTH] = wp.max(
+                            K[values, layout.VALUE_FIXED_DEPTH], wp.float64(-gap)
                         )
                         if wp.static(has_floor):
                             if is_hit:
-                                if time - K[BOARD_VALUES, VALUE_LAST_IMPULSE] > BOUNCE_PAUSE:
-                                    state.counts[world, BOUNCES] = state.counts[world, BOUNCES] + wp.int64(1)
-                                K[BOARD_VALUES, VALUE_LAST_IMPULSE] = time
+                                count_bounce(state, world, time, K[values, layout.VALUE_LAST_IMPULSE])
+                                K[values, layout.VALUE_LAST_IMPULSE] = time
                 if wp.static(has_self):
                     if is_stale:
                         if lane == 0:
-                            state.counts[world, LIST_BUILDS] = state.counts[world, LIST_BUILDS] + wp.int64(1)
+                            add_count(state, world, layout.LIST_BUILDS, wp.int64(1))
                         pairs = build_list(K, L, contact_constants(K, n), lane, control.skin, upper_bound(opening))
                         if pairs > wp.static(lists.capacity):
                             status = int(LIST_OVERFLOW)
@@ -413,10 +374,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if is_hit:
                         next_end = exchange_ends(ends, place, read_link(K, lane))
                     evaluate_first_stage(forces, K, place, next_end)
-        attempts_before = state.attempts_before[world] + state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
-        if status == RUNNING and attempts_before + wp.int64(attempts) >= control.step_limit:
+        if status == RUNNING and attempts_made(state, world) + wp.int64(attempts) >= control.step_limit:
             status = int(STEP_LIMIT)
-        is_last = status != RUNNING and status != NOT_FINITE and state.last_sample[world, TIME] != time
+        is_last = lacks_last_sample(state, world, time, status)
         publish(K, place)
         barrier()
         if lane < n:
@@ -424,26 +384,23 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             left = wp.array(
                 ptr=scratch[world].ptr, shape=(wp.static(layout.BOARD_VALUES), wp.static(kept_width)), dtype=wp.float64
             )
-            row = int(BOARD_LOST_SELF)
+            row = int(layout.BOARD_LOST_SELF)
             while row < wp.static(layout.BOARD_VALUES):
                 left[row, lane] = K[row, lane]
                 row += 1
         if lane == 0:
             if is_last:
-                # the series ends with the state in which the run ends
                 write_sample(state, record, world, time, summarise(K, present(model, state, control, world)))
             store_losses(K, state, world, n, wp.static(fixed_loss))
-            counts = state.counts[world]
-            counts[ACCEPTED] = counts[ACCEPTED] + wp.int64(accepted)
-            counts[REJECTED] = counts[REJECTED] + wp.int64(attempts - accepted)
-            counts[fixed_count] = counts[fixed_count] + wp.int64(T[wp.static(touch.fixed_hits)])
-            counts[SELF_IMPULSES] = counts[SELF_IMPULSES] + wp.int64(T[wp.static(touch.self_hits)])
-            state.extremes[world, OPENING] = K[BOARD_VALUES, VALUE_OPENING]
-            state.extremes[world, SELF_DEPTH] = wp.max(
-                state.extremes[world, SELF_DEPTH], wp.float64(wp.cast(T[wp.static(touch.deepest)], wp.float32))
-            )
-            state.extremes[world, fixed_depth] = K[BOARD_VALUES, VALUE_FIXED_DEPTH]
-            state.watch[world, LAST_FLOOR_IMPULSE] = K[BOARD_VALUES, VALUE_LAST_IMPULSE]
+            add_count(state, world, layout.ACCEPTED, wp.int64(accepted))
+            add_count(state, world, layout.REJECTED, wp.int64(attempts - accepted))
+            add_count(state, world, fixed_count, wp.int64(T[wp.static(touch.fixed_hits)]))
+            add_count(state, world, layout.SELF_IMPULSES, wp.int64(T[wp.static(touch.self_hits)]))
+            state.extremes[world, layout.OPENING] = K[values, layout.VALUE_OPENING]
+            deepest = wp.cast(T[wp.static(touch.deepest)], wp.float32)
+            raise_extreme(state, world, layout.SELF_DEPTH, wp.float64(deepest))
+            state.extremes[world, fixed_depth] = K[values, layout.VALUE_FIXED_DEPTH]
+            state.watch[world, layout.LAST_FLOOR_IMPULSE] = K[values, layout.VALUE_LAST_IMPULSE]
             state.is_fresh[world] = 0
             state.has_first_stage[world] = 1
             state.reach[world] = wp.float64(reach)

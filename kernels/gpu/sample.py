@@ -19,7 +19,7 @@ from warpchain.kernels.layout import (
     VALUE_STOP_TIME,
     VALUE_TOLERANCE,
 )
-from warpchain.kernels.physics.scaled_loads import lay_inertias
+from warpchain.kernels.physics.scaled_loads import write_inertias
 from warpchain.kernels.types import Control, Drive, Model, Record, State
 
 wp.set_module_options({"enable_backward": False})
@@ -42,7 +42,7 @@ def block_sample(features: Features, touch: TouchLayout):
     and says when the launch has lasted long enough.
     """
     softens = features.softens
-    is_driven = features.watch == "steady"
+    is_driven = features.is_driven
     look_at_chain = sampling(features.watch, softens)
     present = present_chain(softens, is_driven)
 
@@ -68,7 +68,7 @@ def block_sample(features: Features, touch: TouchLayout):
                 book_softening(chain, after, state, world)
                 write_constants(K, after)
                 if wp.static(is_driven):
-                    lay_inertias(K, after)
+                    write_inertias(K, after)
             write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
         K[BOARD_VALUES, VALUE_STOP_TIME] = state.stop_time[world]
         K[BOARD_VALUES, VALUE_NEXT_SAMPLE] = wp.float64(state.next_sample[world]) * control.sample_interval

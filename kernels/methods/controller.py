@@ -63,6 +63,13 @@ def quick_root(x: wp.float32) -> wp.float32:
     ...
 
 
+@wp.func
+def next_step(step: wp.float64, h: wp.float64, factor: wp.float64):
+    """Step [s] to propose after an accepted one of h. A shortened step must not lower the proposal it was cut from."""
+    proposal = h * factor
+    return wp.where(h < step, wp.max(step, proposal), proposal)
+
+
 @functools.cache
 def step_controller(order: int, error_order: int, real: type = wp.float64):
     """Warp functions (factor after acceptance, factor after rejection) for a method of these orders.
@@ -102,7 +109,7 @@ def step_controller(order: int, error_order: int, real: type = wp.float64):
 
 
 @functools.cache
-def implicit_controller(error_order: int, real: type = wp.float64):
+def implicit_controller(error_order: int):
     """The same two functions for implicit methods: always proportional-integral, exponents and source as above.
 
     Steps of an implicit method are set by accuracy, and the error jumps where a joint's friction changes its sign:
@@ -115,19 +122,17 @@ def implicit_controller(error_order: int, real: type = wp.float64):
     proportional = -0.7 / (error_order + 1)
     integral = 0.4 / (error_order + 1)
     alone = -1.0 / (error_order + 1)
-    least_shrinkage = float(LEAST_SHRINKAGE)
-    power = quick_power if real is wp.float32 else wp.pow
 
     @wp.func
-    def growth(error: real, last_error: real, _proportional: wp.int32):
-        bounded = wp.max(error, wp.static(real(1e-6)))
-        factor = wp.static(real(safety)) * power(bounded, wp.static(real(proportional)))
-        factor = factor * power(last_error, wp.static(real(integral)))
-        return wp.clamp(factor, wp.static(real(least_shrinkage)), wp.static(real(GREATEST_GROWTH)))
+    def growth(error: wp.float64, last_error: wp.float64, _proportional: wp.int32):
+        bounded = wp.max(error, wp.static(wp.float64(1e-6)))
+        factor = wp.static(wp.float64(safety)) * wp.pow(bounded, wp.static(wp.float64(proportional)))
+        factor = factor * wp.pow(last_error, wp.static(wp.float64(integral)))
+        return wp.clamp(factor, LEAST_SHRINKAGE, wp.static(wp.float64(GREATEST_GROWTH)))
 
     @wp.func
-    def shrinkage(error: real):
-        return wp.max(wp.static(real(safety)) * power(error, wp.static(real(alone))), wp.static(real(least_shrinkage)))
+    def shrinkage(error: wp.float64):
+        return wp.max(wp.static(wp.float64(safety)) * wp.pow(error, wp.static(wp.float64(alone))), LEAST_SHRINKAGE)
 
     return growth, shrinkage
 

@@ -1,11 +1,18 @@
 """Butcher tableaus of the embedded explicit Runge–Kutta methods, as data.
 
-A new explicit method is a new entry of :data:`TABLEAUS`; no other file changes.
+A new explicit method is one call of :func:`register`, at the end of this file or elsewhere; no other file changes.
 """
 
 from dataclasses import dataclass
 from fractions import Fraction as F
 from functools import cached_property
+
+from warpchain.kernels.methods.rosenbrock_tableaus import ROSENBROCK_TABLES
+
+HYBRID = "hybrid"
+"""The method that takes rigid joints between impulses …"""
+HYBRID_SPRINGS = "os32"
+"""… and this explicit method while joints are springs."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +98,33 @@ class Tableau:
             for column, value in enumerate(lower):
                 products[column] += factor * value
         return tuple(products)
+
+
+TABLEAUS: dict[str, Tableau] = {}
+"""Every explicit method by its name; filled by :func:`register`."""
+
+
+def register(tableau: Tableau) -> None:
+    """Make a tableau a method that can be asked for by its name.
+
+    Raises:
+        ValueError: The name is taken, a row has the wrong length, the weights of a solution do not add up to one, or
+            the embedded solution is of an order below 2, for which the step controller has no exponent.
+    """
+    name = tableau.name
+    if name in {*TABLEAUS, *ROSENBROCK_TABLES, HYBRID}:
+        raise ValueError(f"{name}: there is a method of this name")
+    rows = [(f"matrix[{stage}]", row, stage) for stage, row in enumerate(tableau.matrix)]
+    solutions = [("weights", tableau.weights), ("embedded", tableau.embedded)]
+    for place, row, length in [*rows, *((place, row, tableau.stages) for place, row in solutions)]:
+        if len(row) != length:
+            raise ValueError(f"{name}.{place}: {len(row)} entries instead of {length}")
+    for place, row in solutions:
+        if sum(row) != 1:
+            raise ValueError(f"{name}.{place}: the entries add up to {sum(row)}, not 1")
+    if tableau.error_order < 2:
+        raise ValueError(f"{name}.error_order: {tableau.error_order} is less than 2")
+    TABLEAUS[name] = tableau
 
 
 RKF78 = Tableau(
@@ -195,4 +229,5 @@ and 7.3/|λ| on the axis, with `dp5`, which has as many stages, 3.4 and 3.3, wit
 and 2.5.
 """
 
-TABLEAUS = {tableau.name: tableau for tableau in (RKF78, DP5, BS32, OS32)}
+for _tableau in (RKF78, DP5, BS32, OS32):
+    register(_tableau)

@@ -7,12 +7,8 @@ nothing else names it. ``hybrid`` takes an explicit method near contacts and rig
 from dataclasses import dataclass
 from typing import Literal
 
-from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
+from warpchain.kernels.methods.explicit_tableaus import HYBRID, HYBRID_SPRINGS, TABLEAUS
 from warpchain.kernels.methods.rosenbrock_tableaus import ROSENBROCK_TABLES
-
-HYBRID = "hybrid"
-HYBRID_SPRINGS = "os32"
-"""Explicit method that `hybrid` takes while joints are springs."""
 
 
 @dataclass(frozen=True)

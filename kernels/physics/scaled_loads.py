@@ -57,7 +57,7 @@ def under_load(own: Chain, factor: wp.float64) -> Chain:
 
 
 @wp.func
-def lay_inertias(K: wp.array2d(dtype=wp.float64), chain: Chain):
+def write_inertias(K: wp.array2d(dtype=wp.float64), chain: Chain):
     """Rotary inertia of each link and its inverse, into the rows of constants."""
     i = int(0)
     while i < chain.link_count:

@@ -11,11 +11,11 @@ from warpchain.kernels.methods.method import find_method, method_names
 
 
 def test_a_new_tableau_is_a_method() -> None:
-    """What is added to the kernels' tables is taken for `method`, and named in its description and in the help."""
+    """A tableau that is registered is taken for `method`, and named in its description and in the help."""
     program = (
         "from dataclasses import replace\n"
-        "from warpchain.kernels.methods.explicit_tableaus import BS32, TABLEAUS\n"
-        "TABLEAUS['new32'] = replace(BS32, name='new32', title='a new method 3(2)')\n"
+        "from warpchain.kernels.methods.explicit_tableaus import BS32, register\n"
+        "register(replace(BS32, name='new32', title='a new method 3(2)'))\n"
         "from warpchain.cli.main import main\n"
         "from warpchain.inputs.options import Options\n"
         "print(Options(method='new32', device='cuda').method)\n"

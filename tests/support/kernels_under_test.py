@@ -225,7 +225,7 @@ def _contact_pass(columns: int) -> wp.Kernel:
         results[world, 4] = greatest_displacement(block, chain)
         results[world, 5] = list_slack(block, chain, skin, opening)
         if (parts & 4) != 0:
-            results[world, 6] = wp.float64(resolve_floor(block, chain))
+            results[world, 6] = wp.float64(resolve_floor(block, chain, sprocket_speed, push_rate))
         if (parts & 8) != 0:
             results[world, 7] = wp.float64(resolve_sprocket(block, chain, sprocket_speed, push_rate))
         if (parts & 16) != 0:

@@ -8,7 +8,8 @@ from pydantic import BaseModel, Field, field_validator, model_validator
 
 from warpchain.inputs.methods import BURST_TOLERANCE, FORMER_METHODS, METHODS, METHODS_BY_NEED
 from warpchain.inputs.validation import STRICT, number_field, refusal, shown, suggestion
-from warpchain.kernels.methods.method import HYBRID, find_method
+from warpchain.kernels.methods.explicit_tableaus import HYBRID
+from warpchain.kernels.methods.method import find_method, method_names
 
 LONGEST_DRIVE_INTERVAL: Final = 2e-3
 """Greatest time [s] between two of the small steps in which soft joints become stiff, or multiplied loads fall."""
@@ -88,7 +89,7 @@ class Options(BaseModel):
     def _with_defaults_of_method(cls, values: object) -> object:
         if not isinstance(values, Mapping):
             return values
-        word, known = values.get("method", "standard"), (*METHODS_BY_NEED, *METHODS)
+        word, known = values.get("method", "standard"), (*METHODS_BY_NEED, *method_names())
         if word not in known:
             if isinstance(word, str) and word in FORMER_METHODS:
                 raise refusal("method", f"{shown(word)} was removed; give {FORMER_METHODS[word]}")

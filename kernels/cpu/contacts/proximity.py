@@ -79,61 +79,40 @@ def sprocket_gap(K: wp.array2d(dtype=wp.float64), chain: Chain):
     return wp.sqrt(wp.cast(least, wp.float64)) - chain.sprocket_radius - chain.circle_radius
 
 
-@wp.func
-def resolve_floor(K: wp.array2d(dtype=wp.float64), chain: Chain):
-    """Impulses between links and the floor; returns their number."""
-    impulses = wp.int64(0)
-    i = int(0)
-    while i < chain.link_count:
-        u, v, w, lost_left, lost_right, hits = meet_floor(
-            chain,
-            K[LEFT_X, i],
-            K[LEFT_Y, i],
-            K[RIGHT_X, i],
-            K[RIGHT_Y, i],
-            K[X, i],
-            K[Y, i],
-            K[INVERSE_MASS, i],
-            K[INVERSE_INERTIA, i],
-            K[U, i],
-            K[V, i],
-            K[OMEGA, i],
-        )
-        K[U, i] = u
-        K[V, i] = v
-        K[OMEGA, i] = w
-        K[LOST_FIXED, i] = K[LOST_FIXED, i] + lost_left + lost_right
-        impulses += hits
-        i += 1
-    return impulses
+def resolution(meet: wp.Function):
+    """Warp function ``resolve`` of all links and the body that ``meet`` is about, see :func:`meeting`."""
+
+    @wp.func
+    def resolve(K: wp.array2d(dtype=wp.float64), chain: Chain, surface_speed: wp.float64, push_rate: wp.float64):
+        """Impulses between links and the body; returns their number."""
+        impulses = wp.int64(0)
+        i = int(0)
+        while i < chain.link_count:
+            u, v, w, lost_left, lost_right, hits = meet(
+                chain,
+                surface_speed,
+                push_rate,
+                K[LEFT_X, i],
+                K[LEFT_Y, i],
+                K[RIGHT_X, i],
+                K[RIGHT_Y, i],
+                K[X, i],
+                K[Y, i],
+                K[INVERSE_MASS, i],
+                K[INVERSE_INERTIA, i],
+                K[U, i],
+                K[V, i],
+                K[OMEGA, i],
+            )
+            K[U, i] = u
+            K[V, i] = v
+            K[OMEGA, i] = w
+            K[LOST_FIXED, i] = K[LOST_FIXED, i] + lost_left + lost_right
+            impulses += hits
+            i += 1
+        return impulses
+
+    return resolve
 
 
-@wp.func
-def resolve_sprocket(K: wp.array2d(dtype=wp.float64), chain: Chain, surface_speed: wp.float64, push_rate: wp.float64):
-    """Impulses between links and the sprocket, see :func:`meet_sprocket`; returns their number."""
-    impulses = wp.int64(0)
-    i = int(0)
-    while i < chain.link_count:
-        u, v, w, lost_left, lost_right, hits = meet_sprocket(
-            chain,
-            surface_speed,
-            push_rate,
-            K[LEFT_X, i],
-            K[LEFT_Y, i],
-            K[RIGHT_X, i],
-            K[RIGHT_Y, i],
-            K[X, i],
-            K[Y, i],
-            K[INVERSE_MASS, i],
-            K[INVERSE_INERTIA, i],
-            K[U, i],
-            K[V, i],
-            K[OMEGA, i],
-        )
-        K[U, i] = u
-        K[V, i] = v
-        K[OMEGA, i] = w
-        K[LOST_FIXED, i] = K[LOST_FIXED, i] + lost_left + lost_right
-        impulses += hits
-        i += 1
-    return impulses
+resolve_floor, resolve_sprocket = resolution(meet_floor), resolution(meet_sprocket)

@@ -16,7 +16,7 @@ import functools
 import warp as wp
 
 from warpchain.kernels.contacts.link_pair import are_neighbours, circles_of_links, collide, links_of, natural
-from warpchain.kernels.contacts.pair_list import list_layout
+from warpchain.kernels.contacts.pair_list import GEOMETRY_COLUMNS, GEOMETRY_ROWS, list_layout
 from warpchain.kernels.layout import (
     INVERSE_INERTIA,
     INVERSE_MASS,
@@ -35,10 +35,10 @@ wp.set_module_options({"enable_backward": False})
 # Rows of the CPU's scratch for contacts, one column per pair of joints. Four circles: the left-hand and the right-hand
 # one of joint p, likewise of joint q; each with its own centre [m] and the centre of mass of its link [m].
 P_LEFT_HAND, P_RIGHT_HAND, Q_LEFT_HAND, Q_RIGHT_HAND = 0, 4, 8, 12
-END_X, END_Y, CENTER_X, CENTER_Y = 0, 1, 2, 3
+END_X, END_Y, CENTER_X, CENTER_Y = range(4)
 # Two contacts, those of a half; each with the numbers that circles_of_links returns.
 FIRST_CONTACT, SECOND_CONTACT = 16, 25
-DEPTH, NORMAL_X, NORMAL_Y, A_N, A_T, B_N, B_T, INVERSE_NN, INVERSE_DETERMINANT = 0, 1, 2, 3, 4, 5, 6, 7, 8
+DEPTH, NORMAL_X, NORMAL_Y, A_N, A_T, B_N, B_T, INVERSE_NN, INVERSE_DETERMINANT = range(9)
 
 
 @wp.func
@@ -62,7 +62,6 @@ def bring_circle(
 def self_contacts(columns: int):
     """Warp function that resolves a chain's contacts with itself, for scratch blocks of this width."""
     lists = list_layout(columns)
-    chunk = lists.geometry_columns
 
     @wp.func
     def list_touching(K: wp.array2d(dtype=wp.float64), L: wp.array(dtype=wp.int32), chain: Chain, opening: wp.float64):
@@ -163,7 +162,7 @@ def self_contacts(columns: int):
         """Returns impulses, energy lost [J], and the greatest depth [m]; ``opening``: greatest |C| [m]."""
         G = wp.array(
             ptr=L.ptr + wp.uint64(wp.static(4 * lists.geometry)),
-            shape=(wp.static(lists.geometry_rows), wp.static(chunk)),
+            shape=(GEOMETRY_ROWS, GEOMETRY_COLUMNS),
             dtype=wp.float64,
         )
         touching = list_touching(K, L, chain, opening)
@@ -174,8 +173,8 @@ def self_contacts(columns: int):
         while half < 2:
             first = int(0)
             while first < touching:
-                count = wp.min(touching - first, wp.static(chunk))
-                if half == 0 or touching > wp.static(chunk):
+                count = wp.min(touching - first, GEOMETRY_COLUMNS)
+                if half == 0 or touching > GEOMETRY_COLUMNS:
                     bring_circles(K, L, G, chain.link_count, first, count)
                 # whole vectors: what lies beyond the last pair is worked out as well, and not used
                 padded = (count + 7) & -8
@@ -210,7 +209,7 @@ def self_contacts(columns: int):
                             impulses += hits
                         second += 1
                     k += 1
-                first += wp.static(chunk)
+                first += GEOMETRY_COLUMNS
             half += 1
         return impulses, lost, wp.cast(deepest, wp.float64)
 

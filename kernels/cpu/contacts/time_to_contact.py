@@ -10,9 +10,11 @@ import functools
 import warp as wp
 
 from warpchain.kernels.contacts.pair_list import list_layout
+from warpchain.kernels.cpu.contacts.proximity import greatest_speed
+from warpchain.kernels.features import Features
 from warpchain.kernels.layout import COSINE, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, SINE, U, V
-from warpchain.kernels.physics.elementary import TWO, ZERO, order_bits
-from warpchain.kernels.types import Chain
+from warpchain.kernels.physics.elementary import HALF, ONE, TWO, ZERO, order_bits
+from warpchain.kernels.types import Chain, Control
 
 wp.set_module_options({"enable_backward": False})
 
@@ -83,3 +85,52 @@ def fastest_meeting(columns: int):
         return wp.cast(greatest, wp.float64)
 
     return meeting
+
+
+@functools.cache
+def step_bound(features: Features, has_flight: bool):
+    """Warp function: longest step [s] from a placed state that cannot miss a contact; ∞ if there are none.
+
+    ``bound(K, L, chain, control, is_rigid, gap, slack, longest)``; ``longest`` [s] bounds steps near a contact.
+    """
+    has_floor = features.fixed_body == "floor"
+    has_fixed = features.fixed_body != "none"
+    has_self = features.self_contact
+    count = list_layout(features.columns).count
+    meeting = fastest_meeting(features.columns)
+
+    @wp.func
+    def bound(
+        K: wp.array2d(dtype=wp.float64),
+        L: wp.array(dtype=wp.int32),
+        chain: Chain,
+        control: Control,
+        is_rigid: bool,
+        gap: wp.float64,
+        slack: wp.float64,
+        longest: wp.float64,
+    ):
+        if wp.static(not (has_fixed or has_self)):
+            return wp.float64(wp.inf)
+        if wp.static(has_flight):
+            if is_rigid:
+                approach = ZERO
+                if wp.static(has_floor):
+                    approach = fastest_fall(K, chain)
+                if wp.static(has_self):
+                    approach = wp.max(approach, meeting(K, L, chain))
+                    approach = wp.max(approach, greatest_speed(K, chain) / wp.max(slack, SMALLEST_GAP))
+                return wp.max(longest, ONE / approach)
+        distance = control.skin
+        is_near = bool(False)
+        if wp.static(has_fixed):
+            is_near = gap < control.skin
+            distance = HALF * gap
+        if wp.static(has_self):
+            is_near = is_near or L[wp.static(count)] > 0
+            distance = wp.min(distance, slack)
+        if is_near:
+            return longest
+        return wp.max(longest, distance / greatest_speed(K, chain))
+
+    return bound

@@ -13,7 +13,7 @@ wp.set_module_options({"enable_backward": False})
 
 # Rows in segment order. The state; constants of the links.
 BASE = 0
-INVERSE_MASS, INVERSE_INERTIA, MASS, INERTIA, COUNTED = 6, 7, 8, 9, 10
+INVERSE_MASS, INVERSE_INERTIA, MASS, INERTIA, COUNTED = range(6, 11)
 # A stage: rates, directions; joints' inverse smoothing and torques, α; accelerations.
 STAGE_U, STAGE_V, SPIN = 11, 12, 13
 COSINE, SINE = 14, 15

@@ -14,22 +14,22 @@ wp.set_module_options({"enable_backward": False})
 
 # Rows in segment order. The state at the start of the step (6), its direction, the links' constants.
 BASE = 0
-BASE_COSINE, BASE_SINE, MASS, INERTIA, COUNTED = 6, 7, 8, 9, 10
+BASE_COSINE, BASE_SINE, MASS, INERTIA, COUNTED = range(6, 11)
 # Accelerations at the start of the step; of joints there: friction's slope and torque, force, spin, opening rate.
 BASE_RATE = 11
-SLOPE, BASE_TORQUE, BASE_FORCE_X, BASE_FORCE_Y, BASE_SPIN, BASE_RATE_X, BASE_RATE_Y = 14, 15, 16, 17, 18, 19, 20
+SLOPE, BASE_TORQUE, BASE_FORCE_X, BASE_FORCE_Y, BASE_SPIN, BASE_RATE_X, BASE_RATE_Y = range(14, 21)
 # A stage: how the direction differs from that at the start, r_q / g, γ Σ C U_v, joint forces and torques of the stage
 # and of the velocities r_q / g.
 COSINE, SINE = 21, 22
 SHIFT, DRIVE = 23, 26
-FORCE_X, FORCE_Y, TORQUE, SHIFT_X, SHIFT_Y, SHIFT_TORQUE = 29, 30, 31, 32, 33, 34
+FORCE_X, FORCE_Y, TORQUE, SHIFT_X, SHIFT_Y, SHIFT_TORQUE = range(29, 35)
 POWER_FRICTION, POWER_DAMPING = 35, 36
 # How a stage's place differs from that at the start, and its velocities; at last the new state. Of the whole step Σ w U
 # of angle and velocities, in rows that its stages have done with.
 NEW = 37
 CHANGE = SHIFT
 # Of joints at the start: opening, f'(w), how fast the spin changes.
-BASE_OPENING_X, BASE_OPENING_Y, TANGENT, SPIN_RATE = 43, 44, 45, 46
+BASE_OPENING_X, BASE_OPENING_Y, TANGENT, SPIN_RATE = range(43, 47)
 # The linear system of :mod:`cpu.implicit.solver`, then three rows a stage: W of :class:`SecondOrderTable`.
 SYSTEM = 47
 LOWER, DIAGONAL, UPPER = SYSTEM, SYSTEM + 9, SYSTEM + 18

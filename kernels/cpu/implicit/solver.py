@@ -18,8 +18,6 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from warpchain.kernels.physics.elementary import ONE, quotient
-
 wp.set_module_options({"enable_backward": False})
 
 LANES = 8
@@ -86,49 +84,6 @@ def row_at(place: int, segment: int, places: int, full: int):
 def place_column(place_after: int):
     """First column of the place before this one, counted from 1; bounds tell the compiler that no sum overflows."""
     return wp.clamp(8 * place_after, 0, 16777216)
-
-
-@functools.cache
-def block_type(size: int):
-    """Warp's type of a B × B block, B = 2 or 3."""
-    if size not in (2, 3):
-        raise ValueError(f"blocks are 2 × 2 or 3 × 3, not {size} × {size}")
-    return wp.types.matrix(shape=(size, size), dtype=wp.float64)
-
-
-@functools.cache
-def block_inverse(size: int):
-    """Warp function that inverts a B × B block by cofactors, B = 2 or 3."""
-    Block = block_type(size)
-
-    if size == 2:
-
-        @wp.func
-        def inverse(m: Block):
-            scale = quotient(ONE, m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0])
-            return Block(m[1, 1] * scale, -m[0, 1] * scale, -m[1, 0] * scale, m[0, 0] * scale)
-
-    else:
-
-        @wp.func
-        def inverse(m: Block):
-            a = m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1]
-            b = m[1, 2] * m[2, 0] - m[1, 0] * m[2, 2]
-            c = m[1, 0] * m[2, 1] - m[1, 1] * m[2, 0]
-            scale = quotient(ONE, m[0, 0] * a + m[0, 1] * b + m[0, 2] * c)
-            return Block(
-                a * scale,
-                (m[0, 2] * m[2, 1] - m[0, 1] * m[2, 2]) * scale,
-                (m[0, 1] * m[1, 2] - m[0, 2] * m[1, 1]) * scale,
-                b * scale,
-                (m[0, 0] * m[2, 2] - m[0, 2] * m[2, 0]) * scale,
-                (m[0, 2] * m[1, 0] - m[0, 0] * m[1, 2]) * scale,
-                c * scale,
-                (m[0, 1] * m[2, 0] - m[0, 0] * m[2, 1]) * scale,
-                (m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]) * scale,
-            )
-
-    return inverse
 
 
 _INVERSES = {

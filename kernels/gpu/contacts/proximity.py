@@ -24,7 +24,7 @@ from warpchain.kernels.layout import (
     V,
 )
 from warpchain.kernels.methods.controller import quick_quotient, quick_root
-from warpchain.kernels.physics.elementary import TWO, ZERO, from_order_key_single, order_bits_single, order_key_single
+from warpchain.kernels.physics.elementary import TWO, from_order_key_single, order_bits_single, order_key_single
 from warpchain.kernels.types import Chain, Control, Drive
 
 wp.set_module_options({"enable_backward": False})
@@ -46,6 +46,7 @@ def block_proximity(features: Features, block_dim: int):
     has_fixed = has_floor or has_sprocket
     has_self = features.self_contact
     has_contacts = has_fixed or has_self
+    meet = meet_sprocket if has_sprocket else meet_floor
     _maximum, write_maxima, read_maxima = block_maxima(block_dim)
 
     @wp.func
@@ -115,44 +116,22 @@ def block_proximity(features: Features, block_dim: int):
         """This link, on the board, after floor or sprocket; returns the number of impulses."""
         link = read_link(K, place.lane)
         left_x, left_y, right_x, right_y = ends_of(link)
-        u = link.u
-        v = link.v
-        omega = link.omega
-        lost_left = ZERO
-        lost_right = ZERO
-        hits = wp.int64(0)
-        if wp.static(has_floor):
-            u, v, omega, lost_left, lost_right, hits = meet_floor(
-                chain,
-                left_x,
-                left_y,
-                right_x,
-                right_y,
-                link.x,
-                link.y,
-                K[INVERSE_MASS, place.column],
-                K[INVERSE_INERTIA, place.column],
-                link.u,
-                link.v,
-                link.omega,
-            )
-        if wp.static(has_sprocket):
-            u, v, omega, lost_left, lost_right, hits = meet_sprocket(
-                chain,
-                sprocket_turning(drive, world, time),
-                drive.push_rate[world],
-                left_x,
-                left_y,
-                right_x,
-                right_y,
-                link.x,
-                link.y,
-                K[INVERSE_MASS, place.column],
-                K[INVERSE_INERTIA, place.column],
-                link.u,
-                link.v,
-                link.omega,
-            )
+        u, v, omega, lost_left, lost_right, hits = meet(
+            chain,
+            sprocket_turning(drive, world, time),
+            drive.push_rate[world],
+            left_x,
+            left_y,
+            right_x,
+            right_y,
+            link.x,
+            link.y,
+            K[INVERSE_MASS, place.column],
+            K[INVERSE_INERTIA, place.column],
+            link.u,
+            link.v,
+            link.omega,
+        )
         K[U, place.lane] = u
         K[V, place.lane] = v
         K[OMEGA, place.lane] = omega

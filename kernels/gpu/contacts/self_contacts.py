@@ -20,7 +20,7 @@ import warp as wp
 from warpchain.kernels.contacts.link_pair import collide, links_of, natural, touching_circles
 from warpchain.kernels.contacts.pair_list import list_layout
 from warpchain.kernels.gpu.threads import barrier, barrier_if_any
-from warpchain.kernels.layout import BOARD_LOST_SELF, RIGHT_X, RIGHT_Y
+from warpchain.kernels.layout import BOARD_LOST_SELF, RIGHT_X, RIGHT_Y, consecutive_offsets
 from warpchain.kernels.physics.elementary import TWO, ZERO
 from warpchain.kernels.types import Chain
 
@@ -39,74 +39,43 @@ class TouchLayout:
 
     Attributes:
         width: Columns of the owners, at least the number of links.
+        shared_pairs: How many touching pairs of joints lie at ``pairs``; further ones lie in the list's row.
         owners: Three boards of ``width`` keys, one per link; rounds use them in turn.
-        pairs: The first ``shared_pairs`` pairs of joints that touch; further ones lie in the list's row.
-        shared_pairs: See ``pairs``.
-        touching: Number of such pairs.
+        pairs: See ``shared_pairs``.
+        touching: Number of touching pairs of joints.
         votes: See :func:`gpu.threads.barrier_if_any`.
         fixed_hits: Impulses with floor or sprocket in this launch.
         self_hits: Impulses between links in this launch.
         mailbox: A status from one thread to all.
-        is_late: Whether the launch has taken its time.
         deepest: Greatest depth of a contact in this launch [m], bits of a single-precision number.
+        is_late: Whether the launch has taken its time.
+        size: Integers from the row's start to the end of the last.
     """
 
     width: int
-    owners: int
     shared_pairs: int
-
-    @property
-    def pairs(self) -> int:
-        """Offset."""
-        return self.owners + 3 * self.width
-
-    @property
-    def touching(self) -> int:
-        """Offset."""
-        return self.pairs + self.shared_pairs
-
-    @property
-    def votes(self) -> int:
-        """Offset."""
-        return self.touching + 1
-
-    @property
-    def fixed_hits(self) -> int:
-        """Offset."""
-        return self.touching + 2
-
-    @property
-    def self_hits(self) -> int:
-        """Offset."""
-        return self.touching + 3
-
-    @property
-    def mailbox(self) -> int:
-        """Offset."""
-        return self.touching + 4
-
-    @property
-    def deepest(self) -> int:
-        """Offset."""
-        return self.touching + 5
-
-    @property
-    def is_late(self) -> int:
-        """Offset."""
-        return self.touching + 6
-
-    @property
-    def size(self) -> int:
-        """Integers from the row's start to the end of the last."""
-        return self.touching + 7
+    owners: int
+    pairs: int
+    touching: int
+    votes: int
+    fixed_hits: int
+    self_hits: int
+    mailbox: int
+    deepest: int
+    is_late: int
+    size: int
 
 
 @functools.cache
 def touch_layout(columns: int, block_dim: int, in_lists: bool) -> TouchLayout:
     """Layout for shared memory of its own, a pair per thread, or inside the scratch parts of the list's row."""
-    if in_lists:
-        return TouchLayout(width=columns, owners=list_layout(columns).owners, shared_pairs=0)
-    return TouchLayout(width=block_dim, owners=0, shared_pairs=block_dim)
+    width, shared_pairs = (columns, 0) if in_lists else (block_dim, block_dim)
+    single = ("touching", "votes", "fixed_hits", "self_hits", "mailbox", "deepest", "is_late")
+    integers = consecutive_offsets(
+        list_layout(columns).owners if in_lists else 0,
+        **{"owners": 3 * width, "pairs": shared_pairs} | dict.fromkeys(single, 1),
+    )
+    return TouchLayout(width, shared_pairs, **integers)
 
 
 @wp.func

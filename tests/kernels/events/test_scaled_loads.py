@@ -17,7 +17,7 @@ from warpchain.engine.devices import start_device
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
-from warpchain.kernels.physics.scaled_loads import crossing_time, drag_shape, lay_inertias, under_load
+from warpchain.kernels.physics.scaled_loads import crossing_time, drag_shape, under_load, write_inertias
 from warpchain.kernels.types import Chain
 from warpchain.oracle.motion_equations import acceleration
 
@@ -35,7 +35,7 @@ CPU = start_device("cpu")
 def _load(chains: wp.array(dtype=Chain), factors: wp.array(dtype=wp.float64), inertias: wp.array3d(dtype=wp.float64)):
     i = wp.tid()
     chains[i] = under_load(chains[i], factors[i])
-    lay_inertias(inertias[i], chains[i])
+    write_inertias(inertias[i], chains[i])
 
 
 def loaded(parameters: Parameters, factor: float, links: int = 4) -> tuple[dict[str, float], Array]:

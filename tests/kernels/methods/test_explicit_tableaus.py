@@ -1,18 +1,22 @@
 """Coefficients of the explicit methods: orders, stability on the chain's own eigenvalues, kernels that differ."""
 
 import math
+from collections.abc import Iterator
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
+import warpchain
 from warpchain.bench.starts import flying
+from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.kernels import layout
 from warpchain.kernels.cpu.loop import make_advance
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.loop import make_advance_block
-from warpchain.kernels.methods.explicit_tableaus import TABLEAUS, Tableau
+from warpchain.kernels.methods.explicit_tableaus import TABLEAUS, Tableau, register
 from warpchain.oracle.motion_equations import acceleration
 
 EACH = pytest.mark.parametrize("tableau", TABLEAUS.values(), ids=list(TABLEAUS))
@@ -79,6 +83,76 @@ def test_os32_bears_sticking_friction_as_well() -> None:
     for name, limit in {"os32": 7.3, "dp5": 3.3}.items():
         assert greatest_growth(TABLEAUS[name], limit * axis) <= 1.0 + 1e-6
         assert greatest_growth(TABLEAUS[name], (limit + 0.2) * axis) > 1.01
+
+
+def fractions(row: str) -> tuple[Fraction, ...]:
+    """Numbers of a row as they are printed in a table."""
+    return tuple(map(Fraction, row.split()))
+
+
+CASH_KARP = Tableau(
+    name="cash_karp",
+    title="Cash–Karp 5(4)",
+    order=5,
+    error_order=4,
+    matrix=(
+        (),
+        fractions("1/5"),
+        fractions("3/40 9/40"),
+        fractions("3/10 -9/10 6/5"),
+        fractions("-11/54 5/2 -70/27 35/27"),
+        fractions("1631/55296 175/512 575/13824 44275/110592 253/4096"),
+    ),
+    weights=fractions("37/378 0 250/621 125/594 0 512/1771"),
+    embedded=fractions("2825/27648 0 18575/48384 13525/55296 277/14336 1/4"),
+    source="J. R. Cash, A. H. Karp, ACM TOMS 16 (1990) 201-222",
+)
+
+
+@pytest.fixture
+def cash_karp() -> Iterator[str]:
+    """Name of a method that is registered for one test."""
+    register(CASH_KARP)
+    yield CASH_KARP.name
+    del TABLEAUS[CASH_KARP.name]
+
+
+def test_a_tableau_is_all_that_a_new_method_takes(cash_karp: str) -> None:
+    """Once registered it is an option and walks on a CPU: the chain falls freely, and its ledger closes."""
+    assert Options(method=cash_karp).method == cash_karp
+    settings = {"links": 12, "frequency": 15.0, "start": "ellipse", "clearance": 0.05, "walk_limit": 5e-3}
+    walk = warpchain.walk(preset="soft", method=cash_karp, **settings)
+    assert walk.status == warpchain.Status.TIME_LIMIT
+    assert walk.steps_accepted > 100
+    fall = walk.center[0, 1] - walk.center[:, 1]
+    np.testing.assert_allclose(fall, preset("soft").gravity * walk.time**2 / 2, rtol=0, atol=1e-14)
+    assert fall[-1] > 1e-4
+    assert walk.energy["joint_friction"] > 1e-6
+    assert abs(walk.energy["residual"]) < 1e-6 * walk.energy["kinetic_at_release"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"name": "dp5"}, "dp5: there is a method of this name"),
+        ({"name": "rodas5p"}, "rodas5p: there is a method of this name"),
+        ({"name": "hybrid"}, "hybrid: there is a method of this name"),
+        (
+            {"matrix": (*CASH_KARP.matrix[:3], CASH_KARP.matrix[2], *CASH_KARP.matrix[4:])},
+            r"cash_karp\.matrix\[3\]: 2 entries instead of 3",
+        ),
+        ({"weights": CASH_KARP.weights[:-1]}, r"cash_karp\.weights: 5 entries instead of 6"),
+        ({"embedded": (*CASH_KARP.embedded, Fraction(0))}, r"cash_karp\.embedded: 7 entries instead of 6"),
+        ({"weights": (Fraction(1), *CASH_KARP.weights[1:])}, r"cash_karp\.weights: the entries add up to .*, not 1"),
+        ({"error_order": 1}, r"cash_karp\.error_order: 1 is less than 2"),
+    ],
+)
+def test_a_tableau_that_does_not_fit_is_refused(changes: dict, message: str) -> None:
+    """The door says in one line what is wrong, and what was there before stays."""
+    before = dict(TABLEAUS)
+    with pytest.raises(ValueError, match=f"^{message}$"):
+        register(replace(CASH_KARP, **changes))
+    assert before == TABLEAUS
 
 
 def test_every_tableau_has_kernels_of_its_own() -> None:

@@ -1,0 +1,59 @@
+"""Counters, greatest depths and losses of energy of a world's run."""
+
+import warp as wp
+
+from warpchain.kernels.layout import (
+    ACCEPTED,
+    BOUNCES,
+    FLOOR_DEPTH,
+    FLOOR_IMPULSES,
+    LOSS_FLOOR,
+    LOSS_SPROCKET,
+    REJECTED,
+    SPROCKET_DEPTH,
+    SPROCKET_IMPULSES,
+)
+from warpchain.kernels.types import State
+
+wp.set_module_options({"enable_backward": False})
+
+BOUNCE_PAUSE = wp.constant(wp.float64(0.01))
+"""A floor impulse this long [s] after the one before it begins a new bounce."""
+
+
+def of_fixed_body(fixed_body: str) -> tuple[int, int, int]:
+    """Places of the loss, the greatest depth and the counter of impulses of the floor or the sprocket."""
+    if fixed_body == "sprocket":
+        return LOSS_SPROCKET, SPROCKET_DEPTH, SPROCKET_IMPULSES
+    return LOSS_FLOOR, FLOOR_DEPTH, FLOOR_IMPULSES
+
+
+@wp.func
+def add_count(state: State, world: int, counter: int, number: wp.int64):
+    """Adds to a counter of ``State.counts``."""
+    state.counts[world, counter] = state.counts[world, counter] + number
+
+
+@wp.func
+def count_bounce(state: State, world: int, time: wp.float64, last_impulse: wp.float64):
+    """Counts a floor impulse as the first of a new bounce if none has been for a while."""
+    if time - last_impulse > BOUNCE_PAUSE:
+        add_count(state, world, BOUNCES, wp.int64(1))
+
+
+@wp.func
+def raise_extreme(state: State, world: int, extreme: int, value: wp.float64):
+    """Raises an entry of ``State.extremes`` to a greater value [m]."""
+    state.extremes[world, extreme] = wp.max(state.extremes[world, extreme], value)
+
+
+@wp.func
+def book_loss(state: State, world: int, cause: int, energy: wp.float64):
+    """Adds an energy [J] to an entry of ``State.losses``."""
+    state.losses[world, cause] = state.losses[world, cause] + energy
+
+
+@wp.func
+def attempts_made(state: State, world: int):
+    """Attempts of the walk so far, those of its earlier phases included."""
+    return state.attempts_before[world] + state.counts[world, ACCEPTED] + state.counts[world, REJECTED]
