@@ -204,7 +204,7 @@ def test_bad_input_is_refused_by_the_process_too(tmp_path: Path) -> None:
     ("content", "problem"),
     [
         ("preset: soft\nscene: {links: 61}", "scene.links: 61 is odd"),
-        ("preset: soft\nscene: {gravity: 1.0}", "scene.gravity: unknown key"),
+        ("preset: soft\nscene: {gravity: 1.0}", "scene.gravity: unknown name; did you mean parameters.gravity?"),
         ("preset: soft\nscene: 3", "scene: 3 is not a mapping"),
         ("preset: soft\nscenes: {links: 60}", "'scenes': unknown key; did you mean scene?"),
         ("preset: soft\npreset: paper", "file.yaml, line 2: key 'preset' is given twice"),

@@ -5,12 +5,14 @@ or written, 130 when interrupted. Values are checked like keyword arguments and 
 same words. Heavy libraries are imported by the functions that need them, so that help is quick.
 """
 
+import contextlib
 import io
 import json
 import sys
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NoReturn, TextIO
 
 import typer
 
@@ -39,7 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal without Δ gets a question mark
     try:
-        status = app(arguments, prog_name="warpchain", standalone_mode=False)
+        with _warnings_on_one_line():
+            status = app(arguments, prog_name="warpchain", standalone_mode=False)
     except typer.TyperException as error:
         context = getattr(error, "ctx", None)
         command = context.command_path if context is not None else "warpchain"
@@ -57,6 +60,31 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     if status == INTERRUPTED:
         print("interrupted", file=sys.stderr)
     sys.exit(status)
+
+
+@contextlib.contextmanager
+def _warnings_on_one_line() -> Iterator[None]:
+    """Print warnings about input as one line, without the line of code that gave them."""
+    with warnings.catch_warnings():
+        usual = warnings.showwarning
+
+        def show(
+            message: Warning | str,
+            category: type[Warning],
+            filename: str,
+            lineno: int,
+            file: TextIO | None = None,
+            line: str | None = None,
+        ) -> None:
+            from warpchain.inputs.validation import InputWarning
+
+            if issubclass(category, InputWarning):
+                print("warning:", message, file=sys.stderr)
+            else:
+                usual(message, category, filename, lineno, file, line)
+
+        warnings.showwarning = show
+        yield
 
 
 def _refuse(problem: str, status: int = REFUSED) -> NoReturn:
@@ -138,7 +166,7 @@ def walk(
         typer.Option(
             "--set",
             metavar="NAME=VALUE",
-            help="Any other value by its name, in SI units, such as clearance=0.005 (in m) or "
+            help="Any other value by its name or symbol, in SI units, such as clearance=0.005 (in m), mu_fc=0.3 or "
             "parameters.floor_friction=0.3; may be repeated.",
         ),
     ] = None,
@@ -234,21 +262,18 @@ def _given_values(named: Mapping[str, str], assignments: Sequence[str]) -> Secti
     Raises:
         InputError: an assignment is not of that form, its name is unknown, or a name is given twice.
     """
-    from warpchain.inputs.setup import SECTION_OF, by_section
-    from warpchain.inputs.validation import InputError, shown, suggestion
+    from warpchain.inputs.sections import SECTION_OF, by_section, dotted_name
+    from warpchain.inputs.validation import InputError, shown
 
     pairs = list(named.items())
     for assignment in assignments:
-        name, equals, text = assignment.partition("=")
+        written, equals, text = assignment.partition("=")
         if not equals:
             raise InputError(f"--set: {shown(assignment)} gives no value; write NAME=VALUE, as in clearance=0.005")
-        pairs.append((name.strip(), text))
+        written = written.strip()
+        pairs.append((dotted_name(written, f"--set {shown(written)}"), text))
     values: dict[str, object] = {}
-    for written, text in pairs:
-        known = {f"{section}.{name}" if "." in written else name: name for name, section in SECTION_OF.items()}
-        if written not in known:
-            raise InputError(f"--set {shown(written)}: unknown name; {suggestion(written, known)}")
-        name = known[written]
+    for name, text in pairs:
         path = f"{SECTION_OF[name]}.{name}"
         if name in values:
             raise InputError(f"{path}: given twice on the command line; give it once")
@@ -280,6 +305,7 @@ def _setup(config: Path | None, preset: str | None, given: Sections, seed: int |
         InputError: something is refused; one line with the field's path and the remedy.
     """
     from warpchain.inputs.distributions import random_generator, sampled
+    from warpchain.inputs.parameters import warn_of_units
     from warpchain.inputs.setup import read_setup, resolve
     from warpchain.inputs.validation import InputError
 
@@ -291,6 +317,7 @@ def _setup(config: Path | None, preset: str | None, given: Sections, seed: int |
         if isinstance(sections[section], Mapping):  # `resolve` refuses anything else
             sections[section] = {**sections[section], **values}
     setup = resolve(preset, **sections)
+    warn_of_units((f"parameters.{name}", name, value) for name, value in sections["parameters"].items())
     return setup if seed is None else sampled(setup, random_generator(seed), kept=sections["scene"])
 
 
