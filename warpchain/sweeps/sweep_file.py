@@ -36,6 +36,7 @@ from warpchain.inputs.yaml_files import read_yaml
 from warpchain.sweeps.block import Block, Value
 from warpchain.sweeps.designs import SAMPLERS, check_design
 from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL, Choice, Recording
+from warpchain.sweeps.shipped import sweep_path
 
 VERSION: Final = 1
 """Version of the file format."""
@@ -53,7 +54,7 @@ _TOP_KEYS: Final = ("version", "seed", "blocks", "same_samples_along", "record",
 def read_sweep(
     source: str | os.PathLike[str] | Mapping[str, object],
 ) -> tuple[str, int, tuple[str, ...], tuple[Block, ...], Recording]:
-    """Read a sweep file, or take its content as a mapping.
+    """Read a sweep file, or one that comes with the package by its bare name, or take its content as a mapping.
 
     Returns:
         Name, seed, axes of equal samples, blocks and recording: the fields of `warpchain.sweeps.plan.Sweep`.
@@ -61,7 +62,7 @@ def read_sweep(
     Raises:
         InputError: the file cannot be read, or something in it is refused.
     """
-    content = source if isinstance(source, Mapping) else read_yaml(source)
+    content = source if isinstance(source, Mapping) else read_yaml(sweep_path(source))
     if not isinstance(content, Mapping):
         raise InputError(f"{source}: no mapping at the top; give the keys {', '.join(_TOP_KEYS)}")
     top = _keys(content, "sweep", _TOP_KEYS)
