@@ -16,7 +16,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NoReturn, Text
 
 import typer
 
+from warpchain.cli import completions
 from warpchain.cli.bench_commands import bench_app
+from warpchain.cli.input_commands import parameters, schema
 from warpchain.cli.sweep_commands import FAILED, add_commands
 from warpchain.inputs.methods import METHODS
 
@@ -29,7 +31,7 @@ INTERRUPTED: Final = 130
 
 Sections = dict[str, dict[str, object]]
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+app = typer.Typer(pretty_exceptions_enable=False)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -129,6 +131,7 @@ def walk(
             metavar="NAME",
             help="rest: hang on the sprocket and spin up; spinning: circulate on it already; "
             "ellipse: circulate without a sprocket. Default: rest.",
+            autocompletion=completions.starts,
         ),
     ] = None,
     preset: Annotated[
@@ -137,6 +140,7 @@ def walk(
             metavar="NAME",
             help="Parameters to start from. paper: Table 1 of the paper; soft: softer joints, many times "
             "faster. Default: paper.",
+            autocompletion=completions.presets,
         ),
     ] = None,
     method: Annotated[
@@ -146,6 +150,7 @@ def walk(
             help="standard: hybrid at 1e-3, joints softened on the sprocket and in the pile, on a GPU the next; "
             "explicit: os32 at 1e-3, softened likewise; reference: rkf78 at 1e-6, as in the paper; or an integrator, "
             f"{'; '.join(f'{name}: {title}' for name, title in METHODS.items())}. Default: standard.",
+            autocompletion=completions.methods,
         ),
     ] = None,
     tolerance: Annotated[
@@ -167,7 +172,8 @@ def walk(
             "--set",
             metavar="NAME=VALUE",
             help="Any other value by its name or symbol, in SI units, such as clearance=0.005 (in m), mu_fc=0.3 or "
-            "parameters.floor_friction=0.3; may be repeated.",
+            "parameters.floor_friction=0.3; may be repeated. `warpchain parameters` lists them.",
+            autocompletion=completions.assignments,
         ),
     ] = None,
     seed: Annotated[
@@ -253,6 +259,8 @@ def walk(
 
 
 add_commands(app)
+app.command()(parameters)
+app.command()(schema)
 app.add_typer(bench_app, name="bench")
 
 
