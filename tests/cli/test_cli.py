@@ -8,14 +8,15 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.support import command_line
+from tests.support.command_line import Answer, Command, process
 from warpchain import load_walk
 from warpchain.cli.main import main
 from warpchain.inputs.methods import METHODS
@@ -23,44 +24,12 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.scene import Scene
 
+command = command_line.command
+
 QUICK = "--links 32 --preset soft --method dp5 --start ellipse --frequency 5".split()
 """A walk of half a simulated second."""
 
 WALK_MODULE = import_module("warpchain.run.single_walk")
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What a command did."""
-
-    status: int
-    out: str
-    err: str
-
-
-Command = Callable[..., Answer]
-
-
-@pytest.fixture
-def command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Command:
-    """Runs `warpchain` in this process and in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str) -> Answer:
-        with pytest.raises(SystemExit) as end:
-            main(arguments)
-        out, err = capsys.readouterr()
-        return Answer(end.value.code or 0, out, err)
-
-    return run
-
-
-def process(*arguments: str, folder: Path) -> Answer:
-    """Runs `python -m warpchain` as a shell does, its output not a terminal."""
-    done = subprocess.run(
-        [sys.executable, "-m", "warpchain", *arguments], cwd=folder, capture_output=True, encoding="utf-8"
-    )
-    return Answer(done.returncode, done.stdout, done.stderr)
 
 
 @pytest.fixture(scope="module")
@@ -204,7 +173,7 @@ def test_bad_input_is_refused_by_the_process_too(tmp_path: Path) -> None:
     ("content", "problem"),
     [
         ("preset: soft\nscene: {links: 61}", "scene.links: 61 is odd"),
-        ("preset: soft\nscene: {gravity: 1.0}", "scene.gravity: unknown key"),
+        ("preset: soft\nscene: {gravity: 1.0}", "scene.gravity: unknown name; did you mean parameters.gravity?"),
         ("preset: soft\nscene: 3", "scene: 3 is not a mapping"),
         ("preset: soft\nscenes: {links: 60}", "'scenes': unknown key; did you mean scene?"),
         ("preset: soft\npreset: paper", "file.yaml, line 2: key 'preset' is given twice"),

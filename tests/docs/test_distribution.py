@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.docs.code_blocks import ROOT
+from warpchain.sweeps.plan import load_sweep
 
 BUILD = "from setuptools import build_meta; print(build_meta.build_{}({!r}))"
 
@@ -67,3 +68,8 @@ def test_wheel_walks_outside_the_repository(sdist: Path, tmp_path: Path) -> None
     words = "walk --start ellipse --links 10 --frequency 3 --preset soft --json"
     walk = json.loads(run(command, *words.split(), cwd=tmp_path))
     assert walk["status"] == "at_rest" and walk["scene"]["links"] == 10
+    assert run(command, "sweep", "--new", "new.yaml", cwd=tmp_path) == "new.yaml\n"
+    for name in ("new.yaml", *(path.stem for path in (ROOT / "sweeps").iterdir())):
+        program = f"from warpchain.sweeps.plan import load_sweep; print(load_sweep({name!r}).digest())"
+        expected = load_sweep(tmp_path / name if name == "new.yaml" else name).digest()
+        assert run(python, "-c", program, cwd=tmp_path) == f"{expected}\n"

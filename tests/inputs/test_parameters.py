@@ -11,7 +11,8 @@ from warpchain.inputs.methods import METHODS_BY_NEED
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters, preset
 from warpchain.inputs.scene import Scene, check_scene, contact_radius, fewest_links, joint_radius
-from warpchain.inputs.setup import SECTION_OF, SECTIONS, resolve
+from warpchain.inputs.sections import SECTION_OF, SECTIONS
+from warpchain.inputs.setup import resolve
 from warpchain.inputs.validation import InputError
 from warpchain.kernels.methods.method import find_method, method_names
 

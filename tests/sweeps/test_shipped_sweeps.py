@@ -1,14 +1,20 @@
 """The sweeps that come with the project."""
 
 import math
+import re
 from pathlib import Path
 
 import pytest
+import yaml
 
 from tests.support.sweep_content import TABLE_1
 from warpchain.inputs.distributions import Uniform
 from warpchain.inputs.parameters import Parameters, preset
+from warpchain.inputs.validation import InputError
+from warpchain.inputs.yaml_files import Loader, read_yaml
 from warpchain.sweeps.plan import load_sweep
+from warpchain.sweeps.shipped import shipped_sweeps, write_new_sweep
+from warpchain.sweeps.sweep_file import _TOP_KEYS
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
 
@@ -57,6 +63,33 @@ def test_every_shipped_sweep_is_tested() -> None:
         *("quickstart", "figure6", "tolerance", "montecarlo", "sensitivity", "kink"),
         *("steadiness", "unsoftened_hold", "softened_drive", "floor_friction"),
     }
+
+
+def test_shipped_sweeps_have_bare_names() -> None:
+    """The package finds every one of them by its name, whatever the folder; what has a suffix is a path."""
+    assert shipped_sweeps() == sorted(path.stem for path in SWEEPS.iterdir())
+    for name in shipped_sweeps():
+        assert load_sweep(name).digest() == load_sweep(SWEEPS / f"{name}.yaml").digest()
+    for missing in ("figure", "figure6.yaml", "sweeps/figure"):
+        with pytest.raises(InputError, match=f"^{missing}: "):
+            load_sweep(missing)
+
+
+def test_the_examples_of_a_new_sweep_are_possible(tmp_path: Path) -> None:
+    """Each example that a new sweep has as a comment can be taken into the file; together they name every key."""
+    path = tmp_path / "new.yaml"
+    write_new_sweep(path)
+    text = path.read_text(encoding="utf-8")
+    examples = re.findall(r"(?:^#(?=\w).*\n(?:^#  .*\n)*)", text, re.MULTILINE)
+    keys = set(read_yaml(path))
+    for example in examples:
+        (key, value), *_ = yaml.load(re.sub("^#", "", example, flags=re.MULTILINE), Loader).items()
+        changed = read_yaml(path) | {key: value}
+        if key == "blocks":
+            del changed["grid"]
+        assert load_sweep(changed).digest() != load_sweep(path).digest(), key
+        keys.add(key)
+    assert keys == set(_TOP_KEYS)
 
 
 def test_figure6_follows_the_paper() -> None:

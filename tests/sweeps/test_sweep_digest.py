@@ -88,6 +88,23 @@ def test_a_stored_sweep_keeps_its_method_unless_it_is_given_a_word_again() -> No
     assert on_device(load_sweep(stored), "cuda").digest() == on_device(planned, "cuda").digest()
 
 
+@pytest.mark.parametrize(
+    ("by_symbol", "by_name"),
+    [
+        ({"grid": {"n": [60], "mu_fc": [0.2, 0.3]}}, {"grid": {"links": [60], "floor_friction": [0.2, 0.3]}}),
+        ({"scene": {"ν": 5}, "grid": None}, {"scene": {"frequency": 5}, "grid": None}),
+        ({"parameters": {"tau_c": 1e-4, "ℓ": 0.013}}, {"parameters": {"coulomb_friction": 1e-4, "link_length": 0.013}}),
+        ({"distributions": {"mu_fc": UNIFORM}}, {"distributions": {"floor_friction": UNIFORM}}),
+        ({"same_samples_along": ["n"]}, {"same_samples_along": ["links"]}),
+        ({"grid": {"nu": {"from": 5, "to": 10, "step": 5}}}, {"grid": {"frequency": [5, 10]}}),
+    ],
+)
+def test_symbols_stand_for_names(by_symbol: dict[str, Any], by_name: dict[str, Any]) -> None:
+    """A sweep by symbols is the sweep by names, which alone its canonical form holds."""
+    assert load_sweep(content(**by_symbol)).canonical() == load_sweep(content(**by_name)).canonical()
+    assert digest(content(**by_symbol)) == digest(content(**by_name))
+
+
 def test_digest_tells_apart_what_matters() -> None:
     """Whatever changes a number or its place changes the digest."""
     changes: list[dict[str, Any]] = [

@@ -5,16 +5,20 @@ or written, 130 when interrupted. Values are checked like keyword arguments and 
 same words. Heavy libraries are imported by the functions that need them, so that help is quick.
 """
 
+import contextlib
 import io
 import json
 import sys
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NoReturn, TextIO
 
 import typer
 
+from warpchain.cli import completions
 from warpchain.cli.bench_commands import bench_app
+from warpchain.cli.input_commands import parameters, schema
 from warpchain.cli.sweep_commands import FAILED, add_commands
 from warpchain.inputs.methods import METHODS
 
@@ -27,7 +31,7 @@ INTERRUPTED: Final = 130
 
 Sections = dict[str, dict[str, object]]
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+app = typer.Typer(pretty_exceptions_enable=False)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -39,7 +43,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal without Δ gets a question mark
     try:
-        status = app(arguments, prog_name="warpchain", standalone_mode=False)
+        with _warnings_on_one_line():
+            status = app(arguments, prog_name="warpchain", standalone_mode=False)
     except typer.TyperException as error:
         context = getattr(error, "ctx", None)
         command = context.command_path if context is not None else "warpchain"
@@ -57,6 +62,31 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     if status == INTERRUPTED:
         print("interrupted", file=sys.stderr)
     sys.exit(status)
+
+
+@contextlib.contextmanager
+def _warnings_on_one_line() -> Iterator[None]:
+    """Print warnings about input as one line, without the line of code that gave them."""
+    with warnings.catch_warnings():
+        usual = warnings.showwarning
+
+        def show(
+            message: Warning | str,
+            category: type[Warning],
+            filename: str,
+            lineno: int,
+            file: TextIO | None = None,
+            line: str | None = None,
+        ) -> None:
+            from warpchain.inputs.validation import InputWarning
+
+            if issubclass(category, InputWarning):
+                print("warning:", message, file=sys.stderr)
+            else:
+                usual(message, category, filename, lineno, file, line)
+
+        warnings.showwarning = show
+        yield
 
 
 def _refuse(problem: str, status: int = REFUSED) -> NoReturn:
@@ -101,6 +131,7 @@ def walk(
             metavar="NAME",
             help="rest: hang on the sprocket and spin up; spinning: circulate on it already; "
             "ellipse: circulate without a sprocket. Default: rest.",
+            autocompletion=completions.starts,
         ),
     ] = None,
     preset: Annotated[
@@ -109,6 +140,7 @@ def walk(
             metavar="NAME",
             help="Parameters to start from. paper: Table 1 of the paper; soft: softer joints, many times "
             "faster. Default: paper.",
+            autocompletion=completions.presets,
         ),
     ] = None,
     method: Annotated[
@@ -118,6 +150,7 @@ def walk(
             help="standard: hybrid at 1e-3, joints softened on the sprocket and in the pile, on a GPU the next; "
             "explicit: os32 at 1e-3, softened likewise; reference: rkf78 at 1e-6, as in the paper; or an integrator, "
             f"{'; '.join(f'{name}: {title}' for name, title in METHODS.items())}. Default: standard.",
+            autocompletion=completions.methods,
         ),
     ] = None,
     tolerance: Annotated[
@@ -138,8 +171,9 @@ def walk(
         typer.Option(
             "--set",
             metavar="NAME=VALUE",
-            help="Any other value by its name, in SI units, such as clearance=0.005 (in m) or "
-            "parameters.floor_friction=0.3; may be repeated.",
+            help="Any other value by its name or symbol, in SI units, such as clearance=0.005 (in m), mu_fc=0.3 or "
+            "parameters.floor_friction=0.3; may be repeated. `warpchain parameters` lists them.",
+            autocompletion=completions.assignments,
         ),
     ] = None,
     seed: Annotated[
@@ -225,6 +259,8 @@ def walk(
 
 
 add_commands(app)
+app.command()(parameters)
+app.command()(schema)
 app.add_typer(bench_app, name="bench")
 
 
@@ -234,21 +270,18 @@ def _given_values(named: Mapping[str, str], assignments: Sequence[str]) -> Secti
     Raises:
         InputError: an assignment is not of that form, its name is unknown, or a name is given twice.
     """
-    from warpchain.inputs.setup import SECTION_OF, by_section
-    from warpchain.inputs.validation import InputError, shown, suggestion
+    from warpchain.inputs.sections import SECTION_OF, by_section, dotted_name
+    from warpchain.inputs.validation import InputError, shown
 
     pairs = list(named.items())
     for assignment in assignments:
-        name, equals, text = assignment.partition("=")
+        written, equals, text = assignment.partition("=")
         if not equals:
             raise InputError(f"--set: {shown(assignment)} gives no value; write NAME=VALUE, as in clearance=0.005")
-        pairs.append((name.strip(), text))
+        written = written.strip()
+        pairs.append((dotted_name(written, f"--set {shown(written)}"), text))
     values: dict[str, object] = {}
-    for written, text in pairs:
-        known = {f"{section}.{name}" if "." in written else name: name for name, section in SECTION_OF.items()}
-        if written not in known:
-            raise InputError(f"--set {shown(written)}: unknown name; {suggestion(written, known)}")
-        name = known[written]
+    for name, text in pairs:
         path = f"{SECTION_OF[name]}.{name}"
         if name in values:
             raise InputError(f"{path}: given twice on the command line; give it once")
@@ -280,6 +313,7 @@ def _setup(config: Path | None, preset: str | None, given: Sections, seed: int |
         InputError: something is refused; one line with the field's path and the remedy.
     """
     from warpchain.inputs.distributions import random_generator, sampled
+    from warpchain.inputs.parameters import warn_of_units
     from warpchain.inputs.setup import read_setup, resolve
     from warpchain.inputs.validation import InputError
 
@@ -291,6 +325,7 @@ def _setup(config: Path | None, preset: str | None, given: Sections, seed: int |
         if isinstance(sections[section], Mapping):  # `resolve` refuses anything else
             sections[section] = {**sections[section], **values}
     setup = resolve(preset, **sections)
+    warn_of_units((f"parameters.{name}", name, value) for name, value in sections["parameters"].items())
     return setup if seed is None else sampled(setup, random_generator(seed), kept=sections["scene"])
 
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from warpchain.cli import completions
+
 if TYPE_CHECKING:
     from warpchain.run.sweep_run import Executor
     from warpchain.store.sweep_result import SweepResult
@@ -15,19 +17,24 @@ if TYPE_CHECKING:
 FAILED: Final = 1
 """Exit status of a command whose walks failed."""
 
-SweepFile = Annotated[
-    Path, typer.Argument(metavar="FILE.yaml", help="The sweep, as those in sweeps/.", show_default=False)
-]
+SWEEP_FILE: Final = typer.Argument(
+    metavar="FILE.yaml",
+    help="The sweep, or the bare name of one that comes with warpchain, such as figure6.",
+    autocompletion=completions.sweep_files,
+    show_default=False,
+)
+SweepFile = Annotated[Path, SWEEP_FILE]
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a sweep.", show_default=False)]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, in SI units, instead of a table.")]
 
 
 def sweep(
-    source: SweepFile,
+    context: typer.Context,
+    source: Annotated[Path | None, SWEEP_FILE] = None,
     output: Annotated[
-        Path,
+        Path | None,
         typer.Option("-o", "--output", metavar="DIR", help="Folder of the results; a killed sweep goes on in it."),
-    ],
+    ] = None,
     device: Annotated[
         str | None,
         typer.Option(metavar="NAME", help="cpu, cuda (the first GPU) or cuda:N, instead of what the sweep says."),
@@ -45,11 +52,23 @@ def sweep(
         typer.Option(metavar="N", min=1, help="Run on the first N GPUs of this machine, a process for each."),
     ] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Discard what another sweep left in the folder.")] = False,
+    new: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.yaml", help="Write a small sweep file that explains its keys; run nothing."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Run a sweep, or what is left of it: many walks over a grid, with random samples in each cell."""
-    from warpchain.cli.terminal import print_sweep, status_line, sweep_progress_text
     from warpchain.inputs.validation import InputError
+
+    if new is not None:
+        _write_new(new, alone=not any(value for name, value in context.params.items() if name != "new"))
+        return
+    if source is None:
+        raise InputError("FILE.yaml: missing; give a sweep file, or --new FILE.yaml to have one written")
+    if output is None:
+        raise InputError("--output: missing; give a folder for the results with -o DIR")
+    from warpchain.cli.terminal import print_sweep, status_line, sweep_progress_text
     from warpchain.run.sweep_run import sweep as run
 
     if gpus is not None:
@@ -71,6 +90,21 @@ def sweep(
         )
     print_sweep(result, as_json)
     _note_failures(result)
+
+
+def _write_new(path: Path, *, alone: bool) -> None:
+    """Write a sweep file to start from.
+
+    Raises:
+        InputError: other arguments are given, there is such a file already, or it cannot be written.
+    """
+    from warpchain.inputs.validation import InputError
+    from warpchain.sweeps.shipped import write_new_sweep
+
+    if not alone:
+        raise InputError("--new: given together with other arguments; leave them out")
+    write_new_sweep(path)
+    print(path)
 
 
 def info(directory: Folder, as_json: AsJson = False) -> None:

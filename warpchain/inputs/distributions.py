@@ -17,7 +17,8 @@ import numpy as np
 
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.setup import SECTION_OF, SECTIONS, Setup
+from warpchain.inputs.sections import SECTION_OF, SECTIONS
+from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import DIMENSIONLESS, Bounds, InputError, checked_whole, field_bounds, field_unit
 
 CLEARANCE_RANGE: Final = (0.005, 0.015)

@@ -32,7 +32,13 @@ class Options(BaseModel):
     model_config = STRICT
 
     method: str = Field(
-        default="standard", description="; ".join(f"{name}: {title}" for name, title in METHODS.items())
+        default="standard",
+        description="; ".join(
+            [
+                f"{', '.join(METHODS_BY_NEED)}: an integrator with its settings",
+                *(f"{name}: {title}" for name, title in METHODS.items()),
+            ]
+        ),
     )
     tolerance: float = number_field(
         1e-6, "1", "error allowed in a step, absolute (SI units) and relative; default of hybrid: 1e-4", **TOLERANCES

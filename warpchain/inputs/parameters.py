@@ -6,20 +6,27 @@ origin. Presets, error messages and the samples of `warpchain.inputs.distributio
 Source: "A walking roller chain", Table 1, unless a quantity says otherwise.
 """
 
-from collections.abc import Mapping
+import math
+import warnings
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Any, Final, Literal, Self
 
 from pydantic import BaseModel, model_validator
 
+from warpchain.inputs.symbols import by_full_name, names_by_symbol
 from warpchain.inputs.validation import (
     DIMENSIONLESS,
     STRICT,
     Bounds,
     InputError,
+    InputWarning,
     field_bounds,
+    field_unit,
     number_field,
     refusal,
+    short,
     shown,
     validated,
 )
@@ -42,6 +49,9 @@ STIFFNESS: Final[Limits] = {"gt": 0.0, "le": 1e12}
 DAMPING: Final[Limits] = {"ge": 0.0, "le": 1e12}
 TURNING: Final[Limits] = {"gt": 0.0, "le": 1e6}
 """Up to a speed that no joint reaches at the highest frequency of a scene."""
+
+FAR: Final = 30.0
+"""A value so many times that of every preset, or so small a part of it, is probably in another unit."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +96,9 @@ class Parameters(BaseModel):
     model_config = STRICT
 
     link_length: float = _row("ℓ", "m", 1.268e-2, 1e-5, LENGTH, "measured", "distance between the two joints of a link")
-    sprocket_radius: float = _row("R", "m", 5.56e-2, 5e-4, LENGTH, "measured", "sprocket radius, see Scene")
+    sprocket_radius: float = _row(
+        "R", "m", 5.56e-2, 5e-4, LENGTH, "measured", "sprocket radius, see sprocket_radius_is"
+    )
     inner_mass: float = _row("m_inner", "kg", 3.700e-3, 2e-6, MASS, "measured", "mass of an inner link")
     outer_mass: float = _row("m_outer", "kg", 3.147e-3, 2e-6, MASS, "measured", "mass of an outer link")
     inner_inertia: float = _row(
@@ -149,12 +161,14 @@ class Parameters(BaseModel):
         """A copy with some values replaced, checked like any other set.
 
         Args:
-            values: name → new value, in the units of the table.
+            values: name or symbol, in ASCII or as printed → new value, in the units of the table.
 
         Raises:
-            InputError: a name is unknown, or the new set is not physical.
+            InputError: a name is unknown, a value is given twice, or the new set is not physical.
         """
-        return validated(type(self), {**self.model_dump(), **values}, "parameters")
+        named = by_full_name(values, names_by_symbol(type(self)), "parameters")
+        given = {name: value for name, (_, value) in named.items()}
+        return validated(type(self), {**self.model_dump(), **given}, "parameters")
 
 
 _TABLE_1: Final = Parameters.model_validate({name: q.value for name, q in Parameters.quantities().items()})
@@ -166,6 +180,38 @@ PRESETS: Final[dict[str, Parameters]] = {
 """Named sets of parameters. `paper` is Table 1 as it is. `soft` has softer joints and a smoother joint
 friction, which take far fewer steps; the paper found that these adjusted values matter little, but they make
 another model."""
+
+
+def warn_of_units(given: Iterable[tuple[str, str, Any]]) -> None:
+    """Warn of values that look like values in another unit, once for each parameter, where the caller was called.
+
+    Args:
+        given: path where a value was given, name of the parameter, value.
+    """
+    named = set()
+    for path, name, value in given:
+        problem = None if name in named else _unit_problem(name, value)
+        if problem is not None:
+            named.add(name)
+            warnings.warn(f"{path}: {problem}", InputWarning, stacklevel=3)
+
+
+def _unit_problem(name: str, value: float) -> str | None:
+    """What makes a value look like one in another unit: it is `FAR` from the parameter's value in every preset.
+
+    Zero is never taken for that, and neither is a pure number, which has no unit.
+    """
+    unit = field_unit(Parameters.model_fields[name])
+    usual = [getattr(parameters, name) for parameters in PRESETS.values()]
+    if unit == DIMENSIONLESS or value == 0 or any(1 / FAR <= value / each <= FAR for each in usual):
+        return None
+    quantity = Parameters.quantities()[name]
+    ratio = value / quantity.value
+    times = f"{short(ratio)} times" if ratio > 1 else f"1/{short(1 / ratio)} of"
+    whose = "the preset's" if quantity.source == "assumed" else "Table 1's"
+    meant = Decimal(repr(value)).scaleb(-round(math.log10(ratio))).normalize()
+    suggested = f"{meant:e}".replace("+", "")
+    return f"{short(value)} {unit} is {times} {whose} {short(quantity.value)} {unit}; did you mean {suggested}?"
 
 
 def preset(name: str) -> Parameters:

@@ -37,10 +37,15 @@ class Scene(BaseModel):
     model_config = STRICT
 
     links: int = number_field(
-        60, "1", "number of links around the loop, even: inner and outer links alternate", ge=4, le=MOST_LINKS
+        60,
+        "1",
+        "number of links around the loop, even: inner and outer links alternate",
+        symbol="n",
+        ge=4,
+        le=MOST_LINKS,
     )
     frequency: float = number_field(
-        15.0, "Hz", "turns of the sprocket per second at the release", ge=0, le=HIGHEST_FREQUENCY
+        15.0, "Hz", "turns of the sprocket per second at the release", symbol="ν", ge=0, le=HIGHEST_FREQUENCY
     )
     start: Literal["rest", "spinning", "ellipse"] = Field(
         default="rest",

@@ -7,21 +7,15 @@ Keyword arguments, the command line and YAML files (`read_setup`) all go through
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
-
-from pydantic import BaseModel
+from typing import Any
 
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import Scene, check_links_on_gpu, check_scene
+from warpchain.inputs.sections import SECTIONS, by_name, by_section
 from warpchain.inputs.validation import InputError, shown, suggestion, validated
 from warpchain.inputs.yaml_files import read_yaml
-
-SECTIONS: Final[Mapping[str, type[BaseModel]]] = {"scene": Scene, "options": Options, "parameters": Parameters}
-"""Sections of a user's values, and the models that hold their fields."""
-SECTION_OF: Final = {name: section for section, model in SECTIONS.items() for name in model.model_fields}
-"""Section of each field; no name is in two."""
 
 
 @dataclass(frozen=True)
@@ -54,20 +48,6 @@ class Setup:
         scene = validated(Scene, {**self.scene.model_dump(), **sections["scene"]}, "scene")
         check_scene(scene, parameters)
         return Setup(self.preset, parameters, scene, self.options)
-
-
-def by_section(settings: Mapping[str, object]) -> dict[str, dict[str, object]]:
-    """Values by the names of their fields, sorted into `SECTIONS`; not checked.
-
-    Raises:
-        InputError: there is no such field.
-    """
-    sections: dict[str, dict[str, object]] = {section: {} for section in SECTIONS}
-    for name, value in settings.items():
-        if name not in SECTION_OF:
-            raise InputError(f"{shown(name)}: unknown name; {suggestion(name, SECTION_OF)}")
-        sections[SECTION_OF[name]][name] = value
-    return sections
 
 
 def resolve(
@@ -109,13 +89,13 @@ def resolve(
 
 
 def read_setup(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
-    """Preset (None if there is none) and sections of a YAML file, not yet checked by `resolve`.
+    """Preset (None if there is none) and sections of a YAML file by full names, values not yet checked by `resolve`.
 
     `1e9` is a number, as in YAML 1.2, and so is `1_000`; `060` and `1:30`, which the versions of YAML read
     differently, are text and therefore refused.
 
     Raises:
-        InputError: the file cannot be read, is not YAML, gives a key twice, or has other keys.
+        InputError: the file cannot be read, is not YAML, gives a value twice, or has other keys or names.
     """
     content = read_yaml(path)
     if not isinstance(content, dict):
@@ -123,5 +103,11 @@ def read_setup(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
     for key in content:
         if key != "preset" and key not in SECTIONS:
             raise InputError(f"{shown(key)}: unknown key; {suggestion(key, ('preset', *SECTIONS))}")
-    # A section with nothing under it is read as None; it changes nothing.
-    return content.get("preset"), {name: {} if content.get(name) is None else content[name] for name in SECTIONS}
+    sections: dict[str, Any] = {}
+    for section, model in SECTIONS.items():
+        values = content.get(section)
+        sections[section] = {} if values is None else values  # what has nothing under it changes nothing
+        if isinstance(values, Mapping):
+            named = by_name(values, section, model.model_fields)
+            sections[section] = {name: value for name, (_, value) in named.items()}
+    return content.get("preset"), sections

@@ -26,6 +26,10 @@ class InputError(ValueError):
     """Input that the user can correct; its text is one line: `path.of.field: what is wrong; what to do`."""
 
 
+class InputWarning(UserWarning):
+    """Input that is possible but probably not meant; its text reads like that of an `InputError`."""
+
+
 @dataclass(frozen=True)
 class Bounds:
     """An interval of physical values.
@@ -65,11 +69,17 @@ def field_unit(field: FieldInfo) -> str:
     return str(extra["unit"]) if isinstance(extra, dict) else DIMENSIONLESS
 
 
-def field_bounds(field: FieldInfo) -> Bounds:
-    """The interval that the limits of a field leave."""
+def field_limits(field: FieldInfo) -> dict[str, float]:
+    """The limits `ge`, `gt`, `le`, `lt` that a field has."""
     limits: dict[str, float] = {}
     for limit in field.metadata:
         limits |= {name: float(getattr(limit, name)) for name in ("ge", "gt", "le", "lt") if hasattr(limit, name)}
+    return limits
+
+
+def field_bounds(field: FieldInfo) -> Bounds:
+    """The interval that the limits of a field leave."""
+    limits = field_limits(field)
     upper = math.nextafter(limits["lt"], -math.inf) if "lt" in limits else limits.get("le", math.inf)
     return Bounds(limits.get("ge", limits.get("gt", -math.inf)), upper, "gt" not in limits)
 
@@ -131,6 +141,17 @@ def suggestion(given: object, known: Iterable[str]) -> str:
     return f"did you mean {close[0]}?" if close else f"give one of {', '.join(names)}"
 
 
+def path_of(path: str, key: object) -> str:
+    """Path of what stands behind a key of the mapping at `path`, for errors."""
+    return f"{path}.{key if str(key).isidentifier() else shown(key)}"
+
+
+def short(number: float) -> str:
+    """A number with at most six digits; `1e9`, not `1e+09`."""
+    mantissa, e, exponent = f"{number:.6g}".partition("e")
+    return f"{mantissa}e{int(exponent)}" if e else mantissa
+
+
 def shown(value: object) -> str:
     """A value as an error message shows it: one line of at most 60 characters."""
     text = str(value) if isinstance(value, int | float) else repr(value)
@@ -142,7 +163,7 @@ def _described(error: ErrorDetails, model: type[BaseModel], path: str) -> str:
     """One line for one of pydantic's errors: the field's path, the problem and the remedy."""
     key = error.get("ctx", {}).get("field", error["loc"][0] if error["loc"] else "")
     name = str(key)
-    where = f"{path}.{name if name.isidentifier() else shown(key)}"
+    where = path_of(path, key)
     if error["type"] in ("extra_forbidden", "invalid_key"):
         return f"{where}: unknown key; {suggestion(name, model.model_fields)}"
     if error["type"] == "refusal" or name not in model.model_fields:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.setup import SECTION_OF, SECTIONS
+from warpchain.inputs.sections import SECTION_OF, SECTIONS
 from warpchain.inputs.validation import DIMENSIONLESS, field_unit
 
 _SYMBOLS: Final = {"dx": "Δx", "links": "n", "frequency": "ν"}

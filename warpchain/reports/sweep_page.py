@@ -17,7 +17,7 @@ import numpy as np
 import yaml
 
 from warpchain.files import replacing
-from warpchain.inputs.setup import SECTIONS
+from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.validation import InputError
 from warpchain.pictures.labels import axis_symbol, cell_text, cell_values, number_text, unit_text, with_unit
 from warpchain.pictures.walk_shape import Walk

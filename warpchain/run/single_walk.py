@@ -10,7 +10,10 @@ import numpy as np
 from warpchain.engine.devices import versions
 from warpchain.inputs.distributions import random_generator, sampled
 from warpchain.inputs.options import Options
-from warpchain.inputs.setup import Setup, by_section, resolve
+from warpchain.inputs.parameters import warn_of_units
+from warpchain.inputs.sections import NAME_OF_SYMBOL, by_section
+from warpchain.inputs.setup import Setup, resolve
+from warpchain.inputs.symbols import full_name
 from warpchain.inputs.validation import InputError, shown
 from warpchain.walks.motion import Keep
 from warpchain.walks.scheduler import run_setups
@@ -76,17 +79,27 @@ def walk(
             of the result, with the forces in the joints; None: 0.5 s if frames are kept; 0: none. Nothing is kept of
             a loop under multiplied loads; ``further_hold`` makes room for more.
         on_progress: Called before kernels are compiled and after each launch, several times a second.
-        settings: Any other field of :class:`Parameters`, :class:`Scene` or :class:`Options`, by its name.
+        settings: Any other field of :class:`Parameters`, :class:`Scene` or :class:`Options`, by its name or the
+            paper's symbol, such as ``mu_fc``; ``warpchain parameters`` lists them.
 
     Returns:
         The walk; look at ``status`` before ``dx``.
 
     Raises:
         InputError: A value is refused; nothing has been computed. It is a ``ValueError``.
+
+    Warns:
+        InputWarning: A parameter looks like one in another unit.
     """
-    named = {"links": links, "frequency": frequency, "method": method, "start": start}
+    named: dict[str, object] = {"links": links, "frequency": frequency, "method": method, "start": start}
+    for symbol in settings:
+        name = full_name(symbol, NAME_OF_SYMBOL)
+        if name in named:
+            raise InputError(f"{symbol}: an argument of its own has this value; give {name}=…")
     chosen = {} if tolerance is None else {"tolerance": tolerance}
     setup = setup_walk(preset, named | chosen | settings, seed)
+    parameters = by_section(settings)["parameters"]
+    warn_of_units((f"parameters.{name}", name, value) for name, value in parameters.items())
     return run_walk(
         setup, seed=seed, frame_interval=frame_interval, record_before=record_before, on_progress=on_progress
     )

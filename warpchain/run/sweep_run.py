@@ -18,6 +18,7 @@ from typing import Any, Protocol
 from warpchain.engine.kernel_choice import shared_threads
 from warpchain.engine.processors import processors
 from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import warn_of_units
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, validated
 from warpchain.status import Status
@@ -93,7 +94,7 @@ def sweep(
     """Run a sweep, or what is left of it, and load its results.
 
     Args:
-        source: A sweep file (YAML), its content, or a :class:`Sweep`.
+        source: A sweep file (YAML), the bare name of one that comes with the package, its content, or a :class:`Sweep`.
         out: Folder of the results. A sweep that was killed goes on where it was, and leaves the same bytes.
         device: ``"cpu"``, ``"cuda"`` or ``"cuda:N"`` instead of what the sweep says. Method ``standard`` is then what
             it means there; the ``sweep.yaml`` of a folder names the method that was run, which stays.
@@ -106,8 +107,12 @@ def sweep(
     Raises:
         InputError: The sweep or the folder is refused; one line with the remedy. It is a ``ValueError``.
         OSError: The folder cannot be read or written.
+
+    Warns:
+        InputWarning: A parameter looks like one in another unit.
     """
     planned = load_sweep(source)
+    warn_of_units(given for block in planned.blocks for given in block.given_parameters())
     if device is not None:
         planned = on_device(planned, device)
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):

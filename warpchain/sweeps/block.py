@@ -1,12 +1,14 @@
 """One block of a sweep: a grid of cells, and what the samples of a cell draw."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from warpchain.inputs.distributions import Distribution, Gaussian, placed
-from warpchain.inputs.setup import SECTION_OF, SECTIONS, Setup, resolve
+from warpchain.inputs.distributions import Distribution, Gaussian, Uniform, placed
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.sections import SECTION_OF, SECTIONS
+from warpchain.inputs.setup import Setup, resolve
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.designs import walks_per_sample
 
@@ -87,6 +89,20 @@ class Block:
             return f"{self.path}.grid.{name}[{at[name]}]: {problem}"
         place = ", ".join(f"{name} {self.axes[name][number]}" for name, number in at.items())
         return f"{self.path}.{where}: {problem}" + (f" (in the cell {place})" if place else "")
+
+    def given_parameters(self) -> Iterator[tuple[str, str, float]]:
+        """Path, name and value of every parameter that is given; of a distribution the mean or the upper end."""
+        given = [(f"parameters.{name}", name, value) for name, value in self.sections["parameters"].items()]
+        for name, values in self.axes.items():
+            given += [(f"grid.{name}[{number}]", name, value) for number, value in enumerate(values)]
+        for name, distribution in self.distributions.items():
+            if isinstance(distribution, Uniform):
+                given.append((f"distributions.{name}.uniform[1]", name, distribution.upper))
+            elif distribution.mean is not None:
+                given.append((f"distributions.{name}.gaussian.mean", name, distribution.mean))
+        for where, name, value in given:
+            if name in Parameters.model_fields:
+                yield f"{self.path}.{where}", name, float(value)
 
     def placed(self, fixed: Setup) -> dict[str, Distribution]:
         """The distributions of a cell, given its `fixed` setup."""

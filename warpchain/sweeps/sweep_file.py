@@ -19,13 +19,15 @@ from warpchain.inputs.distributions import DRAWABLE, LARGEST_SEED, TABLE, Distri
 from warpchain.inputs.methods import METHODS_BY_NEED
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.setup import SECTION_OF, SECTIONS
+from warpchain.inputs.sections import NAME_OF_SYMBOL, SECTION_OF, SECTIONS, by_name
+from warpchain.inputs.symbols import full_name
 from warpchain.inputs.validation import (
     Bounds,
     InputError,
     checked_positive,
     checked_whole,
     field_bounds,
+    path_of,
     shown,
     suggestion,
     validated,
@@ -34,6 +36,7 @@ from warpchain.inputs.yaml_files import read_yaml
 from warpchain.sweeps.block import Block, Value
 from warpchain.sweeps.designs import SAMPLERS, check_design
 from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL, Choice, Recording
+from warpchain.sweeps.shipped import sweep_path
 
 VERSION: Final = 1
 """Version of the file format."""
@@ -51,7 +54,7 @@ _TOP_KEYS: Final = ("version", "seed", "blocks", "same_samples_along", "record",
 def read_sweep(
     source: str | os.PathLike[str] | Mapping[str, object],
 ) -> tuple[str, int, tuple[str, ...], tuple[Block, ...], Recording]:
-    """Read a sweep file, or take its content as a mapping.
+    """Read a sweep file, or one that comes with the package by its bare name, or take its content as a mapping.
 
     Returns:
         Name, seed, axes of equal samples, blocks and recording: the fields of `warpchain.sweeps.plan.Sweep`.
@@ -59,7 +62,7 @@ def read_sweep(
     Raises:
         InputError: the file cannot be read, or something in it is refused.
     """
-    content = source if isinstance(source, Mapping) else read_yaml(source)
+    content = source if isinstance(source, Mapping) else read_yaml(sweep_path(source))
     if not isinstance(content, Mapping):
         raise InputError(f"{source}: no mapping at the top; give the keys {', '.join(_TOP_KEYS)}")
     top = _keys(content, "sweep", _TOP_KEYS)
@@ -137,12 +140,11 @@ def _level(keys: Mapping[str, Any], path: str) -> dict[str, Any]:
     level = dict(keys)
     for section, model in SECTIONS.items():
         where = f"{path}.{section}"
-        values = _mapping(keys.get(section), where, tuple(model.model_fields))
-        level[section] = {name: _checked(name, value, f"{where}.{name}") for name, value in values.items()}
-    where = f"{path}.distributions"
-    given = _mapping(keys.get("distributions"), where, ("all", *DRAWABLE))
+        values = _named(keys.get(section), where, tuple(model.model_fields))
+        level[section] = {name: _checked(name, value, place) for name, (place, value) in values.items()}
+    given = _named(keys.get("distributions"), f"{path}.distributions", ("all", *DRAWABLE), elsewhere=False)
     level["distributions"] = {
-        name: (f"{where}.{name}", _distribution(name, value, f"{where}.{name}")) for name, value in given.items()
+        name: (place, _distribution(name, value, place)) for name, (place, value) in given.items()
     }
     return level
 
@@ -217,10 +219,8 @@ def _checked(name: str, value: object, path: str) -> Value:
 
 def _axes(level: Mapping[str, Any], level_path: str) -> dict[str, tuple[Value, ...]]:
     """The axes of a level's grid; an axis whose name also has a fixed value there is refused."""
-    where = f"{level_path}.grid"
     axes = {}
-    for name, content in _mapping(level.get("grid"), where, ("preset", *SECTION_OF)).items():
-        path = f"{where}.{name}"
+    for name, (path, content) in _named(level.get("grid"), f"{level_path}.grid", ("preset", *SECTION_OF)).items():
         home = SECTION_OF.get(name, name)
         if name in (level if home == "preset" else level[home]):
             raise InputError(f"{path}: also given in {level_path}.{home}; leave one out")
@@ -361,31 +361,39 @@ def _same_samples_along(content: object, blocks: Sequence[Block]) -> tuple[str, 
     known = sorted({name for block in blocks for name in block.axes})
     if not isinstance(content, Sequence) or isinstance(content, str):
         raise InputError(f"{path}: {shown(content)} is no list; give names of axes, such as [tolerance]")
-    for number, name in enumerate(content):
+    names: list[str] = []
+    for number, written in enumerate(content):
+        name = full_name(written, NAME_OF_SYMBOL)
         if name not in known:
             remedy = suggestion(name, known) if known else "leave it out"
-            raise InputError(f"{path}[{number}]: {shown(name)} is no axis of any block; {remedy}")
-        if name in content[:number]:
-            raise InputError(f"{path}[{number}]: {shown(name)} is given twice; leave one out")
-    return tuple(sorted(content))
+            raise InputError(f"{path}[{number}]: {shown(written)} is no axis of any block; {remedy}")
+        if name in names:
+            raise InputError(f"{path}[{number}]: {shown(written)} is given twice; leave one out")
+        names.append(name)
+    return tuple(sorted(names))
 
 
-def _mapping(content: object, path: str, known: Sequence[str]) -> dict[str, Any]:
-    """A mapping with known keys; nothing at all is an empty one."""
+def _mapping(content: object, path: str) -> Mapping[Any, Any]:
+    """A mapping; nothing at all is an empty one."""
     if content is None:
         return {}
     if not isinstance(content, Mapping):
         raise InputError(f"{path}: {shown(content)} is not a mapping; give keys with values")
-    for key in content:
-        if key not in known:
-            where = key if isinstance(key, str) and key.isidentifier() else shown(key)
-            raise InputError(f"{path}.{where}: unknown key; {suggestion(key, known)}")
-    return dict(content)
+    return content
+
+
+def _named(content: object, path: str, known: Sequence[str], *, elsewhere: bool = True) -> dict[str, tuple[str, Any]]:
+    """The values of a mapping by full names, each with the path where it was given, see `by_name`."""
+    return by_name(_mapping(content, path), path, known, elsewhere=elsewhere)
 
 
 def _keys(content: object, path: str, known: Sequence[str]) -> dict[str, Any]:
     """A mapping with known keys, without those that have nothing behind them."""
-    return {key: value for key, value in _mapping(content, path, known).items() if value is not None}
+    given = _mapping(content, path)
+    for key in given:
+        if key not in known:
+            raise InputError(f"{path_of(path, key)}: unknown key; {suggestion(key, known)}")
+    return {key: value for key, value in given.items() if value is not None}
 
 
 def _needed(keys: Mapping[str, Any], key: str, path: str, remedy: str) -> Any:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from warpchain.engine.tallies import CONTACTS, LOST
 from warpchain.inputs.distributions import DRAWABLE
-from warpchain.inputs.setup import SECTION_OF, SECTIONS
+from warpchain.inputs.sections import SECTION_OF, SECTIONS
 from warpchain.inputs.validation import field_unit
 from warpchain.walks.walk_result import STORED
 

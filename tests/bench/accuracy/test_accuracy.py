@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import warpchain
-from tests.cli import test_cli
 from tests.reports.test_sweep_page import Document
+from tests.support import command_line
+from tests.support.command_line import Answer, Command, process
 from warpchain.bench.accuracy.columns import COLUMNS
 from warpchain.bench.accuracy.ensembles import Ensemble, run_ensemble, summary
 from warpchain.bench.accuracy.figures import figures
@@ -34,8 +35,7 @@ from warpchain.inputs.options import Options
 from warpchain.kernels.methods.method import find_method, method_names
 from warpchain.oracle import motion_equations
 
-Answer, Command, process = test_cli.Answer, test_cli.Command, test_cli.process
-command = test_cli.command
+command = command_line.command
 
 TINY = "--links 8 --methods rkf78,dp5 --problems flight --tolerances 1e-3,1e-6 --no-scipy --rounds 1 --presets soft"
 WALKS = "--start ellipse --samples 3"

@@ -1,0 +1,92 @@
+"""All values that a user may give, with what is known of each."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, get_args
+
+from pydantic.fields import FieldInfo
+
+from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import Parameters, preset
+from warpchain.inputs.scene import Scene
+from warpchain.inputs.sections import SECTIONS, SYMBOL_OF
+from warpchain.inputs.validation import field_limits, field_unit
+
+METHOD_WORDS: Final = (*METHODS_BY_NEED, *METHODS)
+"""What `method` can be."""
+
+
+@dataclass(frozen=True)
+class ValueEntry:
+    """What is known of one value.
+
+    Attributes:
+        name: its name.
+        symbol: the paper's symbol in ASCII, which may stand for the name; None if it has none.
+        unit: SI unit, "1" for pure numbers and for what is no number.
+        value: what holds when nothing is given; None where a rule decides, which `meaning` tells.
+        sigma: standard deviation in Table 1, in `unit`; None if the table gives none.
+        limits: `ge`, `gt`, `le`, `lt` → limit, in `unit`.
+        choices: the possible values, if these are words or truth values, else empty.
+        source: where the value is from.
+        meaning: one line.
+    """
+
+    name: str
+    symbol: str | None
+    unit: str
+    value: Any
+    sigma: float | None
+    limits: Mapping[str, float]
+    choices: tuple[Any, ...]
+    source: str
+    meaning: str
+
+
+def list_values(preset_name: str) -> dict[str, list[ValueEntry]]:
+    """Entries of all fields by section, parameters first.
+
+    Args:
+        preset_name: the preset that parameters have their values from.
+
+    Raises:
+        InputError: there is no such preset.
+    """
+    parameters = preset(preset_name)
+    # A word for the method stands for settings of other options, which are listed as they come out.
+    options = Options().model_dump() | {"method": Options.model_fields["method"].default}
+    values = {"parameters": parameters.model_dump(), "scene": Scene().model_dump(), "options": options}
+    return {section: list(_entries(section, values[section], preset_name)) for section in values}
+
+
+def field_choices(name: str, field: FieldInfo) -> tuple[Any, ...]:
+    """The possible values of a field, if these are words or truth values, else empty."""
+    if field.annotation is bool:
+        return (True, False)
+    if name == "method":
+        return METHOD_WORDS
+    return tuple(word for word in get_args(field.annotation) if isinstance(word, str))
+
+
+def _entries(section: str, values: Mapping[str, Any], preset_name: str) -> Iterator[ValueEntry]:
+    quantities = Parameters.quantities()
+    for name, field in SECTIONS[section].model_fields.items():
+        sigma, source, quantity = None, "chosen here", quantities.get(name)
+        if quantity is not None:
+            sigma = quantity.sigma or None
+            if quantity.value != values[name]:
+                source = f"preset {preset_name}"
+            elif quantity.source != "assumed":
+                source = f"Table 1, {quantity.source}"
+        yield ValueEntry(
+            name=name,
+            symbol=SYMBOL_OF.get(name),
+            unit=field_unit(field),
+            value=values[name],
+            sigma=sigma,
+            limits=field_limits(field),
+            choices=field_choices(name, field),
+            source=source,
+            meaning=str(field.description),
+        )

@@ -1,0 +1,49 @@
+"""The sweeps that come with the package, found by their bare names, and the file that a new sweep starts from."""
+
+import os
+import re
+from pathlib import Path
+from typing import Final
+
+from warpchain.inputs.validation import InputError, suggestion
+
+_PACKAGE: Final = Path(__file__).parents[1]
+_SHIPPED: Final = _PACKAGE / "shipped_sweeps"
+"""In a checkout a link to sweeps/."""
+_TEMPLATE: Final = _PACKAGE / "sweeps" / "new_sweep.yaml"
+
+
+def shipped_sweeps() -> list[str]:
+    """Bare names of the sweeps that come with the package."""
+    return sorted(path.stem for path in _SHIPPED.glob("*.yaml"))
+
+
+def sweep_path(source: str | os.PathLike[str]) -> Path:
+    """Path of a sweep file; a bare name that is no file is that of a sweep that comes with the package.
+
+    Raises:
+        InputError: a bare name is neither a file nor a sweep of the package.
+    """
+    path, name = Path(source), os.fspath(source)
+    if path.is_file() or not re.fullmatch(r"[A-Za-z0-9_-]+", name):
+        return path
+    known = shipped_sweeps()
+    if name not in known:
+        raise InputError(f"{name}: neither a file nor a sweep that comes with warpchain; {suggestion(name, known)}")
+    return _SHIPPED / f"{name}.yaml"
+
+
+def write_new_sweep(path: Path) -> None:
+    """Write a small sweep file whose comments explain its keys.
+
+    Raises:
+        InputError: there is such a file already, or it cannot be written.
+    """
+    text = _TEMPLATE.read_text(encoding="utf-8")
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise InputError(f"--new: {path} exists; give another name") from None
+    except OSError as error:
+        raise InputError(f"--new: {path}: {error.strerror}; give a file that can be written") from None
