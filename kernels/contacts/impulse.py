@@ -8,13 +8,13 @@ to P. An impulse J on B, and −J on A, changes v = v_A − v_B at P to v' = v �
 *Two impulses.* J₁ = v_n/W_nn n̂ alone ends the approach, J₂ = W⁻¹ v ends all relative motion. D = J₂ − J₁ turns the one
 into the other: W D has no normal component, so any multiple of D leaves v'_n to J₁.
 
-*The law.* J = (1 + e) J₁ + (1 + e_t) D if this lies in the friction cone |J_t| ≤ μ J_n (sticking). Otherwise the part of
-D is reduced to κ < 1 + e_t, for which J lies on the cone (sliding):
+*The law.* J = (1 + e) J₁ + (1 + e_t) D if this lies in the friction cone |J_t| ≤ μ J_n (sticking). Otherwise the part
+of D is reduced to κ < 1 + e_t, for which J lies on the cone (sliding):
 
     |κ D_t| = μ ((1 + e) J₁ₙ + κ D_n)    gives    κ = μ (1 + e) J₁ₙ / (|D_t| − μ D_n).
 
 The divisor is positive whenever the first J is outside the cone, for that is (1 + e_t)(|D_t| − μ D_n) > μ (1 + e) J₁ₙ.
-In both cases v'_n = −e v_n. As J₁ and D are orthogonal in W, with κ = 1 + e_t when sticking the kinetic energy changes by
+In both cases v'_n = −e v_n. J₁ and D are orthogonal in W; with κ = 1 + e_t for sticking, the kinetic energy changes by
 
     ΔT = −½ (1 − e²) J₁ᵀ W J₁ − ½ κ (2 − κ) Dᵀ W D ≤ 0    for e in [0, 1], e_t in [−1, 1] and any μ ≥ 0.
 
@@ -55,8 +55,8 @@ def collision_impulse(
 ):
     """Impulse (J_n, J_t) [N s] on body B from v = (normal_speed, tangential_speed) [m/s] and W [1/kg], see above.
 
-    ``inverse_nn`` and ``inverse_determinant`` are those of :func:`inverse_masses`. The caller makes sure that the bodies
-    approach (v·n̂ > 0).
+    ``inverse_nn`` and ``inverse_determinant`` are those of :func:`inverse_masses`. The caller makes sure that the
+    bodies approach (v·n̂ > 0).
     """
     first = normal_speed * inverse_nn
     second_n = (w_tt * normal_speed - w_nt * tangential_speed) * inverse_determinant
