@@ -1,8 +1,8 @@
 """Warp kernels of warpchain, installed as ``warpchain.kernels``.
 
-Nothing here knows of files, options or people: arrays of structs go in, numbers come out. Every module imports
-only ``warp`` and its siblings. The physics functions are scalar ``wp.func``s, so that a loop over links (CPU) and
-one thread per link (GPU) can call the very same source.
+Arrays of structs go in, numbers come out; nothing here knows of files or options. Every module imports only ``warp``
+and its siblings. The physics functions are scalar ``wp.func``s, so that a loop over links (CPU) and one thread per link
+(GPU) call the same source.
 """
 
 if __name__ != "warpchain.kernels":

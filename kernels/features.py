@@ -1,25 +1,25 @@
-"""What a kernel is compiled for, and with which flags."""
+"""What a step kernel is compiled for, and the compiler's flags."""
 
 from dataclasses import dataclass
 
 COMPILER_FLAGS = (
     "-march=native -ffp-contract=fast -mllvm=-inline-threshold=9000 -mllvm=-inline-cold-callsite-threshold=3000"
 )
-"""Clang flags of the step kernels. Fusing a product and a sum makes a stage 1.7 times faster."""
+"""Clang flags of the step kernels. Fused multiply-adds make a stage 1.7 times faster."""
 
 
 @dataclass(frozen=True)
 class Features:
-    """What a kernel is compiled for; everything else is left out of it.
+    """What a step kernel is compiled for; code for anything else is left out.
 
     Attributes:
         method: Name of a method, see :mod:`methods.method`.
-        columns: Width of the scratch blocks, see :func:`layout.padded_width`.
+        columns: Width of a chain's scratch, see :func:`layout.padded_width`.
         fixed_body: ``"floor"``, ``"sprocket"`` or ``"none"``.
         self_contact: Contacts between a chain's own links.
-        broad_phase: ``"grid"`` or ``"all_pairs"``; the latter exists to measure the former against.
-        watch: ``"rest"``, ``"steady"`` or ``"none"``: what ends the run before its stop time.
-        softens: The watch also changes the softness of the joints, see :mod:`events.softening`.
+        broad_phase: ``"grid"`` or ``"all_pairs"``, which exists for comparison only.
+        watch: What ends the run before its stop time: ``"rest"``, ``"steady"`` or ``"none"``.
+        softens: Whether samples may change the softness of the joints, see :mod:`events.softening`.
     """
 
     method: str

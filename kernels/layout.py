@@ -1,7 +1,7 @@
-"""Where a chain's numbers lie in its scratch block: rows are quantities, columns links or joints.
+"""Where a chain's numbers lie in its scratch: rows are quantities, columns links or joints.
 
-One block of static shape per chain is what lets the CPU compiler vectorise: with run-time strides or several arrays
-it would have to allow for aliasing. Joint i joins the right end of link i to the left end of link i + 1.
+One array of static shape per chain lets the CPU compiler vectorise; with run-time strides or several arrays it would
+have to allow for aliasing. Joint i joins the right end of link i to the left end of link i + 1.
 """
 
 from itertools import accumulate
@@ -11,16 +11,16 @@ X, Y, THETA, U, V, OMEGA = range(6)
 COSINE, SINE = 6, 7
 # Constants of the links.
 MASS, INERTIA, INVERSE_MASS, INVERSE_INERTIA = range(8, 12)
-# A stage: link ends (left rows are padded: column n repeats column 0), arm, spin (padded).
+# A stage: link ends, arm, spin. Rows of left ends and of the spin are padded: column n repeats column 0.
 LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y = range(12, 16)
 LEFT_U, LEFT_V, RIGHT_U, RIGHT_V = range(16, 20)
 STAGE_ARM_X, STAGE_ARM_Y, STAGE_SPIN = 20, 21, 22
 # A finished attempt: candidate state and its error ratio.
 NEW_X, NEW_Y, NEW_THETA, NEW_U, NEW_V, NEW_OMEGA = range(23, 29)
 ERROR = 29
-# Joint forces and torques, shifted by one: column i + 1 is joint i, column 0 repeats column n. At least three rows
-# from the stage rows they are made of: closer, clang fears that a load waits for the store of an earlier column and
-# vectorises by 2 instead of 8.
+# Joint forces and torques, shifted by one: column i + 1 is joint i, column 0 repeats column n. They lie at least three
+# rows from the stage rows they are computed from. Closer, clang allows for a load that waits for the store of an
+# earlier column, and vectorises by 2 instead of 8.
 FORCE_X, FORCE_Y, TORQUE = 30, 31, 32
 # Energy [J] lost so far: per joint to friction and damping, per link to floor or sprocket.
 LOST_FRICTION, LOST_DAMPING, LOST_FIXED = 33, 34, 35
@@ -30,14 +30,14 @@ LISTED_X, LISTED_Y = 36, 37
 STAGES = 38
 STAGE_ROWS = 5
 
-# The block form keeps the first 16 rows above and the following ones on a board that all threads of the block see; the
-# scratch block keeps rows from BOARD_LOST_SELF up to BOARD_VALUES between launches. Every row less leaves a
-# multiprocessor more cache for what does not fit into registers.
+# On a GPU the first 16 rows above and the following ones lie on a board that all threads of a block share. Between
+# launches the scratch keeps the rows from BOARD_LOST_SELF up to BOARD_VALUES. Every row less leaves a multiprocessor
+# more cache for register spills.
 BOARD_LOST_SELF, BOARD_LOST_FRICTION, BOARD_LOST_DAMPING, BOARD_LOST_FIXED = range(16, 20)
 BOARD_LISTED_X, BOARD_LISTED_Y = 20, 21
 # First stage of the next step: accelerations, then the two powers (see STAGES).
 BOARD_FIRST = 22
-# Numbers of the chain rather than of its links, in the first columns of one more row.
+# Values of the whole chain, in the first columns of one more row.
 BOARD_VALUES = 27
 VALUE_OPENING, VALUE_FIXED_DEPTH, VALUE_LAST_IMPULSE, VALUE_STOP_TIME, VALUE_NEXT_SAMPLE = range(5)
 VALUE_STIFFNESS, VALUE_DAMPING, VALUE_VISCOUS, VALUE_COULOMB, VALUE_INVERSE_SMOOTHING = range(5, 10)
@@ -87,17 +87,17 @@ def consecutive_offsets(start: int = 0, /, **sizes: int) -> dict[str, int]:
 
 
 def scratch_rows(stages: int) -> int:
-    """Rows of a chain's scratch block for a method with this many stages."""
+    """Rows of a chain's scratch on a CPU, for an explicit method with this many stages."""
     return STAGES + STAGE_ROWS * stages
 
 
 def board_size(threads: int) -> int:
-    """Doubles of the board of a block of so many threads: a column for each, one more, and the last row's numbers."""
+    """Doubles of a board: a column per thread of the block and one more, and the row of the chain's values."""
     return BOARD_VALUES * (threads + 1) + max(threads + 1, VALUES)
 
 
 def padded_width(link_count: int) -> int:
-    """Static number of columns that serves a chain of this many links.
+    """Static number of columns for a chain of this many links.
 
     200 columns serve every chain of the paper's range without a row stride that maps rows onto the same cache sets
     (powers of two are 1.3 to 2 times slower); longer chains get the next odd multiple of 200 that fits.

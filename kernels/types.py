@@ -1,6 +1,6 @@
-"""Structs that cross the border between host and device.
+"""Structs that host and device share.
 
-World (one chain instance) is always axis 0; W worlds, n links (the world's own, ``link_count``), N the longest.
+World (one chain instance) is always axis 0. W: number of worlds; n: links of a world (``link_count``); N: greatest n.
 """
 
 import warp as wp
@@ -10,7 +10,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.struct
 class Model:
-    """What a chain is made of: constant during a run. Every array has shape (W,)."""
+    """Constants of the chains, which no run changes. Every array has shape (W,)."""
 
     link_count: wp.array(dtype=wp.int32)  # n
     link_length: wp.array(dtype=wp.float64)  # ℓ [m], joint to joint
@@ -37,56 +37,60 @@ class Model:
 
 @wp.struct
 class Drive:
-    """What happens to a chain and when its run ends. Every array has shape (W,)."""
+    """What the sprocket does and when a hold ends. Every array has shape (W,)."""
 
     sprocket_speed: wp.array(dtype=wp.float64)  # final angular velocity Ω [rad/s], counter-clockwise positive
     spin_up_start: wp.array(dtype=wp.float64)  # [s]
     spin_up_time: wp.array(dtype=wp.float64)  # [s]; 0: at full speed from the start
-    hold_start: wp.array(dtype=wp.float64)  # [s]; the steady-state watch begins here
-    loop_speed: wp.array(dtype=wp.float64)  # speed along the loop that counts as steady [m/s]
+    hold_start: wp.array(dtype=wp.float64)  # from then on the loop is watched until it is stationary [s]
+    loop_speed: wp.array(dtype=wp.float64)  # speed of the sprocket's surface, along the loop [m/s]
     loop_period: wp.array(dtype=wp.float64)  # [s]
-    load_factor: wp.array(dtype=wp.float64)  # of the hold's first part, see scaled_loads
+    load_factor: wp.array(dtype=wp.float64)  # of the hold's first part, see physics.scaled_loads
     steady_window: wp.array(dtype=wp.float64)  # over which means are taken in the hold's second part [s]
-    steady_time: wp.array(dtype=wp.float64)  # for which the loop must then keep its shape [s]; negative: by itself
-    steady_tolerance: wp.array(dtype=wp.float64)  # relative change of its shape that counts as kept
-    further_hold: wp.array(dtype=wp.float64)  # how long a stationary loop is held on [s]
-    release_phase: wp.array(dtype=wp.float64)  # and then for this part of a loop period
-    hold_softness: wp.array(dtype=wp.float64)  # from the hold to the release, 1 to 2; 0: own values
-    loaded_softness: wp.array(dtype=wp.float64)  # the same under load
-    push_rate: wp.array(dtype=wp.float64)  # at which the sprocket pushes out circles that have sunk in [1/s]
+    steady_time: wp.array(
+        dtype=wp.float64
+    )  # for which the loop must then keep its shape [s]; negative: see events.release
+    steady_tolerance: wp.array(dtype=wp.float64)  # greatest relative change of the shape of a stationary loop
+    further_hold: wp.array(dtype=wp.float64)  # how long a stationary loop is held further [s]
+    release_phase: wp.array(dtype=wp.float64)  # and after that, in loop periods
+    hold_softness: wp.array(dtype=wp.float64)  # of the joints from the hold to the release, 1 to 2; 0: own values
+    loaded_softness: wp.array(dtype=wp.float64)  # of the joints under load
+    push_rate: wp.array(dtype=wp.float64)  # speed at which the sprocket pushes out sunken circles, per depth [1/s]
 
 
 @wp.struct
 class State:
-    """What evolves. Shapes (W,) unless given.
+    """What changes during a run. Shapes (W,) unless given.
 
-    A run is bit-identical however it is cut into launches: what the loop over steps remembers between two attempts is
-    kept here and in the chain's scratch block, which therefore belongs to its world until the run ends.
+    A run is bit-identical however it is cut into launches: all that the step loop needs for the next attempt is kept
+    here and in the chain's scratch, which belongs to its world until the run ends.
     """
 
     links: wp.array3d(dtype=wp.float64)  # (W, 6, N): x, y [m], θ [rad], and their rates
     time: wp.array(dtype=wp.float64)  # [s]
-    stop_time: wp.array(dtype=wp.float64)  # the run lands on this time exactly and ends [s]
-    stop_status: wp.array(dtype=wp.int32)  # status it then gets
-    is_fresh: wp.array(dtype=wp.int32)  # 1: links were set by the host, the scratch block is void
-    has_first_stage: wp.array(dtype=wp.int32)  # 1: the scratch block holds the first stage of the next step
-    gap: wp.array(dtype=wp.float64)  # of the CPU form: least distance to floor or sprocket [m]
-    reach: wp.array(dtype=wp.float64)  # of the block form: time in which nothing comes near unseen [s]
-    slack: wp.array(dtype=wp.float64)  # how far joints may yet move before the list is stale [m]; of blocks that fly
-    step: wp.array(dtype=wp.float64)  # step that the controller proposes [s]
+    stop_time: wp.array(dtype=wp.float64)  # the run ends at exactly this time [s]
+    stop_status: wp.array(dtype=wp.int32)  # status of a run that ends there
+    is_fresh: wp.array(dtype=wp.int32)  # 1: the host has set the links, and the scratch is void
+    has_first_stage: wp.array(dtype=wp.int32)  # 1: the scratch holds the first stage of the next step
+    gap: wp.array(dtype=wp.float64)  # CPU: least distance to floor or sprocket [m]
+    time_to_contact: wp.array(dtype=wp.float64)  # GPU: longest step that cannot miss a contact [s]
+    slack: wp.array(dtype=wp.float64)  # CPU: how far joints may move before the neighbour list is stale [m]
+    step: wp.array(dtype=wp.float64)  # proposed next step [s]
     last_error: wp.array(dtype=wp.float64)  # error ratio of the last accepted step (PI controller)
-    is_rigid: wp.array(dtype=wp.int32)  # 1: on rigid joints, see joint_switch
-    other_step: wp.array(dtype=wp.float64)  # step that was proposed last on the other model of the joints [s]
-    closing_time: wp.array(dtype=wp.float64)  # when joints may next be closed [s]
+    is_rigid: wp.array(dtype=wp.int32)  # 1: joints are rigid, see cpu.implicit.joint_switch
+    other_step: wp.array(dtype=wp.float64)  # last step proposed for the other model of the joints [s]
+    closing_time: wp.array(dtype=wp.float64)  # earliest time at which joints may close [s]
     next_sample: wp.array(dtype=wp.int64)  # index of the next sample mark
     status: wp.array(dtype=wp.int32)
     watch: wp.array2d(dtype=wp.float64)  # (W, WATCH_ROWS): memory of the watches
-    softness: wp.array(dtype=wp.float64)  # of the joints: 0 the model's own, 1 soft, 2 softest; see softening
-    load_factor: wp.array(dtype=wp.float64)  # of gravity, friction and inertia on the sprocket, see scaled_loads
-    first_area: wp.array(dtype=wp.float64)  # enclosed by the loop when its run began [m²]
-    attempts_before: wp.array(dtype=wp.int64)  # attempts of the walk's earlier phases, for the limit
-    first_sample: wp.array2d(dtype=wp.float64)  # (W, SAMPLE_COLUMNS): the chain when its run began …
-    last_sample: wp.array2d(dtype=wp.float64)  # … and when it was last looked at, at the end of the run the last time
+    softness: wp.array(dtype=wp.float64)  # of the joints: 0 the model's own, 1 soft, 2 softest; see events.softening
+    load_factor: wp.array(
+        dtype=wp.float64
+    )  # of gravity, friction and inertia on the sprocket, see physics.scaled_loads
+    first_area: wp.array(dtype=wp.float64)  # area inside the loop when its run began [m²]
+    attempts_before: wp.array(dtype=wp.int64)  # attempts of the walk's earlier phases, which its limit includes
+    first_sample: wp.array2d(dtype=wp.float64)  # (W, SAMPLE_COLUMNS): when the run began
+    last_sample: wp.array2d(dtype=wp.float64)  # the latest, in the end that of the final state
     counts: wp.array2d(dtype=wp.int64)  # (W, COUNT_ROWS)
     extremes: wp.array2d(dtype=wp.float64)  # (W, EXTREME_ROWS) [m]
     losses: wp.array2d(dtype=wp.float64)  # (W, LOSS_ROWS) [J]
@@ -94,7 +98,7 @@ class State:
 
 @wp.struct
 class Record:
-    """Time series that the host drains between launches; a full one ends the launch, nothing is dropped."""
+    """Time series, which the host drains between launches. A full one ends the launch; nothing is dropped."""
 
     sample_count: wp.array(dtype=wp.int32)  # (W,)
     frame_count: wp.array(dtype=wp.int32)  # (W,)
@@ -108,16 +112,16 @@ class Record:
 class Control:
     """Numerical settings of a launch, the same for all its worlds."""
 
-    tolerance: wp.float64  # absolute and relative
-    soft_tolerance: wp.float64  # the same while joints are soft or softer
-    flight_tolerance: wp.float64  # the same on rigid joints
+    tolerance: wp.float64  # of a step's error, absolute and relative
+    soft_tolerance: wp.float64  # while joints are soft or softer
+    flight_tolerance: wp.float64  # on rigid joints
     proportional: wp.int32  # 1: proportional-integral controller, 0: odeint's standard one
     contact_step: wp.float64  # longest step near a contact [s]
     skin: wp.float64  # margin of the neighbour list [m]
     smallest_step: wp.float64  # [s]
     step_limit: wp.int64  # attempts in all
     attempts: wp.int32  # attempts in this launch
-    launch_time: wp.float64  # after which a block stops at its next look [s]
+    launch_time: wp.float64  # after which a block stops at its next sample [s]
     sample_interval: wp.float64  # [s]
     frame_every: wp.int64  # samples per frame
     rest_speed: wp.float64  # [m/s]
@@ -125,16 +129,16 @@ class Control:
     soft_stiffness: wp.float64  # k of soft joints [N/m]
     soft_damping: wp.float64  # b [N s/m]
     soft_smoothing: wp.float64  # ω_c [rad/s]
-    softest_stiffness: wp.float64  # the same of the softest, whose ω_c is that of soft ones
-    softest_damping: wp.float64
-    soft_contact_step: wp.float64  # longest near a contact on the softest joints, in the drive on soft ones [s]
-    soften_area: wp.float64  # joints soften below this fraction of the first area
-    stiffening_time: wp.float64  # from soft joints at the release to the model's own [s]
+    softest_stiffness: wp.float64  # k of the softest joints, whose ω_c is that of soft ones
+    softest_damping: wp.float64  # b of the softest joints [N s/m]
+    soft_contact_step: wp.float64  # contact_step of the softest joints, in the drive also of soft ones [s]
+    soften_area: wp.float64  # joints soften when the area falls below this fraction of the first
+    stiffening_time: wp.float64  # in which joints return to their own values after the release [s]
 
 
 @wp.struct
 class Chain:
-    """One world's constants, read once per launch."""
+    """One world's constants, under its present loads and with its present softness."""
 
     link_count: wp.int32
     half_length: wp.float64

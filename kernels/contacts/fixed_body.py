@@ -1,4 +1,4 @@
-"""A link meets the floor or the sprocket: one impulse for each of its circles that overlaps and approaches."""
+"""A link and the floor or the sprocket: one impulse for each of its circles that overlaps and approaches."""
 
 import warp as wp
 
@@ -76,11 +76,11 @@ def sprocket_circle(
     """One circle against the sprocket about the origin (body A; n̂ points outwards).
 
     ``arm`` leads from the link's centre to the circle's; ``surface_speed`` is the sprocket's angular velocity. The
-    touching point is the circle's nearest to the sprocket's centre. Where the circle has sunk in by d, the surface
-    moves outwards at ``push_rate`` d. Impulses alone stop a circle only after a step in which it has sunk in: in steps
-    of 50 µs loops sank by 0.06 to 0.14 mm, and were slower for it.
+    touching point is that of the circle which is nearest to the sprocket's centre. At a depth d the surface moves
+    outwards at ``push_rate`` d. Without that an impulse stops a circle only after a step in which it has sunk in: in
+    steps of 50 µs loops sank in by 0.06 to 0.14 mm, which slowed them down.
     """
-    # a circle exactly at the centre has no normal: zero instead makes it one that does not approach
+    # a circle exactly at the centre has no normal; with a normal of zero it does not approach
     distance = wp.max(wp.sqrt(circle_x * circle_x + circle_y * circle_y), SMALLEST)
     normal_x = quotient(circle_x, distance)
     normal_y = quotient(circle_y, distance)
@@ -109,7 +109,7 @@ def sprocket_circle(
 
 
 def meeting(circle: wp.Function):
-    """Warp function ``meet`` of a link and a fixed body, whose contact with one circle is given."""
+    """Warp function ``meet`` of a link and a fixed body, from that of one circle and the body."""
 
     @wp.func
     def meet(

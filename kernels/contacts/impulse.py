@@ -14,8 +14,7 @@ of D is reduced to κ < 1 + e_t, for which J lies on the cone (sliding):
     |κ D_t| = μ ((1 + e) J₁ₙ + κ D_n)    gives    κ = μ (1 + e) J₁ₙ / (|D_t| − μ D_n).
 
 The divisor is positive whenever the first J is outside the cone, for that is (1 + e_t)(|D_t| − μ D_n) > μ (1 + e) J₁ₙ.
-In both cases v'_n = −e v_n. As J₁ and D are orthogonal in W, with κ = 1 + e_t when sticking the kinetic energy changes
-by
+In both cases v'_n = −e v_n. J₁ and D are orthogonal in W; with κ = 1 + e_t for sticking, the kinetic energy changes by
 
     ΔT = −½ (1 − e²) J₁ᵀ W J₁ − ½ κ (2 − κ) Dᵀ W D ≤ 0    for e in [0, 1], e_t in [−1, 1] and any μ ≥ 0.
 

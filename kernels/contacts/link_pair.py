@@ -24,7 +24,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.func
 def natural(index: int):
-    """The same index, now known to the compiler as not negative: such ones count from an array's end in Warp."""
+    """The same index, known to the compiler not to be negative: Warp counts negative ones from an array's end."""
     return index & 2147483647
 
 
@@ -45,7 +45,7 @@ def effective_masses(
     b_n: wp.float64,
     b_t: wp.float64,
 ):
-    """W_nn, W_nt, W_tt [1/kg] of a contact: 1/m_A + 1/m_B, 1/I_A, 1/I_B, and levers as of :func:`circles_of_links`."""
+    """W_nn, W_nt, W_tt [1/kg] of a contact; arguments as those and the results of :func:`circles_of_links`."""
     return (
         mass + a_n * a_n * inertia_a + b_n * b_n * inertia_b,
         a_n * a_t * inertia_a + b_n * b_t * inertia_b,
@@ -70,7 +70,7 @@ def circles_of_links(
 ):
     """Geometry of the contact of a circle of link A and one of link B, without branches.
 
-    Numbers, not a struct: clang would carry that through memory, which makes a pile on the CPU twice as slow.
+    It returns numbers, not a struct: clang kept a struct in memory, and a pile on the CPU was twice as slow.
 
     Args:
         radius: Of both circles [m].
@@ -87,17 +87,17 @@ def circles_of_links(
         inertia_b: 1/I_B [1/(kg m²)].
 
     Returns:
-        Depth of the overlap [m], 0 if there is none (exactly concentric circles have no normal: no contact); normal
-        from A to B; levers of A crossed with normal and tangent [m], likewise of B; 1/W_nn [kg] and 1/det W [kg²].
-        Without an overlap all but the depth mean nothing.
+        Depth of the overlap [m], 0 if there is none (concentric circles have no normal and count as none); normal from
+        A to B; levers of A crossed with normal and tangent [m], likewise of B; 1/W_nn [kg] and 1/det W [kg²]. Without
+        an overlap only the depth has a meaning.
     """
     dx = end_b_x - end_a_x
     dy = end_b_y - end_a_y
-    reach = TWO * radius
+    touching = TWO * radius
     square = dx * dx + dy * dy
-    overlap = square < reach * reach and square > ZERO
+    overlap = square < touching * touching and square > ZERO
     distance = wp.sqrt(square)
-    depth = wp.where(overlap, reach - distance, ZERO)
+    depth = wp.where(overlap, touching - distance, ZERO)
     nx = quotient(dx, distance)
     ny = quotient(dy, distance)
     px = HALF * (end_a_x + end_b_x)
@@ -117,14 +117,14 @@ def circles_of_links(
 
 @wp.func
 def links_of(p: int, q: int, half: int, second: int, n: int):
-    """Links A and B of the contact of joints p < q in this half of the sequence, the first (0) or second (1) of two."""
+    """Links A and B of a contact of joints p < q: the first (0) or second (1) in this half of the sequence."""
     link_b = q + (second ^ half)
     return p + second, wp.where(link_b == n, 0, link_b)
 
 
 @wp.func
 def touching_circles(K: wp.array2d(dtype=wp.float64), chain: Chain, p: int, q: int, half: int, second: int):
-    """Geometry of that contact, see :func:`links_of`; links that share a joint have none.
+    """Geometry of a contact, see :func:`links_of` and :func:`circles_of_links`; depth 0 for links that share a joint.
 
     Joint j's left-hand circle belongs to link j's right end, its right-hand circle to the left end of the link after.
     """
@@ -168,8 +168,8 @@ def collide(
     inverse_nn: wp.float64,
     inverse_determinant: wp.float64,
 ):
-    """Impulse between two touching links, if they approach; returns the energy lost [J] and the number of impulses."""
-    # all is read before anything is written: otherwise the compiler would read again, not knowing that A is not B
+    """Impulse between two overlapping links if they approach; returns energy lost [J] and number of impulses."""
+    # all is read before anything is written: the compiler does not know that A is not B, and would read again
     u_a = K[U, link_a]
     v_a = K[V, link_a]
     omega_a = K[OMEGA, link_a]

@@ -1,4 +1,4 @@
-"""Where the neighbour list of a chain lies, which joints it holds, and how cells of the grid are hashed."""
+"""The neighbour list of a chain: its layout, its reach, and the hash of grid cells."""
 
 import functools
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ wp.set_module_options({"enable_backward": False})
 
 
 GEOMETRY_ROWS = 34
-"""Rows of the CPU's scratch for contacts, see :mod:`cpu.contacts.self_contacts`."""
+"""Rows of the CPU's scratch of contacts, see :mod:`cpu.contacts.self_contacts`."""
 GEOMETRY_COLUMNS = 64
-"""Pairs of joints whose contacts are worked out together, a multiple of 8."""
+"""Pairs of joints whose contacts are evaluated together, a multiple of 8."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class ListLayout:
 
 @functools.cache
 def list_layout(columns: int) -> ListLayout:
-    """Layout for chains in scratch blocks of this width."""
+    """Layout for chains in scratch of this width."""
     capacity = layout.PAIRS_PER_LINK * columns
     table = 1
     while table < 2 * columns:

@@ -1,7 +1,7 @@
 """Embedded explicit Runge–Kutta methods: one loop over stages for every tableau.
 
-Written for one CPU thread per chain. The loops over links keep to the form that clang vectorises: ``while`` loops
-with an integer of their own, one scratch block of static shape, no branch and no library call inside.
+One CPU thread carries a chain. Loops over links have the form that clang vectorises: ``while`` loops with an integer of
+their own, one array of static shape, no branch and no library call inside.
 """
 
 import functools
@@ -77,7 +77,7 @@ def place_ends(K: wp.array2d(dtype=wp.float64), chain: Chain):
 
 @wp.func
 def begin_stages(K: wp.array2d(dtype=wp.float64), chain: Chain):
-    """First stage's rows from the state: arms and end velocities; ``place_ends`` did the positions."""
+    """Rows of the first stage from the state: arms, spins, end velocities; :func:`place_ends` has placed the ends."""
     n = chain.link_count
     a = chain.half_length
     i = int(0)
@@ -248,7 +248,7 @@ def explicit_method(name: str):
             K[NEW_U, i] = u + h * du
             K[NEW_V, i] = v + h * dv
             K[NEW_OMEGA, i] = w + h * dw
-            # sums would overestimate, maxima of integers see NaN; below, one reduction over links
+            # maxima of integers keep NaN; those over links follow in one reduction below
             worst = wp.max(
                 wp.max(
                     error_bits(hh * ex, K[X, i], u, h),
@@ -275,7 +275,7 @@ def explicit_method(name: str):
             greatest = wp.max(greatest, order_bits(K[ERROR, i]))
             furthest = wp.max(furthest, order_bits(K[NEW_THETA, i] - K[THETA, i]))
             i += 1
-        # a turn beyond the polynomials' range is refused as an error of 2: the step shrinks
+        # a turn beyond the polynomials' range counts as an error of 2: the step shrinks
         if wp.cast(furthest, wp.float64) > LARGEST_TURN:
             greatest = wp.max(greatest, order_bits(TWO))
         return greatest

@@ -15,15 +15,15 @@ from warpchain.kernels.methods.w_tableaus import ROS34PW2
 
 @dataclass(frozen=True)
 class CpuMethod:
-    """Warp functions of a method for scratch blocks of one width.
+    """Warp functions of a method for scratch of one width.
 
     Attributes:
-        first_stage: ``(K, chain)``: evaluates the first stage of the next step.
+        first_stage: ``(K, chain)`` evaluates the first stage of the next step.
         attempt: ``(K, chain, h, tolerance)`` → error ratio as ordered bits.
-        commit: ``(K, chain, h)``: takes over the state that the last attempt found.
+        commit: ``(K, chain, h)`` accepts the state that the last attempt found.
         growth: Factor of the step after acceptance, see :mod:`methods.controller`.
         shrinkage: Factor of the step after rejection.
-        reuses_last: Whether a step leaves the first stage of the next.
+        reuses_last: Whether the last stage of a step is the first of the next.
     """
 
     first_stage: Any
@@ -36,15 +36,15 @@ class CpuMethod:
 
 @dataclass(frozen=True)
 class RigidFlight:
-    """Warp functions for flight on rigid joints, from one impulse to the next.
+    """Warp functions of flight on rigid joints, from one impulse to the next.
 
     Attributes:
-        attempt: As that of a method.
-        commit: ``(K, chain, h)`` → whether springs would hold little enough energy for the flight to go on.
+        attempt: As in :class:`CpuMethod`.
+        commit: ``(K, chain, h)`` → whether joints may stay rigid: springs would hold little energy.
         close_joints: ``(K, chain)`` → (whether joints are rigid now, energy lost [J]).
         open_joints: ``(K, chain)`` → energy lost [J].
-        growth: As that of a method.
-        shrinkage: As that of a method.
+        growth: As in :class:`CpuMethod`.
+        shrinkage: As in :class:`CpuMethod`.
     """
 
     attempt: Any
@@ -56,7 +56,7 @@ class RigidFlight:
 
 
 def scratch_rows(name: str, columns: int) -> int:
-    """Rows of a chain's scratch block of so many columns."""
+    """Rows of a chain's scratch with this many columns."""
     method = find_method(name)
     if method.kind == "rosenbrock":
         return rosenbrock_rows(method.tableau, columns)

@@ -1,8 +1,8 @@
-"""The loop over steps: one CPU thread carries one chain through a bounded number of attempts.
+"""The CPU loop over steps: one thread carries one chain through a bounded number of attempts.
 
-A method makes a step and an error estimate; the controller below accepts it and proposes the next; a contact pass
-follows each accepted step; the record looks at the chain every sample interval; a status says how it ended. An attempt
-that is not accepted leaves no trace but the counter and a smaller step.
+A method attempts a step and estimates its error; the controller accepts or rejects it and proposes the next step. A
+contact pass follows each accepted step. A sample is taken every sample interval. A rejected attempt changes nothing but
+its counter and the step.
 """
 
 import functools
@@ -50,7 +50,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.func
 def load_state(K: wp.array2d(dtype=wp.float64), state: State, chain: Chain, world: int):
-    """Fills the state rows and the constants of the links; energy rows start at zero."""
+    """Fills the rows of the state and of the links' constants; rows of losses start at zero."""
     i = int(0)
     while i < chain.link_count:
         row = int(0)
@@ -69,7 +69,7 @@ def load_state(K: wp.array2d(dtype=wp.float64), state: State, chain: Chain, worl
 
 @wp.func
 def store_state(K: wp.array2d(dtype=wp.float64), state: State, chain: Chain, world: int, fixed_loss: int):
-    """Writes the state rows and the losses since loading."""
+    """Writes the state and the losses since loading."""
     friction = ZERO
     damping = ZERO
     fixed = ZERO
@@ -110,9 +110,9 @@ def state_is_finite(K: wp.array2d(dtype=wp.float64), chain: Chain):
 def make_advance(features: Features):
     """Kernel ``advance(worlds, model, drive, state, record, scratch, lists, control)``, one thread per chain.
 
-    worlds: (launched,) int32, the worlds to carry on; those whose status is not RUNNING are passed over. scratch: (W,
-    rows, columns) float64, lists: (W, size) int32, see :mod:`layout` and :mod:`cpu.contacts.neighbour_list`; both
-    belong to a world until its run ends.
+    worlds: (launched,) int32, the worlds to carry on; those whose status is not RUNNING are left alone. scratch: (W,
+    rows, columns) float64, lists: (W, size) int32, see :mod:`layout` and :mod:`contacts.pair_list`; both belong to a
+    world until its run ends.
     """
     columns = features.columns
     rows = scratch_rows(features.method, columns)
@@ -132,7 +132,7 @@ def make_advance(features: Features):
     present = present_chain(softens, is_driven)
     first_stage, attempt, commit = method.first_stage, method.attempt, method.commit
     growth, shrinkage = method.growth, method.shrinkage
-    # on the sprocket impulses never pause
+    # on the sprocket impulses never pause long enough for a flight
     flight = None if has_sprocket else rigid_flight(features.method, columns)
     has_flight = flight is not None
     if flight is not None:
@@ -165,10 +165,10 @@ def make_advance(features: Features):
             longest = contact_step(state, control, world, wp.static(is_driven))
         if wp.static(softens or is_driven):
             tolerance = spring_tolerance(drive, state, control, world, wp.static(is_driven))
-        block = scratch[world]
-        K = wp.array(ptr=block.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
-        block_list = lists[world]
-        L = wp.array(ptr=block_list.ptr, shape=(wp.static(list_size),), dtype=wp.int32)
+        memory = scratch[world]
+        K = wp.array(ptr=memory.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
+        list_memory = lists[world]
+        L = wp.array(ptr=list_memory.ptr, shape=(wp.static(list_size),), dtype=wp.int32)
         status = int(RUNNING)
         if state.is_fresh[world] != 0:
             load_state(K, state, chain, world)
@@ -214,13 +214,13 @@ def make_advance(features: Features):
                 status = state.stop_status[world]
                 break
             if wp.static(has_flight):
-                # flights of soft joints save nothing: their springs ring longer than impulses pause
+                # with soft joints flights save nothing: their springs ring longer than impulses pause
                 if is_rigid == 0 and time >= closing_time and state.softness[world] == ZERO:
                     closed, lost = close_joints(K, chain)
                     closing_time = time + QUIET_TIME
                     if closed:
                         is_rigid = int(1)
-                        slack = wp.float64(-1.0)  # the next list has the skin of flights
+                        slack = wp.float64(-1.0)  # the next list is to have the skin of flights
                         step, other_step = other_step + ZERO, step + ZERO
                         last_error = ONE
                         place_ends(K, chain)

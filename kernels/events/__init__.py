@@ -1,1 +1,1 @@
-"""What is done at every sample mark: record, release, rest, softening."""
+"""What happens at every sample mark: recording, release, rest, softening; and what a run tallies."""

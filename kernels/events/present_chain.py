@@ -1,4 +1,4 @@
-"""A chain's constants at this moment: its own, under the present loads, with joints as soft as they are now."""
+"""A chain's constants at this moment: under its present loads, with its present softness."""
 
 import functools
 
@@ -14,7 +14,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.func
 def has_changed(state: State, world: int, softness: wp.float64, load_factor: wp.float64):
-    """Whether a look has changed a chain, from these values before it, or dragged its links, as it does under load."""
+    """Whether a sample has changed a chain that had these values before, or the velocities of its links (drag)."""
     return state.softness[world] != softness or load_factor > ONE or state.load_factor[world] > ONE
 
 

@@ -1,4 +1,4 @@
-"""What is looked at every sample interval: sums over a chain, the watches that end a phase, time series, frames."""
+"""Time series and frames: samples of a chain, joint positions and loads."""
 
 import warp as wp
 
@@ -33,7 +33,7 @@ def write_row(rows: wp.array2d(dtype=wp.float64), row: int, time: wp.float64, su
 
 @wp.func
 def write_sample(state: State, record: Record, world: int, time: wp.float64, summary: Summary):
-    """Notes the first and the last look at a chain, and appends to the time series if it is kept."""
+    """Writes the first and the latest sample of a chain, and appends to the time series if it is kept."""
     if state.last_sample[world, TIME] < ZERO:
         write_row(state.first_sample, world, time, summary)
     write_row(state.last_sample, world, time, summary)
@@ -60,7 +60,7 @@ def write_load(loads: wp.array2d(dtype=wp.float64), row: int, K: wp.array2d(dtyp
 
 @wp.func
 def write_frame(record: Record, K: wp.array2d(dtype=wp.float64), chain: Chain, world: int, time: wp.float64):
-    """Appends all joint positions, if frames are kept, and the loads of the joints, if they are."""
+    """Appends all joint positions if frames are kept, and the loads of the joints if these are kept."""
     if record.frames.shape[1] == 0:
         return
     n = chain.link_count
@@ -78,7 +78,7 @@ def write_frame(record: Record, K: wp.array2d(dtype=wp.float64), chain: Chain, w
 
 @wp.func
 def lacks_last_sample(state: State, world: int, time: wp.float64, status: int):
-    """True if a run has ended between two samples: the series then ends with one of the state in which it ended."""
+    """Whether a run has ended between two samples: then the final state is the last sample of its series."""
     return status != RUNNING and status != NOT_FINITE and state.last_sample[world, TIME] != time
 
 

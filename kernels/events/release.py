@@ -51,7 +51,7 @@ SHORTEST_WINDOW = wp.constant(wp.float64(0.05))
 
 @wp.func
 def is_watched(state: State, drive: Drive, world: int, time: wp.float64):
-    """Whether the loop is being held and its release has not been set."""
+    """Whether the loop is held and the time of its release is not set yet."""
     return state.stop_status[world] != FINISHED and time >= drive.hold_start[world]
 
 

@@ -1,4 +1,4 @@
-"""One sample: record the chain, then ask every watch."""
+"""One sample of a chain: record it, then evaluate every watch."""
 
 import functools
 
@@ -10,9 +10,7 @@ from warpchain.kernels.events.release import drag_rate, load_at, watch_steadines
 from warpchain.kernels.events.rest import watch_rest
 from warpchain.kernels.events.softening import watch_collapse, watch_drive, watch_stiffening
 from warpchain.kernels.events.summary import summarise
-from warpchain.kernels.layout import (
-    TIME,
-)
+from warpchain.kernels.layout import TIME
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.scaled_loads import drag_shape
 from warpchain.kernels.types import Chain, Control, Drive, Record, State
@@ -22,19 +20,19 @@ wp.set_module_options({"enable_backward": False})
 
 @functools.cache
 def sampling(watch: str, softens: bool = False):
-    """Warp function ``look``, one sample of a placed chain: time series, frame and watch; returns the status.
+    """Warp function ``sample`` of a chain whose ends are placed: time series, frame, watches; returns the status.
+
+    With ``"steady"`` it may also change the chain's loads and the velocities of its links.
 
     Args:
         watch: ``"rest"``, ``"steady"`` or ``"none"``.
-        softens: Whether the look may change the softness of the joints, see :mod:`events.softening`.
-
-    A look at a chain on its sprocket (``"steady"``) may also change its loads and the velocities of its links.
+        softens: Whether it may change the softness of the joints, see :mod:`events.softening`.
     """
     watches_rest = watch == "rest"
     watches_steadiness = watch == "steady"
 
     @wp.func
-    def look(
+    def sample(
         K: wp.array2d(dtype=wp.float64),
         chain: Chain,
         drive: Drive,
@@ -68,4 +66,4 @@ def sampling(watch: str, softens: bool = False):
             watch_drive(state, drive, control, world, time)
         return RUNNING
 
-    return look
+    return sample

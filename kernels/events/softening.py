@@ -1,22 +1,22 @@
-"""Softer joints where nothing fast is left to resolve: on the sprocket, just after the release, in the collapsed loop.
+"""Softer joints where no fast motion matters: on the sprocket, just after the release, in the collapsed loop.
 
-Stiff joints are what makes steps short. Softness s is 0 for the model's own k, b and 1/ω_c, 1 for those of soft joints
-and 2 for the softest, which have less k and b; in between they are interpolated geometrically. No value ever becomes
-stiffer than the model's own. Softness changes at looks only, so that a run does not depend on how it is cut into
-launches. On the softest joints, and on soft ones in the drive, steps near a contact may be longer, too: there they
-would else be what keeps steps short.
+Stiff joints make steps short. Softness s is 0 for the model's own k, b and 1/ω_c, 1 for those of soft joints and 2 for
+the softest, which have less k and b; in between values are interpolated geometrically. No value ever becomes stiffer
+than the model's own. Softness changes at samples only, so that a run does not depend on how it is cut into launches. On
+the softest joints, and in the drive on soft ones, steps near a contact may be longer too: else the contact step would
+limit them.
 
-*Drive.* Joints are softest while the chain settles and the sprocket spins up, and as soft as the loop's tension allows
-while it is to become stationary: C = T/k stretches it by T/ℓk, at 30 Hz on the softest joints by 0.3 %; so much is
-wanted of k that it is a tenth of that. While its loads are multiplied (:mod:`physics.scaled_loads`) it may be 0.1 %.
-With ten times the ω_c of soft joints another loop becomes stationary, for friction is what holds a loop's width.
-*Release.* Soft joints get their own values back before the chain lands. *Pile.* Joints are soft for good once the loop
-begins to collapse, and softest once it encloses half of what it did then; softest at once shifts Δx of long chains.
+*Drive.* Joints are softest while the chain settles and the sprocket spins up. Afterwards, while the loop becomes
+stationary, they are as soft as its tension allows: C = T/k stretches the loop by T/ℓk, which on the softest joints is
+0.3 % at 30 Hz, and k is chosen for a tenth of that. While loads are multiplied (:mod:`physics.scaled_loads`) it may be
+0.1 %. With ten times the ω_c of soft joints another loop becomes stationary, because friction determines its width.
+*Release.* Soft joints return to their own values before the chain reaches the floor. *Pile.* Joints become soft for
+good when the loop begins to collapse, and softest when its area has halved again. Softest at once shifts Δx of long
+chains.
 
-A change of k at openings C sets ½ (k_before − k_after) Σ C² of energy free, which is booked. Going soft is one jump: C
-has then grown to T/k_after within a few periods of the soft springs. Going back, C must shrink a hundred- to a
-thousandfold, which a jump would turn into a pull of as many times T; so it takes many small ones, each damped away
-before the next.
+A change of k at openings C releases the energy ½ (k_before − k_after) Σ C², which is booked. Softening is one jump: C
+grows to T/k_after within a few periods of the soft springs. When joints stiffen, C must shrink a hundred- to a
+thousandfold. One jump would make a force of as many times T; so it takes many small ones, each damped before the next.
 """
 
 import warp as wp
@@ -45,7 +45,7 @@ ROUGHEST = wp.constant(wp.float64(0.1))
 
 @wp.func
 def contact_step(state: State, control: Control, world: int, is_driven: bool):
-    """Longest step [s] near a contact after the last look; longer on the softest joints, in the drive on soft ones."""
+    """Longest step [s] near a contact; longer on the softest joints, in the drive also on soft ones."""
     softness = state.softness[world]
     if softness < ONE or (softness == ONE and not is_driven):
         return control.contact_step
@@ -54,10 +54,10 @@ def contact_step(state: State, control: Control, world: int, is_driven: bool):
 
 @wp.func
 def spring_tolerance(drive: Drive, state: State, control: Control, world: int, is_driven: bool):
-    """Error allowed in a step of the springs after the last look.
+    """Tolerance of steps on springs after the last sample.
 
-    Ten times as much until a loop that is driven is held under its own loads: it forgets what came before, and steps
-    are twice as long.
+    In the drive it is ten times as large until the loop is held under its own loads: the loop does not remember what
+    came before, and steps are twice as long.
     """
     tolerance = wp.where(state.softness[world] >= ONE, control.soft_tolerance, control.tolerance)
     if is_driven:
@@ -69,7 +69,7 @@ def spring_tolerance(drive: Drive, state: State, control: Control, world: int, i
 
 @wp.func
 def book_softening(before: Chain, after: Chain, state: State, world: int):
-    """Books the energy that a change of the joints' stiffness at the last look sets free."""
+    """Books the energy that a change of the joints' stiffness at the last sample has released."""
     freed = state.last_sample[world, SPRING] * (ONE - after.joint_stiffness / before.joint_stiffness)
     state.losses[world, LOSS_SOFTENING] = state.losses[world, LOSS_SOFTENING] + freed
 
@@ -95,10 +95,10 @@ def watch_collapse(
     time: wp.float64,
     is_first: bool,
 ):
-    """Makes joints soft, for good, once the loop encloses less than a fraction of what it did at the first look.
+    """Makes joints soft, for good, when the loop's area has fallen below a fraction of that at the first sample.
 
-    Below half of that fraction they become softest. Joints that are as soft already stay as they are, and no moment of
-    softening is noted.
+    Below half of that fraction they become softest. Joints that are as soft already stay as they are, without a time of
+    softening.
     """
     if is_first:
         state.first_area[world] = enclosed_area(K, chain)
@@ -121,7 +121,7 @@ def watch_collapse(
 
 @wp.func
 def watch_stiffening(state: State, drive: Drive, control: Control, world: int, time: wp.float64):
-    """Gives joints that were soft on the sprocket their own values back, in the first moments after the release."""
+    """Returns joints that were soft on the sprocket to their own values, in the first moments after the release."""
     if state.softness[world] > ZERO and state.watch[world, SOFTENED_AT] < ZERO:
         left = wp.max(ZERO, ONE - time / control.stiffening_time)
         state.softness[world] = drive.hold_softness[world] * left

@@ -1,4 +1,4 @@
-"""What a chain's threads see of one another: the board of the block form, and what each thread holds itself."""
+"""The board, on which all threads of a block see the state of their chain: written, read, loaded and stored."""
 
 import warp as wp
 
@@ -14,7 +14,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.func
 def place_of(chain: Chain, lane: int) -> Place:
-    """Neighbours of a thread's link."""
+    """A thread's link and its neighbours."""
     n = chain.link_count
     place = Place()
     place.lane = lane
@@ -30,7 +30,7 @@ def place_of(chain: Chain, lane: int) -> Place:
 
 @wp.func
 def write_constants(K: wp.array2d(dtype=wp.float64), chain: Chain):
-    """What stages and contacts need of a chain, onto the board."""
+    """Writes the constants of stages and contacts on the board."""
     K[layout.BOARD_VALUES, layout.VALUE_HALF_LENGTH] = chain.half_length
     K[layout.BOARD_VALUES, layout.VALUE_STIFFNESS] = chain.joint_stiffness
     K[layout.BOARD_VALUES, layout.VALUE_DAMPING] = chain.joint_damping
@@ -51,7 +51,7 @@ def write_constants(K: wp.array2d(dtype=wp.float64), chain: Chain):
 
 @wp.func
 def contact_constants(K: wp.array2d(dtype=wp.float64), n: int) -> Chain:
-    """What contacts need of a chain, back from the board."""
+    """Constants of contacts, from the board; other fields are 0."""
     chain = Chain()
     chain.link_count = n
     chain.circle_radius = K[layout.BOARD_VALUES, layout.VALUE_CIRCLE_RADIUS]
@@ -68,7 +68,7 @@ def contact_constants(K: wp.array2d(dtype=wp.float64), n: int) -> Chain:
 
 @wp.func
 def load_link(K: wp.array2d(dtype=wp.float64), state: State, world: int, lane: int, n: int):
-    """Puts a thread's link on the board; threads beyond the last get one at the origin that nothing acts upon."""
+    """Writes a thread's link on the board; threads without a link get one at the origin that nothing acts on."""
     row = int(0)
     while row < SINE:
         K[row, lane] = ZERO
@@ -85,7 +85,7 @@ def load_link(K: wp.array2d(dtype=wp.float64), state: State, world: int, lane: i
 
 @wp.func
 def store_link(K: wp.array2d(dtype=wp.float64), state: State, world: int, lane: int):
-    """Writes the state of a thread's link."""
+    """Stores the state of a thread's link."""
     state.links[world, X, lane] = K[X, lane]
     state.links[world, Y, lane] = K[Y, lane]
     state.links[world, THETA, lane] = K[THETA, lane]
@@ -96,7 +96,7 @@ def store_link(K: wp.array2d(dtype=wp.float64), state: State, world: int, lane: 
 
 @wp.func
 def store_losses(K: wp.array2d(dtype=wp.float64), state: State, world: int, n: int, fixed_loss: int):
-    """Writes the losses since loading, summed over the links in their order; for one thread."""
+    """Stores the losses since loading, summed over the links in their order; for one thread."""
     friction = ZERO
     damping = ZERO
     fixed = ZERO
@@ -116,7 +116,7 @@ def store_losses(K: wp.array2d(dtype=wp.float64), state: State, world: int, n: i
 
 @wp.func
 def point(K: wp.array2d(dtype=wp.float64), lane: int):
-    """Direction of a link, exactly, from its angle on the board."""
+    """Writes a link's direction, exactly, from its angle on the board."""
     cosine, sine = cos_sin(K[THETA, lane])
     K[COSINE, lane] = cosine
     K[SINE, lane] = sine
@@ -130,7 +130,7 @@ def ends_of(link: Link):
 
 @wp.func
 def publish(K: wp.array2d(dtype=wp.float64), place: Place):
-    """Fills the board's rows of ends from those of the state, with no barrier."""
+    """Writes a link's ends on the board, without a barrier."""
     lane = place.lane
     n = place.links
     if lane < n:

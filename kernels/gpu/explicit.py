@@ -1,8 +1,8 @@
-"""Embedded explicit Runge–Kutta methods in the block form: one thread per link, stages in registers.
+"""Embedded explicit Runge–Kutta methods on a GPU: one thread per link, stages in registers.
 
 The same stages as in :mod:`cpu.explicit`, for the same tableaus. In every stage the threads wait for the friction of
-their joints. Meanwhile they work out where they are in the next one: in the Nyström form that does not depend on the
-stage in hand; and in a last stage that is at the new state, what is to be known of that.
+their joints. Meanwhile they evaluate their places in the next stage, which in the Nyström form do not depend on the
+present one. In a last stage at the new state they evaluate its proximity instead.
 """
 
 import functools
@@ -33,14 +33,14 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.struct
 class Ahead:
-    """What is known of a stage, or of the new state, before the stage that precedes it."""
+    """A stage, or the new state, as far as it is known before the preceding stage."""
 
     x: wp.float64  # [m]
     y: wp.float64  # [m]
     turn: wp.float64  # since the step began [rad]
-    u: wp.float64  # sums Σ a_ij k_j so far; …
+    u: wp.float64  # sums Σ a_ij k_j so far, …
     v: wp.float64
-    omega: wp.float64  # … they lack the term of the preceding stage
+    omega: wp.float64  # … without the term of the preceding stage
 
 
 @functools.cache
@@ -50,12 +50,12 @@ def explicit_attempt(name: str, block_dim: int, write_proximity: Any, read_proxi
     Args:
         name: Key of :data:`TABLEAUS`.
         block_dim: Threads in a block.
-        write_proximity: Warp function that notes what a link knows of the proximity, see :mod:`gpu.contacts.proximity`.
-        read_proximity: Warp function that says what all of them know.
+        write_proximity: See :func:`gpu.contacts.proximity.block_proximity`.
+        read_proximity: See :func:`gpu.contacts.proximity.block_proximity`.
 
     Returns:
-        ``attempt(ends, forces, maxima, S, K, place, h, tolerance)`` → Attempt, from the state and first stage on the
-        board; ``maxima`` is where ``write_proximity`` notes, and neither the memory S nor the tolerance is needed.
+        ``attempt(ends, forces, maxima, K, place, h)`` → Attempt, from the state and first stage on the board;
+        ``maxima``: memory of ``write_proximity``.
     """
     tableau = TABLEAUS[name]
     stages, last = tableau.stages, tableau.stages - 1
@@ -69,7 +69,7 @@ def explicit_attempt(name: str, block_dim: int, write_proximity: Any, read_proxi
     exchange_ends, stage = block_stage(block_dim)
     Stages = wp.types.vector(length=stages, dtype=wp.float64)
 
-    def look_ahead(s: int):
+    def ahead_of(s: int):
         """Warp function ``ahead(link, h, ax, ay, at)`` → Ahead of row s, from the accelerations before row s − 1."""
 
         @wp.func
@@ -95,7 +95,7 @@ def explicit_attempt(name: str, block_dim: int, write_proximity: Any, read_proxi
 
         return ahead
 
-    rows = [None, *map(look_ahead, range(1, stages + 1))]
+    rows = [None, *map(ahead_of, range(1, stages + 1))]
 
     @wp.func
     def attempt(
@@ -142,7 +142,7 @@ def explicit_attempt(name: str, block_dim: int, write_proximity: Any, read_proxi
             there.v = link.v + h * row.v
             there.omega = link.omega + h * row.omega
             next_end = exchange_ends(ends, place, there)
-            # what does not depend on this stage, while its friction is worked out
+            # what does not depend on this stage is evaluated while its friction is
             if wp.static(s < last or not reuses_last):
                 row = wp.static(rows[s + 1])(link, h, ax, ay, at)
             if wp.static(s == last):
@@ -180,7 +180,7 @@ def explicit_attempt(name: str, block_dim: int, write_proximity: Any, read_proxi
                 result.damping += wp.static(wp.float64(velocity_weights[s])) * rates.damping
             if wp.static(s == last):
                 result.last = rates
-        link = read_link(K, lane)  # read again: meanwhile its registers were free
+        link = read_link(K, lane)  # read again, so that its registers were free meanwhile
         if wp.static(not reuses_last and velocity_weights[last] != 0.0):
             row.u += wp.static(wp.float64(velocity_weights[last])) * result.last.x
             row.v += wp.static(wp.float64(velocity_weights[last])) * result.last.y

@@ -1,13 +1,11 @@
-"""The loop over steps in the block form: one block of threads carries one chain, one thread per link.
+"""The GPU loop over steps: one block of threads carries one chain, one thread per link.
 
-The same run as in :mod:`cpu.loop`, on the same structs and with the same functions of physics, for devices where a
-block of threads is cheap. Stages live in registers, the state on a board in the memory that a block shares, where
-neighbours and contacts meet. Everything that decides (error, gap, status …) is known to all threads alike, so that all
-take the same branches. What a run gives depends neither on how it is cut into launches nor on the other chains.
+It makes the same run as :mod:`cpu.loop`, on the same structs and with the same functions of physics. Stages lie in
+registers, the state on a board in the shared memory of the block. All threads know the values that decide (error, gap,
+status …), and take the same branches. The results depend neither on how a run is cut into launches nor on other chains.
 
-An attempt on springs costs two barriers a stage and one for the error; an accepted one three more unless its last stage
-is the first of the next step. Contacts cost nothing more while the floor or sprocket is out of reach and the list of
-neighbours empty.
+An attempt takes two barriers a stage and one for the error; an accepted one three more unless its last stage is the
+first of the next step. Contacts take no more as long as nothing is near the floor or sprocket and no pair is listed.
 """
 
 import functools
@@ -71,7 +69,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         registers: Greatest number of registers a thread may take on a GPU; None: as many as a block of this size can
             have.
 
-    scratch: (W, ≥ :func:`gpu.functions.block_rows`, columns) float64; lists as for the CPU form.
+    scratch: (W, ≥ :func:`gpu.functions.board_rows`, columns) float64; lists as on a CPU.
     """
     available = REGISTERS_OF_MULTIPROCESSOR // block_dim // 8 * 8
     if available < 255:
@@ -114,7 +112,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     def evaluate_first_stage(
         forces: wp.tile[vec3d, block_dim], K: wp.array2d(dtype=wp.float64), place: Place, next_end: vec5d
     ):
-        """Works out the first stage of the next step; ``next_end``: left end of the next link."""
+        """Evaluates the first stage of the next step; ``next_end``: left end of the next link."""
         column = place.column
         first = stage(
             forces,
@@ -177,7 +175,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             touch_start = list_row.ptr
         K = wp.array(ptr=board_start, shape=(wp.static(layout.BOARD_ROWS), wp.static(width)), dtype=wp.float64)
         T = wp.array(ptr=touch_start, shape=(wp.static(touch.size),), dtype=wp.int32)
-        # what stages hand over is not needed while contacts are resolved
+        # contacts use the memory in which stages exchange ends and forces
         ends_start = ends_address(ends)
         forces_start = forces_address(forces)
         E = wp.array(ptr=ends_start, shape=(5, wp.static(block_dim)), dtype=wp.float64)
@@ -232,8 +230,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     status = int(LIST_OVERFLOW)
         reach = time_to_contact(control, pairs, proximity.gap, slack, proximity.speed)
         if not is_fresh:
-            # as the last step left them: worked out anew they could round differently
-            reach = wp.float32(state.reach[world])
+            # as the last step left them: evaluated again they could round differently
+            reach = wp.float32(state.time_to_contact[world])
             if wp.static(has_self):
                 pairs = L[wp.static(lists.count)]
         if is_fresh or state.has_first_stage[world] == 0:
@@ -403,7 +401,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             state.watch[world, layout.LAST_FLOOR_IMPULSE] = K[values, layout.VALUE_LAST_IMPULSE]
             state.is_fresh[world] = 0
             state.has_first_stage[world] = 1
-            state.reach[world] = wp.float64(reach)
+            state.time_to_contact[world] = wp.float64(reach)
             state.time[world] = time
             state.step[world] = step
             state.last_error[world] = wp.float64(last_error)

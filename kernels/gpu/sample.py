@@ -1,4 +1,4 @@
-"""A look at a chain in the block form: samples, watches, and what follows from them for the steps to come."""
+"""A sample taken by one thread of a block, and its consequences for the following steps."""
 
 import functools
 
@@ -29,25 +29,25 @@ wp.set_module_options({"enable_backward": False})
 def write_step_bounds(
     K: wp.array2d(dtype=wp.float64), drive: Drive, state: State, control: Control, world: int, is_driven: bool
 ):
-    """Puts on the board what bounds steps of the springs after the last look."""
+    """Writes the bounds of steps on springs after the last sample on the board."""
     K[BOARD_VALUES, VALUE_CONTACT_STEP] = contact_step(state, control, world, is_driven)
     K[BOARD_VALUES, VALUE_TOLERANCE] = spring_tolerance(drive, state, control, world, is_driven)
 
 
 @functools.cache
 def block_sample(features: Features, touch: TouchLayout):
-    """Warp function ``look(K, T, model, drive, state, record, control, world, time)`` for one thread of a block.
+    """Warp function ``take_sample(K, T, model, drive, state, record, control, world, time)`` for one thread of a block.
 
-    It is called behind a barrier behind the board's rows of ends, and leaves none; it puts the status into the mailbox
-    and says when the launch has lasted long enough.
+    The board's rows of ends must be written, and a barrier passed; the caller has a barrier afterwards. The status goes
+    to the mailbox, and ``is_late`` is set when the launch has lasted long enough.
     """
     softens = features.softens
     is_driven = features.is_driven
-    look_at_chain = sampling(features.watch, softens)
+    sample = sampling(features.watch, softens)
     present = present_chain(softens, is_driven)
 
     @wp.func
-    def look(
+    def take_sample(
         K: wp.array2d(dtype=wp.float64),
         T: wp.array(dtype=wp.int32),
         model: Model,
@@ -61,7 +61,7 @@ def block_sample(features: Features, touch: TouchLayout):
         softness = state.softness[world]
         load_factor = state.load_factor[world]
         chain = present(model, state, control, world)
-        T[wp.static(touch.mailbox)] = look_at_chain(K, chain, drive, state, record, control, world, time)
+        T[wp.static(touch.mailbox)] = sample(K, chain, drive, state, record, control, world, time)
         if wp.static(softens or is_driven):
             if has_changed(state, world, softness, load_factor):
                 after = present(model, state, control, world)
@@ -75,4 +75,4 @@ def block_sample(features: Features, touch: TouchLayout):
         if clock() > K[BOARD_VALUES, VALUE_DEADLINE]:
             T[wp.static(touch.is_late)] = 1
 
-    return look
+    return take_sample

@@ -1,10 +1,10 @@
-"""What methods share in the block form, one thread per link: a link, an attempt, its error, a stage on the springs.
+"""A stage on springs, one thread per link, and the structs of a step: link, rates, proximity, attempt.
 
-A thread works out the joint at its link's right end. In each stage it hands its left end to the link before and its
-joint's force to the link after; two barriers a stage cost less than working out every joint twice.
+A thread evaluates the joint at its link's right end. In each stage it passes its left end to the previous link and its
+joint's force to the next one. Two barriers a stage cost less than evaluating every joint twice.
 
-Registers are dear: what does not fit goes to local memory, for which shared memory leaves hardly any cache. So the
-constants of the chain lie on the board and are read where they are needed.
+Registers are scarce: spills go to local memory, and large shared memory leaves little L1 cache for them. So the chain's
+constants lie on the board and are read where they are needed.
 """
 
 import functools
@@ -38,7 +38,7 @@ from warpchain.kernels.types import Chain
 wp.set_module_options({"enable_backward": False})
 
 LARGEST_SCALE = wp.constant(wp.float32(1e30))
-"""Greatest divisor in use, below where :func:`quick_quotient` finds 0; a smaller one only makes the ratio greater."""
+"""Divisors are reduced to this, because :func:`quick_quotient` is 0 beyond 2¹²⁶; the ratio only grows."""
 
 vec3d = wp.types.vector(length=3, dtype=wp.float64)
 vec5d = wp.types.vector(length=5, dtype=wp.float64)
@@ -46,7 +46,7 @@ vec5d = wp.types.vector(length=5, dtype=wp.float64)
 
 @wp.struct
 class Link:
-    """State of a link with its arm, see :mod:`physics.geometry`, instead of its angle, which no stage needs."""
+    """State of a link, with its arm (see :mod:`physics.geometry`) instead of its angle, which no stage needs."""
 
     x: wp.float64  # [m]
     y: wp.float64  # [m]
@@ -59,39 +59,39 @@ class Link:
 
 @wp.struct
 class Place:
-    """Where a thread stands in its block."""
+    """A thread's place in its block."""
 
     lane: wp.int32  # its link
-    column: wp.int32  # the same, of the last link for threads beyond
+    column: wp.int32  # its link, or the last one for threads without a link
     before: wp.int32  # the link to the left
     after: wp.int32  # the link to the right
-    links: wp.int32  # how many the chain has
+    links: wp.int32  # number of links of the chain
 
 
 @wp.struct
 class Rates:
-    """A stage: accelerations of the link, and what its right joint loses."""
+    """A stage: accelerations of the link, and power lost in its right joint."""
 
     x: wp.float64
     y: wp.float64
     theta: wp.float64
     friction: wp.float64  # [W]
-    damping: wp.float64  # [W] over the joint's b
+    damping: wp.float64  # [W], divided by the joint's b
 
 
 @wp.struct
 class Proximity:
-    """What is known of a whole chain in a state; compared in single precision, which keeps signs."""
+    """Maxima over a whole chain in one state, in single precision, which keeps signs."""
 
     opening: wp.float32  # greatest of a joint [m]
     gap: wp.float32  # least to floor or sprocket [m]
-    displacement: wp.float32  # greatest of a joint since the neighbour list was made [m]
-    speed: wp.float32  # bound on that of any point [m/s]
+    displacement: wp.float32  # greatest of a joint since the neighbour list was built [m]
+    speed: wp.float32  # bound on the speed of any point [m/s]
 
 
 @wp.struct
 class Attempt:
-    """A finished attempt: the link's new state, its last stage, and losses averaged over the step."""
+    """A finished attempt: the link's new state, its last stage, and mean powers lost in the step."""
 
     x: wp.float64
     y: wp.float64
@@ -100,19 +100,19 @@ class Attempt:
     v: wp.float64
     omega: wp.float64
     last: Rates
-    proximity: Proximity  # of the new state, from methods that reuse the last stage
+    proximity: Proximity  # of the new state, if the method reuses the last stage
     cosine: wp.float64  # direction of the new state
     sine: wp.float64
     friction: wp.float64
     damping: wp.float64
-    error: wp.float64  # greatest error times tolerance, a quotient not yet divided, and …
-    scale: wp.float64  # … its divisor
+    error: wp.float64  # greatest error ratio times tolerance, as numerator …
+    scale: wp.float64  # … and divisor
     turns_far: bool  # further than the method allows in one step
 
 
 @wp.func
 def read_link(K: wp.array2d(dtype=wp.float64), column: int) -> Link:
-    """A link as it stands on the board."""
+    """A link, from the board."""
     link = Link()
     link.x = K[X, column]
     link.y = K[Y, column]
@@ -127,7 +127,7 @@ def read_link(K: wp.array2d(dtype=wp.float64), column: int) -> Link:
 
 @wp.func
 def write_first_stage(K: wp.array2d(dtype=wp.float64), column: int, first: Rates, with_powers: bool):
-    """Puts a link's first stage of the next step on the board."""
+    """Writes a link's first stage of the next step on the board."""
     K[BOARD_FIRST, column] = first.x
     K[BOARD_FIRST + 1, column] = first.y
     K[BOARD_FIRST + 2, column] = first.theta
@@ -138,7 +138,7 @@ def write_first_stage(K: wp.array2d(dtype=wp.float64), column: int, first: Rates
 
 @wp.func
 def read_first_stage(K: wp.array2d(dtype=wp.float64), column: int) -> Rates:
-    """A link's first stage as it stands on the board, with powers if they were noted."""
+    """A link's first stage, from the board; its powers are those of the last :func:`write_first_stage` with powers."""
     first = Rates()
     first.x = K[BOARD_FIRST, column]
     first.y = K[BOARD_FIRST + 1, column]
@@ -150,7 +150,7 @@ def read_first_stage(K: wp.array2d(dtype=wp.float64), column: int) -> Rates:
 
 @wp.func
 def joint_constants(K: wp.array2d(dtype=wp.float64)) -> Chain:
-    """What joints need of a chain, but for gravity, from the board."""
+    """Constants of joints, from the board; other fields, gravity among them, are 0."""
     chain = Chain()
     chain.half_length = K[BOARD_VALUES, VALUE_HALF_LENGTH]
     chain.joint_stiffness = K[BOARD_VALUES, VALUE_STIFFNESS]
@@ -163,14 +163,14 @@ def joint_constants(K: wp.array2d(dtype=wp.float64)) -> Chain:
 
 @wp.func
 def greater(error_a: wp.float64, scale_a: wp.float64, error_b: wp.float64, scale_b: wp.float64):
-    """The greater of two quotients |error| / scale with positive scales, a NaN before any number."""
+    """The greater of two quotients |error| / scale with positive scales; a NaN is the greatest."""
     keeps_a = wp.abs(error_a) * scale_b >= wp.abs(error_b) * scale_a or error_a != error_a
     return wp.where(keeps_a, error_a, error_b), wp.where(keeps_a, scale_a, scale_b)
 
 
 @wp.func
 def error_of(result: Attempt, tolerance: wp.float64):
-    """Error ratio of a link as ordered bits, a NaN above all numbers; turning too far counts as an error of 2."""
+    """Error ratio of a link as ordered bits, NaN above all numbers; turning too far counts as a ratio of 2."""
     scale = wp.float32(result.scale * tolerance)
     ratio = quick_quotient(wp.float32(wp.abs(result.error)), wp.where(scale > LARGEST_SCALE, LARGEST_SCALE, scale))
     if result.turns_far and ratio < wp.float32(2.0):
@@ -187,7 +187,7 @@ def greatest_of_three(
     error_c: wp.float64,
     scale_c: wp.float64,
 ):
-    """The greatest of three such quotients."""
+    """The greatest of three quotients, see :func:`greater`."""
     error, scale = greater(error_a, scale_a, error_b, scale_b)
     return greater(error, scale, error_c, scale_c)
 
@@ -196,9 +196,9 @@ def greatest_of_three(
 def greatest_position_error(
     link: Link, theta: wp.float64, h: wp.float64, ex: wp.float64, ey: wp.float64, et: wp.float64
 ):
-    """The greatest error of x, y and θ over its scale, as a quotient not yet divided.
+    """Greatest error of x, y and θ over its scale, as numerator and divisor.
 
-    Found by cross-multiplication, so that only one needs a division.
+    Quotients are compared by cross-multiplication, so that a single division remains.
     """
     return greatest_of_three(
         ex,
@@ -212,7 +212,7 @@ def greatest_position_error(
 
 @wp.func
 def greatest_velocity_error(link: Link, first: Rates, h: wp.float64, eu: wp.float64, ev: wp.float64, ew: wp.float64):
-    """The same of u, v and ω."""
+    """Greatest error of u, v and ω over its scale, as numerator and divisor."""
     return greatest_of_three(
         eu,
         error_scale(link.u, first.x, h),
@@ -225,7 +225,7 @@ def greatest_velocity_error(link: Link, first: Rates, h: wp.float64, eu: wp.floa
 
 @functools.cache
 def block_stage(block_dim: int):
-    """Warp functions for blocks of this size: (hand over ends, evaluate a stage).
+    """Warp functions for blocks of this size: (exchange ends, evaluate a stage).
 
     Args:
         block_dim: Threads in a block.
@@ -256,7 +256,7 @@ def block_stage(block_dim: int):
         inverse_mass: wp.float64,
         inverse_inertia: wp.float64,
     ):
-        # constants are read from the board where they are needed: registers are dearer than such reads
+        # constants are read from the board where they are needed: that costs less than registers
         chain = joint_constants(K)
         _left_x, _left_y, right_x, right_y = end_positions(link.x, link.y, link.arm_x, link.arm_y)
         _left_u, _left_v, right_u, right_v = end_velocities(link.u, link.v, link.omega, link.arm_x, link.arm_y)

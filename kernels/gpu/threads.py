@@ -1,10 +1,10 @@
-"""What the threads of a block share: its memory seen as arrays, a barrier, and the greatest of their numbers.
+"""Operations of the threads of a block: barriers, shared memory seen as arrays, maxima.
 
-In the block form one block of threads carries one chain, one thread per link. Control flow is the same in all threads
-of a block up to where a comment says otherwise, because every barrier must be reached by all of them.
+In GPU kernels one block of threads carries one chain, one thread per link. Unless a comment says otherwise all threads
+of a block take the same branches, because all of them must reach every barrier.
 
-The native snippets below are all that pure Warp lacks; their CPU branches run where blocks are made of fibers
-(``wp.config.enable_cpu_blocks``), which is how the block form is tested without a GPU.
+The native snippets below are what pure Warp lacks. Their CPU branches run in blocks of fibers
+(``wp.config.enable_cpu_blocks``), in which GPU kernels are tested without a GPU.
 """
 
 import functools
@@ -16,7 +16,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.func_native("WP_TILE_SYNC();")
 def barrier():
-    """Wait until all threads of the block are here; what they wrote before is seen by all afterwards."""
+    """Waits until all threads of the block are here; then all see what each wrote before."""
     ...
 
 
@@ -37,9 +37,9 @@ def barrier():
 #endif
 """)
 def barrier_if_any(flags: wp.array(dtype=wp.int32), slot: int, x: bool) -> bool:
-    """A barrier that tells all threads whether x is true in any of them; one instruction on a GPU.
+    """A barrier that returns to all threads whether x is true in any of them; one instruction on a GPU.
 
-    Fibers have none: there ``flags[slot]``, 0 before and after, sees it.
+    Fibers use ``flags[slot]`` instead, which is 0 before and after.
     """
     ...
 
@@ -52,9 +52,9 @@ def barrier_if_any(flags: wp.array(dtype=wp.int32), slot: int, x: bool) -> bool:
 #endif
 """)
 def warp_greatest(x: wp.int32) -> wp.int32:
-    """Greatest number of the threads of a hardware warp, in one instruction (compute capability 8.0 and above).
+    """Greatest x of the threads of a hardware warp, in one instruction (compute capability 8.0 and above).
 
-    ``wp.tile_max`` shuffles and needs four barriers.
+    ``wp.tile_max`` uses shuffles and four barriers instead.
     """
     ...
 
@@ -67,7 +67,7 @@ def warp_greatest(x: wp.int32) -> wp.int32:
 #endif
 """)
 def warp_width() -> int:
-    """Threads in a hardware warp; a fiber is alone."""
+    """Number of threads in a hardware warp; 1 for fibers."""
     ...
 
 
@@ -81,7 +81,7 @@ def warp_width() -> int:
 #endif
 """)
 def clock() -> wp.float64:
-    """Time [s] to a fraction of a microsecond; without a GPU, in 10⁹ cycles of the processor."""
+    """Time [s] to a fraction of a microsecond; without a GPU in 10⁹ cycles of the processor."""
     ...
 
 
@@ -89,7 +89,7 @@ def clock() -> wp.float64:
 def tile_address(dtype: type, size: int):
     """Warp function ``address(tile)`` of the shared memory behind a tile (size,) of this type.
 
-    Seen as an array, a tile can be written by many threads without a barrier after each element, and by atomics.
+    As an array, a tile can be written by many threads without a barrier after each element, and by atomics.
     """
 
     @wp.func_native("return reinterpret_cast<::wp::uint64>(tile.data.ptr);")
@@ -109,7 +109,7 @@ vec4i = wp.types.vector(length=4, dtype=wp.int32)
 #endif
 """)
 def write_four(memory: wp.uint64, index: int, value: vec4i):
-    """Four integers side by side into the memory at this address, a multiple of 16."""
+    """Writes four integers at an index into memory whose address is a multiple of 16."""
     ...
 
 
@@ -122,19 +122,18 @@ def write_four(memory: wp.uint64, index: int, value: vec4i):
 #endif
 """)
 def read_four(memory: wp.uint64, index: int) -> vec4i:
-    """Four integers from there."""
+    """Reads four integers that :func:`write_four` wrote."""
     ...
 
 
 @functools.cache
 def block_maxima(block_dim: int):
-    """Warp functions for the greatest of the threads' numbers in a block.
+    """Warp functions for maxima over the threads of a block.
 
     Returns:
-        ``greatest(tile, lane, value)`` → the greatest of an integer, in all threads;
-        ``write_maxima(memory, lane, values)``, a barrier of the caller's, then
-        ``read_maxima(memory)`` → the greatest of each of four.
-        Tile and memory may be used again after any other barrier.
+        ``greatest(tile, lane, value)`` → the greatest value; ``write_maxima(memory, lane, values)``, then a barrier of
+        the caller, then ``read_maxima(memory)`` → the greatest of each of four values. Tile and memory may be used
+        again after the next barrier.
     """
 
     @wp.func

@@ -1,4 +1,4 @@
-"""How large the next step is: the error ratio of an attempt and what the controllers make of it."""
+"""Step control: the error ratio of an attempt, and the controllers that derive the next step from it."""
 
 import functools
 
@@ -21,7 +21,7 @@ def error_bits(error: wp.float64, value: wp.float64, rate: wp.float64, h: wp.flo
 
 @wp.func
 def error_scale(value: wp.float64, rate: wp.float64, h: wp.float64):
-    """Divisor 1 + |y| + h |ẏ| of that norm."""
+    """Divisor 1 + |y| + h |ẏ| of odeint's norm, see :func:`error_bits`."""
     return ONE + wp.abs(value) + h * wp.abs(rate)
 
 
@@ -33,7 +33,7 @@ def error_scale(value: wp.float64, rate: wp.float64, h: wp.float64):
 #endif
 """)
 def quick_power(x: wp.float32, y: wp.float32) -> wp.float32:
-    """x to the power of y; to about 1e-6 on a GPU, where it takes a sixth of the time of ``wp.pow``."""
+    """x to the power of y; on a GPU to about 1e-6, in a sixth of the time of ``wp.pow``."""
     ...
 
 
@@ -45,7 +45,7 @@ def quick_power(x: wp.float32, y: wp.float32) -> wp.float32:
 #endif
 """)
 def quick_quotient(a: wp.float32, b: wp.float32) -> wp.float32:
-    """a / b; to two units in the last place on a GPU, 0 there for b beyond 2¹²⁶."""
+    """a / b; on a GPU to two units in the last place, and 0 for b beyond 2¹²⁶."""
     ...
 
 
@@ -59,7 +59,7 @@ def quick_quotient(a: wp.float32, b: wp.float32) -> wp.float32:
 #endif
 """)
 def quick_root(x: wp.float32) -> wp.float32:
-    """Square root, to a few units in the last place on a GPU."""
+    """Square root; on a GPU to a few units in the last place."""
     ...
 
 
@@ -72,16 +72,16 @@ def next_step(step: wp.float64, h: wp.float64, factor: wp.float64):
 
 @functools.cache
 def step_controller(order: int, error_order: int, real: type = wp.float64):
-    """Warp functions (factor after acceptance, factor after rejection) for a method of these orders.
+    """Warp functions (growth, shrinkage): factors of the step after acceptance and after rejection.
 
-    Standard: Boost odeint's ``default_step_adjuster`` (K. Ahnert, M. Mulansky, AIP Conf. Proc. 1389 (2011) 1586):
-    grow only below half of the tolerance. Proportional-integral: K. Gustafsson, ACM TOMS 17 (1991) 533, with the
-    exponents 0.7/k and 0.4/k of E. Hairer and G. Wanner, Solving ODEs II, section IV.2.
+    Standard: Boost odeint's ``default_step_adjuster`` (K. Ahnert, M. Mulansky, AIP Conf. Proc. 1389 (2011) 1586), which
+    lets steps grow only if the error is below half of the tolerance. Proportional-integral: K. Gustafsson, ACM TOMS 17
+    (1991) 533, with the exponents 0.7/k and 0.4/k of E. Hairer and G. Wanner, Solving ODEs II, section IV.2.
 
     Args:
         order: Of the solution that is propagated.
         error_order: Of the embedded solution.
-        real: Type of errors and factors.
+        real: Type of errors and factors: ``wp.float64``, or on a GPU ``wp.float32``.
     """
     least_error = 5.0**-order
     least_shrinkage = float(LEAST_SHRINKAGE)
@@ -110,13 +110,13 @@ def step_controller(order: int, error_order: int, real: type = wp.float64):
 
 @functools.cache
 def implicit_controller(error_order: int):
-    """The same two functions for implicit methods: always proportional-integral, exponents and source as above.
+    """(growth, shrinkage) of implicit methods: proportional-integral, see :func:`step_controller`.
 
-    Steps of an implicit method are set by accuracy, and the error jumps where a joint's friction changes its sign:
-    odeint's rule shrinks too far there and grows too soon. In flights of 60 and 150 links it took up to a tenth more
-    attempts for an error of 1e-7 m/s, and twice as many at a tolerance of 1e-4. An error that stays the same settles at
-    safety^(k/0.3) of the tolerance: that is 0.1, which leaves room for jumps. Safeties from 0.8 to 0.95 cost the same
-    for the same error; smaller ones shrink steps for rounding's sake at 1e-12.
+    Accuracy sets the steps of an implicit method, and the error jumps where a joint's friction changes its sign. There
+    odeint's rule shrinks steps too far and lets them grow too soon: in flights of 60 and 150 links it took up to a
+    tenth more attempts for an error of 1e-7 m/s, and twice as many at a tolerance of 1e-4. Under this rule a constant
+    error settles at safety^(k/0.3) = 0.1 of the tolerance, a margin for jumps. Safeties from 0.8 to 0.95 cost the same
+    for the same error; with smaller ones rounding errors shrink steps at 1e-12.
     """
     safety = 0.85
     proportional = -0.7 / (error_order + 1)
@@ -139,11 +139,11 @@ def implicit_controller(error_order: int):
 
 @functools.cache
 def classical_controller(error_order: int):
-    """The same two functions for an error that goes as h^(error_order + 1): the step where it would be the safe one.
+    """(growth, shrinkage) of flights: the next step is SAFETY times that whose error would be the tolerance.
 
-    E. Hairer, S. P. Nørsett, G. Wanner, Solving ODEs I, section II.4. odeint's rule shrinks by a power of the error
-    that with an embedded solution of order 2 is 1; the attempts of flights, see :mod:`cpu.implicit.rigid_flight`, are
-    dear.
+    The error goes as h^(error_order + 1): E. Hairer, S. P. Nørsett, G. Wanner, Solving ODEs I, section II.4. odeint's
+    rule shrinks steps by the first power of the error if the embedded solution is of order 2, which costs too many
+    attempts: those of flights, see :mod:`cpu.implicit.rigid_flight`, are expensive.
     """
 
     @wp.func

@@ -20,8 +20,8 @@ class Tableau:
     """One embedded explicit Runge–Kutta pair.
 
     The chain's equations are of second order, q'' = a(q, q'), and the positions' rows are integrated with the
-    products A·A and b·A (the Nyström form). Since every row sum of A is the stage's time and the weights add up to
-    one, this is the same method on (q, q') with half of the derivatives to store.
+    products A·A and b·A (the Nyström form). Every row sum of A is the stage's time, and the weights add up to one, so
+    this is the same method on (q, q'), with half of the derivatives to store.
 
     Attributes:
         name: What a user writes for ``method``.
@@ -45,12 +45,12 @@ class Tableau:
 
     @property
     def stages(self) -> int:
-        """Number of stages, the one that is reused by the next step included."""
+        """Number of stages, including the one that the next step reuses."""
         return len(self.matrix)
 
     @property
     def first_same_as_last(self) -> bool:
-        """True when the last stage is evaluated at the new state, so that the next step can start from it."""
+        """Whether the last stage lies at the new state, so that it is the first stage of the next step."""
         return self.matrix[-1] == self.weights[:-1]
 
     @cached_property
@@ -60,12 +60,12 @@ class Tableau:
 
     @cached_property
     def velocity(self) -> tuple[tuple[float, ...], ...]:
-        """A as floats: what the accelerations contribute to a stage's velocities, per step h."""
+        """A as floats: weights of the accelerations in a stage's velocities, per h."""
         return tuple(tuple(float(a) for a in row) for row in self.matrix)
 
     @cached_property
     def position(self) -> tuple[tuple[float, ...], ...]:
-        """A·A: what the accelerations contribute to a stage's positions, per h²."""
+        """A·A: weights of the accelerations in a stage's positions, per h²."""
         return tuple(tuple(float(x) for x in self._times_matrix(row)) for row in self.matrix)
 
     @cached_property
@@ -218,15 +218,15 @@ OS32 = Tableau(
     embedded=(F(3, 16), F(0), F(0), F(0), F(0), F(15, 16), F(-1, 8)),
     source="Heun's method of order 3 (Z. Math. Phys. 45 (1900) 23-38) with three stages before it for stability",
 )
-"""Six stages, and one reused, of order 3, for steps that stability bounds.
+"""Order 3 with six stages and a reused one, for steps that stability limits.
 
-Each stage follows from the one before alone. That leaves the stability polynomial 1 + z + z²/2 + z³/6 + c₄ z⁴ +
-c₅ z⁵ + c₆ z⁶ free beyond order 3: c₄ = 1/6 · 39/200, c₅ = c₄ · 3/25, c₆ = c₅ · 23/400. They are near what D. I.
-Ketcheson and A. J. Ahmadia (Commun. Appl. Math. Comput. Sci. 7 (2012) 247) call the optimal polynomial, that of the
-largest h for which |P(hλ)| ≤ 1 on the eigenvalues λ: those of joints with k and b of Table 1 lie on a curve that ends
-at |λ| = 1.08e6/s, 57° off the negative axis, those of sticking friction on the axis. Steps may be 6.2/|λ| on the curve
-and 7.3/|λ| on the axis, with `dp5`, which has as many stages, 3.4 and 3.3, with `bs32`, which has half as many, 2.5
-and 2.5.
+Each stage depends on the previous one only. The stability polynomial is 1 + z + z²/2 + z³/6 + c₄ z⁴ + c₅ z⁵ + c₆ z⁶,
+with c₄ = 1/6 · 39/200, c₅ = c₄ · 3/25, c₆ = c₅ · 23/400 free to choose. They are near those of the optimal polynomial
+in the sense of D. I. Ketcheson and A. J. Ahmadia (Commun. Appl. Math. Comput. Sci. 7 (2012) 247), which allows the
+largest h with |P(hλ)| ≤ 1 on the eigenvalues λ. Eigenvalues of joints with k and b of Table 1 lie on a curve that ends
+at |λ| = 1.08e6/s, 57° off the negative axis; those of sticking friction lie on that axis. Steps may be 6.2/|λ| on the
+curve and 7.3/|λ| on the axis; with `dp5`, which has as many stages, 3.4 and 3.3; with `bs32`, which has half as many,
+2.5 and 2.5.
 """
 
 for _tableau in (RKF78, DP5, BS32, OS32):

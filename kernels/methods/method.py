@@ -1,7 +1,7 @@
-"""Every method by the name that a user writes: what the step loops and the host must know of it.
+"""Every method by the name that a user writes, with the facts that step loops and host need.
 
-The tables of coefficients are the source: an entry of :data:`TABLEAUS` or :data:`ROSENBROCK_TABLES` is a method, and
-nothing else names it. ``hybrid`` takes an explicit method near contacts and rigid joints between them.
+Every entry of :data:`TABLEAUS` and :data:`ROSENBROCK_TABLES` is a method, and nothing else names it. ``hybrid`` takes
+an explicit method near contacts and rigid joints between them.
 """
 
 from dataclasses import dataclass
@@ -18,13 +18,13 @@ class Method:
     Attributes:
         name: What a user writes for ``method``.
         title: One line for help texts.
-        kind: Of its steps on springs.
+        kind: Kind of its steps on springs.
         tableau: Key of its coefficients in the table of that kind.
         order: Order of the solution that is propagated.
         error_order: Order of the embedded solution; both set the controller's exponents.
         stages: Number of stages.
         reuses_last: Whether a step leaves the first stage of the next.
-        has_rigid_flight: Whether it takes joints for rigid between impulses.
+        has_rigid_flight: Whether joints are rigid between impulses.
     """
 
     name: str
@@ -39,7 +39,7 @@ class Method:
 
     @property
     def runs_on_gpus(self) -> bool:
-        """Whether it has a GPU kernel. Implicit steps and rigid flights were written for GPUs, and saved nothing."""
+        """Whether it has a GPU kernel. Those of implicit steps and rigid flights were written, and saved no time."""
         return self.kind == "explicit" and not self.has_rigid_flight
 
 

@@ -9,8 +9,8 @@ from functools import cached_property
 class RosenbrockTable:
     """One stiffly accurate embedded Rosenbrock method for y' = f(y), in the form without products by the Jacobian J.
 
-    Stage i is (1/(hγ) − J) U_i = f(y + Σ_j<i A_ij U_j) + Σ_j<i C_ij U_j / h. The last row of A leads to the embedded
-    solution ŷ, the new state is ŷ plus the last U, which therefore is the error estimate too.
+    Stage i is (1/(hγ) − J) U_i = f(y + Σ_j<i A_ij U_j) + Σ_j<i C_ij U_j / h. The last row of A gives the embedded
+    solution ŷ. The new state is ŷ plus the last U, which is also the error estimate.
 
     Attributes:
         name: What a user writes for ``method``.
@@ -46,8 +46,8 @@ class RosenbrockTable:
     def quadrature(self) -> tuple[float, ...]:
         """Weights w with ∫ p dt = h Σ w_i (p(Y_i) + ∂p/∂y · U_i) over a step, for a p that does not act back on y.
 
-        That is the method on the system extended by e' = p(y): its stages are a triangular system for e alone,
-        E_i = hγ (p(Y_i) + ∂p/∂y · U_i) + γ Σ_j C_ij E_j, which is solved here once and for all.
+        They follow from the method on the system extended by e' = p(y). Its stages are a triangular system for e alone,
+        E_i = hγ (p(Y_i) + ∂p/∂y · U_i) + γ Σ_j C_ij E_j, which is solved here.
         """
         weights = list(self.weights)
         for i in reversed(range(self.stages)):
@@ -93,20 +93,20 @@ def _product(row: Sequence[float], values: Sequence[float]) -> float:
 
 @dataclass(frozen=True)
 class SecondOrderTable:
-    """A method for q' = v, v' = a(q, v) in terms of what accelerations change, W_i = U_q,i / (hγ) − free_i v.
+    """A method for q' = v, v' = a(q, v) in terms of W_i = U_q,i / (hγ) − free_i v, which vanishes in free motion.
 
-    v is the velocity at the start of the step. A chain that no force acts on has W = 0: U_q,i = hγ free_i v, where
-    (1 − γ C) free = (1, …, 1). From U_q,i / (hγ) = v_i + γ Σ_j C_ij U_q,j / (hγ) + U_v,i follows U_v = P W with
-    (1 + A) P = 1 − γ C. So a stage leaves half as many numbers as it has. Without the subtraction of free motion the
-    rounding of coefficients would change velocities in each step alike.
+    v is the velocity at the start of the step. Without forces U_q,i = hγ free_i v, where (1 − γ C) free = (1, …, 1).
+    From U_q,i / (hγ) = v_i + γ Σ_j C_ij U_q,j / (hγ) + U_v,i follows U_v = P W with (1 + A) P = 1 − γ C. So only W has
+    to be stored of a stage, half as many numbers. If free motion were not subtracted, the rounding of coefficients
+    would change velocities in the same way in every step.
 
     Attributes:
         free: See above.
-        place: Stage i is at q + hγ (place_i v + Σ_j<i A_ij W_j) …
+        place: Stage i lies at q + hγ (place_i v + Σ_j<i A_ij W_j) …
         velocity: … with the velocity v + Σ_j<i velocity_ij W_j; row i has i entries, as in all below.
-        shift: r_q,i / (hγ) is free_i v + Σ shift_ij W_j, and U_v,i is W_i less that sum.
+        shift: r_q,i / (hγ) is free_i v + Σ shift_ij W_j, and U_v,i is W_i minus that sum.
         drive: γ Σ_j C_ij U_v,j is Σ drive_ij W_j.
-        loss: Σ w_i U_v,i is Σ loss_i W_i, with the quadrature's weights w, …
+        loss: Σ w_i U_v,i is Σ loss_i W_i, with the weights w of the quadrature, …
         loss_place: … and Σ w_i U_q,i is hγ (loss_place v + Σ w_i W_i).
     """
 

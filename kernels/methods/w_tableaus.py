@@ -61,4 +61,4 @@ ROS34PW2 = WTable(
     embedded=(3.7810903145819369e-1, -9.6042292212423178e-2, 5.0e-1, 2.1793326075422950e-1),
     source="J. Rang, L. Angermann, BIT Numerical Mathematics 45 (2005) 761-787",
 )
-"""Four stages, order 3 with any matrix, stiffly accurate, the damping at infinity total."""
+"""Four stages, order 3 with any matrix, stiffly accurate, R(∞) = 0."""

@@ -1,7 +1,7 @@
 """Branch-free double-precision elementary functions.
 
 A library call or a branch in a loop over links keeps the CPU compiler from vectorising it (a factor of 3 to 4 in
-speed), and on a GPU ``sin``, ``cos`` and ``tanh`` are the dearest operations of a stage. All functions below are
+speed), and on a GPU ``sin``, ``cos`` and ``tanh`` are the most expensive operations of a stage. All functions below are
 polynomials with selections, the same source for both devices.
 
 Coefficients of sine and cosine on [-π/4, π/4]: FreeBSD msun ``k_sin.c``, ``k_cos.c`` (Sun Microsystems, 1993).
@@ -142,7 +142,7 @@ def small_turn(turn: wp.float64):
 #endif
 """)
 def reciprocal(b: wp.float64) -> wp.float64:
-    """1 / b as for :func:`quotient`, to two units in the last place: three operations in a row instead of seven."""
+    """1 / b as for :func:`quotient`, to two units in the last place; three dependent operations instead of seven."""
     ...
 
 
@@ -155,7 +155,7 @@ def reciprocal(b: wp.float64) -> wp.float64:
 #endif
 """)
 def capped(x: wp.float64) -> wp.float64:
-    """|x| up to 20, where tanh is 1; on a GPU, by a minimum of upper halves, up to the last double that shares 20's."""
+    """|x|, at most 20, where tanh is 1; a GPU compares upper halves of doubles only."""
     ...
 
 
@@ -175,9 +175,9 @@ def with_sign(value: wp.float64, x: wp.float64) -> wp.float64:
 def tanh(x: wp.float64):
     """Hyperbolic tangent to 1e-15 absolute: 1 − 2/(exp(2|x|) + 1), with |x| capped where the result is 1.
 
-    Every stage of a step waits for it, so that on a GPU its latency counts: the polynomial's terms are summed in
-    pairs, and exp(2|x|) = 2ᵏ exp(2 r) is reduced by one product with a rounded ln2/2, whose error grows as k, while
-    its weight in the result falls as 2⁻ᵏ.
+    Every stage of a step waits for it, so its latency counts on a GPU. The polynomial's terms are summed in pairs.
+    exp(2|x|) = 2ᵏ exp(2 r) is reduced by one product with a rounded ln2/2: the error grows as k, its weight in the
+    result falls as 2⁻ᵏ.
     """
     y = capped(x)
     shifted = y * TWO_LOG2_E + ROUNDER
@@ -193,14 +193,14 @@ def tanh(x: wp.float64):
 def order_bits(x: wp.float64):
     """Bits of a number ≥ 0 as an integer that orders as the number does, NaN above infinity.
 
-    Integer maxima vectorise and let no NaN slip through; floating-point ones do neither.
+    Maxima of integers vectorise and keep a NaN; floating-point ones do neither.
     """
     return wp.cast(wp.abs(x), wp.int64)
 
 
 @wp.func
 def order_bits_single(x: wp.float32):
-    """The same for single precision. A processor's NaN may be negative: its bits alone would be below all others."""
+    """:func:`order_bits` for single precision. A NaN may be negative: without abs its bits would be the least."""
     return wp.cast(wp.abs(x), wp.int32)
 
 
@@ -213,7 +213,7 @@ def order_key(x: wp.float64):
 
 @wp.func
 def order_key_single(x: wp.float32):
-    """The same for single precision."""
+    """:func:`order_key` for single precision."""
     bits = wp.cast(x, wp.int32)
     return bits ^ ((bits >> 31) & 0x7FFFFFFF)
 

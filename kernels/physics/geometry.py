@@ -1,7 +1,7 @@
 """Where a link's ends are and how they move.
 
-Scalar functions, one link a call. A link's arm is the vector from its centre of mass to its right end: half a link
-length a times its direction (cos θ, sin θ). The left end lies as far on the other side.
+Scalar functions, one link a call. A link's arm is the vector from its centre of mass to its right end, half a link
+length a times its direction (cos θ, sin θ); the left end is at minus the arm.
 """
 
 import warp as wp

@@ -1,4 +1,4 @@
-"""The physics of joints and links: spring, damper, friction, and what they do to a link.
+"""Joints and links: spring, damper, friction, and the acceleration of a link.
 
 Scalar functions, one joint or one link a call.
 """

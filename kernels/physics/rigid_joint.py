@@ -1,4 +1,4 @@
-"""What one link or one joint adds to the equations of rigid joints, see :mod:`cpu.implicit.rigid`: scalar functions."""
+"""Terms of one link or one joint in the equations of rigid joints, see :mod:`cpu.implicit.rigid`: scalar functions."""
 
 import warp as wp
 
@@ -8,19 +8,19 @@ from warpchain.kernels.types import Chain
 wp.set_module_options({"enable_backward": False})
 
 SWITCH_WIDTH = wp.constant(wp.float64(0.2))
-"""c of :mod:`cpu.implicit.rigid_flight`: the part of a joint's change of spin over which friction switches."""
+"""c of :mod:`cpu.implicit.rigid_flight`: fraction of a joint's change of spin over which friction is smoothed."""
 
 
 @wp.func
 def turning_share(half_length: wp.float64, inverse_inertia: wp.float64, cosine: wp.float64, sine: wp.float64):
-    """What a link's turning adds to S [1/kg]: xx, xy and yy of a² t tᵀ / I with t = (−sin, cos)."""
+    """Contribution of a link's turning to S [1/kg]: xx, xy and yy of a² t tᵀ / I with t = (−sin, cos)."""
     share = half_length * half_length * inverse_inertia
     return share * sine * sine, -share * sine * cosine, share * cosine * cosine
 
 
 @wp.func
 def inward_pull(cosine: wp.float64, sine: wp.float64, spin: wp.float64, free: wp.float64):
-    """A link's part of the right-hand side r / a [1/s²]: u ω² − t α, α being what friction alone does to it."""
+    """A link's part of the right-hand side r / a [1/s²]: u ω² − t α, α [rad/s²] being due to friction alone."""
     square = spin * spin
     return square * cosine + free * sine, square * sine - free * cosine
 
@@ -37,7 +37,7 @@ def pushed(
     right_x: wp.float64,
     right_y: wp.float64,
 ):
-    """M⁻¹ Gᵀ P of a link: what the P of its two joints, forces or impulses or displacements, do to x, y and θ."""
+    """M⁻¹ Gᵀ P of a link: how the P of its two joints (forces, impulses or displacements) change x, y and θ."""
     lever = half_length * (cosine * (right_y + left_y) - sine * (right_x + left_x))
     return (right_x - left_x) * inverse_mass, (right_y - left_y) * inverse_mass, lever * inverse_inertia
 
@@ -54,7 +54,7 @@ def opening_of(
     next_cosine: wp.float64,
     next_sine: wp.float64,
 ):
-    """C [m] of the joint between a link and the next."""
+    """Opening C [m] of the joint between a link and the next."""
     return (
         next_x - x - half_length * (cosine + next_cosine),
         next_y - y - half_length * (sine + next_sine),
@@ -75,7 +75,7 @@ def opening_rate_of(
     next_cosine: wp.float64,
     next_sine: wp.float64,
 ):
-    """Ċ [m/s] of that joint."""
+    """Opening rate Ċ [m/s] of the joint between a link and the next."""
     turn_x = spin * sine + next_spin * next_sine
     turn_y = spin * cosine + next_spin * next_cosine
     return next_u - u + half_length * turn_x, next_v - v - half_length * turn_y
@@ -83,14 +83,14 @@ def opening_rate_of(
 
 @wp.func
 def switch_smoothing(chain: Chain, h: wp.float64, relative_acceleration: wp.float64):
-    """1/ω [s/rad] of a joint's friction in a step h, in which its spin changes as fast as given [rad/s²]."""
-    way = SWITCH_WIDTH * h * wp.abs(relative_acceleration)
-    return chain.inverse_smoothing / wp.max(ONE, way * chain.inverse_smoothing)
+    """1/ω [s/rad] by which a joint's friction is smoothed in a step h, from the rate of change of its spin [rad/s²]."""
+    width = SWITCH_WIDTH * h * wp.abs(relative_acceleration)
+    return chain.inverse_smoothing / wp.max(ONE, width * chain.inverse_smoothing)
 
 
 @wp.func
 def steepness(chain: Chain, spin: wp.float64, inverse_smoothing: wp.float64):
-    """About f(w)/w [N m s], which stands for f'(w) in the matrix of the stages."""
+    """Approximation of f(w)/w [N m s], used for f'(w) in the matrix of the stages."""
     return chain.viscous_friction + chain.coulomb_friction * inverse_smoothing / (
         ONE + wp.abs(spin) * inverse_smoothing
     )

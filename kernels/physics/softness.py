@@ -1,4 +1,4 @@
-"""A chain with softer joints: its values between its own, soft ones and the softest."""
+"""A chain with softer joints: values between its own, soft and softest ones."""
 
 import warp as wp
 
@@ -10,7 +10,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.func
 def between(own: wp.float64, soft: wp.float64, softness: wp.float64):
-    """From a joint's own value to the lesser of that and a soft one, exact at both ends."""
+    """From a joint's own value (0) to the lesser of that and a soft one (1), geometrically; exact at both ends."""
     least = wp.min(own, soft)
     if softness <= ZERO or least == own:
         return own
@@ -27,7 +27,7 @@ def on_scale(own: wp.float64, soft: wp.float64, softest: wp.float64, softness: w
 
 @wp.func
 def softened(own: Chain, control: Control, softness: wp.float64) -> Chain:
-    """A chain whose joints have this softness, from one that has its own values."""
+    """A chain whose joints have this softness; ``own`` has its own values."""
     chain = own
     chain.joint_stiffness = on_scale(own.joint_stiffness, control.soft_stiffness, control.softest_stiffness, softness)
     chain.joint_damping = on_scale(own.joint_damping, control.soft_damping, control.softest_damping, softness)

@@ -64,7 +64,7 @@ def solve_loop(lower: Array, diagonal: Array, upper: Array, right: Array) -> Arr
     for index, (values, unit) in enumerate(((lower, -1.0), (diagonal, 1.0), (upper, 0.0))):
         placed = values[at]
         placed[repeats] = unit * np.eye(size)
-        first = segments.block(index)
+        first = segments.submatrix(index)
         block[first : first + size * size, used] = placed.reshape(-1, size * size).T
     placed = right[at]
     placed[repeats] = 0.0

@@ -1,4 +1,4 @@
-"""The one module that launches kernels: a batch of chains in arrays on a device, carried on in bounded launches."""
+"""A batch of chains in arrays on a device, carried on in bounded launches. No other module launches kernels."""
 
 import itertools
 import math
@@ -28,26 +28,20 @@ from warpchain.status import Status
 
 Array = NDArray[np.float64]
 
-PROGRAM = (
-    *("sprocket_speed", "spin_up_start", "spin_up_time", "hold_start"),
-    *("loop_speed", "loop_period", "load_factor", "steady_window", "steady_time", "steady_tolerance"),
-    *("further_hold", "release_phase", "hold_softness", "loaded_softness", "push_rate"),
-)
-"""Fields of :class:`warpchain.kernels.types.Drive`."""
-FIRST_STEP = 1e-7  # s; the controller grows it fivefold per step
-LANES = 3  # streams of a batch for kernels side by side: chains of one length do not fill the device
-LAUNCH_SECONDS = 0.1  # how long a launch should take: the grain of progress and of Ctrl-C
+FIRST_STEP = 1e-7  # s; it may grow fivefold per step
+LANES = 3  # streams of a batch for kernels that run side by side: chains of one length do not fill the device
+LAUNCH_SECONDS = 0.1  # s, wanted duration of a launch, after which progress is shown and Ctrl-C noticed
 UNSET_WATCHES = (
     *(layout.WINDOW_START, layout.STEADY_SINCE, layout.LOADED_SINCE, layout.UNLOADED_SINCE, layout.DRIFT),
     *(layout.REST_SINCE, layout.SOFTENED_AT),
 )
-"""Moments of :attr:`State.watch` that are negative until they come."""
+"""Times in :attr:`State.watch`, negative until they have come."""
 
 
 class Batch:
-    """W chains on one device, each with parameters, state and statistics of its own.
+    """W chains on one device, each with its own parameters, state and statistics.
 
-    Arrays are filled and read through the methods; between launches the host may look at any world.
+    Arrays are written and read through the methods. The host may read any world between launches.
     """
 
     def __init__(
@@ -61,16 +55,16 @@ class Batch:
         keeps_loads: bool = False,
         threads: int | None = None,
     ) -> None:
-        """Allocate a batch; all worlds are idle (status FINISHED) until a chain is loaded.
+        """Allocate a batch. All worlds are idle (status FINISHED) until a chain is loaded.
 
         Args:
-            worlds: Number of chains W that are carried on together.
+            worlds: Number of chains W.
             longest: Greatest number of links of a chain that will be loaded.
             options: Shared by all worlds.
             keeps_samples: Keep the time series.
             frame_every: Keep all joint positions at every so many samples; None keeps none.
             keeps_loads: Keep force and moment of every joint with each frame.
-            threads: Of every block on a GPU, at least as many as links; None: as many as a chain needs.
+            threads: Threads of every block on a GPU, at least as many as links; None: as many as each chain needs.
         """
         self.options = options
         self._threads = threads
@@ -83,44 +77,29 @@ class Batch:
         self.columns = layout.padded_width(longest)
         rows = scratch_rows(options, longest, self.device, threads)
 
-        self.model = Model()
-        self.model.link_count = self._array(np.zeros(worlds, dtype=np.int32))
-        for name in Parameters.model_fields:
-            setattr(self.model, name, self._array(np.ones(worlds)))
-
-        self.drive = Drive()
-        for name in PROGRAM:
-            setattr(self.drive, name, self._array(np.zeros(worlds)))
-
+        self.model = self._arrays(Model)
+        self.drive = self._arrays(Drive)
         self._constant = set(self._mirrors)
         self._order = Mirror(np.zeros(worlds, dtype=np.int32), self.device, self._stream)
-        self.state = State()
-        self.state.links = self._array(np.zeros((worlds, 6, longest)))
-        for name in (
-            *("time", "stop_time", "gap", "reach", "slack", "step", "other_step", "last_error", "closing_time"),
-            *("softness", "load_factor", "first_area"),
-        ):
-            setattr(self.state, name, self._array(np.zeros(worlds)))
-        for name in ("stop_status", "is_fresh", "has_first_stage", "is_rigid"):
-            setattr(self.state, name, self._array(np.zeros(worlds, dtype=np.int32)))
-        self.state.status = self._array(np.full(worlds, int(Status.FINISHED), dtype=np.int32))
-        self.state.attempts_before = self._array(np.zeros(worlds, dtype=np.int64))
-        self.state.next_sample = self._array(np.zeros(worlds, dtype=np.int64))
-        self.state.watch = self._array(np.zeros((worlds, layout.WATCH_ROWS)))
-        for name in ("first_sample", "last_sample"):
-            setattr(self.state, name, self._array(np.zeros((worlds, layout.SAMPLE_COLUMNS))))
-        self.state.counts = self._array(np.zeros((worlds, layout.COUNT_ROWS), dtype=np.int64))
-        self.state.extremes = self._array(np.zeros((worlds, layout.EXTREME_ROWS)))
-        self.state.losses = self._array(np.zeros((worlds, layout.LOSS_ROWS)))
-
+        self.state = self._arrays(
+            State,
+            links=(6, longest),
+            watch=(layout.WATCH_ROWS,),
+            first_sample=(layout.SAMPLE_COLUMNS,),
+            last_sample=(layout.SAMPLE_COLUMNS,),
+            counts=(layout.COUNT_ROWS,),
+            extremes=(layout.EXTREME_ROWS,),
+            losses=(layout.LOSS_ROWS,),
+        )
+        self._edit(self.state.status)[:] = int(Status.FINISHED)
         samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * (frame_every is not None)
-        self.record = Record()
-        self.record.sample_count = self._array(np.zeros(worlds, dtype=np.int32))
-        self.record.frame_count = self._array(np.zeros(worlds, dtype=np.int32))
-        self.record.samples = self._array(np.zeros((worlds, samples, layout.SAMPLE_COLUMNS)))
-        self.record.frames = self._array(np.zeros((worlds, frames, 2 * longest)))
-        self.record.frame_times = self._array(np.zeros((worlds, frames)))
-        self.record.frame_loads = self._array(np.zeros((worlds, frames * keeps_loads, 3 * longest)))
+        self.record = self._arrays(
+            Record,
+            samples=(samples, layout.SAMPLE_COLUMNS),
+            frames=(frames, 2 * longest),
+            frame_times=(frames,),
+            frame_loads=(frames * keeps_loads, 3 * longest),
+        )
 
         self.control = control_of(options)
         self.control.launch_time = LAUNCH_SECONDS
@@ -129,6 +108,14 @@ class Batch:
         self._attempts = 500
         self.scratch = wp.zeros((worlds, rows, self.columns), dtype=wp.float64, device=self.device)
         self.lists = wp.zeros((worlds, list_layout(self.columns).size), dtype=wp.int32, device=self.device)
+
+    def _arrays(self, struct: Any, **shapes: tuple[int, ...]) -> Any:
+        """A struct of arrays of zeros; ``shapes``: their axes after that of the worlds, where there are any."""
+        filled = struct()
+        for name, field in struct.vars.items():
+            dtype = wp.dtype_to_numpy(field.type.dtype)
+            setattr(filled, name, self._array(np.zeros((len(self.links), *shapes.get(name, ())), dtype=dtype)))
+        return filled
 
     def _array(self, values: NDArray[np.generic]) -> wp.array:
         """An array on the device that the host will read or write."""
@@ -149,11 +136,11 @@ class Batch:
         return values
 
     def set_chain(self, world: int, parameters: Parameters, links: int, sprocket_radius: float | None = None) -> None:
-        """Say what a world's chain is made of.
+        """Set parameters and length of a world's chain.
 
         Args:
             world: Index.
-            parameters: Of the chain.
+            parameters: The chain's parameters.
             links: Number of links.
             sprocket_radius: Radius [m] at which circles touch the sprocket; None: the parameter's.
         """
@@ -181,10 +168,10 @@ class Batch:
             world: Index.
             position: (n, 3): x, y [m], θ [rad].
             velocity: (n, 3), their rates.
-            stop_time: The run lands on this time [s] and ends.
-            stop_status: Status it then has.
-            attempts_before: Attempts of earlier phases, which the limit of the options counts as well.
-            softness: Of the joints, see :mod:`warpchain.kernels.events.softening`.
+            stop_time: Time [s] at which the run ends exactly.
+            stop_status: Status of a run that ends there.
+            attempts_before: Attempts of earlier phases, which the limit of the options includes.
+            softness: Softness of the joints, see :mod:`warpchain.kernels.events.softening`.
         """
         state = self.state
         n = self.links[world]
@@ -193,7 +180,7 @@ class Batch:
         for array in (
             state.time,
             state.gap,
-            state.reach,
+            state.time_to_contact,
             state.slack,
             state.counts,
             state.extremes,
@@ -235,13 +222,12 @@ class Batch:
         return features_of(self.options, self.columns, fixed_body=fixed_body, watch=watch, broad_phase=broad_phase)
 
     def run(self, worlds: Sequence[int], features: Features, after_launch: Callable[[], None] | None = None) -> None:
-        """Carry worlds on until none of them is running.
+        """Carry worlds on until none of them is running. Results do not depend on how a run is cut into launches.
 
         Args:
             worlds: Indices.
             features: What the kernel is compiled for.
-            after_launch: Called after each launch; it drains the record. Results do not depend on how a run is cut
-                into launches.
+            after_launch: Called after each launch, to drain the record.
         """
         self.compile(features, [self.links[world] for world in worlds])
         while True:
@@ -258,17 +244,17 @@ class Batch:
                 after_launch()
 
     def compile(self, features: Features, links: Iterable[int] = ()) -> None:
-        """Make sure that the kernels for these features are ready; takes seconds the first time on a machine.
+        """Compile the kernels for these features, which takes seconds the first time on a machine.
 
         Args:
             features: What they are compiled for.
-            links: On a GPU, numbers of links, each of which may need a kernel of its own.
+            links: Numbers of links; on a GPU each may need its own kernel.
         """
         for kernel, threads in kernels_of(self.device, features, map(self.block_size, links)):
             wp.load_module(kernel.module, device=self.device, block_dim=threads)
 
     def block_size(self, links: int) -> int:
-        """Threads of the block that carries a chain of so many links on a GPU."""
+        """Threads of the block that carries a chain of this many links on a GPU."""
         return self._threads or block_threads(links)
 
     def launch(self, worlds: Sequence[int], features: Features, attempts: int) -> float:
@@ -276,14 +262,14 @@ class Batch:
         return self.launch_together({features: worlds}, attempts)
 
     def launch_together(self, groups: Mapping[Features, Sequence[int]], attempts: int) -> float:
-        """Carry groups of worlds on, each with features of its own, at the same time if the device can."""
+        """Carry groups of worlds on together, each with its own features; returns the wall time [s]."""
         before = time.perf_counter()
         self.start(groups, attempts)
         self.finish()
         return time.perf_counter() - before
 
     def start(self, groups: Mapping[Features, Sequence[int]], attempts: int) -> None:
-        """Begin a launch as of :meth:`launch_together`; until :meth:`finish` the host may not look at the worlds.
+        """Begin a launch as of :meth:`launch_together`; until :meth:`finish` the host may not read the worlds.
 
         On a GPU this returns at once, and launches of other batches go on at the same time.
         """
@@ -348,11 +334,11 @@ class Batch:
         return self._view(self.state.links)[world, 3:, : self.links[world]].T.copy()
 
     def status(self, world: int) -> Status:
-        """How the world stands."""
+        """Status of the world."""
         return Status(int(self._view(self.state.status)[world]))
 
     def statuses(self) -> NDArray[np.int32]:
-        """Of all worlds, as numbers; not to be changed."""
+        """Statuses of all worlds, as numbers; a view, not to be changed."""
         return self._view(self.state.status)
 
     def time(self, world: int) -> float:
@@ -365,7 +351,7 @@ class Batch:
         return {name: int(value) for name, value in zip(COUNTS, row, strict=True)}
 
     def attempts(self, world: int) -> int:
-        """Steps tried since loading, accepted or not."""
+        """Attempted steps since loading, accepted or not."""
         counts = self.counts(world)
         return counts["accepted"] + counts["rejected"]
 
@@ -380,11 +366,11 @@ class Batch:
         return {name: float(value) for name, value in zip(LOSSES, row, strict=True)}
 
     def first_sample(self, world: int) -> Array:
-        """Sums over the chain when its run began: (SAMPLE_COLUMNS,), see :mod:`warpchain.kernels.layout`."""
+        """The chain's first sample since loading: (SAMPLE_COLUMNS,), see :mod:`warpchain.kernels.layout`."""
         return np.array(self._view(self.state.first_sample)[world])
 
     def last_sample(self, world: int) -> Array:
-        """The same when the chain was last looked at; at the end of the run if that has ended."""
+        """The chain's latest sample: (SAMPLE_COLUMNS,), that of the final state if its run has ended."""
         return np.array(self._view(self.state.last_sample)[world])
 
     def softened_at(self, world: int) -> float:
@@ -393,12 +379,12 @@ class Batch:
         return moment if moment >= 0 else math.nan
 
     def drift(self, world: int) -> float:
-        """How far a held loop moved in its last watch, relative to its size; NaN if it was not watched for long."""
+        """Drift of a held loop in its last watch, relative to its size; NaN if no window of a watch has ended."""
         drift = float(self._view(self.state.watch)[world, layout.DRIFT])
         return drift if drift >= 0 else math.nan
 
     def unloaded_at(self, world: int) -> float:
-        """Time [s] since loading from which a held loop has borne its own loads; −∞ if it was not watched."""
+        """Time [s] since loading from which a held loop has been under its own loads; −∞ if it was not watched."""
         watch = self._view(self.state.watch)[world]
         if watch[layout.UNLOADED_SINCE] >= 0:
             return float(watch[layout.UNLOADED_SINCE]) + float(LOADING_TIME)
@@ -412,7 +398,7 @@ class Batch:
         return self._view(self.record.samples)[world, :count].copy()
 
     def frame_loads(self, world: int) -> Array:
-        """Loads of the joints in the frames that are to be drained, on the link before each: (f, n, 3), N, N and N m.
+        """Force x, y [N] and moment [N m] of each joint on the link before it, in the frames kept so far: (f, n, 3).
 
         No frames, if loads are not kept.
         """

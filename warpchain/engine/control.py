@@ -1,4 +1,4 @@
-"""Numerical settings of a launch, as options say them and as soft joints are."""
+"""Numerical settings of a launch, from the options and the properties of soft joints."""
 
 import math
 
@@ -8,9 +8,9 @@ from warpchain.inputs.scene import greatest_load
 from warpchain.kernels.types import Control
 
 SOFT = preset("soft")
-"""Whose joints soft ones have, see :mod:`warpchain.kernels.events.softening`."""
+"""Parameters of soft joints, see :mod:`warpchain.kernels.events.softening`."""
 SOFTEST = SOFT.with_values({"joint_stiffness": 1e6, "joint_damping": 30.0})
-"""Whose joints the softest have.
+"""Parameters of the softest joints.
 
 Measured with `paper` and dp5 at 1e-4 on walks that are the same until the loop encloses half of its first area: Δx then
 shifts by 0.01 ± 0.04 mm (24 walks of 60 links at 15 Hz) and 1.5 ± 1.5 mm (16 of 150 at 20 Hz; 0.01 ± 0.08 mm from 0.3
@@ -19,25 +19,25 @@ soft joints but lets circles sink in half as deep again. k = 3e5 N/m takes 1.6 t
 into the floor. From 0.9 of the area 1e6 N/m may shift Δx: by 8 ± 4 mm of 1 m (12 walks of 150 links).
 """
 STIFFENING_TIME = 0.03
-"""Time [s] in which joints that were soft on the sprocket get their own values back after the release."""
+"""Time [s] in which joints that were soft on the sprocket return to their own values after the release."""
 
 HOLD_STRAIN = 3e-4
-"""Strain that the loop's speed may cause in joints that are softened while it is held …"""
+"""Greatest strain of a held loop on softened joints by its speed."""
 LOADED_STRAIN = 1e-3
-"""… and that speed and mean weight may cause while its loads are multiplied."""
+"""Greatest strain by speed and mean weight while loads are multiplied."""
 GREATEST_LOAD = 50.0
-"""Factor by which loads are multiplied unless the chain bears less.
+"""Factor by which loads are multiplied, unless the chain bears less.
 
 With 15, 30 and 60 the loop that is released is the same to 0.2 % of its height and 0.4 % of its width (60 to 180
 links, 5 to 30 Hz), and within 0.8 % of the width of one that was held for 40 s under its own loads. Twice as much
-makes it stationary in two thirds of the time, in steps that are as much shorter.
+makes it stationary in two thirds of the time, in steps that are shorter by as much.
 """
 PUSH = 0.25
-"""Part of its depth by which the sprocket pushes a circle out in the longest step near a contact …"""
+"""Part of its depth by which the sprocket pushes a circle out in the longest step near a contact."""
 FASTEST_PUSH = 5e3
-"""… though not at more than this rate [1/s].
+"""Greatest rate [1/s] of that push.
 
-Circles of 60 to 180 links at 5 to 30 Hz then sink in by 0.1 mm at most under load, without it by 0.3 mm to several.
+With it circles of 60 to 180 links at 5 to 30 Hz sink in by 0.1 mm at most under load, without it by 0.3 mm and more.
 """
 
 
@@ -50,8 +50,8 @@ def mean_weight(parameters: Parameters, links: int, radius: float) -> float:
     """Tension [N] that the weight of a loop causes in the middle of its sides.
 
     Args:
-        parameters: Of the chain.
-        links: Their number.
+        parameters: The chain's parameters.
+        links: Number of links.
         radius: Distance from the sprocket's centre at which joints ride [m].
     """
     side = max(0.0, links * parameters.link_length / 2 - math.pi * radius)
@@ -62,9 +62,9 @@ def hold_softness(parameters: Parameters, tension: float, strain: float) -> floa
     """Softness of the joints of a loop that is held, from 1 for soft ones to 2 for the softest.
 
     Args:
-        parameters: Of the chain.
-        tension: T [N] that stretches the joints by T/k.
-        strain: How far that may be, in links.
+        parameters: The chain's parameters.
+        tension: T [N], which stretches the joints by T/k.
+        strain: Greatest T/k, in link lengths.
     """
     wanted = tension / (strain * parameters.link_length)
     soft = min(parameters.joint_stiffness, SOFT.joint_stiffness)  # as no joint becomes stiffer than its own
@@ -75,11 +75,11 @@ def hold_softness(parameters: Parameters, tension: float, strain: float) -> floa
 
 
 def suitable_load(parameters: Parameters, options: Options, weight: float) -> float:
-    """Factor by which loads are multiplied while a loop becomes stationary, unless the scene says one.
+    """Factor by which loads are multiplied while a loop becomes stationary, unless the scene gives one.
 
     Args:
-        parameters: Of the chain.
-        options: Whether joints are softened on the sprocket.
+        parameters: The chain's parameters.
+        options: They say whether joints are softened on the sprocket.
         weight: Mean tension by the loop's weight [N].
     """
     stiffness = parameters.joint_stiffness
@@ -99,7 +99,7 @@ def push_rate(options: Options) -> float:
 
 
 def control_of(options: Options) -> Control:
-    """What options say of every launch; how long a launch is and which frames it keeps is still to be said."""
+    """Settings from the options; the caller sets the length of a launch and which frames are kept."""
     control = Control()
     control.tolerance = options.tolerance
     control.soft_tolerance = options.tolerance if options.soft_tolerance is None else options.soft_tolerance

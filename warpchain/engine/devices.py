@@ -1,4 +1,4 @@
-"""Devices: how one is started, and how many chains fit into its memory."""
+"""Devices: starting one, and how many chains fit into its memory."""
 
 import contextlib
 import functools
@@ -23,9 +23,9 @@ from warpchain.kernels.gpu import functions as gpu_functions
 CONNECTIONS = "32"  # queues between host and GPU; with fewer than streams, streams wait for one another
 BLOCKS_OF_MULTIPROCESSOR = 32  # most that an NVIDIA multiprocessor holds
 CAPACITY_SAMPLES = 512
-"""Samples of a chain's time series, if that is kept, that a device has room for between two launches."""
+"""Samples of a chain that a device can hold between two launches, if the time series is kept."""
 CAPACITY_FRAMES = 64
-"""The same of frames."""
+"""Frames of a chain that a device can hold between two launches, if frames are kept."""
 
 
 @functools.cache
@@ -49,10 +49,9 @@ def start_device(device: str) -> wp.Device:
 
 @contextlib.contextmanager
 def _without_driver_warning() -> Iterator[None]:
-    """Pass on what Warp's native code writes to stderr, but for its line about a missing NVIDIA driver.
+    """Remove the line about a missing NVIDIA driver from what Warp's native code writes to stderr.
 
-    That line appears on every machine without a GPU, where it says nothing that the user asked for; whoever asks for
-    a missing GPU gets an error.
+    Every machine without a GPU prints it, also if no GPU is asked for. Who asks for a missing GPU gets an error.
     """
     sys.stderr.flush()
     kept = os.dup(2)
@@ -70,13 +69,13 @@ def _without_driver_warning() -> Iterator[None]:
 
 
 def versions() -> dict[str, str]:
-    """Versions of all that may change a number: for the provenance of a result."""
+    """Versions of the packages that may change a number, for the provenance of a result."""
     packages = ("warpchain", "warp-lang", "numpy")
     return {name: importlib.metadata.version(name) for name in packages} | {"python": platform.python_version()}
 
 
 def scratch_rows(options: Options, longest: int, device: wp.Device, threads: int | None = None) -> int:
-    """Rows of a chain's scratch block on a device, for chains of up to this many links; threads as for a batch."""
+    """Rows of a chain's scratch on a device, for chains of up to this many links; ``threads`` as in a batch."""
     columns = layout.padded_width(longest)
     if device.is_cuda:
         return gpu_functions.board_rows(threads or block_threads(longest), columns)
@@ -90,11 +89,11 @@ def world_bytes(
 
     Args:
         longest: Greatest number of links.
-        options: Of the batch.
+        options: Options of the batch.
         samples: Capacity of the time series.
         frames: Capacity of the frames.
-        device: Where.
-        keeps_loads: Loads of joints are kept with the frames.
+        device: Device of the batch.
+        keeps_loads: Whether loads of joints are kept with the frames.
     """
     columns = layout.padded_width(longest)
     few = len(Parameters.model_fields) + 107  # numbers of a world in model, drive and state
@@ -106,9 +105,9 @@ def world_bytes(
 def most_worlds(
     longest: int, options: Options, *, keeps_samples: bool, keeps_frames: bool, keeps_loads: bool = False
 ) -> int:
-    """Chains that a GPU should carry on together: what could ever reside on it, as far as they fit into free memory.
+    """Chains that a GPU should carry on together: as many as can reside on it and fit into half of the free memory.
 
-    Half of what is free is left to others, such as batches of other threads.
+    The other half is left to others, such as batches of other threads.
     """
     device = start_device(options.device)
     samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * keeps_frames

@@ -1,4 +1,4 @@
-"""Which kernels carry chains on: by device, what happens to the chains, and their numbers of links."""
+"""The choice of kernels: by device, features and numbers of links."""
 
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -13,25 +13,25 @@ from warpchain.kernels.gpu.loop import make_advance_block
 from warpchain.kernels.methods.method import find_method
 
 REGISTERS = 168
-"""Registers a thread may take."""
+"""Most registers of a thread."""
 FEWER_REGISTERS = {160: 128, 224: 128, 256: 128}
-"""The same, by threads of a block, where fewer let another block onto a multiprocessor.
+"""Most registers, by threads of a block, where fewer let another block onto a multiprocessor.
 
 A multiprocessor has four schedulers with 16384 registers each, so that a block's number of warps of 32 threads and the
 registers decide how many blocks it holds. Measured on an H200 with slightly older kernels, 4000 chains in flight, ns
 per attempt and chain, with 128 and 168: 60 links 12.0, 6.2, 5.5 and 11.5, 5.5, 4.9 (rkf78, dp5, os32); 150 links 15.5,
 13.3 and 16.8, 15.4 (dp5, os32). Without a bound, few chains run up to 15 % faster and many slower. No bit of a walk
-depends on it: the compiler fuses the same products and sums (`tests/test_on_gpu.py`, walks in blocks of their own and
-of 192 threads).
+depends on it: the compiler fuses the same products and sums (`tests/kernels/gpu/test_on_gpu.py`, walks in blocks of
+their own and of 192 threads).
 """
 SHARED_THREADS = 192
 """Most threads of a block that chains of several lengths share."""
 SHARED_WALKS = 2000
-"""Most walks of a sweep that are carried on in such blocks; with 2016 it made no difference."""
+"""Most walks of a sweep that share such blocks; with 2016 it made no difference."""
 
 
 def block_kernel(features: Features, threads: int) -> wp.Kernel:
-    """The kernel of the block form for blocks of this many threads."""
+    """The GPU kernel for blocks of this many threads."""
     return make_advance_block(features, threads, FEWER_REGISTERS.get(threads, REGISTERS))
 
 
@@ -41,17 +41,17 @@ def block_threads(links: int) -> int:
 
 
 def shared_threads(method: str, links: Iterable[int], walks: int) -> int | None:
-    """Threads of every block of walks that should share a kernel; None: each chain has a block of its own size.
+    """Threads of all blocks if the walks should share a kernel; None: each chain has a block of its own size.
 
-    Kernels of blocks of different sizes that run on one multiprocessor take the instruction cache from one another.
+    Kernels for blocks of different sizes compete for the instruction cache of a multiprocessor.
     With older kernels the 504 walks of Figure 6 (60 to 180 links, os32, one H200) took 6.4 s in blocks of five sizes
-    and 5.3 s in blocks of 192 threads, although most have idle ones; 1008 walks 10.8 and 8.5 s, 2016 walks 15.8 and
+    and 5.3 s in blocks of 192 threads, some of them idle; 1008 walks 10.8 and 8.5 s, 2016 walks 15.8 and
     15.5 s.
 
     Args:
-        method: Of the walks.
-        links: Numbers of links.
-        walks: How many walks there are.
+        method: Method of the walks.
+        links: Their numbers of links.
+        walks: Number of walks.
     """
     sizes = {block_threads(n) for n in links}
     if len(sizes) < 2 or walks > SHARED_WALKS or not find_method(method).runs_on_gpus or max(sizes) > SHARED_THREADS:
@@ -60,7 +60,7 @@ def shared_threads(method: str, links: Iterable[int], walks: int) -> int | None:
 
 
 def features_of(options: Options, columns: int, *, fixed_body: str, watch: str, broad_phase: str = "grid") -> Features:
-    """Kernel features for chains with these options in scratch blocks of this width."""
+    """Kernel features for chains with these options in scratch of this width."""
     return Features(
         method=options.method,
         columns=columns,
@@ -73,17 +73,17 @@ def features_of(options: Options, columns: int, *, fixed_body: str, watch: str, 
 
 
 def kernels_of(device: wp.Device, features: Features, threads: Iterable[int]) -> list[tuple[wp.Kernel, int]]:
-    """Kernels that carry chains on in blocks of these numbers of threads, each with that; on a CPU one for all."""
+    """(Kernel, threads of a block) for each of these numbers of threads; on a CPU one kernel, with 1."""
     if not device.is_cuda:
         return [(make_advance(features), 1)]
     return [(block_kernel(features, size), size) for size in sorted(set(threads))]
 
 
 def load_kernels(wanted: Iterable[tuple[wp.Device, Features, int]]) -> None:
-    """Compile what is not yet in the cache, several kernels at a time.
+    """Compile kernels that are not in the cache yet, several at a time.
 
     Args:
-        wanted: Device, features and threads of a block.
+        wanted: Device, features and threads of a block of each kernel.
     """
     kernels = [
         (device, kernel, threads)

@@ -1,7 +1,7 @@
-"""An array on a device and its copy on the host, brought up to date by the launches themselves.
+"""An array on a device and its copy on the host, which launches bring up to date.
 
-A launch takes along what the host has changed and brings back what it may have changed itself, in the order of its
-stream, so that the host waits for one thing only: the end of the launch.
+A launch uploads what the host has changed and downloads what the kernel may have changed, in the order of its stream.
+So the host waits for one thing only, the end of the launch.
 """
 
 from typing import Any
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 
 class Mirror:
-    """One array; between launches the host reads and edits it through its copy.
+    """One array, which the host reads and edits through its copy between launches.
 
     Attributes:
-        array: On the device.
+        array: The array on the device.
     """
 
     def __init__(self, values: NDArray[np.generic], device: wp.Device, stream: wp.Stream | None) -> None:
-        """Put values on a device; copies go over this stream, on a GPU from and to pinned memory."""
+        """Copy values to a device; later copies use this stream, on a GPU from and to pinned memory."""
         dtype = wp.dtype_from_numpy(values.dtype)
         self.array = wp.array(values, dtype=dtype, device=device)
         self._host = wp.array(values, dtype=dtype, device="cpu", pinned=device.is_cuda)
@@ -37,11 +37,11 @@ class Mirror:
         return self._values
 
     def upload(self) -> None:
-        """Begin to bring the device up to date."""
+        """Begin a copy to the device if the host has edited the elements."""
         if self._is_edited:
             wp.copy(self.array, self._host, stream=self._stream)
             self._is_edited = False
 
     def download(self) -> None:
-        """Begin to bring the host up to date."""
+        """Begin a copy to the host."""
         wp.copy(self._host, self.array, stream=self._stream)

@@ -1,1 +1,1 @@
-"""The contact pass of one thread."""
+"""The contact pass on a CPU."""

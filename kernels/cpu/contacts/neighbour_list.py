@@ -1,9 +1,9 @@
-"""Which joints of a chain may touch: a uniform grid makes a neighbour list with a skin.
+"""Pairs of joints that may touch: a neighbour list with a skin, built with a uniform grid.
 
 Joints are the centres of the links' circles (to within the joint opening |C|). The list holds all pairs of joints
-closer than 2r + skin + 2|C|; it stays complete until a joint has moved further than skin/2 − |C| from where it was
-listed. Cells are as wide as that reach, hashed into a table, so that the grid needs no bounds and a chain of any
-extent the same memory.
+closer than its reach, 2r + skin + 2|C|. It stays complete until a joint has moved further than skin/2 − |C| from where
+it was listed. Cells of the grid are as wide as the reach and hashed into a table, so that the grid needs no bounds, and
+memory does not depend on the chain's extent.
 """
 
 import functools
@@ -11,12 +11,7 @@ import functools
 import warp as wp
 
 from warpchain.kernels.contacts.pair_list import bucket_of, list_layout, listing_reach
-from warpchain.kernels.layout import (
-    LISTED_X,
-    LISTED_Y,
-    RIGHT_X,
-    RIGHT_Y,
-)
+from warpchain.kernels.layout import LISTED_X, LISTED_Y, RIGHT_X, RIGHT_Y
 from warpchain.kernels.physics.elementary import HALF, order_bits
 from warpchain.kernels.types import Chain
 
@@ -25,7 +20,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.func
 def greatest_displacement(K: wp.array2d(dtype=wp.float64), chain: Chain):
-    """Greatest distance [m] of a joint from where it was when the list was built."""
+    """Greatest displacement [m] of a joint since the list was built."""
     greatest = wp.int64(0)
     i = int(0)
     while i < chain.link_count:
@@ -38,9 +33,9 @@ def greatest_displacement(K: wp.array2d(dtype=wp.float64), chain: Chain):
 
 @functools.cache
 def neighbour_list(columns: int):
-    """Warp functions (build by grid, build by testing all pairs) for scratch blocks of this width.
+    """Warp functions (build by grid, build by testing all pairs) for scratch of this width.
 
-    Both fill the list with the same pairs in the same order and return False if they overflow its capacity.
+    Both list the same pairs in the same order, and return False if there are more than the list can hold.
     """
     lists = list_layout(columns)
 
@@ -54,7 +49,7 @@ def neighbour_list(columns: int):
 
     @wp.func
     def arrange(L: wp.array(dtype=wp.int32), total: int):
-        """Stable sort of the pairs found, (p, q) ascending, into the classes (p mod 2, q mod 2)."""
+        """Sorts the pairs found, (p, q) ascending, by (p mod 2, q mod 2); the sort is stable."""
         kept = int(0)
         parity = int(0)
         while parity < 4:
@@ -166,5 +161,5 @@ def neighbour_list(columns: int):
 
 @wp.func
 def list_slack(K: wp.array2d(dtype=wp.float64), chain: Chain, skin: wp.float64, opening: wp.float64):
-    """How far every joint may yet move [m] before the list may lack a pair; 0 or less: the list is stale."""
+    """How far joints may still move [m] before the list may lack a pair; 0 or less: the list is stale."""
     return HALF * skin - opening - greatest_displacement(K, chain)

@@ -1,9 +1,8 @@
-"""Contacts of a chain with floor and sprocket after an accepted step, and how near they are.
+"""Floor and sprocket on a CPU: their distance from a chain, and their contacts after an accepted step.
 
-Overlapping and approaching circles get one impulse each; overlapping ones that separate are left alone, and
-positions are never corrected. A floor or sprocket contact touches one link only, so those are done link by link,
-each link's left circle before its right one: the result is that of any sequence over the links. Contacts between
-links follow one fixed order, see :mod:`cpu.contacts.self_contacts`.
+Every circle that overlaps and approaches gets one impulse; overlapping circles that separate get none, and positions
+are never corrected. Such a contact changes one link only, so the order of links does not matter; each link's left
+circle comes before its right one. Contacts between links have a fixed order, see :mod:`cpu.contacts.self_contacts`.
 """
 
 import warp as wp
@@ -44,7 +43,7 @@ def greatest_opening(K: wp.array2d(dtype=wp.float64), chain: Chain):
 
 @wp.func
 def greatest_speed(K: wp.array2d(dtype=wp.float64), chain: Chain):
-    """A bound of the speed [m/s] of every circle's centre: the greatest of |v| + a |ω|."""
+    """A bound on the speed [m/s] of every circle's centre: the greatest √2 √(v² + (a ω)²) ≥ |v| + a |ω|."""
     greatest = wp.int64(0)
     i = int(0)
     while i < chain.link_count:
@@ -80,11 +79,11 @@ def sprocket_gap(K: wp.array2d(dtype=wp.float64), chain: Chain):
 
 
 def resolution(meet: wp.Function):
-    """Warp function ``resolve`` of all links and the body that ``meet`` is about, see :func:`meeting`."""
+    """Warp function ``resolve`` of all links and a fixed body, from that of one link, see :func:`meeting`."""
 
     @wp.func
     def resolve(K: wp.array2d(dtype=wp.float64), chain: Chain, surface_speed: wp.float64, push_rate: wp.float64):
-        """Impulses between links and the body; returns their number."""
+        """Applies the impulses between links and the body; returns their number."""
         impulses = wp.int64(0)
         i = int(0)
         while i < chain.link_count:

@@ -1,14 +1,14 @@
-"""Contacts of a chain with itself after an accepted step: one fixed sequence, each seeing what those before it left.
+"""Contacts of a chain with itself after an accepted step, resolved in one fixed sequence.
 
-A joint p carries a circle of link p (its right end) and one of link p + 1 (its left end). Two joints p < q that touch
-are up to four pairs of links. The sequence has two halves: in the first come the link pairs (p, q) and
-(p + 1, q + 1), in the second (p, q + 1) and (p + 1, q), which share no link either. Within a half, pairs of joints go
-in the order of (p mod 2, q mod 2, p, q). So no link is met twice in a row by the same two joints, and a block of
-threads can do the same sequence in about as few parallel rounds as the busiest link has contacts.
+A joint p carries a circle of link p (its right end) and one of link p + 1 (its left end), so two joints p < q that
+touch are up to four contacts of links. The sequence has two halves. The first has the link pairs (p, q) and (p + 1, q +
+1), the second (p, q + 1) and (p + 1, q); within a half the two share no link. In each half, pairs of joints are sorted
+by (p mod 2, q mod 2, p, q). Successive contacts then rarely share a link, so a block of threads can resolve the same
+sequence in about as many parallel rounds as the busiest link has contacts.
 
-What a contact needs of the geometry does not depend on velocities: :func:`circles_of_links` finds it for all contacts
-at the same time, which leaves :func:`collide` little to do in its turn. On the CPU it is a vectorised loop over pairs
-of joints, for which the circles are brought side by side first; gathers in that loop took twice as long.
+The geometry of contacts does not depend on velocities. :func:`circles_of_links` evaluates it for all contacts first,
+which leaves little for :func:`collide` to do one after the other. That is a vectorised loop over pairs of joints, whose
+circles are copied side by side before; gathers in that loop took twice as long.
 """
 
 import functools
@@ -32,17 +32,17 @@ from warpchain.kernels.types import Chain
 
 wp.set_module_options({"enable_backward": False})
 
-# Rows of the CPU's scratch for contacts, one column per pair of joints. Four circles: the left-hand and the right-hand
-# one of joint p, likewise of joint q; each with its own centre [m] and the centre of mass of its link [m].
+# Rows of the CPU's scratch of contacts, one column per pair of joints. First four circles, the left-hand and the
+# right-hand one of joint p, likewise of joint q: its own centre [m] and the centre of mass of its link [m].
 P_LEFT_HAND, P_RIGHT_HAND, Q_LEFT_HAND, Q_RIGHT_HAND = 0, 4, 8, 12
 END_X, END_Y, CENTER_X, CENTER_Y = range(4)
-# Two contacts, those of a half; each with the numbers that circles_of_links returns.
+# Then the two contacts of a half, each with the numbers that circles_of_links returns.
 FIRST_CONTACT, SECOND_CONTACT = 16, 25
 DEPTH, NORMAL_X, NORMAL_Y, A_N, A_T, B_N, B_T, INVERSE_NN, INVERSE_DETERMINANT = range(9)
 
 
 @wp.func
-def bring_circle(
+def copy_circle(
     K: wp.array2d(dtype=wp.float64),
     G: wp.array2d(dtype=wp.float64),
     row: int,
@@ -51,7 +51,7 @@ def bring_circle(
     end_y: wp.float64,
     link: int,
 ):
-    """Puts a circle with its link's centre of mass into column k of the scratch."""
+    """Copies a circle and its link's centre of mass into column k of the scratch."""
     G[row + END_X, k] = end_x
     G[row + END_Y, k] = end_y
     G[row + CENTER_X, k] = K[X, link]
@@ -60,12 +60,12 @@ def bring_circle(
 
 @functools.cache
 def self_contacts(columns: int):
-    """Warp function that resolves a chain's contacts with itself, for scratch blocks of this width."""
+    """Warp function that resolves a chain's contacts with itself, for scratch of this width."""
     lists = list_layout(columns)
 
     @wp.func
     def list_touching(K: wp.array2d(dtype=wp.float64), L: wp.array(dtype=wp.int32), chain: Chain, opening: wp.float64):
-        """Lists the pairs of joints that may touch, in their order; returns how many."""
+        """Lists the pairs of joints that may touch, in the order of the list; returns their number."""
         reach = TWO * chain.circle_radius + TWO * opening
         square = reach * reach
         total = L[wp.static(lists.count)]
@@ -83,7 +83,7 @@ def self_contacts(columns: int):
         return touching
 
     @wp.func
-    def bring_circles(
+    def copy_circles(
         K: wp.array2d(dtype=wp.float64),
         L: wp.array(dtype=wp.int32),
         G: wp.array2d(dtype=wp.float64),
@@ -91,20 +91,20 @@ def self_contacts(columns: int):
         first: int,
         count: int,
     ):
-        """Puts the circles of so many touching pairs of joints side by side."""
+        """Copies the circles of ``count`` touching pairs of joints side by side."""
         k = int(0)
         while k < count:
             p = natural(L[wp.static(lists.found_first) + first + k])
             q = natural(L[wp.static(lists.found_second) + first + k])
             after = wp.where(q + 1 == n, 0, q + 1)
-            bring_circle(K, G, P_LEFT_HAND, k, K[RIGHT_X, p], K[RIGHT_Y, p], p)
-            bring_circle(K, G, P_RIGHT_HAND, k, K[LEFT_X, p + 1], K[LEFT_Y, p + 1], p + 1)
-            bring_circle(K, G, Q_LEFT_HAND, k, K[RIGHT_X, q], K[RIGHT_Y, q], q)
-            bring_circle(K, G, Q_RIGHT_HAND, k, K[LEFT_X, q + 1], K[LEFT_Y, q + 1], after)
+            copy_circle(K, G, P_LEFT_HAND, k, K[RIGHT_X, p], K[RIGHT_Y, p], p)
+            copy_circle(K, G, P_RIGHT_HAND, k, K[LEFT_X, p + 1], K[LEFT_Y, p + 1], p + 1)
+            copy_circle(K, G, Q_LEFT_HAND, k, K[RIGHT_X, q], K[RIGHT_Y, q], q)
+            copy_circle(K, G, Q_RIGHT_HAND, k, K[LEFT_X, q + 1], K[LEFT_Y, q + 1], after)
             k += 1
 
     @wp.func
-    def work_out(
+    def evaluate(
         K: wp.array2d(dtype=wp.float64),
         L: wp.array(dtype=wp.int32),
         G: wp.array2d(dtype=wp.float64),
@@ -114,11 +114,11 @@ def self_contacts(columns: int):
         half: int,
         second: int,
     ):
-        """Geometry of one contact of a half for each of these pairs."""
+        """Evaluates the geometry of one contact of a half for each of these pairs."""
         a = wp.where(second == 0, P_LEFT_HAND, P_RIGHT_HAND)
         b = wp.where(second == half, Q_LEFT_HAND, Q_RIGHT_HAND)
         row = wp.where(second == 0, FIRST_CONTACT, SECOND_CONTACT)
-        # links alternate
+        # links alternate: 0 is an inner one, 1 an outer one
         inner_mass = K[INVERSE_MASS, 0]
         outer_mass = K[INVERSE_MASS, 1]
         inner_inertia = K[INVERSE_INERTIA, 0]
@@ -159,7 +159,7 @@ def self_contacts(columns: int):
     def resolve_self_contacts(
         K: wp.array2d(dtype=wp.float64), L: wp.array(dtype=wp.int32), chain: Chain, opening: wp.float64
     ):
-        """Returns impulses, energy lost [J], and the greatest depth [m]; ``opening``: greatest |C| [m]."""
+        """Returns the number of impulses, energy lost [J], greatest depth [m]; ``opening``: greatest |C| [m]."""
         G = wp.array(
             ptr=L.ptr + wp.uint64(wp.static(4 * lists.geometry)),
             shape=(GEOMETRY_ROWS, GEOMETRY_COLUMNS),
@@ -175,11 +175,11 @@ def self_contacts(columns: int):
             while first < touching:
                 count = wp.min(touching - first, GEOMETRY_COLUMNS)
                 if half == 0 or touching > GEOMETRY_COLUMNS:
-                    bring_circles(K, L, G, chain.link_count, first, count)
-                # whole vectors: what lies beyond the last pair is worked out as well, and not used
+                    copy_circles(K, L, G, chain.link_count, first, count)
+                # whole vectors: columns beyond the last pair are evaluated, too, and not used
                 padded = (count + 7) & -8
-                work_out(K, L, G, chain, first, padded, half, 0)
-                work_out(K, L, G, chain, first, padded, half, 1)
+                evaluate(K, L, G, chain, first, padded, half, 0)
+                evaluate(K, L, G, chain, first, padded, half, 1)
                 k = int(0)
                 while k < count:
                     p = natural(L[wp.static(lists.found_first) + first + k])

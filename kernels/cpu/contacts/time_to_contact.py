@@ -1,8 +1,8 @@
-"""How long a flight may go on unseen: a bound of the time to the next touch.
+"""The longest step that cannot miss a contact.
 
-Steps on rigid joints are long, so they are bounded by what is in the way rather than by a margin: each circle's way to
-the floor at the speed with which it sinks, each listed pair's distance at its relative speed. What the chain's
-acceleration adds to that within a step, some hundredths of a millimetre, is what the contact step bounds in the end.
+On springs it follows from a margin and the greatest speed. Steps on rigid joints are long and are bounded by actual
+distances: of each circle from the floor at the speed at which it falls, of each listed pair at its relative speed.
+Acceleration within a step adds some hundredths of a millimetre, which the contact step bounds.
 """
 
 import functools
@@ -19,20 +19,20 @@ from warpchain.kernels.types import Chain, Control
 wp.set_module_options({"enable_backward": False})
 
 FLIGHT_SKIN = wp.constant(wp.float64(4.0))
-"""The neighbour list of a flight has this many times the margin: a step may go as far as half of it."""
+"""The skin of the neighbour list is so many times as wide in a flight, whose steps may move joints by half of it."""
 
 LEAST_SLACK = wp.constant(wp.float64(0.25))
-"""A list is made anew once less than this part of that margin is left: short steps would cost more than the list."""
+"""A flight builds its list anew when less than this part of that skin is left: short steps would cost more."""
 
 SMALLEST_GAP = wp.constant(wp.float64(1e-9))
-"""Distance [m] that stands for all smaller ones and for overlaps."""
+"""Least distance [m]; overlaps count as this."""
 
 
 @wp.func
 def falling(
     chain: Chain, v: wp.float64, omega: wp.float64, cosine: wp.float64, left_y: wp.float64, right_y: wp.float64
 ):
-    """(Speed at which a link's circle sinks) / (its height above the floor) [1/s], left and right; 0 if it rises."""
+    """(Falling speed) / (height above the floor) [1/s] of a link's left and right circle; 0 if it rises."""
     turn = chain.half_length * omega * cosine
     left = wp.max(turn - v, ZERO) / wp.max(left_y - chain.circle_radius, SMALLEST_GAP)
     right = wp.max(-turn - v, ZERO) / wp.max(right_y - chain.circle_radius, SMALLEST_GAP)
@@ -55,10 +55,7 @@ def meeting_of(K: wp.array2d(dtype=wp.float64), chain: Chain, p: int, q: int):
 
 @wp.func
 def fastest_fall(K: wp.array2d(dtype=wp.float64), chain: Chain):
-    """The greatest of (speed at which a circle sinks) / (its height above the floor) [1/s]; 0 if none sinks.
-
-    A circle that overlaps with the floor and sinks counts as infinitely near.
-    """
+    """Greatest (falling speed) / (height above the floor) [1/s] of all circles; 0 if none falls."""
     greatest = wp.int64(0)
     i = int(0)
     while i < chain.link_count:
@@ -70,7 +67,7 @@ def fastest_fall(K: wp.array2d(dtype=wp.float64), chain: Chain):
 
 @functools.cache
 def fastest_meeting(columns: int):
-    """Warp function: the greatest of (relative speed) / (distance) [1/s] of the pairs in the neighbour list."""
+    """Warp function: greatest (relative speed) / (distance) [1/s] of the pairs in the neighbour list."""
     lists = list_layout(columns)
 
     @wp.func

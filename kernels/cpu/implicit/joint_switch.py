@@ -1,12 +1,12 @@
-"""Between the two models of a joint: spring and damper, and rigid.
+"""The switch between the two models of a joint: spring and damper, and rigid.
 
-*Closing*: a chain that has seen no impulse for a while, whose springs have come to rest, is projected on C = 0 and
-Ċ = 0 and goes on with rigid joints. What the springs held and what the projection takes is booked. *Opening*: the
-joints are opened by C = F/k, so that the springs begin with the forces that rigid joints have at that moment, and
-nothing rings but what an impulse sets going. A closing and an opening at the same state cancel in the ledger.
+*Closing*: a chain without impulses for a while, whose springs have come to rest, is projected on C = 0 and Ċ = 0 and
+continues with rigid joints. The energy that the springs held and that the projection takes is booked. *Opening*: joints
+are opened by C = F/k, so that the springs start with the forces of the rigid joints, and only impulses make them ring.
+A closing and an opening at the same state cancel in the ledger.
 
-Both displace links by forces between neighbours alone, so that momentum, centre of mass and with it the energy of
-gravity stay; the angular momentum does to the order of C.
+Both displace links by forces between neighbours, so that momentum, centre of mass and gravitational energy stay, and
+angular momentum to the order of C.
 """
 
 import functools
@@ -26,8 +26,8 @@ wp.set_module_options({"enable_backward": False})
 QUIET_TIME = wp.constant(wp.float64(5e-5))
 """A chain may close its joints after no impulse for this long [s].
 
-That is 30 decay times of the paper's springs for neighbours; long waves round the loop take longer, and what is left
-of them is what the projection takes, and that is booked.
+That is 30 decay times of oscillations between neighbours on the paper's springs. Long waves round the loop decay more
+slowly; the projection takes and books their remaining energy.
 """
 
 
@@ -36,9 +36,8 @@ def joint_switch(columns: int, first_row: int):
     """Warp functions (close joints, open joints) for flights in the rows from ``first_row`` on.
 
     Returns:
-        ``close_joints(K, chain)`` → whether they are closed now, and the energy [J] that went; if not, nothing has
-        changed. ``open_joints(K, chain)``, right after a step of the flight and its impulses → the energy [J] that
-        went, negative.
+        ``close_joints(K, chain)`` → whether they are closed now, and the energy lost [J]; if not, nothing has changed.
+        ``open_joints(K, chain)``, right after a step of the flight and its impulses → the energy lost [J], negative.
     """
     rigid = rigid_joints(columns)
     load, store, solve_joints, displace = rigid.load, rigid.store, rigid.solve_joints, rigid.displace
@@ -79,8 +78,8 @@ def joint_switch(columns: int, first_row: int):
         n = chain.link_count
         places, full, _ = segment_places(n)
         end = place_column(places + 1)
-        # where the links lie on one line, S is singular and neither F nor what opens the joints has a bound: there the
-        # springs shall find their forces by themselves
+        # where all links lie on one line S is singular, and neither F nor the openings are bounded: there the joints
+        # stay closed, and the springs find their forces by themselves
         if not are_stiff(S, chain, end):
             return ZERO
         openings(S, chain, places, full)

@@ -1,4 +1,4 @@
-"""Rigid joints: the limit k → ∞, where no spring oscillates and steps are as long as the motion allows.
+"""Rigid joints: the limit k → ∞, without oscillating springs, where the motion of the chain alone limits steps.
 
 With rigid joints C = 0 and Ċ = 0 hold always, and the joint forces F follow from C̈ = 0: S F = r with, for joint i
 between link i (l) and link i + 1 (r),
@@ -6,12 +6,12 @@ between link i (l) and link i + 1 (r),
     S_ii = (1/m_l + 1/m_r) 1 + a² (t_l t_lᵀ/I_l + t_r t_rᵀ/I_r),    S_i,i+1 = −1/m_r 1 + a² t_r t_rᵀ/I_r,
     r_i = a (u_l ω_l² + u_r ω_r²) − a (t_l α_l + t_r α_r),
 
-α_i = (f_i−1 − f_i)/I_i being what joint friction alone does to link i. S is symmetric, positive definite and cyclic
-block-tridiagonal. The same matrix projects: impulses P with S P = Ċ take the opening rates away, displacements by P
-with S P = C the openings, both weighted with the masses and, being forces between two links, without a change of the
-momentum or of the centre of mass.
+with the acceleration α_i = (f_i−1 − f_i)/I_i of link i by joint friction alone. S is symmetric, positive definite and
+cyclic block-tridiagonal. The same matrix projects: impulses P with S P = Ċ remove the opening rates, displacements by P
+with S P = C the openings. Both projections are orthogonal in the metric of the masses, and as they act between two
+links they keep the momentum and the centre of mass.
 
-All is done in the order of :mod:`cpu.implicit.solver`. A joint lies at the column of the link on its left.
+Memory is in the order of :mod:`cpu.implicit.solver`, see :mod:`cpu.implicit.rigid_layout`.
 """
 
 import functools
@@ -52,41 +52,41 @@ from warpchain.kernels.types import Chain
 wp.set_module_options({"enable_backward": False})
 
 CLOSED = wp.constant(wp.float64(1e-11))
-"""Opening [m] below which a joint counts as closed: 1e-2 N of a spring of 1e9 N/m."""
+"""Opening [m] below which a joint counts as closed; a spring of 1e9 N/m has 1e-2 N there."""
 MOST_CORRECTIONS = 5
 GREATEST_RINGING = wp.constant(wp.float64(1e-5))
 """Part of the kinetic energy that the projection may take; more means that springs still oscillate.
 
-What it takes are long waves round the loop, which the dampers would take a little later: in walks at Table 1's values
-the projections take 0.2 (60 links) to 0.4 % (150) of the energy in all, and with the dampers' part that is the same as
-with 1e-6 here, at less than half of the steps before a loop of 150 links collapses. 1e-4 would save a quarter of all
-steps of its walk again, and take 1.2 %.
+It takes the energy of long waves round the loop, which the dampers would take a little later. In walks at Table 1's
+values the projections take 0.2 (60 links) to 0.4 % (150) of the energy in all. Together with the dampers' part that is
+as much as with 1e-6 here, in less than half of the steps before a loop of 150 links collapses. 1e-4 would save another
+quarter of all steps of its walk, and take 1.2 %.
 """
 GREATEST_STRETCHING = wp.constant(wp.float64(3e-4))
-"""Part of the kinetic energy that springs may hold and still be taken for rigid.
+"""Part of the kinetic energy that springs may hold and still count as rigid.
 
 In a loop turning at a speed v that part is m v²/(k ℓ²), the relative stretch: 7e-5 for k = 1e7 N/m at 5 m/s. Where the
-links of a loop lie on one line, S is singular and forces without bound would go over to the springs.
+links of a loop lie on one line, S is singular, and unbounded forces would be handed to the springs.
 """
 
 
 @dataclass(frozen=True)
 class RigidJoints:
-    """Warp functions on the rows S above and the separators' rows R of :func:`force_layout`.
+    """Warp functions on the rows S of :mod:`cpu.implicit.rigid_layout` and the separators' rows R.
 
     Attributes:
-        load: Takes the state from the rows of the scratch block.
-        store: Gives it back.
-        factorise: Makes S of the directions ready to solve with, until the next call.
-        solve_joints: Solves with it: the right-hand side becomes the solution.
-        solve_forces: Joint forces and accelerations for the directions and spins of a stage.
+        load: Copies the state and the links' constants from the scratch.
+        store: Copies the state to the scratch, and accelerations to where the step loop checks them.
+        factorise: Assembles and factorises the matrix S for the present directions.
+        solve_joints: Solves with the last factors; the solution replaces the right-hand side.
+        solve_forces: Joint forces and accelerations for the directions, spins and smoothing of a stage.
         displace: Moves the links by the last solution.
-        openings: Makes C of the state the right-hand side.
-        stretching: Energy of springs that are open by the right-hand side.
-        close: Projects the state.
-        begin: Joint forces and accelerations of a projected state.
+        openings: Sets directions and spins of the state and the right-hand side C; returns the greatest |C| [m].
+        stretching: Energy [J] of springs that are open by the right-hand side.
+        close: Projects the state on C = 0 (to rounding) and Ċ = 0; returns False if the joints could not be closed.
+        begin: Joint forces and accelerations of a state that ``close`` has left, with the chain's own smoothing.
         kinetic_energy: Of the state [J].
-        are_stiff: Whether springs would hold so little energy with these forces that they may count as rigid.
+        are_stiff: Whether springs would hold so little energy with these forces that they count as rigid.
     """
 
     load: Any
@@ -105,10 +105,10 @@ class RigidJoints:
 
 @functools.cache
 def rigid_joints(columns: int) -> RigidJoints:
-    """The functions of rigid joints for scratch blocks of this width."""
+    """The functions of rigid joints for scratch of this width."""
     system = force_layout(columns)
     factor, solve = cyclic_solver(system)
-    lower, diagonal, upper = (system.block(k) for k in range(3))
+    lower, diagonal, upper = (system.submatrix(k) for k in range(3))
     right, width, separator_rows = system.right, system.columns, system.separator_rows
     pad_constants = pad_behind((INVERSE_MASS, INVERSE_INERTIA))
     pad_directions = pad_behind((COSINE, SINE, SPIN))
@@ -120,7 +120,6 @@ def rigid_joints(columns: int) -> RigidJoints:
 
     @wp.func
     def load(S: wp.array2d(dtype=wp.float64), K: wp.array2d(dtype=wp.float64), chain: Chain):
-        """The state and the links' constants from the rows of the scratch block."""
         n = chain.link_count
         places, full, _ = segment_places(n)
         p = int(0)
@@ -150,7 +149,6 @@ def rigid_joints(columns: int) -> RigidJoints:
 
     @wp.func
     def store(S: wp.array2d(dtype=wp.float64), K: wp.array2d(dtype=wp.float64), chain: Chain):
-        """The state to the rows of the scratch block, accelerations to where the driver looks for them."""
         n = chain.link_count
         places, full, _ = segment_places(n)
         p = int(0)
@@ -172,7 +170,6 @@ def rigid_joints(columns: int) -> RigidJoints:
 
     @wp.func
     def assemble(S: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int):
-        """S of the directions."""
         a = chain.half_length
         pad_directions(S, places, full)
         end = place_column(places + 1)
@@ -201,19 +198,17 @@ def rigid_joints(columns: int) -> RigidJoints:
     def factorise(
         S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int
     ):
-        """S of the directions, ready to solve with; ``factor`` and ``solve`` keep it until the next call."""
         assemble(S, chain, places, full)
         factor(S, R, places, full)
 
     @wp.func
     def solve_joints(S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), places: int, full: int):
-        """The right-hand side becomes the solution, also before the first places."""
         solve(S, R, places)
         pad_solution(S, places, full)
 
     @wp.func
     def pushed_at(S: wp.array2d(dtype=wp.float64), a: wp.float64, c: int):
-        """What the last solution, forces or impulses of the joints, does to the link of a column."""
+        """Change of the link of a column by the last solution, forces or impulses of the joints."""
         ax, ay, turn = pushed(
             a,
             S[INVERSE_MASS, c],
@@ -231,7 +226,6 @@ def rigid_joints(columns: int) -> RigidJoints:
     def solve_forces(
         S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int
     ):
-        """Joint forces and accelerations for the directions, rates and torques of the stage."""
         a = chain.half_length
         end = place_column(places + 1)
         c = int(8)
@@ -262,7 +256,7 @@ def rigid_joints(columns: int) -> RigidJoints:
             c += 1
 
     def pusher(row: int):
-        """The function that adds what the last solution, impulses between the links, does to three rows from this."""
+        """Warp function that adds the changes by the last solution to three rows from this one on."""
 
         @wp.func
         def push(S: wp.array2d(dtype=wp.float64), chain: Chain, places: int):
@@ -282,7 +276,6 @@ def rigid_joints(columns: int) -> RigidJoints:
 
     @wp.func
     def openings(S: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int):
-        """Directions and spins of the state; C becomes the right-hand side; returns the greatest |C| [m]."""
         a = chain.half_length
         end = place_column(places + 1)
         c = int(8)
@@ -317,7 +310,7 @@ def rigid_joints(columns: int) -> RigidJoints:
 
     @wp.func
     def opening_rates(S: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int):
-        """Ċ becomes the right-hand side."""
+        """Sets the right-hand side to Ċ."""
         a = chain.half_length
         end = place_column(places + 1)
         pad_rates(S, places, full)
@@ -343,7 +336,6 @@ def rigid_joints(columns: int) -> RigidJoints:
 
     @wp.func
     def stretching(S: wp.array2d(dtype=wp.float64), chain: Chain, places: int):
-        """Energy [J] in springs that are open by the right-hand side."""
         total = ZERO
         c = int(8)
         while c < place_column(places + 1):
@@ -361,11 +353,7 @@ def rigid_joints(columns: int) -> RigidJoints:
         places: int,
         full: int,
     ):
-        """Projects the state: C = 0 to rounding, then Ċ = 0; leaves the factors of S for it, directions and spins.
-
-        False if the joints could not be closed.
-        """
-        # clang does not inline this: without the static shapes anew its loops would not vectorise
+        # clang does not inline this function: its loops vectorise only if static shapes are given here again
         S = wp.array(ptr=rows.ptr, shape=(wp.static(ROWS_OF_RIGID), wp.static(width)), dtype=wp.float64)
         R = wp.array(ptr=separators.ptr, shape=(wp.static(separator_rows), LANES), dtype=wp.float64)
         corrections = int(0)
@@ -390,7 +378,6 @@ def rigid_joints(columns: int) -> RigidJoints:
 
     @wp.func
     def begin(S: wp.array2d(dtype=wp.float64), R: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int):
-        """Joint forces and accelerations of a state that :func:`close` has left, friction with its own smoothing."""
         end = place_column(places + 1)
         c = int(8)
         while c < end:

@@ -1,19 +1,20 @@
-"""Flight on rigid joints: a W-method on the accelerations of :mod:`cpu.implicit.rigid`, and projections after a step.
+"""Flight on rigid joints: a W-method on the accelerations of :mod:`cpu.implicit.rigid`, with projections after a step.
 
-What stays stiff is joint friction, so the matrix of the method is that of friction alone, seen through the joints:
-A = −P M⁻¹ D with D = −∂Q/∂v (f'(w) of the joints) and P the projection on Ċ = 0. A stage (1 − g A) z = r, g = hγ, then
-asks for (M + g D) z + Gᵀ λ = M r and G z = G r. Freed of the links' places, with y = z_θ − r_θ, this is
+Only joint friction is stiff, so the matrix of the method is that of friction under the constraint of the joints:
+A = −P M⁻¹ D with D = −∂Q/∂v (f'(w) of the joints) and P the projection on Ċ = 0. A stage (1 − g A) z = r, g = hγ, is
+(M + g D) z + Gᵀ λ = M r with G z = G r. Without the links' places, with y = z_θ − r_θ, this is
 
     (1/m_l + 1/m_r) λ_i − λ_i−1/m_l − λ_i+1/m_r + a (t_l y_l + t_r y_r) = 0,
     I_i y_i + g (D y)_i − a t_i·(λ_i + λ_i−1) = −g (D r_θ)_i:
 
-cyclic block-tridiagonal with 3 × 3 blocks for (λ_i, y_i), the symmetric part positive, so that no pivoting is needed.
+cyclic block-tridiagonal with 3 × 3 submatrices for (λ_i, y_i). Its symmetric part is positive, so no pivoting is
+needed.
 
-Coulomb friction switches its sign in a millionth of the time of such a step wherever a joint stops and turns back,
-some thousand times a second in a loop. Seen sharp, each switch makes steps of a few µs. So within one step friction
-is smoothed over a part of the way that the joint's spin w goes in it: tanh(w / max(ω_c, c h |ẇ|)). A passing through
-zero then gives off the same impulse, the two sides being alike; a joint that sticks has no ẇ and keeps ω_c; and with h
-the smoothing goes to nothing. c = 0.2 was best in a prototype: 0.05 was no gain, 1 erred more than it saved.
+Wherever a joint stops and turns back, some thousand times a second in a loop, Coulomb friction changes its sign in a
+millionth of the time of such a step. To resolve that, steps of a few µs would be needed. So friction is smoothed over a
+part of the change of the joint's spin w in the step: tanh(w / max(ω_c, c h |ẇ|)). The impulse of a passage through zero
+stays the same by symmetry, a sticking joint has no ẇ and keeps ω_c, and the smoothing vanishes with h. c = 0.2 was best
+in a prototype: 0.05 gained nothing, and 1 made larger errors than it saved steps.
 """
 
 import functools
@@ -54,7 +55,7 @@ from warpchain.kernels.types import Chain
 
 wp.set_module_options({"enable_backward": False})
 
-# Rows in segment order, behind those of rigid. Slopes; the θ of r, Σ γ_ij k_j of the rates; power; the candidate.
+# Rows in segment order, after those of rigid. Slopes; the θ of r, Σ γ_ij k_j of the rates; power; the new state.
 SLOPE, TARGET, COUPLED = ROWS_OF_RIGID, ROWS_OF_RIGID + 1, ROWS_OF_RIGID + 2
 POWER, DRAG = ROWS_OF_RIGID + 5, ROWS_OF_RIGID + 6
 NEW = ROWS_OF_RIGID + 7
@@ -64,13 +65,13 @@ FLIGHT_SYSTEM = FIRST_STAGE_ROW + 6 * ROS34PW2.stages
 
 @functools.cache
 def friction_layout(columns: int) -> SegmentLayout:
-    """Where the system of the stages lies, for scratch blocks of this width."""
+    """Layout of the stages' system, for scratch of this width."""
     width = force_layout(columns).columns
     return SegmentLayout(size=3, columns=width, matrix=FLIGHT_SYSTEM, right=FLIGHT_SYSTEM + 45)
 
 
 def flight_rows(columns: int) -> int:
-    """Rows that a flight takes of a chain's scratch block of this width."""
+    """Rows of a chain's scratch of this width that a flight takes."""
     forces, friction = force_layout(columns), friction_layout(columns)
     doubles = (FLIGHT_SYSTEM + 48) * forces.columns + LANES * (forces.separator_rows + friction.separator_rows)
     return -(-doubles // columns)
@@ -78,12 +79,12 @@ def flight_rows(columns: int) -> int:
 
 @dataclass(frozen=True)
 class FlightMemory:
-    """Warp functions that find what a flight remembers in a chain's scratch block.
+    """Warp functions ``(K)`` → views of a flight's memory in a chain's scratch.
 
     Attributes:
         rows: The rows in segment order.
         force_rows: The separators' rows of S.
-        friction_rows: Those of the stages' system.
+        friction_rows: The separators' rows of the stages' system.
     """
 
     rows: Any
@@ -93,7 +94,7 @@ class FlightMemory:
 
 @functools.cache
 def flight_memory(columns: int, first_row: int) -> FlightMemory:
-    """Memory of flights in the rows of scratch blocks of this width from ``first_row`` on."""
+    """Memory of flights from ``first_row`` on, in scratch of this width."""
     forces, friction = force_layout(columns), friction_layout(columns)
     count, width = FLIGHT_SYSTEM + 48, forces.columns
     force_count, friction_count = forces.separator_rows, friction.separator_rows
@@ -126,11 +127,11 @@ def flight_memory(columns: int, first_row: int) -> FlightMemory:
 
 @functools.cache
 def flight_method(columns: int, first_row: int):
-    """Warp functions of rigid flight in the rows of the scratch block from ``first_row`` on.
+    """Warp functions of rigid flight with memory from ``first_row`` on.
 
     Returns:
         ``attempt(K, chain, h, tolerance)`` → bits of the greatest error ratio (see :func:`order_bits`), and
-        ``commit(K, chain, h)``, which projects → False if the joints should not be taken for rigid any longer.
+        ``commit(K, chain, h)``, which projects the new state → whether joints may stay rigid.
     """
     table = ROS34PW2
     stages, gamma = table.stages, table.gamma
@@ -142,7 +143,7 @@ def flight_method(columns: int, first_row: int):
     memory = flight_memory(columns, first_row)
     flight_rows_of, force_rows_of, friction_rows_of = memory.rows, memory.force_rows, memory.friction_rows
     factor, solve = cyclic_solver(friction)
-    lower, diagonal, upper = (friction.block(k) for k in range(3))
+    lower, diagonal, upper = (friction.submatrix(k) for k in range(3))
     right = friction.right
     pad_stage = pad_behind((COSINE, SINE, SPIN))
     pad_target = pad_behind((TARGET,))
@@ -262,7 +263,7 @@ def flight_method(columns: int, first_row: int):
         places: int,
         full: int,
     ):
-        """(λ, y) of a stage from its accelerations; adds its part of the power that friction takes."""
+        """Solves for (λ, y) of a stage from its accelerations; adds its part of the power lost to friction."""
         end = place_column(places + 1)
         c = int(8)
         while c < end:
@@ -288,7 +289,7 @@ def flight_method(columns: int, first_row: int):
 
     @wp.func
     def keep_stage(S: wp.array2d(dtype=wp.float64), stage: int, h: wp.float64, end: int):
-        """k of a stage."""
+        """Stores k of a stage."""
         for i in range(wp.static(stages)):
             if stage == i:
                 c = int(8)
@@ -353,7 +354,7 @@ def flight_method(columns: int, first_row: int):
                     turned = wp.max(turned, order_bits(change))
             c += 1
         greatest = order_bits(wp.cast(worst, wp.float64) / tolerance)
-        # a greater turn is refused as an error of 2: the step shrinks
+        # a greater turn counts as an error of 2: the step shrinks
         if wp.cast(turned, wp.float64) > GREATEST_TURN:
             greatest = wp.max(greatest, order_bits(TWO))
         return greatest

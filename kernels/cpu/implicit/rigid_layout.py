@@ -1,6 +1,6 @@
-"""Where rigid joints keep a chain: rows of memory in the order of :mod:`cpu.implicit.solver`, and their neighbours.
+"""Memory of rigid joints: rows in the order of :mod:`cpu.implicit.solver`, padded with neighbours.
 
-The next link is the next place, eight columns on. A joint lies at the column of the link on its left.
+The next link lies at the next place, eight columns further. A joint lies at the column of the link on its left.
 """
 
 import functools
@@ -29,7 +29,7 @@ ROWS_OF_RIGID = SYSTEM + 22
 
 @functools.cache
 def force_layout(columns: int) -> SegmentLayout:
-    """Where S, r and F lie, for scratch blocks of this width."""
+    """Layout of the system S F = r, for scratch of this width."""
     return SegmentLayout(size=2, columns=segment_columns(columns), matrix=SYSTEM, right=SYSTEM + 20)
 
 
@@ -42,13 +42,13 @@ def link_at(place: int, segment: int, places: int, full: int, link_count: int):
 
 @functools.cache
 def pad_joints(rows: tuple[int, ...]):
-    """Warp function that puts, in these rows, before each segment's first place the joint before it."""
+    """Warp function that copies, in these rows, the previous joint before each segment's first place."""
 
     @wp.func
     def pad(S: wp.array2d(dtype=wp.float64), places: int, full: int):
         s = int(0)
         while s < 8:
-            # a short segment begins with the last joint of the segment before, so its predecessor is wanted
+            # a short segment repeats the last joint of the segment before; that one's predecessor is copied
             source = 8 * places + (s + 7) % 8 - wp.where(s >= full, 8, 0)
             for k in range(wp.static(len(rows))):
                 S[wp.static(rows[k]), s] = S[wp.static(rows[k]), source]

@@ -1,15 +1,15 @@
-"""Rosenbrock methods on the chain's equations with their exact Jacobian: O(n) a step, no bound on h from the springs.
+"""Rosenbrock methods with the exact Jacobian of the chain: O(n) a step, and springs set no bound on h.
 
-With v = q̇ and M q̈ = Q(q, v), put g = hγ, K = −∂Q/∂q and D = −∂Q/∂v. A stage of :class:`RosenbrockTable`,
-(1 − g J) U = r with r_q = g v + γ Σ C U_q, r_v = g M⁻¹ Q + γ Σ C U_v at the stage's place, is freed of its velocities:
+With v = q̇ and M q̈ = Q(q, v), put g = hγ, K = −∂Q/∂q and D = −∂Q/∂v. A stage of :class:`RosenbrockTable` is
+(1 − g J) U = r with r_q = g v + γ Σ C U_q, r_v = g M⁻¹ Q + γ Σ C U_v at the stage's place. Without U_v it reads
 
     (M + g D + g² K) Z = M (r_q / g + r_v) + g D r_q / g,    Z = U_q / g,    U_v = Z − r_q / g.
 
-The matrix couples neighbouring links only: 3 × 3 blocks along the loop, the same for all stages of a step. All else of
-a stage are sums over the Z of those before, see :class:`SecondOrderTable`.
+The matrix couples neighbouring links only, with 3 × 3 submatrices, and is the same for all stages of a step. The rest
+of a stage consists of sums over the Z of previous stages, see :class:`SecondOrderTable`.
 
-All is done in the order of :mod:`cpu.implicit.solver`: eight segments of the loop side by side, so that the next link
-is the next vector of memory. A joint lies at the column of the link on its left, rows of joints one place further.
+Memory is in the order of :mod:`cpu.implicit.solver`, see :mod:`cpu.implicit.rosenbrock_layout`: eight segments of the
+loop side by side, so that the next link is the next vector of memory.
 """
 
 import functools
@@ -72,11 +72,11 @@ from warpchain.kernels.types import Chain
 wp.set_module_options({"enable_backward": False})
 
 GREATEST_TURN = wp.constant(wp.float64(1.0))
-"""Greatest turn of a link [rad] in one step: beyond it the error estimate, which sees six places, means nothing."""
+"""Greatest turn of a link [rad] in one step: beyond it the error estimate, made from six places, is no estimate."""
 
 
 def rosenbrock_rows(name: str, columns: int) -> int:
-    """Rows of a chain's scratch block of this width."""
+    """Rows of a chain's scratch of this width."""
     segments = segments_of(columns)
     rows = FIRST_STAGE_ROW + 3 * ROSENBROCK_TABLES[name].stages
     doubles = rows * segments.columns + segments.separator_rows * LANES
@@ -85,11 +85,11 @@ def rosenbrock_rows(name: str, columns: int) -> int:
 
 @functools.cache
 def rosenbrock_method(name: str, columns: int):
-    """Warp functions of one table: (evaluate the first stage, attempt a step, commit it), as of an explicit one.
+    """Warp functions of one table: (evaluate the first stage, attempt a step, commit it), see :class:`CpuMethod`.
 
     Args:
         name: Key of :data:`ROSENBROCK_TABLES`.
-        columns: Width of the scratch blocks.
+        columns: Width of the scratch.
 
     Returns:
         ``first_stage(K, chain)``, ``attempt(K, chain, h, tolerance)`` → bits of the greatest error ratio (see
@@ -145,7 +145,7 @@ def rosenbrock_method(name: str, columns: int):
         n = chain.link_count
         places, full, _ = segment_places(n)
         end = place_column(places + 1)
-        # segment by segment: links lie one behind the other
+        # segment by segment, in each of which links follow one another
         s = int(0)
         while s < 8:
             i = int(first_link(s, places, full, n))
@@ -202,12 +202,12 @@ def rosenbrock_method(name: str, columns: int):
         while c < end:
             S[SPIN_RATE, c + 8] = S[wp.static(BASE_RATE + 2), c] - S[wp.static(BASE_RATE + 2), c + 8]
             c += 1
-        # a repeated separator has no rate of its own; the joint behind it is the last of the segment before
+        # the joint after a repeated separator is the last of the segment before, whose rate it takes
         s = full
         while s < 8:
             S[SPIN_RATE, 16 + s] = S[SPIN_RATE, 8 * places + 7 + s]
             s += 1
-        # the driver looks there for rates that are not finite
+        # the step loop checks these rows for numbers that are not finite
         greatest = wp.int64(0)
         c = int(8)
         while c < end:
@@ -222,7 +222,7 @@ def rosenbrock_method(name: str, columns: int):
 
     @wp.func
     def place_stage(S: wp.array2d(dtype=wp.float64), stage: int, g: wp.float64, end: int):
-        """W of the stage before, how this stage's place differs from the start, r_q / g and γ Σ C U_v."""
+        """W of the previous stage; of this one: change of place since the start, velocities, r_q / g and γ Σ C U_v."""
         for i in range(1, wp.static(stages)):
             if stage == i:
                 c = int(8)
@@ -276,7 +276,7 @@ def rosenbrock_method(name: str, columns: int):
         joints_slope(S, places)
         assemble(S, chain, g, end, full)
         factor(S, R, places, full)
-        # stages are a loop at run time: unrolled, the code of a step would not fit into the cache for instructions
+        # a loop at run time: the unrolled code of a step would not fit into the instruction cache
         stage = int(0)
         while stage < wp.static(stages):
             if stage == 0:
@@ -310,13 +310,13 @@ def rosenbrock_method(name: str, columns: int):
                 S[wp.static(NEW + k), c] = S[wp.static(BASE + k), c] + moved
                 S[wp.static(NEW + 3 + k), c] = S[wp.static(NEW + 3 + k), c] + speed_error
                 speed = S[wp.static(BASE + 3 + k), c]
-                # repeated places have no rate of their own
+                # repeated places do not count
                 counted = S[COUNTED, c]
                 worst = wp.max(worst, error_bits(counted * place_error, S[wp.static(BASE + k), c], speed, h))
                 worst = wp.max(worst, error_bits(counted * speed_error, speed, S[wp.static(BASE_RATE + k), c], h))
             c += 1
         greatest = order_bits(wp.cast(worst, wp.float64) / tolerance)
-        # a greater turn is refused as an error of 2: the step shrinks
+        # a greater turn counts as an error of 2: the step shrinks
         if wp.cast(turned, wp.float64) > GREATEST_TURN:
             greatest = wp.max(greatest, order_bits(TWO))
         return greatest
@@ -328,7 +328,7 @@ def rosenbrock_method(name: str, columns: int):
         places, full, _ = segment_places(n)
         end = place_column(places + 1)
         a = chain.half_length
-        # Σ w U, and how the joints' spins and opening rates change by it
+        # Σ w U, and the changes of the joints' spins and opening rates by it
         c = int(8)
         while c < end:
             dt = wp.static(wp.float64(second.loss_place)) * S[wp.static(BASE + 5), c]

@@ -1,7 +1,7 @@
-"""Where the implicit step keeps a chain: rows in the order of :mod:`cpu.implicit.solver`, and their neighbours.
+"""Memory of the implicit step: rows in the order of :mod:`cpu.implicit.solver`, padded with neighbours.
 
-The next link is the next place, eight columns on. A joint lies at the column of the link on its left in what the loops
-read, but its rows begin one place further, so that a link finds the joint on its left in its own column.
+The next link lies at the next place, eight columns further. Rows of joints begin one place later: the joint on the
+right of the link in column c lies in column c + 8, the joint on its left in column c.
 """
 
 import functools
@@ -15,20 +15,20 @@ wp.set_module_options({"enable_backward": False})
 # Rows in segment order. The state at the start of the step (6), its direction, the links' constants.
 BASE = 0
 BASE_COSINE, BASE_SINE, MASS, INERTIA, COUNTED = range(6, 11)
-# Accelerations at the start of the step; of joints there: friction's slope and torque, force, spin, opening rate.
+# Accelerations at the start of the step. Of joints there: slope and torque of friction, force, spin, opening rate.
 BASE_RATE = 11
 SLOPE, BASE_TORQUE, BASE_FORCE_X, BASE_FORCE_Y, BASE_SPIN, BASE_RATE_X, BASE_RATE_Y = range(14, 21)
-# A stage: how the direction differs from that at the start, r_q / g, γ Σ C U_v, joint forces and torques of the stage
-# and of the velocities r_q / g.
+# A stage: change of the direction since the start, r_q / g, γ Σ C U_v, joint forces and torques of the stage and those
+# of the velocities r_q / g.
 COSINE, SINE = 21, 22
 SHIFT, DRIVE = 23, 26
 FORCE_X, FORCE_Y, TORQUE, SHIFT_X, SHIFT_Y, SHIFT_TORQUE = range(29, 35)
 POWER_FRICTION, POWER_DAMPING = 35, 36
-# How a stage's place differs from that at the start, and its velocities; at last the new state. Of the whole step Σ w U
-# of angle and velocities, in rows that its stages have done with.
+# Change of a stage's place since the start, and its velocities; in the end the new state. Σ w U of angle and
+# velocities, in rows that are no longer needed then.
 NEW = 37
 CHANGE = SHIFT
-# Of joints at the start: opening, f'(w), how fast the spin changes.
+# Of joints at the start: opening, f'(w), rate of change of the spin.
 BASE_OPENING_X, BASE_OPENING_Y, TANGENT, SPIN_RATE = range(43, 47)
 # The linear system of :mod:`cpu.implicit.solver`, then three rows a stage: W of :class:`SecondOrderTable`.
 SYSTEM = 47
@@ -39,13 +39,13 @@ FIRST_STAGE_ROW = RIGHT_SIDE + 3
 
 @functools.cache
 def segments_of(columns: int) -> SegmentLayout:
-    """Layout of the linear system for chains whose scratch blocks have so many columns."""
+    """Layout of the linear system, for scratch of this width."""
     return SegmentLayout(size=3, columns=segment_columns(columns), matrix=SYSTEM, right=RIGHT_SIDE)
 
 
 @functools.cache
 def pad_behind(rows: tuple[int, ...]):
-    """Warp function that puts, in these rows, the next segment's first link behind each segment's last."""
+    """Warp function that copies, in these rows, the next segment's first link behind each segment's last."""
 
     @wp.func
     def pad(S: wp.array2d(dtype=wp.float64), places: int, full: int):
@@ -62,7 +62,7 @@ def pad_behind(rows: tuple[int, ...]):
 
 @functools.cache
 def pad_before(rows: tuple[int, ...], place: int):
-    """Warp function that puts, before the place that rows begin at, what lies at the end of the segment before."""
+    """Warp function that copies, in these rows, the end of the previous segment before the place that rows begin at."""
 
     @wp.func
     def pad(S: wp.array2d(dtype=wp.float64), places: int):

@@ -1,19 +1,19 @@
 """The linear systems of the implicit step: the matrix M + g D + g² K and the right-hand sides of its stages.
 
-A joint between link l on its left and link r on its right opens by C = (X_r − a u_r) − (X_l + a u_l) and pulls with
-F = k C + b Ċ. With σ = g b + g² k its part of the matrix is g F ≙ σ δC + g² b a (ω_l u_l δθ_l + ω_r u_r δθ_r), where
-the last two terms come from the turning of t in Ċ; that of t in the torque a t·F adds g² a u·F to the diagonal. Both
-links' columns of the first part are c = −σ a t + g² b a ω u. So the diagonal blocks are diagonal:
+A joint between link l on its left and link r on its right opens by C = (X_r − a u_r) − (X_l + a u_l) and pulls with F =
+k C + b Ċ. With σ = g b + g² k its part of the matrix is g F ≙ σ δC + g² b a (ω_l u_l δθ_l + ω_r u_r δθ_r), where the
+last two terms come from the turning of t in Ċ. The turning of t in the torque a t·F adds g² a u·F to the diagonal. The
+column of the angle of either link in the first part is c = −σ a t + g² b a ω u. So the submatrices D_i are diagonal:
 
     D_i = diag(m + 2σ, m + 2σ, I + 2σ a² + g (φ_i + φ_i₋₁) + g² a u·(F_i + F_i₋₁)),
     U_i = −(1; a t_iᵀ) (σ, c_i₊₁) − g φ_i,    L_i = (1; −a t_iᵀ) (−σ, c_i₋₁) − g φ_i₋₁,
 
-with φ = f'(w) of the joints' friction, see :func:`friction_secant`, in the corner of the angles.
+with φ = f'(w) of the joints' friction, see :func:`friction_secant`, in the element of the two angles.
 
-Stiff joints open by 1e-8 m, of which the rounding of places, 1e-16 m, is a force of 1e-7 N. It would be another one in
-each stage, and the error estimate, a sum over the stages with coefficients up to 100, would see it at tolerances of
-1e-9. So the opening of a stage is that at the start plus what changes of places and directions, which round a thousand
-times finer, add to it: the estimate then is that of a chain whose joints open by 1e-16 m more or less.
+Stiff joints open by 1e-8 m. Rounding places to 1e-16 m changes their force by 1e-7 N. If this error differed between
+stages, the error estimate, a sum over the stages with coefficients up to 100, would see it at tolerances of 1e-9. So
+the opening of a stage is that at the start plus the part due to changes of places and directions, which is rounded a
+thousand times more finely: all stages then share one error of 1e-16 m.
 """
 
 import warp as wp
@@ -68,7 +68,7 @@ SATURATED = wp.constant(wp.float64(4.0))
 
 @wp.func
 def opening(S: wp.array2d(dtype=wp.float64), chain: Chain, c: int, place: int, direction: int):
-    """Opening C of the joint on the right of a link, from the rows of places x, y and of directions, or its change."""
+    """Opening C of the joint on the right of a link, or its change, from rows of places x, y and of directions."""
     a = chain.half_length
     return (
         (S[place, c + 8] - S[place, c]) - a * (S[direction, c + 8] + S[direction, c]),
@@ -78,7 +78,7 @@ def opening(S: wp.array2d(dtype=wp.float64), chain: Chain, c: int, place: int, d
 
 @wp.func
 def opening_rate(S: wp.array2d(dtype=wp.float64), chain: Chain, c: int, speed: int, direction: int):
-    """Opening rate Ċ of that joint and its spin, from the rows of velocities u, v, ω and of directions."""
+    """Opening rate Ċ and spin of the joint on the right of a link, from rows of velocities and of directions."""
     a = chain.half_length
     _left_u, _left_v, right_u, right_v = end_velocities(
         S[speed, c], S[speed + 1, c], a * S[speed + 2, c], S[direction, c], S[direction + 1, c]
@@ -91,7 +91,7 @@ def opening_rate(S: wp.array2d(dtype=wp.float64), chain: Chain, c: int, speed: i
 
 @wp.func
 def stage_opening_rate(S: wp.array2d(dtype=wp.float64), chain: Chain, c: int):
-    """The same at a stage's place, whose directions are those at the start and their changes."""
+    """:func:`opening_rate` at a stage's place, whose directions are those at the start plus their changes."""
     a = chain.half_length
     _left_u, _left_v, right_u, right_v = end_velocities(
         S[wp.static(NEW + 3), c],
@@ -123,12 +123,12 @@ def friction_secant(
 ):
     """φ of a joint for a step h [N m s]: f'(w), or f(w)/w where the step would jump over the change of sign unseen.
 
-    A joint that slides has hardly any f'(w). Near w = 0 such a joint is thrown to the other side in each step, by less
-    than the tolerance, and never found where it would stick; its errors fall with h alone, so the controller, which
-    knows of higher orders, stayed at steps of 4 µs at a tolerance of 1e-3 where 1e-4 took 20 µs. With f(w)/w the joint
-    sticks at once. It is used where w, beyond the smoothing (4 ω_c), would change its sign and is below
-    :data:`UNSEEN` tolerances of ω: limits of 3, 30 and none cost the same at 1e-3, but none adds rejected steps and
-    errors at 1e-7. Steps that resolve the switch, and so the orders, have f'(w).
+    A sliding joint has hardly any f'(w). Near w = 0 each step overshoots zero by less than the tolerance, so the joint
+    never sticks. Its errors then fall with h only, and the controller, which expects a higher order, stayed at steps of
+    4 µs at a tolerance of 1e-3 where 1e-4 took 20 µs. With f(w)/w the joint sticks at once. It is used where w is
+    beyond the smoothing (4 ω_c), would change its sign, and is below :data:`UNSEEN` tolerances of ω. Limits of 3, 30
+    and none cost the same at 1e-3, but none adds rejected steps and errors at 1e-7. Steps that resolve the switch have
+    f'(w), and with it the method's order.
 
     Args:
         chain: The joint's chain.
@@ -204,7 +204,7 @@ def assemble(S: wp.array2d(dtype=wp.float64), chain: Chain, g: wp.float64, end: 
 def first_right_hand_side(
     S: wp.array2d(dtype=wp.float64), chain: Chain, g: wp.float64, weight: wp.float64, end: int, full: int
 ):
-    """Of the stage at the start of the step, r_q = g v and r_v = g v̇; begins the sums of the powers lost."""
+    """Right-hand side of the first stage, with r_q = g v and r_v = g v̇; begins the sums of the powers lost."""
     a = chain.half_length
     b = chain.joint_damping
     c = int(8)
@@ -239,7 +239,7 @@ def first_right_hand_side(
 
 @wp.func
 def pull_joints(S: wp.array2d(dtype=wp.float64), chain: Chain, weight: wp.float64, end: int):
-    """Forces and torques of the joints at the stage's place, and D r_q / g; sums up the powers lost."""
+    """Forces and torques of the joints at the stage's place, and D r_q / g; adds to the sums of the powers lost."""
     c = int(8)
     while c < end:
         cx, cy = opening(S, chain, c, NEW, COSINE)
@@ -262,7 +262,7 @@ def pull_joints(S: wp.array2d(dtype=wp.float64), chain: Chain, weight: wp.float6
 
 @wp.func
 def right_hand_side(S: wp.array2d(dtype=wp.float64), chain: Chain, g: wp.float64, end: int, full: int):
-    """M (r_q / g + r_v) + D r_q of the stage."""
+    """Right-hand side M (r_q / g + r_v) + D r_q of a later stage."""
     a = chain.half_length
     c = int(8)
     while c < end:

@@ -1,16 +1,14 @@
-"""Linear systems of a loop: cyclic block-tridiagonal matrices with small dense blocks, one CPU thread per loop.
+"""Linear systems of a loop: cyclic block-tridiagonal matrices with small dense submatrices, one CPU thread per loop.
 
-Row i of the system is L_i x_{i−1} + D_i x_i + U_i x_{i+1} = r_i, indices modulo the number of rows n. Elimination
-along the loop is one long chain of dependent operations, so the loop is cut into eight segments that are eliminated
-side by side, one in each lane of a vector (H. H. Wang, ACM TOMS 7 (1981) 170). The last row of each segment is a
-*separator*; once a segment's other rows are gone, the eight separators form a small cyclic system, which three rounds
-of parallel cyclic reduction (R. W. Hockney, J. ACM 12 (1965) 95) solve, again in all lanes at once: after them each
-equation holds one unknown.
+Row i of the system is L_i x_{i−1} + D_i x_i + U_i x_{i+1} = r_i, indices modulo the number of rows n. Elimination along
+the loop is one long sequence of dependent operations. So the loop is cut into eight segments that are eliminated side
+by side, one in each lane of a vector (H. H. Wang, ACM TOMS 7 (1981) 170). The last row of each segment is a
+*separator*. Without the segments' other rows, the eight separators form a small cyclic system. Three rounds of parallel
+cyclic reduction (R. W. Hockney, J. ACM 12 (1965) 95), again in all lanes at once, leave one unknown in each equation.
 
-Pivots are sought in no block but inverted whole by cofactors: the matrices that come here are a symmetric positive
-definite one and a little more, for which block elimination is stable. Measured on matrices of
-chains: errors as those of LAPACK up to a condition of 1e3 (scaled to a unit diagonal), ten times theirs at 1e5.
-Inverting by elimination instead of cofactors halves that and costs 10 %.
+Submatrices are inverted by cofactors, without pivoting: the matrices are close to symmetric positive definite ones, for
+which this elimination is stable. On matrices of chains errors are LAPACK's up to a condition of 1e3 (scaled to a unit
+diagonal), and ten times those at 1e5. Inverting by elimination halves them and costs 10 %.
 """
 
 import functools
@@ -23,23 +21,23 @@ wp.set_module_options({"enable_backward": False})
 LANES = 8
 """Segments of a loop: doubles in the widest vectors of a CPU."""
 ROUNDS = 3
-"""Rounds of cyclic reduction, after which each separator's equation holds that separator alone: log₂ of the lanes."""
+"""Rounds of cyclic reduction until each equation has one unknown: log₂ of the lanes."""
 
 
 @dataclass(frozen=True)
 class SegmentLayout:
-    """Where the rows of a loop's system lie in a block of memory.
+    """Where the rows of a loop's system lie in memory.
 
     Row i of the loop is place p of segment s, column ``LANES * (p + 1) + s``; one place before the first and one
-    behind the last are for the neighbours. A loop of n rows has P = ⌈n / 8⌉ places a segment. If n is no multiple of
+    after the last hold copies of neighbours. A loop of n rows has P = ⌈n / 8⌉ places a segment. If n is no multiple of
     eight, the last segments are *short*: their place 0 repeats the separator of the segment before, and their own rows
-    begin at place 1. A B × B block of the matrix takes B² memory rows, one after the other.
+    begin at place 1. A B × B submatrix takes B² memory rows, one after the other.
 
     Attributes:
-        size: Order B of the blocks.
+        size: Order B of the submatrices.
         columns: Static width of a memory row, see :func:`segment_columns`.
-        matrix: First memory row of the matrix: blocks L, D, U, then two that elimination adds.
-        right: First of B memory rows: the right-hand side, which the solution replaces.
+        matrix: First memory row of the matrix: submatrices L, D, U, then two that elimination adds.
+        right: First of B memory rows of the right-hand side, which the solution replaces.
     """
 
     size: int
@@ -47,8 +45,8 @@ class SegmentLayout:
     matrix: int
     right: int
 
-    def block(self, index: int) -> int:
-        """First memory row of a block of the matrix."""
+    def submatrix(self, index: int) -> int:
+        """First memory row of one of the five submatrices, see ``matrix``."""
         return self.matrix + self.size**2 * index
 
     @property
@@ -58,16 +56,16 @@ class SegmentLayout:
 
 
 def segment_columns(links: int) -> int:
-    """Static width of a memory row for loops of up to this many rows: an odd multiple of 8, for the cache's sake."""
+    """Static width of a memory row for this many links; odd multiples of 8 spread rows over the cache's sets."""
     places = -(-links // LANES) + 2
     return LANES * max(places + 1 - places % 2, 5)
 
 
 @wp.func
 def segment_places(link_count: int):
-    """(places P of a segment, number of segments that are not short, rows that are solved for).
+    """(places P of a segment, number of segments that are not short, number of rows solved for).
 
-    Fewer than eight rows would leave segments empty; they are gone through twice, which has the same solution twice.
+    Fewer than eight rows would leave segments empty; such loops are solved for twice their rows, which repeats them.
     """
     total = wp.where(link_count < 8, 2 * link_count, link_count)
     places = (total + 7) // 8
@@ -76,13 +74,13 @@ def segment_places(link_count: int):
 
 @wp.func
 def row_at(place: int, segment: int, places: int, full: int):
-    """Row of the loop at this place, ``full`` being the number of segments that are not short."""
+    """Row of the loop at this place; ``full``: number of segments that are not short."""
     return segment * places + place - wp.max(segment + 1 - full, 0)
 
 
 @wp.func
 def place_column(place_after: int):
-    """First column of the place before this one, counted from 1; bounds tell the compiler that no sum overflows."""
+    """Eight times an index of places as a column; the bounds tell the compiler that no sum overflows."""
     return wp.clamp(8 * place_after, 0, 16777216)
 
 
@@ -113,12 +111,12 @@ _INVERSES = {
 
 
 def _rotated(name: str, by: int) -> str:
-    """C++ for the vector (or, lane by lane, the block) whose lane s is lane s + by of this one."""
+    """C++ for the vector whose lane s is lane s + by of this one."""
     return f"__builtin_shufflevector({name}, {name}, {', '.join(str((s + by) % LANES) for s in range(LANES))})"
 
 
 def _vectors(layout: SegmentLayout) -> str:
-    """C++ for numbers of all segments at once: a vector has a lane a segment, a block or a column is made of such."""
+    """C++ types and functions for all segments at once: a vector has a lane per segment."""
     size = layout.size
     turns = "".join(
         f"""
@@ -135,7 +133,7 @@ def _vectors(layout: SegmentLayout) -> str:
             enum {{ width = 1 }};
             lanes m[{size}];
         }};
-        struct block {{
+        struct submatrix {{
             enum {{ width = {size} }};
             lanes m[{size * size}];
             lanes& operator()(int i, int j) {{ return m[{size} * i + j]; }}
@@ -161,20 +159,20 @@ def _vectors(layout: SegmentLayout) -> str:
             }}
         }};
         // to += sign a b; the sign is known when this is compiled
-        const auto add = [](auto& to, const block& a, const auto& b, double sign) {{
+        const auto add = [](auto& to, const submatrix& a, const auto& b, double sign) {{
             const int width = b.width;
             for (int i = 0; i < {size}; i++)
                 for (int j = 0; j < width; j++)
                     for (int k = 0; k < {size}; k++)
                         to.m[width * i + j] += sign * a(i, k) * b.m[width * k + j];
         }};
-        const auto invert = [](const block& m) {{
-            block to;
+        const auto invert = [](const submatrix& m) {{
+            submatrix to;
             {_INVERSES[size]}
             return to;
         }};
         const auto multiple_of_one = [](lanes value) {{
-            block to = {{}};
+            submatrix to = {{}};
             for (int i = 0; i < {size}; i++) to(i, i) = value;
             return to;
         }};
@@ -185,26 +183,26 @@ def _vectors(layout: SegmentLayout) -> str:
 def cyclic_solver(layout: SegmentLayout):
     """Warp functions (factor, solve) for systems that lie as this layout says.
 
-    Native, in vectors of all segments: what a place needs of the one before stays in registers. As loops of Warp over
-    lanes it went through memory, and the processor waited for its stores.
+    They are native code on vectors of all segments, which keeps the results of the previous place in registers. Warp
+    loops over lanes passed them through memory, and the processor waited for its stores.
 
     Returns:
-        ``factor(S, R, places, full)`` and ``solve(S, R, places)``. S is the block of memory, R one of
-        ``separator_rows`` × 8. The matrix at a repeated separator must be L = −1, D = 1, U = 0, the right-hand side 0.
+        ``factor(S, R, places, full)`` and ``solve(S, R, places)``. S holds the system, R ``separator_rows`` × 8
+        numbers. At a repeated separator the matrix must be L = −1, D = 1, U = 0, the right-hand side 0.
     """
     size = layout.size
     square = size * size
-    lower, diagonal, upper, fill, head = (layout.block(k) for k in range(5))
-    # rows of R: what leads from sums to separators, what rows take from one another in each round, the last pivots
+    lower, diagonal, upper, fill, head = (layout.submatrix(k) for k in range(5))
+    # rows of R: coupling of sums to separators, what each round subtracts of other rows, the last pivots
     coupling, last_pivot = 0, square
     take_before, take_after = ([square * (2 + 2 * r + k) for r in range(ROUNDS)] for k in range(2))
     vectors = _vectors(layout)
     reduce = "".join(
         f"""
         {{
-            const block pivot = invert(centre);
-            const block pivot_before = turned_{LANES - 2**r}(pivot), pivot_after = turned_{2**r}(pivot);
-            block from_before = {{}}, from_after = {{}}, next_below = {{}}, next_above = {{}};
+            const submatrix pivot = invert(centre);
+            const submatrix pivot_before = turned_{LANES - 2**r}(pivot), pivot_after = turned_{2**r}(pivot);
+            submatrix from_before = {{}}, from_after = {{}}, next_below = {{}}, next_above = {{}};
             add(from_before, below, pivot_before, 1.0);
             add(from_after, above, pivot_after, 1.0);
             store(from_before, at_separators({take_before[r]}), 1);
@@ -240,18 +238,18 @@ def cyclic_solver(layout: SegmentLayout):
             owns[s] = s < full;
             begins[s] = s >= full;
         }}
-        block ahead = {{}}, sum = {{}}, across = multiple_of_one(lanes{{}} + 1.0), head = multiple_of_one(owns);
-        block low, up;
+        submatrix ahead = {{}}, sum = {{}}, across = multiple_of_one(lanes{{}} + 1.0), head = multiple_of_one(owns);
+        submatrix low, up;
         for (int p = 1; p < places; p++) {{
-            block pivot, product = {{}};
+            submatrix pivot, product = {{}};
             load(low, at_place({lower}, p), next_row);
             load(up, at_place({upper}, p), next_row);
             load(pivot, at_place({diagonal}, p), next_row);
             add(pivot, low, ahead, -1.0);
             pivot = invert(pivot);
             add(product, low, across, 1.0);
-            ahead = block{{}};
-            across = block{{}};
+            ahead = submatrix{{}};
+            across = submatrix{{}};
             add(ahead, pivot, up, 1.0);
             add(across, pivot, product, -1.0);
             add(sum, head, across, 1.0);
@@ -259,11 +257,11 @@ def cyclic_solver(layout: SegmentLayout):
             store(ahead, at_place({upper}, p), next_row);
             store(across, at_place({fill}, p), next_row);
             store(head, at_place({head}, p), next_row);
-            block left_over = multiple_of_one(p == 1 ? begins : lanes{{}});
+            submatrix left_over = multiple_of_one(p == 1 ? begins : lanes{{}});
             add(left_over, head, ahead, -1.0);
             head = left_over;
         }}
-        block below = {{}}, centre, above = {{}};
+        submatrix below = {{}}, centre, above = {{}};
         load(low, at_place({lower}, places), next_row);
         load(up, at_place({upper}, places), next_row);
         load(centre, at_place({diagonal}, places), next_row);
@@ -280,7 +278,7 @@ def cyclic_solver(layout: SegmentLayout):
 
     @wp.func_native(f"""
         {vectors}
-        block factor;
+        submatrix factor;
         column value = {{}}, first = {{}}, next;
         for (int p = 1; p < places; p++) {{
             load(next, at_place({layout.right}, p), next_row);

@@ -1,1 +1,1 @@
-"""The contact pass of a block."""
+"""The contact pass on a GPU."""

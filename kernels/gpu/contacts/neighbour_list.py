@@ -1,7 +1,6 @@
 """The neighbour list on a GPU: the grid of :mod:`cpu.contacts.neighbour_list`, built in parallel, one thread a joint.
 
-It holds the same pairs as the list of the CPU form, in no particular order: what contacts are resolved in is decided by
-keys, see :mod:`gpu.contacts.self_contacts`.
+It holds the same pairs as on a CPU, in any order: keys order the contacts, see :mod:`gpu.contacts.self_contacts`.
 """
 
 import functools
@@ -18,10 +17,10 @@ wp.set_module_options({"enable_backward": False})
 
 @functools.cache
 def block_list(columns: int, block_dim: int, broad_phase: str):
-    """Warp function that builds the list of a chain and returns the number of pairs; above capacity: an overflow.
+    """Warp function that builds the list of a chain and returns the number of pairs; above capacity it overflows.
 
     Args:
-        columns: Width of the scratch blocks, which sets the layout of the list.
+        columns: Width of the scratch, which sets the layout of the list.
         block_dim: Threads in a block.
         broad_phase: ``"grid"`` or ``"all_pairs"``.
     """
@@ -63,7 +62,7 @@ def block_list(columns: int, block_dim: int, broad_phase: str):
         skin: wp.float64,
         opening: wp.float64,
     ):
-        """All threads; the board's rows RIGHT_X and RIGHT_Y are filled and a barrier has passed."""
+        """For all threads; the board's rows RIGHT_X and RIGHT_Y are written, and a barrier has passed."""
         n = chain.link_count
         reach = listing_reach(chain, skin, opening)
         square = reach * reach

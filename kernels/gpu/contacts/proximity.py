@@ -1,4 +1,4 @@
-"""Floor and sprocket in the block form: how far they are, how long the next step may be, and what they do."""
+"""Proximity of a chain on a GPU, the longest step that follows from it, and contacts with floor and sprocket."""
 
 import functools
 
@@ -34,7 +34,7 @@ OPENING_MARGIN = wp.constant(wp.float64(1.0 + 1e-6))
 
 @wp.func
 def upper_bound(opening: wp.float32):
-    """An opening that was compared in single precision, made a bound again."""
+    """An upper bound on an opening, from its value in single precision."""
     return wp.float64(opening) * OPENING_MARGIN
 
 
@@ -57,7 +57,7 @@ def block_proximity(features: Features, block_dim: int):
         link: Link,
         next_end: vec5d,
     ):
-        """Notes what a link knows of its proximity; computed in double, compared in single precision."""
+        """Writes a link's share of the maxima; computed in double, compared in single precision."""
         left_x, left_y, right_x, right_y = ends_of(link)
         values = vec4i(0, order_key_single(wp.float32(-wp.inf)), 0, 0)
         if place.lane < place.links:
@@ -83,7 +83,7 @@ def block_proximity(features: Features, block_dim: int):
 
     @wp.func
     def read_proximity(memory: wp.uint64) -> Proximity:
-        """What all links know, after a barrier."""
+        """Maxima over all links, after a barrier."""
         values = read_maxima(memory)
         proximity = Proximity()
         proximity.opening = quick_root(wp.cast(values[0], wp.float32))
@@ -94,15 +94,15 @@ def block_proximity(features: Features, block_dim: int):
 
     @wp.func
     def time_to_contact(control: Control, pairs: int, gap: wp.float32, slack: wp.float32, speed: wp.float32):
-        """Time [s] in which nothing comes through the skin unseen; 0 near contacts, where steps have a bound anyway."""
-        near = pairs > 0
-        room = wp.float32(control.skin)
+        """Longest step [s] that cannot miss a contact; 0 near contacts, where the contact step is the bound."""
+        is_near = pairs > 0
+        distance = wp.float32(control.skin)
         if wp.static(has_fixed):
-            near = near or gap < room
-            room = wp.float32(0.5) * gap
+            is_near = is_near or gap < distance
+            distance = wp.float32(0.5) * gap
         if wp.static(has_self):
-            room = wp.min(room, slack)
-        return wp.where(near, wp.float32(0.0), quick_quotient(room, speed))
+            distance = wp.min(distance, slack)
+        return wp.where(is_near, wp.float32(0.0), quick_quotient(distance, speed))
 
     @wp.func
     def meet_fixed_body(
@@ -113,7 +113,7 @@ def block_proximity(features: Features, block_dim: int):
         world: int,
         time: wp.float64,
     ):
-        """This link, on the board, after floor or sprocket; returns the number of impulses."""
+        """Applies the impulses between floor or sprocket and this link on the board; returns their number."""
         link = read_link(K, place.lane)
         left_x, left_y, right_x, right_y = ends_of(link)
         u, v, omega, lost_left, lost_right, hits = meet(

@@ -1,15 +1,14 @@
-"""Self-contacts in the block form: found in parallel, resolved in parallel rounds.
+"""Contacts of a chain with itself on a GPU: found in parallel, resolved in parallel rounds.
 
-A contact, a circle of one link and one of another, has a key that orders as the fixed sequence of
-:mod:`cpu.contacts.self_contacts` does, and a thread that works out its geometry once. In each round every contact that
-is not done lays its key upon its two links, where the smallest stays, and a contact that finds its own key on both
-goes: none before it in the sequence that shares a link is left. Contacts that go together share no link, so the outcome
-equals that of the sequence to the bit. The smallest key of all always goes, so there are at most as many rounds as
-contacts, and about as many as the busiest link has contacts.
+A contact, of one circle of a link and one of another, has a key. Keys are ordered as the fixed sequence of
+:mod:`cpu.contacts.self_contacts`. In each round every pending contact writes its key to both links by atomic minimum; a
+contact that owns both links is resolved, because no earlier contact of either link is pending. Contacts of one round
+share no link, so the result equals that of the sequence to the bit. The smallest key is resolved in every round, so
+there are at most as many rounds as contacts, and about as many as the busiest link has contacts.
 
-A round costs one barrier: contacts that have to wait lay their keys for the next one while others go, on another board,
-while a third is cleared. If there are threads enough, both halves of the sequence go together. What counts in a round
-is how many instructions one thread has to get through, at four to six cycles each.
+A round takes one barrier: contacts that must wait write their keys for the next round to a second array of owners,
+while a third is cleared. If there are enough threads, both halves of the sequence are resolved together. The cost of a
+round is the number of instructions of one thread, at four to six cycles each.
 """
 
 import functools
@@ -27,7 +26,7 @@ from warpchain.kernels.types import Chain
 wp.set_module_options({"enable_backward": False})
 
 JOINT_BITS = 11
-"""Bits for a joint's number in a key: chains have fewer than 2048 links."""
+"""Bits of a joint's number in a key: chains have fewer than 2048 links."""
 
 FREE = wp.constant(2**31 - 1)
 DONE = wp.constant(-1)
@@ -40,7 +39,7 @@ class TouchLayout:
     Attributes:
         width: Columns of the owners, at least the number of links.
         shared_pairs: How many touching pairs of joints lie at ``pairs``; further ones lie in the list's row.
-        owners: Three boards of ``width`` keys, one per link; rounds use them in turn.
+        owners: Three arrays of ``width`` keys, one per link; rounds use them in turn.
         pairs: See ``shared_pairs``.
         touching: Number of touching pairs of joints.
         votes: See :func:`gpu.threads.barrier_if_any`.
@@ -48,7 +47,7 @@ class TouchLayout:
         self_hits: Impulses between links in this launch.
         mailbox: A status from one thread to all.
         deepest: Greatest depth of a contact in this launch [m], bits of a single-precision number.
-        is_late: Whether the launch has taken its time.
+        is_late: 1 when the launch has lasted long enough.
         size: Integers from the row's start to the end of the last.
     """
 
@@ -110,7 +109,7 @@ def pair_of(key: int):
 
 @wp.func
 def half_of(key: int):
-    """The half of a contact, not of DONE."""
+    """The half of a contact; the key is not DONE."""
     return key >> wp.static(2 * JOINT_BITS + 3)
 
 
@@ -123,20 +122,20 @@ def links_at(key: int, n: int):
 
 @wp.func
 def claim(T: wp.array(dtype=wp.int32), owners: int, link_a: int, link_b: int, key: int):
-    """Lays a key upon the links of a contact."""
+    """Writes a contact's key to both links if none there is smaller."""
     wp.atomic_min(T, natural(owners + link_a), key)
     wp.atomic_min(T, natural(owners + link_b), key)
 
 
 @wp.func
-def is_first(T: wp.array(dtype=wp.int32), owners: int, link_a: int, link_b: int, key: int):
-    """True if no smaller key lies on the links of a contact."""
+def owns_links(T: wp.array(dtype=wp.int32), owners: int, link_a: int, link_b: int, key: int):
+    """Whether a contact owns both links: no pending contact of theirs has a smaller key."""
     return T[natural(owners + link_a)] == key and T[natural(owners + link_b)] == key
 
 
 @functools.cache
 def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
-    """Warp functions (clear, find, resolve) for scratch blocks of this width and blocks of this size."""
+    """Warp functions (clear, find, resolve) for scratch of this width and blocks of this size."""
     lists = list_layout(columns)
 
     @wp.func
@@ -160,10 +159,10 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
 
     @wp.func
     def order(L: wp.array(dtype=wp.int32), T: wp.array(dtype=wp.int32), lane: int, touching: int):
-        """Puts the pairs in the order of their keys.
+        """Sorts the pairs by their keys.
 
-        Not every contact then has a thread of its own, and the code that prepares one rounds differently from that
-        which does not: which way a contact goes must not depend on the order in which threads found the pairs.
+        It is called when not every contact has a thread of its own. A thread's first contact takes other code than
+        further ones, which rounds differently; so that choice must not depend on the order in which pairs were found.
         """
         k = lane
         while k < touching:
@@ -196,7 +195,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         pairs: int,
         opening: wp.float64,
     ):
-        """Number of pairs of joints that may touch now; the board is filled. ``opening``: greatest |C| [m]."""
+        """Number of pairs of joints that may touch now; the board is written. ``opening``: greatest |C| [m]."""
         reach = TWO * chain.circle_radius + TWO * opening
         square = reach * reach
         k = lane
@@ -219,7 +218,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         return touching
 
     @wp.func
-    def note_depth(T: wp.array(dtype=wp.int32), depth: wp.float64):
+    def raise_depth(T: wp.array(dtype=wp.int32), depth: wp.float64):
         wp.atomic_max(T, wp.static(touch.deepest), wp.cast(wp.float32(depth), wp.int32))
 
     @wp.func
@@ -234,7 +233,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         second: int,
         lane: int,
     ):
-        """Lays down the geometry of a thread's first contact; returns its key, or DONE for circles that do not meet."""
+        """Stores the geometry of a thread's first contact; returns its key, or DONE if the circles do not overlap."""
         depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = touching_circles(
             K, chain, first_joint(pair), second_joint(pair), half, second
         )
@@ -249,11 +248,11 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
             F[0, lane] = b_t
             F[1, lane] = inverse_nn
             F[2, lane] = inverse_determinant
-            note_depth(T, depth)
+            raise_depth(T, depth)
         return key
 
     @wp.func
-    def go_prepared(
+    def resolve_prepared(
         K: wp.array2d(dtype=wp.float64),
         E: wp.array2d(dtype=wp.float64),
         F: wp.array2d(dtype=wp.float64),
@@ -262,7 +261,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         link_b: int,
         lane: int,
     ):
-        """The turn of a thread's first contact; returns the number of impulses."""
+        """Resolves a thread's first contact; returns the number of impulses."""
         lost_before = K[BOARD_LOST_SELF, link_a]
         lost, hits = collide(
             K,
@@ -282,19 +281,19 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         return int(hits)
 
     @wp.func
-    def write_proximity(
+    def overlaps(
         K: wp.array2d(dtype=wp.float64), T: wp.array(dtype=wp.int32), chain: Chain, pair: int, half: int, second: int
     ):
-        """1 if the circles of a further contact meet, else 0."""
+        """1 if the circles of a further contact overlap, else 0; raises the greatest depth."""
         depth, _nx, _ny, _a_n, _a_t, _b_n, _b_t, _inverse_nn, _inverse_determinant = touching_circles(
             K, chain, first_joint(pair), second_joint(pair), half, second
         )
-        note_depth(T, depth)
+        raise_depth(T, depth)
         return wp.where(depth > ZERO, 1, 0)
 
     @wp.func
-    def go(K: wp.array2d(dtype=wp.float64), chain: Chain, key: int, link_a: int, link_b: int):
-        """The turn of a further contact; returns the number of impulses."""
+    def resolve_further(K: wp.array2d(dtype=wp.float64), chain: Chain, key: int, link_a: int, link_b: int):
+        """Resolves a further contact; returns the number of impulses."""
         _depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = touching_circles(
             K, chain, first_joint(pair_of(key)), second_joint(pair_of(key)), half_of(key), key & 1
         )
@@ -313,17 +312,17 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         lane: int,
         touching: int,
     ):
-        """All contacts; the board is filled. Returns this thread's impulses and leaves a barrier behind it.
+        """Resolves all contacts; the board is written. Returns this thread's impulses and ends with a barrier.
 
-        A thread keeps the geometry of its first contact in its columns of E and F; should there be more contacts than
-        threads, it works that of the others out again in their turn.
+        A thread keeps the geometry of its first contact in its columns of E and F. With more contacts than threads, the
+        geometry of the others is evaluated again when they are resolved.
         """
         impulses = int(0)
         owners = int(wp.static(touch.owners))
         next_owners = int(wp.static(touch.owners + touch.width))
         last_owners = int(wp.static(touch.owners + 2 * touch.width))
-        # both halves at once if that leaves a thread to each contact: the second after the first, so that contacts
-        # that go together are in few warps
+        # both halves at once if there is a thread for each contact; contacts of one half have neighbouring threads, so
+        # that those resolved in one round are in few warps
         contacts = 2 * touching
         in_turn = 4 * touching > wp.static(block_dim)
         if not in_turn:
@@ -342,7 +341,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
             k = lane + wp.static(block_dim)
             while k < contacts:
                 pair = pair_at(L, T, k >> 1)
-                touches = write_proximity(K, T, chain, pair, turn, k & 1)
+                touches = overlaps(K, T, chain, pair, turn, k & 1)
                 L[wp.static(lists.pending) + k] = touches
                 left += touches
                 if touches != 0:
@@ -352,8 +351,8 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
                 k += wp.static(block_dim)
             while barrier_if_any(T, wp.static(touch.votes), left > 0):
                 if own_key != DONE:
-                    if is_first(T, owners, own_a, own_b, own_key):
-                        impulses += go_prepared(K, E, F, chain, own_a, own_b, lane)
+                    if owns_links(T, owners, own_a, own_b, own_key):
+                        impulses += resolve_prepared(K, E, F, chain, own_a, own_b, lane)
                         left -= 1
                         own_key = DONE
                     else:
@@ -363,8 +362,8 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
                     if L[wp.static(lists.pending) + k] != 0:
                         key = contact_key(pair_at(L, T, k >> 1), turn, k & 1)
                         link_a, link_b = links_at(key, chain.link_count)
-                        if is_first(T, owners, link_a, link_b, key):
-                            impulses += go(K, chain, key, link_a, link_b)
+                        if owns_links(T, owners, link_a, link_b, key):
+                            impulses += resolve_further(K, chain, key, link_a, link_b)
                             left -= 1
                             L[wp.static(lists.pending) + k] = 0
                         else:

@@ -18,7 +18,7 @@ features = loop.Features(method=sys.argv[2], columns=200, fixed_body=sys.argv[3]
 wp.load_module(loop.make_advance(features).module, device="cpu")
 """
 
-COMMON = {"place_ends", "attempt", "greatest_opening", "greatest_speed", "greatest_displacement", "work_out"}
+COMMON = {"place_ends", "attempt", "greatest_opening", "greatest_speed", "greatest_displacement", "evaluate"}
 EXPLICIT = COMMON | {"begin_stages", "derivatives", "commit"}
 IMPLICIT = COMMON | {
     *("assemble", "first_right_hand_side", "place_stage", "pull_joints", "right_hand_side"),
