@@ -3,19 +3,7 @@
 import warp as wp
 
 from warpchain.kernels.contacts.impulse import collision_impulse, inverse_masses
-from warpchain.kernels.layout import (
-    INVERSE_INERTIA,
-    INVERSE_MASS,
-    LEFT_X,
-    LEFT_Y,
-    OMEGA,
-    RIGHT_X,
-    RIGHT_Y,
-    U,
-    V,
-    X,
-    Y,
-)
+from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, LEFT_X, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, U, V, X, Y
 from warpchain.kernels.physics.elementary import HALF, TWO, ZERO, quotient
 from warpchain.kernels.types import Chain
 

@@ -2,21 +2,7 @@
 
 import warp as wp
 
-from warpchain.kernels.layout import (
-    COSINE,
-    INERTIA,
-    LEFT_X,
-    LEFT_Y,
-    MASS,
-    OMEGA,
-    RIGHT_X,
-    RIGHT_Y,
-    SINE,
-    U,
-    V,
-    X,
-    Y,
-)
+from warpchain.kernels.layout import COSINE, INERTIA, LEFT_X, LEFT_Y, MASS, OMEGA, RIGHT_X, RIGHT_Y, SINE, U, V, X, Y
 from warpchain.kernels.physics.elementary import HALF, ZERO, from_order_key, order_key
 from warpchain.kernels.types import Chain
 

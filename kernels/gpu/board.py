@@ -4,7 +4,7 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.gpu.stage import Link, Place, read_link
-from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, MASS, OMEGA, RIGHT_X, RIGHT_Y, SINE, THETA, U, V, X, Y
+from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, MASS, RIGHT_X, RIGHT_Y, SINE, THETA, X
 from warpchain.kernels.physics.elementary import ZERO, cos_sin
 from warpchain.kernels.physics.geometry import end_positions
 from warpchain.kernels.types import Chain, State
@@ -74,24 +74,16 @@ def load_link(K: wp.array2d(dtype=wp.float64), state: State, world: int, lane: i
         K[row, lane] = ZERO
         row += 1
     if lane < n:
-        K[X, lane] = state.links[world, X, lane]
-        K[Y, lane] = state.links[world, Y, lane]
-        K[THETA, lane] = state.links[world, THETA, lane]
-        K[U, lane] = state.links[world, U, lane]
-        K[V, lane] = state.links[world, V, lane]
-        K[OMEGA, lane] = state.links[world, OMEGA, lane]
+        for k in range(6):
+            K[X + k, lane] = state.links[world, X + k, lane]
     point(K, lane)
 
 
 @wp.func
 def store_link(K: wp.array2d(dtype=wp.float64), state: State, world: int, lane: int):
     """Stores the state of a thread's link."""
-    state.links[world, X, lane] = K[X, lane]
-    state.links[world, Y, lane] = K[Y, lane]
-    state.links[world, THETA, lane] = K[THETA, lane]
-    state.links[world, U, lane] = K[U, lane]
-    state.links[world, V, lane] = K[V, lane]
-    state.links[world, OMEGA, lane] = K[OMEGA, lane]
+    for k in range(6):
+        state.links[world, X + k, lane] = K[X + k, lane]
 
 
 @wp.func

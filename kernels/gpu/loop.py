@@ -36,15 +36,7 @@ from warpchain.kernels.gpu.contacts.self_contacts import block_self_contacts, to
 from warpchain.kernels.gpu.explicit import explicit_attempt
 from warpchain.kernels.gpu.functions import shares_board
 from warpchain.kernels.gpu.sample import block_sample, write_step_bounds
-from warpchain.kernels.gpu.stage import (
-    Place,
-    block_stage,
-    error_of,
-    read_link,
-    vec3d,
-    vec5d,
-    write_first_stage,
-)
+from warpchain.kernels.gpu.stage import Place, block_stage, error_of, read_link, vec3d, vec5d, write_first_stage
 from warpchain.kernels.gpu.threads import barrier, barrier_if_any, block_maxima, clock, tile_address, vec4i
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step, step_controller
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
@@ -102,7 +94,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     growth, shrinkage = step_controller(method.order, method.error_order, wp.float32)
     build_list = block_list(columns, block_dim, features.broad_phase)
     clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, block_dim, touch)
-    values = layout.BOARD_VALUES
+    chain_values = layout.BOARD_VALUES
     softens = features.softens
     is_driven = features.is_driven
     present = present_chain(softens, is_driven)
@@ -204,17 +196,17 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 chain = softened(chain, control, state.softness[world])
             write_constants(K, chain)
             write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
-            K[values, layout.VALUE_OPENING] = state.extremes[world, layout.OPENING]
-            K[values, layout.VALUE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
-            K[values, layout.VALUE_LAST_IMPULSE] = state.watch[world, layout.LAST_FLOOR_IMPULSE]
-            K[values, layout.VALUE_STOP_TIME] = state.stop_time[world]
-            K[values, layout.VALUE_NEXT_SAMPLE] = wp.float64(state.next_sample[world]) * control.sample_interval
+            K[chain_values, layout.VALUE_OPENING] = state.extremes[world, layout.OPENING]
+            K[chain_values, layout.VALUE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
+            K[chain_values, layout.VALUE_LAST_IMPULSE] = state.watch[world, layout.LAST_FLOOR_IMPULSE]
+            K[chain_values, layout.VALUE_STOP_TIME] = state.stop_time[world]
+            K[chain_values, layout.VALUE_NEXT_SAMPLE] = wp.float64(state.next_sample[world]) * control.sample_interval
             T[wp.static(touch.fixed_hits)] = 0
             T[wp.static(touch.self_hits)] = 0
             T[wp.static(touch.deepest)] = 0
             T[wp.static(touch.is_late)] = 0
             T[wp.static(touch.votes)] = 0
-            K[values, layout.VALUE_DEADLINE] = clock() + control.launch_time
+            K[chain_values, layout.VALUE_DEADLINE] = clock() + control.launch_time
         barrier()  # the chain's constants are on the board
         publish(K, place)
         barrier()
@@ -247,7 +239,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         accepted = int(0)
         barrier()
         while status == RUNNING and attempts < attempts_left:
-            if time >= K[values, layout.VALUE_NEXT_SAMPLE]:
+            if time >= K[chain_values, layout.VALUE_NEXT_SAMPLE]:
                 softness = state.softness[world]
                 load_factor = state.load_factor[world]
                 publish(K, place)
@@ -264,19 +256,19 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                         evaluate_first_stage(forces, K, place, next_end)
                 if pauses or status != RUNNING:
                     break
-            stop_time = K[values, layout.VALUE_STOP_TIME]
+            stop_time = K[chain_values, layout.VALUE_STOP_TIME]
             if time >= stop_time:
                 status = state.stop_status[world]
                 break
 
             h = step
             if wp.static(has_contacts):
-                h = wp.min(h, wp.max(K[values, layout.VALUE_CONTACT_STEP], wp.float64(reach)))
+                h = wp.min(h, wp.max(K[chain_values, layout.VALUE_CONTACT_STEP], wp.float64(reach)))
             reaches_stop = time + h >= stop_time
             if reaches_stop:
                 h = stop_time - time
 
-            tolerance = K[values, layout.VALUE_TOLERANCE]
+            tolerance = K[chain_values, layout.VALUE_TOLERANCE]
             result = attempt(ends, forces, maxima_start, K, place, h)
             own_error = int(0)
             if lane < n:
@@ -298,7 +290,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 accepted += 1
                 if lane < n:
                     K[layout.BOARD_LOST_FRICTION, lane] = K[layout.BOARD_LOST_FRICTION, lane] + h * result.friction
-                    dissipation = K[values, layout.VALUE_DAMPING] * result.damping
+                    dissipation = K[chain_values, layout.VALUE_DAMPING] * result.damping
                     K[layout.BOARD_LOST_DAMPING, lane] = K[layout.BOARD_LOST_DAMPING, lane] + h * dissipation
                     K[layout.X, lane] = result.x
                     K[layout.Y, lane] = result.y
@@ -319,7 +311,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 opening = proximity.opening
                 gap = proximity.gap
                 if lane == 0:
-                    K[values, layout.VALUE_OPENING] = wp.max(K[values, layout.VALUE_OPENING], wp.float64(opening))
+                    K[chain_values, layout.VALUE_OPENING] = wp.max(
+                        K[chain_values, layout.VALUE_OPENING], wp.float64(opening)
+                    )
                 is_hit = bool(False)
                 is_near = bool(False)
                 is_stale = bool(False)
@@ -342,13 +336,13 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
                 if wp.static(has_fixed):
                     if gap < wp.float32(0.0) and lane == 0:
-                        K[values, layout.VALUE_FIXED_DEPTH] = wp.max(
-                            K[values, layout.VALUE_FIXED_DEPTH], wp.float64(-gap)
+                        K[chain_values, layout.VALUE_FIXED_DEPTH] = wp.max(
+                            K[chain_values, layout.VALUE_FIXED_DEPTH], wp.float64(-gap)
                         )
                         if wp.static(has_floor):
                             if is_hit:
-                                count_bounce(state, world, time, K[values, layout.VALUE_LAST_IMPULSE])
-                                K[values, layout.VALUE_LAST_IMPULSE] = time
+                                count_bounce(state, world, time, K[chain_values, layout.VALUE_LAST_IMPULSE])
+                                K[chain_values, layout.VALUE_LAST_IMPULSE] = time
                 if wp.static(has_self):
                     if is_stale:
                         if lane == 0:
@@ -394,11 +388,11 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             add_count(state, world, layout.REJECTED, wp.int64(attempts - accepted))
             add_count(state, world, fixed_count, wp.int64(T[wp.static(touch.fixed_hits)]))
             add_count(state, world, layout.SELF_IMPULSES, wp.int64(T[wp.static(touch.self_hits)]))
-            state.extremes[world, layout.OPENING] = K[values, layout.VALUE_OPENING]
+            state.extremes[world, layout.OPENING] = K[chain_values, layout.VALUE_OPENING]
             deepest = wp.cast(T[wp.static(touch.deepest)], wp.float32)
             raise_extreme(state, world, layout.SELF_DEPTH, wp.float64(deepest))
-            state.extremes[world, fixed_depth] = K[values, layout.VALUE_FIXED_DEPTH]
-            state.watch[world, layout.LAST_FLOOR_IMPULSE] = K[values, layout.VALUE_LAST_IMPULSE]
+            state.extremes[world, fixed_depth] = K[chain_values, layout.VALUE_FIXED_DEPTH]
+            state.watch[world, layout.LAST_FLOOR_IMPULSE] = K[chain_values, layout.VALUE_LAST_IMPULSE]
             state.is_fresh[world] = 0
             state.has_first_stage[world] = 1
             state.time_to_contact[world] = wp.float64(reach)

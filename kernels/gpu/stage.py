@@ -11,24 +11,8 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.layout import (
-    BOARD_FIRST,
-    BOARD_VALUES,
-    COSINE,
-    OMEGA,
-    SINE,
-    VALUE_COULOMB,
-    VALUE_DAMPING,
-    VALUE_GRAVITY,
-    VALUE_HALF_LENGTH,
-    VALUE_INVERSE_SMOOTHING,
-    VALUE_STIFFNESS,
-    VALUE_VISCOUS,
-    U,
-    V,
-    X,
-    Y,
-)
+from warpchain.kernels import layout
+from warpchain.kernels.layout import COSINE, OMEGA, SINE, U, V, X, Y
 from warpchain.kernels.methods.controller import error_scale, quick_quotient
 from warpchain.kernels.physics.elementary import order_bits_single
 from warpchain.kernels.physics.geometry import end_positions, end_velocities
@@ -119,7 +103,7 @@ def read_link(K: wp.array2d(dtype=wp.float64), column: int) -> Link:
     link.u = K[U, column]
     link.v = K[V, column]
     link.omega = K[OMEGA, column]
-    half_length = K[BOARD_VALUES, VALUE_HALF_LENGTH]
+    half_length = K[layout.BOARD_VALUES, layout.VALUE_HALF_LENGTH]
     link.arm_x = half_length * K[COSINE, column]
     link.arm_y = half_length * K[SINE, column]
     return link
@@ -128,23 +112,23 @@ def read_link(K: wp.array2d(dtype=wp.float64), column: int) -> Link:
 @wp.func
 def write_first_stage(K: wp.array2d(dtype=wp.float64), column: int, first: Rates, with_powers: bool):
     """Writes a link's first stage of the next step on the board."""
-    K[BOARD_FIRST, column] = first.x
-    K[BOARD_FIRST + 1, column] = first.y
-    K[BOARD_FIRST + 2, column] = first.theta
+    K[layout.BOARD_FIRST, column] = first.x
+    K[layout.BOARD_FIRST + 1, column] = first.y
+    K[layout.BOARD_FIRST + 2, column] = first.theta
     if with_powers:
-        K[BOARD_FIRST + 3, column] = first.friction
-        K[BOARD_FIRST + 4, column] = first.damping
+        K[layout.BOARD_FIRST + 3, column] = first.friction
+        K[layout.BOARD_FIRST + 4, column] = first.damping
 
 
 @wp.func
 def read_first_stage(K: wp.array2d(dtype=wp.float64), column: int) -> Rates:
     """A link's first stage, from the board; its powers are those of the last :func:`write_first_stage` with powers."""
     first = Rates()
-    first.x = K[BOARD_FIRST, column]
-    first.y = K[BOARD_FIRST + 1, column]
-    first.theta = K[BOARD_FIRST + 2, column]
-    first.friction = K[BOARD_FIRST + 3, column]
-    first.damping = K[BOARD_FIRST + 4, column]
+    first.x = K[layout.BOARD_FIRST, column]
+    first.y = K[layout.BOARD_FIRST + 1, column]
+    first.theta = K[layout.BOARD_FIRST + 2, column]
+    first.friction = K[layout.BOARD_FIRST + 3, column]
+    first.damping = K[layout.BOARD_FIRST + 4, column]
     return first
 
 
@@ -152,12 +136,12 @@ def read_first_stage(K: wp.array2d(dtype=wp.float64), column: int) -> Rates:
 def joint_constants(K: wp.array2d(dtype=wp.float64)) -> Chain:
     """Constants of joints, from the board; other fields, gravity among them, are 0."""
     chain = Chain()
-    chain.half_length = K[BOARD_VALUES, VALUE_HALF_LENGTH]
-    chain.joint_stiffness = K[BOARD_VALUES, VALUE_STIFFNESS]
-    chain.joint_damping = K[BOARD_VALUES, VALUE_DAMPING]
-    chain.viscous_friction = K[BOARD_VALUES, VALUE_VISCOUS]
-    chain.coulomb_friction = K[BOARD_VALUES, VALUE_COULOMB]
-    chain.inverse_smoothing = K[BOARD_VALUES, VALUE_INVERSE_SMOOTHING]
+    chain.half_length = K[layout.BOARD_VALUES, layout.VALUE_HALF_LENGTH]
+    chain.joint_stiffness = K[layout.BOARD_VALUES, layout.VALUE_STIFFNESS]
+    chain.joint_damping = K[layout.BOARD_VALUES, layout.VALUE_DAMPING]
+    chain.viscous_friction = K[layout.BOARD_VALUES, layout.VALUE_VISCOUS]
+    chain.coulomb_friction = K[layout.BOARD_VALUES, layout.VALUE_COULOMB]
+    chain.inverse_smoothing = K[layout.BOARD_VALUES, layout.VALUE_INVERSE_SMOOTHING]
     return chain
 
 
@@ -270,7 +254,7 @@ def block_stage(block_dim: int):
         damping = cu * cu + cv * cv
         forces[place.lane] = vec3d(force_x, force_y, torque)
         left = forces[place.before]
-        chain.gravity = K[BOARD_VALUES, VALUE_GRAVITY]
+        chain.gravity = K[layout.BOARD_VALUES, layout.VALUE_GRAVITY]
         rates = Rates()
         ax, ay, at = link_acceleration(
             chain,

@@ -43,25 +43,6 @@ def pushed(
 
 
 @wp.func
-def opening_of(
-    half_length: wp.float64,
-    x: wp.float64,
-    y: wp.float64,
-    cosine: wp.float64,
-    sine: wp.float64,
-    next_x: wp.float64,
-    next_y: wp.float64,
-    next_cosine: wp.float64,
-    next_sine: wp.float64,
-):
-    """Opening C [m] of the joint between a link and the next."""
-    return (
-        next_x - x - half_length * (cosine + next_cosine),
-        next_y - y - half_length * (sine + next_sine),
-    )
-
-
-@wp.func
 def opening_rate_of(
     half_length: wp.float64,
     u: wp.float64,

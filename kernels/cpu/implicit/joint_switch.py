@@ -15,9 +15,9 @@ import warp as wp
 
 from warpchain.kernels.cpu.implicit.rigid import GREATEST_RINGING, GREATEST_STRETCHING, rigid_joints
 from warpchain.kernels.cpu.implicit.rigid_flight import flight_memory
-from warpchain.kernels.cpu.implicit.rigid_layout import BASE, FORCE, force_layout, link_at
-from warpchain.kernels.cpu.implicit.solver import place_column, segment_places
-from warpchain.kernels.layout import THETA, X, Y
+from warpchain.kernels.cpu.implicit.rigid_layout import BASE, FORCE, force_layout
+from warpchain.kernels.cpu.implicit.solver import link_at, place_column, segment_places
+from warpchain.kernels.layout import X
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO
 from warpchain.kernels.types import Chain
 
@@ -44,8 +44,7 @@ def joint_switch(columns: int, first_row: int):
     openings, stretching = rigid.openings, rigid.stretching
     close, begin = rigid.close, rigid.begin
     kinetic_energy, are_stiff = rigid.kinetic_energy, rigid.are_stiff
-    memory = flight_memory(columns, first_row)
-    flight_rows, force_rows = memory.rows, memory.force_rows
+    flight_rows, force_rows, _ = flight_memory(columns, first_row)
     right = force_layout(columns).right
 
     @wp.func
@@ -105,9 +104,8 @@ def joint_switch(columns: int, first_row: int):
             while s < 8:
                 i = link_at(p, s, places, full, n)
                 c = 8 * p + 8 + s
-                K[X, i] = S[BASE, c]
-                K[Y, i] = S[wp.static(BASE + 1), c]
-                K[THETA, i] = S[wp.static(BASE + 2), c]
+                for k in range(3):
+                    K[wp.static(X + k), i] = S[wp.static(BASE + k), c]
                 s += 1
             p += 1
         return before - after

@@ -38,15 +38,15 @@ from warpchain.kernels.cpu.implicit.rigid_layout import (
     SPIN,
     TORQUE,
     force_layout,
-    link_at,
     pad_joints,
 )
 from warpchain.kernels.cpu.implicit.rosenbrock_layout import pad_behind
-from warpchain.kernels.cpu.implicit.solver import LANES, cyclic_solver, place_column, row_at, segment_places
-from warpchain.kernels.layout import OMEGA, STAGES, THETA, U, V, X, Y
+from warpchain.kernels.cpu.implicit.rosenbrock_system import opening
+from warpchain.kernels.cpu.implicit.solver import LANES, cyclic_solver, link_at, place_column, row_at, segment_places
+from warpchain.kernels.layout import STAGES, X
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, cos_sin, order_bits
 from warpchain.kernels.physics.joint import smoothed_torque
-from warpchain.kernels.physics.rigid_joint import inward_pull, opening_of, opening_rate_of, pushed, turning_share
+from warpchain.kernels.physics.rigid_joint import inward_pull, opening_rate_of, pushed, turning_share
 from warpchain.kernels.types import Chain
 
 wp.set_module_options({"enable_backward": False})
@@ -128,12 +128,8 @@ def rigid_joints(columns: int) -> RigidJoints:
             while s < 8:
                 i = link_at(p, s, places, full, n)
                 c = 8 * p + 8 + s
-                S[BASE, c] = K[X, i]
-                S[wp.static(BASE + 1), c] = K[Y, i]
-                S[wp.static(BASE + 2), c] = K[THETA, i]
-                S[wp.static(BASE + 3), c] = K[U, i]
-                S[wp.static(BASE + 4), c] = K[V, i]
-                S[wp.static(BASE + 5), c] = K[OMEGA, i]
+                for k in range(6):
+                    S[wp.static(BASE + k), c] = K[wp.static(X + k), i]
                 inner = i % 2 == 0
                 mass = wp.where(inner, chain.inner_mass, chain.outer_mass)
                 inertia = wp.where(inner, chain.inner_inertia, chain.outer_inertia)
@@ -157,12 +153,8 @@ def rigid_joints(columns: int) -> RigidJoints:
             while s < 8:
                 i = link_at(p, s, places, full, n)
                 c = 8 * p + 8 + s
-                K[X, i] = S[BASE, c]
-                K[Y, i] = S[wp.static(BASE + 1), c]
-                K[THETA, i] = S[wp.static(BASE + 2), c]
-                K[U, i] = S[wp.static(BASE + 3), c]
-                K[V, i] = S[wp.static(BASE + 4), c]
-                K[OMEGA, i] = S[wp.static(BASE + 5), c]
+                for k in range(6):
+                    K[wp.static(X + k), i] = S[wp.static(BASE + k), c]
                 for k in range(3):
                     K[wp.static(STAGES + k), i] = S[wp.static(BASE_RATE + k), c]
                 s += 1
@@ -276,7 +268,6 @@ def rigid_joints(columns: int) -> RigidJoints:
 
     @wp.func
     def openings(S: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int):
-        a = chain.half_length
         end = place_column(places + 1)
         c = int(8)
         while c < end:
@@ -291,17 +282,7 @@ def rigid_joints(columns: int) -> RigidJoints:
         c = int(8)
         while c < end:
             repeats = c < 16 and c >= 8 + full
-            cx, cy = opening_of(
-                a,
-                S[BASE, c],
-                S[wp.static(BASE + 1), c],
-                S[COSINE, c],
-                S[SINE, c],
-                S[BASE, c + 8],
-                S[wp.static(BASE + 1), c + 8],
-                S[COSINE, c + 8],
-                S[SINE, c + 8],
-            )
+            cx, cy = opening(S, chain, c, BASE, COSINE)
             S[wp.static(right), c] = wp.where(repeats, ZERO, cx)
             S[wp.static(right + 1), c] = wp.where(repeats, ZERO, cy)
             greatest = wp.max(greatest, order_bits(cx * cx + cy * cy))

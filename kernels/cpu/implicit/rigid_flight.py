@@ -18,8 +18,6 @@ in a prototype: 0.05 gained nothing, and 1 made larger errors than it saved step
 """
 
 import functools
-from dataclasses import dataclass
-from typing import Any
 
 import warp as wp
 
@@ -40,12 +38,19 @@ from warpchain.kernels.cpu.implicit.rigid_layout import (
     STAGE_V,
     TORQUE,
     force_layout,
-    link_at,
     pad_joints,
 )
 from warpchain.kernels.cpu.implicit.rosenbrock import GREATEST_TURN
 from warpchain.kernels.cpu.implicit.rosenbrock_layout import pad_behind
-from warpchain.kernels.cpu.implicit.solver import LANES, SegmentLayout, cyclic_solver, place_column, segment_places
+from warpchain.kernels.cpu.implicit.solver import (
+    LANES,
+    SegmentLayout,
+    cyclic_solver,
+    link_at,
+    place_column,
+    segment_places,
+    view,
+)
 from warpchain.kernels.layout import LOST_FRICTION
 from warpchain.kernels.methods.controller import error_bits
 from warpchain.kernels.methods.w_tableaus import ROS34PW2
@@ -77,52 +82,23 @@ def flight_rows(columns: int) -> int:
     return -(-doubles // columns)
 
 
-@dataclass(frozen=True)
-class FlightMemory:
-    """Warp functions ``(K)`` → views of a flight's memory in a chain's scratch.
-
-    Attributes:
-        rows: The rows in segment order.
-        force_rows: The separators' rows of S.
-        friction_rows: The separators' rows of the stages' system.
-    """
-
-    rows: Any
-    force_rows: Any
-    friction_rows: Any
-
-
 @functools.cache
-def flight_memory(columns: int, first_row: int) -> FlightMemory:
-    """Memory of flights from ``first_row`` on, in scratch of this width."""
+def flight_memory(columns: int, first_row: int):
+    """Views of flights' memory from ``first_row`` on, in scratch of this width.
+
+    Returns:
+        (the rows in segment order, the separators' rows of S, the separators' rows of the stages' system).
+    """
     forces, friction = force_layout(columns), friction_layout(columns)
     count, width = FLIGHT_SYSTEM + 48, forces.columns
-    force_count, friction_count = forces.separator_rows, friction.separator_rows
     offset = 8 * first_row * columns
     force_offset = offset + 8 * count * width
-    friction_offset = force_offset + 8 * LANES * force_count
-
-    @wp.func
-    def rows(K: wp.array2d(dtype=wp.float64)):
-        return wp.array(
-            ptr=K.ptr + wp.uint64(wp.static(offset)), shape=(wp.static(count), wp.static(width)), dtype=wp.float64
-        )
-
-    @wp.func
-    def force_rows(K: wp.array2d(dtype=wp.float64)):
-        return wp.array(
-            ptr=K.ptr + wp.uint64(wp.static(force_offset)), shape=(wp.static(force_count), LANES), dtype=wp.float64
-        )
-
-    @wp.func
-    def friction_rows(K: wp.array2d(dtype=wp.float64)):
-        return wp.array(
-            ptr=K.ptr + wp.uint64(wp.static(friction_offset)),
-            shape=(wp.static(friction_count), LANES),
-            dtype=wp.float64,
-        )
-
-    return FlightMemory(rows, force_rows, friction_rows)
+    friction_offset = force_offset + 8 * LANES * forces.separator_rows
+    return (
+        view(offset, count, width),
+        view(force_offset, forces.separator_rows, LANES),
+        view(friction_offset, friction.separator_rows, LANES),
+    )
 
 
 @functools.cache
@@ -140,8 +116,7 @@ def flight_method(columns: int, first_row: int):
     rigid = rigid_joints(columns)
     factorise, solve_forces = rigid.factorise, rigid.solve_forces
     close, begin, store, are_stiff = rigid.close, rigid.begin, rigid.store, rigid.are_stiff
-    memory = flight_memory(columns, first_row)
-    flight_rows_of, force_rows_of, friction_rows_of = memory.rows, memory.force_rows, memory.friction_rows
+    flight_rows_of, force_rows_of, friction_rows_of = flight_memory(columns, first_row)
     factor, solve = cyclic_solver(friction)
     lower, diagonal, upper = (friction.submatrix(k) for k in range(3))
     right = friction.right

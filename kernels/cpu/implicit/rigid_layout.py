@@ -7,7 +7,7 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.cpu.implicit.solver import SegmentLayout, row_at, segment_columns
+from warpchain.kernels.cpu.implicit.solver import SegmentLayout, segment_columns
 
 wp.set_module_options({"enable_backward": False})
 
@@ -31,13 +31,6 @@ ROWS_OF_RIGID = SYSTEM + 22
 def force_layout(columns: int) -> SegmentLayout:
     """Layout of the system S F = r, for scratch of this width."""
     return SegmentLayout(size=2, columns=segment_columns(columns), matrix=SYSTEM, right=SYSTEM + 20)
-
-
-@wp.func
-def link_at(place: int, segment: int, places: int, full: int, link_count: int):
-    """Link that lies at this place."""
-    row = row_at(place, segment, places, full)
-    return wp.where(row >= link_count, row - link_count, row)
 
 
 @functools.cache

@@ -59,9 +59,17 @@ from warpchain.kernels.cpu.implicit.rosenbrock_system import (
     pull_joints,
     right_hand_side,
 )
-from warpchain.kernels.cpu.implicit.solver import LANES, cyclic_solver, place_column, row_at, segment_places
+from warpchain.kernels.cpu.implicit.solver import (
+    LANES,
+    cyclic_solver,
+    link_at,
+    place_column,
+    row_at,
+    segment_places,
+    view,
+)
 from warpchain.kernels.layout import INERTIA as LINK_INERTIA
-from warpchain.kernels.layout import LOST_DAMPING, LOST_FRICTION, OMEGA, STAGE_ROWS, STAGES, THETA, U, V, X, Y
+from warpchain.kernels.layout import LOST_DAMPING, LOST_FRICTION, STAGE_ROWS, STAGES, X
 from warpchain.kernels.layout import MASS as LINK_MASS
 from warpchain.kernels.methods.controller import error_bits
 from warpchain.kernels.methods.rosenbrock_tableaus import ROSENBROCK_TABLES
@@ -105,31 +113,10 @@ def rosenbrock_method(name: str, columns: int):
     factor, solve = cyclic_solver(segments)
     width = segments.columns
     rows = FIRST_STAGE_ROW + 3 * stages
-    separator_rows = segments.separator_rows
     first_row = STAGES + STAGE_ROWS
     offset = 8 * first_row * columns
-    separator_offset = offset + 8 * rows * width
-
-    @wp.func
-    def segment_rows(K: wp.array2d(dtype=wp.float64)):
-        return wp.array(
-            ptr=K.ptr + wp.uint64(wp.static(offset)), shape=(wp.static(rows), wp.static(width)), dtype=wp.float64
-        )
-
-    @wp.func
-    def separator_rows_of(K: wp.array2d(dtype=wp.float64)):
-        return wp.array(
-            ptr=K.ptr + wp.uint64(wp.static(separator_offset)),
-            shape=(wp.static(separator_rows), LANES),
-            dtype=wp.float64,
-        )
-
-    @wp.func
-    def first_link(segment: int, places: int, full: int, link_count: int):
-        """Link at the first place of a segment."""
-        row = row_at(0, segment, places, full)
-        return wp.where(row >= link_count, row - link_count, row)
-
+    segment_rows = view(offset, rows, width)
+    separator_rows_of = view(offset + 8 * rows * width, segments.separator_rows, LANES)
     behind_start = pad_behind((*range(BASE, BASE + 6), BASE_COSINE, BASE_SINE))
     behind_stage = pad_behind((NEW, NEW + 1, NEW + 3, NEW + 4, NEW + 5, COSINE, SINE, SHIFT, SHIFT + 1, SHIFT + 2))
     behind_rate = pad_behind((BASE_RATE + 2,))
@@ -148,15 +135,11 @@ def rosenbrock_method(name: str, columns: int):
         # segment by segment, in each of which links follow one another
         s = int(0)
         while s < 8:
-            i = int(first_link(s, places, full, n))
+            i = int(link_at(0, s, places, full, n))
             c = 8 + s
             while c < end:
-                S[BASE, c] = K[X, i]
-                S[wp.static(BASE + 1), c] = K[Y, i]
-                S[wp.static(BASE + 2), c] = K[THETA, i]
-                S[wp.static(BASE + 3), c] = K[U, i]
-                S[wp.static(BASE + 4), c] = K[V, i]
-                S[wp.static(BASE + 5), c] = K[OMEGA, i]
+                for k in range(6):
+                    S[wp.static(BASE + k), c] = K[wp.static(X + k), i]
                 S[MASS, c] = K[LINK_MASS, i]
                 S[INERTIA, c] = K[LINK_INERTIA, i]
                 S[COUNTED, c] = wp.where((c < 16 and s >= full) or row_at(c // 8 - 1, s, places, full) >= n, ZERO, ONE)
@@ -362,15 +345,11 @@ def rosenbrock_method(name: str, columns: int):
             c += 1
         s = int(0)
         while s < 8:
-            i = int(first_link(s, places, full, n))
+            i = int(link_at(0, s, places, full, n))
             c = 8 + s
             while c < end:
-                K[X, i] = S[NEW, c]
-                K[Y, i] = S[wp.static(NEW + 1), c]
-                K[THETA, i] = S[wp.static(NEW + 2), c]
-                K[U, i] = S[wp.static(NEW + 3), c]
-                K[V, i] = S[wp.static(NEW + 4), c]
-                K[OMEGA, i] = S[wp.static(NEW + 5), c]
+                for k in range(6):
+                    K[wp.static(X + k), i] = S[wp.static(NEW + k), c]
                 K[LOST_FRICTION, i] = K[LOST_FRICTION, i] + S[POWER_FRICTION, c + 8]
                 K[LOST_DAMPING, i] = K[LOST_DAMPING, i] + S[POWER_DAMPING, c + 8]
                 i = wp.where(i == n - 1, 0, i + 1)

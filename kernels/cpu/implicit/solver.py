@@ -61,6 +61,18 @@ def segment_columns(links: int) -> int:
     return LANES * max(places + 1 - places % 2, 5)
 
 
+def view(offset: int, rows: int, columns: int):
+    """Warp function ``at(K)`` → (rows, columns) numbers that lie at an offset [B] in a chain's scratch."""
+
+    @wp.func
+    def at(K: wp.array2d(dtype=wp.float64)):
+        return wp.array(
+            ptr=K.ptr + wp.uint64(wp.static(offset)), shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64
+        )
+
+    return at
+
+
 @wp.func
 def segment_places(link_count: int):
     """(places P of a segment, number of segments that are not short, number of rows solved for).
@@ -76,6 +88,13 @@ def segment_places(link_count: int):
 def row_at(place: int, segment: int, places: int, full: int):
     """Row of the loop at this place; ``full``: number of segments that are not short."""
     return segment * places + place - wp.max(segment + 1 - full, 0)
+
+
+@wp.func
+def link_at(place: int, segment: int, places: int, full: int, link_count: int):
+    """Link that lies at this place."""
+    row = row_at(place, segment, places, full)
+    return wp.where(row >= link_count, row - link_count, row)
 
 
 @wp.func

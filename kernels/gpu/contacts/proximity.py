@@ -4,25 +4,13 @@ import functools
 
 import warp as wp
 
+from warpchain.kernels import layout
 from warpchain.kernels.contacts.fixed_body import meet_floor, meet_sprocket, sprocket_turning
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import ends_of
 from warpchain.kernels.gpu.stage import Link, Place, Proximity, read_link, vec5d
 from warpchain.kernels.gpu.threads import block_maxima, vec4i
-from warpchain.kernels.layout import (
-    BOARD_LISTED_X,
-    BOARD_LISTED_Y,
-    BOARD_LOST_FIXED,
-    BOARD_VALUES,
-    INVERSE_INERTIA,
-    INVERSE_MASS,
-    OMEGA,
-    VALUE_CIRCLE_RADIUS,
-    VALUE_HALF_LENGTH,
-    VALUE_SPROCKET_RADIUS,
-    U,
-    V,
-)
+from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, OMEGA, U, V
 from warpchain.kernels.methods.controller import quick_quotient, quick_root
 from warpchain.kernels.physics.elementary import TWO, from_order_key_single, order_bits_single, order_key_single
 from warpchain.kernels.types import Chain, Control, Drive
@@ -47,6 +35,7 @@ def block_proximity(features: Features, block_dim: int):
     has_self = features.self_contact
     has_contacts = has_fixed or has_self
     meet = meet_sprocket if has_sprocket else meet_floor
+    chain_values = layout.BOARD_VALUES
     _maximum, write_maxima, read_maxima = block_maxima(block_dim)
 
     @wp.func
@@ -65,18 +54,22 @@ def block_proximity(features: Features, block_dim: int):
             cy = next_end[1] - right_y
             values[0] = order_bits_single(wp.float32(cx * cx + cy * cy))
             if wp.static(has_floor):
-                gap = wp.min(left_y, right_y) - K[BOARD_VALUES, VALUE_CIRCLE_RADIUS]
+                gap = wp.min(left_y, right_y) - K[chain_values, layout.VALUE_CIRCLE_RADIUS]
                 values[1] = order_key_single(wp.float32(-gap))
             if wp.static(has_sprocket):
                 square = wp.min(left_x * left_x + left_y * left_y, right_x * right_x + right_y * right_y)
-                gap = wp.sqrt(square) - K[BOARD_VALUES, VALUE_SPROCKET_RADIUS] - K[BOARD_VALUES, VALUE_CIRCLE_RADIUS]
+                gap = (
+                    wp.sqrt(square)
+                    - K[chain_values, layout.VALUE_SPROCKET_RADIUS]
+                    - K[chain_values, layout.VALUE_CIRCLE_RADIUS]
+                )
                 values[1] = order_key_single(wp.float32(-gap))
             if wp.static(has_self):
-                dx = right_x - K[BOARD_LISTED_X, place.lane]
-                dy = right_y - K[BOARD_LISTED_Y, place.lane]
+                dx = right_x - K[layout.BOARD_LISTED_X, place.lane]
+                dy = right_y - K[layout.BOARD_LISTED_Y, place.lane]
                 values[2] = order_bits_single(wp.float32(dx * dx + dy * dy))
             if wp.static(has_contacts):
-                turn = K[BOARD_VALUES, VALUE_HALF_LENGTH] * link.omega
+                turn = K[chain_values, layout.VALUE_HALF_LENGTH] * link.omega
                 speed = TWO * (link.u * link.u + link.v * link.v + turn * turn)
                 values[3] = order_bits_single(wp.float32(speed))
         write_maxima(memory, place.lane, values)
@@ -135,7 +128,7 @@ def block_proximity(features: Features, block_dim: int):
         K[U, place.lane] = u
         K[V, place.lane] = v
         K[OMEGA, place.lane] = omega
-        K[BOARD_LOST_FIXED, place.lane] = K[BOARD_LOST_FIXED, place.lane] + lost_left + lost_right
+        K[layout.BOARD_LOST_FIXED, place.lane] = K[layout.BOARD_LOST_FIXED, place.lane] + lost_left + lost_right
         return int(hits)
 
     return write_proximity, read_proximity, time_to_contact, meet_fixed_body
