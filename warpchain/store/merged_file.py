@@ -144,9 +144,8 @@ def _motions(block: BlockResult) -> Iterator[tuple[int, Motion]]:
     walks = block.columns["index"].ravel()[places].tolist()
     first = walks[0] - int(places[0])
     manifest = block.motions.manifest
-    for _, group in groupby(walks, manifest.shard_of):
-        members = list(group)
-        found = read_motions(block.motions.directory, manifest, range(members[0], members[-1] + 1))
+    for _, group in groupby(walks, lambda walk: manifest.shard_of(manifest.place(walk))):
+        found = read_motions(block.motions.directory, manifest, list(group))
         yield from ((walk - first, motion) for walk, motion in found.items())
 
 
