@@ -239,7 +239,7 @@ def test_a_dask_worker_may_be_killed(tmp_path, uninterrupted):
                 os.kill(pids[0], signal.SIGKILL)
                 killed.append(progress.done)
 
-        result = sweep(content, tmp_path / "sweep", executor=client.get_executor(), workers=2, on_progress=kill_once)
+        result = sweep(content, tmp_path / "sweep", executor=client, on_progress=kill_once)
         after = set(client.run(os.getpid).values())
     assert killed and killed[0] < 80
     assert pids[0] not in after
@@ -273,6 +273,18 @@ def test_a_dask_cluster_of_separate_processes(tmp_path, uninterrupted):
                 process.wait()
     assert "80 time_limit" in done.stdout, done.stderr
     assert data_of(tmp_path / "sweep") == uninterrupted
+
+
+def test_a_dask_client_is_an_executor(tmp_path, uninterrupted):
+    """`executor=` takes a Dask client or what it gives as an executor: the bytes are the same."""
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        for name, executor in (("client", client), ("executor", client.get_executor())):
+            sweep(TINY, tmp_path / name, executor=executor)
+            assert data_of(tmp_path / name) == uninterrupted
 
 
 def wait_for_workers(where: Path, count: int) -> str:

@@ -11,7 +11,7 @@ import typer
 from warpchain.cli import completions
 
 if TYPE_CHECKING:
-    from warpchain.run.sweep_run import Executor
+    from warpchain.run.sweep_run import DaskClient, Executor
     from warpchain.store.sweep_result import SweepResult
 
 FAILED: Final = 1
@@ -190,8 +190,8 @@ def add_commands(app: typer.Typer) -> None:
 
 
 @contextlib.contextmanager
-def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[tuple[Executor | None, int | None]]":
-    """An executor on GPUs or on a Dask cluster, and its number of workers; (None, None) if neither is asked for.
+def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[tuple[Executor | DaskClient | None, int | None]]":
+    """Workers on GPUs, and their number, or the client of a Dask cluster; (None, None) if neither is asked for.
 
     Raises:
         InputError: there are not so many GPUs, Dask is not installed, or the scheduler does not answer.
@@ -203,7 +203,7 @@ def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[tuple[Execut
             yield executor, gpus
     elif scheduler is not None:
         with _dask_client(scheduler) as client:
-            yield client.get_executor(), sum(client.nthreads().values())
+            yield client, None
     else:
         yield None, None
 

@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from warpchain.engine.kernel_choice import shared_threads
 from warpchain.engine.processors import processors
@@ -48,6 +48,19 @@ class Executor(Protocol):
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any) -> "concurrent.futures.Future[Any]":
         """Run ``function(*arguments)`` somewhere."""
+        ...
+
+
+@runtime_checkable
+class DaskClient(Protocol):
+    """What is used of ``distributed.Client``, which has no such method ``submit`` as executors have."""
+
+    def get_executor(self) -> Executor:
+        """An executor on the workers."""
+        ...
+
+    def nthreads(self) -> Mapping[str, int]:
+        """Number of threads of each worker."""
         ...
 
 
@@ -87,7 +100,7 @@ def sweep(
     out: str | os.PathLike[str],
     *,
     device: str | None = None,
-    executor: Executor | None = None,
+    executor: "Executor | DaskClient | None" = None,
     workers: int | None = None,
     fresh: bool = False,
     on_progress: Callable[[SweepProgress], None] | None = None,
@@ -100,9 +113,11 @@ def sweep(
             with more samples than the folder, and else the same, adds them; latin hypercubes do not grow.
         device: ``"cpu"``, ``"cuda"`` or ``"cuda:N"`` instead of what the sweep says. Method ``standard`` is then what
             it means there; the ``sweep.yaml`` of a folder names the method that was run, which stays.
-        executor: Where shards are run; its workers must see ``out``. Default: threads of this process.
+        executor: Where shards are run, an executor or a Dask client; its workers must see ``out``. Default: threads of
+            this process.
         workers: Number of tasks at a time. Default: the processors of this machine, and two on a GPU, each of which
-            runs thousands of walks. With an executor, at least the number of its workers.
+            runs thousands of walks; with a Dask client the threads of its workers. With an executor, at least the
+            number of its workers.
         fresh: Delete what another sweep left in the folder.
         on_progress: Called before kernels are compiled, when the walks begin and after each shard.
 
@@ -119,6 +134,9 @@ def sweep(
         planned = on_device(planned, device)
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
         raise InputError(f"workers: {workers!r} is not a number of workers; give a whole number from 1")
+    if isinstance(executor, DaskClient):
+        workers = workers or sum(executor.nthreads().values())
+        executor = executor.get_executor()
     at_once = workers or (GPU_WORKERS if _is_on_gpu(planned) else processors())
     with SweepFolder.open(Path(out), planned, fresh=fresh, shard_size=shard_size(planned.walk_count)) as store:
         missing = store.missing()
