@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 FAILED: Final = 1
 """Exit status of a command whose walks failed."""
 
+LOG_EVERY: Final = 30.0
+"""Time [s] between two lines of progress where there is no terminal."""
+
 SWEEP_FILE: Final = typer.Argument(
     metavar="FILE.yaml",
     help="The sweep, or the bare name of one that comes with warpchain, such as figure6.",
@@ -78,7 +81,7 @@ def sweep(
         if device not in (None, "cuda"):
             raise InputError(f"--device: {device} is given together with --gpus; give cuda, or leave one out")
         device = "cuda"
-    with status_line() as show, _executor(gpus, scheduler) as (executor, count):
+    with status_line(LOG_EVERY) as show, _executor(gpus, scheduler) as (executor, count):
         result = run(
             source,
             output,
@@ -110,9 +113,10 @@ def _write_new(path: Path, *, alone: bool) -> None:
 def info(directory: Folder, as_json: AsJson = False) -> None:
     """Show how far a sweep is and what it has found so far."""
     from warpchain.cli.terminal import print_sweep
+    from warpchain.store.folder import running_rate
     from warpchain.store.sweep_result import load
 
-    print_sweep(load(directory), as_json)
+    print_sweep(load(directory), as_json, running_rate(directory))
 
 
 def plot(

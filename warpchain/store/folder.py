@@ -17,6 +17,7 @@ import re
 import secrets
 import shutil
 import socket
+import time
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -174,6 +175,28 @@ def read_rows(directory: Folder, manifest: Manifest) -> Rows:
         parts[-1]["index"] = manifest.walks(places)
     rows = np.concatenate(parts)
     return rows[np.argsort(rows["index"])]
+
+
+def running_rate(directory: Folder) -> float | None:
+    """Walks per second that the process that runs a sweep has written since it began; None if none runs it.
+
+    The times of the files tell: a run writes the lock when it begins, and then its shards.
+
+    Raises:
+        OSError: the folder cannot be read.
+        InputError: there is no sweep in it.
+    """
+    present = present_shards(directory, read_manifest(directory))
+    try:
+        with (Path(directory) / "lock").open("rb") as lock:
+            began = os.fstat(lock.fileno()).st_mtime
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        done = sum(len(places) for places, path in present.items() if path.stat().st_mtime >= began)
+        return done / max(time.time() - began, 1e-3)
+    except FileNotFoundError:
+        pass
+    return None
 
 
 def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Manifest:
