@@ -177,13 +177,18 @@ def report(
 
 
 def merge(
-    directory: Folder,
+    directories: Annotated[
+        list[Path], typer.Argument(metavar="DIR...", help="Folder of a sweep, or several.", show_default=False)
+    ],
     output: Annotated[Path, typer.Argument(metavar="FILE.h5", help="The file to write.", show_default=False)],
 ) -> None:
-    """Put all results into one HDF5 file with named axes and units, which xarray opens."""
+    """Put all results into one HDF5 file with named axes and units, which xarray opens.
+
+    Folders of the same sweep with different seeds are put together: their samples stand one behind the other.
+    """
     from warpchain.store.merged_file import merge as merge_shards
 
-    merge_shards(directory, output)
+    merge_shards(directories, output)
     print(output)
 
 

@@ -228,6 +228,10 @@ class Manifest:
         start = place - (place - parts[0].places.start) % size
         return range(start, min(start + size, parts[-1].places.stop))
 
+    def shard_with(self, walk: int) -> range:
+        """The places of the shard that has a walk, given its number."""
+        return self.shard_of(self.place(walk))
+
     def digests_of(self, place: int) -> list[str]:
         """The digests of the generations up to that of a place: together they name the content of its shard."""
         return [generation.digest for generation in self.generations[: self._generation_of(place) + 1]]

@@ -141,7 +141,7 @@ def read_motions(directory: Folder, manifest: Manifest, walks: Sequence[int]) ->
         OSError: the file cannot be read.
         InputError: the file is damaged or belongs to another sweep.
     """
-    with _opened(directory, manifest, manifest.shard_of(manifest.place(walks[0]))) as file:
+    with _opened(directory, manifest, manifest.shard_with(walks[0])) as file:
         return {walk: read_motion(file, manifest.place(walk)) for walk in walks}
 
 
