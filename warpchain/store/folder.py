@@ -48,7 +48,8 @@ _DISCARDED: Final = re.compile(r"\.discarded-[0-9a-f]{8}")
 _HOLDER: Final = re.compile(r"process \d+ on \S*")
 
 _YAML_HEAD: Final = """\
-# The sweep of this folder with all its values. A changed copy of it needs another folder.
+# The sweep of this folder with all its values. A copy with more samples adds them to this folder; a copy that is
+# changed otherwise needs another folder.
 # It names the method that was run: for the one that suits another device, give a copy of it method: standard.
 """
 
