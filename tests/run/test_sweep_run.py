@@ -21,6 +21,7 @@ from warpchain.inputs.setup import Setup
 from warpchain.run.single_walk import setup_walk
 from warpchain.run.sweep_run import run_shards, shard_size, sweep
 from warpchain.status import Status
+from warpchain.store.manifest import Manifest
 from warpchain.sweeps.plan import load_sweep
 from warpchain.walks.scheduler import run_setups
 
@@ -128,7 +129,7 @@ def test_progress_tells_when_the_walks_begin(tmp_path):
 def test_progress_shows_the_shards_of_a_task_under_way(tmp_path, monkeypatch, uninterrupted):
     """With all shards in one task, each is counted once, and most of them before the task is over."""
     monkeypatch.setattr(runner, "POLL", 0.01)
-    monkeypatch.setattr(runner, "_tasks", lambda planned, missing, workers: iter([list(missing)]))
+    monkeypatch.setattr(runner, "_tasks", lambda planned, manifest, missing, workers: iter([list(missing)]))
     seen = []
     sweep(TINY, tmp_path / "sweep", workers=1, on_progress=lambda p: seen.append((p.done, sum(p.statuses.values()))))
     assert all(done == counted for done, counted in seen)
@@ -142,7 +143,7 @@ def test_walks_are_drawn_when_they_begin(tmp_path, monkeypatch):
     draw, write = type(planned).drawn, runner.write_shard
     monkeypatch.setattr(type(planned), "drawn", lambda self, walk: events.append(walk.index) or draw(self, walk))
     monkeypatch.setattr(runner, "write_shard", lambda *given: events.append("written") or write(*given))
-    monkeypatch.setattr(runner, "_tasks", lambda planned, missing, workers: iter([list(missing)]))
+    monkeypatch.setattr(runner, "_tasks", lambda planned, manifest, missing, workers: iter([list(missing)]))
     monkeypatch.setattr(runner, "prepare", lambda planned: None)
     sweep(TINY, tmp_path / "sweep", workers=1)
     drawn = [event for event in events if event != "written"]
@@ -238,7 +239,7 @@ def test_a_dask_worker_may_be_killed(tmp_path, uninterrupted):
                 os.kill(pids[0], signal.SIGKILL)
                 killed.append(progress.done)
 
-        result = sweep(content, tmp_path / "sweep", executor=client.get_executor(), workers=2, on_progress=kill_once)
+        result = sweep(content, tmp_path / "sweep", executor=client, on_progress=kill_once)
         after = set(client.run(os.getpid).values())
     assert killed and killed[0] < 80
     assert pids[0] not in after
@@ -272,6 +273,18 @@ def test_a_dask_cluster_of_separate_processes(tmp_path, uninterrupted):
                 process.wait()
     assert "80 time_limit" in done.stdout, done.stderr
     assert data_of(tmp_path / "sweep") == uninterrupted
+
+
+def test_a_dask_client_is_an_executor(tmp_path, uninterrupted):
+    """`executor=` takes a Dask client or what it gives as an executor: the bytes are the same."""
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        for name, executor in (("client", client), ("executor", client.get_executor())):
+            sweep(TINY, tmp_path / name, executor=executor)
+            assert data_of(tmp_path / name) == uninterrupted
 
 
 def wait_for_workers(where: Path, count: int) -> str:
@@ -310,7 +323,7 @@ def test_tasks_of_gpus_are_alike(monkeypatch: pytest.MonkeyPatch) -> None:
     missing = [range(first, first + 8) for first in range(0, planned.walk_count, 8)]
     for most, workers, count in ((1000, 3, 3), (60, 2, 4), (1000, 40, 30)):
         monkeypatch.setattr(runner, "GPU_TASK_WALKS", most)
-        tasks = list(runner._tasks(planned, missing, workers))
+        tasks = list(runner._tasks(planned, Manifest.of(planned, 8), missing, workers))
         assert len(tasks) == count
         assert sorted((shard for task in tasks for shard in task), key=lambda shard: shard.start) == missing
         assert max(sum(map(len, task)) for task in tasks) <= most + 8

@@ -91,9 +91,10 @@ def make_sweep(folder: Path, content: Mapping[str, object], outcome: Outcome = d
     with SweepFolder.open(folder, sweep, shard_size=1 if None in outcomes else len(walks)) as store:
         for shard in store.missing():
             rows = empty_rows(sweep, shard)
-            for place, index in enumerate(shard):
+            indices = store.manifest.walks(shard).tolist()
+            for row, index in enumerate(indices):
                 if (given := outcomes[index]) is not None:
-                    fill_row(walks[index], given, rows[place : place + 1])
-            if outcomes[shard.start] is not None:
+                    fill_row(walks[index], given, rows[row : row + 1])
+            if outcomes[indices[0]] is not None:
                 write_shard(store.directory, store.manifest.digest, shard, rows)
     return load(folder)

@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -56,11 +57,16 @@ class SyntheticSweep:
     def canonical(self) -> dict[str, Any]:
         """All that there is."""
         plain: dict[str, Any] = json.loads(json.dumps(asdict(self)))
+        for block in plain["blocks"]:
+            block["sampler"] = "random"
         return plain
 
-    def digest(self) -> str:
-        """SHA-256 of all but the name."""
+    def digest(self, samples: Sequence[int] | None = None) -> str:
+        """SHA-256 of all but the name, with these samples of each block if they are given."""
         content = {name: value for name, value in self.canonical().items() if name != "name"}
+        for number, block in enumerate(content["blocks"]):
+            del block["first"]
+            block["samples"] = block["samples"] if samples is None else samples[number]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 

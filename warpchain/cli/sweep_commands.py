@@ -11,11 +11,14 @@ import typer
 from warpchain.cli import completions
 
 if TYPE_CHECKING:
-    from warpchain.run.sweep_run import Executor
+    from warpchain.run.sweep_run import DaskClient, Executor
     from warpchain.store.sweep_result import SweepResult
 
 FAILED: Final = 1
 """Exit status of a command whose walks failed."""
+
+LOG_EVERY: Final = 30.0
+"""Time [s] between two lines of progress where there is no terminal."""
 
 SWEEP_FILE: Final = typer.Argument(
     metavar="FILE.yaml",
@@ -78,7 +81,7 @@ def sweep(
         if device not in (None, "cuda"):
             raise InputError(f"--device: {device} is given together with --gpus; give cuda, or leave one out")
         device = "cuda"
-    with status_line() as show, _executor(gpus, scheduler) as (executor, count):
+    with status_line(LOG_EVERY) as show, _executor(gpus, scheduler) as (executor, count):
         result = run(
             source,
             output,
@@ -110,9 +113,10 @@ def _write_new(path: Path, *, alone: bool) -> None:
 def info(directory: Folder, as_json: AsJson = False) -> None:
     """Show how far a sweep is and what it has found so far."""
     from warpchain.cli.terminal import print_sweep
+    from warpchain.store.folder import running_rate
     from warpchain.store.sweep_result import load
 
-    print_sweep(load(directory), as_json)
+    print_sweep(load(directory), as_json, running_rate(directory))
 
 
 def plot(
@@ -173,13 +177,18 @@ def report(
 
 
 def merge(
-    directory: Folder,
+    directories: Annotated[
+        list[Path], typer.Argument(metavar="DIR...", help="Folder of a sweep, or several.", show_default=False)
+    ],
     output: Annotated[Path, typer.Argument(metavar="FILE.h5", help="The file to write.", show_default=False)],
 ) -> None:
-    """Put all results into one HDF5 file with named axes and units, which xarray opens."""
+    """Put all results into one HDF5 file with named axes and units, which xarray opens.
+
+    Folders of the same sweep with different seeds are put together: their samples stand one behind the other.
+    """
     from warpchain.store.merged_file import merge as merge_shards
 
-    merge_shards(directory, output)
+    merge_shards(directories, output)
     print(output)
 
 
@@ -190,8 +199,8 @@ def add_commands(app: typer.Typer) -> None:
 
 
 @contextlib.contextmanager
-def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[tuple[Executor | None, int | None]]":
-    """An executor on GPUs or on a Dask cluster, and its number of workers; (None, None) if neither is asked for.
+def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[tuple[Executor | DaskClient | None, int | None]]":
+    """Workers on GPUs, and their number, or the client of a Dask cluster; (None, None) if neither is asked for.
 
     Raises:
         InputError: there are not so many GPUs, Dask is not installed, or the scheduler does not answer.
@@ -203,7 +212,7 @@ def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[tuple[Execut
             yield executor, gpus
     elif scheduler is not None:
         with _dask_client(scheduler) as client:
-            yield client.get_executor(), sum(client.nthreads().values())
+            yield client, None
     else:
         yield None, None
 

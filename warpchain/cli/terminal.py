@@ -4,6 +4,7 @@ import json
 import math
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -49,10 +50,18 @@ def try_folder(folder: Path) -> None:
 
 
 @contextmanager
-def status_line() -> Iterator[Callable[[str], None]]:
-    """Yield a function that shows a changing line on a terminal; without a terminal it shows nothing."""
+def status_line(every: float = math.inf) -> Iterator[Callable[[str], None]]:
+    """Yield a function that shows a changing line on a terminal; without one it prints a line every so many seconds."""
     if not sys.stderr.isatty():
-        yield lambda text: None
+        last = time.monotonic()
+
+        def print_now_and_then(text: str) -> None:
+            nonlocal last
+            if time.monotonic() - last >= every:
+                print(text, file=sys.stderr, flush=True)
+                last = time.monotonic()
+
+        yield print_now_and_then
         return
     with Console(stderr=True).status("starting") as line:
         yield line.update
@@ -82,8 +91,15 @@ def _duration(seconds: float) -> str:
     return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s" if minutes else f"{rest} s"
 
 
-def print_sweep(result: "SweepResult", as_json: bool) -> None:
-    """Print the statuses of a sweep and the mean Δx of each cell on standard output."""
+def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None) -> None:
+    """Print the statuses of a sweep and the mean Δx of each cell on standard output.
+
+    Args:
+        result: the sweep.
+        as_json: whether to print one JSON object instead of a table.
+        rate: walks per second of the process that runs the sweep; None if none does.
+    """
+    time_left = result.missing_count / rate if rate else None
     summary = result.summary()
     statistics = {name: block.statistics() for name, block in result.blocks.items()}
     if as_json:
@@ -95,12 +111,17 @@ def print_sweep(result: "SweepResult", as_json: bool) -> None:
             }
             for name, of_block in statistics.items()
         }
-        whole = {"name": result.name, "walks": result.walk_count, "statuses": summary, "blocks": blocks}
+        whole = {"name": result.name, "walks": result.walk_count, "statuses": summary}
+        whole |= {"rate": rate, "time_left": time_left, "blocks": blocks}
         print(json.dumps(whole, indent=2, allow_nan=False))
         return
     console = Console(highlight=False, markup=False)
     counts = ", ".join(f"{count:,} {label}" for label, count in summary.items() if count or label == "at_rest")
     console.print(f"{result.name}: {result.walk_count:,} walks, {counts}")
+    if rate is not None:
+        console.print(
+            f"running: {rate:.2f} walks a second" + ("" if time_left is None else f", {_duration(time_left)} left")
+        )
     for name, of_block in statistics.items():
         table = Table(box=None, pad_edge=False, title=name if len(statistics) > 1 else None, title_justify="left")
         for heading in (*of_block.axes, "mean Δx / m", "s.d. / m", "at rest", "failed", "missing"):

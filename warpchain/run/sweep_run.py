@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from warpchain.engine.kernel_choice import shared_threads
 from warpchain.engine.processors import processors
@@ -23,6 +23,7 @@ from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, validated
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
+from warpchain.store.manifest import Manifest, read_manifest
 from warpchain.store.shards import empty_rows, read_shard, shard_name, write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
@@ -47,6 +48,19 @@ class Executor(Protocol):
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any) -> "concurrent.futures.Future[Any]":
         """Run ``function(*arguments)`` somewhere."""
+        ...
+
+
+@runtime_checkable
+class DaskClient(Protocol):
+    """What is used of ``distributed.Client``, which has no such method ``submit`` as executors have."""
+
+    def get_executor(self) -> Executor:
+        """An executor on the workers."""
+        ...
+
+    def nthreads(self) -> Mapping[str, int]:
+        """Number of threads of each worker."""
         ...
 
 
@@ -86,7 +100,7 @@ def sweep(
     out: str | os.PathLike[str],
     *,
     device: str | None = None,
-    executor: Executor | None = None,
+    executor: "Executor | DaskClient | None" = None,
     workers: int | None = None,
     fresh: bool = False,
     on_progress: Callable[[SweepProgress], None] | None = None,
@@ -95,12 +109,15 @@ def sweep(
 
     Args:
         source: A sweep file (YAML), the bare name of one that comes with the package, its content, or a :class:`Sweep`.
-        out: Folder of the results. A sweep that was killed goes on where it was, and leaves the same bytes.
+        out: Folder of the results. A sweep that was killed goes on where it was, and leaves the same bytes. A sweep
+            with more samples than the folder, and else the same, adds them; latin hypercubes do not grow.
         device: ``"cpu"``, ``"cuda"`` or ``"cuda:N"`` instead of what the sweep says. Method ``standard`` is then what
             it means there; the ``sweep.yaml`` of a folder names the method that was run, which stays.
-        executor: Where shards are run; its workers must see ``out``. Default: threads of this process.
+        executor: Where shards are run, an executor or a Dask client; its workers must see ``out``. Default: threads of
+            this process.
         workers: Number of tasks at a time. Default: the processors of this machine, and two on a GPU, each of which
-            runs thousands of walks. With an executor, at least the number of its workers.
+            runs thousands of walks; with a Dask client the threads of its workers. With an executor, at least the
+            number of its workers.
         fresh: Delete what another sweep left in the folder.
         on_progress: Called before kernels are compiled, when the walks begin and after each shard.
 
@@ -117,6 +134,9 @@ def sweep(
         planned = on_device(planned, device)
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
         raise InputError(f"workers: {workers!r} is not a number of workers; give a whole number from 1")
+    if isinstance(executor, DaskClient):
+        workers = workers or sum(executor.nthreads().values())
+        executor = executor.get_executor()
     at_once = workers or (GPU_WORKERS if _is_on_gpu(planned) else processors())
     with SweepFolder.open(Path(out), planned, fresh=fresh, shard_size=shard_size(planned.walk_count)) as store:
         missing = store.missing()
@@ -180,33 +200,32 @@ def run_shards(
     Args:
         planned: The sweep.
         directory: The sweep's folder.
-        shards: The walks of each shard.
+        shards: The places of each shard.
         threads: Of every block on a GPU; None: as many as its chain needs.
         stop: When set, the work is abandoned: unfinished shards are not written.
 
     Returns:
         Keys of the shards written.
     """
-    digest = planned.digest()
-    walks = list(planned.undrawn(index for shard in shards for index in shard))
+    digest, manifest = planned.digest(), read_manifest(directory)
+    walks = list(planned.undrawn(index for shard in shards for index in manifest.walks(shard).tolist()))
     under_way: dict[int, PlannedWalk] = {}
-    shard_of = {index: shard for shard in shards for index in shard}
+    stored = [(shard, place) for shard in shards for place in shard]
     rows = {shard: empty_rows(planned, shard) for shard in shards}
     left = {shard: len(shard) for shard in shards}
     motions: dict[range, dict[int, Motion]] = {shard: {} for shard in shards}
     setups, keeps = [walk.setup for walk in walks], [planned.keep(walk) for walk in walks]
     keys = []
 
-    def draw(place: int) -> Setup:
-        under_way[place] = planned.drawn(walks[place])
-        return under_way[place].setup
+    def draw(number: int) -> Setup:
+        under_way[number] = planned.drawn(walks[number])
+        return under_way[number].setup
 
-    for place, run in run_setups(setups, draw=draw, keeps=keeps, threads=threads, stop=stop):
-        walk = under_way.pop(place)
-        shard = shard_of[walk.index]
-        fill_row(rows[shard][walk.index - shard.start], run.outcome(), walk.drawn)
-        if keeps[place].series_every is not None:
-            motions[shard][walk.index] = run.motion
+    for number, run in run_setups(setups, draw=draw, keeps=keeps, threads=threads, stop=stop):
+        shard, place = stored[number]
+        fill_row(rows[shard][place - shard.start], run.outcome(), under_way.pop(number).drawn)
+        if keeps[number].series_every is not None:
+            motions[shard][place] = run.motion
         left[shard] -= 1
         if left[shard] == 0:
             keys.append(write_shard(directory, digest, shard, rows.pop(shard), motions.pop(shard)))
@@ -262,7 +281,7 @@ def _run(
     """Give each worker two tasks at a time, so that memory does not grow with the sweep."""
     report(progress)
     began = time.perf_counter()
-    threads, waiting = _shared_threads(planned), _tasks(planned, missing, workers)
+    threads, waiting = _shared_threads(planned), _tasks(planned, store.manifest, missing, workers)
     folder = store.directory / "shards"
     pending: dict[concurrent.futures.Future[list[str]], list[range]] = {}  # with the shards still to be counted
 
@@ -299,14 +318,14 @@ def _run(
             future.cancel()
 
 
-def _tasks(planned: Sweep, missing: Sequence[range], workers: int) -> Iterator[list[range]]:
+def _tasks(planned: Sweep, manifest: Manifest, missing: Sequence[range], workers: int) -> Iterator[list[range]]:
     """The shards of each task: one on a CPU; on a GPU enough to fill it, if there are enough.
 
     Neighbouring shards are alike, and a GPU has few tasks. So each task takes every n-th shard, and all take equally
     long.
     """
     on_gpu: list[range] = []
-    firsts = planned.undrawn(shard.start for shard in missing)
+    firsts = planned.undrawn(int(manifest.walks(shard)[0]) for shard in missing)
     for shard, first in zip(missing, firsts, strict=True):
         if first.setup.options.device.startswith("cuda"):
             on_gpu.append(shard)

@@ -1,12 +1,13 @@
 """The folder of a sweep, as the one process that runs the sweep holds it.
 
-    DIR/sweep.json     what the folder belongs to, see `Manifest`; written first and never changed
+    DIR/sweep.json     what the folder belongs to, see `Manifest`; written first, replaced when the sweep grows
     DIR/sweep.yaml     the resolved sweep, for people and to run again
     DIR/shards/        000000000-000000063.h5 holds walks 0 … 63, and their series and frames if they are kept
     DIR/log.txt        what the runs of the sweep did, with times
     DIR/lock           locked by the process that runs the sweep; the system unlocks it when that ends
 
-Whatever happens between two of these lines, the next `SweepFolder.open` goes on from there.
+A sweep grows when its file is given more samples: the walks that are there keep their shards, see
+`warpchain.store.manifest`. Whatever happens between two of these lines, the next `SweepFolder.open` goes on from there.
 """
 
 import datetime
@@ -16,6 +17,7 @@ import re
 import secrets
 import shutil
 import socket
+import time
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +29,7 @@ import yaml
 from warpchain.inputs.validation import InputError
 from warpchain.store.manifest import NUMERICS_VERSION, OWN, Folder, Manifest, read_manifest
 from warpchain.store.shards import present_shards, put_file, read_shard, writing
+from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks.motion import SERIES
 from warpchain.walks.rows import Rows
@@ -45,7 +48,8 @@ _DISCARDED: Final = re.compile(r"\.discarded-[0-9a-f]{8}")
 _HOLDER: Final = re.compile(r"process \d+ on \S*")
 
 _YAML_HEAD: Final = """\
-# The sweep of this folder with all its values. A changed copy of it needs another folder.
+# The sweep of this folder with all its values. A copy with more samples adds them to this folder; a copy that is
+# changed otherwise needs another folder.
 # It names the method that was run: for the one that suits another device, give a copy of it method: standard.
 """
 
@@ -66,13 +70,14 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
 
     @classmethod
     def open(cls, directory: Folder, sweep: Sweep, *, fresh: bool = False, shard_size: int) -> Self:
-        """Begin a sweep in a folder, or go on with it.
+        """Begin a sweep in a folder, or go on with it, with more samples if the sweep has more than the folder.
 
         Args:
             directory: the folder; made if need be.
             sweep: the sweep that is to be in it.
             fresh: delete what a sweep has left in the folder, and begin.
-            shard_size: number of walks in a shard of a new folder; a folder that goes on keeps its own.
+            shard_size: number of walks in a shard of a new folder, or of the walks that are added to a folder; the
+                shards that a folder has keep their size.
 
         Raises:
             OSError: the folder cannot be made, locked, read or written, or the disk is too full for the rest of
@@ -88,8 +93,9 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             path.mkdir(parents=True, exist_ok=True)
             lock = _locked(path)
         try:
-            folder = cls(path, _prepared(path, Manifest.of(sweep, shard_size), fresh), lock)
+            folder = cls(path, _prepared(path, sweep, Manifest.of(sweep, shard_size), fresh), lock)
             folder._check()
+            folder._describe()
         except BaseException:
             _unlock(lock)
             raise
@@ -103,9 +109,9 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             file.write(f"{now}  {text}\n")
 
     def missing(self) -> list[range]:
-        """The walks of each shard that is not there yet, in order; errors as of `present_shards`."""
+        """The places of each shard that is not there yet, in order; errors as of `present_shards`."""
         present = present_shards(self.directory, self.manifest)
-        return [walks for walks in self.manifest.shards if walks not in present]
+        return [places for places in self.manifest.shards if places not in present]
 
     def close(self) -> None:
         """Let other processes have the folder."""
@@ -118,9 +124,9 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
     def _check(self) -> None:
         """Refuse what would fail later: bad shards, a folder that cannot be written, a disk too full."""
         problems = []
-        for walks in present_shards(self.directory, self.manifest):
+        for places in present_shards(self.directory, self.manifest):
             try:
-                read_shard(self.directory, self.manifest, walks)
+                read_shard(self.directory, self.manifest, places)
             except InputError as error:
                 problems.append(str(error))
         if problems:
@@ -135,7 +141,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             probe.unlink()
             free = shutil.disk_usage(shards).free
         manifest, series = self.manifest, self.manifest.recording.series
-        need = sum(len(walks) * manifest.row_type.itemsize + SHARD_OVERHEAD for walks in left)
+        need = sum(len(places) * manifest.row_type.itemsize + SHARD_OVERHEAD for places in left)
         if series is not None:  # of short walks, and without frames
             kept = sum(map(len, left)) / manifest.walk_count * manifest.kept_count
             need += round(kept * SHORT_WALK / series.interval * SAMPLE_BYTES)
@@ -145,20 +151,61 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
                 "free; make room and start again, shards written are kept"
             )
 
+    def _describe(self) -> None:
+        """Write what the folder says of its sweep, if that is new; sweep.yaml is never older than sweep.json."""
+        description = self.directory / "sweep.yaml"
+        if read_manifest(self.directory).earlier != self.manifest.earlier:
+            with writing(description):
+                description.unlink(missing_ok=True)
+            put_file(self.directory / "sweep.json", self.manifest.text().encode())
+        if not description.exists():
+            text = yaml.safe_dump(self.manifest.sweep, sort_keys=False, allow_unicode=True)
+            put_file(description, (_YAML_HEAD + text).encode())
+
 
 def read_rows(directory: Folder, manifest: Manifest) -> Rows:
-    """Rows of all walks that are in a folder, in order, shape (walks,); needs no lock, at any moment.
+    """Rows of all walks that are in a folder, by number, shape (walks,); needs no lock, at any moment.
 
     Raises:
         OSError: the folder or a shard cannot be read.
         InputError: a shard is damaged or foreign.
     """
-    parts = [read_shard(directory, manifest, walks) for walks in present_shards(directory, manifest)]
-    return np.concatenate([np.empty(0, manifest.row_type), *parts])
+    parts = [np.empty(0, manifest.row_type)]
+    for places in present_shards(directory, manifest):
+        parts.append(read_shard(directory, manifest, places))
+        parts[-1]["index"] = manifest.walks(places)
+    rows = np.concatenate(parts)
+    return rows[np.argsort(rows["index"])]
 
 
-def _prepared(folder: Path, manifest: Manifest, fresh: bool) -> Manifest:
-    """Make everything but the shards, in an order in which a kill at any moment does no harm."""
+def running_rate(directory: Folder) -> float | None:
+    """Walks per second that the process that runs a sweep has written since it began; None if none runs it.
+
+    The times of the files tell: a run writes the lock when it begins, and then its shards.
+
+    Raises:
+        OSError: the folder cannot be read.
+        InputError: there is no sweep in it.
+    """
+    present = present_shards(directory, read_manifest(directory))
+    try:
+        with (Path(directory) / "lock").open("rb") as lock:
+            began = os.fstat(lock.fileno()).st_mtime
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        done = sum(len(places) for places, path in present.items() if path.stat().st_mtime >= began)
+        return done / max(time.time() - began, 1e-3)
+    except FileNotFoundError:
+        pass
+    return None
+
+
+def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Manifest:
+    """Make manifest and folder of the shards, in an order in which a kill at any moment does no harm.
+
+    Returns:
+        The manifest that the folder is to have; a grown one is not written yet.
+    """
     _clear_leftovers(folder)
     named = folder / "sweep.json"
     if not named.exists():
@@ -171,29 +218,45 @@ def _prepared(folder: Path, manifest: Manifest, fresh: bool) -> Manifest:
         put_file(named, manifest.text().encode())
         _clear_leftovers(folder)
     else:
-        manifest = _continued(folder, manifest)
-    if not (folder / "sweep.yaml").exists():
-        text = yaml.safe_dump(manifest.sweep, sort_keys=False, allow_unicode=True)
-        put_file(folder / "sweep.yaml", (_YAML_HEAD + text).encode())
+        manifest = _continued(folder, sweep, manifest)
     with writing(folder / "shards"):
         (folder / "shards").mkdir(exist_ok=True)
     return manifest
 
 
-def _continued(folder: Path, manifest: Manifest) -> Manifest:
-    """The manifest of a folder that is to go on with the sweep of another one."""
+def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
+    """The manifest of a folder that is to go on with a sweep, whose manifest in a new folder is given.
+
+    Raises:
+        InputError: the folder holds another sweep, or one whose samples do not grow to those of this one.
+    """
     found = read_manifest(folder)
     if found.numerics_version != NUMERICS_VERSION:
         raise InputError(
             f"{folder}: its walks are of numerics {found.numerics_version}, but this warpchain has "
             f"{NUMERICS_VERSION}; use the version that began it, give another folder, or start anew with --fresh"
         )
-    if found.digest != manifest.digest:
+    if found.digest == manifest.digest:
+        return found
+    there = [block["samples"] for block in found.sweep["blocks"]]
+    if len(there) != len(sweep.blocks) or sweep.digest(there) != found.digest:
         raise InputError(
             f"{folder}: holds another sweep ({found.name}), or this one before it was changed; "
             "give another folder, or start anew with --fresh, which deletes what is there"
         )
-    return found
+    for count, block in zip(there, manifest.sweep["blocks"], strict=True):
+        name, asked, sampler = block["name"], block["samples"], block["sampler"]
+        if asked < count:
+            raise InputError(
+                f"{folder}: holds {count} samples of each cell of block {name}, but {asked} are asked for; "
+                f"give samples: {count} or more, or another folder"
+            )
+        if asked > count and sampler not in EXTENSIBLE:
+            raise InputError(
+                f"{folder}: holds {count} samples of each cell of block {name}, but a {sampler} of {asked} samples "
+                f"has other points; give samples: {count}, sampler: random from the start, or another folder"
+            )
+    return manifest.grown_from(found)
 
 
 def _discard(folder: Path, manifest: Manifest) -> None:

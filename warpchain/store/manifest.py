@@ -1,16 +1,25 @@
-"""The manifest of a sweep's folder, sweep.json: what the folder belongs to, and how its walks are laid out."""
+"""The manifest of a sweep's folder, sweep.json: what the folder belongs to, and how its walks are laid out.
 
+Walks have places in a folder, and a shard holds a range of places. In a sweep run as it was begun, a walk's place is
+its number. When the sweep is given more samples, a new generation of shards gets the added walks, at the places after
+all earlier ones, so that no shard changes; the numbers of the walks are then those of the larger sweep.
+"""
+
+import bisect
 import errno
 import importlib.metadata
+import itertools
 import json
 import math
 import os
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpchain.files import version_refusal
 from warpchain.inputs.validation import InputError
@@ -56,6 +65,36 @@ class BlockLayout:
 
 
 @dataclass(frozen=True)
+class Generation:
+    """What a folder held before it grew.
+
+    Attributes:
+        digest: `Sweep.digest` then.
+        samples: number of samples in each cell of each block then.
+        shard_size: number of walks in a shard of this generation; the last has what is left.
+    """
+
+    digest: str
+    samples: tuple[int, ...]
+    shard_size: int
+
+
+@dataclass(frozen=True)
+class _Part:
+    """The walks that one generation adds to one block, in C order over cells and added samples.
+
+    Attributes:
+        places: their places in the folder.
+        block: the block.
+        samples: the added samples of each cell.
+    """
+
+    places: range
+    block: BlockLayout
+    samples: range
+
+
+@dataclass(frozen=True)
 class Manifest:
     """What a folder belongs to and how its walks are laid out: what a reader needs beside the shards.
 
@@ -64,11 +103,12 @@ class Manifest:
         seed: its seed.
         digest: `Sweep.digest`; equal digests mean equal numbers.
         numerics_version: `NUMERICS_VERSION` of the walks.
-        shard_size: number of walks in a shard; the last has what is left.
+        shard_size: number of walks in a shard of the last generation; the last one has what is left.
         walk_count: number of walks.
         blocks: the blocks of the sweep.
         sweep: `Sweep.canonical`.
         versions: the software that began the sweep.
+        earlier: the generations before the last one, in order.
     """
 
     name: str
@@ -80,6 +120,7 @@ class Manifest:
     blocks: tuple[BlockLayout, ...]
     sweep: dict[str, Any]
     versions: dict[str, str]
+    earlier: tuple[Generation, ...] = ()
 
     @classmethod
     def of(cls, sweep: Sweep, shard_size: int) -> Self:
@@ -105,9 +146,54 @@ class Manifest:
         return row_type([name for block in self.blocks for name in block.drawn])
 
     @property
+    def generations(self) -> tuple[Generation, ...]:
+        """All generations, the present one last."""
+        return *self.earlier, Generation(self.digest, tuple(block.samples for block in self.blocks), self.shard_size)
+
+    @cached_property
+    def _parts(self) -> list[list[_Part]]:
+        """The parts of each generation, one for each block."""
+        parts: list[list[_Part]] = []
+        place, before = 0, (0,) * len(self.blocks)
+        for generation in self.generations:
+            parts.append([])
+            for block, first, stop in zip(self.blocks, before, generation.samples, strict=True):
+                count = math.prod(block.shape[:-1]) * (stop - first)
+                parts[-1].append(_Part(range(place, place + count), block, range(first, stop)))
+                place += count
+            before = generation.samples
+        return parts
+
+    def _overlaps(self, places: range) -> Iterator[tuple[_Part, range]]:
+        """The parts that hold some places, each with those of the places that it holds."""
+        for part in (part for parts in self._parts for part in parts):
+            if here := range(max(places.start, part.places.start), min(places.stop, part.places.stop)):
+                yield part, here
+
+    def walks(self, places: range) -> NDArray[np.int64]:
+        """Numbers of the walks at some places, shape (len(places),)."""
+        found = np.empty(len(places), np.int64)
+        for part, here in self._overlaps(places):
+            cell, added = np.divmod(np.arange(here.start, here.stop) - part.places.start, len(part.samples))
+            numbers = part.block.first + cell * part.block.samples + part.samples.start + added
+            found[here.start - places.start : here.stop - places.start] = numbers
+        return found
+
+    def place(self, walk: int) -> int:
+        """The place of a walk, given its number."""
+        number = max(number for number, block in enumerate(self.blocks) if block.first <= walk)
+        cell, sample = divmod(walk - self.blocks[number].first, self.blocks[number].samples)
+        part = next(parts[number] for parts in self._parts if sample in parts[number].samples)
+        return part.places.start + cell * len(part.samples) + sample - part.samples.start
+
+    @property
     def shards(self) -> list[range]:
-        """The walks of each shard."""
-        return [self.shard_of(start) for start in range(0, self.walk_count, self.shard_size)]
+        """The places of each shard."""
+        starts = (
+            range(parts[0].places.start, parts[-1].places.stop, generation.shard_size)
+            for generation, parts in zip(self.generations, self._parts, strict=True)
+        )
+        return [self.shard_of(start) for start in itertools.chain(*starts)]
 
     @property
     def recording(self) -> Recording:
@@ -121,13 +207,13 @@ class Manifest:
             return ()
         return range(block.samples) if series.samples is None else [n for n in series.samples if n < block.samples]
 
-    def kept(self, walks: range) -> list[int]:
-        """Those of some walks whose motion is kept."""
+    def kept(self, places: range) -> list[int]:
+        """Those of some places whose walks have their motion kept."""
         found = []
-        for block in self.blocks:
-            samples, last = self._kept_samples(block), block.first + math.prod(block.shape)
-            part = range(max(walks.start, block.first), min(walks.stop, last))
-            found += [walk for walk in part if (walk - block.first) % block.samples in samples]
+        for part, here in self._overlaps(places):
+            kept = self._kept_samples(part.block)
+            added = part.samples
+            found += [place for place in here if added[(place - part.places.start) % len(added)] in kept]
         return found
 
     @property
@@ -135,10 +221,28 @@ class Manifest:
         """Number of walks whose motion is kept."""
         return sum(math.prod(block.shape[:-1]) * len(self._kept_samples(block)) for block in self.blocks)
 
-    def shard_of(self, walk: int) -> range:
-        """The walks of the shard that a walk is in."""
-        start = walk - walk % self.shard_size
-        return range(start, min(start + self.shard_size, self.walk_count))
+    def shard_of(self, place: int) -> range:
+        """The places of the shard that a place is in."""
+        number = self._generation_of(place)
+        parts, size = self._parts[number], self.generations[number].shard_size
+        start = place - (place - parts[0].places.start) % size
+        return range(start, min(start + size, parts[-1].places.stop))
+
+    def shard_with(self, walk: int) -> range:
+        """The places of the shard that has a walk, given its number."""
+        return self.shard_of(self.place(walk))
+
+    def digests_of(self, place: int) -> list[str]:
+        """The digests of the generations up to that of a place: together they name the content of its shard."""
+        return [generation.digest for generation in self.generations[: self._generation_of(place) + 1]]
+
+    def _generation_of(self, place: int) -> int:
+        """Number of the generation of a place."""
+        return bisect.bisect_right(self._parts, place, key=lambda parts: parts[0].places.start) - 1
+
+    def grown_from(self, found: "Manifest") -> "Manifest":
+        """This manifest for the folder of another one, which has fewer samples of the same walks."""
+        return replace(self, earlier=found.generations, versions=found.versions)
 
     def text(self) -> str:
         """Content of sweep.json."""
@@ -165,6 +269,10 @@ def read_manifest(directory: Folder) -> Manifest:
             block["axes"] = {name: tuple(values) for name, values in block["axes"].items()}
             block["drawn"] = tuple(block["drawn"])
         content["blocks"] = tuple(BlockLayout(**block) for block in content["blocks"])
+        content["earlier"] = tuple(
+            Generation(**{**generation, "samples": tuple(generation["samples"])})
+            for generation in content.get("earlier", ())
+        )
         return Manifest(**content)
     except InputError:
         raise

@@ -1,4 +1,4 @@
-"""The one HDF5 file that holds a whole sweep: rows with named axes, and the motions that were kept.
+"""The one HDF5 file that holds a whole sweep, or several of one grid: rows with named axes, and the kept motions.
 
 Axes and samples are dimension scales; units and meanings are attributes of every dataset, and the resolved sweep,
 versions and counts by status those of the file. A single block is in the root group, which
@@ -7,15 +7,21 @@ versions and counts by status those of the file. A single block is in the root g
 Motions are one behind the other, as the CF conventions have contiguous ragged arrays: of the walk at some place,
 samples `series_start` to `series_start + series_count` along `instant` are in `series_time`, `series_center_y` …;
 likewise its frames along `frame`. The n joints of its frame k are from `joint_start + k n` on along `joint`.
+
+Samples of several sweeps stand one behind the other along `sample`; `seed` has the seed of each, and `index` the number
+of a walk in its own sweep.
 """
 
+import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpchain.files import replacing
 from warpchain.inputs.validation import InputError
@@ -23,6 +29,7 @@ from warpchain.store.manifest import Folder, check_not_own, read_manifest
 from warpchain.store.motion_arrays import ARRAYS, count, flat_arrays
 from warpchain.store.shards import open_new_hdf5, present_shards, read_motions, writing
 from warpchain.store.sweep_result import FORMAT, BlockResult, SweepResult, load
+from warpchain.sweeps.plan import load_sweep
 from warpchain.walks.motion import Motion
 
 if TYPE_CHECKING:
@@ -35,22 +42,60 @@ _ROOM: Final = 2**20
 _NO_VARIABLE: Final = "This is a netCDF dimension but not a netCDF variable."
 
 
-def merge(directory: Folder, path: str | os.PathLike[str]) -> None:
+def merge(directories: Folder | Sequence[Folder], path: str | os.PathLike[str]) -> None:
     """Write the results of a folder to one HDF5 file, whole or not at all; an older merged file is replaced.
 
+    Args:
+        directories: the folder, or several whose sweeps differ in nothing but seed, samples and names; their samples
+            are put together.
+        path: the file.
+
     Raises:
-        OSError: the folder cannot be read, or the file cannot be written.
-        InputError: there is no sweep in the folder, a shard is damaged or foreign, or the file is one of the sweep's
-            own or there already and no merged file.
+        OSError: a folder cannot be read, or the file cannot be written.
+        InputError: there is no sweep in a folder, a shard is damaged or foreign, sweeps do not fit together, or the
+            file is one of a sweep's own or there already and no merged file.
     """
-    result = load(directory)
+    folders = [directories] if isinstance(directories, str | os.PathLike) else list(directories)
     target = Path(path)
-    check_not_own(directory, target)
+    for folder in folders:
+        check_not_own(folder, target)
     if os.path.lexists(target) and not _is_merged(target):
         raise InputError(f"{target}: is there and is no merged sweep; give another name")
-    most = _ROOM + sum(path.stat().st_size for path in present_shards(directory, read_manifest(directory)).values())
+    _check_fit(folders)
+    results = [load(folder) for folder in folders]
+    most = _ROOM * len(folders)
+    for folder in folders:
+        most += sum(path.stat().st_size for path in present_shards(folder, read_manifest(folder)).values())
     with writing(target), replacing(target) as part, open_new_hdf5(part, most) as file:
-        _fill(file, result)
+        _fill(file, results)
+
+
+def _check_fit(folders: Sequence[Folder]) -> None:
+    """Refuse folders whose samples are not independent samples of the same cells.
+
+    Raises:
+        InputError: sweeps differ in more than seed, samples and names, or some of their walks are the same.
+    """
+    seeds: dict[int, Folder] = {}
+    expected = None
+    for folder in folders if len(folders) > 1 else ():
+        manifest = read_manifest(folder)
+        sweep = load_sweep(manifest.sweep)
+        if (other := seeds.setdefault(manifest.seed, folder)) is not folder:
+            raise InputError(
+                f"{folder}: has seed {manifest.seed}, as {other} has, so that walks are the same; "
+                "give sweeps with different seeds"
+            )
+        for block in sweep.blocks:
+            if not block.drawn:
+                raise InputError(f"{folder}: block {block.name} draws nothing, so that more samples are the same walks")
+        cells = (replace(sweep, seed=0).digest([1] * len(sweep.blocks)), manifest.numerics_version)
+        expected = expected or cells
+        if cells != expected:
+            raise InputError(
+                f"{folder}: is not the sweep of {folders[0]} with another seed; give folders that differ in "
+                "nothing but seed, samples and names"
+            )
 
 
 def _is_merged(path: Path) -> bool:
@@ -67,15 +112,37 @@ def _is_merged(path: Path) -> bool:
         return False
 
 
-def _fill(file: "h5py.File", result: SweepResult) -> None:
+def _fill(file: "h5py.File", results: Sequence[SweepResult]) -> None:
     """Fill the empty file."""
-    file.attrs.update(result.notes())
-    for name, block in result.blocks.items():
-        group = file if len(result.blocks) == 1 else file.create_group(name, track_order=True)
+    names = list(results[0].blocks)
+    parts = {name: [list(result.blocks.values())[number] for result in results] for number, name in enumerate(names)}
+    blocks = {name: _joined(of_block) for name, of_block in parts.items()}
+    file.attrs.update(replace(results[0], blocks=blocks).notes())
+    if len(results) > 1:
+        notes = [result.notes() for result in results]
+        file.attrs["sweep"] = json.dumps([result.sweep for result in results], ensure_ascii=False)
+        file.attrs.update({name: ", ".join(str(note[name]) for note in notes) for name in ("seed", "digest")})
+    for name, block in blocks.items():
+        group = file if len(blocks) == 1 else file.create_group(name, track_order=True)
         group.attrs["block"] = name
         _write_rows(block, group)
-        if block.kept.any():
-            _write_motions(block, group)
+        if len(results) > 1:
+            seeds = [
+                str(result.seed)
+                for result, part in zip(results, parts[name], strict=True)
+                for _ in range(part.shape[-1])
+            ]
+            dataset = group.create_dataset("seed", data=np.array(seeds, object))
+            dataset.attrs.update({"units": "1", "description": "seed of the sweep that the sample belongs to"})
+            _attach(dataset, group, ("sample",))
+        if any(part.kept.any() for part in parts[name]):
+            _write_motions(block, parts[name], group)
+
+
+def _joined(parts: Sequence[BlockResult]) -> BlockResult:
+    """One block with the samples of all, without their motions."""
+    columns = {name: np.concatenate([part.columns[name] for part in parts], axis=-1) for name in parts[0].columns}
+    return replace(parts[0], columns=columns, motions=None)
 
 
 def _write_rows(block: BlockResult, group: "h5py.Group") -> None:
@@ -95,19 +162,20 @@ def _write_rows(block: BlockResult, group: "h5py.Group") -> None:
             _attach(dataset, group, dims)
 
 
-def _write_motions(block: BlockResult, group: "h5py.Group") -> None:
-    """Add the motions of a block, one shard in memory at a time."""
+def _write_motions(block: BlockResult, parts: Sequence[BlockResult], group: "h5py.Group") -> None:
+    """Add the motions of a block, which has the samples of its parts, one shard in memory at a time."""
     counts = {kind: np.zeros(block.shape, np.int64) for kind in _AXES}
-    for place, motion in _motions(block):
+    starts: dict[str, NDArray[np.int64]] = {}
+    for place, motion in _motions(block, parts):
         for kind, arrays in flat_arrays(motion).items():
             counts[kind].ravel()[place] = count(arrays)
     totals = {kind: total for kind, found in counts.items() if (total := int(found.sum()))}
     for kind, total in totals.items():
         # As netCDF writes a dimension that has no coordinates.
         group.create_dataset(_AXES[kind], (total,), ">f4").make_scale(f"{_NO_VARIABLE}{total:10d}")
-        starts = np.cumsum(counts[kind]).reshape(block.shape) - counts[kind]
+        starts[kind] = np.cumsum(counts[kind]).reshape(block.shape) - counts[kind]
         for name, values, notes in (
-            (f"{kind}_start", starts, {"description": f"place of a walk's first one along {_AXES[kind]}"}),
+            (f"{kind}_start", starts[kind], {"description": f"place of a walk's first one along {_AXES[kind]}"}),
             (
                 f"{kind}_count",
                 counts[kind],
@@ -122,13 +190,12 @@ def _write_motions(block: BlockResult, group: "h5py.Group") -> None:
             dataset = group.create_dataset(_name(kind, name), (total,), "f4" if kind == "joint" else "f8")
             dataset.attrs.update({"units": unit, "description": meaning})
             _attach(dataset, group, (_AXES[kind],))
-    ends = dict.fromkeys(totals, 0)
-    for _, motion in _motions(block):
+    for place, motion in _motions(block, parts):
         for kind, arrays in flat_arrays(motion).items():
             if kind in totals:
-                first, ends[kind] = ends[kind], ends[kind] + count(arrays)
+                first = starts[kind].ravel()[place]
                 for name, values in arrays.items():
-                    group[_name(kind, name)][first : ends[kind]] = values
+                    group[_name(kind, name)][first : first + count(arrays)] = values
 
 
 def _name(kind: str, name: str) -> str:
@@ -136,18 +203,18 @@ def _name(kind: str, name: str) -> str:
     return f"series_{name}" if kind == "series" else name
 
 
-def _motions(block: BlockResult) -> Iterator[tuple[int, Motion]]:
-    """The motions of a block in the order of its walks, each with its place in a flat column."""
-    if block.motions is None:
-        return
-    places = np.flatnonzero(block.kept)
-    walks = block.columns["index"].ravel()[places].tolist()
-    first = walks[0] - int(places[0])
-    manifest = block.motions.manifest
-    for _, group in groupby(walks, manifest.shard_of):
-        members = list(group)
-        found = read_motions(block.motions.directory, manifest, range(members[0], members[-1] + 1))
-        yield from ((walk - first, motion) for walk, motion in found.items())
+def _motions(block: BlockResult, parts: Sequence[BlockResult]) -> Iterator[tuple[int, Motion]]:
+    """The motions of a block's parts, each with its place in a flat column of the block."""
+    ends = np.cumsum([part.shape[-1] for part in parts])
+    places = np.split(np.arange(block.columns["index"].size).reshape(block.shape), ends[:-1], axis=-1)
+    for part, place in zip(parts, places, strict=True):
+        if part.motions is None:
+            continue
+        manifest = part.motions.manifest
+        place_of = dict(zip(part.columns["index"][part.kept].tolist(), place[part.kept].tolist(), strict=True))
+        for _, group in groupby(place_of, manifest.shard_with):
+            found = read_motions(part.motions.directory, manifest, list(group))
+            yield from ((place_of[walk], motion) for walk, motion in found.items())
 
 
 def _attach(dataset: "h5py.Dataset", group: "h5py.Group", dims: tuple[str, ...]) -> None:

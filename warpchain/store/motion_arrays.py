@@ -1,6 +1,6 @@
 """The motions of walks inside a shard: flat arrays, in which one walk follows the other.
 
-motion/walk            indices of the walks, ascending
+motion/walk            places of the walks in the folder, ascending
 motion/series_start    where the samples of each walk begin, and where the last one's end
 motion/time …          the samples, see `SERIES`
 motion/frame_start     likewise of the frames
@@ -8,7 +8,7 @@ motion/frame_time      times of the frames [s]
 motion/joint_start     likewise of the joints
 motion/joint_x, _y     joints of all frames, frame by frame [m]
 motion/sprocket_height height of the sprocket's centre at the release [m]; NaN without a sprocket
-motion/before_release/ a group for each walk of which that was kept, named by its number, see `before_release`
+motion/before_release/ a group for each walk of which that was kept, named by its place, see `before_release`
 motion/checksum        SHA-256 of each walk's motion
 """
 
@@ -54,7 +54,7 @@ def count(arrays: Mapping[str, NDArray[Any]]) -> int:
 
 
 def write_motions(motions: Mapping[int, Motion], file: "h5py.File") -> None:
-    """Put the motions of walks, by index, into a shard."""
+    """Put the motions of walks, by place, into a shard."""
     walks = sorted(motions)
     flat = [flat_arrays(motions[walk]) for walk in walks]
     group = file.create_group(GROUP, track_order=True)
@@ -72,17 +72,17 @@ def write_motions(motions: Mapping[int, Motion], file: "h5py.File") -> None:
     group["checksum"] = np.frombuffer(checksums, np.uint8).reshape(-1, 32)
 
 
-def read_motion(file: "h5py.File", walk: int) -> Motion:
-    """The motion of a walk, out of its shard.
+def read_motion(file: "h5py.File", place: int) -> Motion:
+    """The motion of the walk at a place, out of its shard.
 
     Raises:
         KeyError: the shard does not have it.
         ValueError: it is damaged.
     """
     group = file[GROUP]
-    (place,) = np.flatnonzero(group["walk"][()] == walk)
+    (row,) = np.flatnonzero(group["walk"][()] == place)
     series, (frame_time,), joints = (
-        [group[name][slice(*group[f"{kind}_start"][place : place + 2])] for name in columns]
+        [group[name][slice(*group[f"{kind}_start"][row : row + 2])] for name in columns]
         for kind, columns in ARRAYS.items()
     )
     shape = (len(frame_time), -1, 2) if len(frame_time) else (0, 0, 2)
@@ -90,9 +90,9 @@ def read_motion(file: "h5py.File", walk: int) -> Motion:
         series=np.stack(series, axis=-1),
         frame_time=frame_time,
         frame_joints=np.stack(joints, axis=-1).reshape(shape),
-        sprocket_height=float(group["sprocket_height"][place]),
-        before_release=read_before_release(group[f"{BEFORE}/{walk}"]) if f"{BEFORE}/{walk}" in group else None,
+        sprocket_height=float(group["sprocket_height"][row]),
+        before_release=read_before_release(group[f"{BEFORE}/{place}"]) if f"{BEFORE}/{place}" in group else None,
     )
-    if motion.checksum() != group["checksum"][place].tobytes():
-        raise ValueError(f"motion of walk {walk}")
+    if motion.checksum() != group["checksum"][row].tobytes():
+        raise ValueError(f"motion of the walk at place {place}")
     return motion

@@ -1,8 +1,9 @@
 """Shards: immutable HDF5 files that hold the rows and motions of ended walks.
 
 A shard appears whole or not at all: its bytes go to a temporary name, to the disk, and then get their name.
-Its content depends only on the digest of the sweep and on the numerics, not on time or place. So a sweep leaves the
-same bytes however often it was killed and wherever its shards were computed.
+Its content depends only on the digest of the sweep and on the numerics, not on when and where it was computed. So a
+sweep leaves the same bytes however often it was killed. A shard knows its walks by their places in the folder, see
+`warpchain.store.manifest`; the numbers of walks in the sweep are found when the shard is read.
 """
 
 import errno
@@ -10,7 +11,7 @@ import hashlib
 import io
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -38,24 +39,25 @@ if TYPE_CHECKING:
     import h5py
 
 
-def empty_rows(sweep: Sweep, walks: range) -> Rows:
-    """Rows to fill in, shape (len(walks),): indices are there, status is `MISSING`, the rest NaN or −1."""
-    return missing_rows(row_type([name for block in sweep.blocks for name in block.drawn]), walks)
+def empty_rows(sweep: Sweep, places: range) -> Rows:
+    """Rows to fill in, shape (len(places),): indices are the places, status is `MISSING`, the rest NaN or −1."""
+    return missing_rows(row_type([name for block in sweep.blocks for name in block.drawn]), places)
 
 
-def shard_name(walks: range) -> str:
-    """Name of the file of a shard; names sort like the walks."""
-    return f"{walks.start:09d}-{walks.stop - 1:09d}.h5"
+def shard_name(places: range) -> str:
+    """Name of the file of a shard; names sort like the places."""
+    return f"{places.start:09d}-{places.stop - 1:09d}.h5"
 
 
-def _key(manifest: Manifest, walks: range) -> str:
+def _key(manifest: Manifest, places: range) -> str:
     """What names the content of a shard: equal keys, equal bytes; hexadecimal SHA-256."""
-    content = (manifest.digest, manifest.numerics_version, FORMAT_VERSION, walks.start, walks.stop)
+    digests = manifest.digests_of(places.start)
+    content = (*digests, manifest.numerics_version, FORMAT_VERSION, places.start, places.stop)
     return hashlib.sha256(" ".join(map(str, content)).encode()).hexdigest()
 
 
 def write_shard(
-    directory: Folder, digest: str, walks: range, rows: Rows, motions: Mapping[int, Motion] | None = None
+    directory: Folder, digest: str, places: range, rows: Rows, motions: Mapping[int, Motion] | None = None
 ) -> str:
     """Write the rows of a shard; needs no lock, so that workers can call it.
 
@@ -64,9 +66,9 @@ def write_shard(
     Args:
         directory: folder of the sweep, opened before by the process that runs the sweep.
         digest: digest of the sweep that the rows were computed for.
-        walks: indices of the walks; one of `SweepFolder.missing`.
-        rows: their rows, shape (len(walks),), in order, of the type that the manifest says.
-        motions: index → motion of those of the walks whose motion the sweep keeps; None: of none.
+        places: places of its walks; one of `SweepFolder.missing`.
+        rows: rows of the walks, with their places as index, shape (len(places),), in order, of the manifest's type.
+        motions: place → motion of those of the walks whose motion the sweep keeps; None: of none.
 
     Returns:
         The key of the shard.
@@ -76,79 +78,79 @@ def write_shard(
         InputError: the folder is not, or no longer, that of the sweep.
         ValueError: the rows or the motions are not those of the walks.
     """
-    manifest, name = read_manifest(directory), f"walks {walks.start} to {walks.stop - 1}"
+    manifest, name = read_manifest(directory), f"walks {places.start} to {places.stop - 1}"
     if (manifest.digest, manifest.numerics_version) != (digest, NUMERICS_VERSION):
         raise InputError(f"{directory}: belongs to another sweep now; these walks were not written")
-    if walks != manifest.shard_of(walks.start):
+    if places != manifest.shard_of(places.start):
         raise ValueError(f"{name} are no shard of this sweep")
-    if rows.dtype != manifest.row_type or not np.array_equal(rows["index"], walks):
+    if rows.dtype != manifest.row_type or not np.array_equal(rows["index"], places):
         raise ValueError(f"the rows are not those of {name}, all in order")
     if not np.isin(rows["status"], [status for status in Status if status != Status.RUNNING]).all():
         raise ValueError(f"one of {name} has no status that ends a walk")
     motions = motions or {}
-    if sorted(motions) != manifest.kept(walks):
+    if sorted(motions) != manifest.kept(places):
         raise ValueError(f"the motions are not those that are kept of {name}")
     rows = rows.copy()
     for column in rows.dtype.names or ():  # there are many NaNs, and which one may depend on the batch
         if rows[column].dtype.kind == "f":
             rows[column][np.isnan(rows[column])] = np.nan
-    key = _key(manifest, walks)
+    key = _key(manifest, places)
 
     def fill(file: "h5py.File") -> None:
         file.attrs["format"] = FORMAT
         file.attrs["key"] = key
-        file.attrs["digest"] = digest
+        file.attrs["digest"] = manifest.digests_of(places.start)[-1]
         file.attrs["numerics_version"] = NUMERICS_VERSION
         dataset = file.create_dataset("rows", data=rows)
         dataset.attrs["sha256"] = _checksum(rows)
         if motions:
             write_motions(motions, file)
 
-    put_file(Path(directory) / "shards" / shard_name(walks), hdf5_image(fill))
+    put_file(Path(directory) / "shards" / shard_name(places), hdf5_image(fill))
     return key
 
 
-def read_shard(directory: Folder, manifest: Manifest, walks: range) -> Rows:
-    """The rows of a shard, all checked; needs no lock.
+def read_shard(directory: Folder, manifest: Manifest, places: range) -> Rows:
+    """The rows of a shard, their places as index, all checked; needs no lock.
 
     Args:
         directory: folder of the sweep.
         manifest: its manifest.
-        walks: indices of all walks of the shard.
+        places: all places of the shard.
 
     Raises:
         OSError: the file cannot be read.
         InputError: the file is damaged or belongs to another sweep.
     """
-    with _opened(directory, manifest, walks) as file:
+    with _opened(directory, manifest, places) as file:
         rows = np.asarray(file["rows"][()])
         if _checksum(rows) != file["rows"].attrs["sha256"]:
             raise ValueError("rows")
     return rows
 
 
-def read_motions(directory: Folder, manifest: Manifest, walks: range) -> dict[int, Motion]:
-    """The motions of some walks of one shard, by index and in order, all checked; needs no lock.
+def read_motions(directory: Folder, manifest: Manifest, walks: Sequence[int]) -> dict[int, Motion]:
+    """The motions of some walks of one shard, by number and in order, all checked; needs no lock.
 
     Args:
         directory: folder of the sweep.
         manifest: its manifest.
-        walks: indices of walks of one shard; those whose motion is not kept are left out.
+        walks: numbers of walks of one shard whose motion is kept.
 
     Raises:
         OSError: the file cannot be read.
         InputError: the file is damaged or belongs to another sweep.
     """
-    with _opened(directory, manifest, manifest.shard_of(walks.start)) as file:
-        return {walk: read_motion(file, walk) for walk in manifest.kept(walks)}
+    with _opened(directory, manifest, manifest.shard_with(walks[0])) as file:
+        return {walk: read_motion(file, manifest.place(walk)) for walk in walks}
 
 
 @contextmanager
-def _opened(directory: Folder, manifest: Manifest, walks: range) -> "Iterator[h5py.File]":
+def _opened(directory: Folder, manifest: Manifest, places: range) -> "Iterator[h5py.File]":
     """The file of a shard; an error while it is read means that it is damaged."""
     import h5py
 
-    path = Path(directory) / "shards" / shard_name(walks)
+    path = Path(directory) / "shards" / shard_name(places)
     try:
         content = path.open("rb")
     except OSError as error:
@@ -157,7 +159,7 @@ def _opened(directory: Folder, manifest: Manifest, walks: range) -> "Iterator[h5
     with content:
         try:
             with h5py.File(content, "r") as file:
-                is_foreign = str(file.attrs["key"]) != _key(manifest, walks)
+                is_foreign = str(file.attrs["key"]) != _key(manifest, places)
                 if not is_foreign:
                     yield file
         except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError):
@@ -173,14 +175,14 @@ def _checksum(rows: Rows) -> str:
 
 
 def present_shards(directory: Folder, manifest: Manifest) -> dict[range, Path]:
-    """The shards that are there, by their walks and in order; hidden files are ignored.
+    """The shards that are there, by their places and in order; hidden files are ignored.
 
     Raises:
         OSError: the folder cannot be read.
         InputError: there is a file that is no shard of this sweep.
     """
     folder = Path(directory) / "shards"
-    named = {shard_name(walks): walks for walks in manifest.shards}
+    named = {shard_name(places): places for places in manifest.shards}
     try:
         names = {name for name in os.listdir(folder) if not name.startswith(".")}
     except FileNotFoundError:
@@ -190,7 +192,7 @@ def present_shards(directory: Folder, manifest: Manifest) -> dict[range, Path]:
     if strange := sorted(names - named.keys()):
         more = f" (and {len(strange) - 1} more)" if strange[1:] else ""
         raise InputError(f"{folder / strange[0]}: not a shard of this sweep; move it out of this folder{more}")
-    return {walks: folder / name for name, walks in named.items() if name in names}
+    return {places: folder / name for name, places in named.items() if name in names}
 
 
 def hdf5_image(fill: "Callable[[h5py.File], None]") -> bytes:

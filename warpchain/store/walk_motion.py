@@ -96,7 +96,7 @@ class MotionReader:
             OSError: its shard cannot be read.
             InputError: its shard is damaged or foreign.
         """
-        motion = read_motions(self.directory, self.manifest, range(index, index + 1))[index]
+        motion = read_motions(self.directory, self.manifest, [index])[index]
         setup = self.sweep.planned(index).setup
         has_sprocket = not math.isnan(motion.sprocket_height)
         return WalkMotion(

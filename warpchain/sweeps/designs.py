@@ -26,6 +26,9 @@ SAMPLERS: Final = ("random", "sobol", "latin_hypercube", "saltelli")
 """Independent samples; a scrambled Sobol' sequence; a latin hypercube; a Sobol' sequence of twice the dimension, each
 row of which becomes two points and their crossings."""
 
+EXTENSIBLE: Final = ("random", "sobol", "saltelli")
+"""Samplers whose samples stay the same when more follow; a latin hypercube of another size has other points."""
+
 _END: Final = 2.0**-53
 """Distance that designed points keep from the ends 0 and 1, where a Gaussian has no quantile."""
 

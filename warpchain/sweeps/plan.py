@@ -11,7 +11,7 @@ import bisect
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -228,12 +228,18 @@ class Sweep:
             "blocks": [block.canonical() for block in self.blocks],
         }
 
-    def digest(self) -> str:
-        """SHA-256 of everything that decides the numbers and their order: the canonical form without names."""
+    def digest(self, samples: Sequence[int] | None = None) -> str:
+        """SHA-256 of everything that decides the numbers and their order: the canonical form without names.
+
+        Args:
+            samples: samples of each block, in place of the sweep's own.
+        """
         content = self.canonical()
         del content["name"]
-        for block, given in zip(self.blocks, content["blocks"], strict=True):
+        for number, (block, given) in enumerate(zip(self.blocks, content["blocks"], strict=True)):
             del given["name"]
+            if samples is not None:
+                given["samples"] = samples[number]
             for name in block.axes.get("preset", ()):
                 given.setdefault("presets", {})[name] = PRESETS[str(name)].model_dump()
         text = json.dumps(content, ensure_ascii=True, allow_nan=False, separators=(",", ":"))

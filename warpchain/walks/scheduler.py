@@ -143,7 +143,10 @@ class BatchRun:
             for features in together.keys() - self._loaded:
                 for world in together[features]:
                     self._watch(self._running[world][1], True)
+                began = time.perf_counter()
                 self.batch.compile(features, [self.batch.links[world] for world in together[features]])
+                for _, run in self._running.values():
+                    run.compile_time += time.perf_counter() - began
                 self._loaded.add(features)
         self.batch.start(together, ATTEMPTS["cuda" if self.batch.device.is_cuda else "cpu"])
         return bool(together)

@@ -67,6 +67,7 @@ class WalkRun:
         drive_counts: Counters (:data:`warpchain.engine.tallies.COUNTS`) of the time before the release.
         drive_extremes: Greatest opening and depths [m] of the time before the release.
         recorder: What is kept of the motion since the release.
+        compile_time: Wall time [s] for which the walk waited for kernels; counted only if somebody watches.
     """
 
     def __init__(self, batch: Batch, world: int, setup: Setup, keep: Keep = NOTHING) -> None:
@@ -75,7 +76,7 @@ class WalkRun:
         self.recorder = Recorder(batch, world, keep)
         self.status = Status.RUNNING
         self.raised = math.nan
-        self.drive_time = 0.0
+        self.drive_time = self.compile_time = 0.0
         self.drift = math.nan
         self.drive_counts = dict.fromkeys(COUNTS, 0)
         self.drive_extremes = dict.fromkeys(EXTREMES, 0.0)

@@ -119,7 +119,7 @@ class WalkResult(Drawn):
     softened_at: Annotated[
         float, Stored("summary", "s", "from the release to the softening of the joints; NaN if they were not")
     ]
-    wall_time: Annotated[float, Stored("summary", "s", "that the computer took")]
+    wall_time: Annotated[float, Stored("summary", "s", "that the computer took, without the compilation of kernels")]
     bounces: Annotated[int, Stored("summary", "1", COUNTS["bounces"])]
     steps_accepted: Annotated[int, Stored("summary", "1", COUNTS["accepted"])]
     steps_rejected: Annotated[int, Stored("summary", "1", COUNTS["rejected"])]

@@ -1,0 +1,76 @@
+"""What the command line says of a sweep that is running, and how long a walk took."""
+
+import json
+import os
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.run.test_sweep_run import TINY
+from tests.support.synthetic_sweep import SWEEP, synthetic_rows, write
+from warpchain.cli import sweep_commands
+from warpchain.cli.main import main
+from warpchain.engine.batch import Batch
+from warpchain.run.single_walk import walk
+from warpchain.store.folder import SweepFolder
+
+
+def run(*arguments: str) -> None:
+    """Play a command; it succeeds."""
+    with pytest.raises(SystemExit) as done:
+        main(list(arguments))
+    assert done.value.code in (None, 0)
+
+
+def test_without_a_terminal_lines_of_progress_are_printed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Every so often a plain line says how many walks are done, how fast, and what is left; a short sweep has none."""
+    (tmp_path / "tiny.yaml").write_text(yaml.safe_dump(TINY, sort_keys=False))
+    for name, every in (("short", sweep_commands.LOG_EVERY), ("long", 0.0)):
+        monkeypatch.setattr(sweep_commands, "LOG_EVERY", every)
+        with pytest.raises(SystemExit):
+            main(["sweep", str(tmp_path / "tiny.yaml"), "-o", str(tmp_path / name), "--workers", "1"])
+        lines = [line for line in capsys.readouterr().err.splitlines() if " of 80 walks" in line]
+        assert bool(lines) == (every == 0.0)
+    assert lines[-1].startswith("80 of 80 walks   ") and " a second   0 s left   80 time_limit" in lines[-1]
+
+
+def test_info_tells_rate_and_time_left_of_a_running_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Counted are the shards written since the run began; a sweep that nobody runs has no rate."""
+    with SweepFolder.open(tmp_path, SWEEP, shard_size=20) as opened:
+        first, second, third, *_ = opened.missing()
+        for walks in (first, second, third):
+            write(opened, walks, synthetic_rows(SWEEP, walks))
+        now = time.time()
+        os.utime(tmp_path / "lock", (now - 10, now - 10))
+        os.utime(opened.directory / "shards/000000000-000000019.h5", (now - 60, now - 60))  # of an earlier run
+        run("info", str(tmp_path))
+        assert "running: 4.0" in (text := capsys.readouterr().out) or "running: 3.9" in text
+        assert "walks a second, 25 s left" in text or "26 s left" in text
+        run("info", str(tmp_path), "--json")
+        found = json.loads(capsys.readouterr().out)
+        assert 3.0 < found["rate"] <= 4.0 and found["time_left"] == pytest.approx(100 / found["rate"])
+    run("info", str(tmp_path))
+    assert "running" not in capsys.readouterr().out
+    run("info", str(tmp_path), "--json")
+    found = json.loads(capsys.readouterr().out)
+    assert found["rate"] is None and found["time_left"] is None
+
+
+def test_the_time_of_a_walk_is_without_compilation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Time spent on kernels is not in the wall time of a walk."""
+    compiled, settings = Batch.compile, {"links": 30, "start": "ellipse", "walk_limit": 0.01, "method": "dp5"}
+    walk(preset="soft", **settings)
+
+    def slowly(*arguments: object) -> None:
+        time.sleep(3.0)
+        compiled(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Batch, "compile", slowly)
+    began = time.perf_counter()
+    result = walk(preset="soft", **settings)
+    assert time.perf_counter() - began > 3.0
+    assert 0 < result.wall_time < 2.5

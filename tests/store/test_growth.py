@@ -1,0 +1,198 @@
+"""Folders of sweeps that are given more samples: shards stay, walks are those of the larger sweep, kills do no harm."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from tests.support.made_sweeps import make_sweep
+from tests.support.sweep_content import UNIFORM, blocks, content
+from tests.support.synthetic_sweep import content as files
+from warpchain.cli.main import main
+from warpchain.inputs.validation import InputError
+from warpchain.store.folder import SweepFolder
+from warpchain.store.manifest import read_manifest
+from warpchain.store.merged_file import merge
+from warpchain.store.sweep_result import SweepResult, load
+from warpchain.sweeps.designs import EXTENSIBLE, SAMPLERS
+from warpchain.sweeps.plan import PlannedWalk, load_sweep
+
+
+def two_blocks(first: int, second: int, **changes: Any) -> dict[str, Any]:
+    """A sweep of two blocks with numbers of samples of their own."""
+    given = [{"grid": {"links": [60, 90]}, "samples": first}, {"grid": {"frequency": [5, 10, 15]}, "samples": second}]
+    return blocks(*given, **changes)
+
+
+def drawn_distance(walk: PlannedWalk) -> float:
+    """A distance that depends on what the walk is, and not on its number [m]."""
+    return walk.setup.scene.links + walk.setup.scene.frequency / 7 + sum(walk.drawn.values())
+
+
+def columns(result: SweepResult) -> dict[tuple[str, str], bytes]:
+    """Block and name → bytes of all columns."""
+    return {
+        (block.name, name): values.tobytes()
+        for block in result.blocks.values()
+        for name, values in block.columns.items()
+    }
+
+
+def shards(folder: Path) -> dict[str, bytes]:
+    """Name → bytes of all shards."""
+    return {name: data for name, data in files(folder).items() if name.startswith("shards/")}
+
+
+@pytest.mark.parametrize("sampler", EXTENSIBLE)
+def test_a_grown_sweep_is_the_larger_one(tmp_path: Path, sampler: str) -> None:
+    """Grown twice, in one block or both, a folder gives the larger sweep to the bit; no shard changes."""
+    drawn = {"distributions": {"all": "fixed", "floor_friction": UNIFORM, "phase": {"uniform": [0, 1]}}}
+    before: dict[str, bytes] = {}
+    for counts in ((2, 4), (8, 4), (16, 8)):
+        given = two_blocks(*counts, sampler=sampler, **drawn)
+        grown = make_sweep(tmp_path / "grown", given, drawn_distance)
+        after = shards(tmp_path / "grown")
+        assert before.items() < after.items()
+        before = after
+    fresh = make_sweep(tmp_path / "fresh", given, drawn_distance)
+    assert grown.missing_count == 0 and columns(grown) == columns(fresh)
+    assert grown.sweep == fresh.sweep and grown.provenance["digest"] == fresh.provenance["digest"]
+    assert yaml.safe_load((tmp_path / "grown/sweep.yaml").read_text()) == fresh.sweep
+    for name in ("grown", "fresh"):
+        merge(tmp_path / name, tmp_path / f"{name}.h5")
+    assert (tmp_path / "grown.h5").read_bytes() == (tmp_path / "fresh.h5").read_bytes()
+
+
+def test_places_and_numbers_are_inverse(tmp_path: Path) -> None:
+    """Every place holds one walk, every walk has one place, and the shards have each place once."""
+    for counts in ((1, 2), (3, 2), (4, 7)):
+        make_sweep(tmp_path, two_blocks(*counts), drawn_distance)
+    manifest = read_manifest(tmp_path)
+    everywhere = range(manifest.walk_count)
+    walks = manifest.walks(everywhere).tolist()
+    assert sorted(walks) == list(everywhere) and [manifest.place(walk) for walk in walks] == list(everywhere)
+    assert [place for shard in manifest.shards for place in shard] == list(everywhere)
+    assert all(manifest.shard_of(place) == shard for shard in manifest.shards for place in shard)
+    np.testing.assert_array_equal(manifest.walks(range(3, 20)), walks[3:20])
+
+
+def test_a_sweep_grows_before_it_is_complete(tmp_path: Path) -> None:
+    """Walks that were missing are then run in their old shards; what is there is read meanwhile."""
+    make_sweep(tmp_path / "grown", content(samples=2), lambda walk: drawn_distance(walk) if walk.sample else None)
+    kept = shards(tmp_path / "grown")
+    made = make_sweep(
+        tmp_path / "grown", content(samples=5), lambda walk: drawn_distance(walk) if walk.cell[0] else None
+    )
+    assert kept.items() < shards(tmp_path / "grown").items()
+    expected = np.zeros((2, 2, 5), bool)
+    expected[1] = expected[:, :, 1] = True
+    np.testing.assert_array_equal(made.status == 1, expected)
+    grown = make_sweep(tmp_path / "grown", content(samples=5), drawn_distance)
+    assert columns(grown) == columns(make_sweep(tmp_path / "fresh", content(samples=5), drawn_distance))
+    assert kept.items() < shards(tmp_path / "grown").items()
+
+
+class _Kill(BaseException):
+    """Stands for a kill between two system calls."""
+
+
+def test_every_step_of_growing_may_be_the_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stopped before any change to the folder, it can be read, and growing it again leaves the same bytes."""
+    small, large = content(samples=2), content(samples=4)
+    for given in (small, large):
+        make_sweep(tmp_path / "whole", given, drawn_distance)
+    expected, stops = files(tmp_path / "whole"), 0
+    while True:
+        folder, left = tmp_path / str(stops), stops
+        make_sweep(folder, small, drawn_distance)
+
+        def counted(real: Callable[..., Any]) -> Callable[..., Any]:
+            def call(*arguments: Any, **settings: Any) -> Any:
+                nonlocal left
+                left -= 1
+                if left < 0:
+                    raise _Kill
+                return real(*arguments, **settings)
+
+            return call
+
+        with monkeypatch.context() as patched:
+            for place, name in ((os, "replace"), (os, "rename"), (os, "mkdir"), (os, "unlink"), (os, "rmdir")):
+                patched.setattr(place, name, counted(getattr(place, name)))
+            try:
+                make_sweep(folder, large, drawn_distance)
+            except _Kill:
+                pass
+            else:
+                break
+        assert load(folder).summary()["at_rest"] >= 8
+        assert not (folder / "sweep.yaml").exists() or (
+            yaml.safe_load((folder / "sweep.yaml").read_text()) == read_manifest(folder).sweep
+        )
+        make_sweep(folder, large, drawn_distance)
+        assert files(folder) == expected, stops
+        stops += 1
+    assert stops >= 5
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (
+            content(samples=3),
+            "holds 4 samples of each cell of block main, but 3 are asked for; give samples: 4 or more",
+        ),
+        (content(samples=8, seed=8), "holds another sweep"),
+        (content(samples=8, grid={"links": [60, 90], "frequency": [5, 12]}), "holds another sweep"),
+        (content(samples=8, options={"tolerance": 1e-5}), "holds another sweep"),
+        (content(samples=8, record={"series": True}), "holds another sweep"),
+        (content(samples=8, sampler="sobol"), "holds another sweep"),
+        (two_blocks(8, 8), "holds another sweep"),
+    ],
+)
+def test_what_is_no_growth_is_refused(tmp_path: Path, given: dict[str, Any], message: str) -> None:
+    """Fewer samples, or another change beside more samples, are refused in one line; the folder stays as it was."""
+    make_sweep(tmp_path, content(samples=4), drawn_distance)
+    before = files(tmp_path)
+    with pytest.raises(InputError, match=message) as caught:
+        make_sweep(tmp_path, given, drawn_distance)
+    assert "\n" not in str(caught.value) and files(tmp_path) == before
+
+
+def test_samples_that_do_not_grow_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A latin hypercube has other points when it is larger: one line says so at the command line."""
+    assert set(SAMPLERS) - set(EXTENSIBLE) == {"latin_hypercube"}
+    make_sweep(tmp_path / "sweep", content(samples=4, sampler="latin_hypercube"), drawn_distance)
+    before = files(tmp_path / "sweep")
+    (tmp_path / "large.yaml").write_text(yaml.safe_dump(content(samples=8, sampler="latin_hypercube"), sort_keys=False))
+    with pytest.raises(SystemExit):
+        main(["sweep", str(tmp_path / "large.yaml"), "-o", str(tmp_path / "sweep")])
+    error = capsys.readouterr().err.strip()
+    assert "but a latin_hypercube of 8 samples has other points; give samples: 4" in error and "\n" not in error
+    assert files(tmp_path / "sweep") == before
+
+
+def test_a_folder_that_cannot_grow_stays_as_it_was(tmp_path: Path) -> None:
+    """Growth on a disk without room for it is refused, and the folder still takes the sweep that it has."""
+    make_sweep(tmp_path, content(samples=4), drawn_distance)
+    before = files(tmp_path)
+    with pytest.raises(OSError, match="make room"):
+        SweepFolder.open(tmp_path, load_sweep(content(samples=10**9)), shard_size=10**9)
+    assert files(tmp_path) == before
+    make_sweep(tmp_path, content(samples=4), drawn_distance)
+
+
+def test_shards_of_a_fresh_and_of_a_grown_folder_do_not_mix(tmp_path: Path) -> None:
+    """A shard of the same places in a folder that was not grown holds other walks, and is refused."""
+    for given in (content(samples=2), content(samples=4)):
+        grown = make_sweep(tmp_path / "grown", given, lambda walk: drawn_distance(walk) if walk.index != 15 else None)
+    fresh = make_sweep(tmp_path / "fresh", given, lambda walk: drawn_distance(walk) if walk.index != 15 else None)
+    assert grown.missing_count == fresh.missing_count == 1
+    shared = [name for name in shards(tmp_path / "fresh") if name in shards(tmp_path / "grown")]
+    (tmp_path / "grown" / shared[-1]).write_bytes((tmp_path / "fresh" / shared[-1]).read_bytes())
+    with pytest.raises(InputError, match="a shard of another sweep"):
+        load(tmp_path / "grown")

@@ -1,0 +1,72 @@
+"""One file of several folders: samples of sweeps with different seeds one behind the other."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray
+import yaml
+
+from tests.run.test_sweep_run import BRIEF, TINY
+from tests.support.made_sweeps import make_sweep
+from tests.support.sweep_content import blocks, content
+from warpchain.cli.main import main
+from warpchain.run.sweep_run import sweep
+from warpchain.store.sweep_result import load
+
+
+def merge(*arguments: Path) -> int | str | None:
+    """Exit status of the command."""
+    with pytest.raises(SystemExit) as done:
+        main(["merge", *map(str, arguments)])
+    return done.value.code
+
+
+def test_samples_of_several_folders_are_put_together(tmp_path: Path) -> None:
+    """Rows and motions of each folder are at its samples, with its seed; a folder may have grown."""
+    given = TINY | {"grid": {"links": [30, 44]}, "scene": BRIEF | {"frequency": 12.0}}
+    given |= {"record": {"series": {"samples": [0, 2]}, "frames": {"samples": [2]}}, "samples": 3}
+    sweep(given | {"seed": 8}, tmp_path / "a", workers=1)
+    for samples in (3, 5):
+        sweep(given | {"seed": 9, "samples": samples, "name": "other"}, tmp_path / "b", workers=1)
+    assert merge(tmp_path / "a", tmp_path / "b", tmp_path / "both.h5") in (None, 0)
+    parts = [load(tmp_path / name) for name in "ab"]
+    with xarray.open_dataset(tmp_path / "both.h5", engine="h5netcdf") as data:
+        assert data.seed.dims == ("sample",) and data.seed.values.tolist() == ["8"] * 3 + ["9"] * 5
+        assert data.attrs["seed"] == "8, 9" and data.attrs["walks"] == 16 and data.attrs["walks_time_limit"] == 16
+        assert [each["seed"] for each in json.loads(data.attrs["sweep"])] == [8, 9]
+        for name in ("loss_joint_friction", "index", "floor_friction_drawn"):
+            np.testing.assert_array_equal(data[name], np.concatenate([part.columns[name] for part in parts], axis=-1))
+        assert (data.series_count.values > 0).tolist() == [[True, False, True, True, False, True, False, False]] * 2
+        for part, sample, place in ((0, 0, 0), (0, 2, 2), (1, 0, 3), (1, 2, 5)):
+            for links in (30, 44):
+                walk, at = parts[part].series(links=links, sample=sample), data.sel(links=links).isel(sample=place)
+                instants = slice(int(at.series_start), int(at.series_start + at.series_count))
+                np.testing.assert_array_equal(data.series_center_y[instants], walk.center[:, 1])
+                joints = slice(int(at.joint_start), int(at.joint_start + at.joint_count))
+                np.testing.assert_array_equal(data.joint_x[joints], walk.frame_joints[..., 0].ravel())
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (content(samples=5), "has seed 7, as "),
+        (content(seed=8, grid={"links": [60, 90], "frequency": [5, 12]}), "is not the sweep of"),
+        (content(seed=8, options={"tolerance": 1e-5}), "is not the sweep of"),
+        (blocks({"grid": {"links": [60, 90]}}, {"grid": {"frequency": [5, 10]}}, seed=8), "is not the sweep of"),
+        (content(seed=8, samples=1, distributions={"all": "fixed"}), "block main draws nothing"),
+    ],
+)
+def test_folders_that_do_not_fit_are_refused(
+    tmp_path: Path, given: dict[str, Any], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The same walks twice, or other cells, are refused in one line, and no file is written."""
+    make_sweep(tmp_path / "a", content())
+    make_sweep(tmp_path / "b", given)
+    assert merge(tmp_path / "a", tmp_path / "b", tmp_path / "both.h5") == 2
+    error = capsys.readouterr().err.strip()
+    assert f"{tmp_path / 'b'}: " in error and message in error and "\n" not in error
+    assert not (tmp_path / "both.h5").exists()
+    assert yaml.safe_load((tmp_path / "b/sweep.yaml").read_text())["name"] == "small"
