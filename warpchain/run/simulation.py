@@ -10,7 +10,7 @@ from warpchain.engine.tallies import LOST
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import check_links_on_gpu
-from warpchain.inputs.validation import InputError, shown, validated
+from warpchain.inputs.validation import InputError, plain, shown, validated
 from warpchain.status import Status
 from warpchain.walks.walk_result import Trajectory
 
@@ -64,6 +64,7 @@ def simulate(
     chosen: dict[str, object] = {"method": method, "device": device, "self_contact": self_contact}
     if tolerance is not None:
         chosen["tolerance"] = tolerance
+    floor, gravity, duration = plain(floor), plain(gravity), plain(duration)
     options = validated(Options, _UNSOFTENED | settings | chosen, "options")
     for name in _UNSOFTENED:
         if getattr(options, name):
@@ -125,7 +126,7 @@ def _checked_state(name: str, given: Array) -> Array:
 
 def _checked_times(duration: float, times: Sequence[float] | Array | None) -> Array:
     """Instants of a trajectory, which rise within the duration, or an `InputError`."""
-    if isinstance(duration, bool) or not isinstance(duration, (int, float, np.integer, np.floating)):
+    if isinstance(duration, bool) or not isinstance(duration, int | float):
         raise InputError(f"duration: {shown(duration)} is not a number; give seconds")
     if not 0 <= duration < LONGEST:
         raise InputError(f"duration: {shown(duration)} is not a time; give a number of seconds, at least 0")

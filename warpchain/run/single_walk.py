@@ -5,8 +5,6 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from warpchain.engine.devices import versions
 from warpchain.inputs.distributions import random_generator, sampled
 from warpchain.inputs.options import Options
@@ -14,7 +12,7 @@ from warpchain.inputs.parameters import warn_of_units
 from warpchain.inputs.sections import NAME_OF_SYMBOL, by_section
 from warpchain.inputs.setup import Setup, resolve
 from warpchain.inputs.symbols import full_name
-from warpchain.inputs.validation import InputError, shown
+from warpchain.inputs.validation import InputError, plain, shown
 from warpchain.walks.motion import Keep
 from warpchain.walks.scheduler import run_setups
 from warpchain.walks.walk_phases import WalkRun
@@ -116,7 +114,7 @@ def setup_walk(preset: str, settings: Mapping[str, object], seed: int | None) ->
     """
     sections = by_section(settings)
     setup = resolve(preset, **sections)
-    return setup if seed is None else sampled(setup, random_generator(seed), kept=sections["scene"])
+    return setup if seed is None else sampled(setup, random_generator(plain(seed)), kept=sections["scene"])
 
 
 def run_walk(
@@ -129,6 +127,7 @@ def run_walk(
 ) -> WalkResult:
     """Run a walk whose setup is complete, samples drawn; the seed is only noted. The rest is as of :func:`walk`."""
     started = time.perf_counter()
+    frame_interval, record_before = plain(frame_interval), plain(record_before)
     frame_every = None if frame_interval is None else _samples_per_frame(frame_interval, setup.options)
     before = _time_before(record_before, frame_every) if setup.scene.start != "ellipse" else 0.0
 
@@ -147,7 +146,7 @@ def run_walk(
         frame_joints=frame_joints,
         before_release=run.recorder.before,
         setup=setup,
-        seed=seed,
+        seed=plain(seed),
         versions=versions(),
         wall_time=time.perf_counter() - started,
     )
@@ -178,4 +177,4 @@ def _time_before(record_before: float | None, frame_every: int | None) -> float:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    return isinstance(value, int | float) and not isinstance(value, bool)

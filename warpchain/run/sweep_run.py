@@ -20,7 +20,7 @@ from warpchain.engine.processors import processors
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import warn_of_units
 from warpchain.inputs.setup import Setup
-from warpchain.inputs.validation import InputError, validated
+from warpchain.inputs.validation import InputError, plain, validated
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.shards import empty_rows, read_shard, shard_name, write_shard
@@ -115,6 +115,7 @@ def sweep(
     warn_of_units(given for block in planned.blocks for given in block.given_parameters())
     if device is not None:
         planned = on_device(planned, device)
+    workers = plain(workers)
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
         raise InputError(f"workers: {workers!r} is not a number of workers; give a whole number from 1")
     at_once = workers or (GPU_WORKERS if _is_on_gpu(planned) else processors())
