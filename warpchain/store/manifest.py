@@ -1,7 +1,6 @@
 """The manifest of a sweep's folder, sweep.json: what the folder belongs to, and how its walks are laid out."""
 
 import errno
-import importlib.metadata
 import json
 import math
 import os
@@ -16,6 +15,7 @@ from warpchain.files import version_refusal
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.plan import Sweep
 from warpchain.sweeps.recording import Recording
+from warpchain.version import package_versions
 from warpchain.walks.rows import row_type
 
 Folder = str | os.PathLike[str]
@@ -96,7 +96,7 @@ class Manifest:
                 for block in sweep.blocks
             ),
             sweep=sweep.canonical(),
-            versions={name: importlib.metadata.version(name) for name in ("warpchain", "warp-lang", "numpy")},
+            versions=package_versions(),
         )
 
     @property
