@@ -275,6 +275,22 @@ class SweepResult:
         lines = [f"<SweepResult {self.name}: {self.walk_count} walks, {_counts(self.summary())}>"]
         return "\n  ".join([*lines, *map(repr, self.blocks.values())])
 
+    def _repr_png_(self) -> bytes | None:
+        """The main figure; None if there is nothing to draw yet."""
+        from warpchain.pictures.inline import first_png
+
+        return first_png([lambda: self.plot()])
+
+    def _repr_html_(self) -> str:
+        """Walks by status, axes of each block, and the main figure."""
+        from warpchain.pictures.inline import page
+
+        rows = [("walks", f"{self.walk_count:,}: {_counts(self.summary())}"), ("seed", str(self.seed))]
+        for name, block in self.blocks.items():
+            sizes = [f"{axis} {_ends(values)}" for axis, values in block.axes.items()]
+            rows.append((f"block {name}", ", ".join([*sizes, f"samples {block.shape[-1]}"])))
+        return page(f"Sweep {self.name}", rows, self._repr_png_())
+
     @property
     def walk_count(self) -> int:
         """Number of walks of the sweep, missing ones included."""
@@ -424,6 +440,12 @@ def _summary(status: Array) -> dict[str, int]:
 
 def _counts(summary: Mapping[str, int]) -> str:
     return ", ".join(f"{count} {label}" for label, count in summary.items() if count)
+
+
+def _ends(values: Array) -> str:
+    """The values of an axis, only the ends of many."""
+    texts = [f"{value:g}" if values.dtype.kind == "f" else str(value) for value in values]
+    return ", ".join(texts) if len(texts) <= 6 else f"{texts[0]} … {texts[-1]} ({len(texts)} values)"
 
 
 def _package(name: str) -> ModuleType:
