@@ -17,6 +17,9 @@ from warpchain.inputs.sections import SECTIONS, by_name, by_section
 from warpchain.inputs.validation import InputError, shown, suggestion, validated
 from warpchain.inputs.yaml_files import read_yaml
 
+DEFAULT_PRESET: Final = "paper"
+"""Preset of a walk or a sweep that names none."""
+
 
 @dataclass(frozen=True)
 class Setup:

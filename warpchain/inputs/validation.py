@@ -24,7 +24,10 @@ DIMENSIONLESS: Final = "1"
 
 
 class InputError(ValueError):
-    """Input that the user can correct; its text is one line: `path.of.field: what is wrong; what to do`."""
+    """Input that the user can correct; its text is `path.of.field: what is wrong; what to do`, in one line.
+
+    A call that checks several values at once, `warpchain.sweep`, has a line for each.
+    """
 
 
 class InputWarning(UserWarning):
