@@ -6,13 +6,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from warpchain.engine.devices import versions
-from warpchain.inputs.distributions import random_generator, sampled
+from warpchain.inputs.distributions import LARGEST_SEED, random_generator, sampled
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import warn_of_units
 from warpchain.inputs.sections import NAME_OF_SYMBOL, by_section
-from warpchain.inputs.setup import Setup, resolve
+from warpchain.inputs.setup import DEFAULT_PRESET, Setup, resolve
 from warpchain.inputs.symbols import full_name
-from warpchain.inputs.validation import InputError, plain, shown
+from warpchain.inputs.validation import InputError, checked_whole, plain, shown
 from warpchain.walks.motion import Keep
 from warpchain.walks.scheduler import run_setups
 from warpchain.walks.walk_phases import WalkRun
@@ -46,12 +46,13 @@ OnProgress = Callable[[Progress], None]
 
 def walk(
     *,
-    links: int = 60,
-    frequency: float = 15.0,
-    preset: str = "paper",
-    method: str = "standard",
+    links: int | None = None,
+    frequency: float | None = None,
+    preset: str | None = None,
+    method: str | None = None,
     tolerance: float | None = None,
-    start: str = "rest",
+    start: str | None = None,
+    setup: Setup | None = None,
     seed: int | None = None,
     frame_interval: float | None = 2e-3,
     record_before: float | None = None,
@@ -61,15 +62,17 @@ def walk(
     """Simulate one walk: hang a chain on its sprocket, spin it up, release it and follow it to rest.
 
     Args:
-        links: Number of links n, even.
-        frequency: Turns of the sprocket per second [Hz].
-        preset: ``"paper"`` (Table 1) or ``"soft"`` (softer joints, 10 to 15 times fewer steps).
-        method: ``"standard"`` (``"hybrid"`` at 1e-3, with joints softened on the sprocket and in the pile; on a GPU
-            the next), ``"explicit"`` (``"os32"`` at 1e-3, softened likewise), ``"reference"`` (``"rkf78"`` at 1e-6, as
-            in the paper), or an integrator: a key of ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
+        links: Number of links n, even; None: 60.
+        frequency: Turns of the sprocket per second [Hz]; None: 15.
+        preset: None or ``"paper"`` (Table 1), or ``"soft"`` (softer joints, 10 to 15 times fewer steps).
+        method: None or ``"standard"`` (``"hybrid"`` at 1e-3, with joints softened on the sprocket and in the pile; on a
+            GPU the next), ``"explicit"`` (``"os32"`` at 1e-3, softened likewise), ``"reference"`` (``"rkf78"`` at 1e-6,
+            as in the paper), or an integrator: a key of ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
         tolerance: Error allowed in a step, absolute (SI units) and relative alike; None: the method's, 1e-6 for an
             integrator, 1e-4 for ``"hybrid"``, and of ``"standard"`` and ``"explicit"`` 3e-3 while joints are soft.
-        start: ``"rest"``, ``"spinning"`` or ``"ellipse"``.
+        start: None or ``"rest"``, ``"spinning"`` or ``"ellipse"``.
+        setup: ``setup`` of another walk, which is repeated to the bit, whatever was drawn for it. It is complete: no
+            other setting is taken beside it, nothing is drawn, and ``seed`` is only noted in the result.
         seed: Draw parameters, phase and clearance from their distributions; None: Table 1's means, phase 0.
         frame_interval: Time between kept frames of all joints [s], rounded to whole samples; None keeps none. Frames
             and samples do not change the walk: they are taken at the end of the first step after their time.
@@ -89,18 +92,33 @@ def walk(
     Warns:
         InputWarning: A parameter looks like one in another unit.
     """
-    named: dict[str, object] = {"links": links, "frequency": frequency, "method": method, "start": start}
+    named = {"links": links, "frequency": frequency, "method": method, "tolerance": tolerance, "start": start}
     for symbol in settings:
         name = full_name(symbol, NAME_OF_SYMBOL)
         if name in named:
             raise InputError(f"{symbol}: an argument of its own has this value; give {name}=…")
-    chosen = {} if tolerance is None else {"tolerance": tolerance}
-    setup = setup_walk(preset, named | chosen | settings, seed)
-    parameters = by_section(settings)["parameters"]
+    given = {name: value for name, value in named.items() if value is not None} | settings
+    if setup is None:
+        setup = setup_walk(DEFAULT_PRESET if preset is None else preset, given, seed)
+    else:
+        _check_repeated(setup, given if preset is None else {"preset": preset, **given}, seed)
+    parameters = by_section(plain(settings))["parameters"]
     warn_of_units((f"parameters.{name}", name, value) for name, value in parameters.items())
     return run_walk(
         setup, seed=seed, frame_interval=frame_interval, record_before=record_before, on_progress=on_progress
     )
+
+
+def _check_repeated(setup: object, others: Mapping[str, object], seed: int | None) -> None:
+    """Refuse what is no complete setup, settings beside one, and what is no seed, by an `InputError`."""
+    if not isinstance(setup, Setup):
+        raise InputError(
+            f"setup: {shown(setup)} is none of a walk; give setup of a WalkResult, such as load_walk(…).setup"
+        )
+    if others:
+        raise InputError(f"{', '.join(others)}: given together with setup, which is complete; leave one out")
+    if seed is not None:
+        checked_whole(plain(seed), "seed", 0, LARGEST_SEED)
 
 
 def setup_walk(preset: str, settings: Mapping[str, object], seed: int | None) -> Setup:
