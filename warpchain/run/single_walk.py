@@ -4,9 +4,11 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Literal, Unpack
 
 from warpchain.engine.devices import versions
 from warpchain.inputs.distributions import LARGEST_SEED, random_generator, sampled
+from warpchain.inputs.keywords import Method, Number, Preset, WalkSettings, Whole
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import warn_of_units
 from warpchain.inputs.sections import NAME_OF_SYMBOL, by_section
@@ -46,18 +48,18 @@ OnProgress = Callable[[Progress], None]
 
 def walk(
     *,
-    links: int | None = None,
-    frequency: float | None = None,
-    preset: str | None = None,
-    method: str | None = None,
-    tolerance: float | None = None,
-    start: str | None = None,
+    links: Whole | None = None,
+    frequency: Number | None = None,
+    preset: Preset | None = None,
+    method: Method | None = None,
+    tolerance: Number | None = None,
+    start: Literal["rest", "spinning", "ellipse"] | None = None,
     setup: Setup | None = None,
-    seed: int | None = None,
-    frame_interval: float | None = 2e-3,
-    record_before: float | None = None,
+    seed: Whole | None = None,
+    frame_interval: Number | None = 2e-3,
+    record_before: Number | None = None,
     on_progress: OnProgress | None = None,
-    **settings: object,
+    **settings: Unpack[WalkSettings],
 ) -> WalkResult:
     """Simulate one walk: hang a chain on its sprocket, spin it up, release it and follow it to rest.
 
@@ -97,7 +99,8 @@ def walk(
         name = full_name(symbol, NAME_OF_SYMBOL)
         if name in named:
             raise InputError(f"{symbol}: an argument of its own has this value; give {name}=…")
-    given = {name: value for name, value in named.items() if value is not None} | settings
+    given: dict[str, object] = {name: value for name, value in named.items() if value is not None}
+    given.update(settings)
     if setup is None:
         setup = setup_walk(DEFAULT_PRESET if preset is None else preset, given, seed)
     else:
@@ -109,7 +112,7 @@ def walk(
     )
 
 
-def _check_repeated(setup: object, others: Mapping[str, object], seed: int | None) -> None:
+def _check_repeated(setup: object, others: Mapping[str, object], seed: Whole | None) -> None:
     """Refuse what is no complete setup, settings beside one, and what is no seed, by an `InputError`."""
     if not isinstance(setup, Setup):
         raise InputError(
@@ -121,7 +124,7 @@ def _check_repeated(setup: object, others: Mapping[str, object], seed: int | Non
         checked_whole(plain(seed), "seed", 0, LARGEST_SEED)
 
 
-def setup_walk(preset: str, settings: Mapping[str, object], seed: int | None) -> Setup:
+def setup_walk(preset: str, settings: Mapping[str, object], seed: Whole | None) -> Setup:
     """Sort settings by name into parameters, scene and options, check them, and draw the sample of a seed.
 
     From the seed's generator come first the parameters, then phase and clearance. A phase or clearance that is
@@ -138,16 +141,15 @@ def setup_walk(preset: str, settings: Mapping[str, object], seed: int | None) ->
 def run_walk(
     setup: Setup,
     *,
-    seed: int | None = None,
-    frame_interval: float | None = 2e-3,
-    record_before: float | None = None,
+    seed: Whole | None = None,
+    frame_interval: Number | None = 2e-3,
+    record_before: Number | None = None,
     on_progress: OnProgress | None = None,
 ) -> WalkResult:
     """Run a walk whose setup is complete, samples drawn; the seed is only noted. The rest is as of :func:`walk`."""
     started = time.perf_counter()
-    frame_interval, record_before = plain(frame_interval), plain(record_before)
-    frame_every = None if frame_interval is None else _samples_per_frame(frame_interval, setup.options)
-    before = _time_before(record_before, frame_every) if setup.scene.start != "ellipse" else 0.0
+    frame_every = None if frame_interval is None else _samples_per_frame(plain(frame_interval), setup.options)
+    before = _time_before(plain(record_before), frame_every) if setup.scene.start != "ellipse" else 0.0
 
     def watch(run: WalkRun, compiling: bool) -> None:
         if on_progress is not None:

@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 from warpchain.engine.kernel_choice import shared_threads
 from warpchain.engine.processors import processors
+from warpchain.inputs.keywords import OptionSettings, ParameterSettings, Preset, Sampler, SceneSettings, Whole
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import warn_of_units
 from warpchain.inputs.setup import Setup
@@ -55,20 +56,20 @@ def sweep(
     out: str | os.PathLike[str] | None = None,
     *,
     grid: Mapping[str, Any] | None = None,
-    samples: int | None = None,
-    sampler: str | None = None,
-    preset: str | None = None,
-    scene: Mapping[str, Any] | None = None,
-    parameters: Mapping[str, Any] | None = None,
-    options: Mapping[str, Any] | None = None,
+    samples: Whole | None = None,
+    sampler: Sampler | None = None,
+    preset: Preset | None = None,
+    scene: SceneSettings | None = None,
+    parameters: ParameterSettings | None = None,
+    options: OptionSettings | None = None,
     distributions: Mapping[str, Any] | None = None,
     same_samples_along: Sequence[str] | None = None,
     record: Mapping[str, Any] | None = None,
     name: str | None = None,
-    seed: int | None = None,
+    seed: Whole | None = None,
     device: str | None = None,
     executor: Executor | None = None,
-    workers: int | None = None,
+    workers: Whole | None = None,
     fresh: bool = False,
     progress: bool = True,
     on_progress: OnProgress | None = None,
@@ -140,7 +141,7 @@ def _checked_call(
     out: str | os.PathLike[str] | None,
     keys: Mapping[str, object],
     device: str | None,
-    workers: int | None,
+    workers: Whole | None,
 ) -> tuple[Sweep, Path]:
     """The sweep on its device, and its folder.
 
