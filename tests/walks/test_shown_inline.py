@@ -73,7 +73,7 @@ def test_a_walk_of_a_sweep_is_shown() -> None:
 def test_a_sweep_is_shown_with_its_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Name, walks by status and axes, escaped; the main figure if there is one."""
     result = make_sweep(tmp_path, FIGURE_6)
-    monkeypatch.setattr(SweepResult, "plot", lambda self: make_walk().plot(), raising=False)
+    assert result._repr_png_().startswith(PNG) and result.plot()._repr_png_().startswith(PNG)
     shown = result._repr_html_()
     for text in ("made &lt;up&gt; &amp; down", "at_rest", "links 60, 90", "frequency 5, 10", "samples 12", "<img"):
         assert text in shown
@@ -81,7 +81,7 @@ def test_a_sweep_is_shown_with_its_counts(tmp_path: Path, monkeypatch: pytest.Mo
     def fail(self: Any) -> Figure:
         raise ValueError("nothing to show")
 
-    monkeypatch.setattr(SweepResult, "plot", fail, raising=False)
+    monkeypatch.setattr(SweepResult, "plot", fail)
     assert result._repr_png_() is None and "<img" not in result._repr_html_()
 
 

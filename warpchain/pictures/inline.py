@@ -3,10 +3,11 @@
 import base64
 import html
 import io
-from collections.abc import Callable, Iterable
-from typing import Final
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Final
 
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 NOTEBOOK_DPI: Final = 100
 """Resolution of a figure in a notebook [dots per inch]."""
@@ -27,7 +28,7 @@ def png(figure: Figure) -> bytes:
     return content.getvalue()
 
 
-def first_png(draws: Iterable[Callable[[], Figure]]) -> bytes | None:
+def first_png(draws: Iterable[Callable[[], Any]]) -> bytes | None:
     """The first figure that can be drawn, as a PNG; None if none can be, whatever the reason."""
     for draw in draws:
         try:
@@ -35,6 +36,16 @@ def first_png(draws: Iterable[Callable[[], Figure]]) -> bytes | None:
         except Exception:  # a result must be shown in any case, without its picture if need be
             continue
     return None
+
+
+def axes_text(axes: Mapping[str, NDArray[Any]], samples: int) -> str:
+    """Name and values of each axis, only the ends of many, and the number of samples."""
+    parts = []
+    for name, values in axes.items():
+        texts = [f"{value:g}" if values.dtype.kind == "f" else str(value) for value in values]
+        shown = ", ".join(texts) if len(texts) <= 6 else f"{texts[0]} … {texts[-1]} ({len(texts)} values)"
+        parts.append(f"{name} {shown}")
+    return "; ".join([*parts, f"samples {samples}"])
 
 
 def page(title: str, rows: Iterable[tuple[str, str]], picture: bytes | None) -> str:
