@@ -115,7 +115,7 @@ def test_all_errors_are_told_at_once(tmp_path):
         "workers: 0 is not a number of workers",
         "sweep.grid.links[1]: 31 is odd",
         "sweep.grid.links[3]: 'x' is text",
-        "sweep.grid.frequenzy: unknown key; did you mean frequency?",
+        "sweep.grid.frequenzy: unknown name; did you mean frequency?",
         "sweep.samples: 0",
         "sweep.scene.clearance: -1.0 is less than 0 m",
         "sweep.scene.start: 'flying' is unknown",

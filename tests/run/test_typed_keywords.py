@@ -12,7 +12,7 @@ import warpchain
 from warpchain.inputs import keywords
 from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.parameters import PRESETS
-from warpchain.inputs.setup import SECTION_OF, SECTIONS
+from warpchain.inputs.sections import NAME_OF_SYMBOL, SECTION_OF, SECTIONS, SYMBOL_OF
 from warpchain.sweeps.designs import SAMPLERS
 
 ROOT = Path(__file__).parents[2]
@@ -28,7 +28,7 @@ TYPES: dict[Any, Any] = {
 SNIPPET = """
 import numpy as np
 import warpchain
-warpchain.walk(floor_friction=0.3, links=np.int64(60), frequency=15, method="dp5", self_contact=False)
+warpchain.walk(floor_friction=0.3, e_fc=0.1, links=np.int64(60), frequency=15, method="dp5", self_contact=False)
 warpchain.walk(floor_frictoin=3)
 warpchain.walk(floor_friction="3")
 warpchain.walk(method="dp6")
@@ -53,7 +53,9 @@ def hints_of(section: str) -> dict[str, Any]:
 def test_keywords_are_the_fields(section: str) -> None:
     """Each field has a keyword of the same type, numbers of NumPy's included, and there is no other."""
     fields, hints = SECTIONS[section].model_fields, hints_of(section)
-    assert hints.keys() == fields.keys()
+    symbols = {symbol: name for name, symbol in SYMBOL_OF.items() if name in fields}
+    assert hints.keys() == fields.keys() | symbols.keys()
+    assert all(hints[symbol] == hints[name] for symbol, name in symbols.items())
     for name, field in fields.items():
         is_literal = get_origin(field.annotation) is Literal
         expected = keywords.Method if name == "method" else field.annotation if is_literal else TYPES[field.annotation]
@@ -70,7 +72,7 @@ def test_names_are_all_there() -> None:
 def test_a_walk_takes_every_setting_once() -> None:
     """Named arguments and typed settings together are the fields of all sections, and no name is in both."""
     named = set(inspect.signature(warpchain.walk).parameters) & SECTION_OF.keys()
-    others = get_type_hints(keywords.WalkSettings).keys()
+    others = get_type_hints(keywords.WalkSettings).keys() - NAME_OF_SYMBOL.keys()
     assert named | others == SECTION_OF.keys() and not named & others
     named = set(inspect.signature(warpchain.simulate).parameters)
     others = get_type_hints(keywords.OtherOptions).keys()

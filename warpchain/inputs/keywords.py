@@ -22,7 +22,32 @@ Sampler = Literal["random", "sobol", "latin_hypercube", "saltelli"]
 """One of `warpchain.sweeps.designs.SAMPLERS`."""
 
 
-class ParameterSettings(TypedDict, total=False):
+class ParameterSymbols(TypedDict, total=False):
+    """Symbols of fields of `Parameters`, which may be given instead of their names."""
+
+    ell: Number
+    R: Number
+    m_inner: Number
+    m_outer: Number
+    I_inner: Number
+    I_outer: Number
+    beta: Number
+    tau_c: Number
+    e_fc: Number
+    mu_fc: Number
+    g: Number
+    e_cc: Number
+    mu_cc: Number
+    e_sc: Number
+    mu_sc: Number
+    k: Number
+    b: Number
+    omega_c: Number
+    e_t: Number
+    r: Number
+
+
+class ParameterSettings(ParameterSymbols, total=False):
     """Fields of `Parameters`."""
 
     link_length: Number
@@ -66,8 +91,10 @@ class OtherScene(TypedDict, total=False):
 
 
 class SceneSettings(OtherScene, total=False):
-    """Fields of `Scene`."""
+    """Fields of `Scene`, and symbols of two of them."""
 
+    n: Whole
+    nu: Number
     links: Whole
     frequency: Number
     start: Literal["rest", "spinning", "ellipse"]

@@ -126,9 +126,10 @@ def sweep(
         "name": name,
         "seed": seed,
     }
-    planned, folder = _checked_call(
+    planned, folder, given = _checked_call(
         source, out, {key: value for key, value in keys.items() if value is not None}, device, workers
     )
+    warn_of_units(given)
     with contextlib.ExitStack() as shown:
         if on_progress is None:
             on_progress = shown.enter_context(progress_bar()) if progress else lambda progress: None
@@ -142,13 +143,13 @@ def _checked_call(
     keys: Mapping[str, object],
     device: str | None,
     workers: Whole | None,
-) -> tuple[Sweep, Path]:
-    """The sweep on its device, and its folder.
+) -> tuple[Sweep, Path, list[tuple[str, str, Any]]]:
+    """The sweep on its device, its folder, and the parameters given for it, for `warn_of_units`.
 
     Raises:
         InputError: Something is refused; one line for each value.
     """
-    problems, planned = [], None
+    problems, planned, given = [], None, []
     if source is not None and keys:
         names = ", ".join(keys)
         problems.append(f"{names}: given together with a source; leave one out, or write it into the source")
@@ -159,14 +160,14 @@ def _checked_call(
         problems.append(f"workers: {count!r} is not a number of workers; give a whole number from 1")
     try:
         planned = sweep_of_keywords(keys, out) if source is None else load_sweep(source)
-        warn_of_units(given for block in planned.blocks for given in block.given_parameters())
+        given = [parameter for block in planned.blocks for parameter in block.given_parameters()]
         if device is not None:
             planned = on_device(planned, device)
     except InputError as error:
         problems.append(str(error))
     if problems or planned is None or out is None:
         raise InputError("\n".join(problems))
-    return planned, Path(out)
+    return planned, Path(out), given
 
 
 def _run_in_folder(
