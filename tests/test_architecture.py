@@ -28,7 +28,7 @@ STOREYS = (
     ("engine", "pictures", "oracle"),
     ("loop",),
     ("inputs",),
-    ("files", "status"),
+    ("files", "status", "version"),
     ("kernels",),
 )
 """Wings of warpchain/, from top to bottom: imports go downwards only."""

@@ -5,9 +5,34 @@
     print(walk.status.label, walk.dx, "m")
 
 Importing the package starts no device and reads no heavy library; the first walk compiles its kernels.
+
+To run:
+
+    walk(...)        one walk: hang a chain on its sprocket, spin it up, release it and follow it to rest
+    sweep(...)       many walks: a grid of values with random samples, kept in a folder
+    simulate(...)    the motion of any given chain, without sprocket
+
+To read:
+
+    load(folder)     results of a sweep, as far as it has run
+    load_walk(path)  a walk that `WalkResult.save` wrote
+    preset(name)     the parameters of a named preset, "paper" or "soft"
+
+What they return, take and raise:
+
+    WalkResult       one walk: status, distance, energies, time series, frames; `plot`, `animate`, `save`
+    SweepResult      a sweep: arrays with named axes and units
+    Trajectory       the motion of a given chain
+    Parameters       physical parameters of a chain, its sprocket and the floor
+    Status           how a walk ended, with a sentence that says what to try
+    InputError       a value is refused: one line with the name of the value and the remedy
+
+The version is `__version__`.
 """
 
 from typing import TYPE_CHECKING, Any
+
+from warpchain import version as _version
 
 if TYPE_CHECKING:
     from warpchain.inputs.parameters import Parameters
@@ -19,6 +44,8 @@ if TYPE_CHECKING:
     from warpchain.status import Status
     from warpchain.store.sweep_result import SweepResult, load
     from warpchain.walks.walk_result import Trajectory, WalkResult, load_walk
+
+__version__ = _version.VERSION
 
 _HOMES = {
     "InputError": "inputs.validation",
@@ -60,3 +87,8 @@ def __getattr__(name: str) -> Any:
     value = getattr(import_module(f"warpchain.{_HOMES[name]}"), name)
     globals()[name] = value
     return value
+
+
+def __dir__() -> list[str]:
+    """The public names, also those that were not used yet."""
+    return sorted({*__all__, "__version__", "__doc__", "__file__", "__name__", "__path__"})

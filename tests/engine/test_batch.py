@@ -18,7 +18,8 @@ from warpchain.engine.mirror import Mirror
 from warpchain.inputs.options import Options
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
-from warpchain.run.sweep_run import SweepProgress, prepare, sweep
+from warpchain.run.progress_bar import SweepProgress
+from warpchain.run.sweep_run import prepare, sweep
 from warpchain.sweeps.plan import Sweep, load_sweep
 from warpchain.walks import scheduler
 

@@ -11,8 +11,10 @@ from warpchain.engine.batch import Batch
 from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.parameters import preset
 from warpchain.oracle.circular_loop import circular_loop
+from warpchain.run.single_walk import setup_walk
 
 SOFT = preset("soft")
+SETUP = setup_walk("soft", {}, None)
 POSITION, VELOCITY = circular_loop(8, SOFT, 1.0)
 
 
@@ -212,7 +214,14 @@ def test_simulate_refuses_switches_that_are_no_truth_values(name, value):
 
 def test_good_walk_is_computed():
     """Walks of each start are computed: the tests below fail for no other reason."""
-    for settings in ({}, {"start": "spinning"}, {"start": "ellipse"}, {"seed": 3}, {"frame_interval": None}):
+    for settings in (
+        {},
+        {"start": "spinning"},
+        {"start": "ellipse"},
+        {"seed": 3},
+        {"frame_interval": None},
+        {"setup": SETUP},
+    ):
         with pytest.raises(ComputedError):
             warpchain.walk(**settings)
 
@@ -236,7 +245,7 @@ def test_good_walk_is_computed():
         ({"walk_limit": 0.0}, r"scene\.walk_limit: 0.0 is not greater than 0 s; .*"),
         # the parameters
         ({"preset": "hard"}, r"preset: 'hard' is unknown; presets are paper, soft"),
-        ({"preset": None}, r"preset: None is unknown; .*"),
+        ({"preset": 1}, r"preset: 1 is unknown; .*"),
         ({"inner_mass": -1.0}, r"parameters\.inner_mass: -1.0 is not greater than 0 kg; give a positive mass"),
         ({"circle_radius": 0.1}, r"parameters\.circle_radius: 0.1 is not smaller than half the link .*; .*"),
         ({"floor_friction": 1.5}, r"parameters\.floor_friction: 1.5 is greater than 1; .*"),
@@ -258,6 +267,11 @@ def test_good_walk_is_computed():
         ({"seed": 1.5}, r"seed: 1.5 is no whole number .*; .*"),
         ({"seed": "1"}, r"seed: '1' is no whole number .*; .*"),
         ({"seed": True}, r"seed: True is no whole number .*; .*"),
+        # setups of other walks
+        ({"setup": SETUP, "links": 60}, r"links: given together with setup, which is complete; leave one out"),
+        ({"setup": SETUP, "preset": "paper", "gravity": 9.0}, r"preset, gravity: given together with setup, .*; .*"),
+        ({"setup": {"links": 60}}, r"setup: \{'links': 60\} is none of a walk; give setup of a WalkResult, .*"),
+        ({"setup": SETUP, "seed": -1}, r"seed: -1 is no whole number from 0 .*; .*"),
         # frames
         ({"frame_interval": 0}, r"frame_interval: 0 is not a positive time in s; give one, or None"),
         ({"frame_interval": -1e-3}, r"frame_interval: -0.001 is not a positive time in s; .*"),

@@ -28,7 +28,8 @@ from warpchain.engine.tallies import CONTACTS
 from warpchain.files import replacing
 from warpchain.inputs.validation import InputError
 from warpchain.run.gpu_workers import GpuWorkers, gpu_workers
-from warpchain.run.sweep_run import SweepProgress, one_of_each_cell, prepare
+from warpchain.run.progress_bar import SweepProgress
+from warpchain.run.sweep_run import one_of_each_cell, prepare
 from warpchain.run.sweep_run import sweep as run_sweep
 from warpchain.status import Status
 from warpchain.store.folder import read_rows

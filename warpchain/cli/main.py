@@ -21,6 +21,7 @@ from warpchain.cli.bench_commands import bench_app
 from warpchain.cli.input_commands import parameters, schema
 from warpchain.cli.sweep_commands import FAILED, add_commands
 from warpchain.inputs.methods import METHODS
+from warpchain.version import VERSION
 
 if TYPE_CHECKING:
     from warpchain.inputs.setup import Setup
@@ -96,9 +97,7 @@ def _refuse(problem: str, status: int = REFUSED) -> NoReturn:
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import version
-
-        print("warpchain", version("warpchain"))
+        print("warpchain", VERSION)
         raise typer.Exit
 
 

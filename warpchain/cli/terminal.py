@@ -21,8 +21,8 @@ from warpchain.pictures.style import save_figure
 from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
+    from warpchain.run.progress_bar import SweepProgress
     from warpchain.run.single_walk import Progress
-    from warpchain.run.sweep_run import SweepProgress
     from warpchain.store.sweep_result import SweepResult
 
 COMPILING: Final = "compiling kernels; later runs find them ready"

@@ -2,7 +2,6 @@
 
 import contextlib
 import functools
-import importlib.metadata
 import os
 import platform
 import sys
@@ -19,6 +18,7 @@ from warpchain.kernels import layout
 from warpchain.kernels.contacts.pair_list import list_layout
 from warpchain.kernels.cpu import functions as cpu_functions
 from warpchain.kernels.gpu import functions as gpu_functions
+from warpchain.version import package_versions
 
 CONNECTIONS = "32"  # queues between host and GPU; with fewer than streams, streams wait for one another
 BLOCKS_OF_MULTIPROCESSOR = 32  # most that an NVIDIA multiprocessor holds
@@ -70,8 +70,7 @@ def _without_driver_warning() -> Iterator[None]:
 
 def versions() -> dict[str, str]:
     """Versions of the packages that may change a number, for the provenance of a result."""
-    packages = ("warpchain", "warp-lang", "numpy")
-    return {name: importlib.metadata.version(name) for name in packages} | {"python": platform.python_version()}
+    return package_versions() | {"python": platform.python_version()}
 
 
 def scratch_rows(options: Options, longest: int, device: wp.Device, threads: int | None = None) -> int:

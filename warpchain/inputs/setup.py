@@ -7,7 +7,7 @@ Keyword arguments, the command line and YAML files (`read_setup`) all go through
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options
 from warpchain.inputs.parameters import Parameters
@@ -16,6 +16,9 @@ from warpchain.inputs.scene import Scene, check_links_on_gpu, check_scene
 from warpchain.inputs.sections import SECTIONS, by_name, by_section
 from warpchain.inputs.validation import InputError, shown, suggestion, validated
 from warpchain.inputs.yaml_files import read_yaml
+
+DEFAULT_PRESET: Final = "paper"
+"""Preset of a walk or a sweep that names none."""
 
 
 @dataclass(frozen=True)

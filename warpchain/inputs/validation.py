@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, TypeVar, get_args
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticCustomError
@@ -23,7 +24,10 @@ DIMENSIONLESS: Final = "1"
 
 
 class InputError(ValueError):
-    """Input that the user can correct; its text is one line: `path.of.field: what is wrong; what to do`."""
+    """Input that the user can correct; its text is `path.of.field: what is wrong; what to do`, in one line.
+
+    A call that checks several values at once, `warpchain.sweep`, has a line for each.
+    """
 
 
 class InputWarning(UserWarning):
@@ -97,18 +101,36 @@ def validated(model: type[ModelT], values: Mapping[str, object], path: str) -> M
 
     Args:
         model: `Parameters`, or another model whose fields carry a unit.
-        values: name → value.
+        values: name → value; NumPy's numbers are taken as `plain` does.
         path: where the values were given, such as `scene`; the error's field path starts with it.
 
     Raises:
         InputError: some value is refused; the first is described, the others are counted.
     """
     try:
-        return model.model_validate(dict(values))
+        return model.model_validate(plain(values))
     except ValidationError as error:
         first, *others = error.errors()
         count = f" (and {len(others)} more)" if others else ""
         raise InputError(_described(first, model, path) + count) from None
+
+
+def plain(value: object) -> Any:
+    """A user's value in Python's own types, as a YAML file gives it; what is none of these is left as it is.
+
+    NumPy's numbers, truth values and texts become Python's; arrays, ranges and tuples become lists, also inside of
+    lists and mappings.
+    """
+    if isinstance(value, Mapping):
+        return {key: plain(content) for key, content in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple | range):
+        return [plain(item) for item in value]
+    for kind, own in ((np.bool_, bool), (np.integer, int), (np.floating, float), (np.str_, str)):
+        if isinstance(value, kind):
+            return own(value)
+    return value
 
 
 def checked_whole(value: object, path: str, least: int, most: int) -> int:

@@ -15,6 +15,7 @@ from matplotlib.ticker import NullLocator, PercentFormatter
 from numpy.typing import NDArray
 
 from warpchain.pictures.grid_panels import MOST_LINES, Axis, Cells, Kind, Panel, grid_panels, line_values
+from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.labels import (
     lost_note,
     math_symbol,
@@ -86,7 +87,7 @@ def draw_grid(
         _draw_legends(ax, [ax], panels)
         return ax.figure
     columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
-    figure = Figure(figsize=_size(panels, columns), layout="constrained") if figure is None else figure
+    figure = InlineFigure(figsize=_size(panels, columns), layout="constrained") if figure is None else figure
     alike = _are_alike(panels)
     sharey = alike or all(panel.kind == "lines" for panel in panels)
     areas, _ = panel_grid(figure, len(panels), columns, sharex=alike, sharey=sharey)

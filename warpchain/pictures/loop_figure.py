@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from warpchain.loop.stationary_loop import Kink, StationaryLoop, average_loop, find_kink
 from warpchain.loop.theory import NoSolutionError, TheoreticalLoop, catenary, predict
+from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.style import BLUE, DASHES, FAINT, GREEN, GROUND, INK, RED, tidy
 from warpchain.pictures.walk_shape import Walk, setting
 
@@ -41,7 +42,7 @@ def loop_figure(walk: Walk, *, figure: Figure | None = None) -> Figure:
     theory, note = _solution(predict, loop)
     hanging, _ = _solution(catenary, loop)
     kink = find_kink(loop)
-    figure = Figure(figsize=(10.0, 6.4), layout="constrained") if figure is None else figure
+    figure = InlineFigure(figsize=(10.0, 6.4), layout="constrained") if figure is None else figure
     height, width = np.ptp(loop.position[:, 1]), np.ptp(loop.position[:, 0])
     share = float(np.clip(5.6 * (width + 0.08) / (height + 0.08), 2.3, 4.2)) / 10.0
     left, right = np.asarray(figure.subfigures(1, 2, width_ratios=[share, 1 - share]))

@@ -1,11 +1,11 @@
-"""Figures of walks: the paper's Figure 5, and a film strip of the chain.
+"""Figures of walks: the paper's Figure 5, energies, and a film strip of the chain.
 
 Figures are made without pyplot: nothing is global, no display is needed, the caller owns what is returned.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Final, cast, get_args
 
 import numpy as np
 from matplotlib import colormaps
@@ -13,14 +13,15 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import ListedColormap, Normalize
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
+from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.loop_figure import loop_figure
-from warpchain.pictures.style import DASHES, FAINT, GROUND, INK, LINE_COLORS, tidy
-from warpchain.pictures.walk_shape import Walk, setting
+from warpchain.pictures.style import BLUE, DASHES, FAINT, GREEN, GROUND, INK, LINE_COLORS, RED, tidy
+from warpchain.pictures.walk_shape import EnergyWalk, Kind, Walk, setting
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
@@ -32,25 +33,28 @@ _CLOSE_UP_LINKS: Final = 9
 _CLOSE_UP_ASPECT: Final = 1.5
 
 
-def draw(walk: Walk, kind: Literal["figure5", "film_strip", "loop"], *, figure: Figure | None = None) -> Figure:
+def draw(walk: Walk, kind: Kind, *, figure: Figure | None = None, ax: Axes | None = None) -> Figure:
     """Draw a walk.
 
     Args:
         walk: what to draw.
         kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself, `loop` for its
-            loop on the sprocket just before the release.
+            loop on the sprocket just before the release, `energy` for its energies.
         figure: an empty figure to draw into; by default a new one.
+        ax: where to draw `energy`, the only figure with one pair of axes, instead of a figure of its own.
 
     Raises:
-        ValueError: the kind is unknown, or the walk does not have what it shows.
+        ValueError: the kind is unknown, the walk does not have what it shows, or `ax` does not suit the kind.
     """
-    if kind == "figure5":
-        return figure5([walk], figure=figure)
-    if kind == "film_strip":
-        return film_strip(walk, figure=figure)
-    if kind == "loop":
-        return loop_figure(walk, figure=figure)
-    raise ValueError(f"kind: {kind!r} is unknown; give 'figure5', 'film_strip' or 'loop'")
+    if kind == "energy":
+        return energy_figure(walk, figure=figure, ax=ax)
+    draws = {"figure5": lambda: figure5([walk], figure=figure), "film_strip": lambda: film_strip(walk, figure=figure)}
+    draws["loop"] = lambda: loop_figure(walk, figure=figure)
+    if kind not in draws:
+        raise ValueError(f"kind: {kind!r} is unknown; give {', '.join(map(repr, get_args(Kind)))}")
+    if ax is not None:
+        raise ValueError(f"ax: {kind} has several axes; give an empty figure=, or a SubFigure of yours")
+    return draws[kind]()
 
 
 def figure5(walks: Sequence[Walk], *, labels: Sequence[str] | None = None, figure: Figure | None = None) -> Figure:
@@ -72,7 +76,7 @@ def figure5(walks: Sequence[Walk], *, labels: Sequence[str] | None = None, figur
     for index, walk in enumerate(walks):
         if len(walk.time) == 0:
             raise ValueError(f"walks[{index}]: it has no time series. {walk.status.sentence}")
-    figure = Figure(figsize=(6.4, 5.0), layout="constrained") if figure is None else figure
+    figure = InlineFigure(figsize=(6.4, 5.0), layout="constrained") if figure is None else figure
     height, speed = figure.subplots(2, 1, sharex=True)
     settings = [f"n = {walk.setup.scene.links}, ν = {walk.setup.scene.frequency:g} Hz" for walk in walks]
     names = list(labels or settings)
@@ -93,6 +97,51 @@ def figure5(walks: Sequence[Walk], *, labels: Sequence[str] | None = None, figur
     else:
         height.set_title(groups[0], fontsize="medium", loc="left")
     return figure
+
+
+def energy_figure(walk: Walk, *, figure: Figure | None = None, ax: Axes | None = None) -> Figure:
+    """Energies of a walk against time, and what was lost by then.
+
+    Lost is the energy at the release less that of the moment. The dot at the end is the sum of the ledger's losses,
+    which counts each cause by itself: it lies on the line if the integration conserved energy.
+
+    Args:
+        walk: a walk with energies.
+        figure: an empty figure to draw into; by default a new one.
+        ax: axes to draw into instead.
+
+    Returns:
+        The figure, that of `ax` if it is given.
+
+    Raises:
+        ValueError: figure and axes are given, the walk has no time series, or its energies were not kept.
+    """
+    if figure is not None and ax is not None:
+        raise ValueError("ax: given together with figure; leave one out")
+    if not hasattr(walk, "kinetic_energy"):
+        raise ValueError("walk: a sweep does not keep its energies; run it by itself, warpchain.walk(setup=….setup)")
+    if len(walk.time) == 0:
+        raise ValueError(f"walk: it has no time series. {walk.status.sentence}")
+    walk = cast(EnergyWalk, walk)
+    if ax is None:
+        figure = InlineFigure(figsize=(6.4, 4.0), layout="constrained") if figure is None else figure
+        ax = figure.subplots()
+    ledger, whole = walk.energy, walk.kinetic_energy + walk.gravitational_energy + walk.spring_energy
+    released = ledger["kinetic_at_release"] + ledger["potential_at_release"]
+    for name, values, color in (
+        ("kinetic", walk.kinetic_energy, BLUE),
+        ("gravitational", walk.gravitational_energy, GREEN),
+        ("joint springs", walk.spring_energy, RED),
+        ("lost since the release", released - whole, INK),
+    ):
+        ax.plot(walk.time, values, label=name, color=color, linewidth=1.4, linestyle=DASHES if color == INK else "-")
+    lost = released - ledger["kinetic_at_end"] - ledger["potential_at_end"] - ledger["residual"]
+    ax.plot(walk.time[-1:], [lost], "o", color=INK, clip_on=False, label="sum of all losses", zorder=4)
+    ax.set(xlabel="time since release $t$ / s", ylabel="energy / J", xlim=(0.0, float(walk.time[-1])))
+    ax.set_title(setting(walk), fontsize="medium", loc="left")
+    ax.legend(frameon=False)
+    tidy(ax, grid="both")
+    return ax.figure.figure if isinstance(ax.figure, SubFigure) else ax.figure
 
 
 def check_frames(walk: Walk) -> None:
@@ -139,7 +188,7 @@ def film_strip(walk: Walk, *, count: int | None = None, figure: Figure | None = 
     close_up_width = min((_WIDTH - 0.3) / len(close_ups), _WIDTH / 3)
     close_up_height = (close_up_width - 0.1) / _CLOSE_UP_ASPECT
     paper = np.array([_WIDTH, strip_height + close_up_height + 1.1])
-    figure = Figure(tuple(paper)) if figure is None else figure
+    figure = InlineFigure(tuple(paper)) if figure is None else figure
     # Viridis without its palest end, which can hardly be seen on white paper.
     colors = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)), name="time")
     color_of = ScalarMappable(Normalize(float(walk.frame_time[0]), float(walk.frame_time[-1])), colors)

@@ -1,7 +1,7 @@
 """What figures need of a walk, whichever class holds it."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,9 @@ from warpchain.loop.stationary_loop import HeldWalk
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
+
+Kind = Literal["figure5", "film_strip", "loop", "energy"]
+"""Figures of a walk."""
 
 
 @dataclass(frozen=True, kw_only=True)  # frozen: its attributes are only read
@@ -35,6 +38,22 @@ class Walk(HeldWalk, Protocol):
     frame_time: Array
     frame_joints: Array
     sprocket_radius: float
+
+
+class EnergyWalk(Walk, Protocol):
+    """A walk with the energies of its chain.
+
+    Attributes:
+        energy: ledger of the walk [J], see `WalkResult.energy`.
+        kinetic_energy: kinetic energy [J], shape (t,).
+        gravitational_energy: energy in the field of gravity [J], shape (t,).
+        spring_energy: energy of the joint springs [J], shape (t,).
+    """
+
+    energy: dict[str, float]
+    kinetic_energy: Array
+    gravitational_energy: Array
+    spring_energy: Array
 
 
 def setting(walk: Walk) -> str:

@@ -9,7 +9,6 @@ import os
 import tempfile
 from collections.abc import Mapping
 from html import escape
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
@@ -27,6 +26,7 @@ from warpchain.store.manifest import Folder, check_not_own
 from warpchain.store.sweep_result import BlockResult, SweepResult, load
 from warpchain.sweeps.plan import load_sweep
 from warpchain.sweeps.recording import Recording
+from warpchain.version import VERSION
 from warpchain.walks.rows import MISSING, field_column
 
 FRAME_INTERVAL: Final = 2e-3
@@ -253,7 +253,7 @@ def _provenance(result: SweepResult) -> str:
         ["digest of the sweep (SHA-256)", f"{result.provenance['digest']}"],
         ["version of the numerics", f"{result.provenance['numerics_version']}"],
         ["software that began the sweep", software],
-        ["software that wrote this page", f"warpchain {version('warpchain')}"],
+        ["software that wrote this page", f"warpchain {VERSION}"],
     ]
     again = "<p>With the text under Sweep in a file: <code>warpchain sweep FILE.yaml -o DIR</code></p>"
     return table(["", ""], rows, numbers_from=2) + again

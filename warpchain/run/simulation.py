@@ -1,16 +1,18 @@
 """The motion of any given chain: what tests and analysts use."""
 
 from collections.abc import Sequence
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.engine.batch import Batch
 from warpchain.engine.tallies import LOST
+from warpchain.inputs.keywords import Method, Number, OtherOptions, Preset, Truth
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import check_links_on_gpu
-from warpchain.inputs.validation import InputError, shown, validated
+from warpchain.inputs.validation import InputError, plain, shown, validated
 from warpchain.status import Status
 from warpchain.walks.walk_result import Trajectory
 
@@ -23,19 +25,19 @@ _UNSOFTENED = {"soften_pile": False, "soften_drive": False}
 
 
 def simulate(
-    parameters: Parameters | str,
+    parameters: Parameters | Preset,
     position: Array,
     velocity: Array,
-    duration: float,
+    duration: Number,
     *,
-    times: Sequence[float] | Array | None = None,
-    floor: bool = True,
-    gravity: bool = True,
-    self_contact: bool = True,
-    method: str = "rkf78",
-    tolerance: float | None = None,
+    times: Sequence[Number] | Array | None = None,
+    floor: Truth = True,
+    gravity: Truth = True,
+    self_contact: Truth = True,
+    method: Method = "rkf78",
+    tolerance: Number | None = None,
     device: str = "cpu",
-    **settings: object,
+    **settings: Unpack[OtherOptions],
 ) -> Trajectory:
     """Integrate a given chain, without sprocket.
 
@@ -64,7 +66,9 @@ def simulate(
     chosen: dict[str, object] = {"method": method, "device": device, "self_contact": self_contact}
     if tolerance is not None:
         chosen["tolerance"] = tolerance
-    options = validated(Options, _UNSOFTENED | settings | chosen, "options")
+    floor, gravity = plain(floor), plain(gravity)
+    end: float = plain(duration)
+    options = validated(Options, {**_UNSOFTENED, **settings, **chosen}, "options")
     for name in _UNSOFTENED:
         if getattr(options, name):
             raise InputError(f"options.{name}: only a walk has phases in which joints soften; leave it out")
@@ -80,7 +84,7 @@ def simulate(
     if len(start) < 4 or len(start) % 2:
         raise InputError(f"position: {len(start)} links; a closed chain has an even number of at least 4")
     check_links_on_gpu(len(start), options.device, "position")
-    instants = _checked_times(duration, times)
+    instants = _checked_times(end, times)
     batch = Batch(1, len(start), options)
     batch.set_chain(0, chain, len(start))
     batch.load(0, start, rates, stop_time=instants[0], stop_status=Status.FINISHED)
@@ -94,8 +98,8 @@ def simulate(
         velocities.append(batch.velocity(0))
         if batch.status(0) != Status.FINISHED:
             break
-    if batch.status(0) == Status.FINISHED and instants[-1] < duration:
-        batch.resume(0, duration, Status.FINISHED)
+    if batch.status(0) == Status.FINISHED and instants[-1] < end:
+        batch.resume(0, end, Status.FINISHED)
         batch.run([0], features)
     counts, extremes, losses = batch.counts(0), batch.extremes(0), batch.losses(0)
     kinds = ("floor", "self")
@@ -123,9 +127,9 @@ def _checked_state(name: str, given: Array) -> Array:
     return array
 
 
-def _checked_times(duration: float, times: Sequence[float] | Array | None) -> Array:
+def _checked_times(duration: float, times: Sequence[Number] | Array | None) -> Array:
     """Instants of a trajectory, which rise within the duration, or an `InputError`."""
-    if isinstance(duration, bool) or not isinstance(duration, (int, float, np.integer, np.floating)):
+    if isinstance(duration, bool) or not isinstance(duration, int | float):
         raise InputError(f"duration: {shown(duration)} is not a number; give seconds")
     if not 0 <= duration < LONGEST:
         raise InputError(f"duration: {shown(duration)} is not a time; give a number of seconds, at least 0")

@@ -4,17 +4,17 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-
-import numpy as np
+from typing import Literal, Unpack
 
 from warpchain.engine.devices import versions
-from warpchain.inputs.distributions import random_generator, sampled
+from warpchain.inputs.distributions import LARGEST_SEED, random_generator, sampled
+from warpchain.inputs.keywords import Method, Number, Preset, WalkSettings, Whole
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import warn_of_units
 from warpchain.inputs.sections import NAME_OF_SYMBOL, by_section
-from warpchain.inputs.setup import Setup, resolve
+from warpchain.inputs.setup import DEFAULT_PRESET, Setup, resolve
 from warpchain.inputs.symbols import full_name
-from warpchain.inputs.validation import InputError, shown
+from warpchain.inputs.validation import InputError, checked_whole, plain, shown
 from warpchain.walks.motion import Keep
 from warpchain.walks.scheduler import run_setups
 from warpchain.walks.walk_phases import WalkRun
@@ -48,30 +48,33 @@ OnProgress = Callable[[Progress], None]
 
 def walk(
     *,
-    links: int = 60,
-    frequency: float = 15.0,
-    preset: str = "paper",
-    method: str = "standard",
-    tolerance: float | None = None,
-    start: str = "rest",
-    seed: int | None = None,
-    frame_interval: float | None = 2e-3,
-    record_before: float | None = None,
+    links: Whole | None = None,
+    frequency: Number | None = None,
+    preset: Preset | None = None,
+    method: Method | None = None,
+    tolerance: Number | None = None,
+    start: Literal["rest", "spinning", "ellipse"] | None = None,
+    setup: Setup | None = None,
+    seed: Whole | None = None,
+    frame_interval: Number | None = 2e-3,
+    record_before: Number | None = None,
     on_progress: OnProgress | None = None,
-    **settings: object,
+    **settings: Unpack[WalkSettings],
 ) -> WalkResult:
     """Simulate one walk: hang a chain on its sprocket, spin it up, release it and follow it to rest.
 
     Args:
-        links: Number of links n, even.
-        frequency: Turns of the sprocket per second [Hz].
-        preset: ``"paper"`` (Table 1) or ``"soft"`` (softer joints, 10 to 15 times fewer steps).
-        method: ``"standard"`` (``"hybrid"`` at 1e-3, with joints softened on the sprocket and in the pile; on a GPU
-            the next), ``"explicit"`` (``"os32"`` at 1e-3, softened likewise), ``"reference"`` (``"rkf78"`` at 1e-6, as
-            in the paper), or an integrator: a key of ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
+        links: Number of links n, even; None: 60.
+        frequency: Turns of the sprocket per second [Hz]; None: 15.
+        preset: None or ``"paper"`` (Table 1), or ``"soft"`` (softer joints, 10 to 15 times fewer steps).
+        method: None or ``"standard"`` (``"hybrid"`` at 1e-3, with joints softened on the sprocket and in the pile; on a
+            GPU the next), ``"explicit"`` (``"os32"`` at 1e-3, softened likewise), ``"reference"`` (``"rkf78"`` at 1e-6,
+            as in the paper), or an integrator: a key of ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
         tolerance: Error allowed in a step, absolute (SI units) and relative alike; None: the method's, 1e-6 for an
             integrator, 1e-4 for ``"hybrid"``, and of ``"standard"`` and ``"explicit"`` 3e-3 while joints are soft.
-        start: ``"rest"``, ``"spinning"`` or ``"ellipse"``.
+        start: None or ``"rest"``, ``"spinning"`` or ``"ellipse"``.
+        setup: ``setup`` of another walk, which is repeated to the bit, whatever was drawn for it. It is complete: no
+            other setting is taken beside it, nothing is drawn, and ``seed`` is only noted in the result.
         seed: Draw parameters, phase and clearance from their distributions; None: Table 1's means, phase 0.
         frame_interval: Time between kept frames of all joints [s], rounded to whole samples; None keeps none. Frames
             and samples do not change the walk: they are taken at the end of the first step after their time.
@@ -91,21 +94,37 @@ def walk(
     Warns:
         InputWarning: A parameter looks like one in another unit.
     """
-    named: dict[str, object] = {"links": links, "frequency": frequency, "method": method, "start": start}
+    named = {"links": links, "frequency": frequency, "method": method, "tolerance": tolerance, "start": start}
     for symbol in settings:
         name = full_name(symbol, NAME_OF_SYMBOL)
         if name in named:
             raise InputError(f"{symbol}: an argument of its own has this value; give {name}=…")
-    chosen = {} if tolerance is None else {"tolerance": tolerance}
-    setup = setup_walk(preset, named | chosen | settings, seed)
-    parameters = by_section(settings)["parameters"]
+    given: dict[str, object] = {name: value for name, value in named.items() if value is not None}
+    given.update(settings)
+    if setup is None:
+        setup = setup_walk(DEFAULT_PRESET if preset is None else preset, given, seed)
+    else:
+        _check_repeated(setup, given if preset is None else {"preset": preset, **given}, seed)
+    parameters = by_section(plain(settings))["parameters"]
     warn_of_units((f"parameters.{name}", name, value) for name, value in parameters.items())
     return run_walk(
         setup, seed=seed, frame_interval=frame_interval, record_before=record_before, on_progress=on_progress
     )
 
 
-def setup_walk(preset: str, settings: Mapping[str, object], seed: int | None) -> Setup:
+def _check_repeated(setup: object, others: Mapping[str, object], seed: Whole | None) -> None:
+    """Refuse what is no complete setup, settings beside one, and what is no seed, by an `InputError`."""
+    if not isinstance(setup, Setup):
+        raise InputError(
+            f"setup: {shown(setup)} is none of a walk; give setup of a WalkResult, such as load_walk(…).setup"
+        )
+    if others:
+        raise InputError(f"{', '.join(others)}: given together with setup, which is complete; leave one out")
+    if seed is not None:
+        checked_whole(plain(seed), "seed", 0, LARGEST_SEED)
+
+
+def setup_walk(preset: str, settings: Mapping[str, object], seed: Whole | None) -> Setup:
     """Sort settings by name into parameters, scene and options, check them, and draw the sample of a seed.
 
     From the seed's generator come first the parameters, then phase and clearance. A phase or clearance that is
@@ -116,21 +135,21 @@ def setup_walk(preset: str, settings: Mapping[str, object], seed: int | None) ->
     """
     sections = by_section(settings)
     setup = resolve(preset, **sections)
-    return setup if seed is None else sampled(setup, random_generator(seed), kept=sections["scene"])
+    return setup if seed is None else sampled(setup, random_generator(plain(seed)), kept=sections["scene"])
 
 
 def run_walk(
     setup: Setup,
     *,
-    seed: int | None = None,
-    frame_interval: float | None = 2e-3,
-    record_before: float | None = None,
+    seed: Whole | None = None,
+    frame_interval: Number | None = 2e-3,
+    record_before: Number | None = None,
     on_progress: OnProgress | None = None,
 ) -> WalkResult:
     """Run a walk whose setup is complete, samples drawn; the seed is only noted. The rest is as of :func:`walk`."""
     started = time.perf_counter()
-    frame_every = None if frame_interval is None else _samples_per_frame(frame_interval, setup.options)
-    before = _time_before(record_before, frame_every) if setup.scene.start != "ellipse" else 0.0
+    frame_every = None if frame_interval is None else _samples_per_frame(plain(frame_interval), setup.options)
+    before = _time_before(plain(record_before), frame_every) if setup.scene.start != "ellipse" else 0.0
 
     def watch(run: WalkRun, compiling: bool) -> None:
         if on_progress is not None:
@@ -147,7 +166,7 @@ def run_walk(
         frame_joints=frame_joints,
         before_release=run.recorder.before,
         setup=setup,
-        seed=seed,
+        seed=plain(seed),
         versions=versions(),
         wall_time=time.perf_counter() - started - run.compile_time,
     )
@@ -178,4 +197,4 @@ def _time_before(record_before: float | None, frame_every: int | None) -> float:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -9,18 +9,19 @@ import contextlib
 import os
 import threading
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from warpchain.engine.kernel_choice import shared_threads
 from warpchain.engine.processors import processors
+from warpchain.inputs.keywords import OptionSettings, ParameterSettings, Preset, Sampler, SceneSettings, Whole
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import warn_of_units
 from warpchain.inputs.setup import Setup
-from warpchain.inputs.validation import InputError, validated
+from warpchain.inputs.validation import InputError, plain, validated
+from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text, progress_bar
+from warpchain.run.sweep_keywords import sweep_of_keywords
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.manifest import Manifest, read_manifest
@@ -64,53 +65,52 @@ class DaskClient(Protocol):
         ...
 
 
-@dataclass
-class SweepProgress:
-    """Progress of a sweep.
-
-    Attributes:
-        walks: Walks of the sweep.
-        done: Walks whose results are on disk, those of earlier runs included.
-        before: Walks that were on disk when this run began.
-        seconds: Wall time [s] of this run so far.
-        statuses: Number of walks of this run by status label.
-        compiling: Kernels are being compiled, which takes seconds to minutes the first time on a machine.
-    """
-
-    walks: int
-    done: int
-    before: int
-    seconds: float = 0.0
-    statuses: Counter[str] = field(default_factory=Counter)
-    compiling: bool = False
-
-    @property
-    def rate(self) -> float:
-        """Walks per second of this run."""
-        return (self.done - self.before) / self.seconds if self.seconds > 0 else 0.0
-
-    @property
-    def time_left(self) -> float | None:
-        """Seconds to go at this rate; None before the first shard."""
-        return (self.walks - self.done) / self.rate if self.rate > 0 else None
-
-
 def sweep(
-    source: str | os.PathLike[str] | Mapping[str, Any] | Sweep,
-    out: str | os.PathLike[str],
+    source: str | os.PathLike[str] | Mapping[str, Any] | Sweep | None = None,
+    out: str | os.PathLike[str] | None = None,
     *,
+    grid: Mapping[str, Any] | None = None,
+    samples: Whole | None = None,
+    sampler: Sampler | None = None,
+    preset: Preset | None = None,
+    scene: SceneSettings | None = None,
+    parameters: ParameterSettings | None = None,
+    options: OptionSettings | None = None,
+    distributions: Mapping[str, Any] | None = None,
+    same_samples_along: Sequence[str] | None = None,
+    record: Mapping[str, Any] | None = None,
+    name: str | None = None,
+    seed: Whole | None = None,
     device: str | None = None,
     executor: "Executor | DaskClient | None" = None,
-    workers: int | None = None,
+    workers: Whole | None = None,
     fresh: bool = False,
-    on_progress: Callable[[SweepProgress], None] | None = None,
+    progress: bool = True,
+    on_progress: OnProgress | None = None,
 ) -> SweepResult:
     """Run a sweep, or what is left of it, and load its results.
 
+        warpchain.sweep(grid={"links": [40, 60], "frequency": np.linspace(5, 30, 6)}, samples=20, out="speeds")
+
     Args:
-        source: A sweep file (YAML), the bare name of one that comes with the package, its content, or a :class:`Sweep`.
+        source: A sweep file (YAML), the bare name of one that comes with the package, its content, or a :class:`Sweep`;
+            or None, and the keys of a file by name:
         out: Folder of the results. A sweep that was killed goes on where it was, and leaves the same bytes. A sweep
             with more samples than the folder, and else the same, adds them; latin hypercubes do not grow.
+        grid: Name of each axis, any field of a walk or ``preset`` → its values, as a list, an array or ``{"from":,
+            "to":, "step":}``. The last axis varies fastest.
+        samples: Samples in each cell of the grid.
+        sampler: ``"random"`` (the default), ``"sobol"``, ``"latin_hypercube"`` or ``"saltelli"``.
+        preset: As of :func:`walk`.
+        scene: Fields of :class:`Scene` that differ from their defaults.
+        parameters: Fields of :class:`Parameters` that differ from the preset.
+        options: Fields of :class:`Options` that differ from their defaults.
+        distributions: Quantity → what samples draw: ``"fixed"``, ``"table"`` (Table 1), ``{"uniform": [lower, upper]}``
+            or ``{"gaussian": {"mean":, "sigma":}}``; ``"all"`` is any that is not named, by default ``"table"``.
+        same_samples_along: Axes along which the same samples are used.
+        record: What is kept of motions, such as ``{"series": True, "frames": {"samples": [0]}}``.
+        name: Of the sweep; by default that of the folder.
+        seed: Of all random numbers, by default 0.
         device: ``"cpu"``, ``"cuda"`` or ``"cuda:N"`` instead of what the sweep says. Method ``standard`` is then what
             it means there; the ``sweep.yaml`` of a folder names the method that was run, which stays.
         executor: Where shards are run, an executor or a Dask client; its workers must see ``out``. Default: threads of
@@ -119,31 +119,93 @@ def sweep(
             runs thousands of walks; with a Dask client the threads of its workers. With an executor, at least the
             number of its workers.
         fresh: Delete what another sweep left in the folder.
+        progress: Show a bar in a terminal or a notebook, unless ``on_progress`` is given; elsewhere nothing is printed.
         on_progress: Called before kernels are compiled, when the walks begin and after each shard.
 
     Raises:
-        InputError: The sweep or the folder is refused; one line with the remedy. It is a ``ValueError``.
+        InputError: The sweep or the folder is refused; one line with the remedy for each value. It is a ``ValueError``.
         OSError: The folder cannot be read or written.
 
     Warns:
         InputWarning: A parameter looks like one in another unit.
     """
-    planned = load_sweep(source)
-    warn_of_units(given for block in planned.blocks for given in block.given_parameters())
-    if device is not None:
-        planned = on_device(planned, device)
-    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
-        raise InputError(f"workers: {workers!r} is not a number of workers; give a whole number from 1")
+    keys = {
+        "grid": grid,
+        "samples": samples,
+        "sampler": sampler,
+        "preset": preset,
+        "scene": scene,
+        "parameters": parameters,
+        "options": options,
+        "distributions": distributions,
+        "same_samples_along": same_samples_along,
+        "record": record,
+        "name": name,
+        "seed": seed,
+    }
+    planned, folder, given = _checked_call(
+        source, out, {key: value for key, value in keys.items() if value is not None}, device, workers
+    )
+    warn_of_units(given)
+    count = plain(workers)
     if isinstance(executor, DaskClient):
-        workers = workers or sum(executor.nthreads().values())
+        count = count or sum(executor.nthreads().values())
         executor = executor.get_executor()
+    with contextlib.ExitStack() as shown:
+        if on_progress is None:
+            on_progress = shown.enter_context(progress_bar()) if progress else lambda progress: None
+        _run_in_folder(planned, folder, executor, count, fresh, on_progress)
+    return load(folder)
+
+
+def _checked_call(
+    source: str | os.PathLike[str] | Mapping[str, Any] | Sweep | None,
+    out: str | os.PathLike[str] | None,
+    keys: Mapping[str, object],
+    device: str | None,
+    workers: Whole | None,
+) -> tuple[Sweep, Path, list[tuple[str, str, Any]]]:
+    """The sweep on its device, its folder, and the parameters given for it, for `warn_of_units`.
+
+    Raises:
+        InputError: Something is refused; one line for each value.
+    """
+    problems, planned, given = [], None, []
+    if source is not None and keys:
+        names = ", ".join(keys)
+        problems.append(f"{names}: given together with a source; leave one out, or write it into the source")
+    if out is None:
+        problems.append("out: missing; give the folder of the results")
+    count = plain(workers)
+    if count is not None and (isinstance(count, bool) or not isinstance(count, int) or count < 1):
+        problems.append(f"workers: {count!r} is not a number of workers; give a whole number from 1")
+    try:
+        planned = sweep_of_keywords(keys, out) if source is None else load_sweep(source)
+        given = [parameter for block in planned.blocks for parameter in block.given_parameters()]
+        if device is not None:
+            planned = on_device(planned, device)
+    except InputError as error:
+        problems.append(str(error))
+    if problems or planned is None or out is None:
+        raise InputError("\n".join(problems))
+    return planned, Path(out), given
+
+
+def _run_in_folder(
+    planned: Sweep,
+    folder: Path,
+    executor: Executor | None,
+    workers: int | None,
+    fresh: bool,
+    report: OnProgress,
+) -> None:
+    """Run what is missing in a folder."""
     at_once = workers or (GPU_WORKERS if _is_on_gpu(planned) else processors())
-    with SweepFolder.open(Path(out), planned, fresh=fresh, shard_size=shard_size(planned.walk_count)) as store:
+    with SweepFolder.open(folder, planned, fresh=fresh, shard_size=shard_size(planned.walk_count)) as store:
         missing = store.missing()
         before = planned.walk_count - sum(len(shard) for shard in missing)
         progress = SweepProgress(walks=planned.walk_count, done=before, before=before)
         store.log(f"{len(missing)} shards to do, {before} of {planned.walk_count} walks done")
-        report = on_progress or (lambda progress: None)
         if missing:
             if executor is not None:
                 _run(executor, None, planned, store, missing, at_once, progress, report)
@@ -154,8 +216,8 @@ def sweep(
                 progress.compiling = False
                 with _threads(at_once) as (threads, stop):
                     _run(threads, stop, planned, store, missing, at_once, progress, report)
-        store.log(f"complete after {progress.seconds:.1f} s: " + _counts(progress.statuses))
-    return load(out)
+        counts = counts_text(progress.statuses) or "nothing to do"
+        store.log(f"complete after {progress.seconds:.1f} s: {counts}")
 
 
 def on_device(planned: Sweep, device: str) -> Sweep:
@@ -276,7 +338,7 @@ def _run(
     missing: Sequence[range],
     workers: int,
     progress: SweepProgress,
-    report: Callable[[SweepProgress], None],
+    report: OnProgress,
 ) -> None:
     """Give each worker two tasks at a time, so that memory does not grow with the sweep."""
     report(progress)
@@ -334,7 +396,3 @@ def _tasks(planned: Sweep, manifest: Manifest, missing: Sequence[range], workers
     count = workers * -(-sum(map(len, on_gpu)) // (workers * GPU_TASK_WALKS))
     for number in range(min(count, len(on_gpu))):
         yield on_gpu[number::count]
-
-
-def _counts(statuses: Counter[str]) -> str:
-    return ", ".join(f"{count} {label}" for label, count in sorted(statuses.items())) or "nothing to do"

@@ -7,7 +7,6 @@ all earlier ones, so that no shard changes; the numbers of the walks are then th
 
 import bisect
 import errno
-import importlib.metadata
 import itertools
 import json
 import math
@@ -25,6 +24,7 @@ from warpchain.files import version_refusal
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.plan import Sweep
 from warpchain.sweeps.recording import Recording
+from warpchain.version import package_versions
 from warpchain.walks.rows import row_type
 
 Folder = str | os.PathLike[str]
@@ -137,7 +137,7 @@ class Manifest:
                 for block in sweep.blocks
             ),
             sweep=sweep.canonical(),
-            versions={name: importlib.metadata.version(name) for name in ("warpchain", "warp-lang", "numpy")},
+            versions=package_versions(),
         )
 
     @property

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.validation import InputError, shown, suggestion
+from warpchain.inputs.validation import InputError, plain, shown, suggestion
 from warpchain.status import Status
 from warpchain.store.folder import read_rows
 from warpchain.store.manifest import FORMAT_VERSION, Folder, read_manifest
@@ -156,8 +156,7 @@ class BlockResult:
                 problem = f"{shown(at[name])} is not on the axis" if name in at else "missing"
                 raise InputError(f"{name}: {problem}; give one of {', '.join(map(str, values))}")
             place.append(int(found[0]))
-        is_whole = isinstance(sample, (int, np.integer)) and not isinstance(sample, bool)
-        if not is_whole or not 0 <= sample < self.shape[-1]:
+        if type(plain(sample)) is not int or not 0 <= sample < self.shape[-1]:
             raise InputError(f"sample: there is no sample {shown(sample)}; give 0 to {self.shape[-1] - 1}")
         return self.walk_motion((*place, sample))
 
@@ -274,6 +273,20 @@ class SweepResult:
         """One line for the sweep and one for each block."""
         lines = [f"<SweepResult {self.name}: {self.walk_count} walks, {_counts(self.summary())}>"]
         return "\n  ".join([*lines, *map(repr, self.blocks.values())])
+
+    def _repr_png_(self) -> bytes | None:
+        """The main figure; None if there is nothing to draw yet."""
+        from warpchain.pictures.inline import first_png
+
+        return first_png([self.plot])
+
+    def _repr_html_(self) -> str:
+        """Walks by status, axes of each block, and the main figure."""
+        from warpchain.pictures.inline import axes_text, page
+
+        blocks = [(f"block {name}", axes_text(each.axes, each.shape[-1])) for name, each in self.blocks.items()]
+        walks = f"{self.walk_count:,}: {_counts(self.summary())}"
+        return page(f"Sweep {self.name}", [("walks", walks), ("seed", str(self.seed)), *blocks], self._repr_png_())
 
     @property
     def walk_count(self) -> int:
@@ -393,8 +406,7 @@ def load(directory: Folder) -> SweepResult:
     rows = missing_rows(manifest.row_type, range(manifest.walk_count))
     present = read_rows(directory, manifest)
     rows[present["index"]] = present
-    keeps_motions = manifest.recording.series is not None
-    motions = MotionReader(Path(directory).absolute(), manifest) if keeps_motions else None
+    motions = MotionReader(Path(directory).absolute(), manifest) if manifest.recording.series is not None else None
     blocks = {}
     for block in manifest.blocks:
         part = rows[block.first : block.first + math.prod(block.shape)].reshape(block.shape)

@@ -54,6 +54,14 @@ class WalkMotion(Drawn):
     sprocket_radius: float
     before_release: BeforeRelease | None = None
 
+    def facts(self) -> list[tuple[str, str]]:
+        """Names and values that a notebook shows beside the picture."""
+        return [
+            ("number in the sweep", str(self.index)),
+            *super().facts(),
+            ("kept", f"{len(self.time)} instants, {len(self.frame_time)} frames"),
+        ]
+
     def __repr__(self) -> str:
         """One line."""
         counts = f"{len(self.time)} instants, {len(self.frame_time)} frames"

@@ -28,6 +28,7 @@ from warpchain.inputs.validation import (
     checked_whole,
     field_bounds,
     path_of,
+    plain,
     shown,
     suggestion,
     validated,
@@ -62,7 +63,7 @@ def read_sweep(
     Raises:
         InputError: the file cannot be read, or something in it is refused.
     """
-    content = source if isinstance(source, Mapping) else read_yaml(sweep_path(source))
+    content = plain(source) if isinstance(source, Mapping) else read_yaml(sweep_path(source))
     if not isinstance(content, Mapping):
         raise InputError(f"{source}: no mapping at the top; give the keys {', '.join(_TOP_KEYS)}")
     top = _keys(content, "sweep", _TOP_KEYS)

@@ -23,7 +23,8 @@ from warpchain.bench.record import Column
 from warpchain.files import replacing
 from warpchain.inputs.methods import METHODS_BY_NEED
 from warpchain.kernels.methods.method import method_names
-from warpchain.run.sweep_run import SweepProgress, sweep
+from warpchain.run.progress_bar import SweepProgress
+from warpchain.run.sweep_run import sweep
 from warpchain.status import Status
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import load_sweep

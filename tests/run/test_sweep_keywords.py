@@ -1,0 +1,193 @@
+"""A sweep by keywords is that of a file; everything that is wrong is told at once; a bar where somebody looks."""
+
+import io
+import re
+import sys
+import types
+
+import numpy as np
+import pytest
+
+import warpchain
+from warpchain.inputs.validation import InputError
+from warpchain.run import sweep_run
+from warpchain.run.sweep_keywords import sweep_of_keywords
+from warpchain.sweeps.plan import load_sweep
+
+SHORT = {"start": "ellipse", "walk_limit": 0.02}
+
+FILE = """
+version: 1
+name: speeds
+seed: 0
+preset: paper
+samples: 4
+sampler: latin_hypercube
+scene: {start: ellipse, walk_limit: 0.02}
+options: {tolerance: 1.0e-3}
+parameters: {gravity: 9.8}
+distributions: {all: fixed, floor_friction: {uniform: [0.1, 0.4]}}
+record: {series: true}
+grid: {links: [30, 40], frequency: {from: 5, to: 15, step: 5}}
+same_samples_along: [links]
+"""
+
+KEYWORDS = {
+    "grid": {"links": np.array([30, 40]), "frequency": np.linspace(5, 15, 3)},
+    "samples": 4,
+    "sampler": "latin_hypercube",
+    "scene": SHORT,
+    "options": {"tolerance": 1e-3},
+    "parameters": {"gravity": 9.8},
+    "distributions": {"all": "fixed", "floor_friction": {"uniform": (0.1, 0.4)}},
+    "record": {"series": True},
+    "same_samples_along": ("links",),
+}
+
+
+class Terminal(io.StringIO):
+    """A text that is a terminal to those who ask."""
+
+    def isatty(self):
+        """Yes."""
+        return True
+
+
+def refused(**keywords):
+    """The lines with which a sweep is refused."""
+    with pytest.raises(InputError) as caught:
+        warpchain.sweep(**keywords)
+    return str(caught.value).splitlines()
+
+
+def test_keywords_say_what_a_file_says(tmp_path):
+    """Name from the folder, seed 0, the preset of a walk: content and digest are those of the file."""
+    path = tmp_path / "speeds.yaml"
+    path.write_text(FILE, encoding="utf-8")
+    of_file, of_keywords = load_sweep(path), sweep_of_keywords(KEYWORDS, tmp_path / "speeds")
+    assert of_keywords.canonical() == of_file.canonical() and of_keywords.digest() == of_file.digest()
+    named = sweep_of_keywords({**KEYWORDS, "name": "other", "seed": np.int64(3), "preset": "soft"}, "speeds")
+    assert (named.name, named.seed, named.blocks[0].preset) == ("other", 3, "soft")
+
+
+def test_a_sweep_runs_from_keywords(tmp_path, capfd):
+    """It goes on where it was, the preset may be an axis, and nothing is printed without a terminal."""
+    keywords = {"grid": {"preset": ["soft"], "links": range(30, 34, 2)}, "samples": 1, "scene": SHORT}
+    result = warpchain.sweep(**keywords, out=tmp_path / "short")
+    assert (result.name, result.seed, result.shape, result.missing_count) == ("short", 0, (1, 2, 1), 0)
+    assert warpchain.sweep(**keywords, out=tmp_path / "short").provenance == result.provenance
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_sweep_on_a_gpu_is_that_of_the_file(tmp_path, monkeypatch):
+    """The device changes both alike."""
+    planned = []
+
+    def stop(sweep, *arguments):
+        planned.append(sweep)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sweep_run, "_run_in_folder", stop)
+    path = tmp_path / "speeds.yaml"
+    path.write_text(FILE, encoding="utf-8")
+    for keywords in ({"source": path}, KEYWORDS):
+        with pytest.raises(KeyboardInterrupt):
+            warpchain.sweep(**keywords, out=tmp_path / "speeds", device="cuda")
+    assert planned[0].canonical() == planned[1].canonical()
+    assert planned[0].blocks[0].sections["options"]["method"] == "os32"
+
+
+def test_all_errors_are_told_at_once(tmp_path):
+    """One line for each value, with its place in a list, in the order of the keywords."""
+    lines = refused(
+        grid={"links": [30, 31, 40, "x"], "frequenzy": [1.0], "frequency": [5.0]},
+        samples=0,
+        scene={"clearance": -1.0, "start": "flying"},
+        parameters={"gravity": "9.8 m/s²"},
+        options={"tolerance": 1.0, "device": "gpu"},
+        distributions={"floor_friction": {"uniform": [0.4, 0.1]}},
+        record={"series": 3},
+        seed=-1,
+        workers=0,
+    )
+    begins = (
+        "out: missing",
+        "workers: 0 is not a number of workers",
+        "sweep.grid.links[1]: 31 is odd",
+        "sweep.grid.links[3]: 'x' is text",
+        "sweep.grid.frequenzy: unknown name; did you mean frequency?",
+        "sweep.samples: 0",
+        "sweep.scene.clearance: -1.0 is less than 0 m",
+        "sweep.scene.start: 'flying' is unknown",
+        "sweep.parameters.gravity: '9.8 m/s²' has its unit written with it",
+        "sweep.options.tolerance: 1.0 is greater than 0.1",
+        "sweep.options.device: 'gpu' is no device",
+        "sweep.distributions.floor_friction.uniform[1]: 0.1 is not greater than 0.4",
+        "sweep.record.series: 3",
+        "sweep.seed: -1",
+    )
+    assert len(lines) == len(begins)
+    for begin in begins:
+        assert [line for line in lines if line.startswith(begin) and ";" in line], begin
+
+
+@pytest.mark.parametrize(
+    ("keywords", "begin"),
+    [
+        ({}, "sweep.samples: missing"),
+        ({"samples": 1, "grid": {"links": [28]}}, "sweep.grid.links[0]: 28 links of 0.01268 m do not reach round"),
+        ({"samples": 1, "grid": {"links": [40, 40]}}, "sweep.grid.links[1]: 40 is given twice"),
+        ({"samples": 1, "grid": {"links": []}}, "sweep.grid.links: empty"),
+        ({"samples": 1, "grid": [40]}, "sweep.grid: [40] is not a mapping"),
+        ({"samples": 1, "same_samples_along": ["links"]}, "sweep.same_samples_along[0]: 'links' is no axis"),
+        ({"samples": 1, "source": {"version": 1}}, "samples: given together with a source"),
+        ({"samples": 1, "grid": {"device": ["cpu", "cuda"]}, "device": "cpu"}, "sweep.grid.device"),
+    ],
+    ids=str,
+)
+def test_what_only_the_whole_shows_is_told(keywords, begin, tmp_path):
+    """Values that contradict one another, and what is missing, are refused as in a file."""
+    lines = refused(**keywords, out=tmp_path)
+    assert [line for line in lines if line.startswith(begin) or ("device" in begin and "device" in line)]
+
+
+def test_values_that_suit_one_another_only_together():
+    """A value that the default of another field would refuse is not told beside a real error."""
+    with pytest.raises(InputError) as caught:
+        sweep_of_keywords({"grid": {"links": [10]}, "parameters": {"sprocket_radius": 0.01}, "samples": -1}, "x")
+    (line,) = str(caught.value).splitlines()
+    assert line.startswith("sweep.samples: -1")
+
+
+def test_a_terminal_shows_a_bar(tmp_path, monkeypatch):
+    """Done walks and statuses on standard error, unless that is turned off or the caller is told of progress."""
+    keywords = {"grid": {"links": [30]}, "samples": 1, "scene": SHORT, "preset": "soft"}
+    for quiet in ({"progress": False}, {"on_progress": lambda progress: None}):
+        screen = Terminal()
+        monkeypatch.setattr(sys, "stderr", screen)
+        warpchain.sweep(**keywords, out=tmp_path / str(*quiet), **quiet)
+        assert screen.getvalue() == ""
+    warpchain.sweep(**keywords, out=tmp_path / "shown")
+    text = re.sub(r"\x1b\[[\d?;]*\w", "", screen.getvalue())
+    assert "1/1 walks" in text and "1 time_limit" in text
+
+
+def test_a_notebook_shows_a_bar(tmp_path, monkeypatch):
+    """One output of the cell, which is updated until all walks are done."""
+    shown = []
+
+    class Handle:
+        def update(self, content, raw):
+            shown.append(content)
+
+    def display(content, raw, display_id):
+        shown.append(content)
+        return Handle()
+
+    kernel = types.SimpleNamespace(config={"IPKernelApp": {}})
+    monkeypatch.setitem(sys.modules, "IPython", types.SimpleNamespace(get_ipython=lambda: kernel))
+    monkeypatch.setitem(sys.modules, "IPython.display", types.SimpleNamespace(display=display))
+    warpchain.sweep(grid={"links": [30]}, samples=1, scene=SHORT, preset="soft", out=tmp_path / "shown")
+    assert shown[0]["text/plain"] == "0 of 1 walks  compiling kernels"
+    assert shown[-1]["text/plain"] == "1 of 1 walks  1 time_limit"
+    assert '<progress value="1" max="1">' in shown[-1]["text/html"]

@@ -1,0 +1,112 @@
+"""The progress of a sweep, shown where somebody looks: in a terminal or in a notebook."""
+
+import contextlib
+import html
+import importlib
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass
+class SweepProgress:
+    """Progress of a sweep.
+
+    Attributes:
+        walks: Walks of the sweep.
+        done: Walks whose results are on disk, those of earlier runs included.
+        before: Walks that were on disk when this run began.
+        seconds: Wall time [s] of this run so far.
+        statuses: Number of walks of this run by status label.
+        compiling: Kernels are being compiled, which takes seconds to minutes the first time on a machine.
+    """
+
+    walks: int
+    done: int
+    before: int
+    seconds: float = 0.0
+    statuses: Counter[str] = field(default_factory=Counter)
+    compiling: bool = False
+
+    @property
+    def rate(self) -> float:
+        """Walks per second of this run."""
+        return (self.done - self.before) / self.seconds if self.seconds > 0 else 0.0
+
+    @property
+    def time_left(self) -> float | None:
+        """Seconds to go at this rate; None before the first shard."""
+        return (self.walks - self.done) / self.rate if self.rate > 0 else None
+
+
+OnProgress = Callable[[SweepProgress], None]
+
+
+def counts_text(statuses: Counter[str]) -> str:
+    """Number of walks by status label, in one line."""
+    return ", ".join(f"{count} {label}" for label, count in sorted(statuses.items()))
+
+
+@contextlib.contextmanager
+def progress_bar() -> Iterator[OnProgress]:
+    """Yield a function that shows progress as a bar; without a terminal and a notebook it shows nothing."""
+    if _in_notebook():
+        yield _notebook_bar()
+    elif sys.stderr.isatty():
+        with _terminal_bar() as show:
+            yield show
+    else:
+        yield lambda progress: None
+
+
+def _in_notebook() -> bool:
+    """Whether this process is the kernel of a notebook."""
+    if "IPython" not in sys.modules:
+        return False
+    return "IPKernelApp" in getattr(importlib.import_module("IPython").get_ipython(), "config", {})
+
+
+@contextlib.contextmanager
+def _terminal_bar() -> Iterator[OnProgress]:
+    """A bar on standard error."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("walks"),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[text]}"),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task("", total=None, text="")
+
+        def show(progress: SweepProgress) -> None:
+            bar.update(task, total=progress.walks, completed=progress.done, text=_text(progress))
+
+        yield show
+
+
+def _notebook_bar() -> OnProgress:
+    """A bar in the output of a cell, which needs no widgets."""
+    display = importlib.import_module("IPython.display").display
+    handle: Any = None
+
+    def show(progress: SweepProgress) -> None:
+        nonlocal handle
+        text = f"{progress.done} of {progress.walks} walks  {_text(progress)}"
+        bar = f'<progress value="{progress.done}" max="{progress.walks}"></progress> {html.escape(text)}'
+        content = {"text/plain": text, "text/html": bar}
+        if handle is None:
+            handle = display(content, raw=True, display_id=True)
+        else:
+            handle.update(content, raw=True)
+
+    return show
+
+
+def _text(progress: SweepProgress) -> str:
+    return "compiling kernels" if progress.compiling else counts_text(progress.statuses)
