@@ -89,7 +89,7 @@ class State:
     )  # of gravity, friction and inertia on the sprocket, see physics.scaled_loads
     first_area: wp.array(dtype=wp.float64)  # area inside the loop when its run began [m²]
     attempts_before: wp.array(dtype=wp.int64)  # attempts of the walk's earlier phases, which its limit includes
-    first_sample: wp.array2d(dtype=wp.float64)  # (W, SAMPLE_COLUMNS): when the run began
+    first_sample: wp.array2d(dtype=wp.float64)  # (W, SAMPLE_COLUMNS): the sample taken when the run began
     last_sample: wp.array2d(dtype=wp.float64)  # the latest, in the end that of the final state
     counts: wp.array2d(dtype=wp.int64)  # (W, COUNT_ROWS)
     extremes: wp.array2d(dtype=wp.float64)  # (W, EXTREME_ROWS) [m]

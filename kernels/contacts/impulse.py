@@ -3,18 +3,21 @@
 *Effective mass.* Bodies A and B touch at P, n̂ points from A to B, t̂ = ẑ × n̂, and r leads from a body's centre of mass
 to P. An impulse J on B, and −J on A, changes v = v_A − v_B at P to v' = v − W J, where
 
-    W = (1/m_A + 1/m_B) 1 + p_A p_Aᵀ/I_A + p_B p_Bᵀ/I_B,    p = ẑ × r.
+    W = (1/m_A + 1/m_B) 𝟙 + p_A p_Aᵀ/I_A + p_B p_Bᵀ/I_B,    p = ẑ × r,
 
-*Two impulses.* J₁ = v_n/W_nn n̂ alone ends the approach, J₂ = W⁻¹ v ends all relative motion. D = J₂ − J₁ turns the one
-into the other: W D has no normal component, so any multiple of D leaves v'_n to J₁.
+and 𝟙 is the unit matrix.
 
-*The law.* J = (1 + e) J₁ + (1 + e_t) D if this lies in the friction cone |J_t| ≤ μ J_n (sticking). Otherwise the part
-of D is reduced to κ < 1 + e_t, for which J lies on the cone (sliding):
+*Two impulses.* J₁ = v_n/W_nn n̂ alone ends the approach, J₂ = W⁻¹ v ends all relative motion. D = J₂ − J₁ is the
+difference. W D has no normal component, so adding a multiple of D does not change v'_n.
+
+*The law.* e is the coefficient of restitution, e_t that of tangential restitution and μ that of friction.
+J = (1 + e) J₁ + (1 + e_t) D if this lies in the friction cone |J_t| ≤ μ J_n (sticking). Otherwise the factor of D is
+reduced from 1 + e_t to κ, for which J lies on the cone (sliding):
 
     |κ D_t| = μ ((1 + e) J₁ₙ + κ D_n)    gives    κ = μ (1 + e) J₁ₙ / (|D_t| − μ D_n).
 
-The divisor is positive whenever the first J is outside the cone, for that is (1 + e_t)(|D_t| − μ D_n) > μ (1 + e) J₁ₙ.
-In both cases v'_n = −e v_n. J₁ and D are orthogonal in W; with κ = 1 + e_t for sticking, the kinetic energy changes by
+The divisor is positive whenever sticking fails, because then (1 + e_t)(|D_t| − μ D_n) > μ (1 + e) J₁ₙ.
+In both cases v'_n = −e v_n. As J₁ᵀ W D = 0, the kinetic energy changes by (sticking: κ = 1 + e_t)
 
     ΔT = −½ (1 − e²) J₁ᵀ W J₁ − ½ κ (2 − κ) Dᵀ W D ≤ 0    for e in [0, 1], e_t in [−1, 1] and any μ ≥ 0.
 
@@ -55,8 +58,8 @@ def collision_impulse(
 ):
     """Impulse (J_n, J_t) [N s] on body B from v = (normal_speed, tangential_speed) [m/s] and W [1/kg], see above.
 
-    ``inverse_nn`` and ``inverse_determinant`` are those of :func:`inverse_masses`. The caller makes sure that the
-    bodies approach (v·n̂ > 0).
+    ``inverse_nn`` and ``inverse_determinant`` are those of :func:`inverse_masses`; ``restitution`` is e,
+    ``tangential_restitution`` e_t and ``friction`` μ. The caller makes sure that the bodies approach (v·n̂ > 0).
     """
     first = normal_speed * inverse_nn
     second_n = (w_tt * normal_speed - w_nt * tangential_speed) * inverse_determinant
@@ -90,10 +93,11 @@ def fixed_contact(
     v: wp.float64,
     omega: wp.float64,
 ):
-    """Velocities of a link (B) after one of its circles met an immovable body (A), without branches.
+    """Velocities of a link (B) after one of its circles met a fixed body (A), without branches.
 
-    ``lever`` [m] leads from the link's centre to the touching point; ``surface`` [m/s] is the velocity of the body's
-    surface there.
+    A fixed body is a body that no impulse moves; its surface may run. ``gap`` [m] is the distance between the circle
+    and the body. ``normal`` is the unit vector n̂ from the body to the link. ``lever`` [m] leads from the link's centre
+    to the touching point; ``surface`` [m/s] is the velocity of the body's surface there.
 
     Returns:
         u, v, ω after the contact, the energy [J] that the link lost (negative if it gained), and 1 if there was an

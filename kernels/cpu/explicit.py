@@ -1,7 +1,8 @@
 """Embedded explicit Runge–Kutta methods: one loop over stages for every tableau.
 
-One CPU thread carries a chain. Loops over links have the form that clang vectorises: ``while`` loops with an integer of
-their own, one array of static shape, no branch and no library call inside.
+One CPU thread carries a chain. K is the chain's scratch: an array with a row for each quantity and a column for each
+link or joint, see :mod:`layout`. Loops over links have the form that clang vectorises: ``while`` loops with an integer
+of their own, one array of static shape, no branch and no library call inside.
 """
 
 import functools
@@ -248,7 +249,8 @@ def explicit_method(name: str):
             K[NEW_U, i] = u + h * du
             K[NEW_V, i] = v + h * dv
             K[NEW_OMEGA, i] = w + h * dw
-            # maxima of integers keep NaN; those over links follow in one reduction below
+            # Take the maximum over components, not the sum. Compare the floats' bits as integers, where NaN is
+            # greatest.
             worst = wp.max(
                 wp.max(
                     error_bits(hh * ex, K[X, i], u, h),
@@ -266,8 +268,9 @@ def explicit_method(name: str):
                     error_bits(h * ew, w, K[wp.static(STAGES + 2), i], h),
                 ),
             )
-            K[ERROR, i] = wp.cast(worst, wp.float64) / tolerance
+            K[ERROR, i] = wp.cast(worst, wp.float64) / tolerance  # wp.cast reads the bits back as a float
             i += 1
+        # maxima over links: the longest turn and the greatest error ratio, as bits
         furthest = wp.int64(0)
         greatest = wp.int64(0)
         i = int(0)

@@ -1,8 +1,8 @@
 """The CPU loop over steps: one thread carries one chain through a bounded number of attempts.
 
-A method attempts a step and estimates its error; the controller accepts or rejects it and proposes the next step. A
-contact pass follows each accepted step. A sample is taken every sample interval. A rejected attempt changes nothing but
-its counter and the step.
+A method attempts a step and estimates its error; the step controller (methods/controller.py) accepts or refuses it and
+proposes the next step. A contact pass follows each accepted step. Every sample interval the chain is recorded and
+watched. A rejected attempt changes nothing but its counter and the step.
 """
 
 import functools
@@ -132,7 +132,7 @@ def make_advance(features: Features):
     present = present_chain(softens, is_driven)
     first_stage, attempt, commit = method.first_stage, method.attempt, method.commit
     growth, shrinkage = method.growth, method.shrinkage
-    # on the sprocket impulses never pause long enough for a flight
+    # on the sprocket the pauses between impulses are too short for a flight
     flight = None if has_sprocket else rigid_flight(features.method, columns)
     has_flight = flight is not None
     if flight is not None:
@@ -214,13 +214,13 @@ def make_advance(features: Features):
                 status = state.stop_status[world]
                 break
             if wp.static(has_flight):
-                # with soft joints flights save nothing: their springs ring longer than impulses pause
+                # soft joints are not made rigid: their springs still ring when the next impulse comes
                 if is_rigid == 0 and time >= closing_time and state.softness[world] == ZERO:
                     closed, lost = close_joints(K, chain)
                     closing_time = time + QUIET_TIME
                     if closed:
                         is_rigid = int(1)
-                        slack = wp.float64(-1.0)  # the next list is to have the skin of flights
+                        slack = wp.float64(-1.0)  # flights have a greater skin: the list is built anew
                         step, other_step = other_step + ZERO, step + ZERO
                         last_error = ONE
                         place_ends(K, chain)

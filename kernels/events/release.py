@@ -1,22 +1,30 @@
 """The release rule: a loop is held on its sprocket until it is stationary, and released a drawn time later.
 
-A hold has two parts. First the loop is watched *under load* (see :mod:`physics.scaled_loads`), for as long as slow
-waves need to cross it there. Then its loads fall to its own within ``LOADING_TIME``, by equal factors in equal times,
-and it is watched *free*, for ``steady_time``. The watched quantities are its height, its width, the place of its centre
-of mass and its speed, each averaged over windows of time. The loop is stationary when
+A hold has two parts. First the loop is watched *under load* (see :mod:`physics.scaled_loads`), for one crossing time of
+slow waves under that load (:func:`crossing_time`). Then its loads fall to its own within ``LOADING_TIME``, by equal
+factors in equal times, and it is watched *free*, for ``steady_time``. By default that is one loop period, or the
+crossing time, 5 to 10 s, if the loop was never loaded or slips on its sprocket by more than 0.6 %.
 
-- the averages of all windows agree to within ``steady_tolerance`` of its height (vertical quantities) or width
-  (horizontal ones); those of the free watch also agree with the last window under load;
-- the loop runs evenly, near the speed of its sprocket.
+The watched quantities are the loop's height, its width, the place of its centre of mass and its speed. Each is averaged
+over windows of time: max(0.05 s, half a crossing) under load; half a loop period, within 0.05 to 0.25 s, when free. The
+loop is stationary when, over all windows of a watch,
 
-A loop that changes its shape when it becomes free, or does not become stationary under load, is held again under the
-square root of the factor, finally under its own loads. A free watch lasts as long as slow waves need, 5 to 10 s, if the
-loop was held under its own loads only, or slips on its sprocket by more than 0.6 %.
+- the averages of its shape and place agree to within ``steady_tolerance`` of its height (vertical quantities) or width
+  (horizontal ones). For shape and place the free watch counts the last loaded window as its first;
+- the averages of its speed agree to within ``steady_tolerance`` of the sprocket's speed, or 0.02 m/s if that is more,
+  and each differs from the sprocket's speed by at most 25 %, or 0.02 m/s. The watch of the speed starts afresh when
+  the loop becomes free.
+
+A window that breaks these rules begins a new watch. The loop is released ``further_hold`` + phase × loop period after
+it is found stationary.
+
+A loop that changes its shape when it becomes free, or is not stationary after eight crossings under load, is held again
+under the square root of the load factor; below 3 the factor becomes 1.
 
 Loads that fall at once let the joints contract at once, which throws the loop off its sprocket: with λ = 80 by 25 mm
 (180 links, 30 Hz). If they take 0.05 s to fall, nothing of that is seen; in 0.25 s the loop also follows the small
-difference between its curves with and without load. Loads that fall to a smaller multiple do so at once: the loop has
-time to come back.
+difference between its curves with and without load. Loads that fall to a smaller factor, for the loop to be held again,
+do so at once: it has time to come back.
 """
 
 import warp as wp
@@ -40,7 +48,7 @@ MOST_SLIP = wp.constant(wp.float64(0.25))
 LOADING_TIME = wp.constant(wp.float64(0.25))
 """Time [s] in which loads fall to the loop's own."""
 LEAST_LOAD = wp.constant(wp.float64(3.0))
-"""Least factor under which a loop is held again."""
+"""Least factor under which a loop is held again; below it the factor becomes 1."""
 MOST_CROSSINGS = wp.constant(wp.float64(8.0))
 """Crossings of slow waves after which a loop that is not stationary under load is held under less. Most take three."""
 SLOWEST_STEADY = wp.constant(wp.float64(0.02))
@@ -51,7 +59,7 @@ SHORTEST_WINDOW = wp.constant(wp.float64(0.05))
 
 @wp.func
 def is_watched(state: State, drive: Drive, world: int, time: wp.float64):
-    """Whether the loop is held and the time of its release is not set yet."""
+    """Whether the loop is held and its release is not set yet; ``stop_status == FINISHED`` marks that it is."""
     return state.stop_status[world] != FINISHED and time >= drive.hold_start[world]
 
 
@@ -160,7 +168,7 @@ def watch_steadiness(chain: Chain, state: State, drive: Drive, world: int, time:
     keeps_shape = drift <= tolerance
     is_over = keeps_shape and keeps_speed and not is_first and time - watch[layout.STEADY_SINCE] >= wanted
     if is_first or not (keeps_shape and keeps_speed) or (is_over and is_loaded):
-        # the next watch begins with this window
+        # the next watch counts this window as its first
         watch[layout.STEADY_SINCE] = time
         widen(watch, layout.LEAST_HEIGHT, layout.GREATEST_HEIGHT, height, True)
         widen(watch, layout.LEAST_WIDTH, layout.GREATEST_WIDTH, width, True)
@@ -168,7 +176,7 @@ def watch_steadiness(chain: Chain, state: State, drive: Drive, world: int, time:
         widen(watch, layout.LEAST_Y, layout.GREATEST_Y, y, True)
         widen(watch, layout.LEAST_SPEED, layout.GREATEST_SPEED, speed, True)
     if is_over and is_loaded:
-        watch[layout.LEAST_SPEED] = wp.float64(wp.inf)  # under load it slipped more
+        watch[layout.LEAST_SPEED] = wp.float64(wp.inf)  # speed starts afresh: under load the loop slipped more
         watch[layout.GREATEST_SPEED] = -wp.float64(wp.inf)
         watch[layout.UNLOADED_SINCE] = time
         watch[layout.STEADY_SINCE] = time + LOADING_TIME

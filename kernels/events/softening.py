@@ -1,22 +1,23 @@
 """Softer joints where no fast motion matters: on the sprocket, just after the release, in the collapsed loop.
 
-Stiff joints make steps short. Softness s is 0 for the model's own k, b and 1/ω_c, 1 for those of soft joints and 2 for
-the softest, which have less k and b; in between values are interpolated geometrically. No value ever becomes stiffer
-than the model's own. Softness changes at samples only, so that a run does not depend on how it is cut into launches. On
-the softest joints, and in the drive on soft ones, steps near a contact may be longer too: else the contact step would
-limit them.
+Stiff joints make steps short. Softness s is 0 for the model's own k, b and 1/ω_c, 1 for SOFT and 2 for SOFTEST
+(engine/control.py), which has less k and b; in between values are interpolated geometrically. No value ever becomes
+stiffer than the model's own. Softness changes at samples only, so that a run does not depend on how it is cut into
+launches. On the softest joints, and in the drive on soft ones, steps near a contact may be longer too: otherwise
+contacts would limit the step.
 
 *Drive.* Joints are softest while the chain settles and the sprocket spins up. Afterwards, while the loop becomes
-stationary, they are as soft as its tension allows: C = T/k stretches the loop by T/ℓk, which on the softest joints is
-0.3 % at 30 Hz, and k is chosen for a tenth of that. While loads are multiplied (:mod:`physics.scaled_loads`) it may be
-0.1 %. With ten times the ω_c of soft joints another loop becomes stationary, because friction determines its width.
-*Release.* Soft joints return to their own values before the chain reaches the floor. *Pile.* Joints become soft for
-good when the loop begins to collapse, and softest when its area has halved again. Softest at once shifts Δx of long
-chains.
+stationary, they are as soft as its tension T allows. Openings C = T/k stretch the loop by the strain T/kℓ, with ℓ the
+length of a link. On the softest joints it is 0.3 % at 30 Hz. k is chosen so that the strain is at most 0.03 %, but
+never above that of SOFT. Under multiplied loads (:mod:`physics.scaled_loads`) 0.1 % is allowed. With ten times the ω_c
+of soft joints another loop becomes stationary, because friction determines its width. *Release.* Soft joints return to
+their own values before the chain reaches the floor. *Pile.* Joints become soft for good when the loop begins to
+collapse, and softest when its area is below half of that at which it began. Softest at once shifts Δx of long chains.
 
 A change of k at openings C releases the energy ½ (k_before − k_after) Σ C², which is booked. Softening is one jump: C
-grows to T/k_after within a few periods of the soft springs. When joints stiffen, C must shrink a hundred- to a
-thousandfold. One jump would make a force of as many times T; so it takes many small ones, each damped before the next.
+grows to T/k_after within a few periods of the soft springs. When joints stiffen, C must shrink by a factor of 100 to
+1000. One jump would make a pull 100 to 1000 times T; so joints stiffen in many small jumps, each damped before the
+next.
 """
 
 import warp as wp
@@ -54,10 +55,10 @@ def contact_step(state: State, control: Control, world: int, is_driven: bool):
 
 @wp.func
 def spring_tolerance(drive: Drive, state: State, control: Control, world: int, is_driven: bool):
-    """Tolerance of steps on springs after the last sample.
+    """Tolerance of steps on springs, until the next sample.
 
-    In the drive it is ten times as large until the loop is held under its own loads: the loop does not remember what
-    came before, and steps are twice as long.
+    Ten times looser on the sprocket, until the loop is held under its own loads: the stationary loop does not depend on
+    how it was reached, and steps are twice as long.
     """
     tolerance = wp.where(state.softness[world] >= ONE, control.soft_tolerance, control.tolerance)
     if is_driven:
@@ -97,8 +98,8 @@ def watch_collapse(
 ):
     """Makes joints soft, for good, when the loop's area has fallen below a fraction of that at the first sample.
 
-    Below half of that fraction they become softest. Joints that are as soft already stay as they are, without a time of
-    softening.
+    Below half of that fraction they become softest. Joints of a model that is as soft itself stay as they are, and no
+    time of softening is noted.
     """
     if is_first:
         state.first_area[world] = enclosed_area(K, chain)

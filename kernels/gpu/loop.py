@@ -4,8 +4,8 @@ It makes the same run as :mod:`cpu.loop`, on the same structs and with the same 
 registers, the state on a board in the shared memory of the block. All threads know the values that decide (error, gap,
 status …), and take the same branches. The results depend neither on how a run is cut into launches nor on other chains.
 
-An attempt takes two barriers a stage and one for the error; an accepted one three more unless its last stage is the
-first of the next step. Contacts take no more as long as nothing is near the floor or sprocket and no pair is listed.
+An attempt costs two barriers a stage and one for the error; an accepted one costs three more, except with methods that
+reuse the last stage. Contacts cost none while nothing is near the floor or sprocket and no pair is listed.
 """
 
 import functools
@@ -61,7 +61,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         registers: Greatest number of registers a thread may take on a GPU; None: as many as a block of this size can
             have.
 
-    scratch: (W, ≥ :func:`gpu.functions.board_rows`, columns) float64; lists as on a CPU.
+    Arrays of the kernel:
+        scratch: (W, ≥ :func:`gpu.functions.board_rows`, columns) float64.
+        lists: As on a CPU.
     """
     available = REGISTERS_OF_MULTIPROCESSOR // block_dim // 8 * 8
     if available < 255:
@@ -121,7 +123,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     def measure_proximity(
         ends: wp.tile[vec5d, block_dim], K: wp.array2d(dtype=wp.float64), maxima: wp.uint64, place: Place
     ):
-        """Left end of the next link and what is known of the whole chain, in the state on the board."""
+        """Left end of the next link, and the proximity of the whole chain, in the state on the board."""
         link = read_link(K, place.lane)
         next_end = exchange_ends(ends, place, link)
         write_proximity(K, maxima, place, link, next_end)
@@ -222,7 +224,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     status = int(LIST_OVERFLOW)
         reach = time_to_contact(control, pairs, proximity.gap, slack, proximity.speed)
         if not is_fresh:
-            # as the last step left them: evaluated again they could round differently
+            # Kept from the last launch, since recomputing could round differently.
             reach = wp.float32(state.time_to_contact[world])
             if wp.static(has_self):
                 pairs = L[wp.static(lists.count)]

@@ -15,33 +15,38 @@ wp.set_module_options({"enable_backward": False})
 def joint_force(chain: Chain, opening: wp.float64, opening_rate: wp.float64):
     """One component of F = k C + b Ċ [N] on the link left of the joint; the link right of it feels −F.
 
-    With C = (X' − a u') − (X + a u) this is −∂V_C/∂q + Q^D of the paper (its section 2.1).
+    X is the centre of the link left of the joint, u its direction (a unit vector) and a its half length; primes mark
+    the link right of it. The joint is open by C = (X' − a u') − (X + a u). F is −∂V_C/∂q + Q^D of the paper (its
+    section 2.1).
     """
     return chain.joint_stiffness * opening + chain.joint_damping * opening_rate
 
 
 @wp.func
 def smoothed_torque(chain: Chain, spin: wp.float64, inverse_smoothing: wp.float64):
-    """f(w) = β w + τ_c tanh(w / ω) [N m] for a relative angular velocity w [rad/s] and a given 1/ω [s/rad]."""
+    """f(w) = β w + τ_c tanh(w / ω_c) [N m] of a joint's spin w [rad/s], with a smoothing given as 1/ω_c [s/rad].
+
+    The spin w of a joint is ω of the link left of it less ω of the link right of it.
+    """
     return chain.viscous_friction * spin + chain.coulomb_friction * tanh(spin * inverse_smoothing)
 
 
 @wp.func
 def smoothed_slope(chain: Chain, spin: wp.float64, inverse_smoothing: wp.float64):
-    """f'(w) = β + τ_c / ω (1 − tanh²(w / ω)) [N m s]."""
+    """f'(w) = β + τ_c / ω_c (1 − tanh²(w / ω_c)) [N m s]."""
     switch = tanh(spin * inverse_smoothing)
     return chain.viscous_friction + chain.coulomb_friction * inverse_smoothing * (ONE - switch * switch)
 
 
 @wp.func
 def friction_torque(chain: Chain, spin: wp.float64):
-    """The torque f(w) of a joint [N m], with the chain's own smoothing ω_c."""
+    """The torque f(w) of a joint [N m], with the chain's own ω_c."""
     return smoothed_torque(chain, spin, chain.inverse_smoothing)
 
 
 @wp.func
 def friction_slope(chain: Chain, spin: wp.float64):
-    """The slope f'(w) of that torque [N m s]."""
+    """The slope f'(w) of that torque [N m s], with the chain's own ω_c."""
     return smoothed_slope(chain, spin, chain.inverse_smoothing)
 
 
@@ -61,8 +66,9 @@ def link_acceleration(
 ):
     """Accelerations (ẍ, ÿ [m/s²], θ̈ [rad/s²]) of a link.
 
-    m Ẍ = F_right − F_left − m g ŷ and I θ̈ = arm × (F_right + F_left) + f_left − f_right, where F_left and F_right are
-    the forces of the joints at its two ends, f_left and f_right their friction torques f(ω_before − ω_after).
+    m Ẍ = F_right − F_left − m g ŷ and I θ̈ = arm × (F_right + F_left) + f_left − f_right. F_left and F_right are the
+    forces of the joints at its two ends. f_left and f_right are their friction torques, each f(ω of the link left of
+    the joint − ω of the link right of it). The arm leads from the link's centre to its right end.
     """
     ax = (right_x - left_x) * inverse_mass
     ay = (right_y - left_y) * inverse_mass - chain.gravity

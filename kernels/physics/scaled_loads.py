@@ -1,22 +1,26 @@
 """Loads multiplied by one number λ: under them a loop on its sprocket becomes stationary λ times sooner.
 
-A loop that runs at speed v is under the tension T = ρ v² + T_e. Seen from rest, waves along it move at v ± √(T/ρ). One
-family has a speed of T_e / 2ρv, 0.3 to 0.5 m/s, and takes seconds to cross the loop: it swings. Its stationary curve
-obeys, with shear N, moment M, curvature κ and tangent t,
+A loop of mass ρ per length that runs at speed v is under the tension T = ρ v² + T_e. Waves on it move at v ± √(T/ρ) as
+seen from the ground. The slow ones move at T_e / 2ρv, 0.3 to 0.5 m/s, and take seconds to cross the loop, which swings
+meanwhile. With shear N, moment M, curvature κ, tangent t, normal n and rotary inertia j per length, the stationary
+curve obeys
 
     (T_e t + N n)' + ρ g = 0,    M' + N = j v² κ',    M = β ℓ v κ' + τ_c tanh(ℓ v κ' / ω_c).
 
-ρ v² has dropped out. So g, β, τ_c and j may all be multiplied by λ: T_e, N and M grow by as much, the curve stays, and
-the slow waves run λ times faster. For rigid links j = (I − m ℓ²/6)/ℓ: the exact dispersion of plane waves of phase κ
-per link, ω² [m cos²(κ/2) + (4I/ℓ²) sin²(κ/2)] = (4T/ℓ) sin²(κ/2), gives for waves whose pattern stands still in space,
-ω = κ v/ℓ, to fourth order T_e κ²/ℓ = (m v²/ℓ²) κ⁴ (I/mℓ² − 1/6). So it is I − m ℓ²/6 that is multiplied, with each
-link's own m; λ I, or I − m ℓ²/12, leads to another curve.
+ρ v² has dropped out. So g, β, τ_c and j may all be multiplied by λ: T_e, N and M are multiplied by λ too, the curve
+stays, and the slow waves run λ times faster.
+
+*Rotary inertia.* For rigid links j = (I − m ℓ²/6)/ℓ. This follows from the exact dispersion of plane waves of phase φ
+per link, ω² [m cos²(φ/2) + (4I/ℓ²) sin²(φ/2)] = (4T/ℓ) sin²(φ/2). Waves that stand still in space have ω = φ v/ℓ, and
+to fourth order T_e φ²/ℓ = (m v²/ℓ²) φ⁴ (I/mℓ² − 1/6). So I − m ℓ²/6 is multiplied, with each link's own m. Multiplying
+I or I − m ℓ²/12 leads to another curve.
 
 *Drag.* A link of a stationary loop moves along its path. A force −γ m v_n against the velocity v_n across the path
 damps every change of shape and vanishes in the stationary state. A link is a chord of its path: its direction and that
 of the path at its middle differ by (θ_{i+1} − 2θ_i + θ_{i−1})/12. Without drag a loop of 180 links at 10 Hz swings for
-15 periods, however large λ, and the remaining amplitude grows by √λ when λ falls at once. With drag the swing is over
-after one period; the remaining bias is smaller by λ. γ is proportional to λ − 1, so drag ends with the scaled loads.
+15 periods, for any λ, and the remaining amplitude is multiplied by √λ when λ falls at once. With drag the swing is over
+after one period, and the remaining bias is divided by λ. γ is proportional to λ − 1, so drag ends with the scaled
+loads.
 """
 
 import warp as wp
@@ -32,9 +36,11 @@ TWELFTH = wp.constant(wp.float64(1.0 / 12.0))
 DRAG_PER_CROSSING = wp.constant(wp.float64(8.0))
 """γ times the time in which slow waves cross the loop: about the critical damping of its slowest swing."""
 DRAG_PER_TURN = wp.constant(wp.float64(2.5))
-"""γ times the time in which the loop runs its height. It is for loops that bear little load, whose waves stay slow:
-they become stationary in 8 to 14 s instead of 14 to 30. With 6 fast short loops (60 Hz) change their shape when drag
-ends."""
+"""γ times the time in which the loop runs its height.
+
+It serves loops that bear little load, on which waves stay slow: they become stationary in 8 to 14 s instead of 14 to
+30. With 6 instead of 2.5, fast short loops (60 Hz) change their shape when drag ends.
+"""
 NEVER = wp.constant(wp.float64(1e9))
 
 
@@ -46,7 +52,7 @@ def scaled_inertia(inertia: wp.float64, mass: wp.float64, length: wp.float64, fa
 
 @wp.func
 def under_load(own: Chain, factor: wp.float64) -> Chain:
-    """A chain under loads multiplied by a factor; exactly the same chain for a factor of 1."""
+    """The chain with its loads multiplied by a factor; for a factor of 1 the same bits."""
     chain = own
     length = TWO * own.half_length
     chain.gravity = factor * own.gravity
@@ -72,9 +78,9 @@ def write_inertias(K: wp.array2d(dtype=wp.float64), chain: Chain):
 def crossing_time(speed: wp.float64, gravity: wp.float64, radius: wp.float64, height: wp.float64):
     """Time [s] in which slow waves cross both sides of a loop.
 
-    At a height y above the lowest point T_e is about ρ g (y + y₀), where y₀, the radius of curvature at that point, is
-    about half the sprocket's radius. Waves move at √(v² + g (y + y₀)) − v; the integral of dy over that has a closed
-    form.
+    At a height y above the lowest point T_e is about ρ g (y + y₀). y₀ is the radius of curvature at that point, about
+    half the sprocket's radius. Slow waves move at c(y) = √(v² + g (y + y₀)) − v; the integral of dy/c has a closed
+    form. Without gravity it is ``NEVER``.
 
     Args:
         speed: Of the loop, v [m/s].
@@ -94,7 +100,7 @@ def crossing_time(speed: wp.float64, gravity: wp.float64, radius: wp.float64, he
 
 @wp.func
 def drag_shape(K: wp.array2d(dtype=wp.float64), chain: Chain, left: wp.float64):
-    """Multiplies the velocity of each link across the path of the loop by ``left``."""
+    """Multiplies the part of each link's velocity that is across the path of the loop by ``left``."""
     n = chain.link_count
     i = int(0)
     while i < n:

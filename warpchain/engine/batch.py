@@ -29,13 +29,14 @@ from warpchain.status import Status
 Array = NDArray[np.float64]
 
 FIRST_STEP = 1e-7  # s; it may grow fivefold per step
-LANES = 3  # streams of a batch for kernels that run side by side: chains of one length do not fill the device
+LANES = 3
+"""Streams on which kernels for different chain lengths run side by side: chains of one length do not fill a GPU."""
 LAUNCH_SECONDS = 0.1  # s, wanted duration of a launch, after which progress is shown and Ctrl-C noticed
 UNSET_WATCHES = (
     *(layout.WINDOW_START, layout.STEADY_SINCE, layout.LOADED_SINCE, layout.UNLOADED_SINCE, layout.DRIFT),
     *(layout.REST_SINCE, layout.SOFTENED_AT),
 )
-"""Times in :attr:`State.watch`, negative until they have come."""
+"""Entries of :attr:`State.watch` that are −1 until set."""
 
 
 class Batch:
@@ -110,7 +111,7 @@ class Batch:
         self.lists = wp.zeros((worlds, list_layout(self.columns).size), dtype=wp.int32, device=self.device)
 
     def _arrays(self, struct: Any, **shapes: tuple[int, ...]) -> Any:
-        """A struct of arrays of zeros; ``shapes``: their axes after that of the worlds, where there are any."""
+        """A struct of arrays of zeros; ``shapes``: further axes of an array, after that of the worlds."""
         filled = struct()
         for name, field in struct.vars.items():
             dtype = wp.dtype_to_numpy(field.type.dtype)
@@ -168,9 +169,9 @@ class Batch:
             world: Index.
             position: (n, 3): x, y [m], θ [rad].
             velocity: (n, 3), their rates.
-            stop_time: Time [s] at which the run ends exactly.
-            stop_status: Status of a run that ends there.
-            attempts_before: Attempts of earlier phases, which the limit of the options includes.
+            stop_time: Time [s] at which the run ends, exactly.
+            stop_status: Status it ends with.
+            attempts_before: Attempts of earlier phases, which count towards the option `step_limit`.
             softness: Softness of the joints, see :mod:`warpchain.kernels.events.softening`.
         """
         state = self.state
@@ -269,7 +270,7 @@ class Batch:
         return time.perf_counter() - before
 
     def start(self, groups: Mapping[Features, Sequence[int]], attempts: int) -> None:
-        """Begin a launch as of :meth:`launch_together`; until :meth:`finish` the host may not read the worlds.
+        """Begin a launch like :meth:`launch_together`; until :meth:`finish` the host may not read the worlds.
 
         On a GPU this returns at once, and launches of other batches go on at the same time.
         """
@@ -366,7 +367,7 @@ class Batch:
         return {name: float(value) for name, value in zip(LOSSES, row, strict=True)}
 
     def first_sample(self, world: int) -> Array:
-        """The chain's first sample since loading: (SAMPLE_COLUMNS,), see :mod:`warpchain.kernels.layout`."""
+        """The sample taken when the run began: (SAMPLE_COLUMNS,), see :mod:`warpchain.kernels.layout`."""
         return np.array(self._view(self.state.first_sample)[world])
 
     def last_sample(self, world: int) -> Array:
@@ -379,7 +380,7 @@ class Batch:
         return moment if moment >= 0 else math.nan
 
     def drift(self, world: int) -> float:
-        """Drift of a held loop in its last watch, relative to its size; NaN if no window of a watch has ended."""
+        """Drift of a held loop in its last watch, relative to its height or width; NaN if no window has ended."""
         drift = float(self._view(self.state.watch)[world, layout.DRIFT])
         return drift if drift >= 0 else math.nan
 

@@ -20,9 +20,9 @@ TOLERANCES: Final = {"ge": 1e-13, "le": 1e-1}
 class Options(BaseModel):
     """How a walk is computed.
 
-    `method` also takes a word of `METHODS_BY_NEED`, whose settings are then the defaults; an explicit `tolerance` also
-    replaces its `soft_tolerance`. An integrator has the defaults below, except that the `tolerance` of `hybrid` is
-    `BURST_TOLERANCE`.
+    `method` is an integrator or a word of `METHODS_BY_NEED`. A word supplies its own defaults; an explicit `tolerance`
+    also replaces its `soft_tolerance`. An integrator has the defaults below, except that the default `tolerance` of
+    `hybrid` is `BURST_TOLERANCE`.
 
     Raises:
         pydantic.ValidationError: a value is unknown or out of bounds, the smallest step is not below the contact step,
@@ -44,31 +44,31 @@ class Options(BaseModel):
         1e-6, "1", "error allowed in a step, absolute (SI units) and relative; default of hybrid: 1e-4", **TOLERANCES
     )
     soft_tolerance: float | None = number_field(
-        None, "1", "the same where soften_drive or soften_pile has softened joints; null: tolerance", **TOLERANCES
+        None, "1", "tolerance while soften_drive or soften_pile softens joints; null: as tolerance", **TOLERANCES
     )
     flight_tolerance: float = number_field(
-        1e-3, "1", "of hybrid: error allowed in a step between impulses, where joints are rigid", **TOLERANCES
+        1e-3, "1", "tolerance of hybrid between impulses, while joints are rigid", **TOLERANCES
     )
     controller: Literal["standard", "pi"] = Field(
         default="standard",
-        description="rule for the next step: from this error alone, or proportional–integral; "
-        "implicit methods have one of the latter kind for both",
+        description="rule for the next step: standard takes the error of the last step, pi those of the last two; "
+        "rodas5p always takes two, hybrid one while joints are rigid",
     )
     contact_step: float = number_field(
-        2e-5, "s", "longest step near a contact; bounds how deep circles sink in before a contact is seen", gt=0
+        2e-5, "s", "longest step near a contact; bounds how deep circles sink in before the contact is found", gt=0
     )
     soft_contact_step: float = number_field(
         5e-5,
         "s",
-        "longest step near a contact where soften_drive makes joints soft, or soften_pile softest, unless "
-        "contact_step is longer; long or slow loops take shorter ones just before the release",
+        "longest step near a contact while joints are softened on the sprocket (soften_drive) or softest in the pile "
+        "(soften_pile); without effect if contact_step is longer",
         gt=0,
     )
     skin: float = number_field(
-        2e-3, "m", "margin of the neighbour list; the list lasts until some joint has moved half of it", gt=0
+        2e-3, "m", "margin of the neighbour list, which is built anew when a joint has moved half of it", gt=0
     )
     step_limit: int = number_field(2_000_000_000, "1", "most steps attempted in one walk", ge=1, le=10**15)
-    smallest_step: float = number_field(1e-12, "s", "a step that has to be shorter than this ends the walk", gt=0)
+    smallest_step: float = number_field(1e-12, "s", "the walk ends if a step must be shorter than this", gt=0)
     self_contact: bool = Field(default=True, description="whether links of the chain can touch one another")
     rest_speed: float = number_field(
         0.02, "m/s", "a chain is slow while its centre of mass and its links (rms) are both below this speed", gt=0
@@ -77,16 +77,16 @@ class Options(BaseModel):
     record_interval: float = number_field(1e-3, "s", "time between two samples of a walk", ge=1e-6)
     soften_pile: bool = Field(
         default=False,
-        description="whether the joints of a walking loop that has collapsed become soft, and softest once it encloses "
-        "half of soften_area",
+        description="whether joints become soft when the walking loop has collapsed, and softest when it encloses less "
+        "than half of soften_area",
     )
     soften_area: float = number_field(
         0.9, "1", "a loop has collapsed when it encloses less than this fraction of its area at the release", gt=0, lt=1
     )
     soften_drive: bool = Field(
         default=False,
-        description="whether joints are softest until the sprocket has spun up, soft or softer until the release, and "
-        "have their own values from 0.03 s after the release",
+        description="whether joints are softened on the sprocket: softest until it has spun up, then at least soft; "
+        "within 0.03 s after the release they return to their own values",
     )
     device: str = Field(default="cpu", description="where walks run: cpu, cuda (the first GPU) or cuda:N")
 

@@ -1,9 +1,13 @@
 """Shards: immutable HDF5 files that hold the rows and motions of ended walks.
 
-A shard appears whole or not at all: its bytes go to a temporary name, to the disk, and then get their name.
+A shard file has the attributes `format`, `key`, `digest` and `numerics_version`; the dataset `rows`, one row for each
+walk with the columns of `warpchain.walks.rows` and the rows' SHA-256 in its attribute `sha256`; and, if motions of its
+walks are kept, the group `motion`, see `warpchain.store.motion_arrays`. Walks have their places in the folder as
+numbers, see `warpchain.store.manifest`; their numbers in the sweep are found when the shard is read.
+
+A shard appears whole or not at all: it is written to a temporary file, flushed to the disk, and then renamed.
 Its content depends only on the digest of the sweep and on the numerics, not on when and where it was computed. So a
-sweep leaves the same bytes however often it was killed. A shard knows its walks by their places in the folder, see
-`warpchain.store.manifest`; the numbers of walks in the sweep are found when the shard is read.
+sweep leaves the same bytes however often it was killed.
 """
 
 import errno
@@ -50,7 +54,7 @@ def shard_name(places: range) -> str:
 
 
 def _key(manifest: Manifest, places: range) -> str:
-    """What names the content of a shard: equal keys, equal bytes; hexadecimal SHA-256."""
+    """A hash of what determines the bytes of a shard: hexadecimal SHA-256."""
     digests = manifest.digests_of(places.start)
     content = (*digests, manifest.numerics_version, FORMAT_VERSION, places.start, places.stop)
     return hashlib.sha256(" ".join(map(str, content)).encode()).hexdigest()
@@ -91,7 +95,7 @@ def write_shard(
     if sorted(motions) != manifest.kept(places):
         raise ValueError(f"the motions are not those that are kept of {name}")
     rows = rows.copy()
-    for column in rows.dtype.names or ():  # there are many NaNs, and which one may depend on the batch
+    for column in rows.dtype.names or ():  # a NaN has many bit patterns, and the pattern may depend on the batch
         if rows[column].dtype.kind == "f":
             rows[column][np.isnan(rows[column])] = np.nan
     key = _key(manifest, places)
@@ -198,7 +202,8 @@ def present_shards(directory: Folder, manifest: Manifest) -> dict[range, Path]:
 def hdf5_image(fill: "Callable[[h5py.File], None]") -> bytes:
     """The bytes of an HDF5 file that `fill` fills; equal content gives equal bytes.
 
-    The file is made in memory, because HDF5 on a full disk neither says what is wrong nor closes the file.
+    The file is made in memory, because HDF5 fails badly on a full disk: it neither says what is wrong nor closes the
+    file.
     """
     import h5py
 
@@ -212,7 +217,7 @@ def hdf5_image(fill: "Callable[[h5py.File], None]") -> bytes:
 def open_new_hdf5(path: Path, most: int) -> "Iterator[h5py.File]":
     """A new HDF5 file that may be too large for `hdf5_image`, with the same bytes.
 
-    Its space on the disk is reserved first, for the reason given there; what is left over is given back.
+    Its space on the disk is reserved first, because HDF5 fails badly on a full disk. What is left over is given back.
 
     Args:
         path: the file, which may be there.
@@ -250,7 +255,7 @@ _REMEDIES: Final = {
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turn an `OSError` of the block into one of one line, with the remedy, which says that this cannot be written."""
+    """Turn an `OSError` of the `with` block into one of one line: the path cannot be written, why, and the remedy."""
     try:
         yield
     except OSError as error:

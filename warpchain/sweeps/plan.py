@@ -1,8 +1,8 @@
 """Sweeps: many walks from one file, each planned by its index when it is asked for.
 
 A sweep is a list of blocks, a block a grid of cells, a cell a number of samples. Walks are numbered through all of
-them, the sample fastest. Walk `index` depends on the sweep and the index only: no table of walks exists, and neither
-the order in which walks are asked for nor who asks changes them.
+them, the sample fastest. Walk `index` depends on the sweep and the index only: no table of walks exists, and a walk is
+the same whoever asks for it, in any order.
 
 `warpchain.sweeps.sweep_file` defines the keys of a file, `warpchain.sweeps.designs` the designed samples.
 """
@@ -95,9 +95,9 @@ class Sweep:
     def drawn(self, walk: PlannedWalk) -> PlannedWalk:
         """A walk of `undrawn` with what is drawn for it.
 
-        A sample that makes no possible walk (a chain that with the drawn lengths does not reach round its sprocket,
-        say) is drawn again as a whole: from its own stream, which for a designed sample begins only then. In
-        `saltelli` the d + 2 walks of a sample go together.
+        A sample may make no possible walk: with the drawn lengths, say, the chain does not reach round its sprocket.
+        Then the whole sample is redrawn from its own random stream, which a designed sample does not use before. In
+        `saltelli` the d + 2 walks of a sample are redrawn together.
 
         Raises:
             InputError: no draw made a possible walk.
@@ -180,7 +180,7 @@ class Sweep:
     def _first_possible(
         self, block: Block, cell: tuple[int, ...], fixed: Setup, row: int, *, designed: bool
     ) -> tuple[list[Point], list[Setup]]:
-        """The first candidate for sample `row` of a cell all of whose walks are possible, and their setups.
+        """The first candidate for sample `row` of a cell that makes possible walks only, and their setups.
 
         Raises:
             InputError: there is none.
@@ -207,7 +207,10 @@ class Sweep:
             yield _points(block, lambda: draw(distributions, rng))
 
     def _stream(self, block: Block, cell: tuple[int, ...]) -> int:
-        """Number of a cell's stream: cells are counted through all blocks, without the axes of equal samples."""
+        """Number of a cell's random stream.
+
+        Cells are numbered through all blocks; axes in `same_samples_along` do not count.
+        """
         number = 0
         for (name, values), place in zip(block.axes.items(), cell, strict=True):
             if name not in self.same_samples_along:

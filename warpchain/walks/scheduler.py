@@ -25,14 +25,14 @@ attempts in a pile take three times as long as in flight, and with equal numbers
 the slowest of its batch.
 """
 BATCHES_PER_GPU = 4
-"""While the host looks after one of them, the others go on and fill the device."""
+"""While the host handles one of them, the others go on and fill the device."""
 NAP = 5e-4
 """Pause [s] before asking again whether a batch is done."""
 
 Begin = Callable[[int, Batch, int], WalkRun]
-"""Begins a walk: its place, and the batch and the world to run on."""
+"""Begins a walk. Called with (place, batch, world); place: index in ``setups``."""
 Watch = Callable[[WalkRun, bool], None]
-"""Told of a run after each of its launches (False), and before a kernel that it needs is loaded (True)."""
+"""Called with (run, is_loading): False after each launch of the run, True before a kernel that it needs is loaded."""
 
 
 def run_setups(
@@ -45,21 +45,21 @@ def run_setups(
     stop: threading.Event | None = None,
     watch: Watch | None = None,
 ) -> Iterator[tuple[int, WalkRun]]:
-    """Run walks and yield each when it is over, as (place in ``setups``, run).
+    """Run walks and yield each when it is over, as (place, run); place: index in ``setups``.
 
     A run must be read before the next one is asked for: its world is used again. No bit of a walk depends on the others
     or on the number of slots.
 
     Args:
         setups: The walks, samples drawn; with ``draw``, options and links suffice.
-        draw: Asked for a walk, by its place, when it begins; its options and links are those of ``setups``.
+        draw: Called with the place of a walk when it begins; returns its setup, with options and links of ``setups``.
         keeps: What is kept of the motion of each, for ``run.recorder``; None: nothing. Walks of equal options keep
             frames equally often.
         slots: Number of chains that run at the same time. Default: on a GPU as many as fill it; on a CPU, where one
             core does a launch, one, which stays in the cache.
         threads: Of every block on a GPU, see `warpchain.engine.kernel_choice.shared_threads`; no bit depends on it.
         stop: When set, the walks are abandoned after the launch that is under way.
-        watch: For progress; kernels are then loaded one by one when they are needed, and said to be.
+        watch: For progress. With it, each kernel is loaded when it is first needed, and ``watch`` is called before.
     """
     buckets: dict[tuple[Options, int], list[int]] = defaultdict(list)
     for place, setup in enumerate(setups):
@@ -70,7 +70,7 @@ def run_setups(
         return WalkRun(batch, world, setup, NOTHING if keeps is None else keeps[place])
 
     for (options, _), places in buckets.items():
-        # long chains take longest: begun first, they are not what is waited for in the end
+        # long chains take longest: they begin first, so that the run does not wait for them in the end
         places.sort(key=lambda place: -setups[place].scene.links)
         links = [setups[place].scene.links for place in places]
         wanted = [] if keeps is None else [keeps[place] for place in places]
@@ -83,7 +83,8 @@ def _batches(
 ) -> list[Batch]:
     """Batches for walks: on a CPU one, on a GPU several, with as many worlds in all as are of use and fit."""
     longest, on_gpu = max(links), options.device.startswith("cuda")
-    # Every batch keeps what any walk wants, although most may want nothing: others would wait for two slowest walks.
+    # Every batch keeps what any walk wants, although most may want nothing: separate batches would each wait for their
+    # own slowest walk.
     samples, loads = any(keep.series_every for keep in keeps), any(keep.before > 0 for keep in keeps)
     frame_every = next((keep.frame_every for keep in keeps if keep.frame_every), None)
     if slots is None and on_gpu:
@@ -121,7 +122,7 @@ class BatchRun:
     """A batch and the walks on its worlds."""
 
     def __init__(self, batch: Batch, waiting: Iterator[int], begin: Begin, watch: Watch | None) -> None:
-        """Prepare to run waiting walks, by their places."""
+        """Prepare to run waiting walks, given by their places."""
         self.batch = batch
         self._waiting, self._begin, self._watch = waiting, begin, watch
         self._loaded: set[Features] = set()
@@ -176,7 +177,7 @@ def _run_batches(
     stop: threading.Event | None,
     watch: Watch | None,
 ) -> Iterator[tuple[int, WalkRun]]:
-    """Run walks, by place, that share options and the width of their arrays."""
+    """Run the walks at these places, which share options and the width of their arrays."""
     runs = [BatchRun(batch, waiting, begin, watch) for batch in batches]
     try:
         under_way = [run for run in runs if run.start()]

@@ -41,7 +41,7 @@ STILL_PERIOD = 0.25
 SHORTEST_WINDOW, LONGEST_WINDOW = 0.05, 0.25
 """Bounds of the time [s] over which a loop under its own loads is averaged; between them half a loop period."""
 BY_ITSELF = -1.0
-"""Stands for a time that the kernel sets, see :mod:`warpchain.kernels.events.release`."""
+"""As `steady_time` means: the kernel chooses how long to watch, see :mod:`warpchain.kernels.events.release`."""
 
 
 class Phase(Enum):
@@ -54,13 +54,13 @@ class Phase(Enum):
 
 
 class WalkRun:
-    """One walk: loads a world, and starts its next phase whenever it has stopped.
+    """One walk: loads a world; each time the world stops, it starts the next phase.
 
     Attributes:
         setup: What the walk is.
         status: RUNNING until the run is over.
-        raised: Height [m] by which the chain was raised at the release, and of the sprocket's centre then; NaN before
-            the release.
+        raised: Height [m] by which the chain and its sprocket were raised at the release, and so the height of the
+            sprocket's centre above the floor; NaN before the release.
         drive_time: Simulated time [s] before the release.
         drift: How far the loop moved while it was last watched on its sprocket, relative to its height or width; NaN if
             it was not watched.
@@ -222,6 +222,7 @@ class WalkRun:
         """Results of the walk apart from its motion, by the names of the fields of `WalkResult`."""
         setup, counts, extremes = self.setup, self.counts, self.extremes
         is_at_rest = self.status == Status.AT_REST
+        # Δx is x of the centre of mass, because the sprocket's centre is at x = 0
         return {
             "status": self.status,
             "dx": float(self._batch.last_sample(self._world)[layout.CENTER_X]) if is_at_rest else math.nan,

@@ -1,12 +1,12 @@
 """The switch between the two models of a joint: spring and damper, and rigid.
 
-*Closing*: a chain without impulses for a while, whose springs have come to rest, is projected on C = 0 and Ċ = 0 and
-continues with rigid joints. The energy that the springs held and that the projection takes is booked. *Opening*: joints
-are opened by C = F/k, so that the springs start with the forces of the rigid joints, and only impulses make them ring.
-A closing and an opening at the same state cancel in the ledger.
+*Closing*: once no impulse has come for ``QUIET_TIME`` and the springs are at rest, the chain is projected on C = 0 and
+Ċ = 0 (C: opening of a joint) and continues with rigid joints. The ledger books the energy that the springs held and
+that the projection takes. *Opening*: joints are opened by C = F/k, so that the springs start with the forces F of the
+rigid joints, and only impulses make them ring. A closing and an opening at the same state cancel in the ledger.
 
-Both displace links by forces between neighbours, so that momentum, centre of mass and gravitational energy stay, and
-angular momentum to the order of C.
+Both displace links in opposite directions on the two sides of a joint, as forces between neighbours would. So momentum,
+centre of mass and gravitational energy do not change, and angular momentum changes only by the order of C.
 """
 
 import functools
@@ -27,7 +27,7 @@ QUIET_TIME = wp.constant(wp.float64(5e-5))
 """A chain may close its joints after no impulse for this long [s].
 
 That is 30 decay times of oscillations between neighbours on the paper's springs. Long waves round the loop decay more
-slowly; the projection takes and books their remaining energy.
+slowly; the projection takes their remaining energy, which is booked.
 """
 
 

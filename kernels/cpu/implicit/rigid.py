@@ -1,15 +1,15 @@
 """Rigid joints: the limit k → ∞, without oscillating springs, where the motion of the chain alone limits steps.
 
-With rigid joints C = 0 and Ċ = 0 hold always, and the joint forces F follow from C̈ = 0: S F = r with, for joint i
-between link i (l) and link i + 1 (r),
+A rigid joint has the opening C = 0 and Ċ = 0 at all times. The joint forces F follow from C̈ = 0, which is S F = r. For
+joint i between link i (l) and link i + 1 (r), with u the direction of a link, t = ẑ × u and 𝟙 the unit matrix,
 
-    S_ii = (1/m_l + 1/m_r) 1 + a² (t_l t_lᵀ/I_l + t_r t_rᵀ/I_r),    S_i,i+1 = −1/m_r 1 + a² t_r t_rᵀ/I_r,
-    r_i = a (u_l ω_l² + u_r ω_r²) − a (t_l α_l + t_r α_r),
+    S_ii = (1/m_l + 1/m_r) 𝟙 + a² (t_l t_lᵀ/I_l + t_r t_rᵀ/I_r),    S_i,i+1 = −1/m_r 𝟙 + a² t_r t_rᵀ/I_r,
+    r_i = a (u_l ω_l² + u_r ω_r²) − a (t_l α_l + t_r α_r).
 
-with the acceleration α_i = (f_i−1 − f_i)/I_i of link i by joint friction alone. S is symmetric, positive definite and
-cyclic block-tridiagonal. The same matrix projects: impulses P with S P = Ċ remove the opening rates, displacements by P
-with S P = C the openings. Both projections are orthogonal in the metric of the masses, and as they act between two
-links they keep the momentum and the centre of mass.
+α_i = (f_i−1 − f_i)/I_i is the angular acceleration of link i by the friction torques f of its joints alone. S is
+symmetric, positive definite and cyclic block-tridiagonal. The same matrix projects: impulses P with S P = Ċ remove the
+opening rates; displacements by P with S P = C remove the openings. Both projections are orthogonal in the metric of the
+masses. As they act between two links, they keep momentum and centre of mass.
 
 Memory is in the order of :mod:`cpu.implicit.solver`, see :mod:`cpu.implicit.rigid_layout`.
 """

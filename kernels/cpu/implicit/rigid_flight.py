@@ -1,20 +1,21 @@
 """Flight on rigid joints: a W-method on the accelerations of :mod:`cpu.implicit.rigid`, with projections after a step.
 
 Only joint friction is stiff, so the matrix of the method is that of friction under the constraint of the joints:
-A = −P M⁻¹ D with D = −∂Q/∂v (f'(w) of the joints) and P the projection on Ċ = 0. A stage (1 − g A) z = r, g = hγ, is
-(M + g D) z + Gᵀ λ = M r with G z = G r. Without the links' places, with y = z_θ − r_θ, this is
+A = −P M⁻¹ D, where D = −∂Q/∂v has the slopes f'(w) of the joints' friction and P projects on Ċ = G v = 0. A stage
+(1 − g A) z = r with g = hγ is (M + g D) z + Gᵀ λ = M r with G z = G r. Eliminating the links' x and y gives, with
+y = z_θ − r_θ and joint i between the links l and r,
 
     (1/m_l + 1/m_r) λ_i − λ_i−1/m_l − λ_i+1/m_r + a (t_l y_l + t_r y_r) = 0,
     I_i y_i + g (D y)_i − a t_i·(λ_i + λ_i−1) = −g (D r_θ)_i:
 
-cyclic block-tridiagonal with 3 × 3 submatrices for (λ_i, y_i). Its symmetric part is positive, so no pivoting is
-needed.
+a cyclic block-tridiagonal system with 3 × 3 submatrices for (λ_i, y_i). Its symmetric part is positive definite, so no
+pivoting is needed.
 
-Wherever a joint stops and turns back, some thousand times a second in a loop, Coulomb friction changes its sign in a
-millionth of the time of such a step. To resolve that, steps of a few µs would be needed. So friction is smoothed over a
-part of the change of the joint's spin w in the step: tanh(w / max(ω_c, c h |ẇ|)). The impulse of a passage through zero
-stays the same by symmetry, a sticking joint has no ẇ and keeps ω_c, and the smoothing vanishes with h. c = 0.2 was best
-in a prototype: 0.05 gained nothing, and 1 made larger errors than it saved steps.
+The spin w of some joint passes through zero a thousand times a second in a loop. Coulomb friction then changes its sign
+within a millionth of a step; to resolve that, steps of a few µs would be needed. So friction is smoothed over a part of
+the change of w in the step: tanh(w / max(ω_c, c h |ẇ|)). By symmetry this does not change the impulse of friction
+during a passage through zero. A sticking joint has ẇ = 0 and keeps ω_c, and the smoothing vanishes with h. c = 0.2 was
+best in a prototype: 0.05 gained nothing, and with 1 the larger errors outweighed the steps saved.
 """
 
 import functools

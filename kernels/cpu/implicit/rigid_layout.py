@@ -1,6 +1,7 @@
-"""Memory of rigid joints: rows in the order of :mod:`cpu.implicit.solver`, padded with neighbours.
+"""Memory of rigid joints: rows in the order of :mod:`cpu.implicit.solver`.
 
-The next link lies at the next place, eight columns further. A joint lies at the column of the link on its left.
+The next link lies at the next place, eight columns further. A segment is padded with copies of neighbouring values
+where they are needed. A joint lies at the column of the link on its left.
 """
 
 import functools

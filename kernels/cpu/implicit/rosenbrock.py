@@ -1,12 +1,13 @@
-"""Rosenbrock methods with the exact Jacobian of the chain: O(n) a step, and springs set no bound on h.
+"""Rosenbrock methods with the exact Jacobian of the chain: O(n) a step, and springs set no bound on the step h.
 
 With v = q̇ and M q̈ = Q(q, v), put g = hγ, K = −∂Q/∂q and D = −∂Q/∂v. A stage of :class:`RosenbrockTable` is
-(1 − g J) U = r with r_q = g v + γ Σ C U_q, r_v = g M⁻¹ Q + γ Σ C U_v at the stage's place. Without U_v it reads
+(1 − g J) U = r with the Jacobian J, r_q = g v + γ Σ C U_q and r_v = g M⁻¹ Q + γ Σ C U_v, with v and Q at the stage's
+place and sums over the earlier stages. Eliminating U_v gives
 
     (M + g D + g² K) Z = M (r_q / g + r_v) + g D r_q / g,    Z = U_q / g,    U_v = Z − r_q / g.
 
-The matrix couples neighbouring links only, with 3 × 3 submatrices, and is the same for all stages of a step. The rest
-of a stage consists of sums over the Z of previous stages, see :class:`SecondOrderTable`.
+The matrix couples neighbouring links only, with 3 × 3 submatrices, and is the same for all stages of a step. Everything
+else in a stage is a sum over the Z of earlier stages, see :class:`SecondOrderTable`.
 
 Memory is in the order of :mod:`cpu.implicit.solver`, see :mod:`cpu.implicit.rosenbrock_layout`: eight segments of the
 loop side by side, so that the next link is the next vector of memory.

@@ -1,7 +1,8 @@
-"""Memory of the implicit step: rows in the order of :mod:`cpu.implicit.solver`, padded with neighbours.
+"""Memory of the implicit step: rows in the order of :mod:`cpu.implicit.solver`.
 
-The next link lies at the next place, eight columns further. Rows of joints begin one place later: the joint on the
-right of the link in column c lies in column c + 8, the joint on its left in column c.
+The next link lies at the next place, eight columns further. A segment is padded with copies of neighbouring values
+where they are needed. Rows of joints begin one place later: the joint on the right of the link in column c lies in
+column c + 8, the joint on its left in column c.
 """
 
 import functools

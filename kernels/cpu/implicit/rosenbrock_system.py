@@ -1,19 +1,20 @@
 """The linear systems of the implicit step: the matrix M + g D + g² K and the right-hand sides of its stages.
 
-A joint between link l on its left and link r on its right opens by C = (X_r − a u_r) − (X_l + a u_l) and pulls with F =
-k C + b Ċ. With σ = g b + g² k its part of the matrix is g F ≙ σ δC + g² b a (ω_l u_l δθ_l + ω_r u_r δθ_r), where the
-last two terms come from the turning of t in Ċ. The turning of t in the torque a t·F adds g² a u·F to the diagonal. The
-column of the angle of either link in the first part is c = −σ a t + g² b a ω u. So the submatrices D_i are diagonal:
+A joint between link l on its left and link r on its right opens by C = (X_r − a u_r) − (X_l + a u_l) and pulls with
+F = k C + b Ċ, where u is a link's direction and t = ẑ × u. Let δ be a change along Z and σ = g b + g² k. In
+(g D + g² K) Z the joint then acts like the pull σ δC + g² b a (ω_l u_l δθ_l + ω_r u_r δθ_r); its last two terms come
+from the turning of t in Ċ. The angle of either link enters this pull with the factor c = −σ a t + g² b a ω u. The
+turning of t in the torque a t·F adds g² a u·F to the diagonal. So the submatrices D_i are diagonal:
 
     D_i = diag(m + 2σ, m + 2σ, I + 2σ a² + g (φ_i + φ_i₋₁) + g² a u·(F_i + F_i₋₁)),
     U_i = −(1; a t_iᵀ) (σ, c_i₊₁) − g φ_i,    L_i = (1; −a t_iᵀ) (−σ, c_i₋₁) − g φ_i₋₁,
 
-with φ = f'(w) of the joints' friction, see :func:`friction_secant`, in the element of the two angles.
+where φ = f'(w) of the joints' friction, see :func:`friction_secant`, stands in the element of the two angles.
 
 Stiff joints open by 1e-8 m. Rounding places to 1e-16 m changes their force by 1e-7 N. If this error differed between
-stages, the error estimate, a sum over the stages with coefficients up to 100, would see it at tolerances of 1e-9. So
-the opening of a stage is that at the start plus the part due to changes of places and directions, which is rounded a
-thousand times more finely: all stages then share one error of 1e-16 m.
+stages, the error estimate would show it at tolerances of 1e-9, because it is a sum over the stages with coefficients up
+to 100. So the opening of a stage is computed as that at the start plus its change, which is rounded a thousand times
+more finely: all stages then share one error of 1e-16 m.
 """
 
 import warp as wp

@@ -3,12 +3,13 @@
 Row i of the system is L_i x_{i−1} + D_i x_i + U_i x_{i+1} = r_i, indices modulo the number of rows n. Elimination along
 the loop is one long sequence of dependent operations. So the loop is cut into eight segments that are eliminated side
 by side, one in each lane of a vector (H. H. Wang, ACM TOMS 7 (1981) 170). The last row of each segment is a
-*separator*. Without the segments' other rows, the eight separators form a small cyclic system. Three rounds of parallel
-cyclic reduction (R. W. Hockney, J. ACM 12 (1965) 95), again in all lanes at once, leave one unknown in each equation.
+*separator*. Once the other rows are eliminated, the eight separators form a small cyclic system. Three rounds of
+parallel cyclic reduction (R. W. Hockney, J. ACM 12 (1965) 95), again in all lanes at once, leave one unknown in each
+equation.
 
 Submatrices are inverted by cofactors, without pivoting: the matrices are close to symmetric positive definite ones, for
-which this elimination is stable. On matrices of chains errors are LAPACK's up to a condition of 1e3 (scaled to a unit
-diagonal), and ten times those at 1e5. Inverting by elimination halves them and costs 10 %.
+which this elimination is stable. On matrices of chains errors are as large as LAPACK's up to a condition number of 1e3
+(scaled to a unit diagonal), and ten times as large at 1e5. Inverting by elimination halves them and costs 10 %.
 """
 
 import functools
