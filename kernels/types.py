@@ -47,9 +47,7 @@ class Drive:
     loop_period: wp.array(dtype=wp.float64)  # [s]
     load_factor: wp.array(dtype=wp.float64)  # of the hold's first part, see physics.scaled_loads
     steady_window: wp.array(dtype=wp.float64)  # over which means are taken in the hold's second part [s]
-    steady_time: wp.array(
-        dtype=wp.float64
-    )  # for which the loop must then keep its shape [s]; negative: see events.release
+    steady_time: wp.array(dtype=wp.float64)  # for which its shape must then stay [s]; negative: see events.release
     steady_tolerance: wp.array(dtype=wp.float64)  # greatest relative change of the shape of a stationary loop
     further_hold: wp.array(dtype=wp.float64)  # how long a stationary loop is held further [s]
     release_phase: wp.array(dtype=wp.float64)  # and after that, in loop periods
@@ -84,9 +82,7 @@ class State:
     status: wp.array(dtype=wp.int32)
     watch: wp.array2d(dtype=wp.float64)  # (W, WATCH_ROWS): memory of the watches
     softness: wp.array(dtype=wp.float64)  # of the joints: 0 the model's own, 1 soft, 2 softest; see events.softening
-    load_factor: wp.array(
-        dtype=wp.float64
-    )  # of gravity, friction and inertia on the sprocket, see physics.scaled_loads
+    load_factor: wp.array(dtype=wp.float64)  # of loads on the sprocket, see physics.scaled_loads
     first_area: wp.array(dtype=wp.float64)  # area inside the loop when its run began [m²]
     attempts_before: wp.array(dtype=wp.int64)  # attempts of the walk's earlier phases, which its limit includes
     first_sample: wp.array2d(dtype=wp.float64)  # (W, SAMPLE_COLUMNS): the sample taken when the run began

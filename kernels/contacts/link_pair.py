@@ -60,19 +60,8 @@ def circles_of_links(
 
     It returns numbers, not a struct: clang kept a struct in memory, and a pile on the CPU was twice as slow.
 
-    Args:
-        radius: Of both circles [m].
-        end_a_x: Centre of A's circle [m].
-        end_a_y: See ``end_a_x``.
-        end_b_x: Centre of B's circle [m].
-        end_b_y: See ``end_b_x``.
-        center_a_x: A's centre of mass [m].
-        center_a_y: See ``center_a_x``.
-        center_b_x: B's centre of mass [m].
-        center_b_y: See ``center_b_x``.
-        mass: 1/m_A + 1/m_B [1/kg].
-        inertia_a: 1/I_A [1/(kg m²)].
-        inertia_b: 1/I_B [1/(kg m²)].
+    Arguments: the radius of both circles, centres ``end`` of the circles of A and B and centres of mass ``center`` of
+    the links [m], the sum 1/m_A + 1/m_B [1/kg], and 1/I_A and 1/I_B [1/(kg m²)].
 
     Returns:
         Depth of the overlap [m], 0 if there is none (concentric circles have no normal and count as none); normal from

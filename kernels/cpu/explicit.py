@@ -9,43 +9,8 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.layout import (
-    COSINE,
-    ERROR,
-    FORCE_X,
-    FORCE_Y,
-    INVERSE_INERTIA,
-    INVERSE_MASS,
-    LEFT_U,
-    LEFT_V,
-    LEFT_X,
-    LEFT_Y,
-    LOST_DAMPING,
-    LOST_FRICTION,
-    NEW_OMEGA,
-    NEW_THETA,
-    NEW_U,
-    NEW_V,
-    NEW_X,
-    NEW_Y,
-    OMEGA,
-    RIGHT_U,
-    RIGHT_V,
-    RIGHT_X,
-    RIGHT_Y,
-    SINE,
-    STAGE_ARM_X,
-    STAGE_ARM_Y,
-    STAGE_ROWS,
-    STAGE_SPIN,
-    STAGES,
-    THETA,
-    TORQUE,
-    U,
-    V,
-    X,
-    Y,
-)
+from warpchain.kernels import layout
+from warpchain.kernels.layout import STAGE_ROWS, STAGES, U, V, X, Y
 from warpchain.kernels.methods.controller import error_bits
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 from warpchain.kernels.physics.elementary import LARGEST_TURN, TWO, ZERO, cos_sin, order_bits
@@ -63,17 +28,17 @@ def place_ends(K: wp.array2d(dtype=wp.float64), chain: Chain):
     a = chain.half_length
     i = int(0)
     while i < n:
-        c, s = cos_sin(K[THETA, i])
-        K[COSINE, i] = c
-        K[SINE, i] = s
+        c, s = cos_sin(K[layout.THETA, i])
+        K[layout.COSINE, i] = c
+        K[layout.SINE, i] = s
         left_x, left_y, right_x, right_y = end_positions(K[X, i], K[Y, i], a * c, a * s)
-        K[LEFT_X, i] = left_x
-        K[LEFT_Y, i] = left_y
-        K[RIGHT_X, i] = right_x
-        K[RIGHT_Y, i] = right_y
+        K[layout.LEFT_X, i] = left_x
+        K[layout.LEFT_Y, i] = left_y
+        K[layout.RIGHT_X, i] = right_x
+        K[layout.RIGHT_Y, i] = right_y
         i += 1
-    K[LEFT_X, n] = K[LEFT_X, 0]
-    K[LEFT_Y, n] = K[LEFT_Y, 0]
+    K[layout.LEFT_X, n] = K[layout.LEFT_X, 0]
+    K[layout.LEFT_Y, n] = K[layout.LEFT_Y, 0]
 
 
 @wp.func
@@ -83,21 +48,21 @@ def begin_stages(K: wp.array2d(dtype=wp.float64), chain: Chain):
     a = chain.half_length
     i = int(0)
     while i < n:
-        arm_x = a * K[COSINE, i]
-        arm_y = a * K[SINE, i]
-        w = K[OMEGA, i]
-        K[STAGE_ARM_X, i] = arm_x
-        K[STAGE_ARM_Y, i] = arm_y
-        K[STAGE_SPIN, i] = w
+        arm_x = a * K[layout.COSINE, i]
+        arm_y = a * K[layout.SINE, i]
+        w = K[layout.OMEGA, i]
+        K[layout.STAGE_ARM_X, i] = arm_x
+        K[layout.STAGE_ARM_Y, i] = arm_y
+        K[layout.STAGE_SPIN, i] = w
         left_u, left_v, right_u, right_v = end_velocities(K[U, i], K[V, i], w, arm_x, arm_y)
-        K[LEFT_U, i] = left_u
-        K[LEFT_V, i] = left_v
-        K[RIGHT_U, i] = right_u
-        K[RIGHT_V, i] = right_v
+        K[layout.LEFT_U, i] = left_u
+        K[layout.LEFT_V, i] = left_v
+        K[layout.RIGHT_U, i] = right_u
+        K[layout.RIGHT_V, i] = right_v
         i += 1
-    K[LEFT_U, n] = K[LEFT_U, 0]
-    K[LEFT_V, n] = K[LEFT_V, 0]
-    K[STAGE_SPIN, n] = K[STAGE_SPIN, 0]
+    K[layout.LEFT_U, n] = K[layout.LEFT_U, 0]
+    K[layout.LEFT_V, n] = K[layout.LEFT_V, 0]
+    K[layout.STAGE_SPIN, n] = K[layout.STAGE_SPIN, 0]
 
 
 def sums_over_stages(velocity: tuple[float, ...], position: tuple[float, ...]):
@@ -157,36 +122,36 @@ def explicit_method(name: str):
         n = chain.link_count
         i = int(0)
         while i < n:
-            cx = K[LEFT_X, i + 1] - K[RIGHT_X, i]
-            cy = K[LEFT_Y, i + 1] - K[RIGHT_Y, i]
-            cu = K[LEFT_U, i + 1] - K[RIGHT_U, i]
-            cv = K[LEFT_V, i + 1] - K[RIGHT_V, i]
-            spin = K[STAGE_SPIN, i] - K[STAGE_SPIN, i + 1]
+            cx = K[layout.LEFT_X, i + 1] - K[layout.RIGHT_X, i]
+            cy = K[layout.LEFT_Y, i + 1] - K[layout.RIGHT_Y, i]
+            cu = K[layout.LEFT_U, i + 1] - K[layout.RIGHT_U, i]
+            cv = K[layout.LEFT_V, i + 1] - K[layout.RIGHT_V, i]
+            spin = K[layout.STAGE_SPIN, i] - K[layout.STAGE_SPIN, i + 1]
             torque = friction_torque(chain, spin)
-            K[FORCE_X, i + 1] = joint_force(chain, cx, cu)
-            K[FORCE_Y, i + 1] = joint_force(chain, cy, cv)
-            K[TORQUE, i + 1] = torque
+            K[layout.FORCE_X, i + 1] = joint_force(chain, cx, cu)
+            K[layout.FORCE_Y, i + 1] = joint_force(chain, cy, cv)
+            K[layout.TORQUE, i + 1] = torque
             if needs_power:
                 K[row + 3, i] = torque * spin
                 K[row + 4, i] = chain.joint_damping * (cu * cu + cv * cv)
             i += 1
-        K[FORCE_X, 0] = K[FORCE_X, n]
-        K[FORCE_Y, 0] = K[FORCE_Y, n]
-        K[TORQUE, 0] = K[TORQUE, n]
+        K[layout.FORCE_X, 0] = K[layout.FORCE_X, n]
+        K[layout.FORCE_Y, 0] = K[layout.FORCE_Y, n]
+        K[layout.TORQUE, 0] = K[layout.TORQUE, n]
         i = int(0)
         while i < n:
             ax, ay, spin_rate = link_acceleration(
                 chain,
-                K[INVERSE_MASS, i],
-                K[INVERSE_INERTIA, i],
-                K[STAGE_ARM_X, i],
-                K[STAGE_ARM_Y, i],
-                K[FORCE_X, i],
-                K[FORCE_Y, i],
-                K[FORCE_X, i + 1],
-                K[FORCE_Y, i + 1],
-                K[TORQUE, i],
-                K[TORQUE, i + 1],
+                K[layout.INVERSE_MASS, i],
+                K[layout.INVERSE_INERTIA, i],
+                K[layout.STAGE_ARM_X, i],
+                K[layout.STAGE_ARM_Y, i],
+                K[layout.FORCE_X, i],
+                K[layout.FORCE_Y, i],
+                K[layout.FORCE_X, i + 1],
+                K[layout.FORCE_Y, i + 1],
+                K[layout.TORQUE, i],
+                K[layout.TORQUE, i + 1],
             )
             K[row, i] = ax
             K[row + 1, i] = ay
@@ -208,32 +173,32 @@ def explicit_method(name: str):
             i = int(0)
             while i < n:
                 du, dv, dw, dx, dy, turn = wp.static(stage_sums[s])(K, i)
-                turn = ch * K[OMEGA, i] + hh * turn
-                arm_x, arm_y = turned(a * K[COSINE, i], a * K[SINE, i], turn)
+                turn = ch * K[layout.OMEGA, i] + hh * turn
+                arm_x, arm_y = turned(a * K[layout.COSINE, i], a * K[layout.SINE, i], turn)
                 x = K[X, i] + (ch * K[U, i] + hh * dx)
                 y = K[Y, i] + (ch * K[V, i] + hh * dy)
                 u = K[U, i] + h * du
                 v = K[V, i] + h * dv
-                w = K[OMEGA, i] + h * dw
-                K[STAGE_ARM_X, i] = arm_x
-                K[STAGE_ARM_Y, i] = arm_y
-                K[STAGE_SPIN, i] = w
+                w = K[layout.OMEGA, i] + h * dw
+                K[layout.STAGE_ARM_X, i] = arm_x
+                K[layout.STAGE_ARM_Y, i] = arm_y
+                K[layout.STAGE_SPIN, i] = w
                 left_x, left_y, right_x, right_y = end_positions(x, y, arm_x, arm_y)
                 left_u, left_v, right_u, right_v = end_velocities(u, v, w, arm_x, arm_y)
-                K[LEFT_X, i] = left_x
-                K[LEFT_Y, i] = left_y
-                K[LEFT_U, i] = left_u
-                K[LEFT_V, i] = left_v
-                K[RIGHT_X, i] = right_x
-                K[RIGHT_Y, i] = right_y
-                K[RIGHT_U, i] = right_u
-                K[RIGHT_V, i] = right_v
+                K[layout.LEFT_X, i] = left_x
+                K[layout.LEFT_Y, i] = left_y
+                K[layout.LEFT_U, i] = left_u
+                K[layout.LEFT_V, i] = left_v
+                K[layout.RIGHT_X, i] = right_x
+                K[layout.RIGHT_Y, i] = right_y
+                K[layout.RIGHT_U, i] = right_u
+                K[layout.RIGHT_V, i] = right_v
                 i += 1
-            K[LEFT_X, n] = K[LEFT_X, 0]
-            K[LEFT_Y, n] = K[LEFT_Y, 0]
-            K[LEFT_U, n] = K[LEFT_U, 0]
-            K[LEFT_V, n] = K[LEFT_V, 0]
-            K[STAGE_SPIN, n] = K[STAGE_SPIN, 0]
+            K[layout.LEFT_X, n] = K[layout.LEFT_X, 0]
+            K[layout.LEFT_Y, n] = K[layout.LEFT_Y, 0]
+            K[layout.LEFT_U, n] = K[layout.LEFT_U, 0]
+            K[layout.LEFT_V, n] = K[layout.LEFT_V, 0]
+            K[layout.STAGE_SPIN, n] = K[layout.STAGE_SPIN, 0]
             derivatives(K, chain, wp.static(STAGES + STAGE_ROWS * s), wp.static(power_needed[s]))
         # new state and error ratio
         i = int(0)
@@ -242,13 +207,13 @@ def explicit_method(name: str):
             eu, ev, ew, ex, ey, et = errors(K, i)
             u = K[U, i]
             v = K[V, i]
-            w = K[OMEGA, i]
-            K[NEW_X, i] = K[X, i] + (h * u + hh * dx)
-            K[NEW_Y, i] = K[Y, i] + (h * v + hh * dy)
-            K[NEW_THETA, i] = K[THETA, i] + (h * w + hh * turn)
-            K[NEW_U, i] = u + h * du
-            K[NEW_V, i] = v + h * dv
-            K[NEW_OMEGA, i] = w + h * dw
+            w = K[layout.OMEGA, i]
+            K[layout.NEW_X, i] = K[X, i] + (h * u + hh * dx)
+            K[layout.NEW_Y, i] = K[Y, i] + (h * v + hh * dy)
+            K[layout.NEW_THETA, i] = K[layout.THETA, i] + (h * w + hh * turn)
+            K[layout.NEW_U, i] = u + h * du
+            K[layout.NEW_V, i] = v + h * dv
+            K[layout.NEW_OMEGA, i] = w + h * dw
             # Take the maximum over components, not the sum. Compare the floats' bits as integers, where NaN is
             # greatest.
             worst = wp.max(
@@ -256,7 +221,7 @@ def explicit_method(name: str):
                     error_bits(hh * ex, K[X, i], u, h),
                     error_bits(hh * ey, K[Y, i], v, h),
                 ),
-                error_bits(hh * et, K[THETA, i], w, h),
+                error_bits(hh * et, K[layout.THETA, i], w, h),
             )
             worst = wp.max(
                 worst,
@@ -268,15 +233,15 @@ def explicit_method(name: str):
                     error_bits(h * ew, w, K[wp.static(STAGES + 2), i], h),
                 ),
             )
-            K[ERROR, i] = wp.cast(worst, wp.float64) / tolerance  # wp.cast reads the bits back as a float
+            K[layout.ERROR, i] = wp.cast(worst, wp.float64) / tolerance  # wp.cast reads the bits back as a float
             i += 1
         # maxima over links: the longest turn and the greatest error ratio, as bits
         furthest = wp.int64(0)
         greatest = wp.int64(0)
         i = int(0)
         while i < n:
-            greatest = wp.max(greatest, order_bits(K[ERROR, i]))
-            furthest = wp.max(furthest, order_bits(K[NEW_THETA, i] - K[THETA, i]))
+            greatest = wp.max(greatest, order_bits(K[layout.ERROR, i]))
+            furthest = wp.max(furthest, order_bits(K[layout.NEW_THETA, i] - K[layout.THETA, i]))
             i += 1
         # a turn beyond the polynomials' range counts as an error of 2: the step shrinks
         if wp.cast(furthest, wp.float64) > LARGEST_TURN:
@@ -296,14 +261,14 @@ def explicit_method(name: str):
                         wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 3), i]
                     )
                     damping += wp.static(wp.float64(velocity_weights[j])) * K[wp.static(STAGES + STAGE_ROWS * j + 4), i]
-            K[LOST_FRICTION, i] = K[LOST_FRICTION, i] + h * friction
-            K[LOST_DAMPING, i] = K[LOST_DAMPING, i] + h * damping
-            K[X, i] = K[NEW_X, i]
-            K[Y, i] = K[NEW_Y, i]
-            K[THETA, i] = K[NEW_THETA, i]
-            K[U, i] = K[NEW_U, i]
-            K[V, i] = K[NEW_V, i]
-            K[OMEGA, i] = K[NEW_OMEGA, i]
+            K[layout.LOST_FRICTION, i] = K[layout.LOST_FRICTION, i] + h * friction
+            K[layout.LOST_DAMPING, i] = K[layout.LOST_DAMPING, i] + h * damping
+            K[X, i] = K[layout.NEW_X, i]
+            K[Y, i] = K[layout.NEW_Y, i]
+            K[layout.THETA, i] = K[layout.NEW_THETA, i]
+            K[U, i] = K[layout.NEW_U, i]
+            K[V, i] = K[layout.NEW_V, i]
+            K[layout.OMEGA, i] = K[layout.NEW_OMEGA, i]
             if wp.static(reuses_last):
                 for row in range(wp.static(STAGE_ROWS)):
                     K[wp.static(STAGES + row), i] = K[wp.static(last_row + row), i]

@@ -9,6 +9,7 @@ from types import ModuleType
 import pytest
 import yaml
 
+import warpchain
 from tests.docs.code_blocks import PAGES, ROOT, name_of
 from warpchain.sweeps import sweep_file
 from warpchain.sweeps.designs import SAMPLERS
@@ -77,5 +78,5 @@ def test_citation_is_of_this_version() -> None:
     """CITATION.cff has the version and the licence of the package, and refers to the paper."""
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert (citation["version"], citation["license"]) == (project["version"], project["license"])
+    assert (citation["version"], citation["license"]) == (warpchain.__version__, project["license"])
     assert citation["references"][0]["doi"] == "10.1051/emsci/2018005"

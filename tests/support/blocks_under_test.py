@@ -1,9 +1,10 @@
-"""Chains in the block form on CPU fibers, next to the same chains in the CPU form."""
+"""The same chains in GPU kernels, on CPU fibers, and in CPU kernels."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
+import pytest
 import warp as wp
 from numpy.typing import NDArray
 
@@ -12,8 +13,9 @@ from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.kernels.contacts.pair_list import list_layout
+from warpchain.kernels.cpu import loop as cpu_loop
 from warpchain.kernels.features import Features
-from warpchain.kernels.gpu.loop import make_advance_block
+from warpchain.kernels.gpu import loop as gpu_loop
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
@@ -31,6 +33,20 @@ def fibers() -> Iterator[None]:
         yield
     finally:
         wp.config.enable_cpu_blocks = before
+
+
+@contextmanager
+def exact_kernels() -> Iterator[None]:
+    """Step kernels without fused operations: then those of GPUs and of CPUs do the same operations."""
+    factories = (cpu_loop.make_advance, gpu_loop.make_advance_block)
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (cpu_loop, gpu_loop):
+            patch.setattr(module, "COMPILER_FLAGS", "-ffp-contract=off")
+        for factory in factories:
+            factory.cache_clear()
+        yield
+    for factory in factories:
+        factory.cache_clear()
 
 
 def heap(links: int, seed: int = 3, *, tilt: float = 0.3, raised: float = 0.0) -> tuple[Array, Array]:
@@ -92,23 +108,23 @@ def features_of(batch: Batch, *, fixed_body: str, watch: str = "none", broad_pha
     return batch.features(fixed_body=fixed_body, watch=watch, broad_phase=broad_phase)
 
 
-def launch_blocks(batch: Batch, features: Features, attempts: int, *, block_dim: int) -> None:
-    """Carry all worlds of a batch on by at most this many attempts each, in the block form."""
+def launch_kernel(batch: Batch, kernel: wp.Kernel, worlds: Sequence[int], attempts: int, *, block_dim: int) -> None:
+    """Carry worlds on by at most this many attempts each in a GPU kernel."""
     batch.control.attempts = attempts
-    worlds = wp.array(np.arange(len(batch.links), dtype=np.int32), dtype=wp.int32, device="cpu")
-    inputs = [worlds, batch.model, batch.drive, batch.state, batch.record, batch.scratch, batch.lists, batch.control]
+    arrays = [batch.model, batch.drive, batch.state, batch.record, batch.scratch, batch.lists, batch.control]
+    inputs = [wp.array(worlds, dtype=wp.int32, device="cpu"), *arrays]
     with fibers():
-        wp.launch_tiled(
-            make_advance_block(features, block_dim),
-            dim=[len(batch.links)],
-            inputs=inputs,
-            block_dim=block_dim,
-            device="cpu",
-        )
+        wp.launch_tiled(kernel, dim=[len(worlds)], inputs=inputs, block_dim=block_dim, device="cpu")
+
+
+def launch_blocks(batch: Batch, features: Features, attempts: int, *, block_dim: int) -> None:
+    """Carry all worlds on in the GPU kernel for these features."""
+    kernel = gpu_loop.make_advance_block(features, block_dim)
+    launch_kernel(batch, kernel, range(len(batch.links)), attempts, block_dim=block_dim)
 
 
 def launch_chains(batch: Batch, features: Features, attempts: int) -> None:
-    """The same in the CPU form."""
+    """Carry all worlds on in the CPU kernel for these features."""
     batch.launch(range(len(batch.links)), features, attempts)
 
 

@@ -1,24 +1,17 @@
-"""Chains for the hybrid method that fly on rigid joints, or fall and bounce on their springs; on any device."""
-
-from collections.abc import Sequence
+"""Chains for the hybrid method: closed loops in flight, and loops that fall on the floor."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tests.support.rigid_joints import projected
-from warpchain import Status, preset
-from warpchain.engine.batch import Batch
-from warpchain.inputs.options import Options
+from warpchain import preset
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.start_shapes import ellipse, lay_chain
-from warpchain.kernels.features import Features
 from warpchain.oracle import motion_equations
 
 Array = NDArray[np.float64]
 
 PAPER = preset("paper")
-CONTACT_STEP = 1e-6
-"""In s; on springs every step then has this length, in both forms to the bit."""
 
 
 def loop(links: int, parameters: Parameters = PAPER, speed: float = 2.0) -> tuple[Array, Array]:
@@ -51,23 +44,3 @@ def falling(
     ends = np.concatenate(motion_equations.link_ends(position, parameters))
     position[:, 1] += parameters.circle_radius + 1e-4 - ends[:, 1].min()
     return position, velocity - [0.0, fall, 0.0]
-
-
-def batch_with(
-    chains: Sequence[tuple[Array, Array]], parameters: Parameters = PAPER, *, softness: float = 0.0, **options: object
-) -> Batch:
-    """A batch of method hybrid with these chains (position, velocity), on springs that may close at once."""
-    settings = Options.model_validate({"method": "hybrid"} | options)
-    batch = Batch(len(chains), max(len(position) for position, _ in chains), settings)
-    batch.control.launch_time = np.inf
-    for world, (position, velocity) in enumerate(chains):
-        batch.set_chain(world, parameters, len(position))
-        batch.load(world, position, velocity, stop_time=1.0, stop_status=Status.FINISHED, softness=softness)
-    return batch
-
-
-def bouncing(chains: Sequence[tuple[Array, Array]], **options: object) -> tuple[Batch, Features]:
-    """A batch whose chains meet the floor, one another's links and a watch, in steps of CONTACT_STEP on springs."""
-    settings = {"tolerance": 1e-3, "soften_pile": True, "contact_step": CONTACT_STEP} | options
-    batch = batch_with(chains, **settings)  # type: ignore[arg-type]
-    return batch, batch.features(fixed_body="floor", watch="rest")

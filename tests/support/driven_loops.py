@@ -31,10 +31,10 @@ class Loop:
         velocity: (n, 3).
         shape: Means over its last period of height, width, and x, y of its centre [m].
         hold_time: For which it was held [s].
-        drift: How far it moved while it was watched last.
-        attempts: Steps tried.
+        drift: Relative change of its shape in its last watch.
+        attempts: Attempted steps.
         depth: Greatest by which circles sank into the sprocket [m].
-        is_released: Or whether the hold ended otherwise.
+        is_released: Whether the hold ended in a release.
         status: Of the batch's world when the drive was over.
     """
 

@@ -246,6 +246,16 @@ class Placed:
     parameters: Parameters
 
 
+def chain_on_cpu(position: Array, velocity: Array, parameters: Parameters) -> tuple[Model, State]:
+    """Structs of one chain; of its state only the links are set."""
+    model, state = Model(), State()
+    model.link_count = wp.array([len(position)], dtype=wp.int32, device=DEVICE)
+    for name, value in parameters:
+        setattr(model, name, wp.array([value], dtype=wp.float64, device=DEVICE))
+    state.links = wp.array(np.hstack([position, velocity]).T[None], dtype=wp.float64, device=DEVICE)
+    return model, state
+
+
 class ContactPass:
     """Many chains, one after the other, on which parts of the contact pass are run."""
 

@@ -7,6 +7,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from tests.support.kernels_under_test import chain_on_cpu
 from warpchain.engine.devices import start_device
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
@@ -82,12 +83,7 @@ def visit(
     """Close the joints of a chain, make a number of steps of h [s] each, and open the joints again if wished."""
     links = len(position)
     columns = layout.padded_width(links)
-    model = Model()
-    model.link_count = wp.array([links], dtype=wp.int32, device=DEVICE)
-    for name, value in parameters:
-        setattr(model, name, wp.array([value], dtype=wp.float64, device=DEVICE))
-    state = State()
-    state.links = wp.array(np.hstack([position, velocity]).T[None], dtype=wp.float64, device=DEVICE)
+    model, state = chain_on_cpu(position, velocity, parameters)
     scratch = wp.full((1, scratch_rows("hybrid", columns), columns), np.nan, dtype=wp.float64, device=DEVICE)
     results = wp.full(3, np.nan, dtype=wp.float64, device=DEVICE)
     wp.launch(_visit(columns), dim=1, inputs=[model, state, scratch, h, steps, int(opens), results], device=DEVICE)

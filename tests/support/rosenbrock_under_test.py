@@ -6,6 +6,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from tests.support.kernels_under_test import chain_on_cpu
 from warpchain.engine.devices import start_device
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
@@ -117,12 +118,7 @@ def one_step(
     """Position (n, 3) and velocity (n, 3) after one step, its error ratio, and what friction and damping took [J]."""
     links = len(position)
     columns = layout.padded_width(links)
-    model = Model()
-    model.link_count = wp.array([links], dtype=wp.int32, device=DEVICE)
-    for name, value in parameters:
-        setattr(model, name, wp.array([value], dtype=wp.float64, device=DEVICE))
-    state = State()
-    state.links = wp.array(np.hstack([position, velocity]).T[None], dtype=wp.float64, device=DEVICE)
+    model, state = chain_on_cpu(position, velocity, parameters)
     scratch = wp.full((1, scratch_rows(method, columns), columns), np.nan, dtype=wp.float64, device=DEVICE)
     error = wp.full(1, np.nan, dtype=wp.float64, device=DEVICE)
     wp.launch(_step(method, columns), dim=1, inputs=[model, state, scratch, h, tolerance, error], device=DEVICE)

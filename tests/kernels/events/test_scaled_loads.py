@@ -103,8 +103,8 @@ def wave_frequencies(tension: float, links: int, parameters: Parameters) -> Arra
     """Squares of the frequencies [1/s²] of waves across a straight chain of this many links that closes in itself.
 
     From the forces of `reference.acceleration`, linearised in y and θ of one link after the other by finite
-    differences. The chain is straight and long: the links looked at are the middle ones of it, and the rows of the
-    matrix, which are all the same, are laid round.
+    differences. The chain is straight and long. Rows of the matrix are those of its middle links, repeated round the
+    loop.
     """
     opening = tension / parameters.joint_stiffness
     many, middle = 12, 6

@@ -11,7 +11,7 @@ from scipy.special import ellipe
 import warpchain
 from warpchain import InputError, Status, preset
 from warpchain.engine.batch import Batch
-from warpchain.engine.control import HOLD_STRAIN, LOADED_STRAIN, SOFTEST, STIFFENING_TIME, hold_softness
+from warpchain.engine.control import HOLD_STRAIN, LOADED_STRAIN, SOFTEST, hold_softness
 from warpchain.engine.devices import start_device
 from warpchain.inputs.options import Options
 from warpchain.inputs.start_shapes import ellipse, lay_chain
@@ -22,8 +22,7 @@ from warpchain.kernels.events.softening import contact_step, enclosed_area, spri
 from warpchain.kernels.physics.softness import softened
 from warpchain.kernels.types import Chain, Control, Drive, Model, State, read_chain
 from warpchain.run.single_walk import setup_walk
-from warpchain.walks import scheduler
-from warpchain.walks.walk_phases import Phase, WalkRun
+from warpchain.walks.walk_phases import WalkRun
 
 PAPER = preset("paper")
 SERIES = ("time", "center", "center_velocity", "kinetic_energy", "spring_energy", "lowest", "rms_speed")
@@ -288,173 +287,6 @@ def test_soft_joints_are_left_alone() -> None:
         assert_array_equal(getattr(walks[0], name), getattr(walks[1], name), err_msg=name)
     assert walks[0].energy == walks[1].energy
     assert np.isnan(walks[1].softened_at)
-
-
-# --- the sprocket ---
-
-
-SPINNING = {"links": 30, "frequency": 15.0, "start": "spinning", "steady_time": 0.4, "method": "reference"}
-
-
-def test_joints_are_soft_on_the_sprocket_and_stiff_soon_after_the_release() -> None:
-    """Spring energy is n T²/2k' at the release, T = m̄ v²/ℓ, k' such as stretches by 3e-4; as on stiff joints soon."""
-    stiff, soft = (
-        warpchain.walk(**SPINNING, preset="paper", clearance=0.02, walk_limit=0.06, soften_drive=on)
-        for on in (False, True)
-    )
-    speed = 2 * np.pi * 15.0 * (PAPER.sprocket_radius + PAPER.circle_radius)
-    tension = (PAPER.inner_mass + PAPER.outer_mass) / 2 * speed**2 / PAPER.link_length
-    for walk, stiffness in ((stiff, PAPER.joint_stiffness), (soft, tension / (3e-4 * PAPER.link_length))):
-        level = 30 * tension**2 / (2 * stiffness)
-        assert walk.spring_energy[0] == pytest.approx(level, rel=0.5)
-    assert stiff.lowest.min() > 0
-    levels = [np.median(walk.spring_energy[walk.time > STIFFENING_TIME + 2e-3]) for walk in (stiff, soft)]
-    assert levels[1] == pytest.approx(levels[0], rel=0.1)
-
-
-def test_a_soft_drive_takes_fewer_steps_and_as_long() -> None:
-    """The release comes when it would have come, to a few looks 1 ms apart, after a drive of far fewer steps."""
-    stiff, soft = (warpchain.walk(**SPINNING, preset="paper", walk_limit=1e-3, soften_drive=on) for on in (False, True))
-    assert soft.steps_accepted < 0.3 * stiff.steps_accepted
-    assert soft.simulated_time == pytest.approx(stiff.simulated_time, abs=3e-3)
-
-
-@pytest.mark.parametrize(("frequency", "held"), [(9.0, 1e6), (15.0, 2.25e6), (35.0, 1e7)])
-def test_joints_are_softest_until_the_sprocket_has_spun_up(frequency: float, held: float) -> None:
-    """In the spin-up spring energy is n T²/2k of the softest joints, T = m̄ v²/ℓ; in the hold they stretch by 3e-4.
-
-    There k is as great as that needs, within bounds: 2.25e6 N/m at 15 Hz. Loads are their own.
-    """
-    settings = {"links": 30, "frequency": frequency, "method": "standard", "settle_time": 0.1, "spin_up_time": 0.3}
-    settings |= {"load_factor": 1.0}
-    setup = setup_walk("paper", settings, None)
-    batch = Batch(1, 30, setup.options)
-    run = WalkRun(batch, 0, setup)
-    levels = []
-    for moment in (0.09, 0.4 - 1.1 * STIFFENING_TIME, 0.45):
-        batch.resume(0, moment, Status.FINISHED)
-        batch.run([0], run.features)
-        look = batch.last_sample(0)
-        levels.append((batch.state.softness.numpy()[0], look[layout.SPRING], look[layout.LOOP_SPEED]))
-    assert_allclose([softness for softness, _, _ in levels], [2.0, 2.0, 1 + np.log10(1e7 / held)], atol=5e-3)
-    mass = (PAPER.inner_mass + PAPER.outer_mass) / 2
-    for (_, spring, speed), stiffness in zip(levels[1:], (SOFTEST.joint_stiffness, held), strict=True):
-        tension = mass * speed**2 / PAPER.link_length
-        assert spring == pytest.approx(30 * tension**2 / (2 * stiffness), rel=0.8)  # the loop swings, and has weight
-
-
-@pytest.mark.parametrize("load_factor", [5.0, 40.0])
-def test_joints_under_load_are_as_soft_as_it_allows(load_factor: float) -> None:
-    """Under load k is such that speed and mean weight stretch joints by 1e-3; in between softness follows log λ."""
-    frequency, links = 15.0, 60
-    settings = {"links": links, "frequency": frequency, "start": "spinning", "load_factor": load_factor}
-    setup = setup_walk("soft", settings | {"method": "explicit"}, None)
-    batch = Batch(1, links, setup.options)
-    run = WalkRun(batch, 0, setup)
-    radius = PAPER.sprocket_radius + PAPER.circle_radius
-    density = (PAPER.inner_mass + PAPER.outer_mass) / 2 / PAPER.link_length
-    tension = density * (2 * np.pi * frequency * radius) ** 2
-    side = links * PAPER.link_length / 2 - np.pi * radius
-    weight = load_factor * density * PAPER.gravity * side / 2  # in the middle of a side
-
-    def softness_of(wanted: float) -> float:
-        return 1 + np.log10(1e7 / np.clip(wanted / PAPER.link_length, 1e6, 1e7))
-
-    free, loaded = softness_of(tension / 3e-4), softness_of((tension + weight) / 1e-3)
-    assert free != loaded
-    seen = set()
-    while run.phase != Phase.WALK:
-        batch.launch([0], run.features, 500)
-        load, softness = batch.state.load_factor.numpy()[0], batch.state.softness.numpy()[0]
-        expected = free + (loaded - free) * np.log(load) / np.log(load_factor)
-        if batch.time(0) > 1.5e-3:
-            assert softness == pytest.approx(expected, abs=1e-9)
-            seen.add(load)
-        if batch.status(0) != Status.RUNNING:
-            assert run.next_phase()
-            break
-    assert {1.0, load_factor} < seen
-
-
-def test_a_drive_on_softer_joints_ends_as_one_on_stiff_joints() -> None:
-    """Released after a drive on softer joints, a loop has the same shape and speed as after one on its own joints."""
-    settings = {"links": 36, "frequency": 15.0, "method": "dp5", "tolerance": 1e-4, "settle_time": 0.2}
-    settings |= {"spin_up_time": 0.5, "steady_time": 0.2, "walk_limit": 1e-3, "frame_interval": 1e-3}
-    stiff, soft = (warpchain.walk(**settings, preset="paper", soften_drive=on) for on in (False, True))
-    assert soft.steps_accepted < 0.15 * stiff.steps_accepted
-    assert soft.simulated_time == pytest.approx(stiff.simulated_time, abs=0.01)
-    assert soft.kinetic_energy[0] == pytest.approx(stiff.kinetic_energy[0], rel=5e-3)
-    for axis in (0, 1):
-        extents = [np.ptp(walk.frame_joints[0, :, axis]) for walk in (stiff, soft)]
-        assert extents[1] == pytest.approx(extents[0], rel=0.01)
-    assert soft.greatest_penetration["sprocket"] < 1e-3
-
-
-def energy_before_release(**settings: float) -> tuple[float, int]:
-    """Mean kinetic energy [J] while the last two links come up to the sprocket, and steps tried before the release."""
-    setup = setup_walk(
-        "soft", {"links": 120, "frequency": 5.0, "start": "spinning", "method": "explicit"} | settings, None
-    )
-    batch = Batch(1, 120, setup.options, keeps_samples=True)
-    run = WalkRun(batch, 0, setup)
-    samples: list[np.ndarray] = []
-    while run.phase != Phase.WALK:
-        batch.run([0], run.features, lambda: samples.append(batch.drain_samples(0)))
-        assert run.next_phase()
-    drive = np.concatenate(samples)
-    passage = 2 * PAPER.link_length / drive[-1, layout.LOOP_SPEED]
-    last = drive[:, layout.TIME] > drive[-1, layout.TIME] - passage
-    return float(drive[last, layout.KINETIC].mean()), run.drive_counts["accepted"]
-
-
-def test_a_long_slow_loop_has_the_energy_that_shorter_steps_give_it() -> None:
-    """At 5 Hz 120 links leave the sprocket as from steps that are short throughout, in half as many.
-
-    Joints that sink into the sprocket slow the loop down: with long steps to the end it had 0.2 % less energy.
-    """
-    energy, steps = energy_before_release()
-    short_energy, short_steps = energy_before_release(soft_contact_step=2e-5)
-    assert energy == pytest.approx(short_energy, rel=7e-4)
-    assert steps < 0.6 * short_steps
-
-
-def test_a_soft_drive_alone_never_softens_the_pile() -> None:
-    """Without soften_pile the joints keep their own values to the end, however small the loop's area gets."""
-    walk = short_walk(start="spinning", links=36, frequency=5.0, soften_drive=True, frame_interval=None)
-    assert walk.status == Status.AT_REST
-    assert np.isnan(walk.softened_at)
-    assert abs(walk.energy["residual"]) < 1e-4 * walk.energy["kinetic_at_release"]
-    assert walk.energy["softening"] < 0
-
-
-def test_a_whole_walk_from_soft_joints() -> None:
-    """Softened on the sprocket and in the pile, a walk ends at rest where it should, and its ledger closes."""
-    walk = warpchain.walk(
-        method="reference", start="spinning", soften_drive=True, soften_pile=True, soften_area=0.7, frame_interval=None
-    )
-    assert walk.status == Status.AT_REST
-    assert 0.5 < walk.dx < 0.8
-    assert 0.3 < walk.softened_at < walk.walk_time
-    at_release = walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"]
-    assert abs(walk.energy["residual"]) < 1e-5 * at_release
-
-
-# --- launches ---
-
-
-def test_cuts_into_launches_do_not_change_a_softened_walk(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A walk softened on sprocket and in the pile is the same to the bit in launches of 20000 and of 777 attempts."""
-    setup = setup_walk(
-        "paper", SPINNING | {"method": "dp5", "soften_drive": True, "soften_pile": True, "soften_area": 0.3}, None
-    )
-    seen = []
-    for attempts in (20_000, 777):
-        monkeypatch.setitem(scheduler.ATTEMPTS, "cpu", attempts)
-        ((_, run),) = scheduler.run_setups([setup])
-        outcome = run.outcome()
-        seen.append(outcome | {"sprocket_center": outcome["sprocket_center"].tolist(), "drive_time": run.drive_time})
-    assert seen[0] == seen[1]
-    assert seen[0]["softened_at"] > 0
 
 
 # --- refusals ---

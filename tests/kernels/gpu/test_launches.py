@@ -1,4 +1,4 @@
-"""What a chain gives in the block form depends neither on how its run is cut into launches nor on its threads' order.
+"""The results of a GPU kernel depend neither on how a run is cut into launches nor on the order of threads.
 
 Fibers take their turns in the order of their numbers, from barrier to barrier, so that what the first notes for all is
 there for the others even where a barrier is missing. With the links given to them the other way round it is not.
@@ -15,7 +15,7 @@ import pytest
 import warp as wp
 from numpy.typing import NDArray
 
-from tests.support.blocks_under_test import FIXED_STEP, SOFT, batch_of, fibers, heap, listed_pairs
+from tests.support.blocks_under_test import FIXED_STEP, SOFT, batch_of, heap, launch_kernel, listed_pairs
 from warpchain.engine.batch import Batch
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
@@ -41,17 +41,6 @@ def piles(method: str) -> Batch:
     return batch
 
 
-def launch(batch: Batch, kernel: wp.Kernel, worlds: list[int], attempts: int) -> None:
-    """Carry worlds on in the block form."""
-    batch.control.attempts = attempts
-    inputs = [
-        wp.array(worlds, dtype=wp.int32, device="cpu"),
-        *(batch.model, batch.drive, batch.state, batch.record, batch.scratch, batch.lists, batch.control),
-    ]
-    with fibers():
-        wp.launch_tiled(kernel, dim=[len(worlds)], inputs=inputs, block_dim=LINKS, device="cpu")
-
-
 def everything(batch: Batch, world: int) -> dict[str, NDArray[np.generic]]:
     """All that is kept of a world: its state, what its board leaves, its list and its time series."""
     found = {name: getattr(batch.state, name).numpy()[world].copy() for name in State.vars}
@@ -73,7 +62,7 @@ def run(
     batch = piles(method)
     kernel = factory(features_of(batch), LINKS)
     while batch.status(0) == Status.RUNNING or batch.status(1) == Status.RUNNING:
-        launch(batch, kernel, [0, 1], attempts)
+        launch_kernel(batch, kernel, [0, 1], attempts, block_dim=LINKS)
     return [everything(batch, world) for world in (0, 1)]
 
 
@@ -97,13 +86,13 @@ def test_cuts_change_no_number(method: str) -> None:
     for attempts in (1, 7):
         assert_same(run(method, make_advance_block, attempts), whole)
     alone = piles(method)
-    launch(alone, make_advance_block(features_of(alone), LINKS), [1], 10**6)
+    launch_kernel(alone, make_advance_block(features_of(alone), LINKS), [1], 10**6, block_dim=LINKS)
     assert_same([everything(alone, 1)], whole[1:])
 
 
 @pytest.fixture
 def reversed_factory(tmp_path: Path) -> Iterator[Callable[[Features, int], wp.Kernel]]:
-    """The block form whose last link belongs to the first thread."""
+    """The GPU kernel with the last link in the first thread."""
     source = Path(loop.__file__).read_text(encoding="utf-8")
     numbered = "        block, lane = wp.tid()\n"
     assert source.count(numbered) == 1
@@ -123,5 +112,5 @@ def reversed_factory(tmp_path: Path) -> Iterator[Callable[[Features, int], wp.Ke
 def test_the_order_of_threads_changes_no_number(
     method: str, reversed_factory: Callable[[Features, int], wp.Kernel]
 ) -> None:
-    """No thread reads what another notes for it before a barrier has passed."""
+    """No thread reads what another writes for it before a barrier has passed."""
     assert_same(run(method, reversed_factory, 25), run(method, make_advance_block, 25))

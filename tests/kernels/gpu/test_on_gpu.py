@@ -17,7 +17,6 @@ import yaml
 from tests.kernels.methods.test_flight import FLIGHTS, exact_flight, greatest
 from tests.run.test_sweep_run import brief_setup, data_of, outcomes
 from tests.support.blocks_under_test import FIXED_STEP, SOFT, heap
-from tests.support.bouncing_chains import PAPER, bouncing, falling
 from warpchain import simulate, sweep, walk
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
@@ -100,24 +99,6 @@ def test_a_walk_gives_the_same_bits_in_any_block(method: str) -> None:
     """In the block of its own size, or in one that it shares with the longest chain, see `shared_threads`."""
     setups = [brief_setup(links, links=links, device="cuda", method=method) for links in (30, 60, 90, 120, 150, 180)]
     assert outcomes(setups, threads=192) == outcomes(setups)
-
-
-@pytest.mark.usefixtures("cpu")
-def test_flights_and_landings_agree_with_the_cpu() -> None:
-    """Chains that fly on rigid joints, land, bounce on their springs and fly again, to 1e-6."""
-    batches = []
-    for device in ("cuda", "cpu"):
-        batch, features = bouncing([falling(12, PAPER, 0.3), falling(60, PAPER, 0.6)], device=device)
-        batch.launch(range(2), features, 240)
-        batches.append(batch)
-    ours, theirs = batches
-    for world in range(2):
-        assert theirs.losses(world)["joint_switch"] != 0.0
-        assert ours.counts(world) == theirs.counts(world)
-        assert np.abs(ours.position(world) - theirs.position(world)).max() < 1e-6
-        assert np.abs(ours.velocity(world) - theirs.velocity(world)).max() < 1e-6 * np.abs(theirs.velocity(world)).max()
-        for name, loss in theirs.losses(world).items():
-            assert ours.losses(world)[name] == pytest.approx(loss, rel=1e-5, abs=1e-12)
 
 
 def test_memory_that_holds_few_chains_only_takes_longer(monkeypatch: pytest.MonkeyPatch) -> None:

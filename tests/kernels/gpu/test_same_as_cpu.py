@@ -1,8 +1,8 @@
-"""The block form equals the CPU form.
+"""GPU kernels equal CPU kernels.
 
-It runs on CPU fibers here. Both forms are compiled without fusing products and sums, which compilers do here and there;
-what remains are the same operations on the same numbers, so that steps of the same size must agree to the bit, contacts
-that were resolved in parallel rounds included.
+They run on CPU fibers here. Both are compiled without fused products and sums, which compilers choose differently. Then
+both do the same operations on the same numbers, so that steps of the same size must agree to the bit, including
+contacts resolved in parallel rounds.
 """
 
 import itertools
@@ -18,6 +18,7 @@ from tests.support.blocks_under_test import (
     FIXED_STEP,
     SOFT,
     batch_of,
+    exact_kernels,
     features_of,
     heap,
     launch_blocks,
@@ -28,30 +29,21 @@ from warpchain.engine.batch import Batch
 from warpchain.engine.kernel_choice import block_kernel
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
-from warpchain.kernels.cpu import loop as cpu_loop
-from warpchain.kernels.cpu.loop import make_advance
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu import functions
-from warpchain.kernels.gpu import loop as gpu_loop
 from warpchain.kernels.gpu.loop import make_advance_block
 from warpchain.status import Status
 
 LINKS = 12
 SINGLE = 1e-6
-"""Relative; what the block form compares in single precision."""
+"""Relative error of what GPU kernels compare in single precision."""
 
 
 @pytest.fixture(scope="module", autouse=True)
-def exact_kernels() -> Iterator[None]:
-    """Kernels without fused operations."""
-    with pytest.MonkeyPatch.context() as patch:
-        for module in (cpu_loop, gpu_loop):
-            patch.setattr(module, "COMPILER_FLAGS", "-ffp-contract=off")
-        for factory in (make_advance, make_advance_block):
-            factory.cache_clear()
+def without_fused_operations() -> Iterator[None]:
+    """All kernels here are exact."""
+    with exact_kernels():
         yield
-    for factory in (make_advance, make_advance_block):
-        factory.cache_clear()
 
 
 def assert_same(ours: Batch, theirs: Batch) -> None:
@@ -72,7 +64,7 @@ def assert_same(ours: Batch, theirs: Batch) -> None:
         ("os32", "sprocket", True, LINKS),
     ],
 )
-def test_fixed_steps_equal_the_cpu_form(method: str, fixed_body: str, self_contact: bool, block_dim: int) -> None:
+def test_fixed_steps_equal_a_cpu_kernel(method: str, fixed_body: str, self_contact: bool, block_dim: int) -> None:
     """Forty steps with dozens of impulses of every kind end in the same state, to the bit.
 
     Threads are too few for a contact each, or enough for both halves of the sequence at once.
@@ -91,8 +83,8 @@ def test_fixed_steps_equal_the_cpu_form(method: str, fixed_body: str, self_conta
 
 
 @pytest.mark.parametrize("block_dim", [LINKS, 224])
-def test_chains_too_long_for_shared_memory_equal_the_cpu_form(block_dim: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Long chains keep their board in the scratch block, with the same result, even with more threads than columns."""
+def test_chains_too_long_for_shared_memory_equal_a_cpu_kernel(block_dim: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Long chains keep their board in the scratch, with the same result, even with more threads than columns."""
     monkeypatch.setattr(functions, "LARGEST_SHARED_BLOCK", LINKS - 1)
     make_advance_block.cache_clear()
     ours, theirs = (batch_of([heap(LINKS)], method="bs32") for _ in range(2))
@@ -105,7 +97,7 @@ def test_chains_too_long_for_shared_memory_equal_the_cpu_form(block_dim: int, mo
     assert_same(ours, theirs)
 
 
-def test_free_flight_equals_the_cpu_form() -> None:
+def test_free_flight_equals_a_cpu_kernel() -> None:
     """Adaptive steps of a chain that touches nothing: the same number of attempts, the same flight to the tolerance."""
     position, velocity = lay_chain(ellipse(1.5), LINKS, SOFT.link_length, 2.0, 0.1)
     velocity[:, 2] += np.random.default_rng(1).normal(size=LINKS)
@@ -162,8 +154,8 @@ def run_length(batch: Batch) -> int:
     return int(batch.record.sample_count.numpy()[1])
 
 
-def test_samples_frames_and_rest_equal_the_cpu_form() -> None:
-    """Time series, frames, loads, first and last look are those of the CPU form; rest is seen at the same sample."""
+def test_samples_frames_and_rest_equal_a_cpu_kernel() -> None:
+    """Time series, frames, loads, first and last sample are the CPU kernel's; rest is seen at the same one."""
     ours, theirs = bounded_heaps(2), bounded_heaps(2)
     for batch in (ours, theirs):
         batch.control.rest_speed, batch.control.rest_time = 100.0, 20 * FIXED_STEP

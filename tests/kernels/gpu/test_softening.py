@@ -1,4 +1,4 @@
-"""The block form softens, stiffens and loads a chain in the same steps, and to the same bits, as the CPU form does."""
+"""GPU kernels soften, stiffen and load a chain in the same steps, and to the same bits, as CPU kernels."""
 
 import dataclasses
 from collections.abc import Iterator
@@ -8,18 +8,14 @@ import pytest
 import warp as wp
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tests.support.blocks_under_test import FIXED_STEP, batch_of, heap, launch_blocks, launch_chains
+from tests.support.blocks_under_test import FIXED_STEP, batch_of, exact_kernels, heap, launch_blocks, launch_chains
 from warpchain.engine.batch import Batch
 from warpchain.engine.control import SOFT
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
-from warpchain.kernels.cpu import loop as cpu_loop
-from warpchain.kernels.cpu.loop import make_advance
 from warpchain.kernels.events import release
 from warpchain.kernels.events.sample import sampling
 from warpchain.kernels.features import Features
-from warpchain.kernels.gpu import loop as gpu_loop
-from warpchain.kernels.gpu.loop import make_advance_block
 from warpchain.kernels.gpu.sample import block_sample
 from warpchain.status import Status
 
@@ -27,15 +23,10 @@ LINKS = 12
 
 
 @pytest.fixture
-def exact_kernels(monkeypatch: pytest.MonkeyPatch):
-    """Kernels without fused operations, in which the block form and the CPU form do the same operations."""
-    for module in (cpu_loop, gpu_loop):
-        monkeypatch.setattr(module, "COMPILER_FLAGS", "-ffp-contract=off")
-    for factory in (make_advance, make_advance_block):
-        factory.cache_clear()
-    yield
-    for factory in (make_advance, make_advance_block):
-        factory.cache_clear()
+def without_fused_operations() -> Iterator[None]:
+    """All kernels of a test are exact."""
+    with exact_kernels():
+        yield
 
 
 def soften_much(batch: Batch) -> Batch:
@@ -48,7 +39,7 @@ def soften_much(batch: Batch) -> Batch:
 
 
 def heaps(area: float) -> Batch:
-    """Heaps on the floor that soften below a fraction of their first area, in fixed steps, looked at often."""
+    """Heaps on the floor that soften below a fraction of their first area, in fixed steps with frequent samples."""
     batch = batch_of([heap(LINKS, 5, tilt=2.0), heap(LINKS, 10, tilt=2.0)], method="dp5", keeps=True)
     batch.control.sample_interval = 5 * FIXED_STEP
     batch.control.soften_area = area
@@ -71,7 +62,7 @@ UNLOADED = 90 * FIXED_STEP  # s when they begin to
 
 
 @pytest.fixture
-def quick_unloading(monkeypatch: pytest.MonkeyPatch, exact_kernels: None) -> Iterator[None]:
+def quick_unloading(monkeypatch: pytest.MonkeyPatch, without_fused_operations: None) -> Iterator[None]:
     """Loads that fall in twenty steps, in kernels made anew."""
     monkeypatch.setattr(release, "LOADING_TIME", wp.constant(wp.float64(LOAD_FALLS)))
     for cached in (sampling, block_sample):
@@ -116,7 +107,7 @@ def softening_features(batch: Batch, fixed_body: str, watch: str) -> Features:
 
 
 def launch_both(ours: Batch, theirs: Batch, features: Features, cut: int, attempts: int = 60) -> None:
-    """So many attempts or a few more: in blocks, a part of them to a launch, and in the CPU form, all at once."""
+    """Make so many attempts or a few more: ``cut`` to a launch in the GPU kernel, all at once in the CPU kernel."""
     launches = -(-attempts // cut)
     for _ in range(launches):
         launch_blocks(ours, features, cut, block_dim=LINKS)
@@ -125,8 +116,10 @@ def launch_both(ours: Batch, theirs: Batch, features: Features, cut: int, attemp
 
 @pytest.mark.parametrize("cut", [60, 7])
 @pytest.mark.parametrize(("area", "softness"), [(0.9975, 1.0), (1.995, 2.0)])
-def test_blocks_soften_a_pile_as_the_cpu_form_does(area: float, softness: float, cut: int, exact_kernels: None) -> None:
-    """The block form softens at the same looks, frees the same energy, and goes on to the same bits, however cut."""
+def test_a_gpu_kernel_softens_a_pile_as_a_cpu_kernel_does(
+    area: float, softness: float, cut: int, without_fused_operations: None
+) -> None:
+    """The GPU kernel softens at the same samples, frees the same energy, and ends in the same bits, however cut."""
     ours, theirs = heaps(area), heaps(area)
     features = softening_features(ours, "floor", "rest")
     launch_both(ours, theirs, features, cut)
@@ -138,8 +131,8 @@ def test_blocks_soften_a_pile_as_the_cpu_form_does(area: float, softness: float,
 
 
 @pytest.mark.parametrize("cut", [60, 7])
-def test_blocks_stiffen_as_the_cpu_form_does(cut: int, exact_kernels: None) -> None:
-    """The block form gives the joints their values back in the same steps, however cut into launches."""
+def test_a_gpu_kernel_stiffens_as_a_cpu_kernel_does(cut: int, without_fused_operations: None) -> None:
+    """The GPU kernel returns joints to their own values in the same steps, however cut into launches."""
     ours, theirs = released(), released()
     features = softening_features(ours, "floor", "rest")
     launch_both(ours, theirs, features, cut)
@@ -149,8 +142,8 @@ def test_blocks_stiffen_as_the_cpu_form_does(cut: int, exact_kernels: None) -> N
 
 
 @pytest.mark.parametrize("cut", [80, 7])
-def test_blocks_drive_under_load_as_the_cpu_form_does(cut: int, quick_unloading: None) -> None:
-    """In the block form loads and softness change in the same steps of the drive, however cut: on, falling, off."""
+def test_a_gpu_kernel_drives_under_load_as_a_cpu_kernel_does(cut: int, quick_unloading: None) -> None:
+    """In the GPU kernel loads and softness change in the same steps of the drive, however cut: on, falling, off."""
     ours, theirs = driven(), driven()
     features = softening_features(ours, "sprocket", "steady")
     launch_both(ours, theirs, features, cut, attempts=80)
@@ -163,16 +156,16 @@ def test_blocks_drive_under_load_as_the_cpu_form_does(cut: int, quick_unloading:
     assert_same_bits(ours, theirs)
 
 
-@pytest.mark.parametrize("form", ["block", "cpu"])
-def test_loads_are_on_then_fall_then_are_off(form: str, quick_unloading: None) -> None:
-    """A look after the other they are 1, 15, powers of it that fall with time, and 1 for good; softness follows."""
+@pytest.mark.parametrize("device", ["gpu", "cpu"])
+def test_loads_are_on_then_fall_then_are_off(device: str, quick_unloading: None) -> None:
+    """From sample to sample they are 1, 15, powers of it that fall with time, and 1 for good; softness follows."""
     batch = driven()
     features = softening_features(batch, "sprocket", "steady")
     seen = []
     for _ in range(80):
-        advance(batch, form, features, 1)
-        look = batch.last_sample(0)[layout.TIME]
-        seen.append((look / FIXED_STEP, batch.state.load_factor.numpy()[0], batch.state.softness.numpy()[0]))
+        advance(batch, device, features, 1)
+        time = batch.last_sample(0)[layout.TIME]
+        seen.append((time / FIXED_STEP, batch.state.load_factor.numpy()[0], batch.state.softness.numpy()[0]))
     fell = False
     for steps, load, softness in seen:
         expected = 15.0 ** np.clip(1 - (steps - 90) / 20, 0, 1) if steps >= 70 - 1e-6 else 1.0
@@ -183,29 +176,29 @@ def test_loads_are_on_then_fall_then_are_off(form: str, quick_unloading: None) -
     assert fell and {1.0, 15.0} <= {load for _, load, _ in seen}
 
 
-def advance(batch: Batch, form: str, features: Features, attempts: int) -> None:
-    """Carry a batch on in the block form or in the CPU form."""
-    if form == "block":
+def advance(batch: Batch, device: str, features: Features, attempts: int) -> None:
+    """Carry a batch on in a GPU or a CPU kernel."""
+    if device == "gpu":
         launch_blocks(batch, features, attempts, block_dim=LINKS)
     else:
         launch_chains(batch, features, attempts)
 
 
-@pytest.mark.parametrize("form", ["block", "cpu"])
+@pytest.mark.parametrize("device", ["gpu", "cpu"])
 @pytest.mark.parametrize("made", ["heap", "ring"])
-def test_soft_tolerance_is_that_of_soft_joints_only(made: str, form: str) -> None:
+def test_soft_tolerance_is_that_of_soft_joints_only(made: str, device: str) -> None:
     """A soft tolerance that no step meets refuses every step of joints at softness 1, and none of stiffer ones."""
     batch = heaps(0.9975) if made == "heap" else released()
     features = softening_features(batch, "floor", "rest")
     if made == "ring":
-        advance(batch, form, features, 8)  # until it has begun to stiffen
+        advance(batch, device, features, 8)  # until it has begun to stiffen
     batch.control.soft_tolerance = 1e-13
     refused_before = [0] * len(batch.links)
     seen = set()
     for _ in range(60):
-        advance(batch, form, features, 1)
+        advance(batch, device, features, 1)
         refused = [batch.counts(world)["rejected"] for world in range(len(batch.links))]
-        softness = batch.state.softness.numpy().tolist()  # a look that changes it comes before the try
+        softness = batch.state.softness.numpy().tolist()  # a sample that changes it comes before the attempt
         assert np.subtract(refused, refused_before).tolist() == [soft >= 1.0 for soft in softness]
         seen.update(soft >= 1.0 for soft in softness)
         refused_before = refused

@@ -1,4 +1,4 @@
-"""What threads of a block find out together, on CPU fibers."""
+"""Maxima over the threads of a block, and what the scratch keeps of a board; on CPU fibers."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from warpchain.kernels.physics.elementary import order_bits_single
 
 DEVICE = start_device("cpu")
 THREADS = 24
-GREATEST, NOTE, NOTED = block_maxima(THREADS)
+GREATEST, WRITE_MAXIMA, READ_MAXIMA = block_maxima(THREADS)
 ADDRESS = tile_address(vec4i, THREADS)
 
 
@@ -46,9 +46,9 @@ def greatest_of_four(numbers: wp.array(dtype=vec4i), found: wp.array(dtype=vec4i
     _block, lane = wp.tid()
     tile = wp.tile_empty(shape=(wp.static(THREADS),), dtype=vec4i, storage="shared")
     memory = ADDRESS(tile)
-    NOTE(memory, lane, numbers[lane])
+    WRITE_MAXIMA(memory, lane, numbers[lane])
     barrier()
-    found[lane] = NOTED(memory)
+    found[lane] = READ_MAXIMA(memory)
 
 
 def test_all_threads_find_the_greatest_of_each_of_four() -> None:
@@ -64,7 +64,7 @@ def test_all_threads_find_the_greatest_of_each_of_four() -> None:
 
 @pytest.mark.parametrize(("threads", "links"), [(32, 8), (64, 60), (192, 180), (1024, 1000)])
 def test_scratch_holds_what_a_board_leaves_there(threads: int, links: int) -> None:
-    """Between launches a scratch block holds what a shared board cannot keep, or all of a board not shared."""
+    """Between launches the scratch holds what a shared board cannot keep, or all of a board not shared."""
     columns = layout.padded_width(links)
     rows = board_rows(threads, columns)
     if shares_board(threads):

@@ -1,0 +1,295 @@
+"""When a loop on its sprocket counts as stationary: the release rule, fed with made-up samples."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+import warp as wp
+from numpy.typing import NDArray
+
+from warpchain import Status, preset
+from warpchain.engine.batch import Batch
+from warpchain.engine.devices import start_device
+from warpchain.inputs.options import Options
+from warpchain.kernels.events.release import (
+    LEAST_LOAD,
+    LITTLE_SLIP,
+    LOADING_TIME,
+    MOST_CROSSINGS,
+    MOST_SLIP,
+    SHORTEST_WINDOW,
+    load_at,
+    watch_steadiness,
+)
+from warpchain.kernels.events.summary import Summary
+from warpchain.kernels.physics.scaled_loads import under_load
+from warpchain.kernels.types import Drive, Model, State, read_chain
+
+Array = NDArray[np.float64]
+
+SOFT = preset("soft")
+CPU = start_device("cpu")
+STEP = 1 / 1024  # s between two samples; sums of it are exact
+HEIGHT, WIDTH, SPEED = 0.5, 0.125, 5.0
+USUAL = {"height": HEIGHT, "width": WIDTH, "x": 0.01, "y": -0.2, "speed": SPEED}
+SIZES = [("height", HEIGHT), ("width", WIDTH), ("x", WIDTH), ("y", HEIGHT)]
+"""What is watched of a loop's shape, and what its changes are relative to."""
+FALL = float(LOADING_TIME)
+
+
+@wp.kernel(module="unique", enable_backward=False)
+def _watch(
+    model: Model,
+    drive: Drive,
+    state: State,
+    samples: wp.array2d(dtype=wp.float64),
+    loads: wp.array(dtype=wp.float64),
+):
+    """Feeds one made-up sample after the other to the release rule, as `events.sample` does."""
+    for i in range(samples.shape[0]):
+        time = samples[i, 0]
+        summary = Summary()
+        summary.height = samples[i, 1]
+        summary.width = samples[i, 2]
+        summary.center_x = samples[i, 3]
+        summary.center_y = samples[i, 4]
+        summary.loop_speed = samples[i, 5]
+        chain = under_load(read_chain(model, 0), state.load_factor[0])
+        watch_steadiness(chain, state, drive, 0, time, summary)
+        state.load_factor[0] = load_at(state, drive, 0, time)
+        loads[i] = state.load_factor[0]
+
+
+@dataclass
+class Watched:
+    """A loop that is sampled every STEP, and the world that watches it.
+
+    Attributes:
+        duration: Of all samples [s].
+        drive: Fields of the world's drive that are not the usual ones.
+        loads: Factor of the loads after each sample.
+    """
+
+    duration: float = 4.0
+    drive: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Make a world whose loop is held from 0.5 s on."""
+        self.batch = Batch(1, 4, Options())
+        self.batch.set_chain(0, SOFT, 4)
+        self.batch.load(0, np.zeros((4, 3)), np.zeros((4, 3)), stop_time=30.0, stop_status=Status.NOT_STEADY)
+        drive = {"hold_start": 0.5, "loop_speed": SPEED, "loop_period": 0.25, "load_factor": 16.0}
+        drive |= {"steady_window": 0.125, "steady_time": -1.0, "steady_tolerance": 0.01}
+        self.batch.set_drive(0, **drive | self.drive)
+        self.time = STEP * np.arange(round(self.duration / STEP) + 1)
+        self.loads = np.full(len(self.time), np.nan)
+
+    def sample(self, first: float = 0.0, last: float = math.inf, **seen: Any) -> "Watched":
+        """Samples from one time to before another of a loop that is as usual, except for the quantities given."""
+        of = (first - STEP / 2 < self.time) & (self.time < last - STEP / 2)
+        time = self.time[of]
+        rows = np.stack([time, *(np.broadcast_to(value, time.shape) for value in (USUAL | seen).values())], axis=1)
+        loads = wp.full(len(rows), np.nan, dtype=wp.float64, device=CPU)
+        samples = wp.array(rows, dtype=wp.float64, device=CPU)
+        inputs = [self.batch.model, self.batch.drive, self.batch.state, samples, loads]
+        wp.launch(_watch, dim=1, inputs=inputs, device=CPU)
+        self.loads[of] = loads.numpy()
+        return self
+
+    @property
+    def release(self) -> float:
+        """Moment [s] of the release; NaN if none is set."""
+        is_set = self.batch.state.stop_status.numpy()[0] == Status.FINISHED
+        return float(self.batch.state.stop_time.numpy()[0]) if is_set else math.nan
+
+    @property
+    def drift(self) -> float:
+        """DRIFT of the watch."""
+        return self.batch.drift(0)
+
+
+def crossing(load: float, gravity: float = SOFT.gravity) -> float:
+    """2 ∫ dy / (√(v² + λ g (y + ρ/2)) − v) up to HEIGHT by Gauss and Legendre."""
+    nodes, weights = np.polynomial.legendre.leggauss(100)
+    pull = load * gravity * (HEIGHT / 2 * (nodes + 1) + SOFT.sprocket_radius / 2)
+    return HEIGHT * float(weights @ ((np.sqrt(SPEED**2 + pull) + SPEED) / pull))
+
+
+def first_sample(moment: float) -> float:
+    """Time of the first sample at a moment or after it."""
+    return math.ceil(moment / STEP - 1e-9) * STEP
+
+
+def end_of_watch(start: float, window: float, wanted: float, since: float | None = None) -> float:
+    """When the first window ends that is not before a time wanted.
+
+    Args:
+        start: Of the first window.
+        window: Length of each.
+        wanted: The time for which the shape must be kept.
+        since: From when on it is counted; None: from the end of the first window.
+    """
+    length = first_sample(window)
+    if since is None:
+        since = start + length
+        start = since
+    return start + max(1, math.ceil((wanted + since - start) / length - 1e-9)) * length
+
+
+def fall_of(load: float, start: float = 0.5) -> float:
+    """When the loads of a loop that keeps its shape begin to fall."""
+    return end_of_watch(start, max(float(SHORTEST_WINDOW), crossing(load) / 2), crossing(load))
+
+
+def test_a_loop_that_keeps_its_shape_is_released_in_time() -> None:
+    """Held for a window and a crossing under load, let down, watched for a period; then further_hold and the phase."""
+    watched = Watched(drive={"further_hold": 0.75, "release_phase": 0.5}).sample()
+    time, loads = watched.time, watched.loads
+    fall = fall_of(16.0)
+    assert np.all(loads[time < 0.5] == 1.0)
+    assert np.all(loads[(time >= 0.5) & (time < fall)] == 16.0)
+    falling = (time >= fall) & (time < fall + FALL)
+    assert loads[falling] == pytest.approx(16.0 ** (1 - (time[falling] - fall) / FALL), rel=1e-9)
+    assert np.all(loads[time >= fall + FALL] == 1.0)
+    watch = first_sample(fall + FALL) + STEP  # the sample that makes it free is the last under load
+    end = end_of_watch(watch, 0.125, 0.25, since=fall + FALL)
+    assert watched.release == pytest.approx(end + 0.75 + 0.5 * 0.25, abs=1e-12)
+    assert watched.drift == pytest.approx(0, abs=1e-12)
+
+
+def test_steady_time_sets_how_long_a_free_loop_is_watched() -> None:
+    """With a steady_time of 1 s instead of a period's 0.25 s the release is 0.75 s later; 0 takes one window."""
+    by_itself, second, none = (
+        Watched(drive={"steady_time": steady_time}).sample().release for steady_time in (-1.0, 1.0, 0.0)
+    )
+    assert second - by_itself == 0.75
+    assert by_itself - none == 0.125
+
+
+def test_own_loads_are_watched_for_as_long_as_slow_waves_need() -> None:
+    """With a factor of 1 there is one watch, of 6 s in this loop; a steady_time that is given overrides that."""
+    watched = Watched(duration=8.0, drive={"load_factor": 1.0}).sample()
+    assert np.all(watched.loads == 1.0)
+    assert 6.0 < crossing(1.0) < 6.2
+    assert watched.release == end_of_watch(0.5, 0.125, crossing(1.0))
+    given = Watched(drive={"load_factor": 1.0, "steady_time": 0.5}).sample()
+    assert given.release == end_of_watch(0.5, 0.125, 0.5)
+
+
+@pytest.mark.parametrize("load_factor", [16.0, 1.0])
+@pytest.mark.parametrize(("name", "size"), SIZES)
+def test_a_loop_that_drifts_is_not_released(name: str, size: float, load_factor: float) -> None:
+    """A drift by 3 % in a crossing is never let pass, one by 0.1 % is."""
+    for part, is_released in ((0.03, False), (0.001, True)):
+        watched = Watched(duration=10.0, drive={"load_factor": load_factor})
+        rate = part * size / crossing(load_factor)
+        watched.sample(**{name: USUAL[name] + rate * (watched.time - 5.0)})
+        assert math.isfinite(watched.release) == is_released, part
+
+
+def test_a_loop_that_does_not_become_stationary_is_held_under_less() -> None:
+    """A width that never stops growing under load is given up after some crossings, for the root of the load."""
+    watched = Watched(duration=0.5 + 0.5 + float(MOST_CROSSINGS) * (crossing(16.0) + crossing(4.0)))
+    watched.sample(width=WIDTH * (1 + 0.03 * (watched.time - 5.0) / crossing(16.0)))
+    change = watched.time[np.flatnonzero(np.diff(watched.loads))[1:] + 1]
+    assert sorted(set(watched.loads)) == [1.0, 4.0, 16.0]
+    given_up = 0.5 + float(MOST_CROSSINGS) * crossing(16.0)
+    assert given_up <= change[0] <= given_up + crossing(16.0) / 2 + 2 * STEP
+    given_up = change[0] + float(MOST_CROSSINGS) * crossing(4.0)
+    assert len(change) == 1 or given_up <= change[1] <= given_up + crossing(4.0) / 2 + 2 * STEP
+    assert math.isnan(watched.release)
+
+
+def test_ripples_shorter_than_a_window_do_not_matter() -> None:
+    """A width that ripples by a tenth as links pass is its mean: the loop is released when a smooth one is."""
+    watched = Watched()
+    ripple = WIDTH * (1 + 0.1 * np.sin(2 * np.pi * watched.time / 2.5e-3))
+    assert watched.sample(width=ripple).release == Watched().sample().release
+
+
+@pytest.mark.parametrize(("name", "size"), SIZES)
+def test_drift_is_the_band_of_means_relative_to_height_or_width(name: str, size: float) -> None:
+    """A step of half the tolerance when the loop becomes free is let pass, and told as what it is."""
+    watched = Watched()
+    moved = watched.time > fall_of(16.0) + 0.1
+    watched.sample(**{name: USUAL[name] + 0.005 * size * moved})
+    assert math.isfinite(watched.release)
+    assert watched.drift == pytest.approx(0.005, rel=0.006)
+
+
+def test_a_loop_that_leaves_its_shape_when_free_is_held_under_the_root() -> None:
+    """Whenever its loads have fallen its width jumps by 2 %: held under 16, then 4, then its own, and released."""
+    assert 2 < float(LEAST_LOAD) < 4
+    watched = Watched(duration=14.0)
+    width, held = WIDTH, []
+    before = 1.0
+    for place, moment in enumerate(watched.time):
+        watched.sample(moment, moment + STEP, width=width)
+        load = watched.loads[place]
+        if load > before:
+            held.append(load)
+        if load == 1.0 < before:
+            width *= 1.02
+        before = load
+        if math.isfinite(watched.release):
+            break
+    assert held == [16.0, 4.0]
+    free = watched.time[np.flatnonzero(watched.loads > 1)[-1]]
+    assert crossing(1.0) < watched.release - free < crossing(1.0) + 0.5
+    assert watched.release == moment
+
+
+@pytest.mark.parametrize("slip", [0.5, 0.9])
+def test_a_loop_that_slips_a_little_is_released_as_one_that_does_not(slip: float) -> None:
+    """Up to LITTLE_SLIP, some thousandths, nothing is different."""
+    slow = Watched().sample(speed=SPEED * (1 - slip * float(LITTLE_SLIP)))
+    assert slow.release == Watched().sample().release
+
+
+@pytest.mark.parametrize("slip", [1.1 * float(LITTLE_SLIP), 0.2])
+def test_a_free_loop_that_slips_more_is_watched_for_as_long_as_slow_waves_need(slip: float) -> None:
+    """Beyond LITTLE_SLIP it is not released after a period, but after a crossing under its own loads."""
+    watched = Watched(duration=10.0).sample(speed=SPEED * (1 - slip))
+    fall = fall_of(16.0)
+    watch = first_sample(fall + FALL) + STEP
+    assert watched.release == end_of_watch(watch, 0.125, crossing(1.0), since=fall + FALL)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_loop_that_slips_much_is_not_released(sign: int) -> None:
+    """Slower or faster than its sprocket by more than MOST_SLIP it is never stationary."""
+    for slip, is_released in ((float(MOST_SLIP) - 0.01, True), (float(MOST_SLIP) + 0.01, False)):
+        watched = Watched(duration=10.0).sample(speed=SPEED * (1 - sign * slip))
+        assert math.isfinite(watched.release) == is_released
+
+
+def test_a_loop_that_changes_its_speed_as_it_becomes_free_may() -> None:
+    """Loaded loops slip more: what is watched of the speed of a free loop is its own."""
+    watched = Watched()
+    watched.sample(speed=SPEED * (1 - 0.015 * (watched.time < fall_of(16.0) + 0.1)))
+    assert watched.release == Watched().sample().release
+
+
+def test_a_loop_whose_speed_varies_is_not_released() -> None:
+    """A speed that grows by 3 % in a crossing is not that of an even loop, though none of it is far off; 0.1 % is."""
+    for part, is_released in ((0.03, False), (0.001, True)):
+        watched = Watched(duration=3.0)
+        watched.sample(speed=SPEED * (1 + part * (watched.time - 1.5) / crossing(16.0)))
+        assert math.isfinite(watched.release) == is_released
+
+
+def test_a_standing_loop_is_released() -> None:
+    """On a sprocket that stands still the speed may be anything below 2 cm/s."""
+    drive = {"loop_speed": 0.0, "loop_period": 0.25}
+    assert math.isfinite(Watched(drive=drive).sample(speed=0.015).release)
+    assert math.isnan(Watched(drive=drive).sample(speed=0.025).release)
+
+
+def test_what_happens_before_the_hold_does_not_matter() -> None:
+    """However a loop swings while it spins up, the watch begins with the hold."""
+    watched = Watched()
+    early = watched.time < 0.5
+    shape = {"height": HEIGHT * (1 + 0.5 * early), "width": WIDTH * (1 - 0.5 * early), "speed": SPEED * (1 - early)}
+    assert watched.sample(**shape).release == Watched().sample().release
