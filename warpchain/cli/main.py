@@ -20,6 +20,7 @@ from warpchain.cli import completions
 from warpchain.cli.bench_commands import bench_app
 from warpchain.cli.input_commands import parameters, schema
 from warpchain.cli.sweep_commands import FAILED, add_commands
+from warpchain.cli.walk_commands import animate, setup_like
 from warpchain.inputs.methods import METHODS
 from warpchain.version import VERSION
 
@@ -49,15 +50,15 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except typer.TyperException as error:
         context = getattr(error, "ctx", None)
         command = context.command_path if context is not None else "warpchain"
-        _refuse(f"{error.format_message().rstrip('.')}; see {command} --help", error.exit_code)
+        _refuse([f"{error.format_message().rstrip('.')}; see {command} --help"], error.exit_code)
     except OSError as error:
-        _refuse(str(error))
+        _refuse([str(error)])
     except ValueError as error:
         from warpchain.inputs.validation import InputError
 
         if not isinstance(error, InputError):
             raise
-        _refuse(str(error))
+        _refuse(str(error).splitlines())
     except KeyboardInterrupt:
         status = INTERRUPTED
     if status == INTERRUPTED:
@@ -90,8 +91,10 @@ def _warnings_on_one_line() -> Iterator[None]:
         yield
 
 
-def _refuse(problem: str, status: int = REFUSED) -> NoReturn:
-    print("error:", " ".join(problem.split()), file=sys.stderr)
+def _refuse(problems: Sequence[str], status: int = REFUSED) -> NoReturn:
+    """Print each problem on a line of its own and exit."""
+    for problem in problems:
+        print("error:", " ".join(problem.split()), file=sys.stderr)
     sys.exit(status)
 
 
@@ -191,6 +194,14 @@ def walk(
             "line gives counts more.",
         ),
     ] = None,
+    like: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="WALK.h5",
+            help="Take setup and seed of a saved walk, which repeats it to the bit; other options change single "
+            "values, and nothing is drawn anew. Not with --config, --preset or --seed.",
+        ),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -219,7 +230,7 @@ def walk(
     """Let one chain walk: hang it on its sprocket, spin it up, drop it and follow it until it rests."""
     from warpchain.cli.terminal import print_walk, progress_text, status_line, try_folder, write_files
     from warpchain.inputs.distributions import LARGEST_SEED
-    from warpchain.inputs.validation import checked_whole
+    from warpchain.inputs.validation import InputError, checked_whole
     from warpchain.run.single_walk import run_walk
 
     named = {
@@ -231,8 +242,14 @@ def walk(
         "device": device,
     }
     given = _given_values({name: text for name, text in named.items() if text is not None}, assignments or [])
-    chosen_seed = None if seed is None else checked_whole(_parsed("seed", seed), "seed", 0, LARGEST_SEED)
-    setup = _setup(config, preset, given, chosen_seed)
+    if like is None:
+        chosen_seed = None if seed is None else checked_whole(_parsed("seed", seed), "seed", 0, LARGEST_SEED)
+        setup = _setup(config, preset, given, chosen_seed)
+    else:
+        for option, value in (("--config", config), ("--preset", preset), ("--seed", seed)):
+            if value is not None:
+                raise InputError(f"{option}: given together with --like, and a saved walk has its own; leave one out")
+        setup, chosen_seed = setup_like(like, given)
     interval = _frame_interval(output, animation, frame_interval)
     if output is not None:
         try_folder(output)
@@ -258,6 +275,7 @@ def walk(
 
 
 add_commands(app)
+app.command()(animate)
 app.command()(parameters)
 app.command()(schema)
 app.add_typer(bench_app, name="bench")

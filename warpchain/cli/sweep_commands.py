@@ -1,6 +1,7 @@
 """The commands of the command line that are about sweeps: sweep, info, plot, report, merge."""
 
 import contextlib
+import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from warpchain.cli import completions
+from warpchain.cli.walk_commands import plot_walk
 
 if TYPE_CHECKING:
     from warpchain.run.sweep_run import DaskClient, Executor
@@ -120,27 +122,44 @@ def info(directory: Folder, as_json: AsJson = False) -> None:
 
 
 def plot(
-    directory: Folder,
+    path: Annotated[
+        Path, typer.Argument(metavar="PATH", help="Folder of a sweep, or file of a saved walk.", show_default=False)
+    ],
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="DIR", help="Folder of the figures. Default: DIR."),
+        typer.Option("-o", "--output", metavar="DIR", help="Folder of the figures. Default: that of PATH."),
     ] = None,
     quantity: Annotated[
-        str, typer.Option(metavar="NAME", help="Column to draw: dx, walk_time, bounces, hold_time ...")
-    ] = "dx",
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Column of a sweep to draw: dx, walk_time, bounces, hold_time ... Default: dx."
+        ),
+    ] = None,
 ) -> None:
-    """Draw every figure that the sweep has something for: Figures 6 and 5, grids, tolerance, sensitivity, statuses."""
+    """Draw every figure that a sweep or a saved walk has something for.
+
+    Of a sweep: Figures 6 and 5, grids, tolerance, sensitivity, statuses. Of a walk: figure5.png, film_strip.png,
+    loop.png and energy.png; a line says what is left out and why.
+    """
+    from warpchain.inputs.validation import InputError
+
+    if os.path.isfile(path) or (path.suffix == ".h5" and not os.path.isdir(path)):
+        if quantity is not None:
+            raise InputError("--quantity: a saved walk has no columns; leave it out, or give the folder of a sweep")
+        if not plot_walk(path, output):
+            raise typer.Exit(FAILED)
+        return
     from warpchain.cli.terminal import try_folder
     from warpchain.reports.sweep_figures import figures
     from warpchain.store.manifest import check_not_own
     from warpchain.store.sweep_result import load
 
-    result = load(directory)
-    folder = output or directory
-    check_not_own(directory, folder.resolve())
+    result = load(path)
+    folder = output or path
+    check_not_own(path, folder.resolve())
     try_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    for picture in figures(result, quantity):
+    for picture in figures(result, quantity or "dx"):
         print(picture.save(folder))
 
 

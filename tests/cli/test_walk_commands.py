@@ -1,0 +1,200 @@
+"""The commands that read the file of a saved walk, through `main`: plot, animate, walk --like."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import warpchain
+from tests.support import command_line
+from tests.support.command_line import Command
+from warpchain.cli import main as command_module
+from warpchain.inputs.validation import InputError
+from warpchain.walks.walk_result import STORED, WalkResult
+
+command = command_line.command
+
+TINY = {
+    "links": 20,
+    "frequency": 5.0,
+    "preset": "soft",
+    "method": "dp5",
+    "start": "ellipse",
+    "walk_limit": 0.02,
+    "clearance": 0.004,
+    "gravity": 9.7,
+}
+
+
+@pytest.fixture(scope="module")
+def tiny_walk() -> WalkResult:
+    """A walk of 20 ms with drawn parameters and frames."""
+    return warpchain.walk(**TINY, seed=7)
+
+
+@pytest.fixture
+def saved(tiny_walk: WalkResult, tmp_path: Path) -> Path:
+    """Its file, in a folder of its own."""
+    (tmp_path / "saved").mkdir()
+    tiny_walk.save(tmp_path / "saved/walk.h5")
+    return tmp_path / "saved/walk.h5"
+
+
+def _without_frames(path: Path) -> None:
+    warpchain.walk(**TINY, frame_interval=None).save(path)
+
+
+@pytest.mark.parametrize("options", [(), ("-o", "new/deep")])
+def test_plot_draws_a_saved_walk_and_tells_what_it_leaves_out(
+    command: Command, saved: Path, options: Sequence[str]
+) -> None:
+    """The figures stand beside the file or in the folder; this chain never was on a sprocket."""
+    answer = command("plot", str(saved), *options)
+    folder = Path(options[-1]) if options else saved.parent
+    drawn = [folder / f"{kind}.png" for kind in ("figure5", "film_strip", "energy")]
+    assert answer.status == 0
+    assert sorted(answer.out.splitlines()) == sorted(map(str, drawn))
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in drawn)
+    assert answer.err.startswith(f"{folder / 'loop.png'}: not drawn; ") and answer.err.count("\n") == 1
+    assert {path.name for path in folder.iterdir()} - {"walk.h5"} == {path.name for path in drawn}
+
+
+def test_plot_of_a_walk_without_frames_leaves_the_film_strip_out(command: Command) -> None:
+    """Each figure that is left out has a line with its reason."""
+    _without_frames(Path("walk.h5"))
+    answer = command("plot", "walk.h5")
+    assert answer.status == 0 and sorted(answer.out.splitlines()) == ["energy.png", "figure5.png"]
+    lines = sorted(answer.err.splitlines())
+    assert [line.partition(":")[0] for line in lines] == ["film_strip.png", "loop.png"]
+    assert "not drawn; walk: it has no frames" in lines[0]
+
+
+def test_plot_of_a_walk_that_never_was_released_fails(command: Command) -> None:
+    """Status 1 and a line for each figure, since there is nothing to draw; nothing is written."""
+    never = {**TINY, "links": 32, "start": "spinning", "hold_limit": 0.001}
+    warpchain.walk(**never, frame_interval=None).save("walk.h5")
+    answer = command("plot", "walk.h5")
+    assert (answer.status, answer.out) == (1, "")
+    names = ["energy.png", "figure5.png", "film_strip.png", "loop.png"]
+    assert sorted(line.partition(": not drawn; ")[0] for line in answer.err.splitlines()) == names
+    assert [path.name for path in Path().iterdir()] == ["walk.h5"]
+
+
+@pytest.mark.parametrize(("suffix", "beginning"), [("gif", b"GIF89a"), ("html", b"<!DOCTYPE html>")])
+def test_animate_writes_a_moving_picture(command: Command, saved: Path, suffix: str, beginning: bytes) -> None:
+    """The file is of the kind that its suffix says."""
+    answer = command("animate", str(saved), f"walk.{suffix}", "--slow", "8")
+    assert (answer.status, answer.out, answer.err) == (0, f"walk.{suffix}\n", "")
+    assert Path(f"walk.{suffix}").read_bytes()[: len(beginning)].upper() == beginning.upper()
+
+
+def test_like_repeats_a_walk_to_the_bit(command: Command, tiny_walk: WalkResult, saved: Path) -> None:
+    """Setup, seed, and every number but the time it took are those of the saved walk."""
+    answer = command("walk", "--like", str(saved), "-o", "again")
+    assert answer.status == 1  # of the time limit, as the saved walk
+    again = warpchain.load_walk("again/walk.h5")
+    assert (again.setup, again.seed, again.status) == (tiny_walk.setup, 7, tiny_walk.status)
+    for name in STORED:
+        if name != "wall_time":
+            np.testing.assert_equal(getattr(again, name), getattr(tiny_walk, name), err_msg=name)
+
+
+def test_like_changes_single_values(command: Command, tiny_walk: WalkResult, saved: Path) -> None:
+    """What the line gives counts, and all else is the saved walk's, drawn values among it."""
+    command("walk", "--like", str(saved), *"--frequency 6 --set walk_limit=0.01 --set g=9.8 -o other".split())
+    other, setup = warpchain.load_walk("other/walk.h5"), tiny_walk.setup
+    assert other.setup.scene == setup.scene.model_copy(update={"frequency": 6.0, "walk_limit": 0.01})
+    assert other.setup.parameters == setup.parameters.model_copy(update={"gravity": 9.8})
+    assert (other.setup.options, other.setup.preset, other.seed) == (setup.options, "soft", 7)
+    assert other.walk_time == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("--method bs32", {"method": "bs32"}),
+        ("--method reference", {"method": "reference"}),
+        ("--method standard --tol 1e-4", {"method": "standard", "tolerance": 1e-4}),
+        ("--tol 1e-4", {"method": "dp5", "tolerance": 1e-4}),
+    ],
+)
+def test_a_method_beside_like_brings_its_settings(
+    command: Command, saved: Path, monkeypatch: pytest.MonkeyPatch, line: str, expected: dict[str, object]
+) -> None:
+    """A method means the same as in a new walk."""
+    from warpchain.inputs.options import Options
+
+    seen = []
+
+    def run_walk(setup: object, **_: object) -> None:
+        seen.append(setup)
+        raise InputError("enough")
+
+    monkeypatch.setattr("warpchain.run.single_walk.run_walk", run_walk)
+    assert command("walk", "--like", str(saved), *line.split()).err == "error: enough\n"
+    assert seen[0].options == Options.model_validate(expected)
+
+
+REFUSED = {
+    "plot nowhere.h5": "nowhere.h5: No such file or directory",
+    "plot text.h5": "text.h5: not an HDF5 file",
+    "plot text": "text: not an HDF5 file",
+    "plot saved/walk.h5 --quantity dx": "--quantity: a saved walk has no columns",
+    "plot saved/walk.h5 -o text": "--output: text: Not a directory",
+    "animate nowhere.h5 walk.gif": "nowhere.h5: No such file or directory",
+    "animate text.h5 walk.gif": "text.h5: not an HDF5 file",
+    "animate frameless.h5 walk.gif": "walk: it has no frames",
+    "animate saved/walk.h5 walk.avi": "walk.avi: unknown kind of picture",
+    "animate saved/walk.h5 walk.gif --fps 0": "fps: 0.0 is not a positive number",
+    "animate saved/walk.h5 walk.gif --slow nan": "slow: nan is not a positive number",
+    "animate saved/walk.h5 walk.gif --fps many": "Invalid value for '--fps'",
+    "animate saved/walk.h5 nowhere/walk.gif": "nowhere/walk.gif: cannot be written",
+    "animate saved/walk.h5": "Missing argument 'FILE'",
+    "walk --like nowhere.h5": "nowhere.h5: No such file or directory",
+    "walk --like text.h5": "text.h5: not an HDF5 file",
+    "walk --like saved": "saved: Is a directory",
+    "walk --like saved/walk.h5 --seed 3": "--seed: given together with --like",
+    "walk --like saved/walk.h5 --preset soft": "--preset: given together with --like",
+    "walk --like saved/walk.h5 --config walk.yaml": "--config: given together with --like",
+    "walk --like saved/walk.h5 --links 61": "scene.links: 61 is odd",
+    "walk --like saved/walk.h5 --method hybrid --device cuda": "options.method: 'hybrid' runs on a CPU only",
+}
+"""Bad arguments → how the line of refusal begins."""
+
+
+@pytest.mark.parametrize("arguments", REFUSED)
+def test_bad_input_is_refused_in_one_line(command: Command, saved: Path, arguments: str) -> None:
+    """Status 2, one line on stderr, nothing on stdout, nothing written."""
+    Path("text").write_text("no walk", encoding="utf-8")
+    Path("text.h5").write_text("no walk", encoding="utf-8")
+    if "frameless" in arguments:
+        _without_frames(Path("frameless.h5"))
+    before = sorted(Path().rglob("*"))
+    answer = command(*arguments.split())
+    assert (answer.status, answer.out) == (2, "")
+    assert answer.err.startswith(f"error: {REFUSED[arguments]}") and answer.err.count("\n") == 1
+    assert sorted(Path().rglob("*")) == before
+
+
+def test_mp4_without_its_extra_is_refused_in_one_line(
+    command: Command, saved: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The line has the command that installs it."""
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    answer = command("animate", str(saved), "walk.mp4")
+    assert answer.status == 2 and answer.err.count("\n") == 1 and "pip install 'warpchain[video]'" in answer.err
+    assert not Path("walk.mp4").exists()
+
+
+def test_a_refusal_of_several_lines_is_printed_as_several(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each of several problems has a line of its own."""
+
+    def refuse(*_: object) -> None:
+        raise InputError("links: 3 is odd;  give an even number\nsamples: 0 is less than 1; give 1 or more")
+
+    monkeypatch.setattr(command_module, "_setup", refuse)
+    answer = command("walk")
+    lines = ["error: links: 3 is odd; give an even number", "error: samples: 0 is less than 1; give 1 or more"]
+    assert answer.status == 2 and answer.err.splitlines() == lines

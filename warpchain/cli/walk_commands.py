@@ -1,0 +1,127 @@
+"""What the command line does with the file of a saved walk: its figures, its animation, the same walk again."""
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from warpchain.inputs.setup import Setup
+    from warpchain.walks.walk_result import WalkResult
+
+
+def plot_walk(path: Path, output: Path | None) -> bool:
+    """Draw every figure that a saved walk has something for, and say on stderr what is left out and why.
+
+    Args:
+        path: file of the walk.
+        output: folder of the figures; None: that of the file.
+
+    Returns:
+        Whether anything was drawn.
+
+    Raises:
+        InputError: the file is no walk, or the folder cannot be written to.
+        OSError: a file cannot be read or written.
+    """
+    from typing import get_args
+
+    from warpchain.cli.terminal import try_folder
+    from warpchain.pictures.style import save_figure
+    from warpchain.pictures.walk_shape import Kind
+
+    walk, folder, drawn = _saved_walk(path), path.parent if output is None else output, False
+    try_folder(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    for kind in get_args(Kind):
+        target = folder / f"{kind}.png"
+        try:
+            figure = walk.plot(kind)
+        except ValueError as error:
+            print(f"{target}: not drawn; {error}", file=sys.stderr)
+            continue
+        save_figure(figure, target)
+        print(target)
+        drawn = True
+    return drawn
+
+
+def animate(
+    walk: Annotated[
+        Path, typer.Argument(metavar="WALK.h5", help="A walk that `warpchain walk -o DIR` wrote.", show_default=False)
+    ],
+    output: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="The file to write; its name ends in .gif, .mp4 or .html.", show_default=False
+        ),
+    ],
+    fps: Annotated[
+        float,
+        typer.Option(
+            metavar="NUMBER", help="Pictures per second; in HTML the browser decides. Default: 30.", show_default=False
+        ),
+    ] = 30.0,
+    slow: Annotated[
+        float,
+        typer.Option(metavar="NUMBER", help="Playing time per simulated time. Default: 4.", show_default=False),
+    ] = 4.0,
+) -> None:
+    """Write a moving picture of a saved walk: GIF, MP4 or a page with a player."""
+    from warpchain.inputs.validation import InputError
+
+    result = _saved_walk(walk)
+    try:
+        result.animate(output, fps=fps, slow=slow)
+    except (ValueError, ImportError) as error:
+        raise InputError(str(error)) from None
+    print(output)
+
+
+def setup_like(path: Path, given: Mapping[str, Mapping[str, object]]) -> "tuple[Setup, int | None]":
+    """Setup of a saved walk with other values in place of some of its own, and its seed.
+
+    A method that is given brings its own settings, and a tolerance also holds where joints are soft, as in a new walk.
+
+    Args:
+        path: file of the walk.
+        given: section → field → value.
+
+    Raises:
+        InputError: the file is no walk, or a value is refused.
+        OSError: the file cannot be read.
+    """
+    from warpchain.inputs.methods import METHODS_BY_NEED
+    from warpchain.inputs.parameters import warn_of_units
+    from warpchain.inputs.setup import resolve
+
+    saved = _saved_walk(path)
+    options = given["options"]
+    replaced = {"soft_tolerance"} if "tolerance" in options else set()
+    if "method" in options:
+        replaced |= {"tolerance", "soft_tolerance"}.union(*METHODS_BY_NEED.values())
+    sections = {
+        section: {**getattr(saved.setup, section).model_dump(exclude=replaced), **values}
+        for section, values in given.items()
+    }
+    setup = resolve(saved.setup.preset, **sections)
+    warn_of_units((f"parameters.{name}", name, value) for name, value in given["parameters"].items())
+    return setup, saved.seed
+
+
+def _saved_walk(path: Path) -> "WalkResult":
+    """Read a saved walk.
+
+    Raises:
+        InputError: the file is no walk, is damaged, or belongs to another version.
+        OSError: the file cannot be read.
+    """
+    from warpchain.inputs.validation import InputError
+    from warpchain.walks.walk_result import load_walk
+
+    try:
+        return load_walk(path)
+    except ValueError as error:
+        raise InputError(str(error)) from None
