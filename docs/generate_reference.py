@@ -19,6 +19,7 @@ from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters
 from warpchain.inputs.scene import Scene
+from warpchain.inputs.symbols import spelled
 from warpchain.status import Status
 from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL
@@ -115,8 +116,9 @@ def parameters_page() -> str:
         unit = "" if row.unit == "1" else row.unit
         sigma = f"{row.sigma:g}" if row.sigma else ""
         bounds = f"{lower}, ≤ {row.bounds.upper:g}"
-        rows.append((f"`{name}`", row.symbol, f"{row.value:g}", sigma, unit, bounds, row.source, row.meaning))
-    heads = ("name", "symbol", "value", "σ", "unit", "bounds", "source", "meaning")
+        written = f"`{ascii_symbol}`" if (ascii_symbol := spelled(row.symbol)) != row.symbol else ""
+        rows.append((f"`{name}`", row.symbol, written, f"{row.value:g}", sigma, unit, bounds, row.source, row.meaning))
+    heads = ("name", "symbol", "in ASCII", "value", "σ", "unit", "bounds", "source", "meaning")
     differing = [
         (
             f"`{preset}`",
@@ -133,7 +135,8 @@ def parameters_page() -> str:
         "# Parameters\n\n"
         "The quantities of Table 1 of the paper, in SI units. σ is the standard deviation of the Gaussian that samples "
         "draw from; a draw outside the bounds is drawn again. `circle_radius` is smaller than half of `link_length`. "
-        "The source *assumed* marks a quantity that the paper does not give.\n\n"
+        "The source *assumed* marks a quantity that the paper does not give. A symbol, also in ASCII, stands for its "
+        "name: `mu_fc=0.3` for `floor_friction=0.3`.\n\n"
         + table(heads, rows)
         + "\n## Presets\n\n"
         + table(("preset", "what differs from Table 1"), differing)
