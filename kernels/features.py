@@ -20,6 +20,7 @@ class Features:
         broad_phase: ``"grid"`` or ``"all_pairs"``, which exists for comparison only.
         watch: What ends the run before its stop time: ``"rest"``, ``"steady"`` or ``"none"``.
         softens: Whether samples may change the softness of the joints, see :mod:`events.softening`.
+        tilts: Whether the plane of the chain may move, see :mod:`physics.plane`; with an explicit method only.
     """
 
     method: str
@@ -29,6 +30,7 @@ class Features:
     broad_phase: str
     watch: str
     softens: bool = False
+    tilts: bool = False
 
     @property
     def is_driven(self) -> bool:

@@ -45,7 +45,10 @@ VALUE_GRAVITY, VALUE_CIRCLE_RADIUS, VALUE_SPROCKET_RADIUS, VALUE_TANGENTIAL = ra
 VALUE_FLOOR_RESTITUTION, VALUE_FLOOR_FRICTION, VALUE_SPROCKET_RESTITUTION, VALUE_SPROCKET_FRICTION = range(14, 18)
 VALUE_CHAIN_RESTITUTION, VALUE_CHAIN_FRICTION, VALUE_HALF_LENGTH = 18, 19, 20
 VALUE_DEADLINE, VALUE_CONTACT_STEP, VALUE_TOLERANCE = 21, 22, 23
-VALUES = 24
+# A plane that tilts, as the links feel it in this step.
+VALUE_PLANE_SPEED, VALUE_TURN_X, VALUE_TURN_Y, VALUE_UP_X, VALUE_UP_Y, VALUE_UP_Z = range(24, 30)
+VALUE_ORIGIN_HEIGHT, VALUE_HALF_WIDTH = 30, 31
+VALUES = 32
 BOARD_ROWS = 28
 
 # State.watch
@@ -56,7 +59,24 @@ LEAST_SPEED, GREATEST_SPEED = 16, 17
 HOLD_LOAD, LOADED_SINCE, UNLOADED_SINCE, DRIFT = range(18, 22)
 REST_SINCE, LAST_FLOOR_IMPULSE = 22, 23
 SOFTENED_AT = 24
-WATCH_ROWS = 25
+COLLAPSED_AT, FELL_AT, GREATEST_LEAN = 25, 26, 27
+WATCH_ROWS = 28
+
+# State.plane. First the plane itself: lateral speed u [m/s], rates ω1, ω2 [rad/s] about e1 and e2, the components of
+# the room's X and Y axes along e1, e2, e3, and the room's coordinates of the plane's origin [m].
+PLANE_SPEED, PLANE_TURN_X, PLANE_TURN_Y = 0, 1, 2
+AHEAD, UP, ORIGIN = 3, 6, 9
+PLANE_VALUES = 12
+# The plane half a step later, as the links feel it during the step, and in its first stage; and one in between.
+PLANE_MID, PLANE_BETWEEN = 12, 24
+# Sums over the links in one state, see physics.plane, and the inverse of the mass matrix, by rows of its upper triangle.
+PLANE_SUMS = 36
+SUM_MASS, SUM_MX, SUM_MY, SUM_XX, SUM_XY, SUM_YY = range(36, 42)
+SUM_MU, SUM_MV, SUM_XU, SUM_XV, SUM_YU, SUM_YV = range(42, 48)
+SUM_SPIN, SUM_SPIN_SINE, SUM_SPIN_COSINE = 48, 49, 50
+INVERSE_00, INVERSE_01, INVERSE_02, INVERSE_11, INVERSE_12, INVERSE_22 = range(51, 57)
+PLANE_ROWS = 57
+SUM_COUNT = 15
 
 # State.counts
 ACCEPTED, REJECTED, FLOOR_IMPULSES, SPROCKET_IMPULSES, SELF_IMPULSES, BOUNCES, LIST_BUILDS = range(7)
@@ -75,6 +95,10 @@ TIME, CENTER_X, CENTER_Y, CENTER_U, CENTER_V = range(5)
 KINETIC, GRAVITATIONAL, SPRING, LOWEST, RMS_SPEED = range(5, 10)
 HEIGHT, WIDTH, LOOP_SPEED = 10, 11, 12
 SAMPLE_COLUMNS = 13
+# Further columns if the plane tilts: the plane, then place and speed of the centre of mass along the room's Z axis.
+PLANE_COLUMN = 13
+CENTER_Z, CENTER_W = 25, 26
+ALL_COLUMNS = 27
 
 # Capacity of the neighbour list, in pairs of joints per column.
 PAIRS_PER_LINK = 8

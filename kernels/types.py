@@ -25,6 +25,7 @@ class Model:
     friction_smoothing: wp.array(dtype=wp.float64)  # ω_c [rad/s]
     gravity: wp.array(dtype=wp.float64)  # g [m/s²], along −y
     circle_radius: wp.array(dtype=wp.float64)  # r [m], of a link's two circles
+    half_width: wp.array(dtype=wp.float64)  # h [m], of a link, across the plane of the chain
     tangential_restitution: wp.array(dtype=wp.float64)  # e_t
     floor_restitution: wp.array(dtype=wp.float64)  # e_fc
     floor_friction: wp.array(dtype=wp.float64)  # μ_fc
@@ -81,11 +82,12 @@ class State:
     next_sample: wp.array(dtype=wp.int64)  # index of the next sample mark
     status: wp.array(dtype=wp.int32)
     watch: wp.array2d(dtype=wp.float64)  # (W, WATCH_ROWS): memory of the watches
+    plane: wp.array2d(dtype=wp.float64)  # (W, PLANE_ROWS): the plane of the chain, if it tilts, see layout
     softness: wp.array(dtype=wp.float64)  # of the joints: 0 the model's own, 1 soft, 2 softest; see events.softening
     load_factor: wp.array(dtype=wp.float64)  # of loads on the sprocket, see physics.scaled_loads
     first_area: wp.array(dtype=wp.float64)  # area inside the loop when its run began [m²]
     attempts_before: wp.array(dtype=wp.int64)  # attempts of the walk's earlier phases, which its limit includes
-    first_sample: wp.array2d(dtype=wp.float64)  # (W, SAMPLE_COLUMNS): the sample taken when the run began
+    first_sample: wp.array2d(dtype=wp.float64)  # (W, ALL_COLUMNS): the sample taken when the run began
     last_sample: wp.array2d(dtype=wp.float64)  # the latest, in the end that of the final state
     counts: wp.array2d(dtype=wp.int64)  # (W, COUNT_ROWS)
     extremes: wp.array2d(dtype=wp.float64)  # (W, EXTREME_ROWS) [m]
@@ -98,8 +100,8 @@ class Record:
 
     sample_count: wp.array(dtype=wp.int32)  # (W,)
     frame_count: wp.array(dtype=wp.int32)  # (W,)
-    samples: wp.array3d(dtype=wp.float64)  # (W, capacity, SAMPLE_COLUMNS); capacity 0: not recorded
-    frames: wp.array3d(dtype=wp.float64)  # (W, capacity, 2 N): joint x …, joint y …; capacity 0: not recorded
+    samples: wp.array3d(dtype=wp.float64)  # (W, capacity, *columns*, see layout); capacity 0: not recorded
+    frames: wp.array3d(dtype=wp.float64)  # (W, capacity, 2 N): joint x …, joint y …; then the plane, if it tilts; or 0
     frame_times: wp.array2d(dtype=wp.float64)  # (W, capacity) [s]
     frame_loads: wp.array3d(dtype=wp.float64)  # (W, capacity, 3 N): joint forces x …, y …, moments …; see record
 
@@ -157,6 +159,15 @@ class Chain:
     sprocket_restitution: wp.float64
     sprocket_friction: wp.float64
     sprocket_radius: wp.float64
+    half_width: wp.float64
+    # the plane that the links move in, if it tilts, see physics.plane: otherwise 0
+    plane_speed: wp.float64
+    turn_x: wp.float64
+    turn_y: wp.float64
+    up_x: wp.float64
+    up_y: wp.float64
+    up_z: wp.float64
+    origin_height: wp.float64
 
 
 @wp.func
@@ -184,4 +195,5 @@ def read_chain(model: Model, world: int) -> Chain:
     chain.sprocket_restitution = model.sprocket_restitution[world]
     chain.sprocket_friction = model.sprocket_friction[world]
     chain.sprocket_radius = model.sprocket_radius[world]
+    chain.half_width = model.half_width[world]
     return chain

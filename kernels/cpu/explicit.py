@@ -16,6 +16,7 @@ from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 from warpchain.kernels.physics.elementary import LARGEST_TURN, TWO, ZERO, cos_sin, order_bits
 from warpchain.kernels.physics.geometry import end_positions, end_velocities, turned
 from warpchain.kernels.physics.joint import friction_torque, joint_force, link_acceleration
+from warpchain.kernels.physics.plane import plane_load
 from warpchain.kernels.types import Chain
 
 wp.set_module_options({"enable_backward": False})
@@ -94,11 +95,12 @@ def sums_over_stages(velocity: tuple[float, ...], position: tuple[float, ...]):
 
 
 @functools.cache
-def explicit_method(name: str):
+def explicit_method(name: str, tilts: bool = False):
     """Warp functions of one tableau: (evaluate the first stage, attempt a step, commit it).
 
     Args:
         name: Key of :data:`TABLEAUS`.
+        tilts: Whether the plane of the chain may move; ``chain`` is then on the plane of the middle of the step.
 
     Returns:
         ``first_stage(K, chain)``, ``attempt(K, chain, h, tolerance)`` → bits of the greatest error ratio (see
@@ -120,6 +122,9 @@ def explicit_method(name: str):
     @wp.func
     def derivatives(K: wp.array2d(dtype=wp.float64), chain: Chain, row: int, needs_power: bool):
         n = chain.link_count
+        weightless = chain
+        if wp.static(tilts):
+            weightless.gravity = ZERO
         i = int(0)
         while i < n:
             cx = K[layout.LEFT_X, i + 1] - K[layout.RIGHT_X, i]
@@ -141,7 +146,7 @@ def explicit_method(name: str):
         i = int(0)
         while i < n:
             ax, ay, spin_rate = link_acceleration(
-                chain,
+                weightless,
                 K[layout.INVERSE_MASS, i],
                 K[layout.INVERSE_INERTIA, i],
                 K[layout.STAGE_ARM_X, i],
@@ -153,6 +158,17 @@ def explicit_method(name: str):
                 K[layout.TORQUE, i],
                 K[layout.TORQUE, i + 1],
             )
+            if wp.static(tilts):
+                load_x, load_y, load_turn = plane_load(
+                    chain,
+                    K[layout.RIGHT_X, i] - K[layout.STAGE_ARM_X, i],
+                    K[layout.RIGHT_Y, i] - K[layout.STAGE_ARM_Y, i],
+                    K[layout.STAGE_ARM_X, i],
+                    K[layout.STAGE_ARM_Y, i],
+                )
+                ax += load_x
+                ay += load_y
+                spin_rate += load_turn
             K[row, i] = ax
             K[row + 1, i] = ay
             K[row + 2, i] = spin_rate

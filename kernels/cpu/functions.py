@@ -64,14 +64,14 @@ def scratch_rows(name: str, columns: int) -> int:
     return rows + flight_rows(columns) if method.has_rigid_flight else rows
 
 
-def cpu_method(name: str, columns: int) -> CpuMethod:
-    """A method's steps on springs."""
+def cpu_method(name: str, columns: int, tilts: bool = False) -> CpuMethod:
+    """A method's steps on springs; an explicit one can carry chains whose plane tilts."""
     method = find_method(name)
     if method.kind == "rosenbrock":
         functions = rosenbrock_method(method.tableau, columns)
         controller = implicit_controller(method.error_order)
     else:
-        functions = explicit_method(method.tableau)
+        functions = explicit_method(method.tableau, tilts)
         controller = step_controller(method.order, method.error_order)
     return CpuMethod(*functions, *controller, method.reuses_last)
 

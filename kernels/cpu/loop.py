@@ -26,11 +26,19 @@ from warpchain.kernels.cpu.contacts.time_to_contact import FLIGHT_SKIN, LEAST_SL
 from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.functions import cpu_method, rigid_flight, scratch_rows
 from warpchain.kernels.cpu.implicit.joint_switch import QUIET_TIME
+from warpchain.kernels.cpu.tilting import (
+    clear_padding,
+    resolve_tilting_floor,
+    shift_first_stage,
+    tilting_gap,
+    write_plane_sums,
+)
 from warpchain.kernels.events.present_chain import has_changed, present_chain
 from warpchain.kernels.events.record import lacks_last_sample, record_is_full, write_sample
 from warpchain.kernels.events.sample import sampling
 from warpchain.kernels.events.softening import book_softening, contact_step, spring_tolerance
 from warpchain.kernels.events.summary import summarise
+from warpchain.kernels.events.tilting import in_room, write_tilting_sample
 from warpchain.kernels.events.tallies import (
     add_count,
     attempts_made,
@@ -42,6 +50,7 @@ from warpchain.kernels.events.tallies import (
 from warpchain.kernels.features import COMPILER_FLAGS, Features
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step
 from warpchain.kernels.physics.elementary import ONE, ZERO
+from warpchain.kernels.physics.plane import accept_plane, half_step, on_plane
 from warpchain.kernels.physics.scaled_loads import write_inertias
 from warpchain.kernels.types import Chain, Control, Drive, Model, Record, State
 
@@ -116,7 +125,8 @@ def make_advance(features: Features):
     """
     columns = features.columns
     rows = scratch_rows(features.method, columns)
-    method = cpu_method(features.method, columns)
+    tilts = features.tilts
+    method = cpu_method(features.method, columns, tilts)
     list_size = list_layout(columns).size
     list_count = list_layout(columns).count
     has_floor = features.fixed_body == "floor"
@@ -128,7 +138,7 @@ def make_advance(features: Features):
     reuses_last = method.reuses_last
     softens = features.softens
     is_driven = features.is_driven
-    sample = sampling(features.watch, softens)
+    sample = sampling(features.watch, softens, tilts)
     present = present_chain(softens, is_driven)
     first_stage, attempt, commit = method.first_stage, method.attempt, method.commit
     growth, shrinkage = method.growth, method.shrinkage
@@ -169,11 +179,17 @@ def make_advance(features: Features):
         K = wp.array(ptr=memory.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
         list_memory = lists[world]
         L = wp.array(ptr=list_memory.ptr, shape=(wp.static(list_size),), dtype=wp.int32)
+        P = state.plane[world]
         status = int(RUNNING)
         if state.is_fresh[world] != 0:
             load_state(K, state, chain, world)
             place_ends(K, chain)
-            if wp.static(has_fixed):
+            if wp.static(tilts):
+                clear_padding(K, chain.link_count)
+                write_plane_sums(K, P, chain)
+            if wp.static(has_floor and tilts):
+                state.gap[world] = tilting_gap(K, on_plane(chain, P, 0))
+            elif wp.static(has_fixed):
                 state.gap[world] = fixed_gap(K, chain)
             if wp.static(has_self):
                 if not build_list(K, L, chain, control.skin, greatest_opening(K, chain)):
@@ -225,18 +241,32 @@ def make_advance(features: Features):
                         last_error = ONE
                         place_ends(K, chain)
                         book_loss(state, world, layout.LOSS_JOINT_SWITCH, lost)
-            if is_rigid == 0 and has_first_stage == 0:
-                first_stage(K, chain)
-                has_first_stage = int(1)
+            if wp.static(not tilts):
+                if is_rigid == 0 and has_first_stage == 0:
+                    first_stage(K, chain)
+                    has_first_stage = int(1)
 
-            h = wp.min(step, bound_of_step(K, L, chain, control, is_rigid != 0, gap, slack, longest))
+            seen = chain
+            if wp.static(tilts):
+                seen = on_plane(chain, P, 0)
+            h = wp.min(step, bound_of_step(K, L, seen, control, is_rigid != 0, gap, slack, longest))
             reaches_stop = time + h >= stop_time
             if reaches_stop:
                 h = stop_time - time
 
+            feeling = chain
+            if wp.static(tilts):
+                before = on_plane(chain, P, wp.static(layout.PLANE_MID))
+                half_step(P, 0, wp.static(layout.PLANE_MID), chain.gravity, h)
+                feeling = on_plane(chain, P, wp.static(layout.PLANE_MID))
+                if has_first_stage == 0:
+                    first_stage(K, feeling)
+                    has_first_stage = int(1)
+                else:
+                    shift_first_stage(K, before, feeling)
             error_bits = wp.int64(0)
             if is_rigid == 0:
-                error_bits = attempt(K, chain, h, tolerance)
+                error_bits = attempt(K, feeling, h, tolerance)
             if wp.static(has_flight):
                 if is_rigid != 0:
                     error_bits = attempt_flight(K, chain, h, control.flight_tolerance)
@@ -274,12 +304,21 @@ def make_advance(features: Features):
                 opening = greatest_opening(K, chain)
                 raise_extreme(state, world, layout.OPENING, opening)
                 impulses = wp.int64(0)
+                if wp.static(tilts):
+                    accept_plane(P)
+                    write_plane_sums(K, P, chain)
                 if wp.static(has_fixed):
-                    gap = fixed_gap(K, chain)
+                    if wp.static(tilts):
+                        gap = tilting_gap(K, on_plane(chain, P, 0))
+                    else:
+                        gap = fixed_gap(K, chain)
                     if gap < ZERO:
                         raise_extreme(state, world, fixed_depth, -gap)
-                        turning = sprocket_turning(drive, world, time)
-                        impulses = resolve_fixed(K, chain, turning, drive.push_rate[world])
+                        if wp.static(tilts):
+                            impulses = resolve_tilting_floor(K, P, chain)
+                        else:
+                            turning = sprocket_turning(drive, world, time)
+                            impulses = resolve_fixed(K, chain, turning, drive.push_rate[world])
                         add_count(state, world, fixed_count, impulses)
                         if wp.static(has_floor):
                             if impulses > wp.int64(0):
@@ -307,6 +346,10 @@ def make_advance(features: Features):
                         impulses += hits
                 if impulses > wp.int64(0):
                     has_first_stage = int(0)
+                    if wp.static(tilts):
+                        write_plane_sums(K, P, chain)
+                if wp.static(tilts):
+                    half_step(P, 0, 0, chain.gravity, h)
                 if wp.static(has_flight):
                     if impulses > wp.int64(0) or not are_stiff:
                         closing_time = time + QUIET_TIME
@@ -322,7 +365,11 @@ def make_advance(features: Features):
                 status = int(STEP_LIMIT)
         if lacks_last_sample(state, world, time, status):
             place_ends(K, chain)
-            write_sample(state, record, world, time, summarise(K, chain))
+            if wp.static(tilts):
+                flat = summarise(K, chain)
+                write_tilting_sample(P, state, record, world, time, flat, in_room(K, P, chain, flat))
+            else:
+                write_sample(state, record, world, time, summarise(K, chain))
         store_state(K, state, chain, world, wp.static(fixed_loss))
         state.gap[world] = gap
         state.slack[world] = slack

@@ -10,6 +10,7 @@ from warpchain.kernels.events.release import drag_rate, load_at, watch_steadines
 from warpchain.kernels.events.rest import watch_rest
 from warpchain.kernels.events.softening import watch_collapse, watch_drive, watch_stiffening
 from warpchain.kernels.events.summary import summarise
+from warpchain.kernels.events.tilting import in_room, watch_fall, write_frame_plane, write_tilting_sample
 from warpchain.kernels.layout import TIME
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.scaled_loads import drag_shape
@@ -19,7 +20,7 @@ wp.set_module_options({"enable_backward": False})
 
 
 @functools.cache
-def sampling(watch: str, softens: bool = False):
+def sampling(watch: str, softens: bool = False, tilts: bool = False):
     """Warp function ``sample`` of a chain whose ends are placed: time series, frame, watches; returns the status.
 
     With ``"steady"`` it may also change the chain's loads and the velocities of its links.
@@ -27,6 +28,7 @@ def sampling(watch: str, softens: bool = False):
     Args:
         watch: ``"rest"``, ``"steady"`` or ``"none"``.
         softens: Whether it may change the softness of the joints, see :mod:`events.softening`.
+        tilts: Whether the plane of the chain may move; its sums must be those of the present state.
     """
     watches_rest = watch == "rest"
     watches_steadiness = watch == "steady"
@@ -46,14 +48,24 @@ def sampling(watch: str, softens: bool = False):
         last_time = state.last_sample[world, TIME]
         is_first = last_time < ZERO
         summary = summarise(K, chain)
-        write_sample(state, record, world, time, summary)
+        if wp.static(tilts):
+            P = state.plane[world]
+            flat = summary
+            summary = in_room(K, P, chain, flat)
+            write_tilting_sample(P, state, record, world, time, flat, summary)
+        else:
+            write_sample(state, record, world, time, summary)
         if mark % control.frame_every == wp.int64(0):
             write_frame(record, K, chain, world, time)
+            if wp.static(tilts):
+                write_frame_plane(P, record, world)
         passed = wp.int64(wp.floor(time / control.sample_interval))
         state.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
         if wp.static(softens and watches_rest):
             watch_stiffening(state, drive, control, world, time)
             watch_collapse(K, chain, state, control, world, time, is_first)
+        if wp.static(tilts):
+            watch_fall(K, P, chain, state, world, time, is_first)
         if wp.static(watches_rest):
             return watch_rest(state, control, world, time, summary)
         if wp.static(watches_steadiness):

@@ -34,7 +34,7 @@ LANES = 3
 LAUNCH_SECONDS = 0.1  # s, wanted duration of a launch, after which progress is shown and Ctrl-C noticed
 UNSET_WATCHES = (
     *(layout.WINDOW_START, layout.STEADY_SINCE, layout.LOADED_SINCE, layout.UNLOADED_SINCE, layout.DRIFT),
-    *(layout.REST_SINCE, layout.SOFTENED_AT),
+    *(layout.REST_SINCE, layout.SOFTENED_AT, layout.COLLAPSED_AT, layout.FELL_AT),
 )
 """Entries of :attr:`State.watch` that are −1 until set."""
 
@@ -54,6 +54,7 @@ class Batch:
         keeps_samples: bool = False,
         frame_every: int | None = None,
         keeps_loads: bool = False,
+        tilts: bool = False,
         threads: int | None = None,
     ) -> None:
         """Allocate a batch. All worlds are idle (status FINISHED) until a chain is loaded.
@@ -65,6 +66,7 @@ class Batch:
             keeps_samples: Keep the time series.
             frame_every: Keep all joint positions at every so many samples; None keeps none.
             keeps_loads: Keep force and moment of every joint with each frame.
+            tilts: Keep the plane of the chain with samples and frames.
             threads: Threads of every block on a GPU, at least as many as links; None: as many as each chain needs.
         """
         self.options = options
@@ -86,8 +88,9 @@ class Batch:
             State,
             links=(6, longest),
             watch=(layout.WATCH_ROWS,),
-            first_sample=(layout.SAMPLE_COLUMNS,),
-            last_sample=(layout.SAMPLE_COLUMNS,),
+            plane=(layout.PLANE_ROWS,),
+            first_sample=(layout.ALL_COLUMNS,),
+            last_sample=(layout.ALL_COLUMNS,),
             counts=(layout.COUNT_ROWS,),
             extremes=(layout.EXTREME_ROWS,),
             losses=(layout.LOSS_ROWS,),
@@ -96,8 +99,8 @@ class Batch:
         samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * (frame_every is not None)
         self.record = self._arrays(
             Record,
-            samples=(samples, layout.SAMPLE_COLUMNS),
-            frames=(frames, 2 * longest),
+            samples=(samples, layout.ALL_COLUMNS if tilts else layout.SAMPLE_COLUMNS),
+            frames=(frames, 2 * longest + layout.PLANE_VALUES * tilts),
             frame_times=(frames,),
             frame_loads=(frames * keeps_loads, 3 * longest),
         )
@@ -213,14 +216,27 @@ class Batch:
         self._edit(self.state.stop_status)[world] = int(stop_status)
         self._edit(self.state.status)[world] = int(Status.RUNNING)
 
+    def set_plane(self, world: int, plane: Array) -> None:
+        """Set the plane of a world's chain, which tilts: (PLANE_VALUES,), see :mod:`warpchain.kernels.layout`."""
+        self._edit(self.state.plane)[world] = 0.0
+        self._edit(self.state.plane)[world, : layout.PLANE_VALUES] = plane
+
+    def plane(self, world: int) -> Array:
+        """The plane of a world's chain, if it tilts: (PLANE_VALUES,), see :mod:`warpchain.kernels.layout`."""
+        return np.array(self._view(self.state.plane)[world, : layout.PLANE_VALUES])
+
     def set_drive(self, world: int, **values: float) -> None:
         """Set fields of :class:`Drive` of a world."""
         for name, value in values.items():
             self._edit(getattr(self.drive, name))[world] = value
 
-    def features(self, *, fixed_body: str, watch: str, broad_phase: str = "grid") -> Features:
+    def features(
+        self, *, fixed_body: str, watch: str, broad_phase: str = "grid", tilts: bool = False
+    ) -> Features:
         """Kernel features for these worlds."""
-        return features_of(self.options, self.columns, fixed_body=fixed_body, watch=watch, broad_phase=broad_phase)
+        return features_of(
+            self.options, self.columns, fixed_body=fixed_body, watch=watch, broad_phase=broad_phase, tilts=tilts
+        )
 
     def run(self, worlds: Sequence[int], features: Features, after_launch: Callable[[], None] | None = None) -> None:
         """Carry worlds on until none of them is running. Results do not depend on how a run is cut into launches.

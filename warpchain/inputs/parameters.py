@@ -39,6 +39,7 @@ FRACTION: Final[Limits] = {"ge": 0.0, "le": 1.0}
 SIGNED_FRACTION: Final[Limits] = {"ge": -1.0, "le": 1.0}
 LENGTH: Final[Limits] = {"ge": 1e-9, "le": 1e3}
 """From a few atoms to a kilometre: like the next ones far beyond any chain, and small enough for squares and ratios."""
+WIDTH: Final[Limits] = {"ge": 0.0, "le": 1e3}
 MASS: Final[Limits] = {"gt": 0.0, "le": 1e6}
 INERTIA: Final[Limits] = {"gt": 0.0, "le": 1e12}
 """Up to that of the greatest mass at the greatest length."""
@@ -138,6 +139,8 @@ class Parameters(BaseModel):
     )
     circle_radius: float = _row("r", "m", 4.2e-3, 0.0, LENGTH, "assumed", "radius of the circle at a link end")
     """Not in the paper: between the roller (3.9 mm) and the plates (about 5 mm) of a half-inch chain."""
+    half_width: float = _row("h", "m", 4e-3, 0.0, WIDTH, "assumed", "half width of a link, of a plane that tilts")
+    """Not in the paper: a half-inch chain is about 8 mm wide over its pins."""
 
     @model_validator(mode="after")
     def _circles_apart(self) -> Self:

@@ -11,6 +11,7 @@ import warp as wp
 
 from warpchain.kernels.contacts.pair_list import list_layout
 from warpchain.kernels.cpu.contacts.proximity import greatest_speed
+from warpchain.kernels.cpu.tilting import greatest_tilting_speed
 from warpchain.kernels.features import Features
 from warpchain.kernels.layout import COSINE, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, SINE, U, V
 from warpchain.kernels.physics.elementary import HALF, ONE, TWO, ZERO, order_bits
@@ -95,6 +96,7 @@ def step_bound(features: Features, has_flight: bool):
     has_self = features.self_contact
     count = list_layout(features.columns).count
     meeting = fastest_meeting(features.columns)
+    speed_bound = greatest_tilting_speed if features.tilts else greatest_speed
 
     @wp.func
     def bound(
@@ -128,6 +130,6 @@ def step_bound(features: Features, has_flight: bool):
             distance = wp.min(distance, slack)
         if is_near:
             return longest
-        return wp.max(longest, distance / greatest_speed(K, chain))
+        return wp.max(longest, distance / speed_bound(K, chain))
 
     return bound

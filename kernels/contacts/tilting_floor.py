@@ -1,0 +1,292 @@
+"""A link of a tilting plane and the floor: one impulse in three dimensions for each of its rollers that touches.
+
+*Rollers.* A circle of a link is the middle of a roller, a cylinder of half width h across the plane. Its lowest points lie
+on the rims at ζ = ±h, in the direction q = −(up1, up2)/ρ with ρ² = up1² + up2², at the heights
+O·Ŷ + x up1 + y up2 − r ρ ± h up3. a± is the speed at which a rim approaches the floor if it overlaps it, else 0. The roller
+touches if a₊ + a₋ > 0. Then the impulse acts between the rims, at ζ = h (a₊ − a₋)/(a₊ + a₋): at the middle of an upright
+roller, which thus meets the floor as in the plane; at a rim if it alone approaches.
+
+*Law.* That of :mod:`contacts.impulse` with three components. The impulse J at (X, Y, ζ) changes the link as in the plane,
+by (J1, J2), and the plane by A⁻¹ Q with Q = (J3, Y J3 − ζ J2, ζ J1 − X J3) and the mass matrix A of :mod:`physics.plane`.
+So W is the link's 2 × 2 matrix plus Gᵀ A⁻¹ G.
+
+*Many contacts at once.* All touching links share the plane. Each of N links gets a copy of it with the mass A/N, and
+afterwards the plane has the mean of their velocities: A⁻¹ ΣQ. Momentum is kept, since nothing else acts. Energy does not
+rise: no collision of a link and its copy adds any, and the meeting of the copies is inelastic; it loses
+½ [Σ Δ·Q − Δ̄·ΣQ], with the change Δ = N A⁻¹ Q of a copy and that of the plane, Δ̄. The result depends neither on the order
+of the links, so that threads can take one each, nor on which side of the plane is which. Contacts one after the other,
+instead, tip an upright chain over: those on one side come first.
+"""
+
+import warp as wp
+
+from warpchain.kernels.layout import (
+    INVERSE_00,
+    INVERSE_01,
+    INVERSE_02,
+    INVERSE_11,
+    INVERSE_12,
+    INVERSE_22,
+    PLANE_SPEED,
+    PLANE_TURN_X,
+    PLANE_TURN_Y,
+)
+from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, quotient
+from warpchain.kernels.physics.plane import plane_times_inverse
+from warpchain.kernels.types import Chain
+
+wp.set_module_options({"enable_backward": False})
+
+SMALLEST = wp.constant(wp.float64(1e-300))
+
+
+@wp.struct
+class TiltingLink:
+    """A link and its copy of the plane, while they meet the floor."""
+
+    u: wp.float64  # [m/s]
+    v: wp.float64
+    omega: wp.float64  # [rad/s]
+    plane_speed: wp.float64  # [m/s]
+    turn_x: wp.float64  # [rad/s]
+    turn_y: wp.float64
+    push: wp.float64  # Q, the generalised impulse on the plane [N s]
+    moment_x: wp.float64  # [N m s]
+    moment_y: wp.float64
+    lost: wp.float64  # energy [J]
+    hits: wp.int64  # impulses
+
+
+@wp.struct
+class CopyInverse:
+    """N A⁻¹, the inverse mass matrix of a copy of the plane, by rows of its upper triangle."""
+
+    b00: wp.float64
+    b01: wp.float64
+    b02: wp.float64
+    b11: wp.float64
+    b12: wp.float64
+    b22: wp.float64
+
+
+@wp.func
+def copy_inverse(P: wp.array(dtype=wp.float64), copies: wp.float64) -> CopyInverse:
+    """The inverse mass matrix of one of so many copies of the plane."""
+    B = CopyInverse()
+    B.b00 = copies * P[INVERSE_00]
+    B.b01 = copies * P[INVERSE_01]
+    B.b02 = copies * P[INVERSE_02]
+    B.b11 = copies * P[INVERSE_11]
+    B.b12 = copies * P[INVERSE_12]
+    B.b22 = copies * P[INVERSE_22]
+    return B
+
+
+@wp.func
+def steepness(chain: Chain):
+    """ρ: the sine of the angle between the plane's normal and the room's Y axis; 0 for a plane that lies flat."""
+    return wp.sqrt(chain.up_x * chain.up_x + chain.up_y * chain.up_y)
+
+
+@wp.func
+def middle_height(chain: Chain, slope: wp.float64, x: wp.float64, y: wp.float64):
+    """Height [m] of the lowest line of a roller's surface, at its middle, from the place of its circle."""
+    return chain.origin_height + x * chain.up_x + y * chain.up_y - chain.circle_radius * slope
+
+
+@wp.func
+def approaches(
+    chain: Chain,
+    slope: wp.float64,
+    link: TiltingLink,
+    x: wp.float64,
+    y: wp.float64,
+    lever_x: wp.float64,
+    lever_y: wp.float64,
+):
+    """a₊ and a₋ [m/s] of the roller at (x, y); the lever leads from the link's centre to its lowest line."""
+    inverse = ONE / wp.max(slope, SMALLEST)
+    point_x = x - chain.circle_radius * chain.up_x * inverse
+    point_y = y - chain.circle_radius * chain.up_y * inverse
+    across = link.plane_speed + link.turn_x * point_y - link.turn_y * point_x
+    middle = -(
+        chain.up_x * (link.u - link.omega * lever_y)
+        + chain.up_y * (link.v + link.omega * lever_x)
+        + chain.up_z * across
+    )
+    tipping = chain.half_width * (chain.up_y * link.turn_x - chain.up_x * link.turn_y)
+    height = middle_height(chain, slope, x, y)
+    rise = chain.half_width * chain.up_z
+    front = wp.where(height + rise < ZERO, wp.max(middle + tipping, ZERO), ZERO)
+    back = wp.where(height - rise < ZERO, wp.max(middle - tipping, ZERO), ZERO)
+    return front, back
+
+
+@wp.func
+def meet_roller(
+    chain: Chain,
+    slope: wp.float64,
+    B: CopyInverse,
+    before: TiltingLink,
+    inverse_mass: wp.float64,
+    inverse_inertia: wp.float64,
+    circle_x: wp.float64,
+    circle_y: wp.float64,
+    arm_x: wp.float64,
+    arm_y: wp.float64,
+) -> TiltingLink:
+    """One roller against the floor, without branches; ``arm`` leads from the link's centre to the circle's."""
+    inverse = ONE / wp.max(slope, SMALLEST)
+    to_point_x = -chain.circle_radius * chain.up_x * inverse
+    to_point_y = -chain.circle_radius * chain.up_y * inverse
+    x = circle_x + to_point_x
+    y = circle_y + to_point_y
+    lever_x = arm_x + to_point_x
+    lever_y = arm_y + to_point_y
+    front, back = approaches(chain, slope, before, circle_x, circle_y, lever_x, lever_y)
+    total = front + back
+    hit = total > ZERO
+    z = chain.half_width * quotient(front - back, wp.where(hit, total, ONE))
+    # velocity over the floor of the point at (x, y, z), and W
+    v1 = before.u - before.omega * lever_y + z * before.turn_y
+    v2 = before.v + before.omega * lever_x - z * before.turn_x
+    v3 = before.plane_speed + before.turn_x * y - before.turn_y * x
+    c0 = B.b00 + B.b01 * y - B.b02 * x
+    c1 = B.b01 + B.b11 * y - B.b12 * x
+    c2 = B.b02 + B.b12 * y - B.b22 * x
+    w11 = inverse_mass + lever_y * lever_y * inverse_inertia + z * z * B.b22
+    w12 = -lever_x * lever_y * inverse_inertia - z * z * B.b12
+    w22 = inverse_mass + lever_x * lever_x * inverse_inertia + z * z * B.b11
+    w13 = z * c2
+    w23 = -z * c1
+    w33 = c0 + y * c1 - x * c2
+    n1 = chain.up_x
+    n2 = chain.up_y
+    n3 = chain.up_z
+    wn1 = w11 * n1 + w12 * n2 + w13 * n3
+    wn2 = w12 * n1 + w22 * n2 + w23 * n3
+    wn3 = w13 * n1 + w23 * n2 + w33 * n3
+    # first: the impulse along the normal that ends the approach; second: the one that ends all motion
+    first = -quotient(n1 * v1 + n2 * v2 + n3 * v3, n1 * wn1 + n2 * wn2 + n3 * wn3)
+    m11 = w22 * w33 - w23 * w23
+    m12 = w13 * w23 - w12 * w33
+    m13 = w12 * w23 - w13 * w22
+    m22 = w11 * w33 - w13 * w13
+    m23 = w12 * w13 - w11 * w23
+    m33 = w11 * w22 - w12 * w12
+    scale = -quotient(ONE, w11 * m11 + w12 * m12 + w13 * m13)
+    second_1 = scale * (m11 * v1 + m12 * v2 + m13 * v3)
+    second_2 = scale * (m12 * v1 + m22 * v2 + m23 * v3)
+    second_3 = scale * (m13 * v1 + m23 * v2 + m33 * v3)
+    second_n = n1 * second_1 + n2 * second_2 + n3 * second_3
+    tangent_1 = second_1 - second_n * n1
+    tangent_2 = second_2 - second_n * n2
+    tangent_3 = second_3 - second_n * n3
+    tangential = wp.sqrt(tangent_1 * tangent_1 + tangent_2 * tangent_2 + tangent_3 * tangent_3)
+    friction = chain.floor_friction
+    bounce = (ONE + chain.floor_restitution) * first
+    excess = second_n - first
+    stick = ONE + chain.tangential_restitution
+    sticks = stick * tangential <= friction * (bounce + stick * excess)
+    slide = quotient(friction * bounce, tangential - friction * excess)
+    kappa = wp.where(sticks, stick, slide)
+    normal = bounce + kappa * excess
+    j1 = wp.where(hit, normal * n1 + kappa * tangent_1, ZERO)
+    j2 = wp.where(hit, normal * n2 + kappa * tangent_2, ZERO)
+    j3 = wp.where(hit, normal * n3 + kappa * tangent_3, ZERO)
+    q1 = y * j3 - z * j2
+    q2 = z * j1 - x * j3
+    after = TiltingLink()
+    after.u = before.u + j1 * inverse_mass
+    after.v = before.v + j2 * inverse_mass
+    after.omega = before.omega + (lever_x * j2 - lever_y * j1) * inverse_inertia
+    after.plane_speed = before.plane_speed + B.b00 * j3 + B.b01 * q1 + B.b02 * q2
+    after.turn_x = before.turn_x + B.b01 * j3 + B.b11 * q1 + B.b12 * q2
+    after.turn_y = before.turn_y + B.b02 * j3 + B.b12 * q1 + B.b22 * q2
+    after.push = before.push + j3
+    after.moment_x = before.moment_x + q1
+    after.moment_y = before.moment_y + q2
+    gained = j1 * (v1 + HALF * (w11 * j1 + w12 * j2 + w13 * j3))
+    gained += j2 * (v2 + HALF * (w12 * j1 + w22 * j2 + w23 * j3))
+    gained += j3 * (v3 + HALF * (w13 * j1 + w23 * j2 + w33 * j3))
+    after.lost = before.lost - gained
+    after.hits = before.hits + wp.where(hit, wp.int64(1), wp.int64(0))
+    return after
+
+
+@wp.func
+def with_copy(chain: Chain, u: wp.float64, v: wp.float64, omega: wp.float64) -> TiltingLink:
+    """A link before it meets the floor, with a copy of the chain's plane."""
+    link = TiltingLink()
+    link.u = u
+    link.v = v
+    link.omega = omega
+    link.plane_speed = chain.plane_speed
+    link.turn_x = chain.turn_x
+    link.turn_y = chain.turn_y
+    return link
+
+
+@wp.func
+def link_touches(
+    chain: Chain,
+    slope: wp.float64,
+    left_x: wp.float64,
+    left_y: wp.float64,
+    right_x: wp.float64,
+    right_y: wp.float64,
+    x: wp.float64,
+    y: wp.float64,
+    u: wp.float64,
+    v: wp.float64,
+    omega: wp.float64,
+):
+    """1 if a roller of the link touches the floor, else 0."""
+    link = with_copy(chain, u, v, omega)
+    inverse = ONE / wp.max(slope, SMALLEST)
+    to_point_x = -chain.circle_radius * chain.up_x * inverse
+    to_point_y = -chain.circle_radius * chain.up_y * inverse
+    a, b = approaches(chain, slope, link, left_x, left_y, left_x - x + to_point_x, left_y - y + to_point_y)
+    c, d = approaches(chain, slope, link, right_x, right_y, right_x - x + to_point_x, right_y - y + to_point_y)
+    return wp.where(a + b + c + d > ZERO, wp.int64(1), wp.int64(0))
+
+
+@wp.func
+def meet_tilting_floor(
+    chain: Chain,
+    slope: wp.float64,
+    B: CopyInverse,
+    left_x: wp.float64,
+    left_y: wp.float64,
+    right_x: wp.float64,
+    right_y: wp.float64,
+    x: wp.float64,
+    y: wp.float64,
+    inverse_mass: wp.float64,
+    inverse_inertia: wp.float64,
+    u: wp.float64,
+    v: wp.float64,
+    omega: wp.float64,
+) -> TiltingLink:
+    """One link against the floor, its left roller first, together with its copy of the plane."""
+    link = with_copy(chain, u, v, omega)
+    link = meet_roller(
+        chain, slope, B, link, inverse_mass, inverse_inertia, left_x, left_y, left_x - x, left_y - y
+    )
+    return meet_roller(
+        chain, slope, B, link, inverse_mass, inverse_inertia, right_x, right_y, right_x - x, right_y - y
+    )
+
+@wp.func
+def push_plane_by(
+    P: wp.array(dtype=wp.float64), push: wp.float64, moment_x: wp.float64, moment_y: wp.float64, work: wp.float64
+):
+    """Gives the plane the sum of the impulses on its copies; returns the energy [J] lost as they meet.
+
+    ``work``: Σ Δ·Q over the copies.
+    """
+    du, d1, d2 = plane_times_inverse(P, push, moment_x, moment_y)
+    P[PLANE_SPEED] = P[PLANE_SPEED] + du
+    P[PLANE_TURN_X] = P[PLANE_TURN_X] + d1
+    P[PLANE_TURN_Y] = P[PLANE_TURN_Y] + d2
+    return HALF * (work - (du * push + d1 * moment_x + d2 * moment_y))
