@@ -45,10 +45,10 @@ VALUE_GRAVITY, VALUE_CIRCLE_RADIUS, VALUE_SPROCKET_RADIUS, VALUE_TANGENTIAL = ra
 VALUE_FLOOR_RESTITUTION, VALUE_FLOOR_FRICTION, VALUE_SPROCKET_RESTITUTION, VALUE_SPROCKET_FRICTION = range(14, 18)
 VALUE_CHAIN_RESTITUTION, VALUE_CHAIN_FRICTION, VALUE_HALF_LENGTH = 18, 19, 20
 VALUE_DEADLINE, VALUE_CONTACT_STEP, VALUE_TOLERANCE = 21, 22, 23
-# A plane that tilts, as the links feel it in this step.
-VALUE_PLANE_SPEED, VALUE_TURN_X, VALUE_TURN_Y, VALUE_UP_X, VALUE_UP_Y, VALUE_UP_Z = range(24, 30)
-VALUE_ORIGIN_HEIGHT, VALUE_HALF_WIDTH = 30, 31
-VALUES = 32
+# A plane that tilts, as the links feel it: seven values, see gpu.tilting; and in the attempt before.
+VALUE_HALF_WIDTH = 24
+VALUE_PLANE, VALUE_PLANE_BEFORE = 25, 32
+VALUES = 39
 BOARD_ROWS = 28
 
 # State.watch
@@ -111,8 +111,11 @@ def consecutive_offsets(start: int = 0, /, **sizes: int) -> dict[str, int]:
 
 
 def scratch_rows(stages: int) -> int:
-    """Rows of a chain's scratch on a CPU, for an explicit method with this many stages."""
-    return STAGES + STAGE_ROWS * stages
+    """Rows of a chain's scratch on a CPU, for an explicit method with this many stages.
+
+    At least those of four stages: between attempts their rows hold terms of sums, if the plane of the chain tilts.
+    """
+    return STAGES + STAGE_ROWS * max(stages, 4)
 
 
 def board_size(threads: int) -> int:

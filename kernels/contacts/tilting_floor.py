@@ -95,6 +95,14 @@ def middle_height(chain: Chain, slope: wp.float64, x: wp.float64, y: wp.float64)
 
 
 @wp.func
+def greatest_across_speed(chain: Chain, x: wp.float64, y: wp.float64):
+    """A bound on what the motion of the plane adds to the speed [m/s] of any point of the rollers of a link at (x, y)."""
+    reach = chain.half_length + chain.circle_radius + chain.half_width
+    turn = wp.abs(chain.turn_x) + wp.abs(chain.turn_y)
+    return wp.abs(chain.plane_speed + chain.turn_x * y - chain.turn_y * x) + reach * turn
+
+
+@wp.func
 def approaches(
     chain: Chain,
     slope: wp.float64,

@@ -5,6 +5,7 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.tilting_floor import (
     copy_inverse,
+    greatest_across_speed,
     link_touches,
     meet_tilting_floor,
     middle_height,
@@ -39,16 +40,37 @@ from warpchain.kernels.types import Chain
 wp.set_module_options({"enable_backward": False})
 
 LANES = 8
-"""Links that are summed side by side. Sum k lies in row ``SUMS + k % 5`` from column ``8 (k // 5)`` on."""
+"""Columns that are summed side by side."""
 SUMS = STAGES + STAGE_ROWS
-"""The rows of the second stage, which are free between attempts."""
+"""First of the rows for terms of sums: those of the second to fourth stage, which are free between attempts."""
+
+
+@wp.func_native("""
+    const ::wp::float64* values = &K.data[row * (K.strides[0] / sizeof(::wp::float64))];
+    ::wp::float64 sums[8] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    for (int i = 0; i < count; i += 8) {
+        for (int lane = 0; lane < 8; ++lane) {
+            sums[lane] += values[i + lane];
+        }
+    }
+    return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
+""")
+def row_sum(K: wp.array2d(dtype=wp.float64), row: int, count: int) -> wp.float64:
+    """Sum of the first ``count`` columns of a row, a multiple of 8; in pure Warp clang would add one after the other."""
+    ...
+
+
+@wp.func
+def whole_lanes(n: int):
+    """The number of links, rounded up to a multiple of the lanes."""
+    return (n + wp.static(LANES - 1)) // wp.static(LANES) * wp.static(LANES)
 
 
 @wp.func
 def clear_padding(K: wp.array2d(dtype=wp.float64), n: int):
     """Makes the columns behind the last link count as links without mass, up to a whole number of lanes."""
     i = n
-    while i < (n + wp.static(LANES - 1)) // wp.static(LANES) * wp.static(LANES):
+    while i < whole_lanes(n):
         row = int(0)
         while row < layout.INVERSE_INERTIA + 1:
             K[row, i] = ZERO
@@ -59,39 +81,26 @@ def clear_padding(K: wp.array2d(dtype=wp.float64), n: int):
 @wp.func
 def write_plane_sums(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), chain: Chain):
     """Writes the sums over the placed links, and the inverse of the plane's mass matrix."""
-    lane = int(0)
-    while lane < wp.static(LANES):
+    count = whole_lanes(chain.link_count)
+    i = int(0)
+    while i < count:
+        terms = plane_terms(
+            chain,
+            K[MASS, i],
+            K[INERTIA, i],
+            K[X, i],
+            K[Y, i],
+            K[U, i],
+            K[V, i],
+            K[OMEGA, i],
+            K[COSINE, i],
+            K[SINE, i],
+        )
         for k in range(wp.static(SUM_COUNT)):
-            K[wp.static(SUMS + k % STAGE_ROWS), wp.static(LANES * (k // STAGE_ROWS)) + lane] = ZERO
-        lane += 1
-    first = int(0)
-    while first < chain.link_count:
-        lane = int(0)
-        while lane < wp.static(LANES):
-            i = first + lane
-            terms = plane_terms(
-                chain,
-                K[MASS, i],
-                K[INERTIA, i],
-                K[X, i],
-                K[Y, i],
-                K[U, i],
-                K[V, i],
-                K[OMEGA, i],
-                K[COSINE, i],
-                K[SINE, i],
-            )
-            for k in range(wp.static(SUM_COUNT)):
-                K[wp.static(SUMS + k % STAGE_ROWS), wp.static(LANES * (k // STAGE_ROWS)) + lane] = (
-                    K[wp.static(SUMS + k % STAGE_ROWS), wp.static(LANES * (k // STAGE_ROWS)) + lane] + terms[k]
-                )
-            lane += 1
-        first += wp.static(LANES)
+            K[wp.static(SUMS + k), i] = terms[k]
+        i += 1
     for k in range(wp.static(SUM_COUNT)):
-        total = ZERO
-        for j in range(wp.static(LANES)):
-            total += K[wp.static(SUMS + k % STAGE_ROWS), wp.static(LANES * (k // STAGE_ROWS) + j)]
-        P[wp.static(layout.PLANE_SUMS + k)] = total
+        P[wp.static(layout.PLANE_SUMS + k)] = row_sum(K, wp.static(SUMS + k), count)
     invert_plane_mass(P)
 
 
@@ -132,12 +141,11 @@ def greatest_tilting_speed(K: wp.array2d(dtype=wp.float64), chain: Chain):
     i = int(0)
     while i < chain.link_count:
         turn = chain.half_length * K[OMEGA, i]
-        across = chain.plane_speed + chain.turn_x * K[Y, i] - chain.turn_y * K[X, i]
+        across = greatest_across_speed(chain, K[X, i], K[Y, i])
         square = TWO * (K[U, i] * K[U, i] + K[V, i] * K[V, i] + turn * turn) + across * across
         greatest = wp.max(greatest, order_bits(square))
         i += 1
-    reach = chain.half_length + chain.circle_radius + chain.half_width
-    return wp.sqrt(wp.cast(greatest, wp.float64)) + reach * (wp.abs(chain.turn_x) + wp.abs(chain.turn_y))
+    return wp.sqrt(wp.cast(greatest, wp.float64))
 
 
 @wp.func
@@ -201,16 +209,15 @@ def resolve_tilting_floor(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.
         )
         impulses += link.hits
         i += 1
-    push = ZERO
-    moment_x = ZERO
-    moment_y = ZERO
-    work = ZERO
-    i = int(0)
-    while i < chain.link_count:
-        push += K[wp.static(SUMS), i]
-        moment_x += K[wp.static(SUMS + 1), i]
-        moment_y += K[wp.static(SUMS + 2), i]
-        work += K[wp.static(SUMS + 3), i]
+    count = whole_lanes(chain.link_count)
+    i = chain.link_count
+    while i < count:
+        for k in range(4):
+            K[wp.static(SUMS) + k, i] = ZERO
         i += 1
+    push = row_sum(K, wp.static(SUMS), count)
+    moment_x = row_sum(K, wp.static(SUMS + 1), count)
+    moment_y = row_sum(K, wp.static(SUMS + 2), count)
+    work = row_sum(K, wp.static(SUMS + 3), count)
     K[LOST_FIXED, 0] = K[LOST_FIXED, 0] + push_plane_by(P, push, moment_x, moment_y, work)
     return impulses

@@ -44,7 +44,7 @@ class Ahead:
 
 
 @functools.cache
-def explicit_attempt(name: str, block_dim: int, write_proximity: Any, read_proximity: Any):
+def explicit_attempt(name: str, block_dim: int, write_proximity: Any, read_proximity: Any, tilts: bool = False):
     """Warp function that attempts a step with a tableau in blocks of this size.
 
     Args:
@@ -52,6 +52,7 @@ def explicit_attempt(name: str, block_dim: int, write_proximity: Any, read_proxi
         block_dim: Threads in a block.
         write_proximity: See :func:`gpu.contacts.proximity.block_proximity`.
         read_proximity: See :func:`gpu.contacts.proximity.block_proximity`.
+        tilts: Whether the plane of the chain may move.
 
     Returns:
         ``attempt(ends, forces, maxima, K, place, h)`` → Attempt, from the state and first stage on the board;
@@ -66,7 +67,7 @@ def explicit_attempt(name: str, block_dim: int, write_proximity: Any, read_proxi
     velocity = (*tableau.velocity, velocity_weights)
     position = (*tableau.position, tableau.position_weights)
     nodes = (*tableau.nodes, 1.0)
-    exchange_ends, stage = block_stage(block_dim)
+    exchange_ends, stage = block_stage(block_dim, tilts)
     Stages = wp.types.vector(length=stages, dtype=wp.float64)
 
     def ahead_of(s: int):

@@ -18,6 +18,7 @@ from warpchain.kernels.contacts.pair_list import list_layout
 from warpchain.kernels.events.present_chain import has_changed, present_chain
 from warpchain.kernels.events.record import lacks_last_sample, record_is_full, write_sample
 from warpchain.kernels.events.summary import summarise
+from warpchain.kernels.events.tilting import in_room, write_tilting_sample
 from warpchain.kernels.events.tallies import add_count, attempts_made, count_bounce, of_fixed_body, raise_extreme
 from warpchain.kernels.features import COMPILER_FLAGS, Features
 from warpchain.kernels.gpu.board import (
@@ -37,11 +38,13 @@ from warpchain.kernels.gpu.explicit import explicit_attempt
 from warpchain.kernels.gpu.functions import shares_board
 from warpchain.kernels.gpu.sample import block_sample, write_step_bounds
 from warpchain.kernels.gpu.stage import Place, block_stage, error_of, read_link, vec3d, vec5d, write_first_stage
+from warpchain.kernels.gpu.tilting import block_tilting, write_felt_plane
 from warpchain.kernels.gpu.threads import barrier, barrier_if_any, block_maxima, clock, tile_address, vec4i
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step, step_controller
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import ONE, ZERO
+from warpchain.kernels.physics.plane import accept_plane, half_step
 from warpchain.kernels.physics.scaled_loads import under_load
 from warpchain.kernels.physics.softness import softened
 from warpchain.kernels.types import Control, Drive, Model, Record, State, read_chain
@@ -88,11 +91,13 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     touch_address = tile_address(wp.int32, touch_size)
     ends_address = tile_address(vec5d, block_dim)
     forces_address = tile_address(vec3d, block_dim)
-    exchange_ends, stage = block_stage(block_dim)
+    exchange_ends, stage = block_stage(block_dim, features.tilts)
     greatest, _write, _read = block_maxima(block_dim)
     maxima_address = tile_address(vec4i, block_dim)
     write_proximity, read_proximity, time_to_contact, meet_fixed_body = block_proximity(features, block_dim)
-    attempt = explicit_attempt(method.tableau, block_dim, write_proximity, read_proximity)
+    tilts = features.tilts
+    attempt = explicit_attempt(method.tableau, block_dim, write_proximity, read_proximity, tilts)
+    begin_step, sum_up, meet_tilting_floor = block_tilting(block_dim)
     growth, shrinkage = step_controller(method.order, method.error_order, wp.float32)
     build_list = block_list(columns, block_dim, features.broad_phase)
     clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, block_dim, touch)
@@ -175,6 +180,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         E = wp.array(ptr=ends_start, shape=(5, wp.static(block_dim)), dtype=wp.float64)
         F = wp.array(ptr=forces_start, shape=(3, wp.static(block_dim)), dtype=wp.float64)
         maxima_start = maxima_address(maxima)
+        # so do the sums for a plane that tilts
+        M = wp.array(ptr=ends_start, shape=(wp.static(5 * block_dim),), dtype=wp.float64)
+        P = state.plane[world]
 
         chain = read_chain(model, world)
         if wp.static(is_driven):
@@ -197,6 +205,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if wp.static(softens):
                 chain = softened(chain, control, state.softness[world])
             write_constants(K, chain)
+            if wp.static(tilts):
+                write_felt_plane(K, P)
             write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
             K[chain_values, layout.VALUE_OPENING] = state.extremes[world, layout.OPENING]
             K[chain_values, layout.VALUE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
@@ -223,6 +233,11 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 if pairs > wp.static(lists.capacity):
                     status = int(LIST_OVERFLOW)
         reach = time_to_contact(control, pairs, proximity.gap, slack, proximity.speed)
+        if wp.static(tilts):
+            if is_fresh:
+                barrier()  # all have read the ends
+                sum_up(K, P, M, place)
+                barrier()
         if not is_fresh:
             # Kept from the last launch, since recomputing could round differently.
             reach = wp.float32(state.time_to_contact[world])
@@ -270,6 +285,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if reaches_stop:
                 h = stop_time - time
 
+            if wp.static(tilts):
+                begin_step(K, P, place, h)
             tolerance = K[chain_values, layout.VALUE_TOLERANCE]
             result = attempt(ends, forces, maxima_start, K, place, h)
             own_error = int(0)
@@ -316,6 +333,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     K[chain_values, layout.VALUE_OPENING] = wp.max(
                         K[chain_values, layout.VALUE_OPENING], wp.float64(opening)
                     )
+                if wp.static(tilts):
+                    if lane == 0:
+                        accept_plane(P)
+                    sum_up(K, P, M, place)
                 is_hit = bool(False)
                 is_near = bool(False)
                 is_stale = bool(False)
@@ -323,7 +344,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 if wp.static(has_fixed):
                     if gap < wp.float32(0.0):
                         is_near = bool(True)
-                        if lane < n:
+                        if wp.static(tilts):
+                            hits = meet_tilting_floor(K, P, M, contact_constants(K, n), place)
+                        elif lane < n:
                             hits = meet_fixed_body(K, place, contact_constants(K, n), drive, world, time)
                         if hits > 0:
                             wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
@@ -364,6 +387,13 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                             if not is_hit:
                                 is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
                 reach = time_to_contact(control, pairs, gap, slack, proximity.speed)
+                if wp.static(tilts):
+                    if is_hit:
+                        barrier()  # contacts have left the memory of the sums
+                        sum_up(K, P, M, place)
+                        barrier()
+                    if lane == 0:
+                        half_step(P, 0, 0, K[chain_values, layout.VALUE_GRAVITY], h)
                 if is_hit or wp.static(not reuses_last):
                     if is_hit:
                         next_end = exchange_ends(ends, place, read_link(K, lane))
@@ -384,7 +414,12 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 row += 1
         if lane == 0:
             if is_last:
-                write_sample(state, record, world, time, summarise(K, present(model, state, control, world)))
+                last = present(model, state, control, world)
+                flat = summarise(K, last)
+                if wp.static(tilts):
+                    write_tilting_sample(P, state, record, world, time, flat, in_room(K, P, last, flat))
+                else:
+                    write_sample(state, record, world, time, flat)
             store_losses(K, state, world, n, wp.static(fixed_loss))
             add_count(state, world, layout.ACCEPTED, wp.int64(accepted))
             add_count(state, world, layout.REJECTED, wp.int64(attempts - accepted))

@@ -43,7 +43,7 @@ def block_sample(features: Features, touch: TouchLayout):
     """
     softens = features.softens
     is_driven = features.is_driven
-    sample = sampling(features.watch, softens)
+    sample = sampling(features.watch, softens, features.tilts)
     present = present_chain(softens, is_driven)
 
     @wp.func

@@ -17,6 +17,7 @@ from warpchain.kernels.methods.controller import error_scale, quick_quotient
 from warpchain.kernels.physics.elementary import order_bits_single
 from warpchain.kernels.physics.geometry import end_positions, end_velocities
 from warpchain.kernels.physics.joint import friction_torque, joint_force, link_acceleration
+from warpchain.kernels.physics.plane import plane_load
 from warpchain.kernels.types import Chain
 
 wp.set_module_options({"enable_backward": False})
@@ -146,6 +147,20 @@ def joint_constants(K: wp.array2d(dtype=wp.float64)) -> Chain:
 
 
 @wp.func
+def felt_plane(K: wp.array2d(dtype=wp.float64), own: Chain, first: int) -> Chain:
+    """The chain on the plane whose values begin at this place of the board's values."""
+    chain = own
+    chain.plane_speed = K[layout.BOARD_VALUES, first]
+    chain.turn_x = K[layout.BOARD_VALUES, first + 1]
+    chain.turn_y = K[layout.BOARD_VALUES, first + 2]
+    chain.up_x = K[layout.BOARD_VALUES, first + 3]
+    chain.up_y = K[layout.BOARD_VALUES, first + 4]
+    chain.up_z = K[layout.BOARD_VALUES, first + 5]
+    chain.origin_height = K[layout.BOARD_VALUES, first + 6]
+    return chain
+
+
+@wp.func
 def greater(error_a: wp.float64, scale_a: wp.float64, error_b: wp.float64, scale_b: wp.float64):
     """The greater of two quotients |error| / scale with positive scales; a NaN is the greatest."""
     keeps_a = wp.abs(error_a) * scale_b >= wp.abs(error_b) * scale_a or error_a != error_a
@@ -208,11 +223,12 @@ def greatest_velocity_error(link: Link, first: Rates, h: wp.float64, eu: wp.floa
 
 
 @functools.cache
-def block_stage(block_dim: int):
+def block_stage(block_dim: int, tilts: bool = False):
     """Warp functions for blocks of this size: (exchange ends, evaluate a stage).
 
     Args:
         block_dim: Threads in a block.
+        tilts: Whether the plane of the chain may move; what links feel of it lies on the board.
 
     Returns:
         ``exchange_ends(ends, place, link)`` → left end of the next link;
@@ -254,7 +270,8 @@ def block_stage(block_dim: int):
         damping = cu * cu + cv * cv
         forces[place.lane] = vec3d(force_x, force_y, torque)
         left = forces[place.before]
-        chain.gravity = K[layout.BOARD_VALUES, layout.VALUE_GRAVITY]
+        if wp.static(not tilts):
+            chain.gravity = K[layout.BOARD_VALUES, layout.VALUE_GRAVITY]
         rates = Rates()
         ax, ay, at = link_acceleration(
             chain,
@@ -269,6 +286,13 @@ def block_stage(block_dim: int):
             left[2],
             torque,
         )
+        if wp.static(tilts):
+            chain.gravity = K[layout.BOARD_VALUES, layout.VALUE_GRAVITY]
+            felt = felt_plane(K, chain, wp.static(layout.VALUE_PLANE))
+            load_x, load_y, load_turn = plane_load(felt, link.x, link.y, link.arm_x, link.arm_y)
+            ax += load_x
+            ay += load_y
+            at += load_turn
         rates.x = ax
         rates.y = ay
         rates.theta = at

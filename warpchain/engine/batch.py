@@ -219,7 +219,8 @@ class Batch:
     def set_plane(self, world: int, plane: Array) -> None:
         """Set the plane of a world's chain, which tilts: (PLANE_VALUES,), see :mod:`warpchain.kernels.layout`."""
         self._edit(self.state.plane)[world] = 0.0
-        self._edit(self.state.plane)[world, : layout.PLANE_VALUES] = plane
+        for first in (0, layout.PLANE_MID):
+            self._edit(self.state.plane)[world, first : first + layout.PLANE_VALUES] = plane
 
     def plane(self, world: int) -> Array:
         """The plane of a world's chain, if it tilts: (PLANE_VALUES,), see :mod:`warpchain.kernels.layout`."""

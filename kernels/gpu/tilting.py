@@ -1,0 +1,249 @@
+"""A chain whose plane may tilt, in a block of threads: see :mod:`cpu.tilting`.
+
+The first thread of the block moves the plane, in one row of :attr:`State.plane`. What the links feel of it lies on the
+board. Sums over the links are those of the hardware warps, added up by the first thread, and round otherwise than on a CPU.
+"""
+
+import functools
+
+import warp as wp
+
+from warpchain.kernels import layout
+from warpchain.kernels.contacts.tilting_floor import (
+    copy_inverse,
+    link_touches,
+    meet_tilting_floor,
+    push_plane_by,
+    steepness,
+)
+from warpchain.kernels.gpu.board import ends_of
+from warpchain.kernels.gpu.stage import Place, felt_plane, read_link
+from warpchain.kernels.gpu.threads import barrier, warp_width
+from warpchain.kernels.layout import (
+    BOARD_FIRST,
+    BOARD_VALUES,
+    COSINE,
+    INERTIA,
+    INVERSE_INERTIA,
+    INVERSE_MASS,
+    MASS,
+    OMEGA,
+    ORIGIN,
+    PLANE_MID,
+    PLANE_SPEED,
+    PLANE_TURN_X,
+    PLANE_TURN_Y,
+    SINE,
+    SUM_COUNT,
+    U,
+    UP,
+    V,
+    VALUE_PLANE,
+    VALUE_PLANE_BEFORE,
+    X,
+    Y,
+)
+from warpchain.kernels.physics.elementary import ZERO
+from warpchain.kernels.physics.plane import (
+    half_step,
+    invert_plane_mass,
+    on_plane,
+    plane_load,
+    plane_terms,
+)
+from warpchain.kernels.types import Chain
+
+wp.set_module_options({"enable_backward": False})
+
+FELT = 7
+"""Values of a plane that lie on the board: u, ω1, ω2, the three of up, and the height of the origin."""
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    for (int offset = 16; offset > 0; offset >>= 1) {
+        x += __shfl_xor_sync(0xffffffffu, x, offset);
+    }
+    if ((lane & 31) == 0) {
+        memory.data[slot * (block_dim / 32) + lane / 32] = x;
+    }
+#else
+    if (lane == 0) {
+        memory.data[slot] = 0.0;
+    }
+    memory.data[slot] += x;
+#endif
+""")
+def add_up(memory: wp.array(dtype=wp.float64), slot: int, lane: int, block_dim: int, x: wp.float64):
+    """Writes the sums of x over each hardware warp; fibers, which run one after the other, add to one number.
+
+    After a barrier :func:`added_up` reads the sum over the block.
+    """
+    ...
+
+
+@wp.func
+def added_up(memory: wp.array(dtype=wp.float64), slot: int, block_dim: int):
+    """The sum over all threads of the block."""
+    if warp_width() == 1:
+        return memory[slot]
+    warps = block_dim // 32
+    total = ZERO
+    i = int(0)
+    while i < warps:
+        total += memory[slot * warps + i]
+        i += 1
+    return total
+
+
+@wp.func
+def write_felt_plane(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64)):
+    """Writes the plane of the middle of the step on the board; what lay there becomes that of the attempt before."""
+    for k in range(wp.static(FELT)):
+        K[BOARD_VALUES, VALUE_PLANE_BEFORE + k] = K[BOARD_VALUES, VALUE_PLANE + k]
+    K[BOARD_VALUES, VALUE_PLANE] = P[PLANE_MID + PLANE_SPEED]
+    K[BOARD_VALUES, VALUE_PLANE + 1] = P[PLANE_MID + PLANE_TURN_X]
+    K[BOARD_VALUES, VALUE_PLANE + 2] = P[PLANE_MID + PLANE_TURN_Y]
+    for k in range(3):
+        K[BOARD_VALUES, VALUE_PLANE + 3 + k] = P[PLANE_MID + UP + k]
+    K[BOARD_VALUES, VALUE_PLANE + 6] = P[PLANE_MID + ORIGIN + 1]
+
+
+@wp.func
+def shift_first_stage(K: wp.array2d(dtype=wp.float64), lane: int):
+    """Changes a link's first stage on the board from the plane of the attempt before to that of this one."""
+    own = Chain()
+    own.gravity = K[BOARD_VALUES, layout.VALUE_GRAVITY]
+    own.half_length = K[BOARD_VALUES, layout.VALUE_HALF_LENGTH]
+    link = read_link(K, lane)
+    now = felt_plane(K, own, VALUE_PLANE)
+    before = felt_plane(K, own, VALUE_PLANE_BEFORE)
+    ax, ay, turn = plane_load(now, link.x, link.y, link.arm_x, link.arm_y)
+    old_ax, old_ay, old_turn = plane_load(before, link.x, link.y, link.arm_x, link.arm_y)
+    K[BOARD_FIRST, lane] = K[BOARD_FIRST, lane] + (ax - old_ax)
+    K[BOARD_FIRST + 1, lane] = K[BOARD_FIRST + 1, lane] + (ay - old_ay)
+    K[BOARD_FIRST + 2, lane] = K[BOARD_FIRST + 2, lane] + (turn - old_turn)
+
+
+@functools.cache
+def block_tilting(block_dim: int):
+    """Warp functions of a plane for blocks of this size: (begin a step, sum up, meet the floor).
+
+    Returns:
+        ``begin(K, P, place, h)`` moves the plane to the middle of a step, and the first stage with it;
+        ``sum_up(K, P, M, place)`` writes the sums over the links into P; ``meet(K, P, M, chain, place)`` applies the
+        impulses between rollers and floor → number of those of this thread. M is memory that all threads share and
+        that nobody reads meanwhile. Each passes barriers, and there must be one before M is used otherwise.
+    """
+    count_slot, contact_slot = SUM_COUNT, SUM_COUNT + 1
+
+    @wp.func
+    def begin(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), place: Place, h: wp.float64):
+        if place.lane == 0:
+            half_step(P, 0, wp.static(PLANE_MID), K[BOARD_VALUES, layout.VALUE_GRAVITY], h)
+            write_felt_plane(K, P)
+        barrier()
+        if place.lane < place.links:
+            shift_first_stage(K, place.lane)
+
+    @wp.func
+    def sum_up(
+        K: wp.array2d(dtype=wp.float64),
+        P: wp.array(dtype=wp.float64),
+        M: wp.array(dtype=wp.float64),
+        place: Place,
+    ):
+        lane = place.lane
+        chain = Chain()
+        chain.half_width = K[BOARD_VALUES, layout.VALUE_HALF_WIDTH]
+        mass = ZERO
+        inertia = ZERO
+        if lane < place.links:
+            mass = K[MASS, lane]
+            inertia = K[INERTIA, lane]
+        terms = plane_terms(
+            chain, mass, inertia, K[X, lane], K[Y, lane], K[U, lane], K[V, lane], K[OMEGA, lane], K[COSINE, lane], K[SINE, lane]
+        )
+        for k in range(wp.static(SUM_COUNT)):
+            add_up(M, k, lane, wp.static(block_dim), terms[k])
+        barrier()
+        if lane == 0:
+            for k in range(wp.static(SUM_COUNT)):
+                P[wp.static(layout.PLANE_SUMS + k)] = added_up(M, k, wp.static(block_dim))
+            invert_plane_mass(P)
+
+    @wp.func
+    def meet(
+        K: wp.array2d(dtype=wp.float64),
+        P: wp.array(dtype=wp.float64),
+        M: wp.array(dtype=wp.float64),
+        own: Chain,
+        place: Place,
+    ):
+        lane = place.lane
+        barrier()  # the plane and its mass are those of the new state
+        chain = on_plane(own, P, 0)
+        slope = steepness(chain)
+        link = read_link(K, lane)
+        left_x, left_y, right_x, right_y = ends_of(link)
+        touches = wp.int64(0)
+        if lane < place.links:
+            touches = link_touches(
+                chain, slope, left_x, left_y, right_x, right_y, link.x, link.y, link.u, link.v, link.omega
+            )
+        add_up(M, wp.static(count_slot), lane, wp.static(block_dim), wp.float64(touches))
+        barrier()
+        touching = added_up(M, wp.static(count_slot), wp.static(block_dim))
+        hits = int(0)
+        if touching > ZERO:
+            push = ZERO
+            moment_x = ZERO
+            moment_y = ZERO
+            work = ZERO
+            if touches > wp.int64(0):
+                met = meet_tilting_floor(
+                    chain,
+                    slope,
+                    copy_inverse(P, touching),
+                    left_x,
+                    left_y,
+                    right_x,
+                    right_y,
+                    link.x,
+                    link.y,
+                    K[INVERSE_MASS, lane],
+                    K[INVERSE_INERTIA, lane],
+                    link.u,
+                    link.v,
+                    link.omega,
+                )
+                K[U, lane] = met.u
+                K[V, lane] = met.v
+                K[OMEGA, lane] = met.omega
+                K[layout.BOARD_LOST_FIXED, lane] = K[layout.BOARD_LOST_FIXED, lane] + met.lost
+                push = met.push
+                moment_x = met.moment_x
+                moment_y = met.moment_y
+                work = (
+                    (met.plane_speed - chain.plane_speed) * push
+                    + (met.turn_x - chain.turn_x) * moment_x
+                    + (met.turn_y - chain.turn_y) * moment_y
+                )
+                hits = int(met.hits)
+            add_up(M, wp.static(contact_slot), lane, wp.static(block_dim), push)
+            add_up(M, wp.static(contact_slot + 1), lane, wp.static(block_dim), moment_x)
+            add_up(M, wp.static(contact_slot + 2), lane, wp.static(block_dim), moment_y)
+            add_up(M, wp.static(contact_slot + 3), lane, wp.static(block_dim), work)
+            barrier()
+            if lane == 0:
+                lost = push_plane_by(
+                    P,
+                    added_up(M, wp.static(contact_slot), wp.static(block_dim)),
+                    added_up(M, wp.static(contact_slot + 1), wp.static(block_dim)),
+                    added_up(M, wp.static(contact_slot + 2), wp.static(block_dim)),
+                    added_up(M, wp.static(contact_slot + 3), wp.static(block_dim)),
+                )
+                K[layout.BOARD_LOST_FIXED, 0] = K[layout.BOARD_LOST_FIXED, 0] + lost
+        return hits
+
+    return begin, sum_up, meet
