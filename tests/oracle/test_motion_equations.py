@@ -8,23 +8,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.impulse_cases import UNIT
+from tests.support.mild_parameters import MILD, SILENT
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.oracle import motion_equations
 from warpchain.oracle.circular_loop import circular_loop
 
 PAPER = preset("paper")
-MILD = PAPER.with_values(
-    {
-        "joint_stiffness": 1e5,
-        "joint_damping": 0.5,
-        "friction_smoothing": 5.0,
-        "viscous_friction": 9e-4,
-        "coulomb_friction": 1e-3,
-    }
-)
-"""Soft and dissipative: every term of the equations matters within milliseconds."""
-SILENT = MILD.with_values({"joint_damping": 0.0, "viscous_friction": 0.0, "coulomb_friction": 0.0})
-"""MILD without dissipation."""
 
 
 def disturbed_loop(n: int, parameters: Parameters, seed: int = 1):

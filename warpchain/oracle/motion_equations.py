@@ -11,6 +11,7 @@ Conventions of all functions:
 Source: "A walking roller chain", section 2.1.
 """
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -170,32 +171,57 @@ def solve_flight(
         ValueError: `times` is not a strictly increasing sequence, or the start is not finite.
         RuntimeError: the solver failed.
     """
-    try:
-        from scipy.integrate import solve_ivp
-    except ImportError as error:
-        raise ImportError("solve_flight needs SciPy: pip install 'warpchain[scipy]'") from error
-
-    times = np.asarray(times, dtype=np.float64)
-    if times.ndim != 1 or len(times) == 0 or not np.all(np.diff(times) > 0):
-        raise ValueError("times must be a strictly increasing sequence of at least one time")
     n = len(position)
 
     def derivative(_: float, state: Array) -> Array:
         x, v = state.reshape(2, n, 3)
         return np.concatenate([v, acceleration(x, v, parameters, gravity=gravity)]).ravel()
 
-    states = np.empty((len(times), 2, n, 3))
-    states[0] = position, velocity
+    start = np.stack([position, velocity]).ravel()
+    states, evaluations = integrated(derivative, start, times, rtol=rtol, atol=atol, method=method)
+    motion = states.reshape(-1, 2, n, 3)
+    return motion[:, 0], motion[:, 1], evaluations
+
+
+def integrated(
+    derivative: Callable[[float, Array], Array], start: Array, times: Array, *, rtol: float, atol: float, method: str
+) -> tuple[Array, int]:
+    """Integrate any first-order equations with `scipy.integrate.solve_ivp`, as `solve_flight` does.
+
+    Args:
+        derivative: of the state, from time (s) and state (d,).
+        start: state (d,) at `times[0]`.
+        times: (t,), s, strictly increasing. Every one ends an integration, so that no result is interpolated.
+        rtol: relative tolerance of `solve_ivp`.
+        atol: absolute tolerance of `solve_ivp`.
+        method: method of `solve_ivp`.
+
+    Returns:
+        states (t, d) and the number of evaluations of `derivative`.
+
+    Raises:
+        ImportError: SciPy is not installed.
+        ValueError: `times` is not a strictly increasing sequence, or the start is not finite.
+        RuntimeError: the solver failed.
+    """
+    try:
+        from scipy.integrate import solve_ivp
+    except ImportError as error:
+        raise ImportError("a flight needs SciPy: pip install 'warpchain[scipy]'") from error
+
+    times = np.asarray(times, dtype=np.float64)
+    if times.ndim != 1 or len(times) == 0 or not np.all(np.diff(times) > 0):
+        raise ValueError("times must be a strictly increasing sequence of at least one time")
+    states = np.empty((len(times), len(start)))
+    states[0] = start
     evaluations = 0
     for step, span in enumerate(pairwise(times)):
-        solution = solve_ivp(
-            derivative, span, states[step].ravel(), method=method, t_eval=[span[1]], rtol=rtol, atol=atol
-        )
+        solution = solve_ivp(derivative, span, states[step], method=method, t_eval=[span[1]], rtol=rtol, atol=atol)
         evaluations += int(solution.nfev)
         if not solution.success or not np.all(np.isfinite(solution.y)):
             raise RuntimeError(f"{method} failed between {span[0]} s and {span[1]} s: {solution.message}")
-        states[step + 1] = solution.y[:, -1].reshape(2, n, 3)
-    return states[:, 0], states[:, 1], evaluations
+        states[step + 1] = solution.y[:, -1]
+    return states, evaluations
 
 
 def _alternating(n: int, inner: float, outer: float) -> Array:
