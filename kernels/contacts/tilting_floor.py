@@ -37,7 +37,8 @@ from warpchain.kernels.types import Chain
 
 wp.set_module_options({"enable_backward": False})
 
-SMALLEST = wp.constant(wp.float64(1e-300))
+SMALLEST = wp.constant(wp.float64(1e-12))
+"""Least ρ: a plane that lies flat has no direction q, and touches with the middle of its faces."""
 
 
 @wp.struct
@@ -278,12 +279,9 @@ def meet_tilting_floor(
 ) -> TiltingLink:
     """One link against the floor, its left roller first, together with its copy of the plane."""
     link = with_copy(chain, u, v, omega)
-    link = meet_roller(
-        chain, slope, B, link, inverse_mass, inverse_inertia, left_x, left_y, left_x - x, left_y - y
-    )
-    return meet_roller(
-        chain, slope, B, link, inverse_mass, inverse_inertia, right_x, right_y, right_x - x, right_y - y
-    )
+    link = meet_roller(chain, slope, B, link, inverse_mass, inverse_inertia, left_x, left_y, left_x - x, left_y - y)
+    return meet_roller(chain, slope, B, link, inverse_mass, inverse_inertia, right_x, right_y, right_x - x, right_y - y)
+
 
 @wp.func
 def push_plane_by(

@@ -60,9 +60,7 @@ def across_speed(P: wp.array(dtype=wp.float64), x: wp.float64, y: wp.float64):
 
 
 @wp.func
-def in_room(
-    K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), chain: Chain, flat: Summary
-) -> Summary:
+def in_room(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), chain: Chain, flat: Summary) -> Summary:
     """Sums in the room, from those in the plane; height, width and speed of the loop stay those in the plane."""
     n = chain.link_count
     square = flat.rms_speed * flat.rms_speed * wp.float64(n)
@@ -104,7 +102,13 @@ def write_plane(row: wp.array(dtype=wp.float64), P: wp.array(dtype=wp.float64), 
 
 @wp.func
 def write_tilting_sample(
-    P: wp.array(dtype=wp.float64), state: State, record: Record, world: int, time: wp.float64, flat: Summary, seen: Summary
+    P: wp.array(dtype=wp.float64),
+    state: State,
+    record: Record,
+    world: int,
+    time: wp.float64,
+    flat: Summary,
+    seen: Summary,
 ):
     """Writes a sample: the sums in the room (``seen``), and the plane."""
     if state.last_sample[world, TIME] < ZERO:

@@ -68,14 +68,11 @@ FELT = 7
         memory.data[slot * (block_dim / 32) + lane / 32] = x;
     }
 #else
-    if (lane == 0) {
-        memory.data[slot] = 0.0;
-    }
-    memory.data[slot] += x;
+    memory.data[slot * block_dim + lane] = x;
 #endif
 """)
 def add_up(memory: wp.array(dtype=wp.float64), slot: int, lane: int, block_dim: int, x: wp.float64):
-    """Writes the sums of x over each hardware warp; fibers, which run one after the other, add to one number.
+    """Writes the sums of x over each hardware warp; a fiber is a warp of its own, and has memory for five slots.
 
     After a barrier :func:`added_up` reads the sum over the block.
     """
@@ -85,9 +82,7 @@ def add_up(memory: wp.array(dtype=wp.float64), slot: int, lane: int, block_dim: 
 @wp.func
 def added_up(memory: wp.array(dtype=wp.float64), slot: int, block_dim: int):
     """The sum over all threads of the block."""
-    if warp_width() == 1:
-        return memory[slot]
-    warps = block_dim // 32
+    warps = block_dim // warp_width()
     total = ZERO
     i = int(0)
     while i < warps:
@@ -125,6 +120,29 @@ def shift_first_stage(K: wp.array2d(dtype=wp.float64), lane: int):
     K[BOARD_FIRST + 2, lane] = K[BOARD_FIRST + 2, lane] + (turn - old_turn)
 
 
+@wp.func
+def terms_of(K: wp.array2d(dtype=wp.float64), i: int):
+    """The part of link i in the sums for its plane."""
+    chain = Chain()
+    chain.half_width = K[BOARD_VALUES, layout.VALUE_HALF_WIDTH]
+    return plane_terms(
+        chain, K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[U, i], K[V, i], K[OMEGA, i], K[COSINE, i], K[SINE, i]
+    )
+
+
+@wp.func
+def sum_one_by_one(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), n: int):
+    """Writes the sums over all links, by one thread."""
+    for k in range(wp.static(SUM_COUNT)):
+        P[wp.static(layout.PLANE_SUMS + k)] = ZERO
+    i = int(0)
+    while i < n:
+        terms = terms_of(K, i)
+        for k in range(wp.static(SUM_COUNT)):
+            P[wp.static(layout.PLANE_SUMS + k)] = P[wp.static(layout.PLANE_SUMS + k)] + terms[k]
+        i += 1
+
+
 @functools.cache
 def block_tilting(block_dim: int):
     """Warp functions of a plane for blocks of this size: (begin a step, sum up, meet the floor).
@@ -135,12 +153,14 @@ def block_tilting(block_dim: int):
         impulses between rollers and floor → number of those of this thread. M is memory that all threads share and
         that nobody reads meanwhile. Each passes barriers, and there must be one before M is used otherwise.
     """
-    count_slot, contact_slot = SUM_COUNT, SUM_COUNT + 1
+    count_slot, contact_slot, sum_slot = 0, 1, 5
 
     @wp.func
     def begin(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), place: Place, h: wp.float64):
         if place.lane == 0:
             half_step(P, 0, wp.static(PLANE_MID), K[BOARD_VALUES, layout.VALUE_GRAVITY], h)
+        barrier()  # all have evaluated the first stage
+        if place.lane == 0:
             write_felt_plane(K, P)
         barrier()
         if place.lane < place.links:
@@ -154,22 +174,19 @@ def block_tilting(block_dim: int):
         place: Place,
     ):
         lane = place.lane
-        chain = Chain()
-        chain.half_width = K[BOARD_VALUES, layout.VALUE_HALF_WIDTH]
-        mass = ZERO
-        inertia = ZERO
-        if lane < place.links:
-            mass = K[MASS, lane]
-            inertia = K[INERTIA, lane]
-        terms = plane_terms(
-            chain, mass, inertia, K[X, lane], K[Y, lane], K[U, lane], K[V, lane], K[OMEGA, lane], K[COSINE, lane], K[SINE, lane]
-        )
-        for k in range(wp.static(SUM_COUNT)):
-            add_up(M, k, lane, wp.static(block_dim), terms[k])
+        if warp_width() > 1:
+            terms = terms_of(K, place.column)
+            for k in range(wp.static(SUM_COUNT)):
+                add_up(
+                    M, wp.static(sum_slot + k), lane, wp.static(block_dim), wp.where(lane < place.links, terms[k], ZERO)
+                )
         barrier()
         if lane == 0:
-            for k in range(wp.static(SUM_COUNT)):
-                P[wp.static(layout.PLANE_SUMS + k)] = added_up(M, k, wp.static(block_dim))
+            if warp_width() > 1:
+                for k in range(wp.static(SUM_COUNT)):
+                    P[wp.static(layout.PLANE_SUMS + k)] = added_up(M, wp.static(sum_slot + k), wp.static(block_dim))
+            else:
+                sum_one_by_one(K, P, place.links)
             invert_plane_mass(P)
 
     @wp.func

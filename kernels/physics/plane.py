@@ -194,9 +194,7 @@ def turn_axis(P: wp.array(dtype=wp.float64), start: int, slope: int, target: int
 
 
 @wp.func
-def push_plane(
-    P: wp.array(dtype=wp.float64), start: int, slope: int, target: int, gravity: wp.float64, h: wp.float64
-):
+def push_plane(P: wp.array(dtype=wp.float64), start: int, slope: int, target: int, gravity: wp.float64, h: wp.float64):
     """Writes at ``target`` the plane at ``start`` and h times its rates at ``slope``; target may be either of them."""
     du, d1, d2 = plane_rates(P, gravity, slope)
     speed = P[slope + PLANE_SPEED]

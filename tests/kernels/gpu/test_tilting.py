@@ -1,0 +1,94 @@
+"""A chain whose plane tilts: GPU kernels against CPU kernels, and in any cut."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.kernels.gpu.test_same_as_cpu import compiles_for_gpus
+from tests.support.blocks_under_test import SOFT, exact_kernels, launch_blocks, launch_chains
+from warpchain.engine.batch import Batch
+from warpchain.inputs.options import Options
+from warpchain.inputs.start_shapes import ellipse, lay_chain
+from warpchain.kernels import layout
+from warpchain.kernels.features import Features
+from warpchain.status import Status
+
+LINKS = (20, 38)
+
+
+def falling_batch(method: str, fixed_step: float | None = None) -> Batch:
+    """Two circulating loops in planes that lean and turn, which have sunk into the floor a little."""
+    batch = Batch(
+        2,
+        max(LINKS),
+        Options(method=method, tolerance=1e-5 if fixed_step is None else 0.1),
+        keeps_samples=True,
+        frame_every=1,
+        tilts=True,
+    )
+    batch.control.launch_time = 1e9
+    if fixed_step is not None:
+        batch.control.skin, batch.control.contact_step = 1e-9, fixed_step
+    for world, links in enumerate(LINKS):
+        position, velocity = lay_chain(ellipse(1.0), links, SOFT.link_length, 3.0)
+        position[:, 1] += links * SOFT.link_length / (2 * np.pi) + SOFT.circle_radius - 0.004
+        batch.set_chain(world, SOFT, links)
+        batch.load(world, position, velocity, stop_time=0.05, stop_status=Status.TIME_LIMIT)
+        tilt = 0.05 * (1 + world)
+        if fixed_step is not None:
+            batch.state.step.numpy()[world] = fixed_step
+        batch.set_plane(
+            world,
+            np.array([0.2, -1.0, 0.5, 1, 0, 0, 0, np.cos(tilt), np.sin(tilt), 0, 0.001 + SOFT.half_width * tilt, 0]),
+        )
+    return batch
+
+
+def features_of(batch: Batch) -> Features:
+    """Those of a walk whose plane tilts."""
+    return batch.features(fixed_body="floor", watch="rest", tilts=True)
+
+
+@pytest.mark.parametrize("method", ["dp5", "bs32", "os32"])
+def test_a_gpu_kernel_tilts_as_a_cpu_kernel_does(method: str) -> None:
+    """Through first impulses both find the same links and planes, but for the order in which sums are added up."""
+    with exact_kernels():
+        one, other = (falling_batch(method, 2e-6) for _ in range(2))
+        launch_chains(one, features_of(one), 60)
+        launch_blocks(other, features_of(other), 60, block_dim=64)
+    for world in range(2):
+        assert one.counts(world) == other.counts(world)
+        assert one.counts(world)["floor"] > 0
+        assert one.time(world) == pytest.approx(other.time(world), rel=1e-12)
+        np.testing.assert_allclose(one.position(world), other.position(world), rtol=0, atol=1e-11)
+        np.testing.assert_allclose(one.velocity(world), other.velocity(world), rtol=0, atol=1e-7)
+        np.testing.assert_allclose(one.plane(world), other.plane(world), rtol=0, atol=1e-10)
+        np.testing.assert_allclose(one.drain_samples(world), other.drain_samples(world), rtol=1e-8, atol=1e-9)
+        losses = (list(batch.losses(world).values()) for batch in (one, other))
+        np.testing.assert_allclose(*losses, rtol=1e-7, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["chains", "blocks"])
+def test_cuts_change_no_bit(kind: str) -> None:
+    """A run of a tilting chain does not depend on how it is cut into launches."""
+    results = []
+    for attempts in (90, 7):
+        batch = falling_batch("os32")
+        for _ in range(0, 90, attempts):
+            left = min(attempts, 90 - batch.attempts(1))
+            if kind == "chains":
+                launch_chains(batch, features_of(batch), left)
+            else:
+                launch_blocks(batch, features_of(batch), left, block_dim=64)
+        assert batch.attempts(1) == 90
+        results.append((batch.position(1), batch.velocity(1), batch.plane(1), batch.drain_samples(1)))
+    for one, other in zip(*results, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("block_dim", [64])
+def test_it_compiles_for_gpus(tmp_path: Path, block_dim: int) -> None:
+    """The kernel of a tilting walk compiles for two generations of GPUs."""
+    features = Features("os32", layout.padded_width(60), "floor", True, "grid", "rest", softens=True, tilts=True)
+    compiles_for_gpus(tmp_path, features, block_dim)
