@@ -38,7 +38,6 @@ from warpchain.kernels.events.record import lacks_last_sample, record_is_full, w
 from warpchain.kernels.events.sample import sampling
 from warpchain.kernels.events.softening import book_softening, contact_step, spring_tolerance
 from warpchain.kernels.events.summary import summarise
-from warpchain.kernels.events.tilting import in_room, write_tilting_sample
 from warpchain.kernels.events.tallies import (
     add_count,
     attempts_made,
@@ -47,6 +46,7 @@ from warpchain.kernels.events.tallies import (
     of_fixed_body,
     raise_extreme,
 )
+from warpchain.kernels.events.tilting import in_room, write_tilting_sample
 from warpchain.kernels.features import COMPILER_FLAGS, Features
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step
 from warpchain.kernels.physics.elementary import ONE, ZERO

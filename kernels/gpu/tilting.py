@@ -35,11 +35,11 @@ from warpchain.kernels.layout import (
     PLANE_TURN_Y,
     SINE,
     SUM_COUNT,
-    U,
     UP,
-    V,
     VALUE_PLANE,
     VALUE_PLANE_BEFORE,
+    U,
+    V,
     X,
     Y,
 )

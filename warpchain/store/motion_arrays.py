@@ -3,8 +3,10 @@
 motion/walk            places of the walks in the folder, ascending
 motion/series_start    where the samples of each walk begin, and where the last one's end
 motion/time …          the samples, see `SERIES`
+motion/plane_start     likewise of the samples of walks whose plane tilts: motion/center_z, tilt, yaw
 motion/frame_start     likewise of the frames
 motion/frame_time      times of the frames [s]
+motion/frame_plane_start likewise of the planes of these frames: motion/origin_x …, x_axis_x …, y_axis_x …
 motion/joint_start     likewise of the joints
 motion/joint_x, _y     joints of all frames, frame by frame [m]
 motion/sprocket_height height of the sprocket's centre at the release [m]; NaN without a sprocket
@@ -19,14 +21,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.loop.before_release import read_before_release, write_before_release
-from warpchain.walks.motion import SERIES, Motion
+from warpchain.walks.motion import FRAME_PLANE, PLANE_SERIES, SERIES, Motion
 
 if TYPE_CHECKING:
     import h5py
 
 ARRAYS: Final = {
     "series": SERIES,
+    "plane": PLANE_SERIES,
     "frame": {"frame_time": ("s", "time of a frame since the release")},
+    "frame_plane": FRAME_PLANE,
     "joint": {
         "joint_x": ("m", "x of a joint in a frame"),
         "joint_y": ("m", "height of a joint in a frame above the floor"),
@@ -43,7 +47,9 @@ def flat_arrays(motion: Motion) -> dict[str, dict[str, NDArray[Any]]]:
     joints = motion.frame_joints.reshape(-1, 2)
     return {
         "series": {name: motion.series[:, column] for column, name in enumerate(SERIES)},
+        "plane": {name: motion.plane_series[:, column] for column, name in enumerate(PLANE_SERIES)},
         "frame": {"frame_time": motion.frame_time},
+        "frame_plane": {name: motion.frame_planes[:, column] for column, name in enumerate(FRAME_PLANE)},
         "joint": {"joint_x": joints[:, 0], "joint_y": joints[:, 1]},
     }
 
@@ -81,15 +87,17 @@ def read_motion(file: "h5py.File", place: int) -> Motion:
     """
     group = file[GROUP]
     (row,) = np.flatnonzero(group["walk"][()] == place)
-    series, (frame_time,), joints = (
+    series, plane_series, (frame_time,), frame_planes, joints = (
         [group[name][slice(*group[f"{kind}_start"][row : row + 2])] for name in columns]
         for kind, columns in ARRAYS.items()
     )
     shape = (len(frame_time), -1, 2) if len(frame_time) else (0, 0, 2)
     motion = Motion(
         series=np.stack(series, axis=-1),
+        plane_series=np.stack(plane_series, axis=-1),
         frame_time=frame_time,
         frame_joints=np.stack(joints, axis=-1).reshape(shape),
+        frame_planes=np.stack(frame_planes, axis=-1),
         sprocket_height=float(group["sprocket_height"][row]),
         before_release=read_before_release(group[f"{BEFORE}/{place}"]) if f"{BEFORE}/{place}" in group else None,
     )

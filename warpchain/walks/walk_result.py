@@ -27,6 +27,7 @@ from warpchain.inputs.setup import Setup
 from warpchain.loop.before_release import BeforeRelease, read_before_release, write_before_release
 from warpchain.pictures.walk_shape import Kind, Walk
 from warpchain.status import Status
+from warpchain.walks.moving_plane import in_room
 
 if TYPE_CHECKING:
     import h5py
@@ -162,6 +163,36 @@ class WalkResult(Drawn):
             "last watched; NaN if it never was",
         ),
     ]
+    lateral_drift: Annotated[
+        float, Stored("summary", "m", "z of the centre of mass at rest, to the right; NaN unless the plane tilts")
+    ]
+    final_tilt: Annotated[
+        float, Stored("summary", "rad", "tilt of the plane at the end, positive to the left; NaN if the plane is fixed")
+    ]
+    final_yaw: Annotated[
+        float, Stored("summary", "rad", "heading of the plane at the end, anticlockwise; NaN if the plane is fixed")
+    ]
+    greatest_tilt: Annotated[
+        float, Stored("summary", "rad", "greatest size of the tilt in the walk; NaN if the plane is fixed")
+    ]
+    fell_at: Annotated[
+        float, Stored("summary", "s", "from the release until the plane was first tilted by 45°; NaN if it never was")
+    ]
+    collapsed_at: Annotated[
+        float,
+        Stored(
+            "summary",
+            "s",
+            "from the release until the loop enclosed less than half of its area; NaN if it never did, or if the plane "
+            "is fixed",
+        ),
+    ]
+    fell_over: Annotated[
+        int, Stored("summary", "1", "1 if the plane was ever tilted by 45°, 0 if not; −1 if the plane is fixed")
+    ]
+    fell_before_collapse: Annotated[
+        int, Stored("summary", "1", "1 if it fell over before its loop collapsed, 0 if not; −1 if the plane is fixed")
+    ]
     softened_at: Annotated[
         float, Stored("summary", "s", "from the release to the softening of the joints; NaN if they were not")
     ]
@@ -192,7 +223,32 @@ class WalkResult(Drawn):
     frame_joints: Annotated[
         Array, Stored("frames", "m", "joints x, y, shape (f, n, 2); joint i ends link i, even links inner")
     ]
+    center_z: Annotated[
+        Array, Stored("series", "m", "centre of mass z, to the right, shape (t,); (0,) if the plane is fixed")
+    ]
+    tilt: Annotated[Array, Stored("series", "rad", "tilt of the plane, shape (t,); (0,) if the plane is fixed")]
+    yaw: Annotated[
+        Array,
+        Stored("series", "rad", "heading of the plane, all turns counted, shape (t,); (0,) if the plane is fixed"),
+    ]
+    frame_origin: Annotated[
+        Array,
+        Stored(
+            "frames", "m", "origin of the plane's coordinates in the room, shape (f, 3); (0, 3) if the plane is fixed"
+        ),
+    ]
+    frame_axes: Annotated[
+        Array,
+        Stored("frames", "1", "axes of x and y of the plane in the room, shape (f, 2, 3); (0, 2, 3) if it is fixed"),
+    ]
     before_release: BeforeRelease | None = None
+
+    @property
+    def joints_in_room(self) -> Array | None:
+        """Joints x, y, z [m] in the room, shape (f, n, 3), if the plane tilts; else None: `frame_joints` are in the room."""
+        if self.setup.scene.plane == "fixed":
+            return None
+        return in_room(self.frame_joints, self.frame_origin, self.frame_axes)
 
     def __post_init__(self) -> None:
         """Check that arrays and dictionaries fit together."""
@@ -201,6 +257,10 @@ class WalkResult(Drawn):
             name: (instants,) for name, stored in STORED.items() if stored.group == "series"
         }
         shapes["center"] = shapes["center_velocity"] = (instants, 2)
+        moving = self.setup.scene.plane == "tilting"
+        shapes["center_z"] = shapes["tilt"] = shapes["yaw"] = (instants if moving else 0,)
+        shapes["frame_origin"] = (frames if moving else 0, 3)
+        shapes["frame_axes"] = (frames if moving else 0, 2, 3)
         shapes["frame_time"] = (frames,)
         shapes["frame_joints"] = (frames, self.setup.scene.links, 2)
         links, before = self.setup.scene.links, self.before_release
