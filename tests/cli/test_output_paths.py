@@ -89,15 +89,16 @@ def test_what_no_path_has_is_refused(command: Command, word: str) -> None:
     assert content() == {}
 
 
-@pytest.mark.parametrize("line", OUTPUTS)
+@pytest.mark.parametrize("line", [*OUTPUTS, "bench -o {}"])
 def test_a_pipe_in_the_way_is_refused(command: Command, line: str) -> None:
     """No command waits for a pipe or replaces it; status 2, one line, nothing written."""
     prepare()
-    os.mkfifo(OUTPUTS[line])
+    name = OUTPUTS.get(line, "bench.json")
+    os.mkfifo(name)
     before = content()
-    answer = command(*line.format(OUTPUTS[line]).split())
-    assert_refused(answer, 2, OUTPUTS[line])
-    assert answer.out == "" and content() == before and Path(OUTPUTS[line]).is_fifo()
+    answer = command(*line.format(name).split())
+    assert_refused(answer, 2, name)
+    assert answer.out == "" and content() == before and Path(name).is_fifo()
 
 
 @pytest.mark.parametrize("line", OUTPUTS)

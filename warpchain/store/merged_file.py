@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 
 _AXES: Final = {"series": "instant", "frame": "frame", "joint": "joint"}
 """What is counted of a walk, see `ARRAYS` → name of the axis that it is along."""
-_ROOM: Final = 2**20
-"""Most bytes that a merged file takes beyond its shards, for the tables of axes."""
+_ROOM: Final = 2**19
+"""Most bytes that a block takes in a merged file beyond its rows and motions: 156 kB were seen."""
 _NO_VARIABLE: Final = "This is a netCDF dimension but not a netCDF variable."
 
 
@@ -64,9 +64,11 @@ def merge(directories: Folder | Sequence[Folder], path: str | os.PathLike[str]) 
         checked_output(target, _MERGED)
     _check_fit(folders)
     results = [load(folder) for folder in folders]
-    most = _ROOM * len(folders)
+    most = 0
     for folder in folders:
-        most += sum(path.stat().st_size for path in present_shards(folder, read_manifest(folder)).values())
+        manifest = read_manifest(folder)
+        most += _ROOM * len(manifest.blocks) + 2 * (Path(folder) / "sweep.json").stat().st_size  # texts and axes
+        most += sum(path.stat().st_size for path in present_shards(folder, manifest).values())
     with writing(target), replacing(target, _MERGED) as part, open_new_hdf5(part, most) as file:
         _fill(file, results)
 
