@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from warpchain.cli.output_paths import output_path
 from warpchain.cli.sweep_commands import SweepFile
 
 bench_app = typer.Typer()
@@ -45,7 +46,10 @@ def bench(
     ] = None,
     rounds: Annotated[int, typer.Option(metavar="N", min=1, help="Measurements of each; medians are printed.")] = 7,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FILE", help="Write what --json prints to this file, too.")
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FILE", parser=output_path, help="Write what --json prints to this file, too."
+        ),
     ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object, units in its keys or in s, instead of tables.")
@@ -57,12 +61,15 @@ def bench(
     from warpchain.bench.record import machine, plain
     from warpchain.cli.bench_tables import print_bench
     from warpchain.cli.terminal import status_line
+    from warpchain.files import checked_output, write_whole
     from warpchain.inputs.options import Options
     from warpchain.inputs.scene import Scene, check_links_on_gpu
     from warpchain.inputs.validation import InputError, validated
 
     where = validated(Options, {"device": device}, "bench").device
     lengths = [validated(Scene, {"links": count}, "bench").links for count in links or ()]
+    if output is not None:
+        checked_output(output)
     tables: dict[str, Sequence[object]]
     if where == "cpu":
         for option, value in (("--method", methods), ("--chains", chains), ("--scene", scenes)):
@@ -95,7 +102,7 @@ def bench(
         more = {"flops_per_attempt": {name: gpu_steps.flops_per_attempt(name) for name in gpu_steps.METHODS}}
     text = json.dumps(plain({"machine": about, **more, **tables}), indent=2, allow_nan=False)
     if output is not None:
-        output.write_text(text + "\n", encoding="utf-8")
+        write_whole(output, text + "\n")
     if as_json:
         print(text)
     else:
@@ -106,7 +113,13 @@ def bench(
 def accuracy(
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", metavar="DIR", help="Folder of the results; those of other parts are kept."),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="DIR",
+            parser=output_path,
+            help="Folder of the results; those of other parts are kept.",
+        ),
     ],
     parts: Annotated[
         str, typer.Option(metavar="NAME,…", help="Parts to run.")
@@ -203,7 +216,13 @@ def sweep(
     source: SweepFile,
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", metavar="DIR", help="Folder of the results, with a folder for each place."),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="DIR",
+            parser=output_path,
+            help="Folder of the results, with a folder for each place.",
+        ),
     ],
     devices: Annotated[
         str,

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from warpchain.cli.output_paths import output_path
+
 if TYPE_CHECKING:
     from warpchain.inputs.setup import Setup
     from warpchain.walks.walk_result import WalkResult
@@ -29,12 +31,13 @@ def plot_walk(path: Path, output: Path | None) -> bool:
     from typing import get_args
 
     from warpchain.cli.terminal import try_folder
+    from warpchain.files import make_folder
     from warpchain.pictures.style import save_figure
     from warpchain.pictures.walk_shape import Kind
 
     walk, folder, drawn = _saved_walk(path), path.parent if output is None else output, False
     try_folder(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     for kind in get_args(Kind):
         target = folder / f"{kind}.png"
         try:
@@ -55,7 +58,10 @@ def animate(
     output: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE", help="The file to write; its name ends in .gif, .mp4 or .html.", show_default=False
+            metavar="FILE",
+            parser=output_path,
+            help="The file to write; its name ends in .gif, .mp4 or .html.",
+            show_default=False,
         ),
     ],
     fps: Annotated[

@@ -11,6 +11,7 @@ A sweep grows when its file is given more samples: the walks that are there keep
 """
 
 import datetime
+import errno
 import fcntl
 import os
 import re
@@ -26,6 +27,7 @@ from typing import Final, Self
 import numpy as np
 import yaml
 
+from warpchain.files import failure, given_path
 from warpchain.inputs.validation import InputError
 from warpchain.store.manifest import NUMERICS_VERSION, OWN, Folder, Manifest, read_manifest
 from warpchain.store.shards import present_shards, put_file, read_shard, writing
@@ -88,7 +90,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         """
         if shard_size < 1:
             raise ValueError(f"shard_size: {shard_size} is not positive; give 1 or more")
-        path = Path(directory)
+        path = given_path(directory)
         with writing(path):
             path.mkdir(parents=True, exist_ok=True)
             lock = _locked(path)
@@ -146,9 +148,10 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             kept = sum(map(len, left)) / manifest.walk_count * manifest.kept_count
             need += round(kept * SHORT_WALK / series.interval * SAMPLE_BYTES)
         if need > free:
-            raise OSError(
+            raise failure(
+                errno.ENOSPC,
                 f"{self.directory}: the rest of the sweep takes {need / 1e6:.3g} MB, but {free / 1e6:.3g} MB are "
-                "free; make room and start again, shards written are kept"
+                "free; make room and start again, shards written are kept",
             )
 
     def _describe(self) -> None:

@@ -12,17 +12,17 @@ sweep leaves the same bytes however often it was killed.
 
 import errno
 import hashlib
-import io
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpchain.files import replacing
+from warpchain.files import NotReplaceable, failure, remedy, replacing
+from warpchain.hdf5_files import hdf5_image
 from warpchain.inputs.validation import InputError
 from warpchain.status import Status
 from warpchain.store.manifest import (
@@ -199,71 +199,18 @@ def present_shards(directory: Folder, manifest: Manifest) -> dict[range, Path]:
     return {places: folder / name for name, places in named.items() if name in names}
 
 
-def hdf5_image(fill: "Callable[[h5py.File], None]") -> bytes:
-    """The bytes of an HDF5 file that `fill` fills; equal content gives equal bytes.
-
-    The file is made in memory, because HDF5 fails badly on a full disk: it neither says what is wrong nor closes the
-    file.
-    """
-    import h5py
-
-    image = io.BytesIO()
-    with h5py.File(image, "w", **_FIXED) as file:
-        fill(file)
-    return image.getvalue()
-
-
-@contextmanager
-def open_new_hdf5(path: Path, most: int) -> "Iterator[h5py.File]":
-    """A new HDF5 file that may be too large for `hdf5_image`, with the same bytes.
-
-    Its space on the disk is reserved first, because HDF5 fails badly on a full disk. What is left over is given back.
-
-    Args:
-        path: the file, which may be there.
-        most: bytes that it takes at most.
-
-    Raises:
-        OSError: there is not enough room, or the file cannot be written.
-    """
-    import h5py
-
-    with path.open("w+b") as content, h5py.File(content, "w", **_FIXED) as file:
-        _take_room(content.fileno(), most)
-        yield file
-
-
-def _take_room(descriptor: int, size: int) -> None:
-    """Reserve space for a file, whose content stays; an `OSError` if the disk has too little."""
-    if hasattr(os, "posix_fallocate"):
-        os.posix_fallocate(descriptor, 0, size)
-        return
-    zeros, end = bytes(2**20), os.fstat(descriptor).st_size  # macOS
-    while end < size:
-        end += os.pwrite(descriptor, zeros[: size - end], end)
-
-
-_FIXED: Final[dict[str, Any]] = {"libver": ("v108", "v108"), "track_order": True}
-"""Version bounds without which equal content would not give equal bytes; they also leave out times."""
-
-_REMEDIES: Final = {
-    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "make room"),
-    **dict.fromkeys((errno.EROFS, errno.EACCES, errno.EPERM), "make the folder writable"),
-    **dict.fromkeys((errno.ENOENT, errno.ENOTDIR, errno.EEXIST), "give a folder that is there"),
-}
-
-
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
     """Turn an `OSError` of the `with` block into one of one line: the path cannot be written, why, and the remedy."""
     try:
         yield
+    except NotReplaceable:
+        raise
     except OSError as error:
-        number = error.errno or getattr(error.__cause__, "errno", None) or errno.EIO
-        remedy = _REMEDIES.get(number, "see to the disk")
-        raise OSError(
-            f"{path}: cannot be written ({os.strerror(number)}); {remedy} and start again, shards written are kept"
-        ) from error
+        number = error.errno or errno.EIO
+        problem = f"cannot be written ({os.strerror(number)})"
+        remedy_too = f"{remedy(number)} and start again, shards written are kept"
+        raise failure(number, f"{path}: {problem}; {remedy_too}") from error
 
 
 def put_file(path: Path, content: bytes) -> None:
@@ -273,7 +220,7 @@ def put_file(path: Path, content: bytes) -> None:
         OSError: the file cannot be written; one line that names it and the remedy.
     """
     with writing(path):
-        with replacing(path) as part:
+        with replacing(path, clear=False) as part:  # parts go when the folder is opened; it may have many names
             part.write_bytes(content)
         folder = os.open(path.parent, os.O_RDONLY)
         try:

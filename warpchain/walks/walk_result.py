@@ -19,7 +19,8 @@ from pydantic import ValidationError
 from pydantic_core import to_jsonable_python
 
 from warpchain.engine.tallies import COUNTS, DEPTHS, EXTREMES, IMPULSES, LOST
-from warpchain.files import reason, replacing, version_refusal
+from warpchain.files import reason, version_refusal, write_whole
+from warpchain.hdf5_files import hdf5_image
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
@@ -316,12 +317,9 @@ class WalkResult(Drawn):
         """Write the walk to an HDF5 file, whole or not at all; an older file of that name is replaced.
 
         Raises:
-            OSError: the file cannot be written; one line that names it.
+            OSError: the file cannot be written, or something else than a regular file is there; one line that names it.
         """
-        import h5py
-
-        with replacing(path) as part, h5py.File(part, "w") as file:
-            _write(self, file)
+        write_whole(path, hdf5_image(partial(_write, self)))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
