@@ -154,7 +154,7 @@ class Recorder:
         tilt, yaw = angles(samples[:, layout.PLANE_COLUMN :])
         return {"center_z": samples[:, layout.CENTER_Z], "tilt": tilt, "yaw": np.unwrap(yaw)}
 
-    def frame_planes(self) -> dict[str, Array]:
+    def frame_planes(self) -> dict[str, Any]:
         """Origin (f, 3) [m] and axes (f, 2, 3) of the plane in the room in each frame; f = 0 if the plane is fixed."""
         planes = np.concatenate([np.empty((0, layout.PLANE_VALUES)), *(self._planes if self._tilts else [])])
         return {"frame_origin": planes[:, layout.ORIGIN : layout.ORIGIN + 3], "frame_axes": frame_axes(planes)}
