@@ -2,11 +2,13 @@
 
 A saved walk has the groups `series` (time series), `frames` (joint positions), `summary` (numbers), `parameters` (the
 chain's quantities with their symbols) and, if that was kept, `before_release`; every dataset has its unit and meaning.
-The attributes `setup`, `seed` and `versions`, in JSON, say how to make the walk again.
+The attributes `setup`, `seed` and `versions`, in JSON, say how to make the walk again. Checksums stand at its end, see
+`warpchain.hdf5_files`.
 """
 
 import dataclasses
 import json
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,13 +21,14 @@ from pydantic import ValidationError
 from pydantic_core import to_jsonable_python
 
 from warpchain.engine.tallies import COUNTS, DEPTHS, EXTREMES, IMPULSES, LOST
-from warpchain.files import reason, version_refusal, write_whole
-from warpchain.hdf5_files import hdf5_image
+from warpchain.files import version_refusal, write_whole
+from warpchain.hdf5_files import ContentError, Contents, hdf5_image, put_text, reading_hdf5
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.setup import Setup
-from warpchain.loop.before_release import BeforeRelease, read_before_release, write_before_release
+from warpchain.inputs.validation import InputError
+from warpchain.loop.before_release import BeforeRelease, is_ascending, read_before_release, write_before_release
 from warpchain.pictures.walk_shape import Kind, Walk
 from warpchain.status import Status
 
@@ -37,7 +40,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 FORMAT: Final = "warpchain walk"
-FORMAT_VERSION: Final = 4
+FORMAT_VERSION: Final = 5
 
 BEFORE: Final = "before_release"
 
@@ -144,7 +147,8 @@ class WalkResult(Drawn):
     was not kept.
 
     Raises:
-        ValueError: an array has another shape, or a dictionary other keys, than stands beside its field.
+        ValueError: an array has another shape, or a dictionary other keys, than stands beside its field; or times do
+            not ascend.
     """
 
     status: Status
@@ -216,6 +220,9 @@ class WalkResult(Drawn):
         for name, stored in STORED.items():
             if stored.keys and set(getattr(self, name)) != set(stored.keys):
                 raise ValueError(f"{name}: wrong keys; give exactly {', '.join(stored.keys)}")
+        for name in ("time", "frame_time"):
+            if not is_ascending(getattr(self, name)):
+                raise ValueError(f"{name}: does not ascend; give finite times in order")
 
     def __repr__(self) -> str:
         """One line with the most important numbers."""
@@ -298,6 +305,21 @@ STORED: Final[dict[str, Stored]] = {
     if isinstance(note, Stored)
 }
 """Fields of `WalkResult` that a file keeps as datasets: name → where, in which unit, what."""
+_DIMENSIONS: Final = {
+    **{name: 1 for name, stored in STORED.items() if stored.group in ("series", "frames")},
+    **dict.fromkeys(("center", "center_velocity"), 2),
+    "frame_joints": 3,
+    "sprocket_center": 1,
+}
+"""Fields that are arrays: name → number of axes."""
+_KINDS: Final = {
+    item.name: np.dtype(
+        np.int64 if item.type is not None and get_args(item.type)[0] in (int, dict[str, int]) else float
+    )
+    for item in dataclasses.fields(WalkResult)
+    if item.name in STORED
+}
+"""Types of their numbers."""
 _PATHS: Final = {name: f"{stored.group}/{name.removeprefix('frame_')}" for name, stored in STORED.items()}
 
 
@@ -305,32 +327,23 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
     """Read a walk that `WalkResult.save` wrote; every number comes back to the bit.
 
     Raises:
-        OSError: the file cannot be opened.
-        ValueError: the file is no walk, is damaged, or belongs to another version of warpchain.
+        OSError: the file cannot be read.
+        InputError: the file is no walk, or belongs to another version of warpchain. It is a `ValueError`.
+        DamagedFileError: the file is damaged or cut short. It is an `InputError`.
     """
-    import h5py
-
-    try:
-        with open(path, "rb") as content:
-            content.read(1)
-    except OSError as error:
-        raise OSError(f"{path}: {reason(error)}; give the path of a readable walk file") from None
-    if not h5py.is_hdf5(path):
-        raise ValueError(f"{path}: not an HDF5 file; give a file written by WalkResult.save")
-    try:
-        with h5py.File(path, "r") as file:
-            if file.attrs.get("format") != FORMAT:
-                refusal = "HDF5, but not a walk; give a file written by WalkResult.save"
-            elif (found := version_refusal(file.attrs["format_version"], FORMAT_VERSION, "run the walk again")) is None:
-                return _read(file)
-            else:
-                refusal = found
-    except ValidationError as error:
-        first = ".".join(str(part) for part in error.errors()[0]["loc"])
-        refusal = f"this warpchain refuses its setup ({first}); read it with the version that wrote it"
-    except (OSError, RuntimeError, KeyError, TypeError, ValueError):
-        refusal = "damaged or cut short; fetch another copy of the file or run the walk again"
-    raise ValueError(f"{path}: {refusal}")
+    refusal, wanted = None, "give a file written by WalkResult.save"
+    with reading_hdf5(path, "fetch another copy of the file or run the walk again", wanted) as contents:
+        if contents.text("format") != FORMAT:
+            refusal = f"HDF5, but not a walk; {wanted}"
+        else:
+            refusal = version_refusal(contents.whole("format_version"), FORMAT_VERSION, "run the walk again")
+        if refusal is None:
+            try:
+                return _read(contents)
+            except ValidationError as error:
+                first = ".".join(str(part) for part in error.errors()[0]["loc"])
+                refusal = f"this warpchain refuses its setup ({first}); read it with the version that wrote it"
+    raise InputError(f"{path}: {refusal}")
 
 
 def _setup_as_dict(setup: Setup) -> dict[str, Any]:
@@ -345,13 +358,17 @@ def _plain(value: Any) -> Any:
 
 def _write(walk: WalkResult, file: "h5py.File") -> None:
     """Fill an empty file."""
-    file.attrs["format"] = FORMAT
     file.attrs["format_version"] = FORMAT_VERSION
-    file.attrs["status"] = walk.status.label
-    file.attrs["status_sentence"] = walk.status.sentence
-    file.attrs["setup"] = json.dumps(_setup_as_dict(walk.setup), allow_nan=False)
-    file.attrs["seed"] = json.dumps(_plain(walk.seed))
-    file.attrs["versions"] = json.dumps(walk.versions)
+    texts = {
+        "format": FORMAT,
+        "status": walk.status.label,
+        "status_sentence": walk.status.sentence,
+        "setup": json.dumps(_setup_as_dict(walk.setup), allow_nan=False),
+        "seed": json.dumps(_plain(walk.seed)),
+        "versions": json.dumps(walk.versions),
+    }
+    for name, text in texts.items():
+        put_text(file, name, text)
     for name, stored in STORED.items():
         value = getattr(walk, name)
         if stored.keys:
@@ -364,40 +381,48 @@ def _write(walk: WalkResult, file: "h5py.File") -> None:
         dataset = _put(file, f"parameters/{name}", value, quantity.unit, quantity.meaning)
         dataset.attrs["symbol"] = quantity.symbol
     if walk.before_release is not None:
-        write_before_release(walk.before_release, file.create_group(BEFORE))
+        write_before_release(walk.before_release, file.create_group(BEFORE, track_order=True))
 
 
 def _put(file: "h5py.File", path: str, value: float | Array, unit: str, meaning: str) -> "h5py.Dataset":
-    """Write one dataset; arrays are compressed without loss, and so carry the checksums of gzip."""
-    filters = {"compression": "gzip", "shuffle": True} if np.size(value) > 1 else {}
-    dataset = file.create_dataset(path, data=value, **filters)
+    """Write one dataset."""
+    dataset = file.create_dataset(path, data=value)
     dataset.attrs["unit"] = unit
     dataset.attrs["description"] = meaning
     return dataset
 
 
-def _read(file: "h5py.File") -> WalkResult:
+def _read(contents: Contents) -> WalkResult:
     """The walk in a file of our format."""
-    setup = json.loads(file.attrs["setup"])
+    setup, status = contents.json("setup"), Status[contents.text("status").upper()]
     values: dict[str, Any] = {
-        "status": Status[file.attrs["status"].upper()],
+        "status": status,
         "setup": Setup(
             preset=setup["preset"],
             parameters=Parameters.model_validate(setup["parameters"]),
             scene=Scene.model_validate(setup["scene"]),
             options=Options.model_validate(setup["options"]),
         ),
-        "seed": json.loads(file.attrs["seed"]),
-        "versions": json.loads(file.attrs["versions"]),
+        "seed": contents.json("seed"),
+        "versions": contents.json("versions"),
     }
     for name, path in _PATHS.items():
+        group, _, item = path.partition("/")
+        part = contents.part(group)
         if keys := STORED[name].keys:
-            values[name] = {key: file[f"{path}/{key}"][()].item() for key in keys}
-        elif name == "sprocket_center" and path not in file:
+            values[name] = {key: part.array(f"{item}/{key}", _KINDS[name], ()).item() for key in keys}
+        elif name == "sprocket_center" and not part.has(item):
             values[name] = None
         else:
-            number = file[path][()]
-            values[name] = number if number.shape else number.item()
-    if BEFORE in file:
-        values["before_release"] = read_before_release(file[BEFORE])
+            shape = (None,) * _DIMENSIONS.get(name, 0)
+            number = part.array(item, _KINDS[name], shape)
+            values[name] = number if shape else number.item()
+    if contents.has(BEFORE):
+        values["before_release"] = read_before_release(contents.part(BEFORE), np.float64)
+    preset, seed, versions = setup["preset"], values["seed"], values["versions"]
+    texts = (preset, *versions, *versions.values())
+    if not all(isinstance(text, str) for text in texts) or not (seed is None or type(seed) is int):
+        raise ContentError("preset, seed or versions of another type")
+    if status is Status.RUNNING or math.isfinite(values["dx"]) != (status is Status.AT_REST):
+        raise ContentError(f"a walk with status {status.label} and distance {values['dx']}")
     return WalkResult(**values)
