@@ -1,4 +1,4 @@
-"""A sample of a chain whose plane may tilt: sums in the room instead of in the plane, and when it collapsed and fell."""
+"""A sample of a chain whose plane may tilt: sums in the room, not in the plane, and when it collapsed and fell."""
 
 import warp as wp
 

@@ -1,9 +1,9 @@
 """The command `warpchain`.
 
-Exit status: 0 when the walk ended as it should, 1 when it failed or a disk is full or broken, 2 when the input is
-refused or a path cannot be read or written, 130 when interrupted. Values are checked like keyword arguments and YAML
-files, so they are refused in the same words. Heavy libraries are imported by the functions that need them, so that help
-is quick.
+Exit status: 0 when the walk ended as it should, 1 when it failed, a file is damaged or a disk is full or broken, 2 when
+the input is refused or a path cannot be read or written, 130 when interrupted. Values are checked like keyword
+arguments and YAML files, so they are refused in the same words. Heavy libraries are imported by the functions that need
+them, so that help is quick.
 """
 
 import contextlib
@@ -60,11 +60,11 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except OSError as error:
         _refuse([str(error)], FAILED if error.errno in DISK_FAILURES else REFUSED)
     except ValueError as error:
-        from warpchain.inputs.validation import InputError
+        from warpchain.inputs.validation import DamagedFileError, InputError
 
         if not isinstance(error, InputError):
             raise
-        _refuse(str(error).splitlines())
+        _refuse(str(error).splitlines(), FAILED if isinstance(error, DamagedFileError) else REFUSED)
     except KeyboardInterrupt:
         status = INTERRUPTED
     if status == INTERRUPTED:

@@ -1,6 +1,7 @@
 """The commands of the command line that are about sweeps: sweep, info, plot, report, merge."""
 
 import contextlib
+import json
 import os
 import sys
 from collections.abc import Iterator
@@ -124,12 +125,22 @@ def _write_new(path: Path, *, alone: bool) -> None:
     print(path)
 
 
-def info(directory: Folder, as_json: AsJson = False) -> None:
-    """Show how far a sweep is and what it has found so far."""
+def info(
+    directory: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Folder of a sweep, or a merged file.", show_default=False)
+    ],
+    as_json: AsJson = False,
+) -> None:
+    """Show how far a sweep is and what it has found so far; of a merged file, check every byte and show its counts."""
     from warpchain.cli.terminal import print_sweep
     from warpchain.store.folder import running_rate
+    from warpchain.store.merged_file import check_merged
     from warpchain.store.sweep_result import load
 
+    if os.path.isfile(directory):
+        found = check_merged(directory)
+        print(json.dumps(found) if as_json else "\n".join(f"{name:20} {value}" for name, value in found.items()))
+        return
     print_sweep(load(directory), as_json, running_rate(directory))
 
 

@@ -38,8 +38,8 @@ class Scene(BaseModel):
     """What happens in one walk, from hanging on the sprocket to the end.
 
     Raises:
-        pydantic.ValidationError: a value is unknown or out of bounds, `links` is odd, the clearance is that of a hanging
-            chain although the chain never hangs, or the release disturbs a plane that is fixed.
+        pydantic.ValidationError: a value is unknown or out of bounds, `links` is odd, the clearance is that of a
+            hanging chain although the chain never hangs, or the release disturbs a plane that is fixed.
     """
 
     model_config = STRICT

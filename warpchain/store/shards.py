@@ -1,9 +1,9 @@
 """Shards: immutable HDF5 files that hold the rows and motions of ended walks.
 
 A shard file has the attributes `format`, `key`, `digest` and `numerics_version`; the dataset `rows`, one row for each
-walk with the columns of `warpchain.walks.rows` and the rows' SHA-256 in its attribute `sha256`; and, if motions of its
-walks are kept, the group `motion`, see `warpchain.store.motion_arrays`. Walks have their places in the folder as
-numbers, see `warpchain.store.manifest`; their numbers in the sweep are found when the shard is read.
+walk with the columns of `warpchain.walks.rows`; and, if motions of its walks are kept, the group `motion`, see
+`warpchain.store.motion_arrays`. Checksums stand at its end, see `warpchain.hdf5_files`. Walks have their places in the
+folder as numbers, see `warpchain.store.manifest`; their numbers in the sweep are found when the shard is read.
 
 A shard appears whole or not at all: it is written to a temporary file, flushed to the disk, and then renamed.
 Its content depends only on the digest of the sweep and on the numerics, not on when and where it was computed. So a
@@ -12,7 +12,7 @@ sweep leaves the same bytes however often it was killed.
 
 import errno
 import hashlib
-import json
+import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -22,22 +22,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpchain.files import NotReplaceable, failure, remedy, replacing
-from warpchain.hdf5_files import hdf5_image
+from warpchain.hdf5_files import ContentError, Contents, hdf5_image, put_text, reading_hdf5
 from warpchain.inputs.validation import InputError
 from warpchain.status import Status
 from warpchain.store.manifest import (
-    FORMAT,
-    FORMAT_VERSION,
     NUMERICS_VERSION,
     Folder,
     Manifest,
     read_manifest,
     unreadable,
 )
-from warpchain.store.motion_arrays import read_motion, write_motions
+from warpchain.store.manifest_content import FORMAT, FORMAT_VERSION
+from warpchain.store.motion_arrays import GROUP, read_motion, write_motions
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks.motion import Motion
-from warpchain.walks.rows import Rows, missing_rows, row_type
+from warpchain.walks.rows import MISSING, Rows, drawn_column, missing_rows, row_type
 
 if TYPE_CHECKING:
     import h5py
@@ -89,8 +88,8 @@ def write_shard(
         raise ValueError(f"{name} are no shard of this sweep")
     if rows.dtype != manifest.row_type or not np.array_equal(rows["index"], places):
         raise ValueError(f"the rows are not those of {name}, all in order")
-    if not np.isin(rows["status"], [status for status in Status if status != Status.RUNNING]).all():
-        raise ValueError(f"one of {name} has no status that ends a walk")
+    if problem := _problem(rows, manifest):
+        raise ValueError(f"one of {name} {problem}")
     motions = motions or {}
     if sorted(motions) != manifest.kept(places):
         raise ValueError(f"the motions are not those that are kept of {name}")
@@ -101,12 +100,11 @@ def write_shard(
     key = _key(manifest, places)
 
     def fill(file: "h5py.File") -> None:
-        file.attrs["format"] = FORMAT
-        file.attrs["key"] = key
-        file.attrs["digest"] = manifest.digests_of(places.start)[-1]
+        put_text(file, "format", FORMAT)
+        put_text(file, "key", key)
+        put_text(file, "digest", manifest.digests_of(places.start)[-1])
         file.attrs["numerics_version"] = NUMERICS_VERSION
-        dataset = file.create_dataset("rows", data=rows)
-        dataset.attrs["sha256"] = _checksum(rows)
+        file.create_dataset("rows", data=rows)
         if motions:
             write_motions(motions, file)
 
@@ -126,11 +124,29 @@ def read_shard(directory: Folder, manifest: Manifest, places: range) -> Rows:
         OSError: the file cannot be read.
         InputError: the file is damaged or belongs to another sweep.
     """
-    with _opened(directory, manifest, places) as file:
-        rows = np.asarray(file["rows"][()])
-        if _checksum(rows) != file["rows"].attrs["sha256"]:
-            raise ValueError("rows")
+    with _opened(directory, manifest, places) as contents:
+        rows = contents.array("rows", manifest.row_type, (len(places),))
+        if not np.array_equal(rows["index"], places):
+            raise ContentError(f"its rows are not those of the walks at places {places.start} to {places.stop - 1}")
+        if problem := _problem(rows, manifest):
+            raise ContentError(f"a walk {problem}")
     return rows
+
+
+def _problem(rows: Rows, manifest: Manifest) -> str | None:
+    """What no ended walk has but one of these rows, with their places as index; None if all is well."""
+    if not np.isin(rows["status"], [status for status in Status if status != Status.RUNNING]).all():
+        return "has no status that ends a walk"
+    if not np.array_equal(np.isfinite(rows["dx"]), rows["status"] == Status.AT_REST):
+        return "has a distance without being at rest, or none at rest"
+    if any((rows[column] < MISSING).any() for column in rows.dtype.names or () if rows[column].dtype.kind == "i"):
+        return "has a negative count"
+    walks = manifest.walks(range(int(rows["index"][0]), int(rows["index"][-1]) + 1))
+    for block in manifest.blocks:
+        here = (block.first <= walks) & (walks < block.first + math.prod(block.shape))
+        if not all(np.isfinite(rows[drawn_column(name)][here]).all() for name in block.drawn):
+            return "lacks a quantity that was drawn for it"
+    return None
 
 
 def read_motions(directory: Folder, manifest: Manifest, walks: Sequence[int]) -> dict[int, Motion]:
@@ -145,37 +161,21 @@ def read_motions(directory: Folder, manifest: Manifest, walks: Sequence[int]) ->
         OSError: the file cannot be read.
         InputError: the file is damaged or belongs to another sweep.
     """
-    with _opened(directory, manifest, manifest.shard_with(walks[0])) as file:
-        return {walk: read_motion(file, manifest.place(walk)) for walk in walks}
+    with _opened(directory, manifest, manifest.shard_with(walks[0])) as contents:
+        motions = contents.part(GROUP)
+        return {walk: read_motion(motions, manifest.place(walk)) for walk in walks}
 
 
 @contextmanager
-def _opened(directory: Folder, manifest: Manifest, places: range) -> "Iterator[h5py.File]":
+def _opened(directory: Folder, manifest: Manifest, places: range) -> Iterator[Contents]:
     """The file of a shard; an error while it is read means that it is damaged."""
-    import h5py
-
-    path = Path(directory) / "shards" / shard_name(places)
-    try:
-        content = path.open("rb")
-    except OSError as error:
-        raise unreadable(path, error) from error
-    is_foreign = False
-    with content:
-        try:
-            with h5py.File(content, "r") as file:
-                is_foreign = str(file.attrs["key"]) != _key(manifest, places)
-                if not is_foreign:
-                    yield file
-        except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError):
-            problem = "damaged or cut short; delete it and run the sweep again, which computes only its walks"
-            raise InputError(f"{path}: {problem}") from None
+    path, is_foreign = Path(directory) / "shards" / shard_name(places), False
+    with reading_hdf5(path, "delete it and run the sweep again, which computes only its walks") as contents:
+        is_foreign = contents.text("key") != _key(manifest, places)
+        if not is_foreign:
+            yield contents
     if is_foreign:
         raise InputError(f"{path}: a shard of another sweep; move it out of this folder")
-
-
-def _checksum(rows: Rows) -> str:
-    """Hexadecimal SHA-256 of rows and their type."""
-    return hashlib.sha256(json.dumps(rows.dtype.descr).encode() + rows.tobytes()).hexdigest()
 
 
 def present_shards(directory: Folder, manifest: Manifest) -> dict[range, Path]:

@@ -1,8 +1,8 @@
 """A plane that tilts, as seen from the host: at the release, its angles, places in the room.
 
-The values of a plane are those of :mod:`warpchain.kernels.layout`: lateral speed, two rates, the components of the room's X
-and Y axes along the plane's axes e1, e2, e3, and the origin in the room. Z = X × Y points to the right of the way that
-the chain walks.
+The values of a plane are those of :mod:`warpchain.kernels.layout`: lateral speed, two rates, the components of the
+room's X and Y axes along the plane's axes e1, e2, e3, and the origin in the room. Z = X × Y points to the right of the
+way that the chain walks.
 """
 
 import math
@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 def released_plane(setup: Setup, position: Array) -> Array:
     """The plane of a chain at its release, (PLANE_VALUES,).
 
-    It is tilted about a line along the room's X axis. Its lowest point stays at its height, and the centre of mass stays
-    above z = 0 and moves sideways at the scene's lateral speed.
+    It is tilted about a line along the room's X axis. Its lowest point stays at its height, and the centre of mass
+    stays above z = 0 and moves sideways at the scene's lateral speed.
 
     Args:
         setup: of the walk.
