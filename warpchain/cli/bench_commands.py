@@ -211,6 +211,54 @@ def accuracy(
         print(path)
 
 
+@bench_app.command("tilting")
+def tilting(
+    device: Annotated[str, typer.Option(metavar="NAME", help="cpu, cuda or cuda:N.")] = "cpu",
+    methods: Annotated[
+        list[str] | None,
+        typer.Option("--method", metavar="NAME", help="Explicit integrator; may be repeated. Default: dp5, os32."),
+    ] = None,
+    links: Annotated[
+        list[int] | None, typer.Option(metavar="N", help="Number of links; may be repeated. Default: 60 and 150.")
+    ] = None,
+    chains: Annotated[
+        list[int] | None,
+        typer.Option(metavar="N", min=1, help="Chains at a time; may be repeated. Default: 1, on a GPU 400 and 4000."),
+    ] = None,
+    rounds: Annotated[int, typer.Option(metavar="N", min=1, help="Measurements of each; medians are printed.")] = 7,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of a table.")] = False,
+) -> None:
+    """Measure what a plane that tilts adds to a step, beside the same chains in a plane that is fixed."""
+    from warpchain.bench.record import machine, plain
+    from warpchain.bench.tilting_cost import tilting_costs
+    from warpchain.cli.bench_tables import print_bench
+    from warpchain.cli.terminal import status_line
+    from warpchain.inputs.options import Options
+    from warpchain.inputs.scene import Scene, check_links_on_gpu
+    from warpchain.inputs.setup import check_can_tilt
+    from warpchain.inputs.validation import validated
+
+    chosen = methods or ["dp5", "os32"]
+    for method in chosen:
+        check_can_tilt(validated(Options, {"method": method, "device": device}, "bench"))
+    lengths = [validated(Scene, {"links": count}, "bench").links for count in links or (60, 150)]
+    for count in lengths:
+        check_links_on_gpu(count, device, "bench.links")
+    with status_line() as show:
+        costs = tilting_costs(
+            device,
+            methods=chosen,
+            links=lengths,
+            chains=chains or ([1] if device == "cpu" else [400, 4000]),
+            rounds=rounds,
+            report=show,
+        )
+    if as_json:
+        print(json.dumps(plain({"machine": machine(), "tilting": costs}), indent=2, allow_nan=False))
+    else:
+        print_bench(machine(), ("tilting", costs))
+
+
 @bench_app.command("sweep")
 def sweep(
     source: SweepFile,

@@ -84,11 +84,8 @@ def resolve(
         scene=checked,
         options=validated(Options, options, "options"),
     )
-    if checked.plane == "tilting" and not find_method(setup.options.method).can_tilt:
-        raise InputError(
-            f"options.method: {shown(setup.options.method)} keeps the plane of a chain fixed; "
-            "give explicit or an explicit method, or scene.plane: fixed"
-        )
+    if checked.plane == "tilting":
+        check_can_tilt(setup.options)
     check_scene(setup.scene, setup.parameters)
     check_links_on_gpu(setup.scene.links, setup.options.device, "scene.links")
     interval = setup.options.record_interval
@@ -98,6 +95,19 @@ def resolve(
             f"give at most {LONGEST_DRIVE_INTERVAL} s, or scene.load_factor: 1"
         )
     return setup
+
+
+def check_can_tilt(options: Options) -> None:
+    """Check that the method carries chains whose plane tilts.
+
+    Raises:
+        InputError: it does not.
+    """
+    if not find_method(options.method).can_tilt:
+        raise InputError(
+            f"options.method: {shown(options.method)} keeps the plane of a chain fixed; "
+            "give explicit or an explicit method, or scene.plane: fixed"
+        )
 
 
 def read_setup(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
