@@ -136,13 +136,13 @@ def _floor_pass(columns: int) -> wp.Kernel:
     ):
         chain = read_chain(model, 0)
         block = scratch[0]
-        P = planes[0]
+        row = planes[0]
         load_state(block, state, chain, 0)
         place_ends(block, chain)
         clear_padding(block, chain.link_count)
-        write_plane_sums(block, P, chain)
-        results[0] = tilting_gap(block, on_plane(chain, P, 0))
-        results[1] = wp.float64(resolve_tilting_floor(block, P, chain))
+        write_plane_sums(block, row, chain)
+        results[0] = tilting_gap(block, on_plane(chain, row, 0))
+        results[1] = wp.float64(resolve_tilting_floor(block, row, chain))
 
     return floor_pass
 

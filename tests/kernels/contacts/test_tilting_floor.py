@@ -140,7 +140,7 @@ def test_upright_plane_meets_the_floor_as_the_planar_chain(half_width):
         position, velocity, plane, parameters, _ = tilted_heap(seed, PAPER, upright=True)
         parameters = parameters.with_values({"half_width": half_width})
         outcome = floor_pass(position, velocity, plane, parameters)
-        lifted = position + [0.0, plane.origin[1], 0.0]
+        lifted = position + np.array([0.0, plane.origin[1], 0.0])
         planar = ContactPass([Placed(lifted, velocity, parameters)])
         (expected,) = planar.run(FLOOR)
         scale = np.abs(velocity).max(axis=0)

@@ -23,7 +23,7 @@ STIFF = preset("soft").with_values(
     {
         "inner_inertia": 1e-5,
         "outer_inertia": 1e-5,
-        "viscous_friction": 0.1,
+        "viscous_friction": 1.0,
         "coulomb_friction": 0.0,
         "floor_friction": 1.0,
         "floor_restitution": 0.0,
@@ -72,7 +72,7 @@ def test_loop_without_width_tips_over_as_a_pendulum():
     rate = np.sqrt(parameters.gravity * height / moment(parameters, start))
     time, tilt = let_go(start, parameters, 3.0 / rate, longest_step=5e-6)
     assert tilt[-1] > 9e-3
-    # measured: 6e-5; the creep of the joints in 0.3 s changes the height by 1e-3 of itself
+    # 6e-5, mostly by creep: joints ten times thinner make it 2e-4 and more
     assert_allclose(tilt, 1e-3 * np.cosh(rate * time), rtol=3e-4)
 
 
@@ -109,7 +109,7 @@ def test_rocking_loses_what_a_rigid_block_loses(half_width):
     def lifted(tilt):
         return height * (np.cos(tilt) - 1) + half_width * abs(np.sin(tilt))
 
-    _, tilt = let_go(start, parameters, 0.25, longest_step=2.5e-6)
+    _, tilt = let_go(start, parameters, 0.3, longest_step=2.5e-6)
     beyond = np.flatnonzero(tilt < 0)
     assert np.all(np.diff(tilt[: beyond[0]]) < 0)
     rebound = tilt.min()

@@ -49,7 +49,8 @@ def greatest_errors(end, expected):
 
 
 # At tolerance 1e-9 alone dp5 steps by 13 µs, and what is left in plane and velocities is the splitting's: 2e-6 rad/s of
-# 27 rad/s. It falls as h²: 3e-7 at 8 µs, 5e-9 at 1 µs; 1.1e-8 with 40 links. The third order of os32 needs 1e-11 for velocities of 1e-8.
+# 27 rad/s with 20 links. It falls as h²: 3e-7 at 8 µs, 5e-9 at 1 µs. os32 is of third order, and needs 1e-11 for
+# velocities to 1e-8.
 @pytest.mark.parametrize("links", TUMBLING)
 @pytest.mark.parametrize(("method", "tolerance"), [("dp5", 1e-9), ("rkf78", 1e-9), ("os32", 1e-11)])
 def test_flight_equals_scipy(truth, method, tolerance, links):
