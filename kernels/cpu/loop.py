@@ -307,9 +307,10 @@ def make_advance(features: Features):
                 if wp.static(tilts):
                     accept_plane(P)
                     write_plane_sums(K, P, chain)
+                    half_step(P, 0, 0, chain.gravity, h)
                 if wp.static(has_fixed):
                     if wp.static(tilts):
-                        gap = tilting_gap(K, on_plane(chain, P, 0))
+                        gap = tilting_gap(K, feeling)
                     else:
                         gap = fixed_gap(K, chain)
                     if gap < ZERO:
@@ -348,8 +349,6 @@ def make_advance(features: Features):
                     has_first_stage = int(0)
                     if wp.static(tilts):
                         write_plane_sums(K, P, chain)
-                if wp.static(tilts):
-                    half_step(P, 0, 0, chain.gravity, h)
                 if wp.static(has_flight):
                     if impulses > wp.int64(0) or not are_stiff:
                         closing_time = time + QUIET_TIME

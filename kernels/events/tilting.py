@@ -147,7 +147,7 @@ def watch_fall(
     area = enclosed_area(K, chain)
     if is_first:
         state.first_area[world] = area
-    # a loop that runs clockwise has a negative area
+    # a loop that is numbered clockwise has negative areas
     if state.watch[world, COLLAPSED_AT] < ZERO and area / state.first_area[world] < HALF:
         state.watch[world, COLLAPSED_AT] = time
     lean = wp.abs(P[UP + 2])

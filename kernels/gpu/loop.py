@@ -337,6 +337,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if lane == 0:
                         accept_plane(P)
                     sum_up(K, P, M, place)
+                    if lane == 0:
+                        half_step(P, 0, 0, K[chain_values, layout.VALUE_GRAVITY], h)
                 is_hit = bool(False)
                 is_near = bool(False)
                 is_stale = bool(False)
@@ -392,8 +394,6 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                         barrier()  # contacts have left the memory of the sums
                         sum_up(K, P, M, place)
                         barrier()
-                    if lane == 0:
-                        half_step(P, 0, 0, K[chain_values, layout.VALUE_GRAVITY], h)
                 if is_hit or wp.static(not reuses_last):
                     if is_hit:
                         next_end = exchange_ends(ends, place, read_link(K, lane))
