@@ -70,13 +70,13 @@ PLANE_VALUES = 12
 # The plane half a step later, as the links feel it during the step, and in its first stage; and one in between.
 PLANE_MID, PLANE_BETWEEN = 12, 24
 # Sums over the links in one state, see physics.plane, and the inverse of the mass matrix, rows of its upper triangle.
-PLANE_SUMS = 36
+PLANE_SUMS, MOTION_SUMS = 36, 42
 SUM_MASS, SUM_MX, SUM_MY, SUM_XX, SUM_XY, SUM_YY = range(36, 42)
 SUM_MU, SUM_MV, SUM_XU, SUM_XV, SUM_YU, SUM_YV = range(42, 48)
 SUM_SPIN, SUM_SPIN_SINE, SUM_SPIN_COSINE = 48, 49, 50
 INVERSE_00, INVERSE_01, INVERSE_02, INVERSE_11, INVERSE_12, INVERSE_22 = range(51, 57)
 PLANE_ROWS = 57
-SUM_COUNT = 15
+SUMS_OF_PLACES, SUMS_OF_MOTION = 6, 9
 
 # State.counts
 ACCEPTED, REJECTED, FLOOR_IMPULSES, SPROCKET_IMPULSES, SELF_IMPULSES, BOUNCES, LIST_BUILDS = range(7)

@@ -32,6 +32,7 @@ from warpchain.kernels.cpu.tilting import (
     shift_first_stage,
     tilting_gap,
     write_plane_sums,
+    write_sums_of_motion,
 )
 from warpchain.kernels.events.present_chain import has_changed, present_chain
 from warpchain.kernels.events.record import lacks_last_sample, record_is_full, write_sample
@@ -348,7 +349,7 @@ def make_advance(features: Features):
                 if impulses > wp.int64(0):
                     has_first_stage = int(0)
                     if wp.static(tilts):
-                        write_plane_sums(K, P, chain)
+                        write_sums_of_motion(K, P, chain)
                 if wp.static(has_flight):
                     if impulses > wp.int64(0) or not are_stiff:
                         closing_time = time + QUIET_TIME

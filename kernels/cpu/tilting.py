@@ -27,14 +27,15 @@ from warpchain.kernels.layout import (
     SINE,
     STAGE_ROWS,
     STAGES,
-    SUM_COUNT,
+    SUMS_OF_MOTION,
+    SUMS_OF_PLACES,
     U,
     V,
     X,
     Y,
 )
 from warpchain.kernels.physics.elementary import TWO, ZERO, from_order_key, order_bits, order_key
-from warpchain.kernels.physics.plane import invert_plane_mass, on_plane, plane_load, plane_terms
+from warpchain.kernels.physics.plane import invert_plane_mass, motion_terms, on_plane, place_terms, plane_load
 from warpchain.kernels.types import Chain
 
 wp.set_module_options({"enable_backward": False})
@@ -43,6 +44,8 @@ LANES = 8
 """Columns that are summed side by side."""
 SUMS = STAGES + STAGE_ROWS
 """First of the rows for terms of sums: those of the second to fourth stage, which are free between attempts."""
+SUMMED_IN_CONTACT = 4
+TOUCHES = SUMS + SUMMED_IN_CONTACT
 
 
 @wp.func_native("""
@@ -58,6 +61,17 @@ SUMS = STAGES + STAGE_ROWS
 def row_sum(K: wp.array2d(dtype=wp.float64), row: int, count: int) -> wp.float64:
     """Sum of the first ``count`` columns of a row, a multiple of 8; in pure Warp clang adds one after the other."""
     ...
+
+
+@wp.func
+def row_sum_of_lanes(K: wp.array2d(dtype=wp.float64), row: int, first: int):
+    """Sum of one lane each of a row, from column ``first`` on."""
+    total = ZERO
+    lane = int(0)
+    while lane < wp.static(LANES):
+        total += K[row, first + lane]
+        lane += 1
+    return total
 
 
 @wp.func
@@ -79,29 +93,35 @@ def clear_padding(K: wp.array2d(dtype=wp.float64), n: int):
 
 
 @wp.func
+def write_sums_of_motion(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), chain: Chain):
+    """Writes the sums over the links that depend on velocities."""
+    count = whole_lanes(chain.link_count)
+    i = int(0)
+    while i < count:
+        terms = motion_terms(
+            K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[U, i], K[V, i], K[OMEGA, i], K[COSINE, i], K[SINE, i]
+        )
+        for k in range(wp.static(SUMS_OF_MOTION)):
+            K[wp.static(SUMS + k), i] = terms[k]
+        i += 1
+    for k in range(wp.static(SUMS_OF_MOTION)):
+        P[wp.static(layout.MOTION_SUMS + k)] = row_sum(K, wp.static(SUMS + k), count)
+
+
+@wp.func
 def write_plane_sums(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), chain: Chain):
     """Writes the sums over the placed links, and the inverse of the plane's mass matrix."""
     count = whole_lanes(chain.link_count)
     i = int(0)
     while i < count:
-        terms = plane_terms(
-            chain,
-            K[MASS, i],
-            K[INERTIA, i],
-            K[X, i],
-            K[Y, i],
-            K[U, i],
-            K[V, i],
-            K[OMEGA, i],
-            K[COSINE, i],
-            K[SINE, i],
-        )
-        for k in range(wp.static(SUM_COUNT)):
+        terms = place_terms(chain, K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[COSINE, i], K[SINE, i])
+        for k in range(wp.static(SUMS_OF_PLACES)):
             K[wp.static(SUMS + k), i] = terms[k]
         i += 1
-    for k in range(wp.static(SUM_COUNT)):
+    for k in range(wp.static(SUMS_OF_PLACES)):
         P[wp.static(layout.PLANE_SUMS + k)] = row_sum(K, wp.static(SUMS + k), count)
     invert_plane_mass(P)
+    write_sums_of_motion(K, P, chain)
 
 
 @wp.func
@@ -149,17 +169,12 @@ def greatest_tilting_speed(K: wp.array2d(dtype=wp.float64), chain: Chain):
 
 
 @wp.func
-def resolve_tilting_floor(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), own: Chain):
-    """Applies the impulses between rollers and floor to links and plane; returns their number.
-
-    The sums must be those of the present places.
-    """
-    chain = on_plane(own, P, 0)
-    slope = steepness(chain)
+def write_touches(K: wp.array2d(dtype=wp.float64), chain: Chain, slope: wp.float64):
+    """Writes 1 for each link that touches the floor and 0 for others, padding included; returns their number."""
     touching = wp.int64(0)
     i = int(0)
     while i < chain.link_count:
-        touching += link_touches(
+        touches = link_touches(
             chain,
             slope,
             K[LEFT_X, i],
@@ -172,49 +187,74 @@ def resolve_tilting_floor(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.
             K[V, i],
             K[OMEGA, i],
         )
+        K[wp.static(TOUCHES), i] = wp.float64(touches)
+        touching += touches
         i += 1
+    while i < whole_lanes(chain.link_count):
+        for k in range(wp.static(SUMMED_IN_CONTACT + 1)):
+            K[wp.static(SUMS) + k, i] = ZERO
+        i += 1
+    return touching
+
+
+@wp.func
+def resolve_tilting_floor(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), own: Chain):
+    """Applies the impulses between rollers and floor to links and plane; returns their number.
+
+    The sums must be those of the present places. Lanes of links of which none touches are passed over.
+    """
+    chain = on_plane(own, P, 0)
+    slope = steepness(chain)
+    touching = write_touches(K, chain, slope)
     if touching == wp.int64(0):
         return touching
     B = copy_inverse(P, wp.float64(touching))
     impulses = wp.int64(0)
-    i = int(0)
-    while i < chain.link_count:
-        link = meet_tilting_floor(
-            chain,
-            slope,
-            B,
-            K[LEFT_X, i],
-            K[LEFT_Y, i],
-            K[RIGHT_X, i],
-            K[RIGHT_Y, i],
-            K[X, i],
-            K[Y, i],
-            K[INVERSE_MASS, i],
-            K[INVERSE_INERTIA, i],
-            K[U, i],
-            K[V, i],
-            K[OMEGA, i],
-        )
-        K[U, i] = link.u
-        K[V, i] = link.v
-        K[OMEGA, i] = link.omega
-        K[LOST_FIXED, i] = K[LOST_FIXED, i] + link.lost
-        K[wp.static(SUMS), i] = link.push
-        K[wp.static(SUMS + 1), i] = link.moment_x
-        K[wp.static(SUMS + 2), i] = link.moment_y
-        K[wp.static(SUMS + 3), i] = (
-            (link.plane_speed - chain.plane_speed) * link.push
-            + (link.turn_x - chain.turn_x) * link.moment_x
-            + (link.turn_y - chain.turn_y) * link.moment_y
-        )
-        impulses += link.hits
-        i += 1
     count = whole_lanes(chain.link_count)
-    i = chain.link_count
-    while i < count:
-        for k in range(4):
-            K[wp.static(SUMS) + k, i] = ZERO
-        i += 1
+    first = int(0)
+    while first < count:
+        touched = row_sum_of_lanes(K, wp.static(TOUCHES), first)
+        lane = int(0)
+        while lane < wp.static(LANES):
+            for k in range(wp.static(SUMMED_IN_CONTACT)):
+                K[wp.static(SUMS) + k, first + lane] = ZERO
+            lane += 1
+        lane = wp.where(touched > ZERO, int(0), int(wp.static(LANES)))
+        while lane < wp.static(LANES):
+            i = first + lane
+            link = meet_tilting_floor(
+                chain,
+                slope,
+                B,
+                K[LEFT_X, i],
+                K[LEFT_Y, i],
+                K[RIGHT_X, i],
+                K[RIGHT_Y, i],
+                K[X, i],
+                K[Y, i],
+                K[INVERSE_MASS, i],
+                K[INVERSE_INERTIA, i],
+                K[U, i],
+                K[V, i],
+                K[OMEGA, i],
+            )
+            touches = K[wp.static(TOUCHES), i] > ZERO
+            K[U, i] = wp.where(touches, link.u, K[U, i])
+            K[V, i] = wp.where(touches, link.v, K[V, i])
+            K[OMEGA, i] = wp.where(touches, link.omega, K[OMEGA, i])
+            K[LOST_FIXED, i] = K[LOST_FIXED, i] + wp.where(touches, link.lost, ZERO)
+            K[wp.static(SUMS), i] = wp.where(touches, link.push, ZERO)
+            K[wp.static(SUMS + 1), i] = wp.where(touches, link.moment_x, ZERO)
+            K[wp.static(SUMS + 2), i] = wp.where(touches, link.moment_y, ZERO)
+            work = (
+                (link.plane_speed - chain.plane_speed) * link.push
+                + (link.turn_x - chain.turn_x) * link.moment_x
+                + (link.turn_y - chain.turn_y) * link.moment_y
+            )
+            K[wp.static(SUMS + 3), i] = wp.where(touches, work, ZERO)
+            impulses += wp.where(touches, link.hits, wp.int64(0))
+            lane += 1
+        first += wp.static(LANES)
     push = row_sum(K, wp.static(SUMS), count)
     moment_x = row_sum(K, wp.static(SUMS + 1), count)
     moment_y = row_sum(K, wp.static(SUMS + 2), count)

@@ -35,7 +35,8 @@ from warpchain.kernels.layout import (
     PLANE_TURN_X,
     PLANE_TURN_Y,
     SINE,
-    SUM_COUNT,
+    SUMS_OF_MOTION,
+    SUMS_OF_PLACES,
     UP,
     VALUE_PLANE,
     VALUE_PLANE_BEFORE,
@@ -48,9 +49,10 @@ from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.plane import (
     half_step,
     invert_plane_mass,
+    motion_terms,
     on_plane,
+    place_terms,
     plane_load,
-    plane_terms,
 )
 from warpchain.kernels.types import Chain
 
@@ -122,39 +124,75 @@ def shift_first_stage(K: wp.array2d(dtype=wp.float64), lane: int):
 
 
 @wp.func
-def terms_of(K: wp.array2d(dtype=wp.float64), i: int):
-    """The part of link i in the sums for its plane."""
+def places_of(K: wp.array2d(dtype=wp.float64), i: int):
+    """The part of link i in the sums for its plane that depend on places."""
     chain = Chain()
     chain.half_width = K[BOARD_VALUES, layout.VALUE_HALF_WIDTH]
-    return plane_terms(
-        chain, K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[U, i], K[V, i], K[OMEGA, i], K[COSINE, i], K[SINE, i]
-    )
+    return place_terms(chain, K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[COSINE, i], K[SINE, i])
 
 
 @wp.func
-def sum_one_by_one(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), n: int):
-    """Writes the sums over all links, by one thread."""
-    for k in range(wp.static(SUM_COUNT)):
-        P[wp.static(layout.PLANE_SUMS + k)] = ZERO
-    i = int(0)
-    while i < n:
-        terms = terms_of(K, i)
-        for k in range(wp.static(SUM_COUNT)):
-            P[wp.static(layout.PLANE_SUMS + k)] = P[wp.static(layout.PLANE_SUMS + k)] + terms[k]
-        i += 1
+def motion_of(K: wp.array2d(dtype=wp.float64), i: int):
+    """The part of link i in those that depend on velocities."""
+    return motion_terms(
+        K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[U, i], K[V, i], K[OMEGA, i], K[COSINE, i], K[SINE, i]
+    )
+
+
+@functools.cache
+def block_sums(block_dim: int, terms_of: wp.Function, count: int, first: int, slot: int):
+    """Warp functions (write, read) of sums over the links: ``write`` by all threads, after a barrier ``read`` by one.
+
+    Args:
+        block_dim: Threads in a block.
+        terms_of: ``(K, i)`` → the terms of link i.
+        count: Their number.
+        first: Row of the first sum in the memory of the plane.
+        slot: First slot in the memory that the threads share.
+    """
+
+    @wp.func
+    def write(K: wp.array2d(dtype=wp.float64), M: wp.array(dtype=wp.float64), place: Place):
+        if warp_width() > 1:
+            terms = terms_of(K, place.column)
+            for k in range(wp.static(count)):
+                own = wp.where(place.lane < place.links, terms[k], ZERO)
+                add_up(M, wp.static(slot + k), place.lane, wp.static(block_dim), own)
+
+    @wp.func
+    def read(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), M: wp.array(dtype=wp.float64), n: int):
+        for k in range(wp.static(count)):
+            P[wp.static(first + k)] = ZERO
+        if warp_width() > 1:
+            for k in range(wp.static(count)):
+                P[wp.static(first + k)] = added_up(M, wp.static(slot + k), wp.static(block_dim))
+        else:  # fibers have no memory for so many slots
+            i = int(0)
+            while i < n:
+                terms = terms_of(K, i)
+                for k in range(wp.static(count)):
+                    P[wp.static(first + k)] = P[wp.static(first + k)] + terms[k]
+                i += 1
+
+    return write, read
 
 
 @functools.cache
 def block_tilting(block_dim: int):
-    """Warp functions of a plane for blocks of this size: (begin a step, sum up, meet the floor).
+    """Warp functions of a plane for blocks of this size: (begin a step, sum up, sum up velocities, meet the floor).
 
     Returns:
         ``begin(K, P, place, h)`` moves the plane to the middle of a step, and the first stage with it;
-        ``sum_up(K, P, M, place)`` writes the sums over the links into P; ``meet(K, P, M, chain, place)`` applies the
+        ``sum_up(K, P, M, place)`` writes the sums over the links into P, ``sum_motion`` with
+        the same arguments those that impulses change; ``meet(K, P, M, chain, place)`` applies the
         impulses between rollers and floor → number of those of this thread. M is memory that all threads share and
         that nobody reads meanwhile. Each passes barriers, and there must be one before M is used otherwise.
     """
     count_slot, contact_slot, sum_slot = 0, 1, 5
+    write_places, read_places = block_sums(block_dim, places_of, SUMS_OF_PLACES, layout.PLANE_SUMS, sum_slot)
+    write_motion, read_motion = block_sums(
+        block_dim, motion_of, SUMS_OF_MOTION, layout.MOTION_SUMS, sum_slot + SUMS_OF_PLACES
+    )
 
     @wp.func
     def begin(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), place: Place, h: wp.float64):
@@ -174,21 +212,25 @@ def block_tilting(block_dim: int):
         M: wp.array(dtype=wp.float64),
         place: Place,
     ):
-        lane = place.lane
-        if warp_width() > 1:
-            terms = terms_of(K, place.column)
-            for k in range(wp.static(SUM_COUNT)):
-                add_up(
-                    M, wp.static(sum_slot + k), lane, wp.static(block_dim), wp.where(lane < place.links, terms[k], ZERO)
-                )
+        write_places(K, M, place)
+        write_motion(K, M, place)
         barrier()
-        if lane == 0:
-            if warp_width() > 1:
-                for k in range(wp.static(SUM_COUNT)):
-                    P[wp.static(layout.PLANE_SUMS + k)] = added_up(M, wp.static(sum_slot + k), wp.static(block_dim))
-            else:
-                sum_one_by_one(K, P, place.links)
+        if place.lane == 0:
+            read_places(K, P, M, place.links)
+            read_motion(K, P, M, place.links)
             invert_plane_mass(P)
+
+    @wp.func
+    def sum_motion(
+        K: wp.array2d(dtype=wp.float64),
+        P: wp.array(dtype=wp.float64),
+        M: wp.array(dtype=wp.float64),
+        place: Place,
+    ):
+        write_motion(K, M, place)
+        barrier()
+        if place.lane == 0:
+            read_motion(K, P, M, place.links)
 
     @wp.func
     def meet(
@@ -264,4 +306,4 @@ def block_tilting(block_dim: int):
                 K[layout.BOARD_LOST_FIXED, 0] = K[layout.BOARD_LOST_FIXED, 0] + lost
         return hits
 
-    return begin, sum_up, meet
+    return begin, sum_up, sum_motion, meet

@@ -71,18 +71,19 @@ from warpchain.kernels.types import Chain
 wp.set_module_options({"enable_backward": False})
 
 THIRD = wp.constant(wp.float64(1.0 / 3.0))
+THREE_HALVES = wp.constant(wp.float64(1.5))
 
 
 @wp.func
 def plane_load(chain: Chain, x: wp.float64, y: wp.float64, arm_x: wp.float64, arm_y: wp.float64):
     """Accelerations (ẍ, ÿ [m/s²], θ̈ [rad/s²]) of a link by gravity and the motion of its plane."""
     across = chain.plane_speed + chain.turn_x * y - chain.turn_y * x
-    square = chain.half_length * chain.half_length
+    inverse = ONE / (chain.half_length * chain.half_length)
     about_rod = arm_x * chain.turn_x + arm_y * chain.turn_y
     across_rod = arm_x * chain.turn_y - arm_y * chain.turn_x
     ax = -chain.gravity * chain.up_x - chain.turn_y * across
     ay = chain.turn_x * across - chain.gravity * chain.up_y
-    return ax, ay, -(about_rod * across_rod) / square
+    return ax, ay, -(about_rod * across_rod) * inverse
 
 
 @wp.func
@@ -100,8 +101,31 @@ def on_plane(own: Chain, P: wp.array(dtype=wp.float64), first: int) -> Chain:
 
 
 @wp.func
-def plane_terms(
+def place_terms(
     chain: Chain,
+    mass: wp.float64,
+    inertia: wp.float64,
+    x: wp.float64,
+    y: wp.float64,
+    cosine: wp.float64,
+    sine: wp.float64,
+):
+    """One link's part of the sums SUM_MASS … SUM_YY, in that order."""
+    mx = mass * x
+    my = mass * y
+    side = mass * chain.half_width * chain.half_width * THIRD
+    return (
+        mass,
+        mx,
+        my,
+        mx * x + side + inertia * cosine * cosine,
+        mx * y + inertia * cosine * sine,
+        my * y + side + inertia * sine * sine,
+    )
+
+
+@wp.func
+def motion_terms(
     mass: wp.float64,
     inertia: wp.float64,
     x: wp.float64,
@@ -112,24 +136,17 @@ def plane_terms(
     cosine: wp.float64,
     sine: wp.float64,
 ):
-    """One link's part of the sums SUM_MASS … SUM_SPIN_COSINE, in that order."""
-    mx = mass * x
-    my = mass * y
-    side = mass * chain.half_width * chain.half_width * THIRD
+    """One link's part of the sums SUM_MU … SUM_SPIN_COSINE, in that order."""
+    mu = mass * u
+    mv = mass * v
     spin = inertia * omega
     return (
-        mass,
-        mx,
-        my,
-        mx * x + side + inertia * cosine * cosine,
-        mx * y + inertia * cosine * sine,
-        my * y + side + inertia * sine * sine,
-        mass * u,
-        mass * v,
-        mx * u,
-        mx * v,
-        my * u,
-        my * v,
+        mu,
+        mv,
+        x * mu,
+        x * mv,
+        y * mu,
+        y * mv,
         spin,
         TWO * spin * sine * cosine,
         spin * (cosine * cosine - sine * sine),
@@ -219,12 +236,15 @@ def push_plane(P: wp.array(dtype=wp.float64), start: int, slope: int, target: in
 
 @wp.func
 def straighten_axes(P: wp.array(dtype=wp.float64), first: int):
-    """Makes the room's X and Y axes at this row orthogonal unit vectors again."""
+    """Makes the room's X and Y axes at this row orthogonal unit vectors again, which they nearly are.
+
+    A unit vector that is too long by ε has the factor (3 − y·y)/2 = 1 − ε, less ε² and higher powers.
+    """
     x = wp.vec3d(P[first + AHEAD], P[first + AHEAD + 1], P[first + AHEAD + 2])
     y = wp.vec3d(P[first + UP], P[first + UP + 1], P[first + UP + 2])
-    y = y / wp.sqrt(wp.dot(y, y))
+    y = (THREE_HALVES - HALF * wp.dot(y, y)) * y
     x = x - wp.dot(x, y) * y
-    x = x / wp.sqrt(wp.dot(x, x))
+    x = (THREE_HALVES - HALF * wp.dot(x, x)) * x
     for k in range(3):
         P[first + AHEAD + k] = x[k]
         P[first + UP + k] = y[k]
