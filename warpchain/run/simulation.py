@@ -66,8 +66,8 @@ def simulate(
     chosen: dict[str, object] = {"method": method, "device": device, "self_contact": self_contact}
     if tolerance is not None:
         chosen["tolerance"] = tolerance
-    floor, gravity = plain(floor), plain(gravity)
-    end: float = plain(duration)
+    floor, gravity = plain(floor, "floor"), plain(gravity, "gravity")
+    end: float = plain(duration, "duration")
     options = validated(Options, {**_UNSOFTENED, **settings, **chosen}, "options")
     for name in _UNSOFTENED:
         if getattr(options, name):
