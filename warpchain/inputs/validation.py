@@ -153,14 +153,17 @@ def plain(value: object, path: str = "value") -> Any:
     tuples become lists, also inside of lists and mappings.
 
     Raises:
-        InputError: there are more than `MOST_VALUES` of them, deeper than `DEEPEST`, or a key is no text or number; the
-            message begins with `path`.
+        InputError: there are more than `MOST_VALUES` of them, or deeper than `DEEPEST`, a key is no text or number, or
+            a value is a span of time; the message begins with `path`.
     """
     left = MOST_VALUES
 
-    def listed(items: Iterable[object], count: int, depth: int) -> list[Any]:
+    def counted(count: int) -> None:
         if count > left:
             raise InputError(f"{path}: more than {MOST_VALUES} values; give fewer")
+
+    def listed(items: Iterable[object], count: int, depth: int) -> list[Any]:
+        counted(count)
         return [converted(item, depth) for item in items]
 
     def converted(value: object, depth: int) -> Any:
@@ -175,14 +178,17 @@ def plain(value: object, path: str = "value") -> Any:
                     raise InputError(f"{path}: {shown(key)} is no name; give names as text")
             return dict(zip(keys, listed(value.values(), len(value), depth + 1), strict=True))
         if isinstance(value, np.ndarray):
+            counted(value.size)
             items = value if value.dtype.kind in "mMV" and value.ndim else value.tolist()  # times are no numbers
-            return listed(items, value.size, depth + 1) if value.ndim else converted(items, depth + 1)
+            return listed(items, len(items), depth + 1) if value.ndim else converted(items, depth + 1)
         if isinstance(value, range):
             return listed(value, left + 1 if value[left:] else len(value), depth + 1)  # len() has a limit of its own
         if isinstance(value, list | tuple):
             return listed(value, len(value), depth + 1)
+        if isinstance(value, np.timedelta64):  # a whole number to NumPy and pydantic, in whatever unit
+            raise InputError(f"{path}: {shown(value)} is of type timedelta64; give a plain number")
         for kind, own in _OWN_TYPES:
-            if isinstance(value, kind) and not isinstance(value, np.timedelta64):
+            if isinstance(value, kind):
                 return own(value)
         return value
 
