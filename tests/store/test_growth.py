@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -176,12 +177,13 @@ def test_samples_that_do_not_grow_are_refused(tmp_path: Path, capsys: pytest.Cap
     assert files(tmp_path / "sweep") == before
 
 
-def test_a_folder_that_cannot_grow_stays_as_it_was(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_grow_stays_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Growth on a disk without room for it is refused, and the folder still takes the sweep that it has."""
     make_sweep(tmp_path, content(samples=4), drawn_distance)
     before = files(tmp_path)
-    with pytest.raises(OSError, match="make room"):
-        SweepFolder.open(tmp_path, load_sweep(content(samples=10**9)), shard_size=10**9)
+    with monkeypatch.context() as patched, pytest.raises(OSError, match="make room"):
+        patched.setattr("shutil.disk_usage", lambda folder: SimpleNamespace(free=10**6))
+        SweepFolder.open(tmp_path, load_sweep(content(samples=2**20)), shard_size=10**9)
     assert files(tmp_path) == before
     make_sweep(tmp_path, content(samples=4), drawn_distance)
 

@@ -89,7 +89,7 @@ def _warnings_on_one_line() -> Iterator[None]:
             from warpchain.inputs.validation import InputWarning, one_line
 
             if issubclass(category, InputWarning):
-                print(one_line(f"warning: {message}"), file=sys.stderr)
+                print(one_line(str(message), "warning: "), file=sys.stderr)
             else:
                 usual(message, category, filename, lineno, file, line)
 
@@ -102,7 +102,7 @@ def _refuse(problems: Sequence[str], status: int = REFUSED) -> NoReturn:
     from warpchain.inputs.validation import one_line
 
     for problem in problems:
-        print(one_line(f"error: {problem}"), file=sys.stderr)
+        print(one_line(problem, "error: "), file=sys.stderr)
     sys.exit(status)
 
 

@@ -76,7 +76,7 @@ def sweep(
     as_json: AsJson = False,
 ) -> None:
     """Run a sweep, or what is left of it: many walks over a grid, with random samples in each cell."""
-    from warpchain.inputs.validation import InputError, shown
+    from warpchain.inputs.validation import InputError
 
     if new is not None:
         _write_new(new, alone=not any(value for name, value in context.params.items() if name != "new"))
@@ -93,7 +93,7 @@ def sweep(
             if value is not None:
                 raise InputError(f"{name}: given together with --gpus; leave one out")
         if device not in (None, "cuda"):
-            raise InputError(f"--device: {shown(device)} is given together with --gpus; give cuda, or leave one out")
+            raise InputError(f"--device: {device} is given together with --gpus; give cuda, or leave one out")
         device = "cuda"
     with status_line(LOG_EVERY) as show, _executor(gpus, scheduler) as (executor, count):
         result = run(

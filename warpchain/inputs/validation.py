@@ -32,6 +32,8 @@ LONGEST_NAME: Final = 255
 """Most characters of a name that a user gives to something; a folder's name has no more."""
 _LONGEST_VALUE: Final = 60
 """Most characters of a value in a message."""
+_SHORTEST_PATH: Final = 40
+"""Least number of characters that a path keeps in a line that is too long."""
 _LONGEST_CHOICE: Final = 125
 """Most characters of a list of possible words in a message."""
 
@@ -277,13 +279,24 @@ def printable(text: str) -> str:
     )
 
 
-def one_line(text: str) -> str:
-    """A message as one printable line of at most `LONGEST_LINE` characters; what is too long lacks its middle."""
-    if len(text) > 2 * LONGEST_LINE:  # a short way for long texts, of which no more is shown
-        text = text[:LONGEST_LINE] + text[-LONGEST_LINE:]
-    text = printable(" ".join(text.split()))
-    last = LONGEST_LINE // 3
-    return text if len(text) <= LONGEST_LINE else f"{text[: LONGEST_LINE - last - 5]} ... {text[-last:]}"
+def one_line(text: str, kind: str = "") -> str:
+    """A message as one printable line of at most `LONGEST_LINE` characters.
+
+    What is too long lacks the middle of the path that it begins with and, if that is not enough, its own end.
+
+    Args:
+        text: the message.
+        kind: what stands before it, such as `error: `.
+    """
+    if len(text) > 10 * LONGEST_LINE:  # a short way for long texts, of which no more is shown
+        text = text[: 5 * LONGEST_LINE] + text[-5 * LONGEST_LINE :]
+    text, room = printable(" ".join(text.split())), LONGEST_LINE - len(kind)
+    where, colon, rest = text.partition(": ")
+    longest = max(_SHORTEST_PATH, room - len(colon + rest))
+    if len(text) > room and len(where) > longest:
+        first = longest // 3
+        text = f"{where[:first]}...{where[first + 3 - longest :]}{colon}{rest}"
+    return kind + (text if len(text) <= room else f"{text[: room - 3]}...")
 
 
 def short(number: float) -> str:

@@ -52,8 +52,10 @@ def parse_yaml(text: str) -> Any:
     """
     try:
         return yaml.load(text, Loader=Loader)
-    except (ValueError, OverflowError) as error:  # an escape or a version that stands for no character or number
-        raise yaml.YAMLError(f"cannot be read: {error}") from None
+    except yaml.reader.ReaderError as error:
+        raise yaml.YAMLError(f"the character at place {error.position + 1} is not allowed") from None
+    except (ValueError, OverflowError):
+        raise yaml.YAMLError("an escape or a version stands for no character or number") from None
 
 
 class Loader(yaml.SafeLoader):

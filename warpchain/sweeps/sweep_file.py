@@ -366,7 +366,7 @@ def _same_samples_along(content: object, blocks: Sequence[Block]) -> tuple[str, 
     names: list[str] = []
     for number, written in enumerate(content):
         name = full_name(written, NAME_OF_SYMBOL)
-        if name not in known:
+        if not isinstance(name, str) or name not in known:
             remedy = suggestion(name, known) if known else "leave it out"
             raise InputError(f"{path}[{number}]: {shown(written)} is no axis of any block; {remedy}")
         if name in names:
