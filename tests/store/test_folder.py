@@ -240,7 +240,7 @@ def test_other_numerics_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     run(tmp_path)
     for module in (manifest, shards, folder):
         monkeypatch.setattr(module, "NUMERICS_VERSION", 99)
-    with refused(InputError, tmp_path, f"numerics {NUMERICS_VERSION}, but this warpchain has 99", "--fresh"):
+    with refused(InputError, tmp_path, f"numerics {NUMERICS_VERSION}, but this warpchain has 99", "start anew"):
         open_folder(tmp_path)
     with refused(InputError, tmp_path, "belongs to another sweep now"):
         write_shard(tmp_path, SWEEP.digest(), FIRST, synthetic_rows(SWEEP, FIRST))

@@ -250,10 +250,10 @@ def test_a_disk_too_small_for_series_is_said_at_once(tmp_path: Path, monkeypatch
     """Series are in the estimate of the room that a sweep takes."""
     monkeypatch.setattr("shutil.disk_usage", lambda folder: SimpleNamespace(free=2 * 10**9))
     huge = TINY | {"samples": 2**20}
-    SweepFolder.open(tmp_path / "rows", load_sweep(huge), shard_size=10**9).close()
+    SweepFolder.open(tmp_path / "rows", load_sweep(huge), shard_size=256).close()
     huge |= {"record": {"series": True}}
     with pytest.raises(OSError, match=r"the rest of the sweep takes .* MB, but .* MB are free"):
-        SweepFolder.open(tmp_path, load_sweep(huge), shard_size=10**9)
+        SweepFolder.open(tmp_path, load_sweep(huge), shard_size=256)
 
 
 def test_the_merged_file_has_series_by_name(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

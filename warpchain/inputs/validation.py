@@ -32,8 +32,8 @@ LONGEST_NAME: Final = 255
 """Most characters of a name that a user gives to something; a folder's name has no more."""
 _LONGEST_VALUE: Final = 60
 """Most characters of a value in a message."""
-_SHORTEST_PATH: Final = 40
-"""Least number of characters that a path keeps in a line that is too long."""
+_LONGEST_PATH: Final = 120
+"""Most characters of a path with which a line begins that is too long; one can go to a path only if it is whole."""
 _LONGEST_CHOICE: Final = 125
 """Most characters of a list of possible words in a message."""
 
@@ -282,7 +282,7 @@ def printable(text: str) -> str:
 def one_line(text: str, kind: str = "") -> str:
     """A message as one printable line of at most `LONGEST_LINE` characters.
 
-    What is too long lacks the middle of the path that it begins with and, if that is not enough, its own end.
+    What is too long lacks its end, and the middle of a path of more than `_LONGEST_PATH` characters at its beginning.
 
     Args:
         text: the message.
@@ -292,7 +292,7 @@ def one_line(text: str, kind: str = "") -> str:
         text = text[: 5 * LONGEST_LINE] + text[-5 * LONGEST_LINE :]
     text, room = printable(" ".join(text.split())), LONGEST_LINE - len(kind)
     where, colon, rest = text.partition(": ")
-    longest = max(_SHORTEST_PATH, room - len(colon + rest))
+    longest = max(_LONGEST_PATH, room - len(colon + rest))
     if len(text) > room and len(where) > longest:
         first = longest // 3
         text = f"{where[:first]}...{where[first + 3 - longest :]}{colon}{rest}"
