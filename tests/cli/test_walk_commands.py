@@ -192,7 +192,7 @@ def test_a_refusal_of_several_lines_is_printed_as_several(command: Command, monk
     """Each of several problems has a line of its own."""
 
     def refuse(*_: object) -> None:
-        raise InputError("links: 3 is odd;  give an even number\nsamples: 0 is less than 1; give 1 or more")
+        raise InputError("links: 3 is odd;  give an even number", "samples: 0 is less than 1; give 1 or more")
 
     monkeypatch.setattr(command_module, "_setup", refuse)
     answer = command("walk")

@@ -224,7 +224,7 @@ def test_workers_may_write_the_same_shard(tmp_path: Path) -> None:
 def test_a_changed_sweep_is_refused(tmp_path: Path) -> None:
     """Another sweep is refused in a folder unless it may start anew; another name of the same sweep is not."""
     run(tmp_path)
-    with refused(InputError, tmp_path, str(tmp_path), "holds another sweep (synthetic)", "--fresh"):
+    with refused(InputError, tmp_path, f"{tmp_path.name}: holds another sweep (synthetic)", "--fresh"):
         open_folder(tmp_path, CHANGED)
     open_folder(tmp_path, replace(SWEEP, name="renamed")).close()
     with open_folder(tmp_path, CHANGED, fresh=True) as opened:
@@ -240,7 +240,7 @@ def test_other_numerics_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     run(tmp_path)
     for module in (manifest, shards, folder):
         monkeypatch.setattr(module, "NUMERICS_VERSION", 99)
-    with refused(InputError, tmp_path, f"numerics {NUMERICS_VERSION}, but this warpchain has 99", "--fresh"):
+    with refused(InputError, tmp_path, f"numerics {NUMERICS_VERSION}, but this warpchain has 99", "start anew"):
         open_folder(tmp_path)
     with refused(InputError, tmp_path, "belongs to another sweep now"):
         write_shard(tmp_path, SWEEP.digest(), FIRST, synthetic_rows(SWEEP, FIRST))

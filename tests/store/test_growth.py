@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -163,25 +164,29 @@ def test_what_is_no_growth_is_refused(tmp_path: Path, given: dict[str, Any], mes
     assert "\n" not in str(caught.value) and files(tmp_path) == before
 
 
-def test_samples_that_do_not_grow_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_samples_that_do_not_grow_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A latin hypercube has other points when it is larger: one line says so at the command line."""
     assert set(SAMPLERS) - set(EXTENSIBLE) == {"latin_hypercube"}
     make_sweep(tmp_path / "sweep", content(samples=4, sampler="latin_hypercube"), drawn_distance)
     before = files(tmp_path / "sweep")
     (tmp_path / "large.yaml").write_text(yaml.safe_dump(content(samples=8, sampler="latin_hypercube"), sort_keys=False))
+    monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit):
-        main(["sweep", str(tmp_path / "large.yaml"), "-o", str(tmp_path / "sweep")])
+        main(["sweep", "large.yaml", "-o", "sweep"])
     error = capsys.readouterr().err.strip()
     assert "but a latin_hypercube of 8 samples has other points; give samples: 4" in error and "\n" not in error
     assert files(tmp_path / "sweep") == before
 
 
-def test_a_folder_that_cannot_grow_stays_as_it_was(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_grow_stays_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Growth on a disk without room for it is refused, and the folder still takes the sweep that it has."""
     make_sweep(tmp_path, content(samples=4), drawn_distance)
     before = files(tmp_path)
-    with pytest.raises(OSError, match="make room"):
-        SweepFolder.open(tmp_path, load_sweep(content(samples=10**9)), shard_size=10**9)
+    with monkeypatch.context() as patched, pytest.raises(OSError, match="make room"):
+        patched.setattr("shutil.disk_usage", lambda folder: SimpleNamespace(free=10**6))
+        SweepFolder.open(tmp_path, load_sweep(content(samples=2**20)), shard_size=10**9)
     assert files(tmp_path) == before
     make_sweep(tmp_path, content(samples=4), drawn_distance)
 

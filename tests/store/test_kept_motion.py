@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import h5py
@@ -245,11 +246,14 @@ def test_a_shard_without_its_motions_is_not_written(kept: Path, tmp_path: Path) 
         assert store.missing() == manifest.shards
 
 
-def test_a_disk_too_small_for_series_is_said_at_once(tmp_path: Path) -> None:
+def test_a_disk_too_small_for_series_is_said_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Series are in the estimate of the room that a sweep takes."""
-    huge = TINY | {"samples": 10**9, "record": {"series": True}}
+    monkeypatch.setattr("shutil.disk_usage", lambda folder: SimpleNamespace(free=2 * 10**9))
+    huge = TINY | {"samples": 2**20}
+    SweepFolder.open(tmp_path / "rows", load_sweep(huge), shard_size=256).close()
+    huge |= {"record": {"series": True}}
     with pytest.raises(OSError, match=r"the rest of the sweep takes .* MB, but .* MB are free"):
-        SweepFolder.open(tmp_path, load_sweep(huge), shard_size=10**9)
+        SweepFolder.open(tmp_path, load_sweep(huge), shard_size=256)
 
 
 def test_the_merged_file_has_series_by_name(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,7 @@ from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps import designs
 from warpchain.sweeps.plan import load_sweep
-from warpchain.sweeps.sweep_file import CELL_LIMIT
+from warpchain.sweeps.sizes import CELL_LIMIT
 
 
 def test_values_and_layout() -> None:
@@ -427,7 +427,7 @@ def test_from_a_file(tmp_path: Path) -> None:
                     "gravity": {"from": 1, "to": 11, "step": 1},
                 }
             ),
-            f"sweep.grid: the sweep has more than {CELL_LIMIT} cells; give fewer values",
+            f"sweep.grid: 109989 cells, at most {CELL_LIMIT} are possible; give fewer values",
         ),
     ],
 )

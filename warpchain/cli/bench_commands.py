@@ -207,8 +207,10 @@ def accuracy(
     if as_json:
         print((output / FILE).read_text(encoding="utf-8"))
         return
+    from warpchain.inputs.validation import printable
+
     for path in (output / FILE, *paths):
-        print(path)
+        print(printable(str(path)))
 
 
 @bench_app.command("tilting")

@@ -79,6 +79,7 @@ def schema(
     # yaml-language-server: $schema=FILE
     """
     from warpchain.files import write_whole
+    from warpchain.inputs.validation import printable
     from warpchain.sweeps.schema import sweep_schema
 
     text = json.dumps(sweep_schema(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
@@ -86,7 +87,7 @@ def schema(
         print(text, end="")
         return
     write_whole(output, text)
-    print(output)
+    print(printable(str(output)))
 
 
 def _content(entry: "ValueEntry") -> dict[str, Any]:

@@ -64,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
         if not isinstance(error, InputError):
             raise
-        _refuse(str(error).splitlines(), FAILED if isinstance(error, DamagedFileError) else REFUSED)
+        _refuse(error.args, FAILED if isinstance(error, DamagedFileError) else REFUSED)
     except KeyboardInterrupt:
         status = INTERRUPTED
     if status == INTERRUPTED:
@@ -86,10 +86,10 @@ def _warnings_on_one_line() -> Iterator[None]:
             file: TextIO | None = None,
             line: str | None = None,
         ) -> None:
-            from warpchain.inputs.validation import InputWarning
+            from warpchain.inputs.validation import InputWarning, one_line
 
             if issubclass(category, InputWarning):
-                print("warning:", message, file=sys.stderr)
+                print(one_line(str(message), "warning: "), file=sys.stderr)
             else:
                 usual(message, category, filename, lineno, file, line)
 
@@ -99,8 +99,10 @@ def _warnings_on_one_line() -> Iterator[None]:
 
 def _refuse(problems: Sequence[str], status: int = REFUSED) -> NoReturn:
     """Print each problem on a line of its own and exit."""
+    from warpchain.inputs.validation import one_line
+
     for problem in problems:
-        print("error:", " ".join(problem.split()), file=sys.stderr)
+        print(one_line(problem, "error: "), file=sys.stderr)
     sys.exit(status)
 
 
@@ -237,7 +239,7 @@ def walk(
     """Let one chain walk: hang it on its sprocket, spin it up, drop it and follow it until it rests."""
     from warpchain.cli.terminal import print_walk, progress_text, status_line, try_walk_folder, write_files
     from warpchain.inputs.distributions import LARGEST_SEED
-    from warpchain.inputs.validation import InputError, checked_whole
+    from warpchain.inputs.validation import InputError, checked_whole, printable
     from warpchain.run.single_walk import run_walk
 
     named = {
@@ -275,7 +277,7 @@ def walk(
     if output is not None:
         for path in write_files(result, output, animation):
             if not as_json:
-                print(path)
+                print(printable(str(path)))
     if not result.status.ok:
         print(f"{result.status.label}: {result.status.sentence}", file=sys.stderr)
         raise typer.Exit(FAILED)
@@ -322,11 +324,11 @@ def _parsed(path: str, text: str) -> Any:
     import yaml
 
     from warpchain.inputs.validation import InputError, shown
-    from warpchain.inputs.yaml_files import Loader
+    from warpchain.inputs.yaml_files import parse_yaml
 
     try:
-        return yaml.load(text, Loader=Loader)
-    except (yaml.YAMLError, ValueError, RecursionError):
+        return parse_yaml(text)
+    except yaml.YAMLError:
         raise InputError(f"{path}: {shown(text)} cannot be read; give a number, true, false or a name") from None
 
 

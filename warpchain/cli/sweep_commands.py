@@ -116,13 +116,13 @@ def _write_new(path: Path, *, alone: bool) -> None:
         InputError: other arguments are given, or there is such a file already.
         OSError: it cannot be written.
     """
-    from warpchain.inputs.validation import InputError
+    from warpchain.inputs.validation import InputError, printable
     from warpchain.sweeps.shipped import write_new_sweep
 
     if not alone:
         raise InputError("--new: given together with other arguments; leave them out")
     write_new_sweep(path)
-    print(path)
+    print(printable(str(path)))
 
 
 def info(
@@ -166,7 +166,7 @@ def plot(
     Of a sweep: Figures 6 and 5, grids, tolerance, sensitivity, statuses. Of a walk: figure5.png, film_strip.png,
     loop.png and energy.png; a line says what is left out and why.
     """
-    from warpchain.inputs.validation import InputError
+    from warpchain.inputs.validation import InputError, printable
 
     if os.path.isfile(path) or (path.suffix == ".h5" and not os.path.isdir(path)):
         if quantity is not None:
@@ -186,7 +186,7 @@ def plot(
     try_folder(folder)
     make_folder(folder)
     for picture in figures(result, quantity or "dx"):
-        print(picture.save(folder))
+        print(printable(str(picture.save(folder))))
 
 
 def report(
@@ -218,14 +218,14 @@ def report(
     ] = None,
 ) -> None:
     """Write one self-contained HTML page: figures, table, parameters, provenance, failed walks, a walk in motion."""
-    from warpchain.inputs.validation import InputError
+    from warpchain.inputs.validation import InputError, printable
     from warpchain.reports.sweep_page import write_report
 
     if device is not None and walk is None:
         raise InputError("--device: no walk is run for this page; add --walk INDEX, or leave it out")
     path = output or directory / "report.html"
     write_report(directory, path, animation_of=walk, device=device)
-    print(path)
+    print(printable(str(path)))
 
 
 def merge(
@@ -240,10 +240,11 @@ def merge(
 
     Folders of the same sweep with different seeds are put together: their samples stand one behind the other.
     """
+    from warpchain.inputs.validation import printable
     from warpchain.store.merged_file import merge as merge_shards
 
     merge_shards(directories, output)
-    print(output)
+    print(printable(str(output)))
 
 
 def add_commands(app: typer.Typer) -> None:

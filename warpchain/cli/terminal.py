@@ -17,7 +17,7 @@ from rich.table import Table
 
 from warpchain.engine.tallies import LOST
 from warpchain.files import DISK_FAILURES, checked_output, failure, make_folder, remedy, remove_output
-from warpchain.inputs.validation import InputError
+from warpchain.inputs.validation import InputError, one_line, printable
 from warpchain.pictures.style import save_figure
 from warpchain.walks.walk_result import WalkResult
 
@@ -133,17 +133,19 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
         return
     console = Console(highlight=False, markup=False)
     counts = ", ".join(f"{count:,} {label}" for label, count in summary.items() if count or label == "at_rest")
-    console.print(f"{result.name}: {result.walk_count:,} walks, {counts}")
+    console.print(f"{printable(result.name)}: {result.walk_count:,} walks, {counts}")
     if rate is not None:
         console.print(
             f"running: {rate:.2f} walks a second" + ("" if time_left is None else f", {_duration(time_left)} left")
         )
     for name, of_block in statistics.items():
-        table = Table(box=None, pad_edge=False, title=name if len(statistics) > 1 else None, title_justify="left")
-        for heading in (*of_block.axes, "mean Δx / m", "s.d. / m", "at rest", "failed", "missing"):
+        table = Table(
+            box=None, pad_edge=False, title=printable(name) if len(statistics) > 1 else None, title_justify="left"
+        )
+        for heading in (*map(printable, of_block.axes), "mean Δx / m", "s.d. / m", "at rest", "failed", "missing"):
             table.add_column(heading, justify="right")
         for cell in np.ndindex(*of_block.mean.shape):
-            place = [str(values[index]) for values, index in zip(of_block.axes.values(), cell, strict=True)]
+            place = [printable(str(values[index])) for values, index in zip(of_block.axes.values(), cell, strict=True)]
             lengths = [f"{array[cell]:.4f}" for array in (of_block.mean, of_block.sd)]
             walks = [str(array[cell]) for array in (of_block.count, of_block.failed, of_block.missing)]
             table.add_row(*place, *lengths, *walks)
@@ -231,7 +233,7 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
             if result.status.ok and name != loop:
                 raise
             remove_output(path)
-            print(f"{path}: not drawn; {error}", file=sys.stderr)
+            print(one_line(f"{path}: not drawn; {error}"), file=sys.stderr)
         else:
             yield path
 

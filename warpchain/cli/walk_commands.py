@@ -31,6 +31,7 @@ def plot_walk(path: Path, output: Path | None) -> bool:
 
     from warpchain.cli.terminal import try_folder
     from warpchain.files import make_folder
+    from warpchain.inputs.validation import one_line, printable
     from warpchain.pictures.style import save_figure
     from warpchain.pictures.walk_shape import Kind
     from warpchain.walks.walk_result import load_walk
@@ -43,10 +44,10 @@ def plot_walk(path: Path, output: Path | None) -> bool:
         try:
             figure = walk.plot(kind)
         except ValueError as error:
-            print(f"{target}: not drawn; {error}", file=sys.stderr)
+            print(one_line(f"{target}: not drawn; {error}"), file=sys.stderr)
             continue
         save_figure(figure, target)
-        print(target)
+        print(printable(str(target)))
         drawn = True
     return drawn
 
@@ -76,7 +77,7 @@ def animate(
     ] = 4.0,
 ) -> None:
     """Write a moving picture of a saved walk: GIF, MP4 or a page with a player."""
-    from warpchain.inputs.validation import InputError
+    from warpchain.inputs.validation import InputError, printable
     from warpchain.walks.walk_result import load_walk
 
     result = load_walk(walk)
@@ -84,7 +85,7 @@ def animate(
         result.animate(output, fps=fps, slow=slow)
     except (ValueError, ImportError) as error:
         raise InputError(str(error)) from None
-    print(output)
+    print(printable(str(output)))
 
 
 def setup_like(path: Path, given: Mapping[str, Mapping[str, object]]) -> "tuple[Setup, int | None]":

@@ -96,11 +96,12 @@ class Options(BaseModel):
         if not isinstance(values, Mapping):
             return values
         word, known = values.get("method", "standard"), (*METHODS_BY_NEED, *method_names())
-        if word not in known:
+        if not isinstance(word, str) or word not in known:
             if isinstance(word, str) and word in FORMER_METHODS:
                 raise refusal("method", f"{shown(word)} was removed; give {FORMER_METHODS[word]}")
             raise refusal("method", f"{shown(word)} is unknown; {suggestion(word, known)}")
-        if word == "standard" and str(values.get("device")).startswith("cuda"):
+        device = values.get("device")
+        if word == "standard" and isinstance(device, str) and device.startswith("cuda"):
             word = "explicit"
         defaults = {"method": word, **METHODS_BY_NEED.get(word, {})}
         if word == HYBRID:

@@ -7,6 +7,7 @@ Source: "A walking roller chain", Table 1, unless a quantity says otherwise.
 """
 
 import math
+import sys
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -209,7 +210,7 @@ def _unit_problem(name: str, value: float) -> str | None:
     if unit == DIMENSIONLESS or value == 0 or any(1 / FAR <= value / each <= FAR for each in usual):
         return None
     quantity = Parameters.quantities()[name]
-    ratio = value / quantity.value
+    ratio = max(value / quantity.value, sys.float_info.min)  # which has a reciprocal
     times = f"{short(ratio)} times" if ratio > 1 else f"1/{short(1 / ratio)} of"
     whose = "the preset's" if quantity.source == "assumed" else "Table 1's"
     meant = Decimal(repr(value)).scaleb(-round(math.log10(ratio))).normalize()

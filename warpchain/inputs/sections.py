@@ -10,7 +10,7 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.symbols import by_full_name, full_name, names_by_symbol, spelled
-from warpchain.inputs.validation import InputError
+from warpchain.inputs.validation import InputError, as_word, choice
 
 T = TypeVar("T")
 
@@ -21,9 +21,6 @@ SECTION_OF: Final = {name: section for section, model in SECTIONS.items() for na
 NAME_OF_SYMBOL: Final = {symbol: name for model in SECTIONS.values() for symbol, name in names_by_symbol(model).items()}
 """Symbol, in ASCII → name; no symbol is the name of a field."""
 SYMBOL_OF: Final = {name: symbol for symbol, name in NAME_OF_SYMBOL.items()}
-
-_LONGEST_LIST: Final = 25
-"""Most names that an error message lists."""
 
 
 def by_name(
@@ -86,15 +83,16 @@ def suggested_name(written: object, known: Collection[str], *, elsewhere: bool =
     names = {name: name for name in (*known, *(SECTION_OF if elsewhere else ()))}
     names |= {symbol: name for symbol, name in NAME_OF_SYMBOL.items() if name in names}
     shown = {each: each if name in known else f"{SECTION_OF[name]}.{each}" for each, name in names.items()}
-    text = spelled(str(written))
+    text = spelled(as_word(written))
     alike = [text] if text in names else [name for name in names if _is_part(text, name)]
     here = [name for name in alike if names[name] in known]
     found = [shown[name] for name in here or alike or difflib.get_close_matches(text, names, n=1)]
     if found:
         return f"did you mean {' or '.join(filter(None, (', '.join(found[:-1]), found[-1])))}?"
-    if not known or (elsewhere and len(known) > _LONGEST_LIST):
+    words = choice(known)
+    if not known or (elsewhere and words.endswith("...")):
         return "give one of those that `warpchain parameters` lists"
-    return f"give one of {', '.join(known)}"
+    return f"give one of {words}"
 
 
 def _is_part(text: str, name: str) -> bool:

@@ -11,7 +11,7 @@ from warpchain.engine.tallies import LOST
 from warpchain.inputs.keywords import Method, Number, OtherOptions, Preset, Truth
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
-from warpchain.inputs.scene import check_links_on_gpu
+from warpchain.inputs.scene import MOST_LINKS, check_links_on_gpu
 from warpchain.inputs.validation import InputError, plain, shown, validated
 from warpchain.status import Status
 from warpchain.walks.trajectory import Trajectory
@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 LONGEST = 1e9
 """Durations [s] from here on are refused."""
+MOST_PLACES = 10_000_000
+"""Most links × instants of a trajectory, which take 0.5 GB."""
 _UNSOFTENED = {"soften_pile": False, "soften_drive": False}
 """A given chain has no phases in which joints soften."""
 
@@ -66,8 +68,8 @@ def simulate(
     chosen: dict[str, object] = {"method": method, "device": device, "self_contact": self_contact}
     if tolerance is not None:
         chosen["tolerance"] = tolerance
-    floor, gravity = plain(floor), plain(gravity)
-    end: float = plain(duration)
+    floor, gravity = plain(floor, "floor"), plain(gravity, "gravity")
+    end: float = plain(duration, "duration")
     options = validated(Options, {**_UNSOFTENED, **settings, **chosen}, "options")
     for name in _UNSOFTENED:
         if getattr(options, name):
@@ -83,8 +85,15 @@ def simulate(
         raise InputError(f"velocity: {len(rates)} rows, but position has {len(start)}; give one row per link each")
     if len(start) < 4 or len(start) % 2:
         raise InputError(f"position: {len(start)} links; a closed chain has an even number of at least 4")
+    if len(start) > MOST_LINKS:
+        raise InputError(f"position: {len(start)} links; give at most {MOST_LINKS}")
     check_links_on_gpu(len(start), options.device, "position")
     instants = _checked_times(end, times)
+    if len(instants) * len(start) > MOST_PLACES:
+        raise InputError(
+            f"times: {len(instants)} instants of {len(start)} links are too many; "
+            f"give at most {MOST_PLACES // len(start)}"
+        )
     batch = Batch(1, len(start), options)
     batch.set_chain(0, chain, len(start))
     batch.load(0, start, rates, stop_time=instants[0], stop_status=Status.FINISHED)

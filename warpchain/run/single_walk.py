@@ -15,15 +15,13 @@ from warpchain.inputs.sections import NAME_OF_SYMBOL, by_section
 from warpchain.inputs.setup import DEFAULT_PRESET, Setup, resolve
 from warpchain.inputs.symbols import full_name
 from warpchain.inputs.validation import InputError, checked_whole, plain, shown
-from warpchain.walks.motion import Keep
+from warpchain.walks.motion import LONGEST_INTERVAL, Keep
 from warpchain.walks.scheduler import run_setups
 from warpchain.walks.walk_phases import WalkRun
 from warpchain.walks.walk_result import WalkResult
 
 RECORD_BEFORE = 0.5
 """Time [s] before the release that is kept if frames are, unless told otherwise."""
-LONGEST_FRAME_INTERVAL = 1000.0
-"""Greatest time [s] between frames."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +103,7 @@ def walk(
         setup = setup_walk(DEFAULT_PRESET if preset is None else preset, given, seed)
     else:
         _check_repeated(setup, given if preset is None else {"preset": preset, **given}, seed)
-    parameters = by_section(plain(settings))["parameters"]
+    parameters = by_section(plain(settings, "settings"))["parameters"]
     warn_of_units((f"parameters.{name}", name, value) for name, value in parameters.items())
     return run_walk(
         setup, seed=seed, frame_interval=frame_interval, record_before=record_before, on_progress=on_progress
@@ -121,7 +119,7 @@ def _check_repeated(setup: object, others: Mapping[str, object], seed: Whole | N
     if others:
         raise InputError(f"{', '.join(others)}: given together with setup, which is complete; leave one out")
     if seed is not None:
-        checked_whole(plain(seed), "seed", 0, LARGEST_SEED)
+        checked_whole(plain(seed, "seed"), "seed", 0, LARGEST_SEED)
 
 
 def setup_walk(preset: str, settings: Mapping[str, object], seed: Whole | None) -> Setup:
@@ -135,7 +133,7 @@ def setup_walk(preset: str, settings: Mapping[str, object], seed: Whole | None) 
     """
     sections = by_section(settings)
     setup = resolve(preset, **sections)
-    return setup if seed is None else sampled(setup, random_generator(plain(seed)), kept=sections["scene"])
+    return setup if seed is None else sampled(setup, random_generator(plain(seed, "seed")), kept=sections["scene"])
 
 
 def run_walk(
@@ -148,8 +146,10 @@ def run_walk(
 ) -> WalkResult:
     """Run a walk whose setup is complete, samples drawn; the seed is only noted. The rest is as of :func:`walk`."""
     started = time.perf_counter()
-    frame_every = None if frame_interval is None else _samples_per_frame(plain(frame_interval), setup.options)
-    before = _time_before(plain(record_before), frame_every) if setup.scene.start != "ellipse" else 0.0
+    frame_every = (
+        None if frame_interval is None else _samples_per_frame(plain(frame_interval, "frame_interval"), setup.options)
+    )
+    before = _time_before(plain(record_before, "record_before"), frame_every) if setup.scene.start != "ellipse" else 0.0
 
     def watch(run: WalkRun, compiling: bool) -> None:
         if on_progress is not None:
@@ -177,11 +177,11 @@ def _samples_per_frame(frame_interval: float, options: Options) -> int:
     """Whole samples between two kept frames, or an `InputError`."""
     if not (_is_number(frame_interval) and 0 < frame_interval < math.inf):
         raise InputError(f"frame_interval: {shown(frame_interval)} is not a positive time in s; give one, or None")
-    samples = frame_interval / options.record_interval if frame_interval < LONGEST_FRAME_INTERVAL else math.inf
+    samples = frame_interval / options.record_interval if frame_interval < LONGEST_INTERVAL else math.inf
     if not 0.999 < samples < math.inf:
         raise InputError(
             f"frame_interval: {shown(frame_interval)} is not between options.record_interval "
-            f"{options.record_interval} s and {LONGEST_FRAME_INTERVAL} s; give a time between, or None"
+            f"{options.record_interval} s and {LONGEST_INTERVAL} s; give a time between, or None"
         )
     return round(samples)
 
@@ -190,8 +190,10 @@ def _time_before(record_before: float | None, frame_every: int | None) -> float:
     """Time [s] before the release that is kept, or an `InputError`."""
     if record_before is None:
         return RECORD_BEFORE if frame_every is not None else 0.0
-    if not (_is_number(record_before) and 0 <= record_before < math.inf):
-        raise InputError(f"record_before: {shown(record_before)} is not a time in s; give one, 0 for none, or None")
+    if not (_is_number(record_before) and 0 <= record_before <= LONGEST_INTERVAL):
+        raise InputError(
+            f"record_before: {shown(record_before)} is not a time in s from 0 to {LONGEST_INTERVAL}; give one, or None"
+        )
     if record_before > 0 and frame_every is None:
         raise InputError("record_before: a time is given, but frame_interval is None; give a frame_interval as well")
     return float(record_before)

@@ -11,6 +11,9 @@ from warpchain.inputs.validation import InputError, plain
 from warpchain.sweeps.plan import Sweep, load_sweep
 from warpchain.sweeps.sweep_file import VERSION, read_sweep
 
+MOST_PROBLEMS: Final = 20
+"""Most problems that are described, each in a line; the others are counted."""
+
 _ALONE: Final = {"version": VERSION, "name": "sweep", "seed": 0, "preset": DEFAULT_PRESET, "samples": 1}
 """A sweep in which nothing is wrong, beside which each value is tried by itself."""
 
@@ -26,7 +29,7 @@ def sweep_of_keywords(given: Mapping[str, object], out: str | os.PathLike[str] |
     Raises:
         InputError: Something is refused; one line for each value.
     """
-    content: dict[str, Any] = {**plain(given), "version": VERSION}
+    content: dict[str, Any] = {**plain(given, "sweep"), "version": VERSION}
     content.setdefault("name", (Path(out).absolute().name if out is not None else "") or "sweep")
     content.setdefault("seed", 0)
     grid = content.get("grid")
@@ -35,7 +38,11 @@ def sweep_of_keywords(given: Mapping[str, object], out: str | os.PathLike[str] |
     try:
         return load_sweep(content)
     except InputError as error:
-        raise InputError("\n".join(dict.fromkeys([*_problems(content), str(error)]))) from None
+        problems = list(dict.fromkeys([*_problems(content), *error.args]))
+        more = (
+            [f"{len(problems) - MOST_PROBLEMS} more problems; correct these first"] if problems[MOST_PROBLEMS:] else []
+        )
+        raise InputError(*problems[:MOST_PROBLEMS], *more) from None
 
 
 def _problems(content: Mapping[str, Any]) -> Iterator[str]:

@@ -19,7 +19,7 @@ from warpchain.inputs.keywords import OptionSettings, ParameterSettings, Preset,
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import warn_of_units
 from warpchain.inputs.setup import Setup
-from warpchain.inputs.validation import InputError, plain, validated
+from warpchain.inputs.validation import InputError, checked_path, plain, shown, validated
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text, progress_bar
 from warpchain.run.sweep_keywords import sweep_of_keywords
 from warpchain.status import Status
@@ -147,7 +147,7 @@ def sweep(
         source, out, {key: value for key, value in keys.items() if value is not None}, device, workers
     )
     warn_of_units(given)
-    count = plain(workers)
+    count = plain(workers, "workers")
     if isinstance(executor, DaskClient):
         count = count or sum(executor.nthreads().values())
         executor = executor.get_executor()
@@ -176,19 +176,21 @@ def _checked_call(
         problems.append(f"{names}: given together with a source; leave one out, or write it into the source")
     if out is None:
         problems.append("out: missing; give the folder of the results")
-    count = plain(workers)
+    else:
+        out = checked_path(out, "out")
+    count = plain(workers, "workers")
     if count is not None and (isinstance(count, bool) or not isinstance(count, int) or count < 1):
-        problems.append(f"workers: {count!r} is not a number of workers; give a whole number from 1")
+        problems.append(f"workers: {shown(count)} is not a number of workers; give a whole number from 1")
     try:
         planned = sweep_of_keywords(keys, out) if source is None else load_sweep(source)
         given = [parameter for block in planned.blocks for parameter in block.given_parameters()]
         if device is not None:
             planned = on_device(planned, device)
     except InputError as error:
-        problems.append(str(error))
+        problems += error.args
     if problems or planned is None or out is None:
-        raise InputError("\n".join(problems))
-    return planned, Path(out), given
+        raise InputError(*problems)
+    return planned, out, given
 
 
 def _run_in_folder(

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpchain.inputs.validation import InputError
+from warpchain.sweeps.sizes import check_design_size
 
 Array = NDArray[np.float64]
 
@@ -48,7 +49,7 @@ def check_design(sampler: str, samples: int, dimensions: int, path: str) -> None
         path: where sampler and samples were given, for errors.
 
     Raises:
-        InputError: samples would all be equal, break the balance of a Sobol' sequence, or need SciPy.
+        InputError: samples would all be equal, are too many, break the balance of a Sobol' sequence, or need SciPy.
     """
     if dimensions == 0:
         if sampler == "saltelli":
@@ -61,6 +62,7 @@ def check_design(sampler: str, samples: int, dimensions: int, path: str) -> None
         return
     if sampler == "random":
         return
+    check_design_size(samples, dimensions * (2 if sampler == "saltelli" else 1), path)
     if find_spec("scipy") is None:
         raise InputError(
             f"{path}.sampler: {sampler} needs SciPy, which is not installed; pip install 'warpchain[scipy]'"

@@ -15,7 +15,8 @@ from warpchain.inputs.sections import NAME_OF_SYMBOL, SECTION_OF, SECTIONS, SYMB
 from warpchain.inputs.validation import DIMENSIONLESS, field_unit
 from warpchain.inputs.value_list import field_choices
 from warpchain.sweeps.designs import SAMPLERS
-from warpchain.sweeps.sweep_file import AXIS_LIMIT, VERSION
+from warpchain.sweeps.sizes import AXIS_LIMIT
+from warpchain.sweeps.sweep_file import VERSION
 
 Schema = dict[str, Any]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from warpchain.files import failure, write_whole
-from warpchain.inputs.validation import InputError, suggestion
+from warpchain.inputs.validation import InputError, checked_path, suggestion
 
 _PACKAGE: Final = Path(__file__).parents[1]
 _SHIPPED: Final = _PACKAGE / "shipped_sweeps"
@@ -24,10 +24,11 @@ def sweep_path(source: str | os.PathLike[str]) -> Path:
     """Path of a sweep file; a bare name that is no file is that of a sweep that comes with the package.
 
     Raises:
-        InputError: a bare name is neither a file nor a sweep of the package.
+        InputError: it is no path, or a bare name that is neither a file nor a sweep of the package.
     """
-    path, name = Path(source), os.fspath(source)
-    if path.is_file() or not re.fullmatch(r"[A-Za-z0-9_-]+", name):
+    path = checked_path(source, "sweep")
+    name = str(path)
+    if os.path.isfile(path) or not re.fullmatch(r"[A-Za-z0-9_-]+", name):
         return path
     known = shipped_sweeps()
     if name not in known:

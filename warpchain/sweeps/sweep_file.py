@@ -22,6 +22,7 @@ from warpchain.inputs.scene import Scene
 from warpchain.inputs.sections import NAME_OF_SYMBOL, SECTION_OF, SECTIONS, by_name
 from warpchain.inputs.symbols import full_name
 from warpchain.inputs.validation import (
+    LONGEST_NAME,
     Bounds,
     InputError,
     checked_positive,
@@ -38,15 +39,11 @@ from warpchain.sweeps.block import Block, Value
 from warpchain.sweeps.designs import SAMPLERS, check_design
 from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL, Choice, Recording
 from warpchain.sweeps.shipped import sweep_path
+from warpchain.sweeps.sizes import AXIS_LIMIT, check_count, check_declared
+from warpchain.walks.motion import LONGEST_INTERVAL
 
 VERSION: Final = 1
 """Version of the file format."""
-
-AXIS_LIMIT: Final = 10_000
-"""Most values of one axis."""
-
-CELL_LIMIT: Final = 100_000
-"""Most cells of a sweep, because each is checked when the sweep is loaded. Samples have no such limit."""
 
 _BLOCK_KEYS: Final = ("name", "preset", "samples", "sampler", *SECTIONS, "distributions", "grid")
 _TOP_KEYS: Final = ("version", "seed", "blocks", "same_samples_along", "record", *_BLOCK_KEYS)
@@ -63,16 +60,17 @@ def read_sweep(
     Raises:
         InputError: the file cannot be read, or something in it is refused.
     """
-    content = plain(source) if isinstance(source, Mapping) else read_yaml(sweep_path(source))
+    content = plain(source, "sweep") if isinstance(source, Mapping) else read_yaml(sweep_path(source))
     if not isinstance(content, Mapping):
         raise InputError(f"{source}: no mapping at the top; give the keys {', '.join(_TOP_KEYS)}")
     top = _keys(content, "sweep", _TOP_KEYS)
     version = _needed(top, "version", "sweep", f"give {VERSION}")
-    if version != VERSION or isinstance(version, bool):
+    if type(version) is not int or version != VERSION:
         raise InputError(f"sweep.version: {shown(version)} is not supported; give {VERSION}")
     recording = _recording(top.get("record"))
     name = _text(_needed(top, "name", "sweep", "give the sweep a name"), "sweep.name")
     seed = checked_whole(_needed(top, "seed", "sweep", "give a whole number"), "sweep.seed", 0, LARGEST_SEED)
+    check_declared(top)
     blocks = tuple(_blocks(top))
     same = _same_samples_along(top.get("same_samples_along"), blocks)
     return name, seed, same, tuple(_numbered(blocks, same)), recording
@@ -99,14 +97,18 @@ def _choice(content: object, path: str, interval: float, more: tuple[str, ...] =
     keys = {} if content is True else _keys(content, path, ("interval", "samples", *more))
     chosen = keys.get("samples", "all")
     samples = None
-    if chosen != "all":
+    if not isinstance(chosen, str) or chosen != "all":
         numbers = _sequence(chosen, f"{path}.samples", "give all, or a list such as [0, 1]")
         samples = tuple(checked_whole(item, f"{path}.samples[{place}]", 0, 2**30) for place, item in enumerate(numbers))
         if len(set(samples)) < len(samples):
             raise InputError(f"{path}.samples: a number is given twice; leave one out")
         samples = tuple(sorted(samples))
-    before = float(checked_positive(keys["before"], f"{path}.before")) if "before" in keys else 0.0
-    return Choice(float(checked_positive(keys.get("interval", interval), f"{path}.interval")), samples, before)
+    times = {"before": 0.0, "interval": interval}
+    for key in times.keys() & keys.keys():
+        times[key] = float(checked_positive(keys[key], f"{path}.{key}"))
+        if times[key] > LONGEST_INTERVAL:
+            raise InputError(f"{path}.{key}: {shown(keys[key])} s is too long; give at most {LONGEST_INTERVAL} s")
+    return Choice(times["interval"], samples, times["before"])
 
 
 def _blocks(top: Mapping[str, Any]) -> Iterator[Block]:
@@ -163,7 +165,7 @@ def _block(name: str, path: str, outer: Mapping[str, Any], inner: Mapping[str, A
         chosen = _needed(keys, "preset", path, "name the parameters to start from, such as preset: paper")
         chosen = str(_checked("preset", chosen, f"{path}.preset"))
     sampler = keys.get("sampler", "random")
-    if sampler not in SAMPLERS:
+    if not isinstance(sampler, str) or sampler not in SAMPLERS:
         raise InputError(f"{path}.sampler: {shown(sampler)} is unknown; {suggestion(sampler, SAMPLERS)}")
     samples = _needed(keys, "samples", path, "give the number of samples per cell")
     samples = checked_whole(samples, f"{path}.samples", 1, 2**30)
@@ -176,15 +178,14 @@ def _numbered(blocks: Iterable[Block], same_samples_along: Collection[str]) -> I
     """The blocks with their first walks and streams, numbered through all of them.
 
     Raises:
-        InputError: there are too many cells.
+        InputError: there are too many cells or walks.
     """
     first = first_stream = cells = 0
     for block in blocks:
         yield replace(block, first=first, first_stream=first_stream)
         cells += math.prod(block.shape[:-1])
-        if cells > CELL_LIMIT:
-            raise InputError(f"{block.path}.grid: the sweep has more than {CELL_LIMIT} cells; give fewer values")
         first += block.walk_count
+        check_count(cells, first, block.path)
         first_stream += math.prod(len(values) for name, values in block.axes.items() if name not in same_samples_along)
 
 
@@ -227,13 +228,13 @@ def _axes(level: Mapping[str, Any], level_path: str) -> dict[str, tuple[Value, .
             raise InputError(f"{path}: also given in {level_path}.{home}; leave one out")
         if isinstance(content, Mapping):
             content = _range(name, content, path)
-        values: list[Value] = []
+        values: dict[Value, None] = {}  # in order, and quick to look up
         remedy = f"give a list such as [{shown(content)}], or {{from:, to:, step:}}"
         for number, item in enumerate(_sequence(content, path, remedy)):
             value = _checked(name, item, f"{path}[{number}]")
             if value in values:
                 raise InputError(f"{path}[{number}]: {shown(value)} is given twice; leave one out")
-            values.append(value)
+            values[value] = None
         axes[name] = tuple(values)
     return axes
 
@@ -282,12 +283,12 @@ def _range(name: str, content: Mapping[object, object], path: str) -> list[Value
 def _distribution(name: str, content: object, path: str) -> Distribution | str:
     """What a level says about one quantity, or about `all`."""
     if name == "all":
-        if content not in ("table", "fixed"):
+        if not isinstance(content, str) or content not in ("table", "fixed"):
             raise InputError(f"{path}: {shown(content)} is unknown; give table or fixed")
-        return str(content)
-    if content == "fixed":
+        return content
+    if isinstance(content, str) and content == "fixed":
         return "fixed"
-    if content == "table":
+    if isinstance(content, str) and content == "table":
         if name not in TABLE:
             raise InputError(f"{path}: there is no uncertainty of {name} in Table 1; give uniform or gaussian")
         return "table"
@@ -365,7 +366,7 @@ def _same_samples_along(content: object, blocks: Sequence[Block]) -> tuple[str, 
     names: list[str] = []
     for number, written in enumerate(content):
         name = full_name(written, NAME_OF_SYMBOL)
-        if name not in known:
+        if not isinstance(name, str) or name not in known:
             remedy = suggestion(name, known) if known else "leave it out"
             raise InputError(f"{path}[{number}]: {shown(written)} is no axis of any block; {remedy}")
         if name in names:
@@ -417,4 +418,6 @@ def _sequence(content: object, path: str, remedy: str) -> Sequence[object]:
 def _text(value: object, path: str) -> str:
     if not isinstance(value, str) or not value.strip() or not value.isprintable():
         raise InputError(f"{path}: {shown(value)} is no name; give a line of text")
+    if len(value) > LONGEST_NAME:
+        raise InputError(f"{path}: {len(value)} characters are no name; give at most {LONGEST_NAME}")
     return value

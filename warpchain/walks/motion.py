@@ -52,6 +52,9 @@ class Keep:
 
 NOTHING: Final = Keep()
 
+LONGEST_INTERVAL: Final = 1000.0
+"""Greatest time [s] between two samples or frames that are kept, and of what is kept before a release."""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:

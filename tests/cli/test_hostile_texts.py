@@ -1,0 +1,106 @@
+"""Hostile files and words on the command line end in one short printable line and exit status 2."""
+
+import contextlib
+import io
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.support import command_line
+from tests.support.command_line import Command
+from tests.support.made_sweeps import make_sweep
+from tests.support.sweep_content import content
+from warpchain.cli.terminal import print_sweep
+
+command = command_line.command
+
+ESCAPE = "\x1b]0;owned\x07\x1b[2J"
+LEVELS = "".join(f", &{b} [{', '.join([f'*{a}'] * 9)}]" for a, b in zip("abcdefgh", "bcdefghi", strict=True))
+BOMB = f"version: 1\nname: [&a [x, x, x, x, x, x, x, x, x]{LEVELS}]\n"
+
+MEASURED = """
+import resource, sys
+from warpchain.cli.main import main
+try:
+    main(sys.argv[1:])
+finally:
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+def test_a_bomb_is_refused_in_little_memory(tmp_path: Path) -> None:
+    """Nine levels of aliases, 10⁹ values in 400 bytes."""
+    (tmp_path / "bomb.yaml").write_text(BOMB)
+    done = subprocess.run(
+        [sys.executable, "-c", MEASURED, "sweep", "bomb.yaml", "-o", "out"],
+        cwd=tmp_path, capture_output=True, encoding="utf-8", timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 2 and int(done.stdout) < 500_000  # kB
+    assert done.stderr == (
+        "error: bomb.yaml, line 2: more than 100000 values, with those that aliases repeat; correct the YAML\n"
+    )
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["walk", "--set", f"links={ESCAPE}"],
+        ["walk", "--set", f"{ESCAPE}=1"],
+        ["walk", "--set", ESCAPE],
+        ["walk", "--set", "links=" + "[" * 10_000],
+        ["walk", "--set", "links=" + "[" + "a," * 50_000 + "]"],
+        ["walk", "--set", "links=!!int ''"],
+        ["walk", "--set", "links=" + "9" * 5000],
+        ["walk", "--set", "x" * 100_000 + "=1"],
+        ["walk", "--links", "x" * 100_000],
+        ["walk", "--method", ESCAPE],
+        ["walk", "--preset", ESCAPE],
+        ["walk", "--preset", "x" * 100_000],
+        ["walk", "--seed", "1e300"],
+        ["walk", "--config", ESCAPE],
+        ["walk", "--config", "x" * 5000],
+        ["walk", "--like", ESCAPE],
+        ["walk", "--like", "x" * 5000],
+        ["walk", f"--{ESCAPE}"],
+        ["walk", ESCAPE],
+        [ESCAPE],
+        ["x" * 100_000],
+        ["sweep", ESCAPE, "-o", "out"],
+        ["sweep", "a\0b", "-o", "out"],
+        ["sweep", "\udcff", "-o", "out"],
+        ["sweep", "/dev/zero", "-o", "out"],
+        ["sweep", "quickstart", "-o", "out", "--workers", ESCAPE],
+        ["sweep", "quickstart", "-o", "out", "--device", ESCAPE],
+        ["parameters", ESCAPE],
+        ["parameters", "--preset", ESCAPE],
+        ["info", ESCAPE],
+        ["schema", "-o", f"none/{ESCAPE}"],
+    ],
+)
+def test_words_are_refused_in_one_short_printable_line(command: Command, arguments: list[str]) -> None:
+    """Names, values and paths with control characters, of any length."""
+    answer = command(*arguments)
+    (line,) = answer.err.splitlines()
+    assert answer.status == 2 and answer.out == ""
+    assert line.startswith("error: ") and line.isprintable() and len(line) <= 200
+
+
+def test_names_of_files_are_printed_without_control_characters(command: Command, tmp_path: Path) -> None:
+    """A path that is written is named by escapes, on standard output and in errors alike."""
+    answer = command("schema", "-o", "a\x1b[31mb.json")
+    assert (answer.status, answer.out, answer.err) == (0, "a\\x1b[31mb.json\n", "")
+    assert (tmp_path / "a\x1b[31mb.json").exists()
+    answer = command("sweep", "--new", "a\x1b[31mb.json")
+    assert (answer.status, answer.out) == (2, "") and "a\\x1b[31mb.json exists" in answer.err
+
+
+def test_a_folder_cannot_hide_its_name(command: Command, tmp_path: Path) -> None:
+    """The name in a folder's sweep.json may have been changed; the table of the sweep writes escapes."""
+    result = make_sweep(tmp_path / "s", content())
+    object.__setattr__(result, "name", ESCAPE)
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        print_sweep(result, as_json=False)
+    assert "\x1b" not in out.getvalue() and "\x07" not in out.getvalue() and "\\x1b]0;owned" in out.getvalue()
