@@ -3,6 +3,7 @@
 Room axes are X forward, Y up and Z = X × Y, to the right of the way the chain walks.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -178,3 +179,30 @@ def room_box(walk: TiltingWalk, joints: Array) -> tuple[Array, Array]:
         low, high = np.minimum(low, circle.min(axis=0)), np.maximum(high, circle.max(axis=0))
     low[1] = 0.0
     return low, high
+
+
+@dataclass(frozen=True)
+class Floor:
+    """The part of the floor that is shown, with a grid.
+
+    Attributes:
+        spacing: of the lines of the grid [m].
+        x: places of the lines across the way, the first and the last at the ends of the floor [m].
+        z: places of the lines along the way [m].
+    """
+
+    spacing: float
+    x: tuple[float, ...]
+    z: tuple[float, ...]
+
+
+def floor_of(low: Array, high: Array) -> Floor:
+    """The floor below a box with these least and greatest x, y, z [m]."""
+    longest = max(float(high[axis] - low[axis]) for axis in (0, 2))
+    spacing = next((step for step in (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0) if longest / step <= 9), 10.0)
+
+    def places(axis: int) -> tuple[float, ...]:
+        first, last = math.floor(low[axis] / spacing), math.ceil(high[axis] / spacing)
+        return tuple(round(number * spacing, 6) for number in range(first, last + 1))
+
+    return Floor(spacing, places(0), places(2))

@@ -1,4 +1,4 @@
-"""Figures of a walk whose plane tilts: film strips from three sides, and tilt, heading and drift against time."""
+"""Figures of a walk whose plane tilts: film strips from three sides, and tilt, yaw and drift against time."""
 
 from dataclasses import dataclass
 from typing import Any, Final
@@ -43,7 +43,7 @@ _WIDTH: Final = 10.0
 _HIGHEST: Final = 4.6
 _DEEPEST: Final = 8.0
 """Width of a film strip, greatest height of its side view, and of both views below one another [inches]."""
-_LEFT, _BETWEEN, _RIGHT, _TOP, _BELOW, _FOOT = 0.65, 0.65, 0.25, 0.35, 0.85, 1.05
+_LEFT, _BETWEEN, _RIGHT, _TOP, _BELOW, _FOOT = 0.65, 0.65, 0.25, 0.35, 0.85, 1.3
 """Room for labels [inches]: beside, between and above the views, between the rows, and for the legend at the foot."""
 _FLOOR: Final = 0.4
 """Height of the floor in the side view [inches]."""
@@ -191,7 +191,7 @@ def _draw_way(axes: Axes, walk: TiltingWalk, panel: _Panel) -> None:
 
 
 def tilt_figure(walk: Walk, *, figure: Figure | None = None) -> Figure:
-    """Tilt and heading of the plane, and lateral drift of the centre of mass, against time.
+    """Tilt and yaw of the plane, and lateral drift of the centre of mass, against time.
 
     Marked are the moments at which the chain was first tilted by 45°, beyond which it has fallen over, and at which
     its loop collapsed, if the walk says when.
@@ -214,7 +214,7 @@ def tilt_figure(walk: Walk, *, figure: Figure | None = None) -> Figure:
     for limit in (-FALLEN, FALLEN):
         angles.axhline(limit, color=FAINT, linewidth=0.8, linestyle=DOTS)
     angles.plot(walk.time, np.degrees(in_room.tilt), color=BLUE, linewidth=1.4, label="tilt, to the left")
-    angles.plot(walk.time, np.degrees(in_room.yaw), color=GREEN, linewidth=1.4, label="heading, to the left")
+    angles.plot(walk.time, np.degrees(in_room.yaw), color=GREEN, linewidth=1.4, label="yaw, to the left")
     drift.axhline(0.0, color=FAINT, linewidth=0.8)
     drift.plot(walk.time, in_room.center_z, color=INK, linewidth=1.4)
     for name, label, color, dashes in (
