@@ -63,7 +63,9 @@ def check_room(walk: TiltingWalk) -> Array:
     """
     joints = np.asarray(walk.joints_in_room)
     if joints.shape != (*walk.frame_joints.shape[:2], 3):
-        raise ValueError(f"joints_in_room: its shape is {joints.shape}; give three coordinates for each joint of a frame")
+        raise ValueError(
+            f"joints_in_room: its shape is {joints.shape}; give three coordinates for each joint of a frame"
+        )
     if not np.all(np.isfinite(joints)):
         raise ValueError(f"walk: its frames are not all finite numbers. {walk.status.sentence}")
     return joints
@@ -166,7 +168,7 @@ def sprocket_circle(walk: Walk) -> Array | None:
     angle = np.linspace(0.0, 2 * np.pi, 100)
     x, y = walk.sprocket_center
     circle = walk.sprocket_radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    return np.asarray(circle + (x, y, 0.0))
+    return np.asarray(circle + np.array([x, y, 0.0]))
 
 
 def room_box(walk: TiltingWalk, joints: Array) -> tuple[Array, Array]:

@@ -45,6 +45,8 @@ _DEEPEST: Final = 8.0
 """Width of a film strip, greatest height of its side view, and of both views below one another [inches]."""
 _LEFT, _BETWEEN, _RIGHT, _TOP, _BELOW, _FOOT = 0.65, 0.65, 0.25, 0.35, 0.85, 1.3
 """Room for labels [inches]: beside, between and above the views, between the rows, and for the legend at the foot."""
+_NARROWEST: Final = 1.3
+"""Least width of the view from the front [inches]."""
 _FLOOR: Final = 0.4
 """Height of the floor in the side view [inches]."""
 
@@ -90,15 +92,16 @@ def film_strip_in_room(walk: TiltingWalk, *, count: int | None = None, figure: F
     """
     joints = check_room(walk)
     low, high = room_box(walk, joints)
-    # A chain that stays upright is thin from above and from the front: room for the numbers on the axes.
-    missing = max(0.0, float(high[1]) - float(high[2] - low[2]))
-    low[2], high[2] = low[2] - missing / 2, high[2] + missing / 2
     size = high - low
-    scale = min(
-        (_WIDTH - _LEFT - _BETWEEN - _RIGHT) / (size[0] + size[2]),
-        _HIGHEST / size[1],
-        (_DEEPEST - _FLOOR) / (size[1] + size[2]),
-    )
+    # A chain that stays upright is thin from above and from the front: room for the numbers on the axes.
+    broad, across = max(size[1], size[2]), _WIDTH - _LEFT - _BETWEEN - _RIGHT
+    scale = min(across / (size[0] + broad), _HIGHEST / size[1], (_DEEPEST - _FLOOR) / (size[1] + broad))
+    if scale * broad < _NARROWEST:
+        scale = (across - _NARROWEST) / size[0]
+        broad = _NARROWEST / scale
+    middle = (low[2] + high[2]) / 2
+    low[2], high[2] = middle - broad / 2, middle + broad / 2
+    size = high - low
     depth = _FLOOR / scale
     width, height, breadth = scale * size[0], scale * size[1] + _FLOOR, scale * size[2]
     paper = np.array([_WIDTH, _TOP + height + _BELOW + breadth + _FOOT])

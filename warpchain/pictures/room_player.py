@@ -84,7 +84,9 @@ for (const end of [1, -1]) {
     const turn = k * Math.PI / 8;
     corners.push([end, end * Math.cos(turn), end * Math.sin(turn)]);
   }
-  for (const ramp of [2 / 3, 1 / 3, 0, -1 / 3, -2 / 3]) corners.push([end * ramp, 0, end * (0.62 + 0.38 * ramp * ramp)]);
+  for (const ramp of [2 / 3, 1 / 3, 0, -1 / 3, -2 / 3]) {
+    corners.push([end * ramp, 0, end * (0.62 + 0.38 * ramp * ramp)]);
+  }
 }
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -232,7 +234,10 @@ function drawChain(middle, e1, e2, joints, place, { right, up, toward }, scale) 
   pen.strokeStyle = walk.colors.edge;
   for (const { x, y, dx, dy, outer } of links) {
     const unit = walk.radius / Math.hypot(dx, dy);
-    const flat = corners.map(([h, p, q]) => [x + (h + p * unit) * dx - q * unit * dy, y + (h + p * unit) * dy + q * unit * dx]);
+    const flat = corners.map(([half, along, across]) => {
+      const [p, q] = [half + along * unit, across * unit];
+      return [x + p * dx - q * dy, y + p * dy + q * dx];
+    });
     const spots = flat.map(([u, v]) => [face[0] + scale * (u * a1 + v * a2), face[1] - scale * (u * b1 + v * b2)]);
     pen.fillStyle = outer ? walk.colors.outer_wall : walk.colors.inner_wall;
     pen.beginPath();

@@ -62,9 +62,7 @@ class RoomStage:
         shown = self._view.project(np.concatenate([self._corners, self._joints.reshape(-1, 3)]))
         left, bottom = shown.min(axis=0) - rim
         right, top = shown.max(axis=0) + rim
-        self._scale = min(
-            (WIDTH - 2 * _MARGIN) / (right - left), (TALLEST - _MARGIN - _HEADROOM) / (top - bottom)
-        )
+        self._scale = min((WIDTH - 2 * _MARGIN) / (right - left), (TALLEST - _MARGIN - _HEADROOM) / (top - bottom))
         self._origin = np.array([left - _MARGIN / self._scale, top + _HEADROOM / self._scale])
         width = self._scale * (right - left) + 2 * _MARGIN
         height = self._scale * (top - bottom) + _MARGIN + _HEADROOM

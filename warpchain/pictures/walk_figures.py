@@ -48,7 +48,7 @@ def draw(walk: Walk, kind: Kind, *, figure: Figure | None = None, ax: Axes | Non
     Args:
         walk: what to draw.
         kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself, `loop` for its
-            loop on the sprocket just before the release, `energy` for its energies, `tilt` for tilt, heading and
+            loop on the sprocket just before the release, `energy` for its energies, `tilt` for tilt, yaw and
             lateral drift of a plane that tilts.
         figure: an empty figure to draw into; by default a new one.
         ax: where to draw `energy`, the only figure with one pair of axes, instead of a figure of its own.
