@@ -239,7 +239,7 @@ def test_page_holds_the_joints(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.array(data["center"])[-1] * 1e-4, [*walk.center[-1], walk.center_z[-1]], atol=1e-4)
     assert data["slow"] == 3 and data["sprocket"] == [0, 700, 556]
     assert data["radius"] == pytest.approx(42) and data["half_width"] == pytest.approx(40)
-    x, z = (np.array(data["floor"][axis]) for axis in "xz")
+    x, z = (np.array(data["floor"][f"ends_{axis}"]) for axis in "xz")
     assert x[0] <= joints[..., 0].min() and x[-1] >= joints[..., 0].max()
     assert z[0] <= joints[..., 2].min() and z[-1] >= joints[..., 2].max()
 

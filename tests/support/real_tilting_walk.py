@@ -6,7 +6,6 @@ import numpy as np
 
 from tests.support.made_tilting_walks import Array, MadeWalk
 from warpchain.engine.batch import Batch
-from warpchain.inputs.options import Options
 from warpchain.inputs.setup import resolve
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout

@@ -185,26 +185,31 @@ def room_box(walk: TiltingWalk, joints: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Floor:
-    """The part of the floor that is shown, with a grid.
+    """The part of the floor that is shown, with the lines of a square grid [m].
 
     Attributes:
-        spacing: of the lines of the grid [m].
-        x: places of the lines across the way, the first and the last at the ends of the floor [m].
-        z: places of the lines along the way [m].
+        spacing: of the lines.
+        ends_x: its least and greatest x.
+        ends_z: its least and greatest z.
+        x: places of the lines across the way.
+        z: places of the lines along the way.
     """
 
     spacing: float
+    ends_x: tuple[float, float]
+    ends_z: tuple[float, float]
     x: tuple[float, ...]
     z: tuple[float, ...]
 
 
 def floor_of(low: Array, high: Array) -> Floor:
-    """The floor below a box with these least and greatest x, y, z [m]."""
-    longest = max(float(high[axis] - low[axis]) for axis in (0, 2))
-    spacing = next((step for step in (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0) if longest / step <= 9), 10.0)
-
-    def places(axis: int) -> tuple[float, ...]:
-        first, last = math.floor(low[axis] / spacing), math.ceil(high[axis] / spacing)
-        return tuple(round(number * spacing, 6) for number in range(first, last + 1))
-
-    return Floor(spacing, places(0), places(2))
+    """The floor below a box with these least and greatest x, y, z [m], at least as broad as the box is high."""
+    missing = max(0.0, float(high[1] - low[1]) - float(high[2] - low[2])) / 2
+    ends = [(float(low[0]), float(high[0])), (float(low[2]) - missing, float(high[2]) + missing)]
+    longest = max(last - first for first, last in ends)
+    spacing = next((step for step in (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0) if longest / step <= 11), 10.0)
+    x, z = (
+        tuple(round(k * spacing, 6) for k in range(math.ceil(first / spacing), math.floor(last / spacing) + 1))
+        for first, last in ends
+    )
+    return Floor(spacing, *ends, x, z)

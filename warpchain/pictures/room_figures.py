@@ -43,7 +43,7 @@ _WIDTH: Final = 10.0
 _HIGHEST: Final = 4.6
 _DEEPEST: Final = 8.0
 """Width of a film strip, greatest height of its side view, and of both views below one another [inches]."""
-_LEFT, _BETWEEN, _RIGHT, _TOP, _BELOW, _FOOT = 0.65, 0.65, 0.25, 0.35, 0.85, 1.3
+_LEFT, _BETWEEN, _RIGHT, _TOP, _BELOW, _FOOT = 0.75, 0.7, 0.25, 0.35, 0.85, 1.3
 """Room for labels [inches]: beside, between and above the views, between the rows, and for the legend at the foot."""
 _NARROWEST: Final = 1.3
 """Least width of the view from the front [inches]."""
@@ -132,7 +132,10 @@ def film_strip_in_room(walk: TiltingWalk, *, count: int | None = None, figure: F
         axes.set_aspect("equal")
         axes.set_title(panel.title, fontsize="medium", loc="left")
         for axis, inches in ((axes.xaxis, axes.bbox.width), (axes.yaxis, axes.bbox.height)):
-            axis.set_major_locator(MaxNLocator(max(2, int(inches / figure.dpi / 0.55)), steps=[1, 2, 5, 10]))
+            locator = MaxNLocator(max(2, int(inches / figure.dpi / 0.55)), steps=[1, 2, 5, 10])
+            first, last = sorted(axis.get_view_interval())
+            least = 0.0 if axis is axes.yaxis and panel.axes[1] == 1 else first  # no heights on the ground below 0
+            axis.set_ticks([tick for tick in locator.tick_values(least, last) if least <= tick <= last])
         tidy(axes)
     draw_way(side, walk)
     draw_distance(side, walk, -0.5 * depth)

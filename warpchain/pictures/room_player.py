@@ -1,5 +1,6 @@
 """The moving page of a chain whose plane tilts: its data, and the program that draws it from any side."""
 
+from dataclasses import asdict
 from typing import Any, Final
 
 import numpy as np
@@ -43,7 +44,7 @@ def room_data(walk: TiltingWalk, frames: NDArray[np.int_]) -> dict[str, Any]:
         "sprocket": None if sprocket is None else whole(np.array([*sprocket, walk.sprocket_radius])),
         "low": whole(low),
         "high": whole(high),
-        "floor": {"x": list(floor.x), "z": list(floor.z)},
+        "floor": asdict(floor),
         "view": list(CORNER),
         "colors": {
             "inner": INNER,
@@ -101,8 +102,7 @@ function directions(azimuth, elevation) {
 // Least and greatest right and up of the walk and its floor.
 function bounds({ right, up }) {
   const { low, high, floor } = walk, points = [];
-  for (const x of [floor.x[0], floor.x.at(-1)])
-    for (const z of [floor.z[0], floor.z.at(-1)]) points.push([x * 1e4, 0, z * 1e4]);
+  for (const x of floor.ends_x) for (const z of floor.ends_z) points.push([x * 1e4, 0, z * 1e4]);
   for (const x of [low[0], high[0]]) for (const z of [low[2], high[2]]) points.push([x, high[1], z]);
   const across = points.map(p => dot(p, right)), along = points.map(p => dot(p, up));
   return [Math.min(...across), Math.max(...across), Math.min(...along), Math.max(...along)];
@@ -134,7 +134,7 @@ function draw() {
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   pen.lineJoin = "round";
   pen.lineWidth = 1;
-  drawFloor(place, line, toward, color);
+  drawFloor(place, line, toward, scale, color);
 
   const [ox, oy, oz] = walk.middle[frame], axes = walk.axes[frame].map(part => part / 1e5);
   const e1 = axes.slice(0, 3), e2 = axes.slice(3);
@@ -162,8 +162,8 @@ function draw() {
 }
 
 // The floor with its grid, numbers along the two edges nearest to the viewer, and the sprocket.
-function drawFloor(place, line, toward, color) {
-  const { x, z } = walk.floor, [x0, x1, z0, z1] = [x[0], x.at(-1), z[0], z.at(-1)];
+function drawFloor(place, line, toward, scale, color) {
+  const { x, z, spacing, ends_x: [x0, x1], ends_z: [z0, z1] } = walk.floor;
   const point = (a, b) => [a * 1e4, 0, b * 1e4];
   pen.fillStyle = color("ground");
   line([point(x0, z0), point(x1, z0), point(x1, z1), point(x0, z1)], true);
@@ -182,23 +182,24 @@ function drawFloor(place, line, toward, color) {
   pen.textBaseline = "middle";
   const nearZ = toward[2] >= -1e-9 ? z1 : z0, nearX = toward[0] >= -1e-9 ? x1 : x0;
   const farZ = z0 + z1 - nearZ, farX = x0 + x1 - nearX;
-  label("x", x, a => point(a, nearZ), a => point(a, farZ), a => a === nearX);
-  label("z", z, b => point(nearX, b), b => point(farX, b), b => b === nearZ);
+  label("x", x, a => point(a, nearZ), [x0, x1], point((x0 + x1) / 2, farZ));
+  label("z", z, b => point(nearX, b), [z0, z1], point(farX, (z0 + z1) / 2));
 
-  function label(name, marks, near, far, isCorner) {
-    const spots = marks.map(mark => place(near(mark)));
-    const step = Math.hypot(spots[1][0] - spots[0][0], spots[1][1] - spots[0][1]);
-    if (step * (marks.length - 1) < 60) return; // this edge points to the viewer
-    const opposite = place(far(marks[0]));
-    let [ux, uy] = [spots[0][0] - opposite[0], spots[0][1] - opposite[1]];
+  function label(name, marks, spot, ends, opposite) {
+    const [first, last] = ends.map(end => place(spot(end))), far = place(opposite);
+    const size = Math.hypot(last[0] - first[0], last[1] - first[1]);
+    if (size < 0.2 * scale * (ends[1] - ends[0]) * 1e4) return; // this edge points to the viewer
+    const middle = [(first[0] + last[0]) / 2, (first[1] + last[1]) / 2];
+    let [ux, uy] = [middle[0] - far[0], middle[1] - far[1]];
     const length = Math.hypot(ux, uy);
     [ux, uy] = length < 1 ? [0, 1] : [ux / length, uy / length];
-    const every = Math.ceil(44 / step);
-    marks.forEach((mark, i) => {
-      if (i % every === 0 && !isCorner(mark)) pen.fillText(mark + " m", spots[i][0] + 26 * ux, spots[i][1] + 14 * uy);
-    });
-    const [first, final] = [spots[0], spots.at(-1)];
-    pen.fillText(name, (first[0] + final[0]) / 2 + 64 * ux, (first[1] + final[1]) / 2 + 32 * uy);
+    const every = Math.ceil(44 / (size * spacing / (ends[1] - ends[0])));
+    for (const mark of marks) {
+      if (Math.round(mark / spacing) % every) continue;
+      const [px, py] = place(spot(mark));
+      pen.fillText(mark + " m", px + 26 * ux, py + 14 * uy);
+    }
+    pen.fillText(name, Math.max(6, Math.min(canvas.clientWidth - 6, middle[0] + 64 * ux)), middle[1] + 32 * uy);
   }
 
   if (!walk.sprocket) return;

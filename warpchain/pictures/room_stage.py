@@ -1,5 +1,6 @@
 """Pictures of a chain whose plane tilts for GIF and MP4: from the front right and slightly above, never turned."""
 
+import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -36,6 +37,9 @@ _MARGIN: Final = 50
 _HEADROOM: Final = 30
 """Pixels beside and below the floor, for numbers, and above the walk, for the time."""
 
+_CLOSEST: Final = 40
+"""Least distance between two numbers on the floor [pixels]."""
+
 
 class RoomStage:
     """Draws the frames of one walk, all to the same scale.
@@ -56,8 +60,8 @@ class RoomStage:
         self._view = view_from(*np.radians(CORNER))
         low, high = room_box(walk, self._joints)
         self._floor = floor_of(low, high)
-        x, z = self._floor.x, self._floor.z
-        self._corners = np.array([[x[0], 0, z[0]], [x[-1], 0, z[0]], [x[-1], 0, z[-1]], [x[0], 0, z[-1]]])
+        (left, right), (far, near) = self._floor.ends_x, self._floor.ends_z
+        self._corners = np.array([[left, 0, far], [right, 0, far], [right, 0, near], [left, 0, near]])
         rim = 2 * walk.setup.parameters.circle_radius
         shown = self._view.project(np.concatenate([self._corners, self._joints.reshape(-1, 3)]))
         left, bottom = shown.min(axis=0) - rim
@@ -83,9 +87,9 @@ class RoomStage:
         backdrop = Image.new("RGB", tuple(ENLARGEMENT * side for side in self.size), "white")
         draw = ImageDraw.Draw(backdrop)
         draw.polygon(self._pixels(self._corners).ravel().tolist(), fill=GROUND)
-        x, z = self._floor.x, self._floor.z
-        lines = [np.array([[place, 0, z[0]], [place, 0, z[-1]]]) for place in x]
-        lines += [np.array([[x[0], 0, place], [x[-1], 0, place]]) for place in z]
+        floor = self._floor
+        lines = [np.array([[place, 0, end] for end in floor.ends_z]) for place in floor.x]
+        lines += [np.array([[end, 0, place] for end in floor.ends_x]) for place in floor.z]
         for line in lines:
             draw.line(self._pixels(line).ravel().tolist(), fill=GRID, width=ENLARGEMENT)
         circle = sprocket_circle(self._walk)
@@ -130,19 +134,24 @@ class RoomStage:
 
     def _draw_marks(self, draw: "ImageDraw") -> None:
         """Numbers along the two edges of the floor that are nearest to the viewer, and names of their axes."""
-        x, z = self._floor.x, self._floor.z
-        for axis, places, edge in ((0, x, z[-1]), (2, z, x[-1])):
+        floor = self._floor
+        edges = ((0, floor.x, floor.ends_x, floor.ends_z[1]), (2, floor.z, floor.ends_z, floor.ends_x[1]))
+        for axis, marks, ends, edge in edges:
+            places = np.array([*marks, sum(ends) / 2])
             points = np.zeros((len(places), 3))
             points[:, axis], points[:, 2 - axis] = places, edge
             outward = points.copy()
-            outward[:, 2 - axis] += self._floor.spacing
+            outward[:, 2 - axis] += 1.0
             pixels = self._pixels(points) / ENLARGEMENT
-            away = self._pixels(outward) / ENLARGEMENT - pixels
-            away /= np.linalg.norm(away, axis=1, keepdims=True)
-            dense = float(np.linalg.norm(pixels[1] - pixels[0])) < 45
-            # The corner belongs to both edges.
-            for index in range(0, len(places) - 1, 2 if dense else 1):
-                place, text = pixels[index] + away[index] * (30, 16), f"{places[index]:g} m"
-                draw.text(tuple(place), text, fill=INK, font=self._font, anchor="mm")
-            middle = pixels.mean(axis=0) + away[0] * (74, 36)
-            draw.text(tuple(middle), "x" if axis == 0 else "z", fill=INK, font=self._font, anchor="mm")
+            away = self._pixels(outward[-1]) / ENLARGEMENT - pixels[-1]
+            away /= np.linalg.norm(away)
+            step = np.zeros((2, 3))
+            step[1, axis] = floor.spacing
+            spacing = float(np.linalg.norm(np.diff(self._pixels(step), axis=0))) / ENLARGEMENT
+            every = math.ceil(_CLOSEST / spacing)
+            for mark, pixel in zip(marks, pixels[:-1], strict=True):
+                if round(mark / floor.spacing) % every == 0:
+                    place = tuple(pixel + away * (30, 16))
+                    draw.text(place, f"{mark:g} m", fill=INK, font=self._font, anchor="mm")
+            x, y = pixels[-1] + away * (74, 36)
+            draw.text((min(x, self.size[0] - 8), y), "x" if axis == 0 else "z", fill=INK, font=self._font, anchor="mm")

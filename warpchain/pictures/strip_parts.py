@@ -27,7 +27,7 @@ def time_colors(walk: Walk) -> ScalarMappable:
 
 def link_colors(color_of: ScalarMappable, moment: float) -> tuple[Array, Array, Array]:
     """Colours of inner links, of outer links and of edges at a time [s], shape (3,) each."""
-    color = np.array(color_of.to_rgba(moment)[:3])
+    color = color_of.to_rgba(np.array([moment]))[0, :3]
     return 1 - 0.45 * (1 - color), color, 0.6 * color
 
 
