@@ -212,4 +212,4 @@ def floor_of(low: Array, high: Array) -> Floor:
         tuple(round(k * spacing, 6) for k in range(math.ceil(first / spacing), math.floor(last / spacing) + 1))
         for first, last in ends
     )
-    return Floor(spacing, *ends, x, z)
+    return Floor(spacing, ends[0], ends[1], x, z)
