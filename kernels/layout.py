@@ -69,7 +69,7 @@ AHEAD, UP, ORIGIN = 3, 6, 9
 PLANE_VALUES = 12
 # The plane half a step later, as the links feel it during the step, and in its first stage; and one in between.
 PLANE_MID, PLANE_BETWEEN = 12, 24
-# Sums over the links in one state, see physics.plane, and the inverse of the mass matrix, by rows of its upper triangle.
+# Sums over the links in one state, see physics.plane, and the inverse of the mass matrix, rows of its upper triangle.
 PLANE_SUMS = 36
 SUM_MASS, SUM_MX, SUM_MY, SUM_XX, SUM_XY, SUM_YY = range(36, 42)
 SUM_MU, SUM_MV, SUM_XU, SUM_XV, SUM_YU, SUM_YV = range(42, 48)

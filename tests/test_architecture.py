@@ -27,6 +27,7 @@ STOREYS = (
     ("walks",),
     ("engine", "pictures", "oracle"),
     ("loop",),
+    ("hdf5_files",),
     ("inputs",),
     ("files", "status", "version"),
     ("kernels",),

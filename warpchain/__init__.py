@@ -43,7 +43,8 @@ if TYPE_CHECKING:
     from warpchain.run.sweep_run import sweep
     from warpchain.status import Status
     from warpchain.store.sweep_result import SweepResult, load
-    from warpchain.walks.walk_result import Trajectory, WalkResult, load_walk
+    from warpchain.walks.trajectory import Trajectory
+    from warpchain.walks.walk_result import WalkResult, load_walk
 
 __version__ = _version.VERSION
 
@@ -52,7 +53,7 @@ _HOMES = {
     "Parameters": "inputs.parameters",
     "Status": "status",
     "SweepResult": "store.sweep_result",
-    "Trajectory": "walks.walk_result",
+    "Trajectory": "walks.trajectory",
     "WalkResult": "walks.walk_result",
     "load": "store.sweep_result",
     "load_walk": "walks.walk_result",

@@ -1,37 +1,232 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all, and what a new file may replace.
 
+A file takes the place of nothing or of a regular file, never of a folder, device, FIFO, socket or symbolic link. A link
+is refused, not followed: a folder of unknown origin could point it at any file. Links among the folders of a path are
+followed.
+
+Content is written to a part beside the file, `.NAME.01234567.part.SUFFIX`, which its writer locks (flock). The system
+unlocks the part of a writer that was killed, so the next writer of the file can tell that it is dead and delete it.
+Names with process and host were rejected: numbers of processes are used again, and containers share names of hosts. So
+was an unnamed file (O_TMPFILE): it cannot replace another one.
+"""
+
+import errno
+import fcntl
 import os
+import re
 import secrets
-from collections.abc import Iterator
+import stat
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Final, NamedTuple
+
+DISK_FAILURES: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
+"""Numbers (errno) of an `OSError` that no other path or permission would have avoided."""
+
+_WRONG_TYPES: Final = {
+    stat.S_IFDIR: ("Is a directory", "give the path of a file"),
+    stat.S_IFLNK: ("it is a symbolic link", "give the path of the file itself, or remove the link"),
+    stat.S_IFCHR: ("it is a device", "give the path of a regular file"),
+    stat.S_IFBLK: ("it is a device", "give the path of a regular file"),
+    stat.S_IFIFO: ("it is a pipe", "give the path of a regular file"),
+    stat.S_IFSOCK: ("it is a socket", "give the path of a regular file"),
+}
+"""Type of what is at a path → why it is not replaced, and what to do."""
+
+
+class NotReplaceable(OSError):  # noqa: N818 - the path is refused, nothing went wrong
+    """Something is at a path that a new file must not replace; one line that names it."""
+
+
+class Kind(NamedTuple):
+    """A kind of file by its content.
+
+    Attributes:
+        name: what it is called.
+        has: whether a regular file is of the kind; called with its path.
+    """
+
+    name: str
+    has: Callable[[Path], bool]
+
+
+def failure(number: int, text: str) -> OSError:
+    """An `OSError` that reads as the text and has the number of its cause, an errno."""
+    error = OSError(text)
+    error.errno = number
+    return error
+
+
+def is_possible(path: str) -> bool:
+    """Whether the system could have a file of that path: it has no NUL and can be encoded."""
+    try:
+        return b"\0" not in os.fsencode(path)
+    except UnicodeEncodeError:  # a lone surrogate
+        return False
+
+
+def given_path(path: str | os.PathLike[str]) -> Path:
+    """A path as a user gave it.
+
+    Raises:
+        OSError: it is empty, which `Path` takes for the current folder, or no path at all.
+    """
+    text = os.fspath(path)
+    if not text:
+        raise failure(errno.ENOENT, "a path is empty; name a file or folder")
+    if not is_possible(text):
+        raise failure(errno.EINVAL, f"{ascii(text)[:100]}: has a NUL or a lone surrogate; leave it out")
+    return Path(path)
+
+
+def checked_output(path: str | os.PathLike[str], only: Kind | None = None) -> Path:
+    """Decide whether a file may be written to a path; everything that writes files for a user asks here.
+
+    Args:
+        path: the file.
+        only: the kind of file that may be replaced; None for any regular file.
+
+    Returns:
+        The path.
+
+    Raises:
+        NotReplaceable: there is something else than a regular file, or a file of another kind.
+        OSError: it is no path, or the folder is not there.
+    """
+    target = given_path(path)
+    with _naming(target):
+        target.parent.stat()
+        try:
+            mode = target.lstat().st_mode
+        except FileNotFoundError:
+            return target
+    if not stat.S_ISREG(mode):
+        problem, advice = _WRONG_TYPES.get(stat.S_IFMT(mode), ("it is no regular file", "give another path"))
+        raise NotReplaceable(f"{target}: cannot be written ({problem}); {advice}")
+    if only is not None and not only.has(target):
+        raise NotReplaceable(f"{target}: is there and is no {only.name}; give another name")
+    return target
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary path in the same folder, which becomes `path` if the block ends without an error.
+def replacing(path: str | os.PathLike[str], only: Kind | None = None, *, clear: bool = True) -> Iterator[Path]:
+    """Yield the path of an empty part beside `path`, which becomes `path` if the block ends without an error.
 
-    The data reach the disk before the file is renamed. So `path` is at any moment, even after a power cut, either the
-    old or the whole new file.
+    The data reach the disk before the part is renamed. So `path` is at any moment, even after a power cut, either the
+    old or the whole new file. The block must not replace the part by another file.
+
+    Args:
+        path: the file.
+        only: see `checked_output`.
+        clear: whether to delete the parts that killed writers of the same file left, which takes a look at all names
+            in the folder.
 
     Raises:
-        OSError: the file cannot be written; one line that names it. No temporary file is left.
+        NotReplaceable: see `checked_output`.
+        OSError: the file cannot be written; one line that names it, with the number of the cause. No part is left.
     """
-    target = Path(path)
-    part = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.part{target.suffix}")
+    target = checked_output(path, only)
+    if clear:
+        _clear_parts(target)
+    with _naming(target):
+        part, descriptor = _new_part(target)
     try:
-        os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
-        yield part
-        with open(part, "r+b") as content:
-            os.fsync(content.fileno())
-        os.replace(part, target)
-    except OSError as error:
-        raise OSError(
-            f"{target}: cannot be written ({reason(error)}); give a path in a folder that can take it"
-        ) from error
+        with _naming(target):
+            yield part
+            os.fsync(descriptor)
+        checked_output(target, only)  # again: the block may have taken hours
+        with _naming(target):
+            os.replace(part, target)
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
+        os.close(descriptor)
+
+
+def write_whole(path: str | os.PathLike[str], content: bytes | str, only: Kind | None = None) -> None:
+    """Write a file, see `replacing`; text in UTF-8."""
+    data = content.encode() if isinstance(content, str) else content
+    with replacing(path, only) as part:
+        part.write_bytes(data)
+
+
+def remove_output(path: str | os.PathLike[str]) -> None:
+    """Delete a file that a new one would replace; nothing if there is none. Errors as of `checked_output`."""
+    target = checked_output(path)
+    with _naming(target):
+        target.unlink(missing_ok=True)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder for files that follow, unless it is there.
+
+    Raises:
+        OSError: it cannot be made; one line that names it.
+    """
+    with _naming(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+
+
+@contextmanager
+def _naming(target: Path) -> Iterator[None]:
+    """Turn an `OSError` of the `with` block into one of one line that names a file and what to do."""
+    try:
+        yield
+    except OSError as error:
+        number = error.errno or errno.EIO  # without a number: a library that writes a format failed
+        raise failure(number, f"{target}: cannot be written ({reason(error)}); {remedy(number)}") from error
+
+
+def _new_part(target: Path) -> tuple[Path, int]:
+    """Make a part of a file; its path and a descriptor that holds its lock."""
+    while True:
+        part = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.part{target.suffix}")
+        descriptor = os.open(part, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o666)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:  # another writer takes it for dead: it looked between the two calls
+            os.close(descriptor)
+            continue
+        except OSError:  # a file system without locks, where nobody can lock the part to delete it, either
+            return part, descriptor
+        if os.fstat(descriptor).st_nlink:
+            return part, descriptor
+        os.close(descriptor)  # as above, and it is deleted already
+
+
+def _clear_parts(target: Path) -> None:
+    """Delete the parts of a file that nobody is writing; what cannot be deleted stays and does no harm."""
+    named = re.compile(rf"\.{re.escape(target.stem)}\.[0-9a-f]{{8}}\.part{re.escape(target.suffix)}")
+    with suppress(OSError):  # a folder that can be written but not read
+        for name in filter(named.fullmatch, os.listdir(target.parent)):
+            with suppress(OSError):  # locked by its writer, gone, or of another user
+                _remove_unlocked(target.with_name(name))
+
+
+def _remove_unlocked(part: Path) -> None:
+    """Delete a part; an `OSError` if another process has locked it."""
+    if not stat.S_ISREG(part.lstat().st_mode):
+        return
+    descriptor = os.open(part, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        part.unlink()
+    finally:
+        os.close(descriptor)
+
+
+_REMEDIES: Final = {
+    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "make room"),
+    **dict.fromkeys((errno.EROFS, errno.EACCES, errno.EPERM), "make the folder writable"),
+    **dict.fromkeys((errno.ENOENT, errno.ENOTDIR, errno.EEXIST), "give a folder that is there"),
+    errno.ENAMETOOLONG: "give a shorter path",
+}
+
+
+def remedy(number: int) -> str:
+    """What to do when the system refuses to write with that errno."""
+    return _REMEDIES.get(number, "see to the disk")
 
 
 def reason(error: OSError) -> str:

@@ -1,20 +1,20 @@
 """A link of a tilting plane and the floor: one impulse in three dimensions for each of its rollers that touches.
 
-*Rollers.* A circle of a link is the middle of a roller, a cylinder of half width h across the plane. Its lowest points lie
-on the rims at ζ = ±h, in the direction q = −(up1, up2)/ρ with ρ² = up1² + up2², at the heights
-O·Ŷ + x up1 + y up2 − r ρ ± h up3. a± is the speed at which a rim approaches the floor if it overlaps it, else 0. The roller
-touches if a₊ + a₋ > 0. Then the impulse acts between the rims, at ζ = h (a₊ − a₋)/(a₊ + a₋): at the middle of an upright
-roller, which thus meets the floor as in the plane; at a rim if it alone approaches.
+*Rollers.* A circle of a link is the middle of a roller, a cylinder of half width h across the plane. Its lowest points
+lie on the rims at ζ = ±h, in the direction q = −(up1, up2)/ρ with ρ² = up1² + up2², at the heights O·Ŷ + x up1 + y up2
+− r ρ ± h up3. a± is the speed at which a rim approaches the floor if it overlaps it, else 0. The roller touches if a₊ +
+a₋ > 0. Then the impulse acts between the rims, at ζ = h (a₊ − a₋)/(a₊ + a₋): at the middle of an upright roller, which
+thus meets the floor as in the plane; at a rim if it alone approaches.
 
-*Law.* That of :mod:`contacts.impulse` with three components. The impulse J at (X, Y, ζ) changes the link as in the plane,
-by (J1, J2), and the plane by A⁻¹ Q with Q = (J3, Y J3 − ζ J2, ζ J1 − X J3) and the mass matrix A of :mod:`physics.plane`.
-So W is the link's 2 × 2 matrix plus Gᵀ A⁻¹ G.
+*Law.* That of :mod:`contacts.impulse` with three components. The impulse J at (X, Y, ζ) changes the link as in the
+plane, by (J1, J2), and the plane by A⁻¹ Q with Q = (J3, Y J3 − ζ J2, ζ J1 − X J3) and the mass matrix A of
+:mod:`physics.plane`. So W is the link's 2 × 2 matrix plus Gᵀ A⁻¹ G.
 
 *Many contacts at once.* All touching links share the plane. Each of N links gets a copy of it with the mass A/N, and
-afterwards the plane has the mean of their velocities: A⁻¹ ΣQ. Momentum is kept, since nothing else acts. Energy does not
-rise: no collision of a link and its copy adds any, and the meeting of the copies is inelastic; it loses
-½ [Σ Δ·Q − Δ̄·ΣQ], with the change Δ = N A⁻¹ Q of a copy and that of the plane, Δ̄. The result depends neither on the order
-of the links, so that threads can take one each, nor on which side of the plane is which. Contacts one after the other,
+afterwards the plane has the mean of their velocities: A⁻¹ ΣQ. Momentum is kept, since nothing else acts. Energy does
+not rise: no collision of a link and its copy adds any, and the meeting of the copies is inelastic; it loses ½ [Σ Δ·Q −
+Δ̄·ΣQ], with the change Δ = N A⁻¹ Q of a copy and that of the plane, Δ̄. The result depends neither on the order of the
+links, so that threads can take one each, nor on which side of the plane is which. Contacts one after the other,
 instead, tip an upright chain over: those on one side come first.
 """
 
@@ -97,7 +97,7 @@ def middle_height(chain: Chain, slope: wp.float64, x: wp.float64, y: wp.float64)
 
 @wp.func
 def greatest_across_speed(chain: Chain, x: wp.float64, y: wp.float64):
-    """A bound on what the motion of the plane adds to the speed [m/s] of any point of the rollers of a link at (x, y)."""
+    """A bound on what the motion of the plane adds to the speed [m/s] of any point of a link's rollers."""
     reach = chain.half_length + chain.circle_radius + chain.half_width
     turn = wp.abs(chain.turn_x) + wp.abs(chain.turn_y)
     return wp.abs(chain.plane_speed + chain.turn_x * y - chain.turn_y * x) + reach * turn

@@ -38,7 +38,6 @@ from warpchain.kernels.events.record import lacks_last_sample, record_is_full, w
 from warpchain.kernels.events.sample import sampling
 from warpchain.kernels.events.softening import book_softening, contact_step, spring_tolerance
 from warpchain.kernels.events.summary import summarise
-from warpchain.kernels.events.tilting import in_room, write_tilting_sample
 from warpchain.kernels.events.tallies import (
     add_count,
     attempts_made,
@@ -47,6 +46,7 @@ from warpchain.kernels.events.tallies import (
     of_fixed_body,
     raise_extreme,
 )
+from warpchain.kernels.events.tilting import in_room, write_tilting_sample
 from warpchain.kernels.features import COMPILER_FLAGS, Features
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step
 from warpchain.kernels.physics.elementary import ONE, ZERO
@@ -307,9 +307,10 @@ def make_advance(features: Features):
                 if wp.static(tilts):
                     accept_plane(P)
                     write_plane_sums(K, P, chain)
+                    half_step(P, 0, 0, chain.gravity, h)
                 if wp.static(has_fixed):
                     if wp.static(tilts):
-                        gap = tilting_gap(K, on_plane(chain, P, 0))
+                        gap = tilting_gap(K, feeling)
                     else:
                         gap = fixed_gap(K, chain)
                     if gap < ZERO:
@@ -348,8 +349,6 @@ def make_advance(features: Features):
                     has_first_stage = int(0)
                     if wp.static(tilts):
                         write_plane_sums(K, P, chain)
-                if wp.static(tilts):
-                    half_step(P, 0, 0, chain.gravity, h)
                 if wp.static(has_flight):
                     if impulses > wp.int64(0) or not are_stiff:
                         closing_time = time + QUIET_TIME

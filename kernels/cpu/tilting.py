@@ -56,7 +56,7 @@ SUMS = STAGES + STAGE_ROWS
     return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
 """)
 def row_sum(K: wp.array2d(dtype=wp.float64), row: int, count: int) -> wp.float64:
-    """Sum of the first ``count`` columns of a row, a multiple of 8; in pure Warp clang would add one after the other."""
+    """Sum of the first ``count`` columns of a row, a multiple of 8; in pure Warp clang adds one after the other."""
     ...
 
 

@@ -1,4 +1,4 @@
-"""A sample of a chain whose plane may tilt: sums in the room instead of in the plane, and when it collapsed and fell."""
+"""A sample of a chain whose plane may tilt: sums in the room, not in the plane, and when it collapsed and fell."""
 
 import warp as wp
 
@@ -147,7 +147,8 @@ def watch_fall(
     area = enclosed_area(K, chain)
     if is_first:
         state.first_area[world] = area
-    if state.watch[world, COLLAPSED_AT] < ZERO and area < HALF * state.first_area[world]:
+    # a loop that is numbered clockwise has negative areas
+    if state.watch[world, COLLAPSED_AT] < ZERO and area / state.first_area[world] < HALF:
         state.watch[world, COLLAPSED_AT] = time
     lean = wp.abs(P[UP + 2])
     state.watch[world, GREATEST_LEAN] = wp.max(state.watch[world, GREATEST_LEAN], lean)

@@ -18,8 +18,8 @@ from warpchain.kernels.contacts.pair_list import list_layout
 from warpchain.kernels.events.present_chain import has_changed, present_chain
 from warpchain.kernels.events.record import lacks_last_sample, record_is_full, write_sample
 from warpchain.kernels.events.summary import summarise
-from warpchain.kernels.events.tilting import in_room, write_tilting_sample
 from warpchain.kernels.events.tallies import add_count, attempts_made, count_bounce, of_fixed_body, raise_extreme
+from warpchain.kernels.events.tilting import in_room, write_tilting_sample
 from warpchain.kernels.features import COMPILER_FLAGS, Features
 from warpchain.kernels.gpu.board import (
     contact_constants,
@@ -38,8 +38,8 @@ from warpchain.kernels.gpu.explicit import explicit_attempt
 from warpchain.kernels.gpu.functions import shares_board
 from warpchain.kernels.gpu.sample import block_sample, write_step_bounds
 from warpchain.kernels.gpu.stage import Place, block_stage, error_of, read_link, vec3d, vec5d, write_first_stage
-from warpchain.kernels.gpu.tilting import block_tilting, write_felt_plane
 from warpchain.kernels.gpu.threads import barrier, barrier_if_any, block_maxima, clock, tile_address, vec4i
+from warpchain.kernels.gpu.tilting import block_tilting, write_felt_plane
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step, step_controller
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 from warpchain.kernels.methods.method import find_method
@@ -337,6 +337,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if lane == 0:
                         accept_plane(P)
                     sum_up(K, P, M, place)
+                    if lane == 0:
+                        half_step(P, 0, 0, K[chain_values, layout.VALUE_GRAVITY], h)
                 is_hit = bool(False)
                 is_near = bool(False)
                 is_stale = bool(False)
@@ -392,8 +394,6 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                         barrier()  # contacts have left the memory of the sums
                         sum_up(K, P, M, place)
                         barrier()
-                    if lane == 0:
-                        half_step(P, 0, 0, K[chain_values, layout.VALUE_GRAVITY], h)
                 if is_hit or wp.static(not reuses_last):
                     if is_hit:
                         next_end = exchange_ends(ends, place, read_link(K, lane))

@@ -1,7 +1,8 @@
 """A chain whose plane may tilt, in a block of threads: see :mod:`cpu.tilting`.
 
 The first thread of the block moves the plane, in one row of :attr:`State.plane`. What the links feel of it lies on the
-board. Sums over the links are those of the hardware warps, added up by the first thread, and round otherwise than on a CPU.
+board. Sums over the links are those of the hardware warps, added up by the first thread, and round otherwise than on a
+CPU.
 """
 
 import functools
@@ -35,11 +36,11 @@ from warpchain.kernels.layout import (
     PLANE_TURN_Y,
     SINE,
     SUM_COUNT,
-    U,
     UP,
-    V,
     VALUE_PLANE,
     VALUE_PLANE_BEFORE,
+    U,
+    V,
     X,
     Y,
 )

@@ -42,6 +42,11 @@ class Method:
         """Whether it has a GPU kernel. Those of implicit steps and rigid flights were written, and saved no time."""
         return self.kind == "explicit" and not self.has_rigid_flight
 
+    @property
+    def can_tilt(self) -> bool:
+        """Whether it carries chains whose plane tilts: implicit steps and rigid flights know nothing of the plane."""
+        return self.kind == "explicit" and not self.has_rigid_flight
+
 
 def method_names() -> tuple[str, ...]:
     """Names of all methods."""

@@ -23,8 +23,10 @@ X, along which the walk goes, *ahead*.
 is the energy of the motion across the plane.
 
 *Splitting.* The plane changes in 0.1 to 1 s, links within microseconds. So a step is: half a step of the plane with the
-links frozen, a step of the links with the plane frozen, contacts, half a step of the plane. This is of second order in
-the step. A half step is one of the midpoint rule. An upright plane at rest stays so exactly.
+links frozen, a step of the links with the plane frozen, half a step of the plane, contacts. This is of second order in
+the step. A half step is one of the midpoint rule. An upright plane at rest stays so exactly. With contacts before the
+last half step, impulses make it a method of first order: in a walk of 20 links at 1e-9 that falls over the ledger of
+energy then misses 8e-7 of the energy at the release, and 1e-9 as it is.
 
 Functions here work on one row of :attr:`State.plane`, see :mod:`layout`.
 """

@@ -320,13 +320,17 @@ def test_a_chain_that_was_never_released_leaves_no_pictures(command: Command) ->
     assert [line.partition(":")[0] for line in lines] == ["new/figure5.png", "new/film_strip.png", "not_steady"]
 
 
-def test_a_file_that_cannot_be_written_does_not_lose_the_results(command: Command) -> None:
-    """If writing fails after the walk, the results have been printed, and status and line say what is wrong."""
-    Path("new/walk.h5").mkdir(parents=True)
-    answer = command("walk", *QUICK, "--json", "-o", "new")
-    assert answer.status == 2 and json.loads(answer.out)["status"] == "at_rest"
-    assert answer.err.startswith("error: new/walk.h5: cannot be written") and answer.err.count("\n") == 1
-    assert [path.name for path in Path("new").iterdir()] == ["walk.h5"]
+@pytest.mark.parametrize("name", ["walk.h5", "loop.png", "walk.gif"])
+def test_what_a_file_cannot_replace_is_found_before_the_walk(
+    command: Command, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """A folder in the place of one of the files is refused, and no walk is run."""
+    Path("new", name).mkdir(parents=True)
+    monkeypatch.setattr(WALK_MODULE, "run_walk", None)
+    answer = command("walk", *QUICK, "--animate", "gif", "-o", "new")
+    assert (answer.status, answer.out) == (2, "")
+    assert answer.err == f"error: new/{name}: cannot be written (Is a directory); give the path of a file\n"
+    assert [path.name for path in Path("new").iterdir()] == [name]
 
 
 def test_a_defect_is_not_disguised_as_bad_input(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -115,7 +115,7 @@ def test_parameters_as_tables(command: Command) -> None:
             f"x: neither a file nor a sweep that comes with warpchain; give one of {', '.join(shipped_sweeps())}",
         ),
         ("sweep x.yaml -o new", "x.yaml: No such file or directory;"),
-        ("sweep --new no/new.yaml", "--new: no/new.yaml: No such file or directory; give"),
+        ("sweep --new no/new.yaml", "--new: no/new.yaml: cannot be written (No such file or directory); give"),
         ("sweep --new new.yaml -o new", "--new: given together with other arguments; leave them out"),
         ("sweep figure6 --new new.yaml", "--new: given together with other arguments; leave them out"),
     ],

@@ -138,12 +138,12 @@ def test_a_method_beside_like_brings_its_settings(
 
 
 REFUSED = {
-    "plot nowhere.h5": "nowhere.h5: No such file or directory",
+    "plot nowhere.h5": "nowhere.h5: cannot be read (No such file or directory)",
     "plot text.h5": "text.h5: not an HDF5 file",
     "plot text": "text: not an HDF5 file",
     "plot saved/walk.h5 --quantity dx": "--quantity: a saved walk has no columns",
     "plot saved/walk.h5 -o text": "--output: text: Not a directory",
-    "animate nowhere.h5 walk.gif": "nowhere.h5: No such file or directory",
+    "animate nowhere.h5 walk.gif": "nowhere.h5: cannot be read (No such file or directory)",
     "animate text.h5 walk.gif": "text.h5: not an HDF5 file",
     "animate frameless.h5 walk.gif": "walk: it has no frames",
     "animate saved/walk.h5 walk.avi": "walk.avi: unknown kind of picture",
@@ -152,9 +152,9 @@ REFUSED = {
     "animate saved/walk.h5 walk.gif --fps many": "Invalid value for '--fps'",
     "animate saved/walk.h5 nowhere/walk.gif": "nowhere/walk.gif: cannot be written",
     "animate saved/walk.h5": "Missing argument 'FILE'",
-    "walk --like nowhere.h5": "nowhere.h5: No such file or directory",
+    "walk --like nowhere.h5": "nowhere.h5: cannot be read (No such file or directory)",
     "walk --like text.h5": "text.h5: not an HDF5 file",
-    "walk --like saved": "saved: Is a directory",
+    "walk --like saved": "saved: is a folder",
     "walk --like saved/walk.h5 --seed 3": "--seed: given together with --like",
     "walk --like saved/walk.h5 --preset soft": "--preset: given together with --like",
     "walk --like saved/walk.h5 --config walk.yaml": "--config: given together with --like",

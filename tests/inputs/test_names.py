@@ -37,6 +37,7 @@ SYMBOLS = {
     "friction_smoothing": "omega_c",
     "tangential_restitution": "e_t",
     "circle_radius": "r",
+    "half_width": "h",
 }
 QUICK = {"start": "ellipse", "preset": "soft", "links": 32, "method": "dp5", "walk_limit": 1e-6}
 

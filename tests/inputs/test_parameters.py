@@ -42,11 +42,11 @@ def test_table_1(name: str) -> None:
 
 
 def test_table_complete() -> None:
-    """The table holds the paper's quantities and the circle radius, each with symbol, unit and meaning."""
+    """The table holds the paper's quantities and what it leaves out, each with symbol, unit and meaning."""
     quantities = Parameters.quantities()
-    assert set(quantities) == {*TABLE_1, "circle_radius"} == set(Parameters.model_fields)
-    assert quantities["circle_radius"].value == 4.2e-3
-    assert [name for name, q in quantities.items() if q.source == "assumed"] == ["circle_radius"]
+    assert set(quantities) == {*TABLE_1, "circle_radius", "half_width"} == set(Parameters.model_fields)
+    assert quantities["circle_radius"].value == 4.2e-3 and quantities["half_width"].value == 4e-3
+    assert [name for name, q in quantities.items() if q.source == "assumed"] == ["circle_radius", "half_width"]
     assert len({q.symbol for q in quantities.values()}) == len(quantities)
     assert all(q.unit and q.meaning for q in quantities.values())
 

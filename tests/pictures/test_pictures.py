@@ -6,8 +6,9 @@ import math
 import os
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -239,6 +240,43 @@ def test_mp4_without_encoder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     with pytest.raises(ImportError, match=r"pip install 'warpchain\[video\]'") as caught:
         animate(make_walk(), tmp_path / "walk.mp4")
     assert "\n" not in str(caught.value) and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("written", "is_whole"),
+    [
+        (b"\0\0\0\x08ftyp" + b"\0\0\0\x0cmdat1234" + b"\0\0\0\x08moov", True),
+        (b"\0\0\0\x08ftyp" + b"\0\0\0\x01mdat\0\0\0\0\0\0\0\x141234" + b"\0\0\0\x08moov", True),
+        (b"\0\0\0\x08ftyp" + b"\0\0\0\x0cmdat1234", False),
+        (b"\0\0\0\x08ftyp" + b"\0\0\0\x0cmdat1234" + b"\0\0\0\x09moov", False),
+        (b"\0\0\0\x08ftyp" + b"\0\0\0\x0cmdat12", False),
+        (b"", False),
+        (None, False),
+    ],
+)
+def test_a_film_that_was_not_written_to_its_end_is_not_kept(
+    written: bytes | None, is_whole: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """ffmpeg may die without a word, on a full disk for one, or as it is fed (None); the older film stays."""
+
+    def write_frames(path: str, *_: object, **__: object) -> Generator[None, bytes, None]:
+        try:
+            while True:
+                yield
+                if written is None:
+                    raise OSError("[Errno 32] Broken pipe\n\nFFMPEG COMMAND:\n...")
+        finally:
+            Path(path).write_bytes(written or b"")
+
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", SimpleNamespace(write_frames=write_frames))
+    path = tmp_path / "walk.mp4"
+    path.write_bytes(b"old")
+    if is_whole:
+        animate(make_walk(), path)
+    else:
+        with pytest.raises(OSError, match=r"^.*walk\.mp4: cannot be written \(ffmpeg [^\n]*\); see to the disk$"):
+            animate(make_walk(), path)
+    assert path.read_bytes() == (written if is_whole else b"old") and list(tmp_path.iterdir()) == [path]
 
 
 def test_mp4_frames(tmp_path: Path) -> None:

@@ -318,8 +318,8 @@ def test_report_stands_alone(folder: Path, tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_report_is_the_same_each_time(folder: Path, page: str, tmp_path: Path) -> None:
-    """A folder gives the same bytes each time, and an older file is replaced."""
-    (tmp_path / "report.html").write_text("old")
+    """A folder gives the same bytes each time, and an older report is replaced."""
+    (tmp_path / "report.html").write_text(page[: len(page) // 2], encoding="utf-8")
     write_report(folder, tmp_path / "report.html")
     assert (tmp_path / "report.html").read_text(encoding="utf-8") == page
 
@@ -328,17 +328,32 @@ def test_report_is_the_same_each_time(folder: Path, page: str, tmp_path: Path) -
 def test_report_is_written_whole_or_not_at_all(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What goes wrong half-way leaves the old file and no other; the error names the file in one line."""
     target = tmp_path / "report.html"
-    target.write_text("old")
+    write_report(folder, target)
+    old = target.read_bytes()
 
     def full(*arguments: Any, **settings: Any) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Path, "write_text", full)
+    monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(OSError, match=r"report\.html: cannot be written \(No space left on device\)"):
         write_report(folder, target)
-    assert [path.name for path in tmp_path.iterdir()] == ["report.html"] and target.read_text() == "old"
+    assert [path.name for path in tmp_path.iterdir()] == ["report.html"] and target.read_bytes() == old
     with pytest.raises(OSError, match=r"nowhere.report\.html: cannot be written"):
         write_report(folder, tmp_path / "nowhere" / "report.html")
+
+
+@pytest.mark.parametrize("content", ["", "old", "<!DOCTYPE html>\n<html>my own page</html>", None])
+def test_a_report_replaces_reports_only(folder: Path, tmp_path: Path, content: str | None) -> None:
+    """A page of another writer, the player of an animation (None) or any other file is refused and stays."""
+    target = tmp_path / "index.html"
+    if content is None:
+        make_walk().animate(target)
+    else:
+        target.write_text(content, encoding="utf-8")
+    before = target.read_bytes()
+    with pytest.raises(OSError, match=r"index\.html: is there and is no page that warpchain report has written; give"):
+        write_report(folder, target)
+    assert target.read_bytes() == before and list(tmp_path.iterdir()) == [target]
 
 
 def test_folder_without_a_sweep_is_refused(tmp_path: Path) -> None:

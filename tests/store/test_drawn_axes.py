@@ -11,7 +11,7 @@ import xarray
 from tests.support.made_sweeps import distance, make_sweep
 from warpchain.inputs.distributions import DRAWABLE
 from warpchain.inputs.parameters import preset
-from warpchain.inputs.scene import Scene
+from warpchain.inputs.scene import TAP, Scene
 from warpchain.reports.sweep_figures import figures
 from warpchain.reports.sweep_page import write_report
 from warpchain.store.merged_file import merge
@@ -33,6 +33,7 @@ def swept(folder: Path, name: str) -> SweepResult:
         "seed": 4,
         "preset": "soft",
         "samples": 3,
+        "scene": {"plane": "tilting" if name in TAP else "fixed"},
         "grid": {name: [value, 1.001 * value]},
         "distributions": {"all": "fixed", name: {"gaussian": {"sigma": 1e-5 * value}}},
     }

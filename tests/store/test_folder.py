@@ -19,12 +19,14 @@ import pytest
 import yaml
 
 from tests.support import synthetic_sweep
+from tests.support.forged_files import with_byte
 from tests.support.synthetic_sweep import LONG_SWEEP, SHARD_SIZE, SWEEP, content, run, synthetic_rows, write
-from warpchain.inputs.validation import InputError
+from warpchain.inputs.validation import DamagedFileError, InputError, InputWarning
 from warpchain.status import Status
 from warpchain.store import folder, manifest, shards
 from warpchain.store.folder import SweepFolder, read_rows
-from warpchain.store.manifest import FORMAT_VERSION, NUMERICS_VERSION, read_manifest
+from warpchain.store.manifest import NUMERICS_VERSION, read_manifest
+from warpchain.store.manifest_content import FORMAT_VERSION
 from warpchain.store.shards import empty_rows, read_shard, shard_name, write_shard
 from warpchain.walks.rows import ROW
 
@@ -280,40 +282,50 @@ def test_a_shard_of_another_sweep_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("part", [0.0, 0.1, 0.5, 0.999])
-def test_a_truncated_shard_is_refused(tmp_path: Path, part: float) -> None:
-    """A shard cut short is named with the remedy; deleted, only its walks are computed again."""
+def test_a_truncated_shard_is_computed_again(tmp_path: Path, part: float) -> None:
+    """A shard cut short is refused to a reader; a run names it, and computes its walks and no others again."""
     run(tmp_path)
     before, path = content(tmp_path), tmp_path / "shards" / shard_name(FIRST)
     os.truncate(path, int(part * path.stat().st_size))
-    with refused(InputError, tmp_path, f"{path}: damaged or cut short", "delete it"):
-        open_folder(tmp_path)
-    path.unlink()
-    with open_folder(tmp_path) as opened:
+    with refused(DamagedFileError, tmp_path, f"{path}: damaged or cut short", "delete it"):
+        read_rows(tmp_path, read_manifest(tmp_path))
+    with pytest.warns(InputWarning, match=rf"^{path}: damaged or cut short .*; its walks are computed again$"):
+        opened = open_folder(tmp_path)
+    with opened:
         assert opened.missing() == [FIRST]
         write(opened, FIRST, synthetic_rows(SWEEP, FIRST))
     assert content(tmp_path) == before
+    assert f"{path}: damaged or cut short" in (tmp_path / "log.txt").read_text()
 
 
-def test_damage_is_seen(tmp_path: Path) -> None:
-    """No flipped byte of a shard goes unnoticed where it would change a row; several bad shards are counted."""
+def test_no_damage_goes_unnoticed(tmp_path: Path) -> None:
+    """No flipped byte of a shard is read past; all bad shards are named."""
     run(tmp_path)
     path = tmp_path / "shards" / shard_name(FIRST)
     whole = path.read_bytes()
     manifest = read_manifest(tmp_path)
-    rows = read_shard(tmp_path, manifest, FIRST)
-    start = whole.index(rows.tobytes())
-    for place in (*range(0, len(whole), 97), start, start + rows.nbytes - 1):
-        path.write_bytes(whole[:place] + bytes([whole[place] ^ 0x10]) + whole[place + 1 :])
-        try:
-            read = read_shard(tmp_path, manifest, FIRST)
-        except InputError:
-            continue
-        assert not start <= place < start + rows.nbytes
-        assert read.dtype == rows.dtype and read.tobytes() == rows.tobytes()
+    for place in (*range(0, len(whole), 97), len(whole) - 1):
+        path.write_bytes(with_byte(whole, place, lambda byte: byte ^ 0x10))
+        with pytest.raises(DamagedFileError, match=f"^{path}: damaged or cut short"):
+            read_shard(tmp_path, manifest, FIRST)
     path.write_bytes(b"")
     (tmp_path / "shards" / shard_name(SECOND)).write_bytes(b"no HDF5")
-    with refused(InputError, tmp_path, f"{path}: damaged", "(and 1 more)"):
-        open_folder(tmp_path)
+    with pytest.warns(InputWarning) as warned, open_folder(tmp_path) as opened:
+        assert opened.missing() == [FIRST, SECOND]
+    assert [str(warning.message).partition(":")[0] for warning in warned] == [
+        str(tmp_path / "shards" / shard_name(walks)) for walks in (FIRST, SECOND)
+    ]
+
+
+def test_foreign_files_save_damaged_ones(tmp_path: Path) -> None:
+    """As long as a folder is refused, nothing is deleted in it."""
+    run(tmp_path / "one")
+    run(tmp_path / "two", CHANGED)
+    first, second = (tmp_path / "one/shards" / shard_name(walks) for walks in (FIRST, SECOND))
+    first.write_bytes(b"damaged")
+    shutil.copy(tmp_path / "two/shards" / second.name, second)
+    with refused(InputError, tmp_path / "one", f"{second}: a shard of another sweep"):
+        open_folder(tmp_path / "one")
 
 
 @pytest.mark.parametrize(
@@ -332,14 +344,14 @@ def test_a_damaged_manifest_is_refused(tmp_path: Path, text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("version", "remedy"), [(2, "run it again in another folder, or use the warpchain that wrote it"), (4, "update")]
+    ("version", "remedy"), [(3, "run it again in another folder, or use the warpchain that wrote it"), (5, "update")]
 )
 def test_other_formats_are_refused(tmp_path: Path, version: int, remedy: str) -> None:
     """A folder of an older or later version of the format says so, and what to do; starting anew spares it, too."""
     run(tmp_path)
     path = tmp_path / "sweep.json"
-    path.write_text(path.read_text().replace('"format_version": 3', f'"format_version": {version}'))
-    message = f"{path}: format version {version}, but this warpchain reads 3; {remedy}"
+    path.write_text(path.read_text().replace('"format_version": 4', f'"format_version": {version}'))
+    message = f"{path}: format version {version}, but this warpchain reads 4; {remedy}"
     for attempt in (read_manifest, open_folder, lambda place: open_folder(place, fresh=True)):
         with refused(InputError, tmp_path, message):
             attempt(tmp_path)

@@ -1,6 +1,8 @@
 """One file of several folders: samples of sweeps with different seeds one behind the other."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -70,3 +72,24 @@ def test_folders_that_do_not_fit_are_refused(
     assert f"{tmp_path / 'b'}: " in error and message in error and "\n" not in error
     assert not (tmp_path / "both.h5").exists()
     assert yaml.safe_load((tmp_path / "b/sweep.yaml").read_text())["name"] == "small"
+
+
+def test_a_merge_of_many_blocks_has_room_or_is_refused(tmp_path: Path) -> None:
+    """What is reserved is enough: a disk with less gives one line, as HDF5 ends the process when it fills up."""
+    many = [{"name": f"b{number}", "grid": {"frequency": [5 + number]}} for number in range(20)]
+    given = {"version": 1, "name": "many", "seed": 1, "preset": "soft", "samples": 2, "blocks": many}
+    make_sweep(tmp_path / "many", given)
+    program = (
+        "import resource, sys\n"
+        "from warpchain.cli.main import main\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)\n"
+        "main(['merge', 'many', 'all.h5'])\n"
+    )
+    for limit, status in ((2_000_000, 1), (50_000_000, 0)):
+        arguments = [sys.executable, "-c", program, str(limit)]
+        done = subprocess.run(arguments, cwd=tmp_path, capture_output=True, encoding="utf-8")
+        assert done.returncode == status
+        if status:
+            assert done.stderr.startswith("error: all.h5: cannot be written (File too large); make room")
+            assert done.stderr.count("\n") == 1 and [path.name for path in tmp_path.iterdir()] == ["many"]
+    assert 2_000_000 < (tmp_path / "all.h5").stat().st_size < 10_000_000

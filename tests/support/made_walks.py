@@ -33,6 +33,14 @@ def make_walk(links: int = 30, **changes: Any) -> WalkResult:
         "simulated_time": 3.3,
         "hold_time": 0.4,
         "drift": 0.002,
+        "lateral_drift": math.nan,
+        "final_tilt": math.nan,
+        "final_yaw": math.nan,
+        "greatest_tilt": math.nan,
+        "fell_at": math.nan,
+        "collapsed_at": math.nan,
+        "fell_over": -1,
+        "fell_before_collapse": -1,
         "softened_at": 0.4,
         "wall_time": 1.23456789012345678,
         "bounces": 3,
@@ -57,6 +65,11 @@ def make_walk(links: int = 30, **changes: Any) -> WalkResult:
         "rms_speed": rng.random(801),
         "frame_time": frame_time,
         "frame_joints": offset + middle[:, None],
+        "center_z": np.empty(0),
+        "tilt": np.empty(0),
+        "yaw": np.empty(0),
+        "frame_origin": np.empty((0, 3)),
+        "frame_axes": np.empty((0, 2, 3)),
     }
     return WalkResult(**(values | changes))
 

@@ -3,7 +3,6 @@
 As a script, ``python synthetic_sweep.py PART DIR``: plays one of the parts below in a process of its own.
 """
 
-import hashlib
 import itertools
 import json
 import os
@@ -13,7 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,7 @@ from warpchain.store.folder import SweepFolder
 from warpchain.store.manifest import BlockLayout
 from warpchain.store.shards import empty_rows, write_shard
 from warpchain.store.sweep_result import load
+from warpchain.sweeps.plan import digest_of
 from warpchain.walks.rows import Rows, quantity_of
 
 SHARD_SIZE = 20
@@ -55,19 +55,22 @@ class SyntheticSweep:
         return sum(int(np.prod(block.shape)) for block in self.blocks)
 
     def canonical(self) -> dict[str, Any]:
-        """All that there is."""
-        plain: dict[str, Any] = json.loads(json.dumps(asdict(self)))
-        for block in plain["blocks"]:
-            block["sampler"] = "random"
-        return plain
+        """All that there is, in the form of a real sweep."""
+        blocks = [
+            {
+                "name": block.name,
+                "samples": block.samples,
+                "sampler": "random",
+                "distributions": {"all": "fixed"} | {name: {"uniform": [0, 1]} for name in block.drawn},
+                "grid": {name: list(values) for name, values in block.axes.items()},
+            }
+            for block in self.blocks
+        ]
+        return {"name": self.name, "seed": self.seed, "blocks": blocks}
 
     def digest(self, samples: Sequence[int] | None = None) -> str:
-        """SHA-256 of all but the name, with these samples of each block if they are given."""
-        content = {name: value for name, value in self.canonical().items() if name != "name"}
-        for number, block in enumerate(content["blocks"]):
-            del block["first"]
-            block["samples"] = block["samples"] if samples is None else samples[number]
-        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+        """As of a real sweep, with these samples of each block if they are given."""
+        return digest_of(self.canonical(), samples)
 
 
 SWEEP: Any = SyntheticSweep()
@@ -85,7 +88,7 @@ def synthetic_rows(sweep: Any, walks: range) -> Rows:
         names = [name for name in rows.dtype.names or () if name not in ("index", "status")]
         for name in names:
             if rows.dtype[name].kind == "i":
-                row[name] = rng.integers(0, 1000)
+                row[name] = rng.integers(0, 100)
             elif quantity_of(name) in block.drawn or name in ("walk_time", "energy_at_release"):
                 row[name] = rng.random()
         row["dx"] = np.nan if failed else rng.normal(1.0, 0.1)

@@ -19,6 +19,10 @@ from warpchain.sweeps.sweep_file import _TOP_KEYS
 SWEEPS = Path(__file__).parents[2] / "sweeps"
 
 
+PLANAR = [name for name in Parameters.model_fields if name != "half_width"]
+"""Parameters that matter to a chain whose plane is fixed."""
+
+
 @pytest.mark.parametrize(
     ("name", "shapes"),
     [
@@ -35,9 +39,10 @@ SWEEPS = Path(__file__).parents[2] / "sweeps"
         ("unsoftened_hold", {"softened": (400,), "own_joints": (400,)}),
         ("softened_drive", {"main": (4, 3, 2, 200)}),
         ("floor_friction", {"spinning": (5, 3, 7, 100), "rest": (5, 3, 7, 100)}),
+        ("tilt", {"fixed": (5, 5, 200), "tilted": (5, 5, 4, 200)}),
         (
             "sensitivity",
-            {"ranges": (64 * 17,), "measured": (32 * 14,)} | {name: (3, 8) for name in Parameters.model_fields},
+            {"ranges": (64 * 17,), "measured": (32 * 14,)} | {name: (3, 8) for name in PLANAR},
         ),
     ],
 )
@@ -49,6 +54,7 @@ def test_shipped_sweeps(name: str, shapes: dict[str, tuple[int, ...]]) -> None:
     walks = sum(math.prod(shape) for shape in shapes.values())
     assert sweep.walk_count == walks
     stiff = {"figure6": list(shapes), "steadiness": ["paper", "paper_undamped"], "unsoftened_hold": list(shapes)}
+    stiff["tilt"] = list(shapes)
     for block in sweep.blocks:
         preset = "paper" if block.name in stiff.get(name, []) else "soft"
         walks = math.prod(block.shape)
@@ -60,7 +66,7 @@ def test_every_shipped_sweep_is_tested() -> None:
     """No other file is in the folder."""
     names = {path.stem for path in SWEEPS.iterdir()}
     assert names == {
-        *("quickstart", "figure6", "tolerance", "montecarlo", "sensitivity", "kink"),
+        *("quickstart", "figure6", "tolerance", "montecarlo", "sensitivity", "kink", "tilt"),
         *("steadiness", "unsoftened_hold", "softened_drive", "floor_friction"),
     }
 
@@ -120,7 +126,8 @@ def test_sensitivity_varies_every_quantity() -> None:
     assert set(by_name["ranges"].drawn) == {
         name for name, q in Parameters.quantities().items() if q.source in ("measured", "looked up")
     } | {"phase", "clearance"}
-    for name, quantity in Parameters.quantities().items():
+    for name in PLANAR:
+        quantity = Parameters.quantities()[name]
         block = by_name[name]
         assert block.axes.keys() == {name} and block.drawn == ("phase", "clearance")
         assert getattr(preset("soft"), name) in block.axes[name]

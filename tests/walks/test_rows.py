@@ -23,6 +23,8 @@ def test_columns_of_a_row() -> None:
     """A row has the agreed columns, without padding, and the drawn quantities in the order of the table."""
     assert ROW.names == (
         *("index", "status", "dx", "walk_time", "simulated_time", "hold_time", "drift", "softened_at"),
+        *("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at", "collapsed_at"),
+        *("fell_over", "fell_before_collapse"),
         *("bounces", "steps_accepted", "steps_rejected"),
         *("impulses_floor", "impulses_sprocket", "impulses_self", "greatest_opening"),
         *("penetration_floor", "penetration_sprocket", "penetration_self", "energy_at_release"),

@@ -233,7 +233,7 @@ def test_a_saved_setup_repeats_its_walk(tmp_path):
     again = warpchain.walk(setup=saved.setup, seed=saved.seed)
     differing = {"wall_time"}
     for name in {field.name for field in dataclasses.fields(first)} - differing - {"before_release"}:
-        assert np.array_equal(getattr(again, name), getattr(first, name)), name
+        np.testing.assert_array_equal(getattr(again, name), getattr(first, name), err_msg=name)
     before = [dataclasses.asdict(walk.before_release) for walk in (again, first)]
     for name, values in before[0].items():
         assert np.array_equal(values, before[1][name], equal_nan=True), name

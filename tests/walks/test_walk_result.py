@@ -14,7 +14,9 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.support.forged_files import forged, with_byte
 from tests.support.made_walks import assert_same, make_unreleased, make_walk
+from warpchain.hdf5_files import put_text
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.setup import resolve
 from warpchain.status import Status
@@ -160,8 +162,8 @@ def test_provenance(tmp_path: Path) -> None:
     walk = make_walk()
     walk.save(tmp_path / "walk.h5")
     with h5py.File(tmp_path / "walk.h5") as file:
-        assert file.attrs["format"] == "warpchain walk" and file.attrs["format_version"] == 4
-        assert file.attrs["status"] == "at_rest"
+        assert file.attrs["format"] == b"warpchain walk" and file.attrs["format_version"] == 5
+        assert file.attrs["status"] == b"at_rest"
         setup = json.loads(file.attrs["setup"])
         assert json.loads(file.attrs["seed"]) == walk.seed
         assert json.loads(file.attrs["versions"]) == walk.versions
@@ -241,22 +243,25 @@ def test_foreign_files_are_refused(tmp_path: Path) -> None:
     assert "not an HDF5 file" in _refused(path)
     with h5py.File(path, "w") as file:
         file["x"] = 1.0
-    assert "HDF5, but not a walk" in _refused(path)
+    assert "no checksums at its end; older versions wrote none" in _refused(path)
     make_walk().save(path)
-    for version, remedy in ((3, "run the walk again, or use the warpchain that wrote it"), (5, "update warpchain")):
-        with h5py.File(path, "a") as file:
+    for version, remedy in ((4, "run the walk again, or use the warpchain that wrote it"), (6, "update warpchain")):
+        with forged(path) as file:
             file.attrs["format_version"] = version
-        assert f"format version {version}, but this warpchain reads 4; {remedy}" in _refused(path)
+        assert f"format version {version}, but this warpchain reads 5; {remedy}" in _refused(path)
+    with forged(path) as file:
+        put_text(file, "format", "another")
+    assert "HDF5, but not a walk" in _refused(path)
 
 
 def test_setup_of_another_version_is_refused(tmp_path: Path) -> None:
     """A setup with a field that this version doesn't know is refused by name."""
     path = tmp_path / "walk.h5"
     make_walk().save(path)
-    with h5py.File(path, "a") as file:
+    with forged(path) as file:
         setup = json.loads(file.attrs["setup"])
         setup["options"]["warp_factor"] = 9
-        file.attrs["setup"] = json.dumps(setup)
+        put_text(file, "setup", json.dumps(setup))
     assert "(warp_factor)" in _refused(path)
 
 
@@ -265,7 +270,7 @@ def test_missing_part_is_refused(name: str, tmp_path: Path) -> None:
     """A file that lacks a dataset is damaged, unless the dataset only repeats the setup."""
     path = tmp_path / "walk.h5"
     make_walk().save(path)
-    with h5py.File(path, "a") as file:
+    with forged(path) as file:
         del file[name]
     if name == "parameters":
         assert_same(load_walk(path), make_walk())
@@ -288,15 +293,13 @@ def test_flipped_bit_is_noticed(tmp_path: Path) -> None:
     path = tmp_path / "walk.h5"
     make_walk().save(path)
     with h5py.File(path) as file:
-        offset = file["frames/joints"].id.get_chunk_info(0).byte_offset
-    content = bytearray(path.read_bytes())
-    content[offset + 100] ^= 1
-    path.write_bytes(content)
-    assert "damaged or cut short" in _refused(path)
+        offset = file["frames/joints"].id.get_offset()
+    path.write_bytes(with_byte(path.read_bytes(), offset + 100, lambda byte: byte ^ 1))
+    assert "damaged or cut short (somewhere in its bytes 0 to " in _refused(path)
 
 
 def test_absent_file_is_named(tmp_path: Path) -> None:
     """A file that isn't there is an OSError with its path and a remedy."""
-    with pytest.raises(OSError, match=r"none\.h5: No such file or directory; give") as caught:
+    with pytest.raises(OSError, match=r"none\.h5: cannot be read \(No such file or directory\); give") as caught:
         load_walk(tmp_path / "none.h5")
     assert "\n" not in str(caught.value)

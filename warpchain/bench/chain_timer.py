@@ -12,6 +12,7 @@ from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.status import Status
+from warpchain.walks.moving_plane import UPRIGHT
 from warpchain.walks.scheduler import BATCHES_PER_GPU
 
 FAR: Final = 1e9
@@ -68,6 +69,7 @@ class ChainTimer:
         broad_phase: str = "grid",
         launches: int = 1,
         settling_runs: int = 1,
+        tilts: bool = False,
     ) -> None:
         """Put the chains into their start and carry them past the first steps.
 
@@ -80,9 +82,10 @@ class ChainTimer:
             broad_phase: ``"grid"`` or ``"all_pairs"``.
             launches: Launches of each batch that are queued together.
             settling_runs: Runs of :data:`SETTLING_ATTEMPTS` after each start.
+            tilts: Whether the plane of the chains may move; it is upright and at rest.
         """
         self.links, self.chains = len(start[0]), chains
-        self._start, self._launches, self._settling_runs = start, launches, settling_runs
+        self._start, self._launches, self._settling_runs, self._tilts = start, launches, settling_runs, tilts
         worlds = -(-chains // BATCHES_PER_GPU)
         self.batches = [Batch(min(worlds, chains - first), self.links, options) for first in range(0, chains, worlds)]
         for batch in self.batches:
@@ -90,7 +93,7 @@ class ChainTimer:
             batch.control.launch_time = math.inf  # only the number of attempts ends a launch: it is divided by
             for world in range(len(batch.links)):
                 batch.set_chain(world, parameters, self.links)
-        self.features = self.batches[0].features(fixed_body="floor", watch=watch, broad_phase=broad_phase)
+        self.features = self.batches[0].features(fixed_body="floor", watch=watch, broad_phase=broad_phase, tilts=tilts)
         self.batches[0].compile(self.features, [self.links])
         self.settled = self._begin()
 
@@ -112,6 +115,8 @@ class ChainTimer:
         for batch in self.batches:
             for world in range(len(batch.links)):
                 batch.load(world, *self._start, stop_time=FAR, stop_status=Status.FINISHED)
+                if self._tilts:
+                    batch.set_plane(world, UPRIGHT)
         return [self._run(SETTLING_ATTEMPTS) for _ in range(self._settling_runs)][-1]
 
     def _run(self, attempts: int) -> Stretch:

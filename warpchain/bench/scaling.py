@@ -25,7 +25,7 @@ from warpchain.bench.places import Place
 from warpchain.bench.record import machine, plain
 from warpchain.engine.processors import processors
 from warpchain.engine.tallies import CONTACTS
-from warpchain.files import replacing
+from warpchain.files import checked_output, make_folder, write_whole
 from warpchain.inputs.validation import InputError
 from warpchain.run.gpu_workers import GpuWorkers, gpu_workers
 from warpchain.run.progress_bar import SweepProgress
@@ -172,6 +172,8 @@ def measure(
     about = machine() | {"processors": str(processors())}
     if gpus := [place.device for place in places if place.device != "cpu"]:
         about |= gpu_machine(gpus[0]) | {"GPUs": str(wp.get_cuda_device_count())}
+    make_folder(out)
+    checked_output(out / FILE)
     changed: list[Comparison] = []
     for turn in range(rounds):
         for place, sweep, runs in measured:
@@ -185,8 +187,7 @@ def measure(
                 changed.append(Comparison(place.name, place.name, len(run.rows), differing))
             done = [one for one in measured if one[2]]
             scaling = Scaling(about, given.name, rounds, _costs(done), [*changed, *_comparisons(done)])
-            with replacing(out / FILE) as part:
-                part.write_text(json.dumps(plain(scaling), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+            write_whole(out / FILE, json.dumps(plain(scaling), indent=2, allow_nan=False) + "\n")
     return scaling
 
 

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from warpchain.cli.output_paths import output_path
 from warpchain.cli.sweep_commands import SweepFile
 
 bench_app = typer.Typer()
@@ -45,7 +46,10 @@ def bench(
     ] = None,
     rounds: Annotated[int, typer.Option(metavar="N", min=1, help="Measurements of each; medians are printed.")] = 7,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FILE", help="Write what --json prints to this file, too.")
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FILE", parser=output_path, help="Write what --json prints to this file, too."
+        ),
     ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object, units in its keys or in s, instead of tables.")
@@ -57,12 +61,15 @@ def bench(
     from warpchain.bench.record import machine, plain
     from warpchain.cli.bench_tables import print_bench
     from warpchain.cli.terminal import status_line
+    from warpchain.files import checked_output, write_whole
     from warpchain.inputs.options import Options
     from warpchain.inputs.scene import Scene, check_links_on_gpu
     from warpchain.inputs.validation import InputError, validated
 
     where = validated(Options, {"device": device}, "bench").device
     lengths = [validated(Scene, {"links": count}, "bench").links for count in links or ()]
+    if output is not None:
+        checked_output(output)
     tables: dict[str, Sequence[object]]
     if where == "cpu":
         for option, value in (("--method", methods), ("--chains", chains), ("--scene", scenes)):
@@ -95,7 +102,7 @@ def bench(
         more = {"flops_per_attempt": {name: gpu_steps.flops_per_attempt(name) for name in gpu_steps.METHODS}}
     text = json.dumps(plain({"machine": about, **more, **tables}), indent=2, allow_nan=False)
     if output is not None:
-        output.write_text(text + "\n", encoding="utf-8")
+        write_whole(output, text + "\n")
     if as_json:
         print(text)
     else:
@@ -106,7 +113,13 @@ def bench(
 def accuracy(
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", metavar="DIR", help="Folder of the results; those of other parts are kept."),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="DIR",
+            parser=output_path,
+            help="Folder of the results; those of other parts are kept.",
+        ),
     ],
     parts: Annotated[
         str, typer.Option(metavar="NAME,…", help="Parts to run.")
@@ -198,12 +211,66 @@ def accuracy(
         print(path)
 
 
+@bench_app.command("tilting")
+def tilting(
+    device: Annotated[str, typer.Option(metavar="NAME", help="cpu, cuda or cuda:N.")] = "cpu",
+    methods: Annotated[
+        list[str] | None,
+        typer.Option("--method", metavar="NAME", help="Explicit integrator; may be repeated. Default: dp5, os32."),
+    ] = None,
+    links: Annotated[
+        list[int] | None, typer.Option(metavar="N", help="Number of links; may be repeated. Default: 60 and 150.")
+    ] = None,
+    chains: Annotated[
+        list[int] | None,
+        typer.Option(metavar="N", min=1, help="Chains at a time; may be repeated. Default: 1, on a GPU 400 and 4000."),
+    ] = None,
+    rounds: Annotated[int, typer.Option(metavar="N", min=1, help="Measurements of each; medians are printed.")] = 7,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of a table.")] = False,
+) -> None:
+    """Measure what a plane that tilts adds to a step, beside the same chains in a plane that is fixed."""
+    from warpchain.bench.record import machine, plain
+    from warpchain.bench.tilting_cost import tilting_costs
+    from warpchain.cli.bench_tables import print_bench
+    from warpchain.cli.terminal import status_line
+    from warpchain.inputs.options import Options
+    from warpchain.inputs.scene import Scene, check_links_on_gpu
+    from warpchain.inputs.setup import check_can_tilt
+    from warpchain.inputs.validation import validated
+
+    chosen = methods or ["dp5", "os32"]
+    for method in chosen:
+        check_can_tilt(validated(Options, {"method": method, "device": device}, "bench"))
+    lengths = [validated(Scene, {"links": count}, "bench").links for count in links or (60, 150)]
+    for count in lengths:
+        check_links_on_gpu(count, device, "bench.links")
+    with status_line() as show:
+        costs = tilting_costs(
+            device,
+            methods=chosen,
+            links=lengths,
+            chains=chains or ([1] if device == "cpu" else [400, 4000]),
+            rounds=rounds,
+            report=show,
+        )
+    if as_json:
+        print(json.dumps(plain({"machine": machine(), "tilting": costs}), indent=2, allow_nan=False))
+    else:
+        print_bench(machine(), ("tilting", costs))
+
+
 @bench_app.command("sweep")
 def sweep(
     source: SweepFile,
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", metavar="DIR", help="Folder of the results, with a folder for each place."),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="DIR",
+            parser=output_path,
+            help="Folder of the results, with a folder for each place.",
+        ),
     ],
     devices: Annotated[
         str,

@@ -41,6 +41,15 @@ TABLES: Final = {
         "blocks": "{0.blocks:d} ({0.occupancy:.0%})",
         "of peak": "{.peak:.0%}",
     },
+    "tilting": {
+        "scene": "{.scene}",
+        "links": "{.links}",
+        "method": "{.method}",
+        "chains": "{.chains:d}",
+        "fixed µs/attempt": "{.fixed_microseconds:.2f}",
+        "tilting µs/attempt": "{.tilting_microseconds:.2f}",
+        "ratio": "{.ratio:.2f}",
+    },
     "costs": {
         "place": "{.name}",
         "methods": "{.methods}",

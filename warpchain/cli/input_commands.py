@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from warpchain.cli import completions
+from warpchain.cli.output_paths import output_path
 
 if TYPE_CHECKING:
     from warpchain.inputs.value_list import ValueEntry
@@ -63,7 +64,13 @@ def parameters(
 def schema(
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="FILE", help="Write it to this file instead of standard output."),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            parser=output_path,
+            help="Write it to this file instead of standard output.",
+        ),
     ] = None,
 ) -> None:
     """Print a JSON schema of sweep files, with which editors check and complete them.
@@ -71,15 +78,14 @@ def schema(
     An editor with a YAML language server finds it by the first line of a sweep file:
     # yaml-language-server: $schema=FILE
     """
-    from warpchain.files import replacing
+    from warpchain.files import write_whole
     from warpchain.sweeps.schema import sweep_schema
 
     text = json.dumps(sweep_schema(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     if output is None:
         print(text, end="")
         return
-    with replacing(output) as part:
-        part.write_text(text, encoding="utf-8")
+    write_whole(output, text)
     print(output)
 
 

@@ -1,8 +1,9 @@
 """The command `warpchain`.
 
-Exit status: 0 when the walk ended as it should, 1 when it failed, 2 when the input is refused or a file cannot be read
-or written, 130 when interrupted. Values are checked like keyword arguments and YAML files, so they are refused in the
-same words. Heavy libraries are imported by the functions that need them, so that help is quick.
+Exit status: 0 when the walk ended as it should, 1 when it failed, a file is damaged or a disk is full or broken, 2 when
+the input is refused or a path cannot be read or written, 130 when interrupted. Values are checked like keyword
+arguments and YAML files, so they are refused in the same words. Heavy libraries are imported by the functions that need
+them, so that help is quick.
 """
 
 import contextlib
@@ -19,8 +20,10 @@ import typer
 from warpchain.cli import completions
 from warpchain.cli.bench_commands import bench_app
 from warpchain.cli.input_commands import parameters, schema
+from warpchain.cli.output_paths import output_path
 from warpchain.cli.sweep_commands import FAILED, add_commands
 from warpchain.cli.walk_commands import animate, setup_like
+from warpchain.files import DISK_FAILURES, is_possible
 from warpchain.inputs.methods import METHODS
 from warpchain.version import VERSION
 
@@ -44,6 +47,9 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal without Δ gets a question mark
+    for word in sys.argv[1:] if arguments is None else arguments:
+        if not is_possible(word):
+            _refuse([f"{ascii(word)[:100]}: has a NUL or a lone surrogate; leave it out"])
     try:
         with _warnings_on_one_line():
             status = app(arguments, prog_name="warpchain", standalone_mode=False)
@@ -52,13 +58,13 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         command = context.command_path if context is not None else "warpchain"
         _refuse([f"{error.format_message().rstrip('.')}; see {command} --help"], error.exit_code)
     except OSError as error:
-        _refuse([str(error)])
+        _refuse([str(error)], FAILED if error.errno in DISK_FAILURES else REFUSED)
     except ValueError as error:
-        from warpchain.inputs.validation import InputError
+        from warpchain.inputs.validation import DamagedFileError, InputError
 
         if not isinstance(error, InputError):
             raise
-        _refuse(str(error).splitlines())
+        _refuse(str(error).splitlines(), FAILED if isinstance(error, DamagedFileError) else REFUSED)
     except KeyboardInterrupt:
         status = INTERRUPTED
     if status == INTERRUPTED:
@@ -208,6 +214,7 @@ def walk(
             "-o",
             "--output",
             metavar="DIR",
+            parser=output_path,
             help="Write walk.h5, figure5.png, film_strip.png and, of a chain on a sprocket, loop.png to this folder; "
             "files of these names are replaced.",
         ),
@@ -228,7 +235,7 @@ def walk(
     ] = False,
 ) -> None:
     """Let one chain walk: hang it on its sprocket, spin it up, drop it and follow it until it rests."""
-    from warpchain.cli.terminal import print_walk, progress_text, status_line, try_folder, write_files
+    from warpchain.cli.terminal import print_walk, progress_text, status_line, try_walk_folder, write_files
     from warpchain.inputs.distributions import LARGEST_SEED
     from warpchain.inputs.validation import InputError, checked_whole
     from warpchain.run.single_walk import run_walk
@@ -252,7 +259,7 @@ def walk(
         setup, chosen_seed = setup_like(like, given)
     interval = _frame_interval(output, animation, frame_interval)
     if output is not None:
-        try_folder(output)
+        try_walk_folder(output, animation)
 
     with status_line() as show:
         result = run_walk(

@@ -1,6 +1,7 @@
 """The commands of the command line that are about sweeps: sweep, info, plot, report, merge."""
 
 import contextlib
+import json
 import os
 import sys
 from collections.abc import Iterator
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from warpchain.cli import completions
+from warpchain.cli.output_paths import output_path
 from warpchain.cli.walk_commands import plot_walk
 
 if TYPE_CHECKING:
@@ -38,7 +40,13 @@ def sweep(
     source: Annotated[Path | None, SWEEP_FILE] = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="DIR", help="Folder of the results; a killed sweep goes on in it."),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="DIR",
+            parser=output_path,
+            help="Folder of the results; a killed sweep goes on in it.",
+        ),
     ] = None,
     device: Annotated[
         str | None,
@@ -59,7 +67,11 @@ def sweep(
     fresh: Annotated[bool, typer.Option("--fresh", help="Discard what another sweep left in the folder.")] = False,
     new: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.yaml", help="Write a small sweep file that explains its keys; run nothing."),
+        typer.Option(
+            metavar="FILE.yaml",
+            parser=output_path,
+            help="Write a small sweep file that explains its keys; run nothing.",
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -101,7 +113,8 @@ def _write_new(path: Path, *, alone: bool) -> None:
     """Write a sweep file to start from.
 
     Raises:
-        InputError: other arguments are given, there is such a file already, or it cannot be written.
+        InputError: other arguments are given, or there is such a file already.
+        OSError: it cannot be written.
     """
     from warpchain.inputs.validation import InputError
     from warpchain.sweeps.shipped import write_new_sweep
@@ -112,12 +125,22 @@ def _write_new(path: Path, *, alone: bool) -> None:
     print(path)
 
 
-def info(directory: Folder, as_json: AsJson = False) -> None:
-    """Show how far a sweep is and what it has found so far."""
+def info(
+    directory: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Folder of a sweep, or a merged file.", show_default=False)
+    ],
+    as_json: AsJson = False,
+) -> None:
+    """Show how far a sweep is and what it has found so far; of a merged file, check every byte and show its counts."""
     from warpchain.cli.terminal import print_sweep
     from warpchain.store.folder import running_rate
+    from warpchain.store.merged_file import check_merged
     from warpchain.store.sweep_result import load
 
+    if os.path.isfile(directory):
+        found = check_merged(directory)
+        print(json.dumps(found) if as_json else "\n".join(f"{name:20} {value}" for name, value in found.items()))
+        return
     print_sweep(load(directory), as_json, running_rate(directory))
 
 
@@ -127,7 +150,9 @@ def plot(
     ],
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="DIR", help="Folder of the figures. Default: that of PATH."),
+        typer.Option(
+            "-o", "--output", metavar="DIR", parser=output_path, help="Folder of the figures. Default: that of PATH."
+        ),
     ] = None,
     quantity: Annotated[
         str | None,
@@ -150,6 +175,7 @@ def plot(
             raise typer.Exit(FAILED)
         return
     from warpchain.cli.terminal import try_folder
+    from warpchain.files import make_folder
     from warpchain.reports.sweep_figures import figures
     from warpchain.store.manifest import check_not_own
     from warpchain.store.sweep_result import load
@@ -158,7 +184,7 @@ def plot(
     folder = output or path
     check_not_own(path, folder.resolve())
     try_folder(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     for picture in figures(result, quantity or "dx"):
         print(picture.save(folder))
 
@@ -166,7 +192,14 @@ def plot(
 def report(
     directory: Folder,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FILE.html", help="The page. Default: DIR/report.html.")
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE.html",
+            parser=output_path,
+            help="The page, which replaces an older one only. Default: DIR/report.html.",
+        ),
     ] = None,
     walk: Annotated[
         int | None,
@@ -199,7 +232,9 @@ def merge(
     directories: Annotated[
         list[Path], typer.Argument(metavar="DIR...", help="Folder of a sweep, or several.", show_default=False)
     ],
-    output: Annotated[Path, typer.Argument(metavar="FILE.h5", help="The file to write.", show_default=False)],
+    output: Annotated[
+        Path, typer.Argument(metavar="FILE.h5", parser=output_path, help="The file to write.", show_default=False)
+    ],
 ) -> None:
     """Put all results into one HDF5 file with named axes and units, which xarray opens.
 

@@ -16,6 +16,7 @@ from rich.console import Console
 from rich.table import Table
 
 from warpchain.engine.tallies import LOST
+from warpchain.files import DISK_FAILURES, checked_output, failure, make_folder, remedy, remove_output
 from warpchain.inputs.validation import InputError
 from warpchain.pictures.style import save_figure
 from warpchain.walks.walk_result import WalkResult
@@ -28,11 +29,25 @@ if TYPE_CHECKING:
 COMPILING: Final = "compiling kernels; later runs find them ready"
 
 
+RECORD: Final = "walk.h5"
+PICTURES: Final = ("figure5.png", "film_strip.png", "loop.png")
+"""Files of a walk, beside its animation."""
+
+
+def try_walk_folder(folder: Path, animation: str | None) -> None:
+    """Check before a walk that all its files can be written; errors as of `try_folder` and `checked_output`."""
+    try_folder(folder)
+    for name in (RECORD, *PICTURES, *([] if animation is None else [f"walk.{animation}"])):
+        if folder.is_dir():
+            checked_output(folder / name)
+
+
 def try_folder(folder: Path) -> None:
     """Check before a long run that a folder can be written to; nothing is left there.
 
     Raises:
         InputError: it cannot.
+        OSError: the disk is full or broken.
     """
     nearest = folder.absolute()
     try:
@@ -44,9 +59,10 @@ def try_folder(folder: Path) -> None:
                 nearest = nearest.parent
         with tempfile.TemporaryDirectory(prefix=".warpchain-", dir=nearest):
             pass
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise InputError(f"--output: {folder}: {reason}; give a folder that can be written to") from None
+    except OSError as error:
+        if error.errno in DISK_FAILURES:
+            raise failure(error.errno, f"--output: {folder}: {error.strerror}; {remedy(error.errno)}") from None
+        raise InputError(f"--output: {folder}: {error.strerror}; give a folder that can be written to") from None
 
 
 @contextmanager
@@ -190,18 +206,19 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
     Raises:
         OSError: a file cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    record = folder / "walk.h5"
+    make_folder(folder)
+    record = folder / RECORD
     result.save(record)
     yield record
+    figure5, film_strip, loop = PICTURES
     pictures: dict[str, Callable[[WalkResult, Path], None]] = {
-        "figure5.png": partial(_draw, "figure5"),
-        "film_strip.png": partial(_draw, "film_strip"),
+        figure5: partial(_draw, "figure5"),
+        film_strip: partial(_draw, "film_strip"),
     }
     if result.before_release is not None:
-        pictures["loop.png"] = partial(_draw, "loop")
+        pictures[loop] = partial(_draw, "loop")
     else:
-        (folder / "loop.png").unlink(missing_ok=True)
+        remove_output(folder / loop)
     if animation is not None:
         from warpchain.pictures.animation import animate
 
@@ -211,9 +228,9 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
         try:
             draw(result, path)
         except ValueError as error:
-            if result.status.ok and name != "loop.png":
+            if result.status.ok and name != loop:
                 raise
-            path.unlink(missing_ok=True)
+            remove_output(path)
             print(f"{path}: not drawn; {error}", file=sys.stderr)
         else:
             yield path

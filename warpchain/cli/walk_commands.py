@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from warpchain.cli.output_paths import output_path
+
 if TYPE_CHECKING:
     from warpchain.inputs.setup import Setup
-    from warpchain.walks.walk_result import WalkResult
 
 
 def plot_walk(path: Path, output: Path | None) -> bool:
@@ -27,12 +28,14 @@ def plot_walk(path: Path, output: Path | None) -> bool:
         OSError: a file cannot be read or written.
     """
     from warpchain.cli.terminal import try_folder
+    from warpchain.files import make_folder
     from warpchain.pictures.style import save_figure
     from warpchain.pictures.walk_shape import kinds_of
+    from warpchain.walks.walk_result import load_walk
 
-    walk, folder, drawn = _saved_walk(path), path.parent if output is None else output, False
+    walk, folder, drawn = load_walk(path), path.parent if output is None else output, False
     try_folder(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     for kind in kinds_of(walk):
         target = folder / f"{kind}.png"
         try:
@@ -53,7 +56,10 @@ def animate(
     output: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE", help="The file to write; its name ends in .gif, .mp4 or .html.", show_default=False
+            metavar="FILE",
+            parser=output_path,
+            help="The file to write; its name ends in .gif, .mp4 or .html.",
+            show_default=False,
         ),
     ],
     fps: Annotated[
@@ -69,8 +75,9 @@ def animate(
 ) -> None:
     """Write a moving picture of a saved walk: GIF, MP4 or a page with a player."""
     from warpchain.inputs.validation import InputError
+    from warpchain.walks.walk_result import load_walk
 
-    result = _saved_walk(walk)
+    result = load_walk(walk)
     try:
         result.animate(output, fps=fps, slow=slow)
     except (ValueError, ImportError) as error:
@@ -94,8 +101,9 @@ def setup_like(path: Path, given: Mapping[str, Mapping[str, object]]) -> "tuple[
     from warpchain.inputs.methods import METHODS_BY_NEED
     from warpchain.inputs.parameters import warn_of_units
     from warpchain.inputs.setup import resolve
+    from warpchain.walks.walk_result import load_walk
 
-    saved = _saved_walk(path)
+    saved = load_walk(path)
     options = given["options"]
     replaced = {"soft_tolerance"} if "tolerance" in options else set()
     if "method" in options:
@@ -107,19 +115,3 @@ def setup_like(path: Path, given: Mapping[str, Mapping[str, object]]) -> "tuple[
     setup = resolve(saved.setup.preset, **sections)
     warn_of_units((f"parameters.{name}", name, value) for name, value in given["parameters"].items())
     return setup, saved.seed
-
-
-def _saved_walk(path: Path) -> "WalkResult":
-    """Read a saved walk.
-
-    Raises:
-        InputError: the file is no walk, is damaged, or belongs to another version.
-        OSError: the file cannot be read.
-    """
-    from warpchain.inputs.validation import InputError
-    from warpchain.walks.walk_result import load_walk
-
-    try:
-        return load_walk(path)
-    except ValueError as error:
-        raise InputError(str(error)) from None

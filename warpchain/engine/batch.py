@@ -423,6 +423,19 @@ class Batch:
         rows = self._view(self.record.frame_loads)[world, :count, : 3 * n].reshape(count, 3, n)
         return rows.transpose(0, 2, 1).copy()
 
+    def frame_planes(self, world: int) -> Array:
+        """The plane in the frames kept so far: (f, PLANE_VALUES); (f, 0) if the batch does not keep planes."""
+        count = int(self._view(self.record.frame_count)[world])
+        first = 2 * self.state.links.shape[2]
+        return self._view(self.record.frames)[world, :count, first:].copy()
+
+    def fall(self, world: int) -> tuple[float, float, float]:
+        """Of a plane that tilts, since loading: time [s] of collapse and of fall, NaN if never; greatest tilt [rad]."""
+        watch = self._view(self.state.watch)[world]
+        collapsed, fell = (float(watch[row]) for row in (layout.COLLAPSED_AT, layout.FELL_AT))
+        lean = min(1.0, float(watch[layout.GREATEST_LEAN]))
+        return collapsed if collapsed >= 0 else math.nan, fell if fell >= 0 else math.nan, math.asin(lean)
+
     def drain_frames(self, world: int) -> tuple[Array, Array]:
         """Take the frames kept so far: times (f,) [s], joint positions (f, n, 2) [m]."""
         count = int(self._view(self.record.frame_count)[world])

@@ -82,7 +82,13 @@ def scratch_rows(options: Options, longest: int, device: wp.Device, threads: int
 
 
 def world_bytes(
-    longest: int, options: Options, samples: int, frames: int, device: wp.Device, keeps_loads: bool = False
+    longest: int,
+    options: Options,
+    samples: int,
+    frames: int,
+    device: wp.Device,
+    keeps_loads: bool = False,
+    tilts: bool = False,
 ) -> int:
     """Memory [B] that a batch takes on a device for each of its worlds.
 
@@ -93,16 +99,24 @@ def world_bytes(
         frames: Capacity of the frames.
         device: Device of the batch.
         keeps_loads: Whether loads of joints are kept with the frames.
+        tilts: Whether the plane of the chain is kept with samples and frames.
     """
     columns = layout.padded_width(longest)
-    few = len(Parameters.model_fields) + 107  # numbers of a world in model, drive and state
+    few = len(Parameters.model_fields) + 195  # numbers of a world in model, drive and state
     numbers = columns * scratch_rows(options, longest, device) + 6 * longest + few
-    numbers += samples * layout.SAMPLE_COLUMNS + frames * ((2 + 3 * keeps_loads) * longest + 1)
+    numbers += samples * (layout.ALL_COLUMNS if tilts else layout.SAMPLE_COLUMNS)
+    numbers += frames * ((2 + 3 * keeps_loads) * longest + layout.PLANE_VALUES * tilts + 1)
     return 8 * numbers + 4 * list_layout(columns).size
 
 
 def most_worlds(
-    longest: int, options: Options, *, keeps_samples: bool, keeps_frames: bool, keeps_loads: bool = False
+    longest: int,
+    options: Options,
+    *,
+    keeps_samples: bool,
+    keeps_frames: bool,
+    keeps_loads: bool = False,
+    tilts: bool = False,
 ) -> int:
     """Chains that a GPU should carry on together: as many as can reside on it and fit into half of the free memory.
 
@@ -110,5 +124,5 @@ def most_worlds(
     """
     device = start_device(options.device)
     samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * keeps_frames
-    fitting = int(device.free_memory) // 2 // world_bytes(longest, options, samples, frames, device, keeps_loads)
+    fitting = int(device.free_memory) // 2 // world_bytes(longest, options, samples, frames, device, keeps_loads, tilts)
     return max(1, min(BLOCKS_OF_MULTIPROCESSOR * int(device.sm_count), fitting))

@@ -38,5 +38,5 @@ METHODS_BY_NEED: Final[Mapping[str, Mapping[str, object]]] = MappingProxyType(
 """One word for an integrator and its settings.
 
 The ensembles of `standard` and `explicit` could not be told from those of `reference`, which is the paper's. `standard`
-is the cheapest on a CPU; on a GPU, where `hybrid` does not run, it means `explicit`.
+is the cheapest on a CPU; it means `explicit` on a GPU and if the plane of the chain tilts, where there is no `hybrid`.
 """

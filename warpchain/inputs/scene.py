@@ -22,16 +22,24 @@ HIGHEST_LOAD: Final = 1e4
 """Greatest factor by which loads are multiplied; more than some hundred make joints stretch and steps short."""
 LEAST_INERTIA: Final = 0.5
 """Part of its rotary inertia that a link must keep under multiplied loads."""
+FASTEST_TAP: Final = 1e3
+"""Greatest speed [m/s] and rate [rad/s] of the plane at the release, far beyond that of any loop."""
 LONGEST: Final = 1e6
 """Greatest time, in which numbers still tell a nanosecond, a short step [s]."""
+
+
+RIGHT_ANGLE: Final = math.pi / 2
+TAP: Final = ("lateral_speed", "tilt", "tilt_rate", "yaw_rate")
+"""What a release may give to a plane that tilts. Each is 0 by default: an upright plane that nothing disturbs stays
+upright, so that a scene with a tilting plane alone is the paper's."""
 
 
 class Scene(BaseModel):
     """What happens in one walk, from hanging on the sprocket to the end.
 
     Raises:
-        pydantic.ValidationError: a value is unknown or out of bounds, `links` is odd, or the clearance is
-            that of a hanging chain although the chain never hangs.
+        pydantic.ValidationError: a value is unknown or out of bounds, `links` is odd, the clearance is that of a
+            hanging chain although the chain never hangs, or the release disturbs a plane that is fixed.
     """
 
     model_config = STRICT
@@ -100,6 +108,34 @@ class Scene(BaseModel):
     walk_limit: float = number_field(
         20.0, "s", "longest time from the release to rest; then the walk ends as time_limit", gt=0, le=LONGEST
     )
+    plane: Literal["fixed", "tilting"] = Field(
+        default="fixed",
+        description="whether the chain stays in an upright plane, or walks in one that moves, turns and may fall over",
+    )
+    lateral_speed: float = number_field(
+        0.0,
+        "m/s",
+        "of the centre of mass at the release, across a plane that tilts; positive to the right of the way it walks",
+        ge=-FASTEST_TAP,
+        le=FASTEST_TAP,
+    )
+    tilt: float = number_field(
+        0.0,
+        "rad",
+        "of a tilting plane at the release, about the way it walks; positive: its top leans to the left",
+        ge=-RIGHT_ANGLE,
+        le=RIGHT_ANGLE,
+    )
+    tilt_rate: float = number_field(
+        0.0, "rad/s", "rate of tilt of a tilting plane at the release", ge=-FASTEST_TAP, le=FASTEST_TAP
+    )
+    yaw_rate: float = number_field(
+        0.0,
+        "rad/s",
+        "rate at which a tilting plane turns about its upright axis at the release, anticlockwise from above",
+        ge=-FASTEST_TAP,
+        le=FASTEST_TAP,
+    )
 
     @field_validator("links")
     @classmethod
@@ -107,6 +143,15 @@ class Scene(BaseModel):
         if links % 2:
             raise refusal("links", f"{links} is odd; a chain alternates inner and outer links, so give an even number")
         return links
+
+    @model_validator(mode="after")
+    def _tap_needs_tilting_plane(self) -> Self:
+        for name in TAP:
+            if getattr(self, name) != 0 and self.plane == "fixed":
+                raise refusal(
+                    name, f"{getattr(self, name)} moves the plane of the chain, which is fixed; give plane: tilting"
+                )
+        return self
 
     @model_validator(mode="after")
     def _hanging_needs_rest(self) -> Self:

@@ -16,6 +16,7 @@ from warpchain.inputs.scene import Scene, check_links_on_gpu, check_scene
 from warpchain.inputs.sections import SECTIONS, by_name, by_section
 from warpchain.inputs.validation import InputError, shown, suggestion, validated
 from warpchain.inputs.yaml_files import read_yaml
+from warpchain.kernels.methods.method import find_method
 
 DEFAULT_PRESET: Final = "paper"
 """Preset of a walk or a sweep that names none."""
@@ -74,12 +75,17 @@ def resolve(
     for path, values in (("scene", scene), ("options", options), ("parameters", parameters)):
         if not isinstance(values, Mapping):
             raise InputError(f"{path}: {shown(values)} is not a mapping; give names with values")
+    checked = validated(Scene, scene, "scene")
+    if checked.plane == "tilting" and options.get("method", "standard") == "standard":
+        options = {**options, "method": "explicit"}
     setup = Setup(
         preset=preset,
         parameters=parameter_preset(preset).with_values(parameters),
-        scene=validated(Scene, scene, "scene"),
+        scene=checked,
         options=validated(Options, options, "options"),
     )
+    if checked.plane == "tilting":
+        check_can_tilt(setup.options)
     check_scene(setup.scene, setup.parameters)
     check_links_on_gpu(setup.scene.links, setup.options.device, "scene.links")
     interval = setup.options.record_interval
@@ -89,6 +95,19 @@ def resolve(
             f"give at most {LONGEST_DRIVE_INTERVAL} s, or scene.load_factor: 1"
         )
     return setup
+
+
+def check_can_tilt(options: Options) -> None:
+    """Check that the method carries chains whose plane tilts.
+
+    Raises:
+        InputError: it does not.
+    """
+    if not find_method(options.method).can_tilt:
+        raise InputError(
+            f"options.method: {shown(options.method)} keeps the plane of a chain fixed; "
+            "give explicit or an explicit method, or scene.plane: fixed"
+        )
 
 
 def read_setup(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:

@@ -30,6 +30,10 @@ class InputError(ValueError):
     """
 
 
+class DamagedFileError(InputError):
+    """A file that is not what warpchain wrote; its text is `path: what is wrong; what to do`, in one line."""
+
+
 class InputWarning(UserWarning):
     """Input that is possible but probably not meant; its text reads like that of an `InputError`."""
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.hdf5_files import Contents
+
 if TYPE_CHECKING:
     import h5py
 
@@ -22,6 +24,16 @@ FIELDS: Final[Mapping[str, tuple[str, str]]] = {
     "frame_moments": ("N m", "friction moment in each joint on the link that it ends, shape (f, n)"),
 }
 """Arrays of a `BeforeRelease`: name → unit and meaning."""
+_OF_JOINTS: Final = ("frame_joints", "frame_forces", "frame_moments")
+_DIMENSIONS: Final = {
+    "time": 1,
+    "center": 2,
+    "center_velocity": 2,
+    "frame_time": 1,
+    "frame_joints": 3,
+    "frame_forces": 3,
+    "frame_moments": 2,
+}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -33,7 +45,7 @@ class BeforeRelease:
     may be softened. Moments are positive counter-clockwise. On the link after a joint both act with the opposite sign.
 
     Raises:
-        ValueError: an array does not have its shape, or a time is not negative.
+        ValueError: an array does not have its shape, a time is not negative, or times do not ascend.
     """
 
     time: Array
@@ -61,11 +73,12 @@ class BeforeRelease:
                 raise ValueError(f"before_release.{name}: its shape is {given}; give an array of shape {shape}")
         if np.any(self.time >= 0) or np.any(self.frame_time >= 0):
             raise ValueError("before_release: a time is not negative; give times before the release")
+        if not (is_ascending(self.time) and is_ascending(self.frame_time)):
+            raise ValueError("before_release: times do not ascend; give them in order")
 
     def as_type(self, joints: type[np.floating[Any]]) -> "BeforeRelease":
         """A copy with joints, forces and moments in another precision."""
-        names = ("frame_joints", "frame_forces", "frame_moments")
-        return replace(self, **{name: getattr(self, name).astype(joints) for name in names})
+        return replace(self, **{name: getattr(self, name).astype(joints) for name in _OF_JOINTS})
 
     def __repr__(self) -> str:
         """One line."""
@@ -73,21 +86,32 @@ class BeforeRelease:
         return f"<BeforeRelease: {span:.3g} s, {len(self.time)} instants, {len(self.frame_time)} frames>"
 
 
+def is_ascending(times: Array) -> bool:
+    """Whether times are finite and none is before its predecessor."""
+    return bool(np.isfinite(times).all() and (np.diff(times) >= 0).all())
+
+
 def write_before_release(before: BeforeRelease, group: "h5py.Group") -> None:
-    """Write the arrays and their units into a group; gzip adds checksums."""
+    """Write the arrays and their units into a group."""
     for name, (unit, meaning) in FIELDS.items():
-        value = getattr(before, name)
-        filters = {"compression": "gzip", "shuffle": True} if value.size else {}
-        dataset = group.create_dataset(name, data=value, **filters)
+        dataset = group.create_dataset(name, data=getattr(before, name))
         dataset.attrs["unit"] = unit
         dataset.attrs["description"] = meaning
 
 
-def read_before_release(group: "h5py.Group") -> BeforeRelease:
+def read_before_release(group: Contents, joints: type[np.floating[Any]]) -> BeforeRelease:
     """Read what `write_before_release` wrote into a group.
+
+    Args:
+        group: the group.
+        joints: precision of joints, forces and moments.
 
     Raises:
         KeyError: an array is missing.
         ValueError: the arrays do not fit together.
     """
-    return BeforeRelease(**{name: group[name][()] for name in FIELDS})
+    values = {
+        name: group.array(name, joints if name in _OF_JOINTS else np.float64, (None,) * dimensions)
+        for name, dimensions in _DIMENSIONS.items()
+    }
+    return BeforeRelease(**values)

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.files import replacing
-from warpchain.pictures.player import EDGE, ENLARGEMENT, FLAT, INNER, OUTER, TALLEST, WIDTH, page, whole
+from warpchain.files import checked_output, replacing, write_whole
+from warpchain.pictures.player_page import EDGE, ENLARGEMENT, FLAT, INNER, OUTER, TALLEST, WIDTH, page, whole
 from warpchain.pictures.room import link_outlines
 from warpchain.pictures.room_player import ROOM, room_data
 from warpchain.pictures.room_stage import RoomStage
@@ -52,7 +52,7 @@ def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow
         ValueError: the suffix is unknown, the walk has no frames or broken ones, fps or slow is not positive, or a
             GIF would have too many pictures, in all or per second: viewers slow down over 50.
         ImportError: an .mp4 is asked for and `imageio-ffmpeg` is not installed.
-        OSError: the file cannot be written.
+        OSError: the file cannot be written, or something else than a regular file is there.
     """
     suffix = Path(path).suffix.lower()
     writers = {".gif": _write_gif, ".mp4": _write_mp4, ".html": _write_html}
@@ -64,7 +64,7 @@ def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow
     if suffix == ".gif" and fps > 50:
         raise ValueError(f"fps: {fps} is too fast for a GIF; give at most 50")
     check_frames(walk)
-    writers[suffix](walk, Path(path), fps, slow)
+    writers[suffix](walk, checked_output(path), fps, slow)
 
 
 def _chosen_frames(walk: Walk, fps: float, slow: float) -> list[int]:
@@ -105,13 +105,34 @@ def _write_mp4(walk: Walk, path: Path, fps: float, slow: float) -> None:
     stage = _stage(walk)
     chosen = _chosen_frames(walk, fps, slow)
     chosen += chosen[-1:] * round(_HOLD * fps)
-    coding = {"fps": fps, "quality": 8, "macro_block_size": 2}
-    with replacing(path) as part, closing(ffmpeg.write_frames(str(part), stage.size, **coding)) as writer:
-        writer.send(None)
-        for frame, group in itertools.groupby(chosen):
-            content = stage.picture(frame).tobytes()
-            for _ in group:
-                writer.send(content)
+    # imageio-ffmpeg lets the lines of ffmpeg through to the terminal, and hides how it ends.
+    coding = {"fps": fps, "quality": 8, "macro_block_size": 2, "ffmpeg_log_level": "quiet"}
+    with replacing(path) as part:
+        try:
+            with closing(ffmpeg.write_frames(str(part), stage.size, **coding)) as writer:
+                writer.send(None)
+                for frame, group in itertools.groupby(chosen):
+                    content = stage.picture(frame).tobytes()
+                    for _ in group:
+                        writer.send(content)
+        except OSError as error:
+            raise OSError("ffmpeg ended early") from error
+        if not _is_whole_mp4(part):
+            raise OSError("ffmpeg did not write it to the end")
+
+
+def _is_whole_mp4(path: Path) -> bool:
+    """Whether the boxes of an MP4 fill its file and the index, which is written last, is among them."""
+    kinds, place, end = [], 0, path.stat().st_size
+    with path.open("rb") as content:
+        while place < end:
+            content.seek(place)
+            size, kind = int.from_bytes(content.read(4)), content.read(4)
+            if size == 1:  # the size does not fit and follows in 8 bytes
+                size = int.from_bytes(content.read(8))
+            kinds.append(kind)
+            place += max(size, 8)
+    return place == end and b"moov" in kinds
 
 
 @dataclass(frozen=True)
@@ -211,15 +232,26 @@ class _Stage:
 
 
 def _write_html(walk: Walk, path: Path, fps: float, slow: float) -> None:
-    """Write a page that contains the frames: lengths in whole tenths of a millimetre, times in microseconds."""
+    write_whole(path, player(walk, slow))
+
+
+def player(walk: Walk, slow: float = 4.0) -> str:
+    """A page with the frames and a player: lengths in whole tenths of a millimetre, times in microseconds.
+
+    Args:
+        walk: a walk with frames.
+        slow: playing time per simulated time at the start.
+
+    Raises:
+        ValueError: the walk has no frames or broken ones.
+    """
+    check_frames(walk)
     count = min(len(walk.frame_time), _PLAYER_FRAMES)
     frames = np.rint(np.linspace(0, len(walk.frame_time) - 1, count)).astype(int)
     title = setting(walk) + (f": \u0394x = {walk.dx:.3f} m" if math.isfinite(walk.dx) else "")
     in_room = tilting(walk)
     data = _flat_data(walk, frames, slow) if in_room is None else {**room_data(in_room, frames), "slow": slow}
-    text = page(title, data, FLAT if in_room is None else ROOM)
-    with replacing(path) as part:
-        part.write_text(text, encoding="utf-8")
+    return page(title, data, FLAT if in_room is None else ROOM)
 
 
 def _flat_data(walk: Walk, frames: NDArray[np.int_], slow: float) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.pictures.player import EDGE, INNER, OUTER, Drawing, whole
+from warpchain.pictures.player_page import EDGE, INNER, OUTER, Drawing, whole
 from warpchain.pictures.room import CORNER, center_in_room, check_room, floor_of, planes, room_box
 from warpchain.pictures.room_stage import INNER_WALL, OUTER_WALL
 from warpchain.pictures.walk_shape import TiltingWalk

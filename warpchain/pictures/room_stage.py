@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.pictures.player import EDGE, ENLARGEMENT, INNER, OUTER, TALLEST, WIDTH
+from warpchain.pictures.player_page import EDGE, ENLARGEMENT, INNER, OUTER, TALLEST, WIDTH
 from warpchain.pictures.room import (
     CORNER,
     center_in_room,

@@ -5,7 +5,10 @@ import io
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from itertools import chain, repeat
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
+
+from warpchain.files import Kind
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -13,10 +16,11 @@ if TYPE_CHECKING:
 _DPI: Final = 160
 
 
-def page(title: str, tiles: Mapping[str, tuple[int, str]], sections: Mapping[str, str]) -> str:
+def page(writer: str, title: str, tiles: Mapping[str, tuple[int, str]], sections: Mapping[str, str]) -> str:
     """A whole page.
 
     Args:
+        writer: what writes the page, see `pages_of`.
         title: heading of the page.
         tiles: numbers at the top of the page: label → number, and ``"bad"`` if it needs attention or else ``""``.
         sections: heading → content in HTML.
@@ -25,7 +29,7 @@ def page(title: str, tiles: Mapping[str, tuple[int, str]], sections: Mapping[str
         f'<div class="{kind}"><dt>{label}</dt><dd>{count:,}</dd></div>' for label, (count, kind) in tiles.items()
     ]
     anchors = {heading: heading.lower().replace(" ", "-") for heading in sections}
-    return _PAGE.format(
+    return _head(writer) + _PAGE.format(
         title=escape(title),
         style=_STYLE,
         numbers="".join(numbers),
@@ -35,6 +39,23 @@ def page(title: str, tiles: Mapping[str, tuple[int, str]], sections: Mapping[str
             for heading, text in sections.items()
         ),
     )
+
+
+def pages_of(writer: str) -> Kind:
+    """The kind of page that one writer has written: it begins with a mark."""
+    head = _head(writer).encode()
+
+    def has(path: Path) -> bool:
+        with path.open("rb") as content:
+            return content.read(len(head)) == head
+
+    return Kind(f"page that {writer} has written", has)
+
+
+def _head(writer: str) -> str:
+    """What a page begins with."""
+    mark = f'<meta name="generator" content="{escape(writer)}">'
+    return f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n{mark}\n'
 
 
 def picture(figure: "Figure", caption: str) -> str:
@@ -105,11 +126,7 @@ pre { max-height: 30rem; overflow: auto; padding: 1rem; background: #f3f4f5; fon
 """
 
 # The policy makes the browser refuse to load anything.
-_PAGE: Final = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
+_PAGE: Final = """<meta name="viewport" content="width=device-width, initial-scale=1">
 <meta http-equiv="Content-Security-Policy"
       content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'">
 <title>{title}</title>

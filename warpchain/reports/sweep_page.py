@@ -6,21 +6,19 @@ the software; on demand also one walk in motion. The same folder always gives th
 
 import math
 import os
-import tempfile
 from collections.abc import Mapping
 from html import escape
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import yaml
 
-from warpchain.files import replacing
+from warpchain.files import checked_output, given_path, write_whole
 from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.validation import InputError
 from warpchain.pictures.labels import axis_symbol, cell_text, cell_values, number_text, unit_text, with_unit
 from warpchain.pictures.walk_shape import Walk
-from warpchain.reports.html_page import page, picture, table
+from warpchain.reports.html_page import page, pages_of, picture, table
 from warpchain.status import Status
 from warpchain.store.manifest import Folder, check_not_own
 from warpchain.store.sweep_result import BlockResult, SweepResult, load
@@ -32,6 +30,10 @@ from warpchain.walks.rows import MISSING, field_column
 FRAME_INTERVAL: Final = 2e-3
 """Time between two frames of the walk in motion [s]."""
 
+_WRITER: Final = "warpchain report"
+_REPORTS: Final = pages_of(_WRITER)
+"""All that a report replaces."""
+
 _MOST_FAILED: Final = 100
 """Greatest number of walks of each status that are listed one by one."""
 
@@ -39,7 +41,7 @@ _MOST_FAILED: Final = 100
 def write_report(
     directory: Folder, path: str | os.PathLike[str], *, animation_of: int | None = None, device: str | None = None
 ) -> None:
-    """Write the report of a sweep as one HTML page, whole or not at all; an older file is replaced.
+    """Write the report of a sweep as one HTML page, whole or not at all; an older report is replaced.
 
     Args:
         directory: folder of the sweep, which may still be running.
@@ -48,12 +50,13 @@ def write_report(
         device: where that walk is run again; by default where the sweep says.
 
     Raises:
-        OSError: the folder cannot be read, or the file cannot be written.
+        OSError: the folder cannot be read, the file cannot be written, or it is there and no report.
         InputError: there is no sweep in the folder, a shard is damaged or foreign, there is no such walk, or the file
             is one of the sweep's own.
     """
+    check_not_own(directory, given_path(path))
     result = load(directory)
-    check_not_own(directory, Path(path))
+    checked_output(path, _REPORTS)
     if animation_of is not None and not 0 <= animation_of < result.walk_count:
         raise InputError(f"--walk: there is no walk {animation_of}; give 0 … {result.walk_count - 1}")
     sections = {
@@ -65,9 +68,8 @@ def write_report(
         "Sweep": _sweep(result),
         "Provenance": _provenance(result),
     }
-    text = page(result.name, _tiles(result), {title: text for title, text in sections.items() if text})
-    with replacing(path) as part:
-        part.write_text(text, encoding="utf-8")
+    text = page(_WRITER, result.name, _tiles(result), {title: text for title, text in sections.items() if text})
+    write_whole(path, text, _REPORTS)
 
 
 def _tiles(result: SweepResult) -> dict[str, tuple[int, str]]:
@@ -171,15 +173,12 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
 
 def _player(walk: Walk) -> str:
     """A frame with the page of the moving picture, or the reason why there is none."""
-    from warpchain.pictures.animation import animate
+    from warpchain.pictures.animation import player
 
-    with tempfile.TemporaryDirectory() as folder:
-        player = Path(folder) / "walk.html"
-        try:
-            animate(walk, player)
-        except ValueError as error:
-            return f'<p class="bad">No moving picture: {escape(str(error))}</p>'
-        content = escape(player.read_text(encoding="utf-8"))
+    try:
+        content = escape(player(walk))
+    except ValueError as error:
+        return f'<p class="bad">No moving picture: {escape(str(error))}</p>'
     # Height of the drawing at the full width of the page, and of its controls [px].
     wide, high = np.ptp(walk.frame_joints[..., 0]), walk.frame_joints[..., 1].max()
     height = round(min(600.0, 170.0 + 960.0 * high / wide))

@@ -27,7 +27,7 @@ _OTHER_MARKERS: Final = "s^vP*X"
 
 @dataclass(frozen=True)
 class Cell:
-    """Statistics of one cell, see `warpchain.store.sweep_result.CellStatistics`."""
+    """Statistics of one cell, see `warpchain.store.cell_statistics.CellStatistics`."""
 
     mean: float
     sd: float

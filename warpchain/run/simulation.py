@@ -14,7 +14,7 @@ from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import check_links_on_gpu
 from warpchain.inputs.validation import InputError, plain, shown, validated
 from warpchain.status import Status
-from warpchain.walks.walk_result import Trajectory
+from warpchain.walks.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 

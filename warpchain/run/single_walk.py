@@ -164,6 +164,7 @@ def run_walk(
         **run.recorder.series(),
         frame_time=frame_time,
         frame_joints=frame_joints,
+        **run.recorder.frame_planes(),
         before_release=run.recorder.before,
         setup=setup,
         seed=plain(seed),

@@ -6,18 +6,24 @@
     DIR/log.txt        what the runs of the sweep did, with times
     DIR/lock           locked by the process that runs the sweep; the system unlocks it when that ends
 
+None of these is a symbolic link when a sweep is run: nothing is written or deleted outside of the folder. A damaged
+shard is deleted, named in log.txt and by a warning, and computed again.
+
 A sweep grows when its file is given more samples: the walks that are there keep their shards, see
 `warpchain.store.manifest`. Whatever happens between two of these lines, the next `SweepFolder.open` goes on from there.
 """
 
 import datetime
+import errno
 import fcntl
 import os
 import re
 import secrets
 import shutil
 import socket
+import stat
 import time
+import warnings
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +32,9 @@ from typing import Final, Self
 import numpy as np
 import yaml
 
-from warpchain.inputs.validation import InputError
+from warpchain.files import failure, given_path
+from warpchain.hdf5_files import open_regular
+from warpchain.inputs.validation import DamagedFileError, InputError, InputWarning
 from warpchain.store.manifest import NUMERICS_VERSION, OWN, Folder, Manifest, read_manifest
 from warpchain.store.shards import present_shards, put_file, read_shard, writing
 from warpchain.sweeps.designs import EXTENSIBLE
@@ -83,14 +91,18 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             OSError: the folder cannot be made, locked, read or written, or the disk is too full for the rest of
                 the sweep.
             InputError: another process holds the folder, it belongs to another sweep or to something else, or a
-                shard is damaged or foreign. Nothing has been deleted.
+                shard is foreign. Nothing has been deleted.
             ValueError: the shard size is not positive.
+
+        Warns:
+            InputWarning: a shard was damaged; its walks are missing now.
         """
         if shard_size < 1:
             raise ValueError(f"shard_size: {shard_size} is not positive; give 1 or more")
-        path = Path(directory)
+        path = given_path(directory)
         with writing(path):
             path.mkdir(parents=True, exist_ok=True)
+            _refuse_links(path)
             lock = _locked(path)
         try:
             folder = cls(path, _prepared(path, sweep, Manifest.of(sweep, shard_size), fresh), lock)
@@ -105,8 +117,10 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         """Add a line with the time to log.txt; an `OSError` if it cannot be written."""
         path = self.directory / "log.txt"
         now = datetime.datetime.now().astimezone().isoformat(timespec="seconds")
-        with writing(path), path.open("a", encoding="utf-8") as file:
-            file.write(f"{now}  {text}\n")
+        with writing(path):
+            descriptor = _opened_own(path, os.O_WRONLY | os.O_APPEND)
+            with open(descriptor, "a", encoding="utf-8") as file:
+                file.write(f"{now}  {text}\n")
 
     def missing(self) -> list[range]:
         """The places of each shard that is not there yet, in order; errors as of `present_shards`."""
@@ -122,15 +136,22 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         self.close()
 
     def _check(self) -> None:
-        """Refuse what would fail later: bad shards, a folder that cannot be written, a disk too full."""
-        problems = []
-        for places in present_shards(self.directory, self.manifest):
+        """Refuse what would fail later: foreign shards, a folder that cannot be written, a disk too full."""
+        problems, bad = [], {}
+        for places, path in present_shards(self.directory, self.manifest).items():
             try:
                 read_shard(self.directory, self.manifest, places)
+            except DamagedFileError as error:
+                bad[path] = str(error).partition("; ")[0]
             except InputError as error:
                 problems.append(str(error))
         if problems:
             raise InputError(problems[0] + (f" (and {len(problems) - 1} more)" if problems[1:] else ""))
+        for path, problem in bad.items():
+            with writing(path):
+                path.unlink()
+            self.log(f"{problem}; deleted, its walks are computed again")
+            warnings.warn(f"{problem}; its walks are computed again", InputWarning, stacklevel=4)
         left = self.missing()
         if not left:
             return
@@ -146,9 +167,10 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             kept = sum(map(len, left)) / manifest.walk_count * manifest.kept_count
             need += round(kept * SHORT_WALK / series.interval * SAMPLE_BYTES)
         if need > free:
-            raise OSError(
+            raise failure(
+                errno.ENOSPC,
                 f"{self.directory}: the rest of the sweep takes {need / 1e6:.3g} MB, but {free / 1e6:.3g} MB are "
-                "free; make room and start again, shards written are kept"
+                "free; make room and start again, shards written are kept",
             )
 
     def _describe(self) -> None:
@@ -189,7 +211,7 @@ def running_rate(directory: Folder) -> float | None:
     """
     present = present_shards(directory, read_manifest(directory))
     try:
-        with (Path(directory) / "lock").open("rb") as lock:
+        with open_regular(Path(directory) / "lock") as lock:
             began = os.fstat(lock.fileno()).st_mtime
             fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -274,10 +296,30 @@ def _clear_leftovers(folder: Path) -> None:
     with writing(folder):
         for place in (folder, folder / "shards"):
             for path in place.iterdir() if place.is_dir() else ():
-                if _PART.fullmatch(path.name):
+                is_folder = path.is_dir() and not path.is_symlink()
+                if _PART.fullmatch(path.name) and not is_folder:
                     path.unlink(missing_ok=True)
                 elif _DISCARDED.fullmatch(path.name) and place == folder:
-                    shutil.rmtree(path)
+                    shutil.rmtree(path) if is_folder else path.unlink()
+
+
+def _refuse_links(folder: Path) -> None:
+    """Refuse a folder in which a name of the sweep's own leads somewhere else; an `InputError`."""
+    for name in (*OWN, "lock"):
+        if (folder / name).is_symlink():
+            raise InputError(
+                f"{folder / name}: a symbolic link, where a sweep writes and deletes; remove it, or put what it leads "
+                "to in its place"
+            )
+
+
+def _opened_own(path: Path, flags: int) -> int:
+    """A descriptor of a file that a sweep writes to, made if need be; an `InputError` if it is no regular file."""
+    descriptor = os.open(path, flags | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise InputError(f"{path}: a pipe or a device in the way of a sweep; give another folder")
+    return descriptor
 
 
 _held: set[int] = set()
@@ -296,7 +338,7 @@ os.register_at_fork(after_in_child=_give_up)
 def _locked(folder: Path) -> int:
     """Lock a folder and say in the lock file who has it; the descriptor of the lock."""
     path = folder / "lock"
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    descriptor = _opened_own(path, os.O_RDWR)
     try:
         holder = os.pread(descriptor, 200, 0).decode(errors="replace").strip()
         if holder and not _HOLDER.fullmatch(holder):

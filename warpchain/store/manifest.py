@@ -11,7 +11,7 @@ import itertools
 import json
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -20,9 +20,10 @@ from typing import Any, Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.files import version_refusal
 from warpchain.inputs.validation import InputError
-from warpchain.sweeps.plan import Sweep
+from warpchain.store.manifest_content import damaged, read_content, samples_of, walks_of, with_checksum
+from warpchain.sweeps.designs import walks_per_sample
+from warpchain.sweeps.plan import Sweep, digest_of
 from warpchain.sweeps.recording import Recording
 from warpchain.version import package_versions
 from warpchain.walks.rows import row_type
@@ -31,10 +32,6 @@ Folder = str | os.PathLike[str]
 
 NUMERICS_VERSION: Final = 10
 """Raised by every change that changes a number of any walk; shards of two versions never mix."""
-
-FORMAT: Final = "warpchain sweep"
-FORMAT_VERSION: Final = 3
-"""Of the manifest and of the shards."""
 
 OWN: Final = ("sweep.json", "sweep.yaml", "shards", "log.txt")
 """What a sweep has in its folder, beside the lock."""
@@ -246,8 +243,24 @@ class Manifest:
 
     def text(self) -> str:
         """Content of sweep.json."""
-        content = {"format": FORMAT, "format_version": FORMAT_VERSION, **asdict(self)}
-        return json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+        return json.dumps(with_checksum(asdict(self)), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+    def agrees(self) -> bool:
+        """Whether the generations grow, and have the digests of their sweep as far as this version can tell."""
+        counts = [generation.samples for generation in self.generations]
+        if any(len(samples) != len(self.blocks) for samples in counts):
+            return False
+        if any(
+            more < fewer for one, other in itertools.pairwise(counts) for fewer, more in zip(one, other, strict=True)
+        ):
+            return False
+        if self.numerics_version != NUMERICS_VERSION:
+            return True
+        walks = [walks_per_sample(block["sampler"], len(block["distributions"]) - 1) for block in self.sweep["blocks"]]
+        return all(
+            generation.digest == digest_of(self.sweep, [n // each for n, each in zip(samples, walks, strict=True)])
+            for generation, samples in zip(self.generations, counts, strict=True)
+        )
 
 
 def read_manifest(directory: Folder) -> Manifest:
@@ -256,33 +269,46 @@ def read_manifest(directory: Folder) -> Manifest:
     Raises:
         OSError: the folder cannot be read.
         InputError: there is no sweep in it, or one of another version of warpchain.
+        DamagedFileError: its sweep.json is damaged.
     """
     path = Path(directory) / "sweep.json"
     try:
-        content = json.loads(path.read_bytes())
-        if content["format"] != FORMAT:
-            raise KeyError("format")
-        if refusal := version_refusal(content["format_version"], FORMAT_VERSION, "run it again in another folder"):
-            raise InputError(f"{path}: {refusal}")
-        del content["format"], content["format_version"]
-        for block in content["blocks"]:
-            block["axes"] = {name: tuple(values) for name, values in block["axes"].items()}
-            block["drawn"] = tuple(block["drawn"])
-        content["blocks"] = tuple(BlockLayout(**block) for block in content["blocks"])
-        content["earlier"] = tuple(
-            Generation(**{**generation, "samples": tuple(generation["samples"])})
-            for generation in content.get("earlier", ())
-        )
-        return Manifest(**content)
-    except InputError:
-        raise
+        content = read_content(path)
     except (FileNotFoundError, NotADirectoryError):
         problem = "no sweep in this folder; give the folder of one, which every worker can reach by this path"
         raise InputError(f"{directory}: {problem}") from None
-    except OSError as error:
-        raise unreadable(path, error) from error
-    except (ValueError, KeyError, TypeError, AttributeError):
-        raise InputError(f"{path}: damaged, or not of warpchain; give the folder of a sweep") from None
+    sweep = content["sweep"]
+    manifest = Manifest(
+        name=sweep["name"],
+        seed=sweep["seed"],
+        digest=content["digest"],
+        numerics_version=content["numerics_version"],
+        shard_size=content["shard_size"],
+        walk_count=sum(map(walks_of, sweep["blocks"])),
+        blocks=_layouts(sweep),
+        sweep=sweep,
+        versions=content["versions"],
+        earlier=tuple(Generation(**{**each, "samples": tuple(each["samples"])}) for each in content["earlier"]),
+    )
+    try:
+        agrees = with_checksum(json.loads(json.dumps(asdict(manifest)))) == with_checksum(content) and manifest.agrees()
+    except KeyError:  # a preset that is none
+        agrees = False
+    if not agrees:
+        raise damaged(path, "it contradicts itself")
+    return manifest
+
+
+def _layouts(sweep: Mapping[str, Any]) -> tuple[BlockLayout, ...]:
+    """The blocks of a sweep, given its canonical form."""
+    found: list[BlockLayout] = []
+    first = 0
+    for block in sweep["blocks"]:
+        axes = {name: tuple(values) for name, values in block["grid"].items()}
+        drawn = tuple(name for name in block["distributions"] if name != "all")
+        found.append(BlockLayout(block["name"], axes, samples_of(block), first, drawn))
+        first += walks_of(block)
+    return tuple(found)
 
 
 def check_not_own(directory: Folder, path: Path) -> None:

@@ -8,6 +8,8 @@ Motions are one behind the other, as the CF conventions have contiguous ragged a
 samples `series_start` to `series_start + series_count` along `instant` are in `series_time`, `series_center_y` …;
 likewise its frames along `frame`. The n joints of its frame k are from `joint_start + k n` on along `joint`.
 
+Checksums stand at its end, see `warpchain.hdf5_files`; `check_merged` compares them.
+
 Samples of several sweeps stand one behind the other along `sample`; `seed` has the seed of each, and `index` the number
 of a walk in its own sweep.
 """
@@ -23,11 +25,12 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.files import replacing
+from warpchain.files import Kind, checked_output, given_path, replacing
+from warpchain.hdf5_files import check_hdf5, open_new_hdf5, put_text, reading_hdf5
 from warpchain.inputs.validation import InputError
 from warpchain.store.manifest import Folder, check_not_own, read_manifest
 from warpchain.store.motion_arrays import ARRAYS, count, flat_arrays
-from warpchain.store.shards import open_new_hdf5, present_shards, read_motions, writing
+from warpchain.store.shards import present_shards, read_motions, writing
 from warpchain.store.sweep_result import FORMAT, BlockResult, SweepResult, load
 from warpchain.sweeps.plan import load_sweep
 from warpchain.walks.motion import Motion
@@ -35,10 +38,18 @@ from warpchain.walks.motion import Motion
 if TYPE_CHECKING:
     import h5py
 
-_AXES: Final = {"series": "instant", "frame": "frame", "joint": "joint"}
+_AXES: Final = {
+    "series": "instant",
+    "plane": "plane_instant",
+    "frame": "frame",
+    "frame_plane": "frame_plane",
+    "joint": "joint",
+}
 """What is counted of a walk, see `ARRAYS` → name of the axis that it is along."""
-_ROOM: Final = 2**20
-"""Most bytes that a merged file takes beyond its shards, for the tables of axes."""
+_ROOM: Final = 2**19
+"""Most bytes that a block takes in a merged file beyond its rows and motions: 156 kB were seen."""
+_REMEDY: Final = "merge the folders again, or fetch another copy of the file"
+_WANTED: Final = "give a folder of a sweep, or a file that warpchain merge wrote"
 _NO_VARIABLE: Final = "This is a netCDF dimension but not a netCDF variable."
 
 
@@ -51,23 +62,44 @@ def merge(directories: Folder | Sequence[Folder], path: str | os.PathLike[str]) 
         path: the file.
 
     Raises:
-        OSError: a folder cannot be read, or the file cannot be written.
+        OSError: a folder cannot be read, or the file cannot be written, or is there already and no merged file.
         InputError: there is no sweep in a folder, a shard is damaged or foreign, sweeps do not fit together, or the
-            file is one of a sweep's own or there already and no merged file.
+            file is one of a sweep's own.
     """
     folders = [directories] if isinstance(directories, str | os.PathLike) else list(directories)
-    target = Path(path)
+    target = given_path(path)
     for folder in folders:
         check_not_own(folder, target)
-    if os.path.lexists(target) and not _is_merged(target):
-        raise InputError(f"{target}: is there and is no merged sweep; give another name")
+    with writing(target):
+        checked_output(target, _MERGED)
     _check_fit(folders)
     results = [load(folder) for folder in folders]
-    most = _ROOM * len(folders)
+    most = 0
     for folder in folders:
-        most += sum(path.stat().st_size for path in present_shards(folder, read_manifest(folder)).values())
-    with writing(target), replacing(target) as part, open_new_hdf5(part, most) as file:
+        manifest = read_manifest(folder)
+        most += _ROOM * len(manifest.blocks) + 2 * (Path(folder) / "sweep.json").stat().st_size  # texts and axes
+        most += sum(path.stat().st_size for path in present_shards(folder, manifest).values())
+    with writing(target), replacing(target, _MERGED) as part, open_new_hdf5(part, most) as file:
         _fill(file, results)
+
+
+def check_merged(path: str | os.PathLike[str]) -> dict[str, str | int]:
+    """Check every byte of a merged file.
+
+    Returns:
+        What it says of itself: title, seed, number of walks, and of walks by status.
+
+    Raises:
+        OSError: it cannot be read.
+        InputError: it is no merged file.
+        DamagedFileError: it is damaged or cut short, or of a version without checksums.
+    """
+    check_hdf5(path, _REMEDY, _WANTED)
+    with reading_hdf5(path, _REMEDY) as contents:
+        if contents.text("format") == FORMAT:
+            counts = {name: contents.whole(name) for name in contents.attributes() if name.startswith("walks")}
+            return {"title": contents.text("title"), "seed": contents.text("seed"), **counts}
+    raise InputError(f"{path}: HDF5, but no merged sweep; {_WANTED}")
 
 
 def _check_fit(folders: Sequence[Folder]) -> None:
@@ -99,17 +131,22 @@ def _check_fit(folders: Sequence[Folder]) -> None:
 
 
 def _is_merged(path: Path) -> bool:
-    """Whether `merge` has written this file."""
-    import h5py
+    """Whether `merge` has written this file, and nothing has damaged its head since; pipes and devices are none.
 
-    if not path.is_file():  # opening a pipe would wait for ever
+    Raises:
+        OSError: it cannot be read.
+    """
+    if path.is_symlink() or not path.is_file():
         return False
     try:
-        with h5py.File(path, "r") as file:
-            found = file.attrs.get("format")
-            return isinstance(found, str) and found == FORMAT
-    except OSError:
+        with reading_hdf5(path, _REMEDY) as contents:
+            return contents.text("format") == FORMAT
+    except InputError:
         return False
+
+
+_MERGED: Final = Kind("merged sweep", _is_merged)
+"""All that a merged file replaces."""
 
 
 def _fill(file: "h5py.File", results: Sequence[SweepResult]) -> None:
@@ -122,6 +159,8 @@ def _fill(file: "h5py.File", results: Sequence[SweepResult]) -> None:
         notes = [result.notes() for result in results]
         file.attrs["sweep"] = json.dumps([result.sweep for result in results], ensure_ascii=False)
         file.attrs.update({name: ", ".join(str(note[name]) for note in notes) for name in ("seed", "digest")})
+    for name in ("format", "title", "seed"):
+        put_text(file, name, file.attrs[name])
     for name, block in blocks.items():
         group = file if len(blocks) == 1 else file.create_group(name, track_order=True)
         group.attrs["block"] = name
@@ -200,7 +239,7 @@ def _write_motions(block: BlockResult, parts: Sequence[BlockResult], group: "h5p
 
 def _name(kind: str, name: str) -> str:
     """Name that a flat array has in the file."""
-    return f"series_{name}" if kind == "series" else name
+    return f"series_{name}" if kind in ("series", "plane") else name
 
 
 def _motions(block: BlockResult, parts: Sequence[BlockResult]) -> Iterator[tuple[int, Motion]]:

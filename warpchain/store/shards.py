@@ -1,9 +1,9 @@
 """Shards: immutable HDF5 files that hold the rows and motions of ended walks.
 
 A shard file has the attributes `format`, `key`, `digest` and `numerics_version`; the dataset `rows`, one row for each
-walk with the columns of `warpchain.walks.rows` and the rows' SHA-256 in its attribute `sha256`; and, if motions of its
-walks are kept, the group `motion`, see `warpchain.store.motion_arrays`. Walks have their places in the folder as
-numbers, see `warpchain.store.manifest`; their numbers in the sweep are found when the shard is read.
+walk with the columns of `warpchain.walks.rows`; and, if motions of its walks are kept, the group `motion`, see
+`warpchain.store.motion_arrays`. Checksums stand at its end, see `warpchain.hdf5_files`. Walks have their places in the
+folder as numbers, see `warpchain.store.manifest`; their numbers in the sweep are found when the shard is read.
 
 A shard appears whole or not at all: it is written to a temporary file, flushed to the disk, and then renamed.
 Its content depends only on the digest of the sweep and on the numerics, not on when and where it was computed. So a
@@ -12,32 +12,31 @@ sweep leaves the same bytes however often it was killed.
 
 import errno
 import hashlib
-import io
-import json
+import math
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpchain.files import replacing
+from warpchain.files import NotReplaceable, failure, remedy, replacing
+from warpchain.hdf5_files import ContentError, Contents, hdf5_image, put_text, reading_hdf5
 from warpchain.inputs.validation import InputError
 from warpchain.status import Status
 from warpchain.store.manifest import (
-    FORMAT,
-    FORMAT_VERSION,
     NUMERICS_VERSION,
     Folder,
     Manifest,
     read_manifest,
     unreadable,
 )
-from warpchain.store.motion_arrays import read_motion, write_motions
+from warpchain.store.manifest_content import FORMAT, FORMAT_VERSION
+from warpchain.store.motion_arrays import GROUP, read_motion, write_motions
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks.motion import Motion
-from warpchain.walks.rows import Rows, missing_rows, row_type
+from warpchain.walks.rows import MISSING, Rows, drawn_column, missing_rows, row_type
 
 if TYPE_CHECKING:
     import h5py
@@ -89,8 +88,8 @@ def write_shard(
         raise ValueError(f"{name} are no shard of this sweep")
     if rows.dtype != manifest.row_type or not np.array_equal(rows["index"], places):
         raise ValueError(f"the rows are not those of {name}, all in order")
-    if not np.isin(rows["status"], [status for status in Status if status != Status.RUNNING]).all():
-        raise ValueError(f"one of {name} has no status that ends a walk")
+    if problem := _problem(rows, manifest):
+        raise ValueError(f"one of {name} {problem}")
     motions = motions or {}
     if sorted(motions) != manifest.kept(places):
         raise ValueError(f"the motions are not those that are kept of {name}")
@@ -101,12 +100,11 @@ def write_shard(
     key = _key(manifest, places)
 
     def fill(file: "h5py.File") -> None:
-        file.attrs["format"] = FORMAT
-        file.attrs["key"] = key
-        file.attrs["digest"] = manifest.digests_of(places.start)[-1]
+        put_text(file, "format", FORMAT)
+        put_text(file, "key", key)
+        put_text(file, "digest", manifest.digests_of(places.start)[-1])
         file.attrs["numerics_version"] = NUMERICS_VERSION
-        dataset = file.create_dataset("rows", data=rows)
-        dataset.attrs["sha256"] = _checksum(rows)
+        file.create_dataset("rows", data=rows)
         if motions:
             write_motions(motions, file)
 
@@ -126,11 +124,29 @@ def read_shard(directory: Folder, manifest: Manifest, places: range) -> Rows:
         OSError: the file cannot be read.
         InputError: the file is damaged or belongs to another sweep.
     """
-    with _opened(directory, manifest, places) as file:
-        rows = np.asarray(file["rows"][()])
-        if _checksum(rows) != file["rows"].attrs["sha256"]:
-            raise ValueError("rows")
+    with _opened(directory, manifest, places) as contents:
+        rows = contents.array("rows", manifest.row_type, (len(places),))
+        if not np.array_equal(rows["index"], places):
+            raise ContentError(f"its rows are not those of the walks at places {places.start} to {places.stop - 1}")
+        if problem := _problem(rows, manifest):
+            raise ContentError(f"a walk {problem}")
     return rows
+
+
+def _problem(rows: Rows, manifest: Manifest) -> str | None:
+    """What no ended walk has but one of these rows, with their places as index; None if all is well."""
+    if not np.isin(rows["status"], [status for status in Status if status != Status.RUNNING]).all():
+        return "has no status that ends a walk"
+    if not np.array_equal(np.isfinite(rows["dx"]), rows["status"] == Status.AT_REST):
+        return "has a distance without being at rest, or none at rest"
+    if any((rows[column] < MISSING).any() for column in rows.dtype.names or () if rows[column].dtype.kind == "i"):
+        return "has a negative count"
+    walks = manifest.walks(range(int(rows["index"][0]), int(rows["index"][-1]) + 1))
+    for block in manifest.blocks:
+        here = (block.first <= walks) & (walks < block.first + math.prod(block.shape))
+        if not all(np.isfinite(rows[drawn_column(name)][here]).all() for name in block.drawn):
+            return "lacks a quantity that was drawn for it"
+    return None
 
 
 def read_motions(directory: Folder, manifest: Manifest, walks: Sequence[int]) -> dict[int, Motion]:
@@ -145,37 +161,21 @@ def read_motions(directory: Folder, manifest: Manifest, walks: Sequence[int]) ->
         OSError: the file cannot be read.
         InputError: the file is damaged or belongs to another sweep.
     """
-    with _opened(directory, manifest, manifest.shard_with(walks[0])) as file:
-        return {walk: read_motion(file, manifest.place(walk)) for walk in walks}
+    with _opened(directory, manifest, manifest.shard_with(walks[0])) as contents:
+        motions = contents.part(GROUP)
+        return {walk: read_motion(motions, manifest.place(walk)) for walk in walks}
 
 
 @contextmanager
-def _opened(directory: Folder, manifest: Manifest, places: range) -> "Iterator[h5py.File]":
+def _opened(directory: Folder, manifest: Manifest, places: range) -> Iterator[Contents]:
     """The file of a shard; an error while it is read means that it is damaged."""
-    import h5py
-
-    path = Path(directory) / "shards" / shard_name(places)
-    try:
-        content = path.open("rb")
-    except OSError as error:
-        raise unreadable(path, error) from error
-    is_foreign = False
-    with content:
-        try:
-            with h5py.File(content, "r") as file:
-                is_foreign = str(file.attrs["key"]) != _key(manifest, places)
-                if not is_foreign:
-                    yield file
-        except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError):
-            problem = "damaged or cut short; delete it and run the sweep again, which computes only its walks"
-            raise InputError(f"{path}: {problem}") from None
+    path, is_foreign = Path(directory) / "shards" / shard_name(places), False
+    with reading_hdf5(path, "delete it and run the sweep again, which computes only its walks") as contents:
+        is_foreign = contents.text("key") != _key(manifest, places)
+        if not is_foreign:
+            yield contents
     if is_foreign:
         raise InputError(f"{path}: a shard of another sweep; move it out of this folder")
-
-
-def _checksum(rows: Rows) -> str:
-    """Hexadecimal SHA-256 of rows and their type."""
-    return hashlib.sha256(json.dumps(rows.dtype.descr).encode() + rows.tobytes()).hexdigest()
 
 
 def present_shards(directory: Folder, manifest: Manifest) -> dict[range, Path]:
@@ -199,71 +199,18 @@ def present_shards(directory: Folder, manifest: Manifest) -> dict[range, Path]:
     return {places: folder / name for name, places in named.items() if name in names}
 
 
-def hdf5_image(fill: "Callable[[h5py.File], None]") -> bytes:
-    """The bytes of an HDF5 file that `fill` fills; equal content gives equal bytes.
-
-    The file is made in memory, because HDF5 fails badly on a full disk: it neither says what is wrong nor closes the
-    file.
-    """
-    import h5py
-
-    image = io.BytesIO()
-    with h5py.File(image, "w", **_FIXED) as file:
-        fill(file)
-    return image.getvalue()
-
-
-@contextmanager
-def open_new_hdf5(path: Path, most: int) -> "Iterator[h5py.File]":
-    """A new HDF5 file that may be too large for `hdf5_image`, with the same bytes.
-
-    Its space on the disk is reserved first, because HDF5 fails badly on a full disk. What is left over is given back.
-
-    Args:
-        path: the file, which may be there.
-        most: bytes that it takes at most.
-
-    Raises:
-        OSError: there is not enough room, or the file cannot be written.
-    """
-    import h5py
-
-    with path.open("w+b") as content, h5py.File(content, "w", **_FIXED) as file:
-        _take_room(content.fileno(), most)
-        yield file
-
-
-def _take_room(descriptor: int, size: int) -> None:
-    """Reserve space for a file, whose content stays; an `OSError` if the disk has too little."""
-    if hasattr(os, "posix_fallocate"):
-        os.posix_fallocate(descriptor, 0, size)
-        return
-    zeros, end = bytes(2**20), os.fstat(descriptor).st_size  # macOS
-    while end < size:
-        end += os.pwrite(descriptor, zeros[: size - end], end)
-
-
-_FIXED: Final[dict[str, Any]] = {"libver": ("v108", "v108"), "track_order": True}
-"""Version bounds without which equal content would not give equal bytes; they also leave out times."""
-
-_REMEDIES: Final = {
-    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "make room"),
-    **dict.fromkeys((errno.EROFS, errno.EACCES, errno.EPERM), "make the folder writable"),
-    **dict.fromkeys((errno.ENOENT, errno.ENOTDIR, errno.EEXIST), "give a folder that is there"),
-}
-
-
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
     """Turn an `OSError` of the `with` block into one of one line: the path cannot be written, why, and the remedy."""
     try:
         yield
+    except NotReplaceable:
+        raise
     except OSError as error:
-        number = error.errno or getattr(error.__cause__, "errno", None) or errno.EIO
-        remedy = _REMEDIES.get(number, "see to the disk")
-        raise OSError(
-            f"{path}: cannot be written ({os.strerror(number)}); {remedy} and start again, shards written are kept"
-        ) from error
+        number = error.errno or errno.EIO
+        problem = f"cannot be written ({os.strerror(number)})"
+        remedy_too = f"{remedy(number)} and start again, shards written are kept"
+        raise failure(number, f"{path}: {problem}; {remedy_too}") from error
 
 
 def put_file(path: Path, content: bytes) -> None:
@@ -273,7 +220,7 @@ def put_file(path: Path, content: bytes) -> None:
         OSError: the file cannot be written; one line that names it and the remedy.
     """
     with writing(path):
-        with replacing(path) as part:
+        with replacing(path, clear=False) as part:  # parts go when the folder is opened; it may have many names
             part.write_bytes(content)
         folder = os.open(path.parent, os.O_RDONLY)
         try:

@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError, plain, shown, suggestion
 from warpchain.status import Status
+from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.folder import read_rows
-from warpchain.store.manifest import FORMAT_VERSION, Folder, read_manifest
+from warpchain.store.manifest import Folder, read_manifest
+from warpchain.store.manifest_content import FORMAT_VERSION
 from warpchain.store.walk_motion import MotionReader, WalkMotion
 from warpchain.walks.rows import COLUMNS, MISSING, Column, drawn_column, field_column, missing_rows, quantity_of
 
@@ -35,34 +37,6 @@ FORMAT: Final = "warpchain sweep result"
 
 _Variables = dict[str, tuple[tuple[str, ...], Array, dict[str, Any]]]
 """Name → axes, values and attributes, as xarray takes them."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class CellStatistics:
-    """Statistics of a quantity over the walks of each cell that came to rest; arrays over the axes of the grid.
-
-    Attributes:
-        axes: name of each axis → its values.
-        unit: unit of `mean` and `sd`.
-        mean: mean; NaN without a walk at rest.
-        sd: standard deviation of a sample (divisor count − 1); NaN with fewer than two walks at rest.
-        count: number of walks at rest.
-        failed: number of walks that ended otherwise.
-        missing: number of walks not computed yet.
-    """
-
-    axes: dict[str, Array]
-    unit: str
-    mean: NDArray[np.float64]
-    sd: NDArray[np.float64]
-    count: NDArray[np.int64]
-    failed: NDArray[np.int64]
-    missing: NDArray[np.int64]
-
-    @property
-    def standard_error(self) -> NDArray[np.float64]:
-        """Standard error of the mean, sd / √count."""
-        return self.sd / np.sqrt(np.maximum(self.count, 1))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)

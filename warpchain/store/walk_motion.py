@@ -17,7 +17,9 @@ from warpchain.status import Status
 from warpchain.store.manifest import Manifest
 from warpchain.store.shards import read_motions
 from warpchain.sweeps.plan import Sweep, load_sweep
-from warpchain.walks.walk_result import STORED, Drawn
+from warpchain.walks.drawn import Drawn
+from warpchain.walks.moving_plane import in_room
+from warpchain.walks.walk_result import STORED
 
 Array = NDArray[np.float64]
 
@@ -36,6 +38,8 @@ class WalkMotion(Drawn):
         center_velocity: its velocity [m/s], shape (t, 2).
         frame_time: times of the frames [s], shape (f,).
         frame_joints: joints x, y [m], shape (f, n, 2); kept to single precision.
+        center_z, tilt, yaw: as of `WalkResult`; empty if the plane is fixed, like the next ones.
+        frame_origin, frame_axes: as of `WalkResult`.
         sprocket_center: centre of the sprocket at the release [m], shape (2,); None without one.
         sprocket_radius: radius of the sprocket that links touch [m]; NaN without one.
         before_release: its motion just before the release, kept to single precision; None if it was not kept.
@@ -50,6 +54,11 @@ class WalkMotion(Drawn):
     center_velocity: Array
     frame_time: Array
     frame_joints: Array
+    center_z: Array
+    tilt: Array
+    yaw: Array
+    frame_origin: Array
+    frame_axes: Array
     sprocket_center: Array | None
     sprocket_radius: float
     before_release: BeforeRelease | None = None
@@ -66,6 +75,13 @@ class WalkMotion(Drawn):
         """One line."""
         counts = f"{len(self.time)} instants, {len(self.frame_time)} frames"
         return f"<WalkMotion {self.index} {self.status.label}: dx {self.dx:.4g} m, {counts}>"
+
+    @property
+    def joints_in_room(self) -> Array | None:
+        """As of `WalkResult`."""
+        if self.setup.scene.plane == "fixed":
+            return None
+        return in_room(self.frame_joints, self.frame_origin, self.frame_axes)
 
     def unit(self, name: str) -> str:
         """SI unit of an array; a `KeyError` if there is none of that name."""
@@ -117,6 +133,11 @@ class MotionReader:
             center_velocity=motion.series[:, 3:5],
             frame_time=motion.frame_time,
             frame_joints=motion.frame_joints.astype(np.float64),
+            center_z=motion.plane_series[:, 0],
+            tilt=motion.plane_series[:, 1],
+            yaw=motion.plane_series[:, 2],
+            frame_origin=motion.frame_planes[:, :3],
+            frame_axes=motion.frame_planes[:, 3:].reshape(-1, 2, 3),
             sprocket_center=np.array([0.0, motion.sprocket_height]) if has_sprocket else None,
             sprocket_radius=contact_radius(setup.scene, setup.parameters) if has_sprocket else math.nan,
             before_release=None if motion.before_release is None else motion.before_release.as_type(np.float64),

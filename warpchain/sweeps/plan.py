@@ -237,16 +237,26 @@ class Sweep:
         Args:
             samples: samples of each block, in place of the sweep's own.
         """
-        content = self.canonical()
-        del content["name"]
-        for number, (block, given) in enumerate(zip(self.blocks, content["blocks"], strict=True)):
-            del given["name"]
-            if samples is not None:
-                given["samples"] = samples[number]
-            for name in block.axes.get("preset", ()):
-                given.setdefault("presets", {})[name] = PRESETS[str(name)].model_dump()
-        text = json.dumps(content, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
-        return hashlib.sha256(text.encode()).hexdigest()
+        return digest_of(self.canonical(), samples)
+
+
+def digest_of(canonical: Mapping[str, Any], samples: Sequence[int] | None = None) -> str:
+    """`Sweep.digest`, given the canonical form of the sweep.
+
+    Raises:
+        KeyError: a preset on an axis is none.
+    """
+    content = {name: value for name, value in canonical.items() if name != "name"}
+    content["blocks"] = []
+    for number, block in enumerate(canonical["blocks"]):
+        given = {name: value for name, value in block.items() if name != "name"}
+        if samples is not None:
+            given["samples"] = samples[number]
+        for name in block["grid"].get("preset", ()):
+            given.setdefault("presets", {})[name] = PRESETS[str(name)].model_dump()
+        content["blocks"].append(given)
+    text = json.dumps(content, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def load_sweep(source: "str | os.PathLike[str] | Mapping[str, object] | Sweep") -> Sweep:

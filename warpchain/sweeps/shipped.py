@@ -1,10 +1,12 @@
 """The sweeps that come with the package, found by their bare names, and the file that a new sweep starts from."""
 
+import errno
 import os
 import re
 from pathlib import Path
 from typing import Final
 
+from warpchain.files import failure, write_whole
 from warpchain.inputs.validation import InputError, suggestion
 
 _PACKAGE: Final = Path(__file__).parents[1]
@@ -37,13 +39,13 @@ def write_new_sweep(path: Path) -> None:
     """Write a small sweep file whose comments explain its keys.
 
     Raises:
-        InputError: there is such a file already, or it cannot be written.
+        InputError: there is such a file already.
+        OSError: it cannot be written.
     """
     text = _TEMPLATE.read_text(encoding="utf-8")
+    if os.path.lexists(path):
+        raise InputError(f"--new: {path} exists; give another name")
     try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError:
-        raise InputError(f"--new: {path} exists; give another name") from None
+        write_whole(path, text)
     except OSError as error:
-        raise InputError(f"--new: {path}: {error.strerror}; give a file that can be written") from None
+        raise failure(error.errno or errno.EIO, f"--new: {error}") from error

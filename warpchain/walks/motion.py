@@ -21,6 +21,19 @@ SERIES: Final = {
 """Columns of a series: name → unit and meaning; what the paper's Figure 5 is drawn from."""
 
 
+PLANE_SERIES: Final = {
+    "center_z": ("m", "z of the centre of mass, to the right"),
+    "tilt": ("rad", "tilt of the plane, positive to the left"),
+    "yaw": ("rad", "heading of the plane, anticlockwise from above, all turns counted"),
+}
+"""Further columns of the series of a walk whose plane tilts."""
+FRAME_PLANE: Final = {
+    **{f"origin_{axis}": ("m", f"{axis} of the origin of the plane's coordinates") for axis in "xyz"},
+    **{f"{of}_axis_{axis}": ("1", f"{axis} of the plane's axis of {of}") for of in "xy" for axis in "xyz"},
+}
+"""What a frame of a walk whose plane tilts has besides its joints: where the plane is in the room."""
+
+
 @dataclass(frozen=True)
 class Keep:
     """What is kept of the motion of one walk.
@@ -46,21 +59,27 @@ class Motion:
 
     Attributes:
         series: t samples with the columns of `SERIES`, shape (t, 5).
+        plane_series: the columns of `PLANE_SERIES` for each sample, shape (t, 3); (0, 3) if the plane is fixed.
         frame_time: times of the frames [s], shape (f,).
         frame_joints: joints x, y [m], shape (f, n, 2).
+        frame_planes: origin [m] and axes of the plane in each frame, the columns of `FRAME_PLANE`, shape (f, 9); (0, 9)
+            if the plane is fixed.
         sprocket_height: height [m] of the sprocket's centre at the release; NaN without a sprocket or a release.
         before_release: the motion just before the release, in single precision but for times; None if not kept.
     """
 
     series: Array
+    plane_series: Array
     frame_time: Array
     frame_joints: NDArray[np.float32]
+    frame_planes: Array
     sprocket_height: float
     before_release: BeforeRelease | None
 
     def checksum(self) -> bytes:
         """SHA-256 of all numbers."""
         parts = [self.series, self.frame_time, self.frame_joints, np.float64(self.sprocket_height)]
+        parts += [self.plane_series, self.frame_planes]
         if self.before_release is not None:
             parts += [getattr(self.before_release, name) for name in FIELDS]
         return hashlib.sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in parts)).digest()

@@ -10,6 +10,7 @@ from warpchain.engine.batch import Batch
 from warpchain.kernels import layout
 from warpchain.loop.before_release import BeforeRelease
 from warpchain.walks.motion import Keep, Motion
+from warpchain.walks.moving_plane import angles, frame_axes
 
 Array = NDArray[np.float64]
 
@@ -45,19 +46,23 @@ class Recorder:
         before: What is kept of the time before the release; None: nothing.
     """
 
-    def __init__(self, batch: Batch, world: int, keep: Keep) -> None:
+    def __init__(self, batch: Batch, world: int, keep: Keep, tilts: bool = False) -> None:
         """Begin with nothing.
 
         Args:
             batch: Where the walk runs; whether it takes samples and frames, and how often, was decided with it.
             world: Index.
             keep: Which of the samples are kept, and whether frames are.
+            tilts: Whether the plane of the chain moves; the batch then keeps it.
         """
         self.before: BeforeRelease | None = None
         self._batch, self._world, self._keep = batch, world, keep
         self._has_samples, self._has_frames = batch.record.samples.size > 0, batch.record.frames.size > 0
         self._place = -1.0
-        self._last: Array = np.empty((0, layout.SAMPLE_COLUMNS))
+        self._width = batch.record.samples.shape[2]
+        self._last: Array = np.empty((0, self._width))
+        self._tilts = tilts
+        self._planes: list[Array] = []
         self._samples: list[Array] = []
         self._frame_times: list[Array] = []
         self._frames: list[Array] = []
@@ -74,15 +79,17 @@ class Recorder:
                 self._samples.append(self._thinned(samples, self._keep.series_every))
                 self._last = samples[-1:]
         if self._has_frames:
+            planes = self._batch.frame_planes(self._world)
             times, frames = self._batch.drain_frames(self._world)
             if released and self._keep.frame_every is not None:
                 self._frame_times.append(times)
                 self._frames.append(frames)
+                self._planes.append(planes)
 
     def _drain_drive(self) -> None:
         """Take what the last launch wrote, and forget what is too old already."""
         world = self._world
-        samples = self._batch.drain_samples(world) if self._has_samples else np.empty((0, layout.SAMPLE_COLUMNS))
+        samples = self._batch.drain_samples(world) if self._has_samples else np.empty((0, self._width))
         loads = self._batch.frame_loads(world)
         times, frames = self._batch.drain_frames(world)
         self._drive.append(_Piece(samples, times, frames, loads))
@@ -131,14 +138,26 @@ class Recorder:
 
     def samples(self) -> Array:
         """Samples (t, SAMPLE_COLUMNS) that are kept, and the last one in any case."""
-        kept = np.concatenate([np.empty((0, layout.SAMPLE_COLUMNS)), *self._samples])
+        kept = np.concatenate([np.empty((0, self._width)), *self._samples])
         is_there = len(kept) == 0 or kept[-1, layout.TIME] == self._last[0, layout.TIME]
         return kept if is_there else np.concatenate([kept, self._last])
 
     def series(self) -> dict[str, Any]:
         """Time series by the names of the fields of `WalkResult`."""
         samples = self.samples()
-        return {name: samples[:, columns] for name, columns in RESULT_COLUMNS.items()}
+        return {name: samples[:, columns] for name, columns in RESULT_COLUMNS.items()} | self._plane_series(samples)
+
+    def _plane_series(self, samples: Array) -> dict[str, Array]:
+        """Place across the way and angles of the plane, (t,) each; (0,) if the plane is fixed."""
+        if not self._tilts:
+            samples = np.empty((0, layout.ALL_COLUMNS))
+        tilt, yaw = angles(samples[:, layout.PLANE_COLUMN :])
+        return {"center_z": samples[:, layout.CENTER_Z], "tilt": tilt, "yaw": np.unwrap(yaw)}
+
+    def frame_planes(self) -> dict[str, Any]:
+        """Origin (f, 3) [m] and axes (f, 2, 3) of the plane in the room in each frame; f = 0 if the plane is fixed."""
+        planes = np.concatenate([np.empty((0, layout.PLANE_VALUES)), *(self._planes if self._tilts else [])])
+        return {"frame_origin": planes[:, layout.ORIGIN : layout.ORIGIN + 3], "frame_axes": frame_axes(planes)}
 
     def frames(self) -> tuple[Array, Array]:
         """Times of the frames (f,) [s], joint positions (f, n, 2) [m]."""
@@ -150,13 +169,24 @@ class Recorder:
     def motion(self, sprocket_height: float) -> Motion:
         """What a sweep keeps of the walk."""
         times, frames = self.frames()
-        series, joints = self.samples()[:, MOTION_COLUMNS], frames.astype(np.float32)
-        for array in (series, joints):  # which NaN a failed walk has may depend on the batch
+        samples = self.samples()
+        series, joints = samples[:, MOTION_COLUMNS], frames.astype(np.float32)
+        planes = self.frame_planes()
+        plane_series = np.stack(list(self._plane_series(samples).values()), axis=-1)
+        frame_planes = np.concatenate([planes["frame_origin"], planes["frame_axes"].reshape(-1, 6)], axis=1)
+        for array in (
+            series,
+            joints,
+            plane_series,
+            frame_planes,
+        ):  # which NaN a failed walk has may depend on the batch
             array[np.isnan(array)] = np.nan
         return Motion(
             series=series,
             frame_time=times,
             frame_joints=joints,
+            plane_series=plane_series,
+            frame_planes=frame_planes,
             sprocket_height=sprocket_height,
             before_release=None if self.before is None else self.before.as_type(np.float32),
         )

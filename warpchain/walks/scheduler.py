@@ -74,12 +74,18 @@ def run_setups(
         places.sort(key=lambda place: -setups[place].scene.links)
         links = [setups[place].scene.links for place in places]
         wanted = [] if keeps is None else [keeps[place] for place in places]
-        batches = _batches(options, links, wanted, slots, threads)
+        tilts = any(setups[place].scene.plane == "tilting" for place in places)
+        batches = _batches(options, links, wanted, slots, threads, tilts)
         yield from _run_batches(batches, iter(places), begin, stop, watch)
 
 
 def _batches(
-    options: Options, links: Sequence[int], keeps: Sequence[Keep], slots: int | None, threads: int | None
+    options: Options,
+    links: Sequence[int],
+    keeps: Sequence[Keep],
+    slots: int | None,
+    threads: int | None,
+    tilts: bool,
 ) -> list[Batch]:
     """Batches for walks: on a CPU one, on a GPU several, with as many worlds in all as are of use and fit."""
     longest, on_gpu = max(links), options.device.startswith("cuda")
@@ -89,11 +95,13 @@ def _batches(
     frame_every = next((keep.frame_every for keep in keeps if keep.frame_every), None)
     if slots is None and on_gpu:
         frames = frame_every is not None
-        slots = most_worlds(longest, options, keeps_samples=samples, keeps_frames=frames, keeps_loads=loads)
+        slots = most_worlds(
+            longest, options, keeps_samples=samples, keeps_frames=frames, keeps_loads=loads, tilts=tilts
+        )
         slots = min(slots, len(links))
     slots = slots or 1
     worlds = -(-slots // BATCHES_PER_GPU) if on_gpu else slots
-    kept: dict[str, Any] = {"keeps_samples": samples, "frame_every": frame_every, "keeps_loads": loads}
+    kept: dict[str, Any] = {"keeps_samples": samples, "frame_every": frame_every, "keeps_loads": loads, "tilts": tilts}
     return [
         Batch(min(worlds, slots - first), longest, options, threads=threads, **kept)
         for first in range(0, slots, worlds)
@@ -112,7 +120,8 @@ def compile_kernels(setups: Iterable[Setup], threads: int | None = None) -> None
         columns = layout.padded_width(setup.scene.links)
         bodies = [("floor", "rest")] + [("sprocket", "steady")] * (setup.scene.start != "ellipse")
         for fixed_body, watch in bodies:
-            features = features_of(setup.options, columns, fixed_body=fixed_body, watch=watch)
+            tilts = fixed_body == "floor" and setup.scene.plane == "tilting"
+            features = features_of(setup.options, columns, fixed_body=fixed_body, watch=watch, tilts=tilts)
             size = (threads or block_threads(setup.scene.links)) if setup.options.device.startswith("cuda") else 1
             wanted.add((setup.options.device, features, size))
     load_kernels((start_device(device), features, size) for device, features, size in wanted)

@@ -32,6 +32,7 @@ from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
 from warpchain.walks.motion import NOTHING, Keep, Motion
+from warpchain.walks.moving_plane import angles, released_plane
 from warpchain.walks.recorder import Recorder
 
 Array = NDArray[np.float64]
@@ -42,6 +43,10 @@ SHORTEST_WINDOW, LONGEST_WINDOW = 0.05, 0.25
 """Bounds of the time [s] over which a loop under its own loads is averaged; between them half a loop period."""
 BY_ITSELF = -1.0
 """As `steady_time` means: the kernel chooses how long to watch, see :mod:`warpchain.kernels.events.release`."""
+
+
+PLANE_OUTCOME = ("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at", "collapsed_at")
+"""Numbers of a walk's outcome that only a plane that tilts has."""
 
 
 class Phase(Enum):
@@ -73,7 +78,7 @@ class WalkRun:
     def __init__(self, batch: Batch, world: int, setup: Setup, keep: Keep = NOTHING) -> None:
         """Place the chain of a walk in a world; the batch has the walk's options, and records what is to be kept."""
         self.setup = setup
-        self.recorder = Recorder(batch, world, keep)
+        self.recorder = Recorder(batch, world, keep, setup.scene.plane == "tilting")
         self.status = Status.RUNNING
         self.raised = math.nan
         self.drive_time = self.compile_time = 0.0
@@ -87,6 +92,7 @@ class WalkRun:
 
         scene, parameters = setup.scene, setup.parameters
         self._has_sprocket = scene.start != "ellipse"
+        self._tilts = scene.plane == "tilting"
         from_rest = scene.start == "rest"
         speed = 2 * math.pi * scene.frequency * joint_radius(scene, parameters)
         if not self._has_sprocket:
@@ -154,7 +160,7 @@ class WalkRun:
     def features(self) -> Features:
         """What the kernel that carries the world on must be compiled for."""
         if self._released:
-            return self._batch.features(fixed_body="floor", watch="rest")
+            return self._batch.features(fixed_body="floor", watch="rest", tilts=self._tilts)
         return self._batch.features(fixed_body="sprocket", watch="steady")
 
     @property
@@ -218,6 +224,24 @@ class WalkRun:
         ledger["residual"] = at_release - at_end - sum(lost.values())
         return ledger if self._released else dict.fromkeys(ledger, math.nan)
 
+    def _fall(self, is_at_rest: bool) -> dict[str, Any]:
+        """What became of the plane; NaN and −1 if it is fixed or was never released."""
+        if not (self._tilts and self._released):
+            return {**dict.fromkeys(PLANE_OUTCOME, math.nan), "fell_over": -1, "fell_before_collapse": -1}
+        last = self._batch.last_sample(self._world)
+        tilt, yaw = angles(last[layout.PLANE_COLUMN :])
+        collapsed_at, fell_at, greatest = self._batch.fall(self._world)
+        return {
+            "lateral_drift": float(last[layout.CENTER_Z]) if is_at_rest else math.nan,
+            "final_tilt": float(tilt),
+            "final_yaw": float(yaw),
+            "greatest_tilt": greatest,
+            "fell_at": fell_at,
+            "collapsed_at": collapsed_at,
+            "fell_over": int(not math.isnan(fell_at)),
+            "fell_before_collapse": int(fell_at < (math.inf if math.isnan(collapsed_at) else collapsed_at)),
+        }
+
     def outcome(self) -> dict[str, Any]:
         """Results of the walk apart from its motion, by the names of the fields of `WalkResult`."""
         setup, counts, extremes = self.setup, self.counts, self.extremes
@@ -238,6 +262,7 @@ class WalkRun:
             "greatest_opening": extremes["opening"],
             "greatest_penetration": {kind: extremes[kind] for kind in CONTACTS},
             "energy": self.energy(),
+            **self._fall(is_at_rest),
             "sprocket_center": np.array([0.0, self.raised]) if self._has_sprocket else None,
             "sprocket_radius": contact_radius(setup.scene, setup.parameters) if self._has_sprocket else math.nan,
         }
@@ -292,6 +317,8 @@ class WalkRun:
             attempts_before=self.drive_counts["accepted"] + self.drive_counts["rejected"],
             softness=self._hold_softness,
         )
+        if self._tilts:
+            self._batch.set_plane(self._world, released_plane(self.setup, position))
         self._released = True
 
 

@@ -2,11 +2,13 @@
 
 A saved walk has the groups `series` (time series), `frames` (joint positions), `summary` (numbers), `parameters` (the
 chain's quantities with their symbols) and, if that was kept, `before_release`; every dataset has its unit and meaning.
-The attributes `setup`, `seed` and `versions`, in JSON, say how to make the walk again.
+The attributes `setup`, `seed` and `versions`, in JSON, say how to make the walk again. Checksums stand at its end, see
+`warpchain.hdf5_files`.
 """
 
 import dataclasses
 import json
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,24 +21,25 @@ from pydantic import ValidationError
 from pydantic_core import to_jsonable_python
 
 from warpchain.engine.tallies import COUNTS, DEPTHS, EXTREMES, IMPULSES, LOST
-from warpchain.files import reason, replacing, version_refusal
+from warpchain.files import version_refusal, write_whole
+from warpchain.hdf5_files import ContentError, Contents, hdf5_image, put_text, reading_hdf5
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.setup import Setup
-from warpchain.loop.before_release import BeforeRelease, read_before_release, write_before_release
-from warpchain.pictures.walk_shape import Kind, Walk
+from warpchain.inputs.validation import InputError
+from warpchain.loop.before_release import BeforeRelease, is_ascending, read_before_release, write_before_release
 from warpchain.status import Status
+from warpchain.walks.drawn import Drawn
+from warpchain.walks.moving_plane import in_room
 
 if TYPE_CHECKING:
     import h5py
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
 FORMAT: Final = "warpchain walk"
-FORMAT_VERSION: Final = 4
+FORMAT_VERSION: Final = 5
 
 BEFORE: Final = "before_release"
 
@@ -68,72 +71,6 @@ class Stored:
     keys: Mapping[str, str] = field(default_factory=dict)
 
 
-class Drawn:
-    """A walk that can draw itself, also in a notebook."""
-
-    def plot(
-        self: Walk, kind: Kind = "figure5", *, figure: "Figure | None" = None, ax: "Axes | None" = None
-    ) -> "Figure":
-        """Draw the walk.
-
-        Args:
-            kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself, `loop` for
-                its loop on the sprocket just before the release, `energy` for its energies, `tilt` for tilt, yaw and
-                lateral drift of a plane that tilts.
-            figure: an empty matplotlib figure to draw into; by default a new one, which a notebook shows.
-            ax: where to draw `energy`, the only figure with one pair of axes.
-
-        Returns:
-            The figure, that of `ax` if it is given.
-
-        Raises:
-            ValueError: the kind is unknown, the walk does not have what it shows (frames, `before_release`, energies),
-                or `ax` does not suit the kind.
-        """
-        from warpchain.pictures.walk_figures import draw
-
-        return draw(self, kind, figure=figure, ax=ax)
-
-    def animate(self: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
-        """Write a moving picture of the walk; the suffix of `path` gives the format: .gif, .mp4 or .html.
-
-        Args:
-            path: the file to write, whole or not at all; an older one is replaced.
-            fps: pictures per second of playing time; in a .html file the browser decides.
-            slow: playing time per simulated time; in a .html file the value at the start.
-
-        Raises:
-            ValueError: the walk has no frames, the suffix is another, `fps` or `slow` is not positive, or a GIF would
-                have too many pictures.
-            ImportError: an .mp4 is asked for, and imageio-ffmpeg is not installed.
-            OSError: the file cannot be written.
-        """
-        from warpchain.pictures.animation import animate
-
-        animate(self, path, fps=fps, slow=slow)
-
-    def facts(self: Walk) -> list[tuple[str, str]]:
-        """Names and values that a notebook shows beside the picture."""
-        scene = self.setup.scene
-        return [
-            ("status", self.status.label if self.status.ok else f"{self.status.label}: {self.status.sentence}"),
-            ("distance Δx", f"{self.dx:.4g} m"),
-            ("chain", f"{scene.links} links at {scene.frequency:g} Hz, preset {self.setup.preset}"),
-        ]
-
-    def _repr_png_(self: Any) -> bytes | None:
-        """The film strip, or Figure 5 if there are no frames; None if there is nothing to draw."""
-        from warpchain.pictures.inline import first_png
-
-        return first_png(partial(self.plot, kind) for kind in ("film_strip", "figure5"))
-
-    def _repr_html_(self: Any) -> str:
-        """The most important numbers, and the picture."""
-        from warpchain.pictures.inline import page
-
-        return page(type(self).__name__, self.facts(), self._repr_png_())
-
-
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class WalkResult(Drawn):
     """One walk, from the release to its end: t instants and f frames of a chain of n links.
@@ -144,7 +81,8 @@ class WalkResult(Drawn):
     was not kept.
 
     Raises:
-        ValueError: an array has another shape, or a dictionary other keys, than stands beside its field.
+        ValueError: an array has another shape, or a dictionary other keys, than stands beside its field; or times do
+            not ascend.
     """
 
     status: Status
@@ -162,6 +100,36 @@ class WalkResult(Drawn):
             "greatest change of the held loop's mean height, width or place, relative to height or width, while it was "
             "last watched; NaN if it never was",
         ),
+    ]
+    lateral_drift: Annotated[
+        float, Stored("summary", "m", "z of the centre of mass at rest, to the right; NaN unless the plane tilts")
+    ]
+    final_tilt: Annotated[
+        float, Stored("summary", "rad", "tilt of the plane at the end, positive to the left; NaN if the plane is fixed")
+    ]
+    final_yaw: Annotated[
+        float, Stored("summary", "rad", "heading of the plane at the end, anticlockwise; NaN if the plane is fixed")
+    ]
+    greatest_tilt: Annotated[
+        float, Stored("summary", "rad", "greatest size of the tilt in the walk; NaN if the plane is fixed")
+    ]
+    fell_at: Annotated[
+        float, Stored("summary", "s", "from the release until the plane was first tilted by 45°; NaN if it never was")
+    ]
+    collapsed_at: Annotated[
+        float,
+        Stored(
+            "summary",
+            "s",
+            "from the release until the loop enclosed less than half of its area; NaN if it never did, or if the plane "
+            "is fixed",
+        ),
+    ]
+    fell_over: Annotated[
+        int, Stored("summary", "1", "1 if the plane was ever tilted by 45°, 0 if not; −1 if the plane is fixed")
+    ]
+    fell_before_collapse: Annotated[
+        int, Stored("summary", "1", "1 if it fell over before its loop collapsed, 0 if not; −1 if the plane is fixed")
     ]
     softened_at: Annotated[
         float, Stored("summary", "s", "from the release to the softening of the joints; NaN if they were not")
@@ -193,7 +161,32 @@ class WalkResult(Drawn):
     frame_joints: Annotated[
         Array, Stored("frames", "m", "joints x, y, shape (f, n, 2); joint i ends link i, even links inner")
     ]
+    center_z: Annotated[
+        Array, Stored("series", "m", "centre of mass z, to the right, shape (t,); (0,) if the plane is fixed")
+    ]
+    tilt: Annotated[Array, Stored("series", "rad", "tilt of the plane, shape (t,); (0,) if the plane is fixed")]
+    yaw: Annotated[
+        Array,
+        Stored("series", "rad", "heading of the plane, all turns counted, shape (t,); (0,) if the plane is fixed"),
+    ]
+    frame_origin: Annotated[
+        Array,
+        Stored(
+            "frames", "m", "origin of the plane's coordinates in the room, shape (f, 3); (0, 3) if the plane is fixed"
+        ),
+    ]
+    frame_axes: Annotated[
+        Array,
+        Stored("frames", "1", "axes of x and y of the plane in the room, shape (f, 2, 3); (0, 2, 3) if it is fixed"),
+    ]
     before_release: BeforeRelease | None = None
+
+    @property
+    def joints_in_room(self) -> Array | None:
+        """Joints x, y, z [m] in the room, (f, n, 3), if the plane tilts; else None: `frame_joints` are in the room."""
+        if self.setup.scene.plane == "fixed":
+            return None
+        return in_room(self.frame_joints, self.frame_origin, self.frame_axes)
 
     def __post_init__(self) -> None:
         """Check that arrays and dictionaries fit together."""
@@ -202,6 +195,10 @@ class WalkResult(Drawn):
             name: (instants,) for name, stored in STORED.items() if stored.group == "series"
         }
         shapes["center"] = shapes["center_velocity"] = (instants, 2)
+        moving = self.setup.scene.plane == "tilting"
+        shapes["center_z"] = shapes["tilt"] = shapes["yaw"] = (instants if moving else 0,)
+        shapes["frame_origin"] = (frames if moving else 0, 3)
+        shapes["frame_axes"] = (frames if moving else 0, 2, 3)
         shapes["frame_time"] = (frames,)
         shapes["frame_joints"] = (frames, self.setup.scene.links, 2)
         links, before = self.setup.scene.links, self.before_release
@@ -216,6 +213,9 @@ class WalkResult(Drawn):
         for name, stored in STORED.items():
             if stored.keys and set(getattr(self, name)) != set(stored.keys):
                 raise ValueError(f"{name}: wrong keys; give exactly {', '.join(stored.keys)}")
+        for name in ("time", "frame_time"):
+            if not is_ascending(getattr(self, name)):
+                raise ValueError(f"{name}: does not ascend; give finite times in order")
 
     def __repr__(self) -> str:
         """One line with the most important numbers."""
@@ -257,41 +257,9 @@ class WalkResult(Drawn):
         """Write the walk to an HDF5 file, whole or not at all; an older file of that name is replaced.
 
         Raises:
-            OSError: the file cannot be written; one line that names it.
+            OSError: the file cannot be written, or something else than a regular file is there; one line that names it.
         """
-        import h5py
-
-        with replacing(path) as part, h5py.File(part, "w") as file:
-            _write(self, file)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Trajectory:
-    """Motion of a chain of n links at t chosen instants, as `warpchain.simulate` returns it.
-
-    Attributes:
-        status: how the simulation ended.
-        time: instants [s], shape (t,).
-        position: x, y [m] and θ [rad] of each link's centre of mass, shape (t, n, 3).
-        velocity: their rates [m/s, m/s, rad/s], shape (t, n, 3).
-        steps_accepted: number of accepted steps.
-        steps_rejected: number of rejected steps.
-        impulses: number of impulses by kind of contact.
-        losses: energy lost by cause [J], positive.
-        greatest_opening: greatest distance between two joined link ends [m].
-        greatest_penetration: greatest overlap by kind of contact [m].
-    """
-
-    status: Status
-    time: Array
-    position: Array
-    velocity: Array
-    steps_accepted: int
-    steps_rejected: int
-    impulses: dict[str, int]
-    losses: dict[str, float]
-    greatest_opening: float
-    greatest_penetration: dict[str, float]
+        write_whole(path, hdf5_image(partial(_write, self)))
 
 
 STORED: Final[dict[str, Stored]] = {
@@ -301,6 +269,23 @@ STORED: Final[dict[str, Stored]] = {
     if isinstance(note, Stored)
 }
 """Fields of `WalkResult` that a file keeps as datasets: name → where, in which unit, what."""
+_DIMENSIONS: Final = {
+    **{name: 1 for name, stored in STORED.items() if stored.group in ("series", "frames")},
+    **dict.fromkeys(("center", "center_velocity"), 2),
+    "frame_joints": 3,
+    "frame_origin": 2,
+    "frame_axes": 3,
+    "sprocket_center": 1,
+}
+"""Fields that are arrays: name → number of axes."""
+_KINDS: Final = {
+    item.name: np.dtype(
+        np.int64 if item.type is not None and get_args(item.type)[0] in (int, dict[str, int]) else float
+    )
+    for item in dataclasses.fields(WalkResult)
+    if item.name in STORED
+}
+"""Types of their numbers."""
 _PATHS: Final = {name: f"{stored.group}/{name.removeprefix('frame_')}" for name, stored in STORED.items()}
 
 
@@ -308,32 +293,23 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
     """Read a walk that `WalkResult.save` wrote; every number comes back to the bit.
 
     Raises:
-        OSError: the file cannot be opened.
-        ValueError: the file is no walk, is damaged, or belongs to another version of warpchain.
+        OSError: the file cannot be read.
+        InputError: the file is no walk, or belongs to another version of warpchain. It is a `ValueError`.
+        DamagedFileError: the file is damaged or cut short. It is an `InputError`.
     """
-    import h5py
-
-    try:
-        with open(path, "rb") as content:
-            content.read(1)
-    except OSError as error:
-        raise OSError(f"{path}: {reason(error)}; give the path of a readable walk file") from None
-    if not h5py.is_hdf5(path):
-        raise ValueError(f"{path}: not an HDF5 file; give a file written by WalkResult.save")
-    try:
-        with h5py.File(path, "r") as file:
-            if file.attrs.get("format") != FORMAT:
-                refusal = "HDF5, but not a walk; give a file written by WalkResult.save"
-            elif (found := version_refusal(file.attrs["format_version"], FORMAT_VERSION, "run the walk again")) is None:
-                return _read(file)
-            else:
-                refusal = found
-    except ValidationError as error:
-        first = ".".join(str(part) for part in error.errors()[0]["loc"])
-        refusal = f"this warpchain refuses its setup ({first}); read it with the version that wrote it"
-    except (OSError, RuntimeError, KeyError, TypeError, ValueError):
-        refusal = "damaged or cut short; fetch another copy of the file or run the walk again"
-    raise ValueError(f"{path}: {refusal}")
+    refusal, wanted = None, "give a file written by WalkResult.save"
+    with reading_hdf5(path, "fetch another copy of the file or run the walk again", wanted) as contents:
+        if contents.text("format") != FORMAT:
+            refusal = f"HDF5, but not a walk; {wanted}"
+        else:
+            refusal = version_refusal(contents.whole("format_version"), FORMAT_VERSION, "run the walk again")
+        if refusal is None:
+            try:
+                return _read(contents)
+            except ValidationError as error:
+                first = ".".join(str(part) for part in error.errors()[0]["loc"])
+                refusal = f"this warpchain refuses its setup ({first}); read it with the version that wrote it"
+    raise InputError(f"{path}: {refusal}")
 
 
 def _setup_as_dict(setup: Setup) -> dict[str, Any]:
@@ -348,13 +324,17 @@ def _plain(value: Any) -> Any:
 
 def _write(walk: WalkResult, file: "h5py.File") -> None:
     """Fill an empty file."""
-    file.attrs["format"] = FORMAT
     file.attrs["format_version"] = FORMAT_VERSION
-    file.attrs["status"] = walk.status.label
-    file.attrs["status_sentence"] = walk.status.sentence
-    file.attrs["setup"] = json.dumps(_setup_as_dict(walk.setup), allow_nan=False)
-    file.attrs["seed"] = json.dumps(_plain(walk.seed))
-    file.attrs["versions"] = json.dumps(walk.versions)
+    texts = {
+        "format": FORMAT,
+        "status": walk.status.label,
+        "status_sentence": walk.status.sentence,
+        "setup": json.dumps(_setup_as_dict(walk.setup), allow_nan=False),
+        "seed": json.dumps(_plain(walk.seed)),
+        "versions": json.dumps(walk.versions),
+    }
+    for name, text in texts.items():
+        put_text(file, name, text)
     for name, stored in STORED.items():
         value = getattr(walk, name)
         if stored.keys:
@@ -367,40 +347,48 @@ def _write(walk: WalkResult, file: "h5py.File") -> None:
         dataset = _put(file, f"parameters/{name}", value, quantity.unit, quantity.meaning)
         dataset.attrs["symbol"] = quantity.symbol
     if walk.before_release is not None:
-        write_before_release(walk.before_release, file.create_group(BEFORE))
+        write_before_release(walk.before_release, file.create_group(BEFORE, track_order=True))
 
 
 def _put(file: "h5py.File", path: str, value: float | Array, unit: str, meaning: str) -> "h5py.Dataset":
-    """Write one dataset; arrays are compressed without loss, and so carry the checksums of gzip."""
-    filters = {"compression": "gzip", "shuffle": True} if np.size(value) > 1 else {}
-    dataset = file.create_dataset(path, data=value, **filters)
+    """Write one dataset."""
+    dataset = file.create_dataset(path, data=value)
     dataset.attrs["unit"] = unit
     dataset.attrs["description"] = meaning
     return dataset
 
 
-def _read(file: "h5py.File") -> WalkResult:
+def _read(contents: Contents) -> WalkResult:
     """The walk in a file of our format."""
-    setup = json.loads(file.attrs["setup"])
+    setup, status = contents.json("setup"), Status[contents.text("status").upper()]
     values: dict[str, Any] = {
-        "status": Status[file.attrs["status"].upper()],
+        "status": status,
         "setup": Setup(
             preset=setup["preset"],
             parameters=Parameters.model_validate(setup["parameters"]),
             scene=Scene.model_validate(setup["scene"]),
             options=Options.model_validate(setup["options"]),
         ),
-        "seed": json.loads(file.attrs["seed"]),
-        "versions": json.loads(file.attrs["versions"]),
+        "seed": contents.json("seed"),
+        "versions": contents.json("versions"),
     }
     for name, path in _PATHS.items():
+        group, _, item = path.partition("/")
+        part = contents.part(group)
         if keys := STORED[name].keys:
-            values[name] = {key: file[f"{path}/{key}"][()].item() for key in keys}
-        elif name == "sprocket_center" and path not in file:
+            values[name] = {key: part.array(f"{item}/{key}", _KINDS[name], ()).item() for key in keys}
+        elif name == "sprocket_center" and not part.has(item):
             values[name] = None
         else:
-            number = file[path][()]
-            values[name] = number if number.shape else number.item()
-    if BEFORE in file:
-        values["before_release"] = read_before_release(file[BEFORE])
+            shape = (None,) * _DIMENSIONS.get(name, 0)
+            number = part.array(item, _KINDS[name], shape)
+            values[name] = number if shape else number.item()
+    if contents.has(BEFORE):
+        values["before_release"] = read_before_release(contents.part(BEFORE), np.float64)
+    preset, seed, versions = setup["preset"], values["seed"], values["versions"]
+    texts = (preset, *versions, *versions.values())
+    if not all(isinstance(text, str) for text in texts) or not (seed is None or type(seed) is int):
+        raise ContentError("preset, seed or versions of another type")
+    if status is Status.RUNNING or math.isfinite(values["dx"]) != (status is Status.AT_REST):
+        raise ContentError(f"a walk with status {status.label} and distance {values['dx']}")
     return WalkResult(**values)

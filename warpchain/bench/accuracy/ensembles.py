@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from warpchain.bench.accuracy.method_settings import LOOSE, TIGHT, MethodSetting
 from warpchain.bench.accuracy.two_samples import bootstrap_interval, kolmogorov_smirnov
 from warpchain.bench.record import Column
-from warpchain.files import replacing
+from warpchain.files import make_folder, write_whole
 from warpchain.inputs.methods import METHODS_BY_NEED
 from warpchain.kernels.methods.method import method_names
 from warpchain.run.progress_bar import SweepProgress
@@ -106,7 +106,7 @@ def run_ensemble(
     """
     planned = load_sweep(ensemble.content(method_setting))
     place = _place(folder, ensemble, method_setting)
-    place.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(place.parent)
     who = f"{ensemble.title}, {method_setting.title}"
     report(f"{who}: compiling")
     compile_kernels([planned.planned(0).setup])
@@ -120,8 +120,7 @@ def run_ensemble(
             "core_seconds": earlier.get("core_seconds", 0.0) + time.process_time() - began,
             "wall_seconds": earlier.get("wall_seconds", 0.0) + progress.seconds,
         }
-        with replacing(cost_file) as part:
-            part.write_text(json.dumps(cost), encoding="utf-8")
+        write_whole(cost_file, json.dumps(cost))
         report(f"{who}: {progress.done} of {progress.walks} walks, {progress.rate:.2f} a second")
 
     sweep(planned, place, on_progress=after_shard)

@@ -7,17 +7,20 @@ from pathlib import Path
 from typing import Any, Final
 
 from warpchain.bench.accuracy.figures import figures
-from warpchain.files import replacing
+from warpchain.files import write_whole
 from warpchain.pictures.style import Picture
-from warpchain.reports.html_page import page, picture, table
+from warpchain.reports.html_page import page, pages_of, picture, table
 
 PAGE: Final = "accuracy.html"
+_WRITER: Final = "warpchain bench accuracy"
+PAGES: Final = pages_of(_WRITER)
+"""All that the page replaces."""
 
 Row = dict[str, Any]
 
 
 def write_pictures_and_page(folder: Path, document: dict[str, Any]) -> list[Path]:
-    """Write every figure and the page; older files of these names are replaced.
+    """Write every figure and the page; an older page and older figures are replaced.
 
     Returns:
         Paths of the files, the page last.
@@ -27,8 +30,7 @@ def write_pictures_and_page(folder: Path, document: dict[str, Any]) -> list[Path
     """
     pictures = list(figures(document))
     paths = [drawn.save(folder) for drawn in pictures]
-    with replacing(folder / PAGE) as part:
-        part.write_text(_page(document, pictures), encoding="utf-8")
+    write_whole(folder / PAGE, _page(document, pictures), PAGES)
     return [*paths, folder / PAGE]
 
 
@@ -51,7 +53,7 @@ def _page(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
         "Hard cases": _hard_cases(document["hard_cases"], pictures) if document["hard_cases"] else "",
         "Machines": _machines(document["machines"]),
     }
-    return page("Speed against error", tiles, {title: text for title, text in sections.items() if text})
+    return page(_WRITER, "Speed against error", tiles, {title: text for title, text in sections.items() if text})
 
 
 def _work_precision(document: dict[str, Any], pictures: Sequence[Picture]) -> str:

@@ -22,7 +22,7 @@ from warpchain.bench.problems.scipy_solvers import PATIENCE, scipy_points
 from warpchain.bench.problems.work_precision import PROBLEMS, TOLERANCES, make_problem, make_reference, points
 from warpchain.bench.record import machine, plain
 from warpchain.engine.devices import start_device
-from warpchain.files import replacing
+from warpchain.files import checked_output, make_folder, write_whole
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.scene import Scene, check_scene
@@ -163,7 +163,8 @@ def run_accuracy(folder: Path, plan: Plan, report: Report) -> Document:
         InputError: The folder holds another kind of file under the name of the document.
         OSError: The folder cannot be read or written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
+    checked_output(folder / FILE)  # reading a pipe would wait for ever
     here = machine()
     if find_spec("scipy") is not None:
         here["scipy"] = version("scipy")
@@ -227,8 +228,7 @@ def _record(folder: Path, on: dict[str, str], tables: Mapping[str, Sequence[Row]
         document[table] = list(known.values())
     has_scipy = any("SciPy" in row["method"] for row in document["points"])
     document["notes"]["scipy"] = WITH_SCIPY if has_scipy else WITHOUT_SCIPY
-    with replacing(folder / FILE) as part:
-        part.write_text(json.dumps(plain(document), indent=1, allow_nan=False, ensure_ascii=False), encoding="utf-8")
+    write_whole(folder / FILE, json.dumps(plain(document), indent=1, allow_nan=False, ensure_ascii=False))
 
 
 def _problem_rows(plan: Plan, name: str, links: int, report: Report) -> dict[str, list[Row]]:

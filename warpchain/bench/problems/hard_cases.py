@@ -39,7 +39,8 @@ from warpchain.run.simulation import simulate
 from warpchain.run.single_walk import run_walk, setup_walk
 from warpchain.status import Status
 from warpchain.walks.scheduler import compile_kernels
-from warpchain.walks.walk_result import Trajectory, WalkResult
+from warpchain.walks.trajectory import Trajectory
+from warpchain.walks.walk_result import WalkResult
 
 Array = NDArray[np.float64]
 

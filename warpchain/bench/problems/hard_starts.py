@@ -11,7 +11,8 @@ from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain, links_between
 from warpchain.oracle import motion_equations
 from warpchain.oracle.circular_loop import circular_loop
-from warpchain.walks.walk_result import Trajectory, WalkResult
+from warpchain.walks.trajectory import Trajectory
+from warpchain.walks.walk_result import WalkResult
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,159 @@
+"""What commands write where: paths that are refused, and disks that are full."""
+
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from tests.support import command_line
+from tests.support.command_line import Answer, Command
+from tests.support.made_sweeps import TOLERANCE, make_sweep
+from tests.support.made_walks import make_walk
+
+command = command_line.command
+
+QUICK = "--links 32 --preset soft --method dp5 --start ellipse --frequency 5".split()
+SWEEP = """\
+version: 1
+name: some
+seed: 1
+preset: soft
+samples: 2
+scene: {links: 32, start: ellipse, walk_limit: 0.001}
+options: {method: dp5}
+grid: {frequency: [5, 6]}
+"""
+
+OUTPUTS = {
+    "report swept -o {}": "page.html",
+    "merge swept {}": "merged.h5",
+    "animate walk.h5 {}": "walk.gif",
+    "animate walk.h5 --slow 4 {}": "walk.html",
+    "plot walk.h5 -o {}": "folder",
+    "plot swept -o {}": "folder",
+    "schema -o {}": "schema.json",
+    "sweep --new {}": "new.yaml",
+}
+"""Command → name of what it writes."""
+
+
+def prepare() -> None:
+    """A walk and a sweep to make something of."""
+    make_walk().save("walk.h5")
+    make_sweep(Path("swept"), TOLERANCE)
+
+
+def content() -> dict[str, bytes | None]:
+    """All that lies in the folder."""
+    return {str(path): path.read_bytes() if path.is_file() else None for path in sorted(Path().rglob("*"))}
+
+
+@contextmanager
+def small_files(size: int) -> Iterator[None]:
+    """No file of this process can grow beyond some bytes, which fails as on a full disk."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def assert_refused(answer: Answer, status: int, *words: str) -> None:
+    """One line on stderr that has the words."""
+    assert answer.status == status and answer.err.startswith("error: ") and answer.err.count("\n") == 1
+    for word in words:
+        assert word in answer.err
+
+
+@pytest.mark.parametrize("line", [*OUTPUTS, "walk -o {}", "sweep some.yaml -o {}", "bench -o {}"])
+def test_an_empty_path_is_refused(command: Command, line: str) -> None:
+    """It is not taken for the current folder; status 2, one line, nothing written."""
+    prepare()
+    before = content()
+    answer = command(*("" if word == "{}" else word for word in line.split()))
+    assert_refused(answer, 2, "a path is empty; name a file or folder")
+    assert answer.out == "" and content() == before
+
+
+@pytest.mark.parametrize("word", ["a\0b", "a\ud800b"])
+def test_what_no_path_has_is_refused(command: Command, word: str) -> None:
+    """A NUL or a lone surrogate in any word gives one line."""
+    for line in (["info", word], ["walk", "-o", word], ["sweep", word, "-o", "x"], ["walk", "--like", word]):
+        assert_refused(command(*line), 2, ascii(word))
+    assert content() == {}
+
+
+@pytest.mark.parametrize("line", [*OUTPUTS, "bench -o {}"])
+def test_a_pipe_in_the_way_is_refused(command: Command, line: str) -> None:
+    """No command waits for a pipe or replaces it; status 2, one line, nothing written."""
+    prepare()
+    name = OUTPUTS.get(line, "bench.json")
+    os.mkfifo(name)
+    before = content()
+    answer = command(*line.format(name).split())
+    assert_refused(answer, 2, name)
+    assert answer.out == "" and content() == before and Path(name).is_fifo()
+
+
+@pytest.mark.parametrize("line", OUTPUTS)
+def test_a_full_disk_gives_one_line(command: Command, line: str) -> None:
+    """Status 1, what is wrong and what to do in one line, and no part of a file."""
+    prepare()
+    before = content()
+    with small_files(1000):
+        answer = command(*line.format(OUTPUTS[line]).split())
+    assert_refused(answer, 1, OUTPUTS[line], "cannot be written (File too large); make room")
+    assert answer.out == "" and content() | {"folder": None} == before | {"folder": None}
+
+
+def test_a_full_disk_does_not_end_a_walk_badly(tmp_path: Path) -> None:
+    """The results are printed, status 1 and one line say what is wrong; no part of a file."""
+    program = (
+        "import os, resource, sys\n"
+        "from warpchain.cli import main, terminal\n"
+        "write = terminal.write_files\n"
+        "def on_a_full_disk(*arguments):\n"
+        "    resource.setrlimit(resource.RLIMIT_FSIZE, (64_000, 64_000))\n"
+        "    return write(*arguments)\n"
+        "terminal.write_files = on_a_full_disk\n"
+        "main.main(sys.argv[1:])\n"
+    )
+    arguments = [sys.executable, "-c", program, "walk", *QUICK, "-o", "new"]
+    done = subprocess.run(arguments, cwd=tmp_path, capture_output=True, encoding="utf-8")
+    answer = Answer(done.returncode, done.stdout, done.stderr)
+    assert_refused(answer, 1, "new/walk.h5: cannot be written (File too large); make room")
+    assert "at_rest" in answer.out and list((tmp_path / "new").iterdir()) == []
+
+
+def test_a_sweep_goes_on_after_a_full_disk(command: Command) -> None:
+    """A shard that has no room: status 1, one line, no part; then the same bytes as without."""
+    Path("some.yaml").write_text(SWEEP, encoding="utf-8")
+    expected = command("sweep", "some.yaml", "-o", "whole")
+    assert expected.status == 1, "the time limit of the walks"
+    command("sweep", "some.yaml", "-o", "results")
+    whole = {path.name: path.read_bytes() for path in Path("whole/shards").iterdir()}
+    for path in Path("results/shards").iterdir():
+        path.unlink()
+    with small_files(min(map(len, whole.values())) - 1):
+        answer = command("sweep", "some.yaml", "-o", "results")
+    assert_refused(answer, 1, "results/shards/", "cannot be written (File too large); make room and start again")
+    assert list(Path("results/shards").iterdir()) == []
+    assert command("sweep", "some.yaml", "-o", "results").out == expected.out
+    assert {path.name: path.read_bytes() for path in Path("results/shards").iterdir()} == whole
+
+
+def test_a_film_that_ffmpeg_cannot_end_is_not_kept(command: Command) -> None:
+    """An MP4 whose writer died on a full disk: status 1, one line, no part."""
+    pytest.importorskip("imageio_ffmpeg")
+    prepare()
+    before = content()
+    with small_files(20_000):
+        answer = command("animate", "walk.h5", "walk.mp4")
+    assert_refused(answer, 1, "walk.mp4: cannot be written (ffmpeg")
+    assert content() == before

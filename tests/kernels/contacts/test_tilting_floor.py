@@ -1,0 +1,153 @@
+"""Rollers of a tilting chain at the floor: against the reference in NumPy, and the law's properties."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from tests.support.kernels_under_test import FLOOR, ContactPass, Placed
+from tests.support.tilted_chains import mirrored, tilted_heap
+from tests.support.tilting_under_test import floor_pass
+from warpchain.inputs.parameters import preset
+from warpchain.oracle import motion_equations, tilting_contacts, tilting_plane
+from warpchain.oracle.tilting_plane import Plane, axes
+
+PAPER = preset("paper")
+HEAPS = range(300)
+"""Seeds; every third heap is almost or exactly upright, every third almost or exactly flat, and a third have h = 0."""
+
+
+@pytest.fixture(scope="module")
+def passes():
+    """Heaps (position, velocity, plane, parameters), and what a pass of the kernel leaves of each."""
+    found = []
+    for seed in HEAPS:
+        position, velocity, plane, parameters, half_width = tilted_heap(seed, PAPER)
+        heap = position, velocity, plane, parameters.with_values({"half_width": half_width})
+        found.append((heap, floor_pass(*heap)))
+    return found
+
+
+def momentum_gained(heap, outcome):
+    """Change of the momentum in the room, (3,)."""
+    position, velocity, plane, parameters = heap
+    before = tilting_plane.room_momentum(position, velocity, plane, parameters)
+    return tilting_plane.room_momentum(position, outcome.velocity, moved(plane, outcome), parameters) - before
+
+
+def moved(plane, outcome):
+    """The plane with the speeds after a pass."""
+    return Plane(outcome.rates[0], outcome.rates[1:], plane.x, plane.y, plane.origin)
+
+
+def test_pass_equals_reference(passes):
+    """Velocities, the plane's rates, losses, number of impulses and gap are the reference's to rounding."""
+    impulses = []
+    for heap, outcome in passes:
+        *state, parameters = heap
+        expected = tilting_contacts.resolve_tilting_floor(*heap, half_width=parameters.half_width)
+        scale = np.abs(expected.velocity).max(axis=0)
+        assert_allclose(outcome.velocity / scale, expected.velocity / scale, rtol=0, atol=1e-13)
+        assert_allclose(outcome.rates, expected.plane.rates, rtol=1e-13, atol=1e-13)
+        loss = sum(impulse.loss for impulse in expected.impulses) + expected.merging_loss
+        assert outcome.loss == pytest.approx(loss, abs=1e-14)
+        assert outcome.impulses == len(expected.impulses)
+        gap = tilting_plane.floor_gap(state[0], state[2], parameters, half_width=parameters.half_width)
+        assert outcome.gap == pytest.approx(gap, abs=1e-15)
+        impulses.append(outcome.impulses)
+    assert sum(impulses) > 1000
+    assert max(impulses) >= 20
+    assert 0 in impulses
+
+
+def touching_points(position, velocity, plane, parameters):
+    """Link and place (X, Y, ζ) [m] of each roller that touches."""
+    ends = np.stack(motion_equations.link_ends(position, parameters), axis=1)
+    sizes = (parameters.circle_radius, parameters.half_width)
+    points = [
+        (link, tilting_contacts.touching_point(end, position[link], velocity[link], plane, plane.rates, *sizes))
+        for link in range(len(position))
+        for end in ends[link]
+    ]
+    return [(link, point) for link, point in points if point is not None]
+
+
+def test_lone_contact_turns_the_approach_back(passes):
+    """If one roller touches, v_n becomes −e v_n at its point, and angular momentum changes by r × J."""
+    lone = 0
+    for heap, outcome in passes:
+        position, velocity, plane, parameters = heap
+        points = touching_points(*heap)
+        if outcome.impulses != 1 or len(points) != 1:
+            continue
+        lone += 1
+        ((link, point),) = points
+        before, after = (
+            plane.y @ tilting_contacts.point_velocity(point, position[link], speeds[link], rates)
+            for speeds, rates in ((velocity, plane.rates), (outcome.velocity, outcome.rates))
+        )
+        assert before < 0
+        assert after == pytest.approx(-parameters.floor_restitution * before, abs=1e-11 * (1 + abs(before)))
+        turning = [
+            tilting_plane.room_angular_momentum(position, *state, parameters, half_width=parameters.half_width)
+            for state in ((velocity, plane), (outcome.velocity, moved(plane, outcome)))
+        ]
+        at = plane.origin + axes(plane) @ point
+        expected = np.cross(at, momentum_gained(heap, outcome))
+        assert_allclose(turning[1] - turning[0], expected, rtol=0, atol=1e-12 * np.abs(turning[0]).max())
+    assert lone >= 15, lone
+
+
+def test_floor_pushes_up_and_within_the_cone_of_friction(passes):
+    """The momentum that the floor gives a heap points up, and leans by μ at most, as each of its impulses does."""
+    slides = 0
+    for heap, outcome in passes:
+        if outcome.impulses == 0:
+            continue
+        gained, friction = momentum_gained(heap, outcome), heap[-1].floor_friction
+        along = np.hypot(gained[0], gained[2])
+        assert gained[1] > 0
+        assert along <= friction * gained[1] + 1e-13
+        slides += bool(along > 0.99 * friction * gained[1] > 0)
+    assert slides > 10
+
+
+def test_energy_falls_by_what_is_booked(passes):
+    """The energy never rises, and falls by the loss of all collisions and of the meeting of the plane's copies."""
+    for heap, outcome in passes:
+        position, velocity, plane, parameters = heap
+        before, after = (
+            tilting_plane.tilting_kinetic_energy(position, *state, parameters, half_width=parameters.half_width)
+            for state in ((velocity, plane), (outcome.velocity, moved(plane, outcome)))
+        )
+        assert after <= before * (1 + 1e-13)
+        assert before - after == pytest.approx(outcome.loss, abs=1e-12 * before)
+
+
+def test_mirror_image_meets_the_floor_as_the_mirror_image(passes):
+    """The mirrored plane gets the opposite changes, and links and losses are the same, all to the bit."""
+    for (position, velocity, plane, parameters), outcome in passes:
+        image = floor_pass(position, velocity, mirrored(plane), parameters)
+        assert_array_equal(image.velocity, outcome.velocity)
+        assert_array_equal(image.rates, -outcome.rates)
+        assert (image.loss, image.impulses, image.gap) == (outcome.loss, outcome.impulses, outcome.gap)
+
+
+@pytest.mark.parametrize("half_width", [0.0, 4e-3])
+def test_upright_plane_meets_the_floor_as_the_planar_chain(half_width):
+    """In an upright plane at rest the pass is that of the planar kernel, and the plane stays at rest exactly."""
+    touched = 0
+    for seed in range(100):
+        position, velocity, plane, parameters, _ = tilted_heap(seed, PAPER, upright=True)
+        parameters = parameters.with_values({"half_width": half_width})
+        outcome = floor_pass(position, velocity, plane, parameters)
+        lifted = position + np.array([0.0, plane.origin[1], 0.0])
+        planar = ContactPass([Placed(lifted, velocity, parameters)])
+        (expected,) = planar.run(FLOOR)
+        scale = np.abs(velocity).max(axis=0)
+        assert_allclose(outcome.velocity / scale, planar.velocity(0) / scale, rtol=0, atol=1e-13)
+        assert outcome.impulses == expected["floor"]
+        assert outcome.loss == pytest.approx(planar.fixed_loss(0), abs=1e-13)
+        assert outcome.gap == pytest.approx(expected["floor_gap"], abs=1e-15)
+        assert_array_equal(outcome.rates, 0)
+        touched += outcome.impulses
+    assert touched > 200

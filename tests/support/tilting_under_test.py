@@ -1,0 +1,168 @@
+"""Chains whose plane tilts, in the CPU kernels: runs through `Batch`, and single passes over the floor's contacts."""
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from tests.support.kernels_under_test import chain_on_cpu
+from warpchain.engine.batch import Batch
+from warpchain.engine.devices import start_device
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import Parameters
+from warpchain.kernels import layout
+from warpchain.kernels.cpu.explicit import place_ends
+from warpchain.kernels.cpu.loop import load_state
+from warpchain.kernels.cpu.tilting import clear_padding, resolve_tilting_floor, tilting_gap, write_plane_sums
+from warpchain.kernels.features import COMPILER_FLAGS
+from warpchain.kernels.physics.plane import on_plane
+from warpchain.kernels.types import Model, State, read_chain
+from warpchain.oracle.tilting_plane import Plane
+from warpchain.status import Status
+
+Array = NDArray[np.float64]
+Start = tuple[Array, Array, Plane]
+"""Position (n, 3), velocity (n, 3) and plane."""
+
+DEVICE = start_device("cpu")
+
+
+def row_of(plane: Plane) -> Array:
+    """A plane as `Batch.set_plane` takes it, (12,)."""
+    return np.array([plane.speed, *plane.turn, *plane.x, *plane.y, *plane.origin])
+
+
+def plane_of(row: Array) -> Plane:
+    """A plane from what `Batch.plane` gives, (12,)."""
+    return Plane(float(row[0]), row[1:3].copy(), row[3:6].copy(), row[6:9].copy(), row[9:12].copy())
+
+
+def tilting_batch(
+    starts: Sequence[Start],
+    parameters: Sequence[Parameters],
+    options: Options,
+    stop_time: float,
+    *,
+    longest_step: float | None = None,
+    **kept: bool | int,
+) -> Batch:
+    """A batch of chains of equal length, about to start.
+
+    Args:
+        starts: of each chain.
+        parameters: of each chain.
+        options: for all.
+        stop_time: s.
+        longest_step: no step is longer, s; all are that long if the tolerance allows more. It needs contacts, among
+            links or with the floor, in the kernel's features. None: as the tolerance will have it.
+        kept: what `Batch` is to keep.
+    """
+    links = len(starts[0][0])
+    batch = Batch(len(starts), links, options, tilts=True, **kept)
+    if longest_step is not None:
+        batch.control.skin, batch.control.contact_step = 1e-9, longest_step
+    for world, ((position, velocity, plane), chain) in enumerate(zip(starts, parameters, strict=True)):
+        batch.set_chain(world, chain, links)
+        batch.load(world, position, velocity, stop_time=stop_time, stop_status=Status.FINISHED)
+        if longest_step is not None:
+            batch.state.step.numpy()[world] = longest_step
+        batch.set_plane(world, row_of(plane))
+    return batch
+
+
+def end_of(batch: Batch, world: int = 0) -> Start:
+    """Where a run has left a chain."""
+    return batch.position(world), batch.velocity(world), plane_of(batch.plane(world))
+
+
+def fly(
+    start: Start,
+    parameters: Parameters,
+    duration: float,
+    *,
+    method: str = "dp5",
+    tolerance: float = 1e-9,
+    longest_step: float | None = None,
+) -> Batch:
+    """A flight without a floor that must reach its end without contacts; the batch afterwards.
+
+    Args:
+        start: of the chain.
+        parameters: of the chain.
+        duration: s.
+        method: of integration.
+        tolerance: of its steps.
+        longest_step: see `tilting_batch`.
+    """
+    options = Options(method=method, tolerance=tolerance)
+    batch = tilting_batch([start], [parameters], options, duration, longest_step=longest_step)
+    batch.run([0], batch.features(fixed_body="none", watch="none", tilts=True))
+    assert batch.status(0) == Status.FINISHED
+    assert batch.counts(0)["self"] == 0
+    return batch
+
+
+@dataclass(frozen=True)
+class FloorOutcome:
+    """What a pass over the contacts of rollers with the floor leaves.
+
+    Attributes:
+        velocity: (n, 3).
+        rates: (u, ω1, ω2) of the plane.
+        loss: energy that the pass booked, J.
+        impulses: their number.
+        gap: height of the lowest rim over the floor, m.
+    """
+
+    velocity: Array
+    rates: Array
+    loss: float
+    impulses: int
+    gap: float
+
+
+@functools.cache
+def _floor_pass(columns: int) -> wp.Kernel:
+    @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS})
+    def floor_pass(
+        model: Model,
+        state: State,
+        scratch: wp.array3d(dtype=wp.float64),
+        planes: wp.array2d(dtype=wp.float64),
+        results: wp.array(dtype=wp.float64),
+    ):
+        chain = read_chain(model, 0)
+        block = scratch[0]
+        row = planes[0]
+        load_state(block, state, chain, 0)
+        place_ends(block, chain)
+        clear_padding(block, chain.link_count)
+        write_plane_sums(block, row, chain)
+        results[0] = tilting_gap(block, on_plane(chain, row, 0))
+        results[1] = wp.float64(resolve_tilting_floor(block, row, chain))
+
+    return floor_pass
+
+
+def floor_pass(position: Array, velocity: Array, plane: Plane, parameters: Parameters) -> FloorOutcome:
+    """One pass over all rollers at the floor, in memory poisoned with NaN; the plane's width is that of parameters."""
+    links = len(position)
+    columns = layout.padded_width(links)
+    model, state = chain_on_cpu(position, velocity, parameters)
+    scratch = wp.full((1, layout.scratch_rows(0), columns), np.nan, dtype=wp.float64, device=DEVICE)
+    values = np.full((1, layout.PLANE_ROWS), np.nan)
+    values[0, : layout.PLANE_VALUES] = row_of(plane)
+    planes = wp.array(values, dtype=wp.float64, device=DEVICE)
+    results = wp.full(2, np.nan, dtype=wp.float64, device=DEVICE)
+    wp.launch(_floor_pass(columns), dim=1, inputs=[model, state, scratch, planes, results], device=DEVICE)
+    rows = scratch.numpy()[0, :, :links]
+    return FloorOutcome(
+        velocity=rows[[layout.U, layout.V, layout.OMEGA]].T.copy(),
+        rates=planes.numpy()[0, :3].copy(),
+        loss=float(rows[layout.LOST_FIXED].sum()),
+        impulses=int(results.numpy()[1]),
+        gap=float(results.numpy()[0]),
+    )

@@ -1,0 +1,150 @@
+"""Files that are written whole or not at all, and what they may replace."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.support.made_walks import make_walk
+from tests.support.synthetic_sweep import SWEEP, run
+from warpchain.files import NotReplaceable, checked_output, given_path, replacing, write_whole
+from warpchain.store.merged_file import merge
+from warpchain.store.sweep_result import load
+
+
+def parts(folder: Path) -> list[str]:
+    """Names of hidden files."""
+    return sorted(path.name for path in folder.iterdir() if path.name.startswith("."))
+
+
+@pytest.mark.parametrize(
+    ("kind", "reason"),
+    [("folder", "Is a directory"), ("pipe", "it is a pipe"), ("socket", "it is a socket"), ("link", "symbolic link")],
+)
+def test_only_regular_files_are_replaced(tmp_path: Path, kind: str, reason: str) -> None:
+    """Folder, pipe, socket and link are refused in one line and stay; what a link leads to is not touched."""
+    path, other = tmp_path / "walk.h5", tmp_path / "other"
+    other.write_text("mine")
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "link":
+        path.symlink_to(other)
+    else:
+        with socket.socket(socket.AF_UNIX) as server:
+            server.bind(str(path))
+    before = path.lstat()
+    with pytest.raises(NotReplaceable, match=rf"^{path}: cannot be written \(.*{reason}\); give the path") as caught:
+        make_walk().save(path)
+    assert "\n" not in str(caught.value)
+    assert path.lstat() == before and other.read_text() == "mine" and len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize("path", ["/dev/null", "/dev/stdout"])
+def test_devices_are_refused(path: str) -> None:
+    """The decision that every writer asks for; no test tries to replace a device."""
+    with pytest.raises(NotReplaceable, match=rf"^{path}: cannot be written"):
+        checked_output(path)
+
+
+def test_what_comes_while_a_file_is_written_is_not_replaced(tmp_path: Path) -> None:
+    """What may be replaced is decided again just before it is."""
+    path = tmp_path / "file"
+    with pytest.raises(NotReplaceable, match="pipe"), replacing(path) as part:
+        part.write_text("new")
+        os.mkfifo(path)
+    assert path.is_fifo() and parts(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("path", "problem"),
+    [("", "a path is empty"), ("a\0b", r"'a\\x00b': has a NUL"), ("a\ud800b", r"'a\\ud800b': has a NUL or a lone")],
+)
+def test_no_path_at_all_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path: str, problem: str) -> None:
+    """Nothing, NUL and lone surrogates give one line, whoever is asked to write."""
+    monkeypatch.chdir(tmp_path)
+    for write in (given_path, make_walk().save, lambda name: merge(tmp_path, name), lambda name: run(name)):
+        with pytest.raises(OSError, match=f"^{problem}.*; ") as caught:
+            write(path)
+        assert str(caught.value).isascii() and str(caught.value).isprintable()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("error", [OSError(28, "full"), ValueError("bad"), KeyboardInterrupt(), SystemExit(3)])
+def test_no_part_is_left_after_any_exception(tmp_path: Path, error: BaseException) -> None:
+    """The part goes and the older file stays."""
+    path = tmp_path / "file"
+    path.write_text("old")
+    with pytest.raises(type(error)), replacing(path) as part:
+        part.write_text("half")
+        raise error
+    assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
+
+
+def killed(program: str, *arguments: object) -> None:
+    """A process that kills itself by the function `die`."""
+    head = "import os, signal, sys\ndef die(*_): os.kill(os.getpid(), signal.SIGKILL)\n"
+    done = subprocess.run([sys.executable, "-c", head + program, *map(str, arguments)], check=False)
+    assert done.returncode == -signal.SIGKILL
+
+
+def test_the_part_of_a_killed_walk_goes(tmp_path: Path) -> None:
+    """The next writer of the same file deletes what a killed one left, and nothing else."""
+    path = tmp_path / "walk.h5"
+    others = [".walk.0123.part.h5", ".other.01234567.part.h5", ".walk.01234567.part.png", ".walk.h5"]
+    for name in others:
+        (tmp_path / name).write_text("mine")
+    (tmp_path / ".walk.89abcdef.part.h5").mkdir()
+    others.append(".walk.89abcdef.part.h5")
+    make_walk().save(path)
+    killed("import warpchain\nos.fsync = die\nwarpchain.load_walk(sys.argv[1]).save(sys.argv[1])", path)
+    assert len(parts(tmp_path)) == len(others) + 1
+    make_walk().save(path)
+    assert parts(tmp_path) == sorted(others)
+
+
+def test_the_part_of_a_killed_merge_goes(tmp_path: Path) -> None:
+    """As that of a walk, with what had been written of it."""
+    run(tmp_path / "sweep")
+    path = tmp_path / "merged.h5"
+    program = "from warpchain.store import merged_file\nmerged_file._write_rows = die\nmerged_file.merge(*sys.argv[1:])"
+    killed(program, tmp_path / "sweep", path)
+    assert len(parts(tmp_path)) == 1 and not path.exists()
+    merge(tmp_path / "sweep", path)
+    assert parts(tmp_path) == [] and load(tmp_path / "sweep").walk_count == SWEEP.walk_count
+
+
+def test_the_part_of_a_living_writer_stays(tmp_path: Path) -> None:
+    """A second writer of the same file, in another process or this one, takes nothing away; the last one counts."""
+    path = tmp_path / "file"
+    with replacing(path) as part:
+        part.write_text("slow")
+        program = "import sys; from warpchain.files import write_whole; write_whole(sys.argv[1], 'quick')"
+        subprocess.run([sys.executable, "-c", program, path], check=True)
+        assert path.read_text() == "quick" and parts(tmp_path) == [part.name]
+        write_whole(path, "quicker")
+        assert path.read_text() == "quicker" and parts(tmp_path) == [part.name]
+    assert path.read_text() == "slow" and parts(tmp_path) == []
+
+
+def test_a_part_that_is_taken_for_dead_is_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A writer whose part is deleted before it is locked makes another one."""
+    path, opened, lost = tmp_path / "file", os.open, []
+
+    def open_and_lose(name: os.PathLike[str], flags: int, *mode: int) -> int:
+        descriptor = opened(name, flags, *mode)
+        if flags & os.O_EXCL and len(lost) < 3:
+            lost.append(name)
+            os.unlink(name)
+        return descriptor
+
+    monkeypatch.setattr(os, "open", open_and_lose)
+    with replacing(path) as part:
+        assert part.exists() and part not in lost
+        part.write_text("new")
+    assert path.read_text() == "new" and len(lost) == 3

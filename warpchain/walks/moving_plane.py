@@ -1,0 +1,73 @@
+"""A plane that tilts, as seen from the host: at the release, its angles, places in the room.
+
+The values of a plane are those of :mod:`warpchain.kernels.layout`: lateral speed, two rates, the components of the
+room's X and Y axes along the plane's axes e1, e2, e3, and the origin in the room. Z = X × Y points to the right of the
+way that the chain walks.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.inputs.setup import Setup
+from warpchain.kernels import layout
+
+Array = NDArray[np.float64]
+
+
+UPRIGHT: Final = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+"""A plane at rest whose axes are the room's X and Y."""
+
+
+def released_plane(setup: Setup, position: Array) -> Array:
+    """The plane of a chain at its release, (PLANE_VALUES,).
+
+    It is tilted about a line along the room's X axis. Its lowest point stays at its height, and the centre of mass
+    stays above z = 0 and moves sideways at the scene's lateral speed.
+
+    Args:
+        setup: of the walk.
+        position: x, y [m], θ [rad] of the links in the upright plane, shape (n, 3).
+    """
+    scene, parameters = setup.scene, setup.parameters
+    masses = np.resize([parameters.inner_mass, parameters.outer_mass], len(position))
+    center_x, center_y, _ = masses @ position / masses.sum()
+    ends = position[:, 1] - parameters.link_length / 2 * np.abs(np.sin(position[:, 2]))
+    lowest = float(ends.min()) - parameters.circle_radius
+    sine, cosine = math.sin(scene.tilt), math.cos(scene.tilt)
+    turn_x, turn_y = -scene.tilt_rate, scene.yaw_rate
+    plane = np.zeros(layout.PLANE_VALUES)
+    plane[layout.PLANE_SPEED] = scene.lateral_speed - turn_x * center_y + turn_y * center_x
+    plane[layout.PLANE_TURN_X], plane[layout.PLANE_TURN_Y] = turn_x, turn_y
+    plane[layout.AHEAD : layout.AHEAD + 3] = 1.0, 0.0, 0.0
+    plane[layout.UP : layout.UP + 3] = 0.0, cosine, sine
+    raised = lowest * (1 - cosine) + parameters.half_width * abs(sine)
+    plane[layout.ORIGIN : layout.ORIGIN + 3] = 0.0, raised, center_y * sine
+    return plane
+
+
+def angles(planes: Array) -> tuple[Array, Array]:
+    """Tilt and yaw [rad] of planes, shape (…, ≥ PLANE_VALUES); yaw within (−π, π], anticlockwise from above."""
+    ahead, up = (planes[..., first : first + 3] for first in (layout.AHEAD, layout.UP))
+    sideways = np.cross(ahead, up)
+    return np.arcsin(np.clip(up[..., 2], -1.0, 1.0)), np.arctan2(-sideways[..., 0], ahead[..., 0])
+
+
+def frame_axes(planes: Array) -> Array:
+    """e1 and e2 in the room, shape (f, 2, 3), of planes (f, PLANE_VALUES)."""
+    ahead, up = (planes[:, first : first + 3] for first in (layout.AHEAD, layout.UP))
+    axes = np.stack([ahead, up, np.cross(ahead, up)], axis=1)  # room axes along axis 1, components along axis 2
+    return np.ascontiguousarray(axes[:, :, :2].transpose(0, 2, 1))
+
+
+def in_room(joints: Array, origin: Array, axes: Array) -> Array:
+    """Places in the room, shape (f, n, 3), of points of planes.
+
+    Args:
+        joints: x, y [m] in the plane, shape (f, n, 2).
+        origin: of the plane [m], shape (f, 3).
+        axes: e1 and e2, shape (f, 2, 3).
+    """
+    return origin[:, None, :] + joints @ axes
