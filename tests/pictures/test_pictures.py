@@ -19,7 +19,8 @@ from PIL import Image, ImageSequence
 from tests.support.made_walks import make_unreleased, make_walk
 from warpchain.pictures import animation
 from warpchain.pictures.animation import animate
-from warpchain.pictures.walk_figures import figure5, film_strip, link_outlines
+from warpchain.pictures.room import link_outlines
+from warpchain.pictures.walk_figures import figure5, film_strip
 from warpchain.status import Status
 from warpchain.walks.walk_result import WalkResult
 

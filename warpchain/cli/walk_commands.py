@@ -27,19 +27,17 @@ def plot_walk(path: Path, output: Path | None) -> bool:
         InputError: the file is no walk, or the folder cannot be written to.
         OSError: a file cannot be read or written.
     """
-    from typing import get_args
-
     from warpchain.cli.terminal import try_folder
     from warpchain.files import make_folder
     from warpchain.inputs.validation import one_line, printable
     from warpchain.pictures.style import save_figure
-    from warpchain.pictures.walk_shape import Kind
+    from warpchain.pictures.walk_shape import kinds_of
     from warpchain.walks.walk_result import load_walk
 
     walk, folder, drawn = load_walk(path), path.parent if output is None else output, False
     try_folder(folder)
     make_folder(folder)
-    for kind in get_args(Kind):
+    for kind in kinds_of(walk):
         target = folder / f"{kind}.png"
         try:
             figure = walk.plot(kind)

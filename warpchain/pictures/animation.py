@@ -1,9 +1,7 @@
 """Moving pictures of a walk: GIF, MP4, or a page with a player for the browser."""
 
-import html
 import importlib
 import itertools
-import json
 import math
 import os
 from contextlib import closing
@@ -15,24 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.files import checked_output, replacing, write_whole
-from warpchain.pictures.style import BLUE, FAINT, GROUND, INK
-from warpchain.pictures.walk_figures import center_at, check_frames, extent, link_outlines
-from warpchain.pictures.walk_shape import Walk, setting
+from warpchain.pictures.player_page import EDGE, ENLARGEMENT, FLAT, INNER, OUTER, TALLEST, WIDTH, page, whole
+from warpchain.pictures.room import link_outlines
+from warpchain.pictures.room_player import ROOM, room_data
+from warpchain.pictures.room_stage import RoomStage
+from warpchain.pictures.strip_parts import center_at
+from warpchain.pictures.style import FAINT, GROUND, INK
+from warpchain.pictures.walk_figures import check_frames, extent
+from warpchain.pictures.walk_shape import Walk, setting, tilting
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
 Array = NDArray[np.float64]
-
-_WIDTH: Final = 960
-_TALLEST: Final = 560
-"""Greatest width and height of GIF and MP4 [pixels]."""
-_ENLARGEMENT: Final = 3
-"""Pictures are drawn this many times larger and averaged down, because Pillow does not smooth edges."""
-
-_OUTER: Final = BLUE
-_INNER: Final = "#9CCBE6"
-_EDGE: Final = "#00385A"
 
 _HOLD: Final = 1.5
 """Time for which GIF and MP4 show their last picture [s]."""
@@ -45,7 +38,8 @@ _PLAYER_FRAMES: Final = 2000
 def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
     """Write a moving picture of a walk; the suffix of `path` gives the format: .gif, .mp4 or .html.
 
-    If there are more pictures than frames, each frame is shown until the next one.
+    If there are more pictures than frames, each frame is shown until the next one. A chain whose plane tilts is seen
+    from the front right and slightly above; in a .html file it can be turned.
 
     Args:
         walk: a walk with frames.
@@ -93,7 +87,7 @@ def _write_gif(walk: Walk, path: Path, fps: float, slow: float) -> None:
     ends = np.rint(np.cumsum([0, *repeats]) * 100 / fps)
     durations = [int(hundredths) * 10 for hundredths in np.diff(ends)]
     durations[-1] = int(_HOLD * 1000)
-    stage = _Stage(walk)
+    stage = _stage(walk)
     # One palette for all, from the first, the middle and the last picture; otherwise each picture has its own.
     samples = [np.asarray(stage.picture(pictures[round(part * (len(pictures) - 1))])) for part in (0, 0.5, 1)]
     palette = Image.fromarray(np.concatenate(samples)).quantize(48, dither=Image.Dither.NONE)
@@ -108,7 +102,7 @@ def _write_mp4(walk: Walk, path: Path, fps: float, slow: float) -> None:
         ffmpeg = importlib.import_module("imageio_ffmpeg")
     except ImportError:
         raise ImportError(f"{path}: MP4 needs imageio-ffmpeg; pip install 'warpchain[video]'") from None
-    stage = _Stage(walk)
+    stage = _stage(walk)
     chosen = _chosen_frames(walk, fps, slow)
     chosen += chosen[-1:] * round(_HOLD * fps)
     # imageio-ffmpeg lets the lines of ffmpeg through to the terminal, and hides how it ends.
@@ -161,6 +155,12 @@ def _view(walk: Walk) -> _View:
     return _View(left, right, bottom, top, tuple(round(number * spacing, 6) for number in numbers))
 
 
+def _stage(walk: Walk) -> "_Stage | RoomStage":
+    """What draws the frames of a walk."""
+    in_room = tilting(walk)
+    return _Stage(walk) if in_room is None else RoomStage(in_room)
+
+
 class _Stage:
     """Draws the frames of one walk, all to the same scale.
 
@@ -174,7 +174,7 @@ class _Stage:
         view = _view(walk)
         width, height = view.right - view.left, view.top - view.bottom
         self._walk, self._view = walk, view
-        self._scale = min(_WIDTH / width, _TALLEST / height)
+        self._scale = min(WIDTH / width, TALLEST / height)
         self.size = 2 * round(self._scale * width / 2), 2 * round(self._scale * height / 2)
         self._font = ImageFont.load_default(16)
         self._backdrop = self._draw_backdrop()
@@ -182,27 +182,27 @@ class _Stage:
 
     def _pixels(self, points: Array) -> Array:
         """Pixels in the enlarged picture of points x, y [m], both of shape (…, 2)."""
-        scale = self._scale * _ENLARGEMENT
+        scale = self._scale * ENLARGEMENT
         return np.asarray((points - (self._view.left, self._view.top)) * (scale, -scale))
 
     def _draw_backdrop(self) -> "Image":
         """What never moves, enlarged."""
         from PIL import Image, ImageDraw
 
-        width, height = (_ENLARGEMENT * side for side in self.size)
+        width, height = (ENLARGEMENT * side for side in self.size)
         backdrop = Image.new("RGB", (width, height), "white")
         draw = ImageDraw.Draw(backdrop)
         if self._walk.sprocket_center is not None:
             center = tuple(self._pixels(self._walk.sprocket_center))
-            radius = self._walk.sprocket_radius * self._scale * _ENLARGEMENT
-            draw.circle(center, radius, outline=FAINT, width=_ENLARGEMENT)
-            draw.circle(center, 2 * _ENLARGEMENT, fill=FAINT)
+            radius = self._walk.sprocket_radius * self._scale * ENLARGEMENT
+            draw.circle(center, radius, outline=FAINT, width=ENLARGEMENT)
+            draw.circle(center, 2 * ENLARGEMENT, fill=FAINT)
         floor = self._pixels(np.zeros(2))[1]
         draw.rectangle((0, floor, width, height), fill=GROUND)
-        draw.line((0, floor, width, floor), fill=INK, width=_ENLARGEMENT)
+        draw.line((0, floor, width, floor), fill=INK, width=ENLARGEMENT)
         for mark in self._view.marks:
             x = self._pixels(np.array([mark, 0.0]))[0]
-            draw.line((x, floor, x, floor + 6 * _ENLARGEMENT), fill=INK, width=_ENLARGEMENT)
+            draw.line((x, floor, x, floor + 6 * ENLARGEMENT), fill=INK, width=ENLARGEMENT)
         return backdrop
 
     def picture(self, frame: int) -> "Image":
@@ -213,20 +213,20 @@ class _Stage:
         draw = ImageDraw.Draw(image)
         joints, radius = self._walk.frame_joints[frame], self._walk.setup.parameters.circle_radius
         rim = min(0.7 / self._scale, radius / 2)
-        for parity, fill in ((0, _INNER), (1, _OUTER)):
-            for size, color in ((radius, _EDGE), (radius - rim, fill)):
+        for parity, fill in ((0, INNER), (1, OUTER)):
+            for size, color in ((radius, EDGE), (radius - rim, fill)):
                 for outline in self._pixels(link_outlines(joints, size)[parity::2]):
                     draw.polygon(outline.ravel().tolist(), fill=color)
         moment = self._walk.frame_time[frame]
         path = self._center[: max(1, int(np.searchsorted(self._walk.time, moment, side="right")))]
-        draw.line(path.ravel().tolist(), fill=INK, width=_ENLARGEMENT)
+        draw.line(path.ravel().tolist(), fill=INK, width=ENLARGEMENT)
         x, y = path[-1]
-        draw.circle((x, y), 3.5 * _ENLARGEMENT, fill=INK)
-        image = image.reduce(_ENLARGEMENT)
+        draw.circle((x, y), 3.5 * ENLARGEMENT, fill=INK)
+        image = image.reduce(ENLARGEMENT)
         draw = ImageDraw.Draw(image)
         draw.text((self.size[0] - 12, 10), f"{moment:.3f} s", fill=INK, font=self._font, anchor="rt")
         for mark in self._view.marks:
-            x, y = self._pixels(np.array([mark, 0.0])) / _ENLARGEMENT
+            x, y = self._pixels(np.array([mark, 0.0])) / ENLARGEMENT
             draw.text((x, y + 9), f"{mark:g} m", fill=INK, font=self._font, anchor="mt")
         return image
 
@@ -248,178 +248,23 @@ def player(walk: Walk, slow: float = 4.0) -> str:
     check_frames(walk)
     count = min(len(walk.frame_time), _PLAYER_FRAMES)
     frames = np.rint(np.linspace(0, len(walk.frame_time) - 1, count)).astype(int)
-    times, view, sprocket = walk.frame_time[frames], _view(walk), walk.sprocket_center
     title = setting(walk) + (f": \u0394x = {walk.dx:.3f} m" if math.isfinite(walk.dx) else "")
-    data: dict[str, Any] = {
-        "time": np.rint(times * 1e6).astype(int).tolist(),
-        "joints": _tenths(walk.frame_joints[frames].reshape(count, -1)),
-        "center": _tenths(center_at(walk, times)),
+    in_room = tilting(walk)
+    data = _flat_data(walk, frames, slow) if in_room is None else {**room_data(in_room, frames), "slow": slow}
+    return page(title, data, FLAT if in_room is None else ROOM)
+
+
+def _flat_data(walk: Walk, frames: NDArray[np.int_], slow: float) -> dict[str, Any]:
+    """What the page of a chain in an upright plane draws."""
+    times, view, sprocket = walk.frame_time[frames], _view(walk), walk.sprocket_center
+    return {
+        "time": whole(times, 1e6),
+        "joints": whole(walk.frame_joints[frames].reshape(len(frames), -1)),
+        "center": whole(center_at(walk, times)),
         "radius": walk.setup.parameters.circle_radius * 1e4,
-        "sprocket": None if sprocket is None else _tenths(np.array([*sprocket, walk.sprocket_radius])),
-        "view": _tenths(np.array([view.left, view.right, view.bottom, view.top])),
+        "sprocket": None if sprocket is None else whole(np.array([*sprocket, walk.sprocket_radius])),
+        "view": whole(np.array([view.left, view.right, view.bottom, view.top])),
         "marks": list(view.marks),
         "slow": slow,
-        "colors": {"inner": _INNER, "outer": _OUTER, "edge": _EDGE},
+        "colors": {"inner": INNER, "outer": OUTER, "edge": EDGE},
     }
-    page = _PAGE.replace("{{title}}", html.escape(title))
-    return page.replace("{{data}}", json.dumps(data, separators=(",", ":"), allow_nan=False))
-
-
-def _tenths(lengths: Array) -> Any:
-    """Lengths [m] in whole tenths of a millimetre, as lists."""
-    return np.rint(lengths * 1e4).astype(int).tolist()
-
-
-_PAGE: Final = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{{title}}</title>
-<style>
-:root { color-scheme: light dark; --paper: #fff; --ink: #222; --faint: #888; --ground: #e3e3e3; }
-@media (prefers-color-scheme: dark) {
-  :root { --paper: #16181c; --ink: #e8e8e8; --faint: #8a8f98; --ground: #33373e; }
-}
-body { margin: 0 auto; max-width: 1100px; padding: 1rem; background: var(--paper); color: var(--ink);
-       font: 16px/1.4 system-ui, sans-serif; }
-h1 { font-size: 1.1rem; margin: 0 0 .5rem; }
-canvas { display: block; width: 100%; }
-.controls { display: flex; flex-wrap: wrap; gap: .75rem; align-items: center; margin-top: .75rem; }
-input { flex: 1 1 12rem; accent-color: #0072b2; }
-button, select { font: inherit; padding: .25rem .6rem; min-width: 5.5rem; }
-output { font-variant-numeric: tabular-nums; min-width: 4.5rem; text-align: right; }
-</style>
-</head>
-<body>
-<h1>{{title}}</h1>
-<canvas id="stage" role="img" aria-label="The chain at the chosen time"></canvas>
-<div class="controls">
-  <button id="play" title="space">Play</button>
-  <input id="slider" type="range" min="0" value="0" aria-label="frame" title="arrow keys: one frame">
-  <output id="clock"></output>
-  <select id="speed" aria-label="speed"></select>
-</div>
-<script>
-"use strict";
-const walk = {{data}};
-const [left, right, bottom, top_] = walk.view;
-const [canvas, play, slider, clock, speed] =
-  ["stage", "play", "slider", "clock", "speed"].map(id => document.getElementById(id));
-const pen = canvas.getContext("2d");
-const last = walk.time.length - 1;
-let frame = 0, moment = walk.time[0], playing = false, before = 0;
-
-slider.max = last;
-for (const slow of [...new Set([1, 2, 4, 8, 16, 32, 64, walk.slow])].sort((a, b) => a - b)) {
-  const text = slow === 1 ? "real time" : slow > 1 ? slow + "× slower" : 1 / slow + "× faster";
-  speed.add(new Option(text, slow, false, slow === walk.slow));
-}
-
-// Outline of a link from joint a to joint b: two circles and a waist.
-function trace(ax, ay, bx, by, radius) {
-  const turn = Math.atan2(by - ay, bx - ax), half = Math.PI / 2;
-  const waist = 0.24 * radius, nx = -Math.sin(turn) * waist, ny = Math.cos(turn) * waist;
-  const mx = (ax + bx) / 2, my = (ay + by) / 2;
-  pen.beginPath();
-  pen.arc(bx, by, radius, turn - half, turn + half);
-  pen.quadraticCurveTo(mx + nx, my + ny, ax - Math.sin(turn) * radius, ay + Math.cos(turn) * radius);
-  pen.arc(ax, ay, radius, turn + half, turn + 3 * half);
-  pen.quadraticCurveTo(mx - nx, my - ny, bx + Math.sin(turn) * radius, by - Math.cos(turn) * radius);
-  pen.fill();
-  pen.stroke();
-}
-
-function draw() {
-  const style = getComputedStyle(document.documentElement);
-  const color = name => style.getPropertyValue("--" + name);
-  const ratio = window.devicePixelRatio || 1, width = canvas.clientWidth;
-  const scale = Math.min(width / (right - left), 0.75 * window.innerHeight / (top_ - bottom));
-  canvas.style.height = scale * (top_ - bottom) + "px";
-  canvas.width = Math.round(width * ratio);
-  canvas.height = Math.round(scale * (top_ - bottom) * ratio);
-  const shift = (width - scale * (right - left)) / 2;
-  // From here on lengths are tenths of a millimetre and y points up.
-  pen.setTransform(scale * ratio, 0, 0, -scale * ratio, (shift - left * scale) * ratio, top_ * scale * ratio);
-  const hair = 1 / scale, wide = width / scale;
-  pen.lineWidth = hair;
-  pen.strokeStyle = color("faint");
-  pen.beginPath();
-  if (walk.sprocket) pen.arc(...walk.sprocket, 0, 2 * Math.PI);
-  pen.stroke();
-  pen.fillStyle = color("ground");
-  pen.fillRect(left - wide, bottom, 3 * wide, -bottom);
-  pen.fillStyle = color("ink");
-  pen.fillRect(left - wide, -hair / 2, 3 * wide, hair);
-  for (const mark of walk.marks) pen.fillRect(mark * 1e4 - hair / 2, -6 * hair, hair, 6 * hair);
-
-  const joints = walk.joints[frame], size = joints.length;
-  pen.strokeStyle = walk.colors.edge;
-  for (const parity of [0, 2]) {
-    pen.fillStyle = parity ? walk.colors.outer : walk.colors.inner;
-    for (let i = parity; i < size; i += 4) {
-      const k = (i + size - 2) % size;
-      trace(joints[k], joints[k + 1], joints[i], joints[i + 1], walk.radius);
-    }
-  }
-  pen.strokeStyle = pen.fillStyle = color("ink");
-  pen.beginPath();
-  for (let i = 0; i <= frame; i++) pen.lineTo(...walk.center[i]);
-  pen.stroke();
-  pen.beginPath();
-  pen.arc(...walk.center[frame], 4 * hair, 0, 2 * Math.PI);
-  pen.fill();
-
-  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-  pen.font = "13px system-ui, sans-serif";
-  pen.textAlign = "center";
-  pen.textBaseline = "top";
-  const place = mark => shift + (mark * 1e4 - left) * scale;
-  for (const mark of walk.marks) pen.fillText(mark + " m", place(mark), top_ * scale + 9);
-  clock.textContent = (walk.time[frame] / 1e6).toFixed(3) + " s";
-  slider.value = frame;
-}
-
-function show(number) {
-  frame = Math.max(0, Math.min(last, number));
-  moment = walk.time[frame];
-  draw();
-}
-
-function toggle(on) {
-  playing = on;
-  play.textContent = on ? "Pause" : "Play";
-  if (on && frame === last) show(0);
-  before = performance.now();
-  if (on) requestAnimationFrame(tick);
-}
-
-function tick(now) {
-  if (!playing) return;
-  moment += 1000 * Math.max(0, now - before) / Number(speed.value);
-  before = now;
-  while (frame < last && walk.time[frame + 1] <= moment) frame++;
-  draw();
-  if (frame < last) requestAnimationFrame(tick);
-  else toggle(false);
-}
-
-play.onclick = () => toggle(!playing);
-slider.oninput = () => { toggle(false); show(Number(slider.value)); };
-window.onresize = draw;
-new ResizeObserver(draw).observe(canvas.parentElement); // a frame may get its size after the first drawing
-window.onkeydown = event => {
-  const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-  if (event.target === speed || event.target === play) return;
-  if (event.key === " ") toggle(!playing);
-  else if (step) { toggle(false); show(frame + step); }
-  else return;
-  event.preventDefault();
-};
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
-show(0);
-toggle(!matchMedia("(prefers-reduced-motion: reduce)").matches);
-</script>
-</body>
-</html>
-"""

@@ -5,14 +5,12 @@ Figures are made without pyplot: nothing is global, no display is needed, the ca
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final, cast, get_args
+from typing import Final, cast, get_args
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
@@ -20,8 +18,19 @@ from numpy.typing import NDArray
 
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.loop_figure import loop_figure
-from warpchain.pictures.style import BLUE, DASHES, FAINT, GREEN, GROUND, INK, LINE_COLORS, RED, tidy
-from warpchain.pictures.walk_shape import EnergyWalk, Kind, Walk, setting
+from warpchain.pictures.room import link_outlines
+from warpchain.pictures.room_figures import film_strip_in_room, tilt_figure
+from warpchain.pictures.strip_parts import (
+    center_at,
+    draw_distance,
+    draw_ground,
+    draw_way,
+    instants,
+    link_colors,
+    time_colors,
+)
+from warpchain.pictures.style import BLUE, DASHES, GREEN, INK, LINE_COLORS, RED, tidy
+from warpchain.pictures.walk_shape import EnergyWalk, Kind, Walk, setting, tilting
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
@@ -39,7 +48,8 @@ def draw(walk: Walk, kind: Kind, *, figure: Figure | None = None, ax: Axes | Non
     Args:
         walk: what to draw.
         kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself, `loop` for its
-            loop on the sprocket just before the release, `energy` for its energies.
+            loop on the sprocket just before the release, `energy` for its energies, `tilt` for tilt, yaw and
+            lateral drift of a plane that tilts.
         figure: an empty figure to draw into; by default a new one.
         ax: where to draw `energy`, the only figure with one pair of axes, instead of a figure of its own.
 
@@ -50,6 +60,7 @@ def draw(walk: Walk, kind: Kind, *, figure: Figure | None = None, ax: Axes | Non
         return energy_figure(walk, figure=figure, ax=ax)
     draws = {"figure5": lambda: figure5([walk], figure=figure), "film_strip": lambda: film_strip(walk, figure=figure)}
     draws["loop"] = lambda: loop_figure(walk, figure=figure)
+    draws["tilt"] = lambda: tilt_figure(walk, figure=figure)
     if kind not in draws:
         raise ValueError(f"kind: {kind!r} is unknown; give {', '.join(map(repr, get_args(Kind)))}")
     if ax is not None:
@@ -161,7 +172,7 @@ def film_strip(walk: Walk, *, count: int | None = None, figure: Figure | None = 
 
     In the strip the centre of mass moves equally far from each instant to the next. Colour is time; outer links are
     darker than inner ones. The close-ups show the first touch of the floor, the first self-contact, the collapse and
-    the end.
+    the end. A chain whose plane tilts is seen from the side, from above and from the front instead.
 
     Args:
         walk: a walk with frames.
@@ -174,6 +185,8 @@ def film_strip(walk: Walk, *, count: int | None = None, figure: Figure | None = 
     check_frames(walk)
     if count is not None and count < 2:
         raise ValueError(f"count: {count} is too few; give 2 or more")
+    if (in_room := tilting(walk)) is not None:
+        return film_strip_in_room(in_room, count=count, figure=figure)
     close_ups = _close_ups(walk)
     size = np.array([1.0, 1.0 / _CLOSE_UP_ASPECT]) * _CLOSE_UP_LINKS * walk.setup.parameters.link_length
     corners = [close_up.spot - size / 2 for close_up in close_ups]
@@ -189,19 +202,19 @@ def film_strip(walk: Walk, *, count: int | None = None, figure: Figure | None = 
     close_up_height = (close_up_width - 0.1) / _CLOSE_UP_ASPECT
     paper = np.array([_WIDTH, strip_height + close_up_height + 1.1])
     figure = InlineFigure(tuple(paper)) if figure is None else figure
-    # Viridis without its palest end, which can hardly be seen on white paper.
-    colors = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)), name="time")
-    color_of = ScalarMappable(Normalize(float(walk.frame_time[0]), float(walk.frame_time[-1])), colors)
+    color_of = time_colors(walk)
 
     def shares(left: float, bottom: float, width: float, height: float) -> tuple[float, float, float, float]:
         return left / paper[0], bottom / paper[1], width / paper[0], height / paper[1]
 
     strip_left = 0.65 + (inner_width - strip_width) / 2
     strip = figure.add_axes(shares(strip_left, close_up_height + 0.95, strip_width, strip_height))
-    _draw_ground(strip, left, right, -depth)
-    for frame in _instants(walk, count):
+    draw_ground(strip, left, right, -depth)
+    for frame in instants(center_at(walk, walk.frame_time), float(np.ptp(walk.frame_joints[0, :, 0])), count):
         _draw_chain(strip, walk, frame, color_of, edge=0.25)
-    _annotate_strip(strip, walk, -0.5 * depth)
+    draw_way(strip, walk)
+    strip.legend(loc="upper right", frameon=False, title=setting(walk), alignment="left")
+    draw_distance(strip, walk, -0.5 * depth)
     strip.set(xlim=(left, right), ylim=(-depth, top), aspect="equal", xlabel="$x$ / m", ylabel="$y$ / m")
     tidy(strip)
     bar_axes = strip.inset_axes((1.0 + 0.12 / strip_width, 0.0, 0.14 / strip_width, 1.0))
@@ -211,7 +224,7 @@ def film_strip(walk: Walk, *, count: int | None = None, figure: Figure | None = 
         letter = f"$\\mathbf{{{'abcd'[column]}}}$"
         axes = figure.add_axes(shares(0.2 + column * close_up_width, 0.1, close_up_width - 0.1, close_up_height))
         (x, y), (width, height) = corner, size
-        _draw_ground(axes, x, x + width, min(y, 0.0))
+        draw_ground(axes, x, x + width, min(y, 0.0))
         _draw_chain(axes, walk, close_up.frame, color_of, edge=0.6)
         axes.set(xlim=(x, x + width), ylim=(y, y + height), aspect="equal", xticks=[], yticks=[])
         title = f"{letter}  {close_up.title}, {walk.frame_time[close_up.frame]:.3f} s"
@@ -222,33 +235,6 @@ def film_strip(walk: Walk, *, count: int | None = None, figure: Figure | None = 
         halo = [withStroke(linewidth=3.0, foreground="white")]
         strip.text(y=y + height, s=letter, va="bottom", zorder=5, path_effects=halo, **side)
     return figure
-
-
-def link_outlines(joints: Array, radius: float) -> Array:
-    """Outlines of the links of one chain: two circles and a waist between them.
-
-    Args:
-        joints: joint positions [m], shape (n, 2); link i reaches from joint i − 1 to joint i.
-        radius: radius of the circles at the joints [m].
-
-    Returns:
-        Corners of a polygon for each link [m], shape (n, c, 2).
-    """
-    half = (joints - np.roll(joints, 1, axis=0)) / 2
-    middle = joints - half
-    along = half / np.hypot(half[:, :1], half[:, 1:])
-    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    # Each corner: half lengths along the link, then radii along and across it.
-    angle, ramp = np.linspace(-np.pi / 2, np.pi / 2, 9), np.linspace(1, -1, 7)[1:-1]
-    cap = np.stack([np.ones_like(angle), np.cos(angle), np.sin(angle)], axis=1)
-    waist = np.stack([ramp, np.zeros_like(ramp), 0.62 + 0.38 * ramp**2], axis=1)
-    corners = np.concatenate([cap, waist, -cap, -waist])
-    outlines: Array = (
-        middle[:, None]
-        + corners[:, :1] * half[:, None]
-        + radius * (corners[:, 1:2] * along[:, None] + corners[:, 2:] * across[:, None])
-    )
-    return outlines
 
 
 @dataclass(frozen=True)
@@ -306,15 +292,6 @@ def _sharpest_bend(joints: Array) -> int:
     return int(np.argmax(np.abs(turn)))
 
 
-def _instants(walk: Walk, count: int | None) -> list[int]:
-    """Frames between which the centre of mass moves equally far, the first and the last among them."""
-    path = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(center_at(walk, walk.frame_time), axis=0).T))])
-    if count is None:
-        count = int(np.clip(1 + path[-1] / (0.6 * np.ptp(walk.frame_joints[0, :, 0])), 6, 12))
-    marks = np.linspace(0.0, path[-1], count)[1:-1]
-    return sorted({0, *(int(np.argmin(np.abs(path - mark))) for mark in marks), len(path) - 1})
-
-
 def extent(walk: Walk, *others: float) -> tuple[float, float, float]:
     """Left and right end and top of the whole walk, with a margin [m]; `others` are x of what else is to be seen."""
     x, y = walk.frame_joints[:, :, 0], walk.frame_joints[:, :, 1]
@@ -323,21 +300,10 @@ def extent(walk: Walk, *others: float) -> tuple[float, float, float]:
     return left - margin, right + margin, float(y.max()) + margin
 
 
-def center_at(walk: Walk, times: Array) -> Array:
-    """Centre of mass x, y [m] at t times [s], shape (t, 2)."""
-    return np.stack([np.interp(times, walk.time, walk.center[:, axis]) for axis in (0, 1)], axis=1)
-
-
-def _draw_ground(axes: Axes, left: float, right: float, bottom: float) -> None:
-    axes.add_patch(Rectangle((left, bottom), right - left, -bottom, facecolor=GROUND, zorder=3))
-    axes.plot([left, right], [0.0, 0.0], color=INK, linewidth=1.0, zorder=3)
-
-
 def _draw_chain(axes: Axes, walk: Walk, frame: int, color_of: ScalarMappable, edge: float) -> None:
     """One chain: a white halo over the chains behind it, then inner links, then outer links."""
     outlines = link_outlines(walk.frame_joints[frame], walk.setup.parameters.circle_radius)
-    color = np.array(color_of.to_rgba(walk.frame_time[frame])[:3])
-    pale, dark = 1 - 0.45 * (1 - color), 0.6 * color
+    pale, color, dark = link_colors(color_of, walk.frame_time[frame])
     axes.add_collection(
         PolyCollection(list(outlines), facecolors="white", edgecolors="white", linewidths=4 * edge + 0.8, zorder=2)
     )
@@ -345,28 +311,3 @@ def _draw_chain(axes: Axes, walk: Walk, frame: int, color_of: ScalarMappable, ed
         axes.add_collection(
             PolyCollection(list(links), facecolors=[fill], edgecolors=[dark], linewidths=edge, zorder=2)
         )
-
-
-def _annotate_strip(axes: Axes, walk: Walk, depth: float) -> None:
-    """The sprocket, the path of the centre of mass, and the distance walked, at height `depth` [m]."""
-    if walk.sprocket_center is not None:
-        x, y = walk.sprocket_center
-        angle = np.linspace(0.0, 2 * np.pi, 100)
-        style: dict[str, Any] = {"color": FAINT, "linewidth": 1.0, "linestyle": DASHES, "zorder": 1.5}
-        circle = walk.sprocket_radius * np.array([np.cos(angle), np.sin(angle)])
-        axes.plot(x + circle[0], y + circle[1], label="sprocket until release", **style)
-        axes.plot([x, x], [0.0, y], **style)
-    dots = (0, (1, 1.5))
-    axes.plot(*walk.center.T, color=INK, linewidth=1.4, linestyle=dots, label="centre of mass", zorder=4)
-    axes.legend(loc="upper right", frameon=False, title=setting(walk), alignment="left")
-    if not np.isfinite(walk.dx):
-        return
-    end = float(walk.center[-1, 0])
-    start = end - walk.dx
-    arrow = {"arrowstyle": "<|-|>", "color": INK, "shrinkA": 0, "shrinkB": 0}
-    axes.annotate("", (end, depth), (start, depth), arrowprops=arrow, zorder=4)
-    for x in (start, end):
-        axes.plot([x, x], [0.0, 1.6 * depth], color=INK, linewidth=0.8, zorder=4)
-    box = {"facecolor": GROUND, "edgecolor": "none", "pad": 2.0}
-    text = f"$\\Delta x$ = {walk.dx:.3f} m"
-    axes.text((start + end) / 2, depth, text, ha="center", va="center", bbox=box, zorder=4)

@@ -1,7 +1,7 @@
 """What figures need of a walk, whichever class holds it."""
 
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal, Protocol, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,8 @@ from warpchain.status import Status
 
 Array = NDArray[np.float64]
 
-Kind = Literal["figure5", "film_strip", "loop", "energy"]
-"""Figures of a walk."""
+Kind = Literal["figure5", "film_strip", "loop", "energy", "tilt"]
+"""Figures of a walk; `tilt` only of one whose plane tilts."""
 
 
 @dataclass(frozen=True, kw_only=True)  # frozen: its attributes are only read
@@ -54,6 +54,36 @@ class EnergyWalk(Walk, Protocol):
     kinetic_energy: Array
     gravitational_energy: Array
     spring_energy: Array
+
+
+class TiltingWalk(Walk, Protocol):
+    """A walk whose plane tilts. Room axes: X forward, Y up, Z = X × Y, to the right of the way the chain walks.
+
+    Its `center` is in the room, its `frame_joints` are coordinates in the plane. It may also have `fell_at` and
+    `collapsed_at`, the moments at which it was first tilted by 45° and at which its loop collapsed [s], or NaN.
+
+    Attributes:
+        joints_in_room: joints x, y, z [m], shape (f, n, 3); None if the plane is fixed.
+        center_z: centre of mass z [m], shape (t,).
+        tilt: angle between the plane and the upright, positive if its top leans to the left [rad], shape (t,).
+        yaw: heading of the plane, anticlockwise from above, all turns counted [rad], shape (t,).
+    """
+
+    joints_in_room: Array | None
+    center_z: Array
+    tilt: Array
+    yaw: Array
+
+
+def tilting(walk: Walk) -> TiltingWalk | None:
+    """The walk itself if its plane tilts, None if it is fixed."""
+    return cast(TiltingWalk, walk) if getattr(walk, "joints_in_room", None) is not None else None
+
+
+def kinds_of(walk: Walk) -> tuple[Kind, ...]:
+    """The figures that a walk of this kind has, if it was recorded."""
+    kinds: tuple[Kind, ...] = get_args(Kind)
+    return kinds if tilting(walk) is not None else tuple(kind for kind in kinds if kind != "tilt")
 
 
 def setting(walk: Walk) -> str:

@@ -21,7 +21,8 @@ class Drawn:
 
         Args:
             kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself, `loop` for
-                its loop on the sprocket just before the release, `energy` for its energies.
+                its loop on the sprocket just before the release, `energy` for its energies, `tilt` for tilt, yaw and
+                lateral drift of a plane that tilts.
             figure: an empty matplotlib figure to draw into; by default a new one, which a notebook shows.
             ax: where to draw `energy`, the only figure with one pair of axes.
 
