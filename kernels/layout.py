@@ -48,7 +48,8 @@ VALUE_DEADLINE, VALUE_CONTACT_STEP, VALUE_TOLERANCE = 21, 22, 23
 # A plane that tilts, as the links feel it: seven values, see gpu.tilting; and in the attempt before.
 VALUE_HALF_WIDTH = 24
 VALUE_PLANE, VALUE_PLANE_BEFORE = 25, 32
-VALUES = 39
+VALUE_INVERSE_SQUARE = 39
+VALUES = 40
 BOARD_ROWS = 28
 
 # State.watch
@@ -67,15 +68,15 @@ WATCH_ROWS = 28
 PLANE_SPEED, PLANE_TURN_X, PLANE_TURN_Y = 0, 1, 2
 AHEAD, UP, ORIGIN = 3, 6, 9
 PLANE_VALUES = 12
-# The plane half a step later, as the links feel it during the step, and in its first stage; and one in between.
-PLANE_MID, PLANE_BETWEEN = 12, 24
+# The plane half a step later, as the links feel it during the step, and in its first stage.
+PLANE_MID = 12
 # Sums over the links in one state, see physics.plane, and the inverse of the mass matrix, rows of its upper triangle.
-PLANE_SUMS, MOTION_SUMS = 36, 42
-SUM_MASS, SUM_MX, SUM_MY, SUM_XX, SUM_XY, SUM_YY = range(36, 42)
-SUM_MU, SUM_MV, SUM_XU, SUM_XV, SUM_YU, SUM_YV = range(42, 48)
-SUM_SPIN, SUM_SPIN_SINE, SUM_SPIN_COSINE = 48, 49, 50
-INVERSE_00, INVERSE_01, INVERSE_02, INVERSE_11, INVERSE_12, INVERSE_22 = range(51, 57)
-PLANE_ROWS = 57
+PLANE_SUMS, MOTION_SUMS = 24, 30
+SUM_MASS, SUM_MX, SUM_MY, SUM_XX, SUM_XY, SUM_YY = range(24, 30)
+SUM_MU, SUM_MV, SUM_XU, SUM_XV, SUM_YU, SUM_YV = range(30, 36)
+SUM_SPIN, SUM_SPIN_SINE, SUM_SPIN_COSINE = 36, 37, 38
+INVERSE_00, INVERSE_01, INVERSE_02, INVERSE_11, INVERSE_12, INVERSE_22 = range(39, 45)
+PLANE_ROWS = 45
 SUMS_OF_PLACES, SUMS_OF_MOTION = 6, 9
 
 # State.counts

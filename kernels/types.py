@@ -168,6 +168,7 @@ class Chain:
     up_y: wp.float64
     up_z: wp.float64
     origin_height: wp.float64
+    inverse_square: wp.float64  # of half a link length [1/m²]
 
 
 @wp.func

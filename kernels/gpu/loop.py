@@ -39,7 +39,7 @@ from warpchain.kernels.gpu.functions import shares_board
 from warpchain.kernels.gpu.sample import block_sample, write_step_bounds
 from warpchain.kernels.gpu.stage import Place, block_stage, error_of, read_link, vec3d, vec5d, write_first_stage
 from warpchain.kernels.gpu.threads import barrier, barrier_if_any, block_maxima, clock, tile_address, vec4i
-from warpchain.kernels.gpu.tilting import block_tilting, write_felt_plane
+from warpchain.kernels.gpu.tilting import block_tilting, copy_plane, write_felt_plane
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step, step_controller
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 from warpchain.kernels.methods.method import find_method
@@ -77,6 +77,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     has_floor = features.fixed_body == "floor"
     has_fixed = features.fixed_body != "none"
     has_self = features.self_contact
+    tilts = features.tilts
     has_contacts = has_fixed or has_self
     fixed_loss, fixed_depth, fixed_count = of_fixed_body(features.fixed_body)
     reuses_last = method.reuses_last
@@ -84,18 +85,18 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     is_shared = shares_board(block_dim)
     width = block_dim + 1
     kept_width = columns if is_shared else width
-    board_size = layout.board_size(block_dim) if is_shared else 1
+    plane_offset = wp.uint64(8 * layout.board_size(block_dim))
+    board_size = layout.board_size(block_dim) + layout.PLANE_ROWS * tilts if is_shared else 1
     touch = touch_layout(columns, block_dim, in_lists=not is_shared)
     touch_size = touch.size if is_shared else 1
     board_address = tile_address(wp.float64, board_size)
     touch_address = tile_address(wp.int32, touch_size)
     ends_address = tile_address(vec5d, block_dim)
     forces_address = tile_address(vec3d, block_dim)
-    exchange_ends, stage = block_stage(block_dim, features.tilts)
+    exchange_ends, stage = block_stage(block_dim, tilts)
     greatest, _write, _read = block_maxima(block_dim)
     maxima_address = tile_address(vec4i, block_dim)
     write_proximity, read_proximity, time_to_contact, meet_fixed_body = block_proximity(features, block_dim)
-    tilts = features.tilts
     attempt = explicit_attempt(method.tableau, block_dim, write_proximity, read_proximity, tilts)
     begin_step, sum_up, sum_motion, meet_tilting_floor = block_tilting(block_dim)
     growth, shrinkage = step_controller(method.order, method.error_order, wp.float32)
@@ -183,6 +184,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         # so do the sums for a plane that tilts
         M = wp.array(ptr=ends_start, shape=(wp.static(5 * block_dim),), dtype=wp.float64)
         P = state.plane[world]
+        if wp.static(tilts and is_shared):
+            P = wp.array(ptr=board_start + wp.static(plane_offset), shape=(layout.PLANE_ROWS,), dtype=wp.float64)
 
         chain = read_chain(model, world)
         if wp.static(is_driven):
@@ -206,6 +209,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 chain = softened(chain, control, state.softness[world])
             write_constants(K, chain)
             if wp.static(tilts):
+                copy_plane(P, state.plane[world])
+                K[chain_values, layout.VALUE_INVERSE_SQUARE] = ONE / (chain.half_length * chain.half_length)
                 write_felt_plane(K, P)
             write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
             K[chain_values, layout.VALUE_OPENING] = state.extremes[world, layout.OPENING]
@@ -232,12 +237,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 pairs = build_list(K, L, chain, lane, control.skin, upper_bound(opening))
                 if pairs > wp.static(lists.capacity):
                     status = int(LIST_OVERFLOW)
-        reach = time_to_contact(control, pairs, proximity.gap, slack, proximity.speed)
-        if wp.static(tilts):
-            if is_fresh:
+            if wp.static(tilts):
                 barrier()  # all have read the ends
                 sum_up(K, P, M, place)
-                barrier()
+        reach = time_to_contact(control, pairs, proximity.gap, slack, proximity.speed)
         if not is_fresh:
             # Kept from the last launch, since recomputing could round differently.
             reach = wp.float32(state.time_to_contact[world])
@@ -262,6 +265,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 publish(K, place)
                 barrier()
                 if lane == 0:
+                    if wp.static(tilts):
+                        copy_plane(state.plane[world], P)
                     take_sample(K, T, model, drive, state, record, control, world, time)
                 barrier()
                 status = T[wp.static(touch.mailbox)]
@@ -398,6 +403,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if is_hit:
                         next_end = exchange_ends(ends, place, read_link(K, lane))
                     evaluate_first_stage(forces, K, place, next_end)
+                    if wp.static(tilts):
+                        barrier()  # all have read the plane that they feel
         if status == RUNNING and attempts_made(state, world) + wp.int64(attempts) >= control.step_limit:
             status = int(STEP_LIMIT)
         is_last = lacks_last_sample(state, world, time, status)
@@ -420,6 +427,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     write_tilting_sample(P, state, record, world, time, flat, in_room(K, P, last, flat))
                 else:
                     write_sample(state, record, world, time, flat)
+            if wp.static(tilts):
+                copy_plane(state.plane[world], P)
             store_losses(K, state, world, n, wp.static(fixed_loss))
             add_count(state, world, layout.ACCEPTED, wp.int64(accepted))
             add_count(state, world, layout.REJECTED, wp.int64(attempts - accepted))

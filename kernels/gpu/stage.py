@@ -289,6 +289,7 @@ def block_stage(block_dim: int, tilts: bool = False):
         if wp.static(tilts):
             chain.gravity = K[layout.BOARD_VALUES, layout.VALUE_GRAVITY]
             felt = felt_plane(K, chain, wp.static(layout.VALUE_PLANE))
+            felt.inverse_square = K[layout.BOARD_VALUES, layout.VALUE_INVERSE_SQUARE]
             load_x, load_y, load_turn = plane_load(felt, link.x, link.y, link.arm_x, link.arm_y)
             ax += load_x
             ay += load_y

@@ -108,11 +108,20 @@ def write_felt_plane(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float
 
 
 @wp.func
+def copy_plane(target: wp.array(dtype=wp.float64), source: wp.array(dtype=wp.float64)):
+    """Copies a plane with all its sums."""
+    row = int(0)
+    while row < layout.PLANE_ROWS:
+        target[row] = source[row]
+        row += 1
+
+
+@wp.func
 def shift_first_stage(K: wp.array2d(dtype=wp.float64), lane: int):
     """Changes a link's first stage on the board from the plane of the attempt before to that of this one."""
     own = Chain()
     own.gravity = K[BOARD_VALUES, layout.VALUE_GRAVITY]
-    own.half_length = K[BOARD_VALUES, layout.VALUE_HALF_LENGTH]
+    own.inverse_square = K[BOARD_VALUES, layout.VALUE_INVERSE_SQUARE]
     link = read_link(K, lane)
     now = felt_plane(K, own, VALUE_PLANE)
     before = felt_plane(K, own, VALUE_PLANE_BEFORE)
@@ -141,10 +150,10 @@ def motion_of(K: wp.array2d(dtype=wp.float64), i: int):
 
 @functools.cache
 def block_sums(block_dim: int, terms_of: wp.Function, count: int, first: int, slot: int):
-    """Warp functions (write, read) of sums over the links: ``write`` by all threads, after a barrier ``read`` by one.
+    """Warp functions (write, read) of sums over the links: ``write`` by all threads, after a barrier ``read`` by all.
 
     Args:
-        block_dim: Threads in a block.
+        block_dim: Threads in a block, at least ``count`` on a GPU.
         terms_of: ``(K, i)`` → the terms of link i.
         count: Their number.
         first: Row of the first sum in the memory of the plane.
@@ -160,15 +169,17 @@ def block_sums(block_dim: int, terms_of: wp.Function, count: int, first: int, sl
                 add_up(M, wp.static(slot + k), place.lane, wp.static(block_dim), own)
 
     @wp.func
-    def read(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), M: wp.array(dtype=wp.float64), n: int):
-        for k in range(wp.static(count)):
-            P[wp.static(first + k)] = ZERO
+    def read(
+        K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), M: wp.array(dtype=wp.float64), place: Place
+    ):
         if warp_width() > 1:
+            if place.lane < wp.static(count):
+                P[wp.static(first) + place.lane] = added_up(M, wp.static(slot) + place.lane, wp.static(block_dim))
+        elif place.lane == 0:  # fibers have no memory for so many slots
             for k in range(wp.static(count)):
-                P[wp.static(first + k)] = added_up(M, wp.static(slot + k), wp.static(block_dim))
-        else:  # fibers have no memory for so many slots
+                P[wp.static(first + k)] = ZERO
             i = int(0)
-            while i < n:
+            while i < place.links:
                 terms = terms_of(K, i)
                 for k in range(wp.static(count)):
                     P[wp.static(first + k)] = P[wp.static(first + k)] + terms[k]
@@ -183,10 +194,11 @@ def block_tilting(block_dim: int):
 
     Returns:
         ``begin(K, P, place, h)`` moves the plane to the middle of a step, and the first stage with it;
-        ``sum_up(K, P, M, place)`` writes the sums over the links into P, ``sum_motion`` with
-        the same arguments those that impulses change; ``meet(K, P, M, chain, place)`` applies the
-        impulses between rollers and floor → number of those of this thread. M is memory that all threads share and
-        that nobody reads meanwhile. Each passes barriers, and there must be one before M is used otherwise.
+        ``sum_up(K, P, M, place)`` writes the sums over the links into P, and the inverse of the mass matrix by the
+        first thread; ``sum_motion`` with the same arguments writes those that impulses change;
+        ``meet(K, P, M, chain, place)`` applies the impulses between rollers and floor → number of those of this thread.
+        P: the plane, in memory that all threads share, which the first one changes. M: the same for sums, which nobody
+        else uses meanwhile. Each passes barriers, and there must be one before M is used otherwise.
     """
     count_slot, contact_slot, sum_slot = 0, 1, 5
     write_places, read_places = block_sums(block_dim, places_of, SUMS_OF_PLACES, layout.PLANE_SUMS, sum_slot)
@@ -198,8 +210,6 @@ def block_tilting(block_dim: int):
     def begin(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), place: Place, h: wp.float64):
         if place.lane == 0:
             half_step(P, 0, wp.static(PLANE_MID), K[BOARD_VALUES, layout.VALUE_GRAVITY], h)
-        barrier()  # all have evaluated the first stage
-        if place.lane == 0:
             write_felt_plane(K, P)
         barrier()
         if place.lane < place.links:
@@ -215,9 +225,10 @@ def block_tilting(block_dim: int):
         write_places(K, M, place)
         write_motion(K, M, place)
         barrier()
+        read_places(K, P, M, place)
+        read_motion(K, P, M, place)
+        barrier()
         if place.lane == 0:
-            read_places(K, P, M, place.links)
-            read_motion(K, P, M, place.links)
             invert_plane_mass(P)
 
     @wp.func
@@ -229,8 +240,8 @@ def block_tilting(block_dim: int):
     ):
         write_motion(K, M, place)
         barrier()
-        if place.lane == 0:
-            read_motion(K, P, M, place.links)
+        read_motion(K, P, M, place)
+        barrier()
 
     @wp.func
     def meet(

@@ -42,7 +42,6 @@ from warpchain.kernels.layout import (
     INVERSE_12,
     INVERSE_22,
     ORIGIN,
-    PLANE_BETWEEN,
     PLANE_MID,
     PLANE_SPEED,
     PLANE_TURN_X,
@@ -78,12 +77,11 @@ THREE_HALVES = wp.constant(wp.float64(1.5))
 def plane_load(chain: Chain, x: wp.float64, y: wp.float64, arm_x: wp.float64, arm_y: wp.float64):
     """Accelerations (ẍ, ÿ [m/s²], θ̈ [rad/s²]) of a link by gravity and the motion of its plane."""
     across = chain.plane_speed + chain.turn_x * y - chain.turn_y * x
-    inverse = ONE / (chain.half_length * chain.half_length)
     about_rod = arm_x * chain.turn_x + arm_y * chain.turn_y
     across_rod = arm_x * chain.turn_y - arm_y * chain.turn_x
     ax = -chain.gravity * chain.up_x - chain.turn_y * across
     ay = chain.turn_x * across - chain.gravity * chain.up_y
-    return ax, ay, -(about_rod * across_rod) * inverse
+    return ax, ay, -(about_rod * across_rod) * chain.inverse_square
 
 
 @wp.func
@@ -97,6 +95,7 @@ def on_plane(own: Chain, P: wp.array(dtype=wp.float64), first: int) -> Chain:
     chain.up_y = P[first + UP + 1]
     chain.up_z = P[first + UP + 2]
     chain.origin_height = P[first + ORIGIN + 1]
+    chain.inverse_square = ONE / (own.half_length * own.half_length)
     return chain
 
 
@@ -184,12 +183,49 @@ def plane_times_inverse(P: wp.array(dtype=wp.float64), q0: wp.float64, q1: wp.fl
     )
 
 
+@wp.struct
+class Plane:
+    """Values of a plane, see :mod:`layout`."""
+
+    speed: wp.float64
+    turn_x: wp.float64
+    turn_y: wp.float64
+    ahead: wp.vec3d
+    up: wp.vec3d
+    origin: wp.vec3d
+
+
 @wp.func
-def plane_rates(P: wp.array(dtype=wp.float64), gravity: wp.float64, first: int):
-    """Rates of u, ω1 and ω2 of the plane whose values begin at row ``first``."""
-    w1 = P[first + PLANE_TURN_X]
-    w2 = P[first + PLANE_TURN_Y]
-    weight = gravity * P[first + UP + 2]
+def read_plane(P: wp.array(dtype=wp.float64), first: int) -> Plane:
+    """The plane whose values begin at this row."""
+    plane = Plane()
+    plane.speed = P[first + PLANE_SPEED]
+    plane.turn_x = P[first + PLANE_TURN_X]
+    plane.turn_y = P[first + PLANE_TURN_Y]
+    plane.ahead = wp.vec3d(P[first + AHEAD], P[first + AHEAD + 1], P[first + AHEAD + 2])
+    plane.up = wp.vec3d(P[first + UP], P[first + UP + 1], P[first + UP + 2])
+    plane.origin = wp.vec3d(P[first + ORIGIN], P[first + ORIGIN + 1], P[first + ORIGIN + 2])
+    return plane
+
+
+@wp.func
+def write_plane(P: wp.array(dtype=wp.float64), first: int, plane: Plane):
+    """Writes a plane's values from this row on."""
+    P[first + PLANE_SPEED] = plane.speed
+    P[first + PLANE_TURN_X] = plane.turn_x
+    P[first + PLANE_TURN_Y] = plane.turn_y
+    for k in range(3):
+        P[first + AHEAD + k] = plane.ahead[k]
+        P[first + UP + k] = plane.up[k]
+        P[first + ORIGIN + k] = plane.origin[k]
+
+
+@wp.func
+def plane_rates(P: wp.array(dtype=wp.float64), gravity: wp.float64, plane: Plane):
+    """Rates of u, ω1 and ω2, from the sums over the links."""
+    w1 = plane.turn_x
+    w2 = plane.turn_y
+    weight = gravity * plane.up[2]
     spin = P[SUM_SPIN]
     j1 = P[SUM_SPIN_SINE] * w1 - P[SUM_SPIN_COSINE] * w2
     j2 = -P[SUM_SPIN_COSINE] * w1 - P[SUM_SPIN_SINE] * w2
@@ -200,66 +236,47 @@ def plane_rates(P: wp.array(dtype=wp.float64), gravity: wp.float64, first: int):
 
 
 @wp.func
-def turn_axis(P: wp.array(dtype=wp.float64), start: int, slope: int, target: int, axis: int, h: wp.float64):
-    """Components of a room axis at ``target``: those at ``start`` and h times their rates at ``slope``."""
-    w1 = P[slope + PLANE_TURN_X]
-    w2 = P[slope + PLANE_TURN_Y]
-    rate_1 = -w2 * P[slope + axis + 2]
-    rate_2 = w1 * P[slope + axis + 2]
-    rate_3 = w2 * P[slope + axis] - w1 * P[slope + axis + 1]
-    P[target + axis] = P[start + axis] + h * rate_1
-    P[target + axis + 1] = P[start + axis + 1] + h * rate_2
-    P[target + axis + 2] = P[start + axis + 2] + h * rate_3
+def axis_rate(axis: wp.vec3d, w1: wp.float64, w2: wp.float64):
+    """Rates of the components of a room axis along e1, e2, e3."""
+    return wp.vec3d(-w2 * axis[2], w1 * axis[2], w2 * axis[0] - w1 * axis[1])
 
 
 @wp.func
-def push_plane(P: wp.array(dtype=wp.float64), start: int, slope: int, target: int, gravity: wp.float64, h: wp.float64):
-    """Writes at ``target`` the plane at ``start`` and h times its rates at ``slope``; target may be either of them."""
+def pushed(P: wp.array(dtype=wp.float64), gravity: wp.float64, start: Plane, slope: Plane, h: wp.float64) -> Plane:
+    """The plane ``start`` and h times the rates that it has at ``slope``; links are frozen."""
     du, d1, d2 = plane_rates(P, gravity, slope)
-    speed = P[slope + PLANE_SPEED]
-    ahead_1 = P[slope + AHEAD]
-    ahead_2 = P[slope + AHEAD + 1]
-    up_1 = P[slope + UP]
-    up_2 = P[slope + UP + 1]
-    drift_x = speed * P[slope + AHEAD + 2]
-    drift_y = speed * P[slope + UP + 2]
-    drift_z = speed * (ahead_1 * up_2 - ahead_2 * up_1)
-    turn_axis(P, start, slope, target, wp.static(AHEAD), h)
-    turn_axis(P, start, slope, target, wp.static(UP), h)
-    P[target + ORIGIN] = P[start + ORIGIN] + h * drift_x
-    P[target + ORIGIN + 1] = P[start + ORIGIN + 1] + h * drift_y
-    P[target + ORIGIN + 2] = P[start + ORIGIN + 2] + h * drift_z
-    P[target + PLANE_SPEED] = P[start + PLANE_SPEED] + h * du
-    P[target + PLANE_TURN_X] = P[start + PLANE_TURN_X] + h * d1
-    P[target + PLANE_TURN_Y] = P[start + PLANE_TURN_Y] + h * d2
+    drift = wp.vec3d(slope.ahead[2], slope.up[2], slope.ahead[0] * slope.up[1] - slope.ahead[1] * slope.up[0])
+    end = Plane()
+    end.speed = start.speed + h * du
+    end.turn_x = start.turn_x + h * d1
+    end.turn_y = start.turn_y + h * d2
+    end.ahead = start.ahead + h * axis_rate(slope.ahead, slope.turn_x, slope.turn_y)
+    end.up = start.up + h * axis_rate(slope.up, slope.turn_x, slope.turn_y)
+    end.origin = start.origin + (h * slope.speed) * drift
+    return end
 
 
 @wp.func
-def straighten_axes(P: wp.array(dtype=wp.float64), first: int):
-    """Makes the room's X and Y axes at this row orthogonal unit vectors again, which they nearly are.
+def straightened(plane: Plane) -> Plane:
+    """The plane with room axes that are orthogonal unit vectors again, which they nearly are.
 
     A unit vector that is too long by ε has the factor (3 − y·y)/2 = 1 − ε, less ε² and higher powers.
     """
-    x = wp.vec3d(P[first + AHEAD], P[first + AHEAD + 1], P[first + AHEAD + 2])
-    y = wp.vec3d(P[first + UP], P[first + UP + 1], P[first + UP + 2])
-    y = (THREE_HALVES - HALF * wp.dot(y, y)) * y
-    x = x - wp.dot(x, y) * y
-    x = (THREE_HALVES - HALF * wp.dot(x, x)) * x
-    for k in range(3):
-        P[first + AHEAD + k] = x[k]
-        P[first + UP + k] = y[k]
+    straight = plane
+    y = (THREE_HALVES - HALF * wp.dot(plane.up, plane.up)) * plane.up
+    x = plane.ahead - wp.dot(plane.ahead, y) * y
+    straight.up = y
+    straight.ahead = (THREE_HALVES - HALF * wp.dot(x, x)) * x
+    return straight
 
 
 @wp.func
 def half_step(P: wp.array(dtype=wp.float64), start: int, target: int, gravity: wp.float64, h: wp.float64):
-    """Carries the plane at row ``start`` on by half of h, by the midpoint rule, to row ``target``; links are frozen.
-
-    The rows of :data:`PLANE_BETWEEN` are used between.
-    """
+    """Carries the plane at row ``start`` on by half of h, by the midpoint rule, to row ``target``; links are frozen."""
     half = HALF * h
-    push_plane(P, start, start, PLANE_BETWEEN, gravity, HALF * half)
-    push_plane(P, start, PLANE_BETWEEN, target, gravity, half)
-    straighten_axes(P, target)
+    plane = read_plane(P, start)
+    between = pushed(P, gravity, plane, plane, HALF * half)
+    write_plane(P, target, straightened(pushed(P, gravity, plane, between, half)))
 
 
 @wp.func
