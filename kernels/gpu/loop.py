@@ -98,7 +98,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     maxima_address = tile_address(vec4i, block_dim)
     write_proximity, read_proximity, time_to_contact, meet_fixed_body = block_proximity(features, block_dim)
     attempt = explicit_attempt(method.tableau, block_dim, write_proximity, read_proximity, tilts)
-    begin_step, sum_up, sum_motion, meet_tilting_floor = block_tilting(block_dim)
+    begin_step, sum_up, meet_tilting_floor = block_tilting(block_dim)
     growth, shrinkage = step_controller(method.order, method.error_order, wp.float32)
     build_list = block_list(columns, block_dim, features.broad_phase)
     clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, block_dim, touch)
@@ -397,7 +397,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 if wp.static(tilts):
                     if is_hit:
                         barrier()  # contacts have left the memory of the sums
-                        sum_motion(K, P, M, place)
+                        sum_up(K, P, M, place)
                         barrier()
                 if is_hit or wp.static(not reuses_last):
                     if is_hit:

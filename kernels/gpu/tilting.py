@@ -62,23 +62,73 @@ FELT = 7
 """Values of a plane that lie on the board: u, ω1, ω2, the three of up, and the height of the origin."""
 
 
-@wp.func_native("""
+vec4d = wp.types.vector(length=4, dtype=wp.float64)
+vec16d = wp.types.vector(length=16, dtype=wp.float64)
+
+SUM_UP = """
 #if defined(__CUDA_ARCH__)
-    for (int offset = 16; offset > 0; offset >>= 1) {
-        x += __shfl_xor_sync(0xffffffffu, x, offset);
+    // in each round a thread keeps half of its values and passes the other half to its partner, who keeps those
+    int width = 16;
+    int index = 0;
+    #pragma unroll
+    for (int half = COUNT / 2; half >= 1; half /= 2) {
+        const bool upper = (lane & width) != 0;
+        #pragma unroll
+        for (int k = 0; k < half; ++k) {
+            const double passed = upper ? x[k] : x[k + half];
+            const double kept = upper ? x[k + half] : x[k];
+            x[k] = kept + __shfl_xor_sync(0xffffffffu, passed, width);
+        }
+        index = 2 * index + (upper ? 1 : 0);
+        width /= 2;
     }
-    if ((lane & 31) == 0) {
-        memory.data[slot * (block_dim / 32) + lane / 32] = x;
+    double sum = x[0];
+    const int sharing = width;
+    #pragma unroll
+    for (; width >= 1; width /= 2) {
+        sum += __shfl_xor_sync(0xffffffffu, sum, width);
+    }
+    if ((lane & (2 * sharing - 1)) == 0) {
+        memory.data[(slot + index) * (block_dim / 32) + lane / 32] = sum;
     }
 #else
-    memory.data[slot * block_dim + lane] = x;
+    for (int k = 0; k < COUNT; ++k) {
+        memory.data[(slot + k) * block_dim + lane] = x[k];
+    }
+#endif
+"""
+
+
+@wp.func_native(SUM_UP.replace("COUNT", "4"))
+def add_up_four(memory: wp.array(dtype=wp.float64), slot: int, lane: int, block_dim: int, x: vec4d):
+    """Writes the sums of four values over each hardware warp, from ``slot`` on; a fiber is a warp of its own.
+
+    After a barrier :func:`added_up` reads the sums over the block.
+    """
+    ...
+
+
+@wp.func_native(SUM_UP.replace("COUNT", "16"))
+def add_up_sixteen(memory: wp.array(dtype=wp.float64), slot: int, lane: int, block_dim: int, x: vec16d):
+    """The same for sixteen values, which fibers have no memory for."""
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    return __syncthreads_count(x);
+#else
+    memory.data[slot * block_dim + lane] = x ? 1.0 : 0.0;
+    WP_TILE_SYNC();
+    int count = 0;
+    for (int i = 0; i < block_dim; ++i) {
+        count += memory.data[slot * block_dim + i] != 0.0;
+    }
+    return count;
 #endif
 """)
-def add_up(memory: wp.array(dtype=wp.float64), slot: int, lane: int, block_dim: int, x: wp.float64):
-    """Writes the sums of x over each hardware warp; a fiber is a warp of its own, and has memory for five slots.
-
-    After a barrier :func:`added_up` reads the sum over the block.
-    """
+def barrier_count(memory: wp.array(dtype=wp.float64), slot: int, lane: int, block_dim: int, x: bool) -> int:
+    """A barrier that returns to all threads in how many of them x is true; fibers count in a slot of the memory."""
     ...
 
 
@@ -148,63 +198,34 @@ def motion_of(K: wp.array2d(dtype=wp.float64), i: int):
     )
 
 
-@functools.cache
-def block_sums(block_dim: int, terms_of: wp.Function, count: int, first: int, slot: int):
-    """Warp functions (write, read) of sums over the links: ``write`` by all threads, after a barrier ``read`` by all.
-
-    Args:
-        block_dim: Threads in a block, at least ``count`` on a GPU.
-        terms_of: ``(K, i)`` → the terms of link i.
-        count: Their number.
-        first: Row of the first sum in the memory of the plane.
-        slot: First slot in the memory that the threads share.
-    """
-
-    @wp.func
-    def write(K: wp.array2d(dtype=wp.float64), M: wp.array(dtype=wp.float64), place: Place):
-        if warp_width() > 1:
-            terms = terms_of(K, place.column)
-            for k in range(wp.static(count)):
-                own = wp.where(place.lane < place.links, terms[k], ZERO)
-                add_up(M, wp.static(slot + k), place.lane, wp.static(block_dim), own)
-
-    @wp.func
-    def read(
-        K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), M: wp.array(dtype=wp.float64), place: Place
-    ):
-        if warp_width() > 1:
-            if place.lane < wp.static(count):
-                P[wp.static(first) + place.lane] = added_up(M, wp.static(slot) + place.lane, wp.static(block_dim))
-        elif place.lane == 0:  # fibers have no memory for so many slots
-            for k in range(wp.static(count)):
-                P[wp.static(first + k)] = ZERO
-            i = int(0)
-            while i < place.links:
-                terms = terms_of(K, i)
-                for k in range(wp.static(count)):
-                    P[wp.static(first + k)] = P[wp.static(first + k)] + terms[k]
-                i += 1
-
-    return write, read
+@wp.func
+def add_one_by_one(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), n: int):
+    """Writes the sums over all links, by one fiber."""
+    for k in range(wp.static(SUMS_OF_PLACES + SUMS_OF_MOTION)):
+        P[wp.static(layout.PLANE_SUMS + k)] = ZERO
+    i = int(0)
+    while i < n:
+        places = places_of(K, i)
+        for k in range(wp.static(SUMS_OF_PLACES)):
+            P[wp.static(layout.PLANE_SUMS + k)] = P[wp.static(layout.PLANE_SUMS + k)] + places[k]
+        motion = motion_of(K, i)
+        for k in range(wp.static(SUMS_OF_MOTION)):
+            P[wp.static(layout.MOTION_SUMS + k)] = P[wp.static(layout.MOTION_SUMS + k)] + motion[k]
+        i += 1
 
 
 @functools.cache
 def block_tilting(block_dim: int):
-    """Warp functions of a plane for blocks of this size: (begin a step, sum up, sum up velocities, meet the floor).
+    """Warp functions of a plane for blocks of this size: (begin a step, sum up, meet the floor).
 
     Returns:
         ``begin(K, P, place, h)`` moves the plane to the middle of a step, and the first stage with it;
-        ``sum_up(K, P, M, place)`` writes the sums over the links into P, and the inverse of the mass matrix by the
-        first thread; ``sum_motion`` with the same arguments writes those that impulses change;
+        ``sum_up(K, P, M, place)`` writes the sums over the links and the inverse of the mass matrix into P;
         ``meet(K, P, M, chain, place)`` applies the impulses between rollers and floor → number of those of this thread.
         P: the plane, in memory that all threads share, which the first one changes. M: the same for sums, which nobody
         else uses meanwhile. Each passes barriers, and there must be one before M is used otherwise.
     """
     count_slot, contact_slot, sum_slot = 0, 1, 5
-    write_places, read_places = block_sums(block_dim, places_of, SUMS_OF_PLACES, layout.PLANE_SUMS, sum_slot)
-    write_motion, read_motion = block_sums(
-        block_dim, motion_of, SUMS_OF_MOTION, layout.MOTION_SUMS, sum_slot + SUMS_OF_PLACES
-    )
 
     @wp.func
     def begin(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), place: Place, h: wp.float64):
@@ -222,26 +243,24 @@ def block_tilting(block_dim: int):
         M: wp.array(dtype=wp.float64),
         place: Place,
     ):
-        write_places(K, M, place)
-        write_motion(K, M, place)
-        barrier()
-        read_places(K, P, M, place)
-        read_motion(K, P, M, place)
+        if warp_width() > 1:
+            places = places_of(K, place.column)
+            motion = motion_of(K, place.column)
+            terms = vec16d()
+            if place.lane < place.links:
+                for k in range(wp.static(SUMS_OF_PLACES)):
+                    terms[k] = places[k]
+                for k in range(wp.static(SUMS_OF_MOTION)):
+                    terms[wp.static(SUMS_OF_PLACES + k)] = motion[k]
+            add_up_sixteen(M, wp.static(sum_slot), place.lane, wp.static(block_dim), terms)
         barrier()
         if place.lane == 0:
+            if warp_width() > 1:
+                for k in range(wp.static(SUMS_OF_PLACES + SUMS_OF_MOTION)):
+                    P[wp.static(layout.PLANE_SUMS + k)] = added_up(M, wp.static(sum_slot + k), wp.static(block_dim))
+            else:
+                add_one_by_one(K, P, place.links)
             invert_plane_mass(P)
-
-    @wp.func
-    def sum_motion(
-        K: wp.array2d(dtype=wp.float64),
-        P: wp.array(dtype=wp.float64),
-        M: wp.array(dtype=wp.float64),
-        place: Place,
-    ):
-        write_motion(K, M, place)
-        barrier()
-        read_motion(K, P, M, place)
-        barrier()
 
     @wp.func
     def meet(
@@ -262,11 +281,9 @@ def block_tilting(block_dim: int):
             touches = link_touches(
                 chain, slope, left_x, left_y, right_x, right_y, link.x, link.y, link.u, link.v, link.omega
             )
-        add_up(M, wp.static(count_slot), lane, wp.static(block_dim), wp.float64(touches))
-        barrier()
-        touching = added_up(M, wp.static(count_slot), wp.static(block_dim))
+        touching = barrier_count(M, wp.static(count_slot), lane, wp.static(block_dim), touches > wp.int64(0))
         hits = int(0)
-        if touching > ZERO:
+        if touching > 0:
             push = ZERO
             moment_x = ZERO
             moment_y = ZERO
@@ -275,7 +292,7 @@ def block_tilting(block_dim: int):
                 met = meet_tilting_floor(
                     chain,
                     slope,
-                    copy_inverse(P, touching),
+                    copy_inverse(P, wp.float64(touching)),
                     left_x,
                     left_y,
                     right_x,
@@ -301,10 +318,8 @@ def block_tilting(block_dim: int):
                     + (met.turn_y - chain.turn_y) * moment_y
                 )
                 hits = int(met.hits)
-            add_up(M, wp.static(contact_slot), lane, wp.static(block_dim), push)
-            add_up(M, wp.static(contact_slot + 1), lane, wp.static(block_dim), moment_x)
-            add_up(M, wp.static(contact_slot + 2), lane, wp.static(block_dim), moment_y)
-            add_up(M, wp.static(contact_slot + 3), lane, wp.static(block_dim), work)
+            summed = vec4d(push, moment_x, moment_y, work)
+            add_up_four(M, wp.static(contact_slot), lane, wp.static(block_dim), summed)
             barrier()
             if lane == 0:
                 lost = push_plane_by(
@@ -317,4 +332,4 @@ def block_tilting(block_dim: int):
                 K[layout.BOARD_LOST_FIXED, 0] = K[layout.BOARD_LOST_FIXED, 0] + lost
         return hits
 
-    return begin, sum_up, sum_motion, meet
+    return begin, sum_up, meet

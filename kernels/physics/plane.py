@@ -64,7 +64,7 @@ from warpchain.kernels.layout import (
     SUM_YY,
     UP,
 )
-from warpchain.kernels.physics.elementary import HALF, ONE, TWO
+from warpchain.kernels.physics.elementary import HALF, ONE, TWO, quotient
 from warpchain.kernels.types import Chain
 
 wp.set_module_options({"enable_backward": False})
@@ -164,7 +164,7 @@ def invert_plane_mass(P: wp.array(dtype=wp.float64)):
     c00 = a11 * a22 - a12 * a12
     c01 = a02 * a12 - a01 * a22
     c02 = a01 * a12 - a02 * a11
-    scale = ONE / (a00 * c00 + a01 * c01 + a02 * c02)
+    scale = quotient(ONE, a00 * c00 + a01 * c01 + a02 * c02)
     P[INVERSE_00] = c00 * scale
     P[INVERSE_01] = c01 * scale
     P[INVERSE_02] = c02 * scale
