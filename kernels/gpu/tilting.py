@@ -65,41 +65,40 @@ FELT = 7
 vec4d = wp.types.vector(length=4, dtype=wp.float64)
 vec16d = wp.types.vector(length=16, dtype=wp.float64)
 
-SUM_UP = """
-#if defined(__CUDA_ARCH__)
-    // in each round a thread keeps half of its values and passes the other half to its partner, who keeps those
-    int width = 16;
-    int index = 0;
-    #pragma unroll
-    for (int half = COUNT / 2; half >= 1; half /= 2) {
-        const bool upper = (lane & width) != 0;
-        #pragma unroll
-        for (int k = 0; k < half; ++k) {
-            const double passed = upper ? x[k] : x[k + half];
-            const double kept = upper ? x[k + half] : x[k];
-            x[k] = kept + __shfl_xor_sync(0xffffffffu, passed, width);
-        }
-        index = 2 * index + (upper ? 1 : 0);
-        width /= 2;
-    }
-    double sum = x[0];
-    const int sharing = width;
-    #pragma unroll
-    for (; width >= 1; width /= 2) {
-        sum += __shfl_xor_sync(0xffffffffu, sum, width);
-    }
-    if ((lane & (2 * sharing - 1)) == 0) {
-        memory.data[(slot + index) * (block_dim / 32) + lane / 32] = sum;
-    }
-#else
-    for (int k = 0; k < COUNT; ++k) {
-        memory.data[(slot + k) * block_dim + lane] = x[k];
-    }
-#endif
-"""
+
+def sum_up_source(count: int) -> str:
+    """Source of a native function that sums ``count`` values of each thread, a power of two up to 16.
+
+    In each round a thread keeps half of its values and passes the other half to its partner, which keeps those: 16
+    exchanges for 16 values, where a sum of each value by itself takes 80. Exchanges are what such sums cost on a GPU.
+    The rounds are written out, because a loop over them would keep the values in local memory.
+    """
+    lines = ["#if defined(__CUDA_ARCH__)", "int index = 0;"]
+    half, width = count // 2, 16
+    while half:
+        lines.append(f"{{ const bool upper = (lane & {width}) != 0; index = 2 * index + (upper ? 1 : 0);")
+        for k in range(half):
+            mine, other = f"x[{k}]", f"x[{k + half}]"
+            passed = f"__shfl_xor_sync(0xffffffffu, upper ? {mine} : {other}, {width})"
+            lines.append(f"{mine} = (upper ? {other} : {mine}) + {passed};")
+        lines.append("}")
+        half, width = half // 2, width // 2
+    sharing = width
+    while width:
+        lines.append(f"x[0] += __shfl_xor_sync(0xffffffffu, x[0], {width});")
+        width //= 2
+    lines.append(
+        f"if ((lane & {2 * sharing - 1}) == 0) memory.data[(slot + index) * (block_dim / 32) + lane / 32] = x[0];"
+    )
+    lines += [
+        "#else",
+        f"for (int k = 0; k < {count}; ++k) memory.data[(slot + k) * block_dim + lane] = x[k];",
+        "#endif",
+    ]
+    return "\n" + "\n".join(lines) + "\n"
 
 
-@wp.func_native(SUM_UP.replace("COUNT", "4"))
+@wp.func_native(sum_up_source(4))
 def add_up_four(memory: wp.array(dtype=wp.float64), slot: int, lane: int, block_dim: int, x: vec4d):
     """Writes the sums of four values over each hardware warp, from ``slot`` on; a fiber is a warp of its own.
 
@@ -108,7 +107,7 @@ def add_up_four(memory: wp.array(dtype=wp.float64), slot: int, lane: int, block_
     ...
 
 
-@wp.func_native(SUM_UP.replace("COUNT", "16"))
+@wp.func_native(sum_up_source(16))
 def add_up_sixteen(memory: wp.array(dtype=wp.float64), slot: int, lane: int, block_dim: int, x: vec16d):
     """The same for sixteen values, which fibers have no memory for."""
     ...
