@@ -1,6 +1,7 @@
 """A worker process for each GPU: what each sees, what is refused; no GPU is needed for that."""
 
 import os
+import sys
 import time
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 import yaml
 
 from tests.run.test_sweep_run import TINY, data_of
+from tests.support.killed_processes import kill_often
 from warpchain.cli.main import main
 from warpchain.inputs.validation import InputError
 from warpchain.run.gpu_workers import gpu_workers, visible_gpus
@@ -84,3 +86,16 @@ def test_what_contradicts_gpus_is_refused(
     assert caught.value.code == 2
     assert message in capfd.readouterr().err
     assert not (tmp_path / "sweep").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="no sessions of processes")
+def test_workers_end_with_their_parent_however_it_dies(tmp_path: Path) -> None:
+    """Parents and workers are killed by SIGKILL and SIGTERM: five seconds later none of them runs, and no byte is lost.
+
+    More often: ``python -m tests.support.killed_processes --kills 50``.
+    """
+    counts = kill_often(8, tmp_path)
+    assert sum(count for text, count in counts.items() if text.endswith("no orphan")) == 8, counts
+    assert not any("orphan" in text and not text.endswith("no orphan") for text in counts), counts
+    assert counts["sweep resumed: equal bytes"] >= 1 and not counts["sweep resumed: OTHER BYTES"]
