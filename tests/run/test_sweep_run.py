@@ -21,7 +21,8 @@ from warpchain.inputs.setup import Setup
 from warpchain.run.single_walk import setup_walk
 from warpchain.run.sweep_run import run_shards, shard_size, sweep
 from warpchain.status import Status
-from warpchain.store.manifest import Manifest
+from warpchain.store.manifest import Manifest, read_manifest
+from warpchain.sweeps.block import Block
 from warpchain.sweeps.plan import load_sweep
 from warpchain.walks.scheduler import run_setups
 
@@ -340,3 +341,46 @@ def test_processors_are_those_of_this_process(monkeypatch: pytest.MonkeyPatch) -
     assert processors() == 7
     monkeypatch.setattr(os, "cpu_count", lambda: None)
     assert processors() == 1
+
+
+MANY = {
+    **{name: value for name, value in TINY.items() if name not in ("grid", "samples")},
+    "samples": 1,
+    "scene": BRIEF | {"links": 30},
+    "blocks": [{"name": f"b{number}", "scene": {"frequency": 5 + number / 10}} for number in range(150)],
+}
+"""A sweep of many blocks, each of one walk, and so with a task for each walk."""
+
+
+def test_a_task_checks_only_the_cells_of_its_walks(tmp_path, monkeypatch):
+    """Each of 150 tasks makes the setup of its own cell, is sent only its block and does not read sweep.json again."""
+    planned, made, sent, read = load_sweep(MANY), [], [], []
+    usual, usual_run, usual_read = Block.fixed_in, run_shards, read_manifest
+
+    def counted(block, cells):
+        for setup in usual(block, cells):
+            made.append(setup)
+            yield setup
+
+    def noted(part, *arguments):
+        sent.append(len(part.blocks))
+        before = len(made)
+        keys = usual_run(part, *arguments)
+        assert len(made) - before <= 2
+        return keys
+
+    monkeypatch.setattr(Block, "fixed_in", counted)
+    monkeypatch.setattr(runner, "run_shards", noted)
+    monkeypatch.setattr("warpchain.store.manifest.read_manifest", lambda folder: read.append(1) or usual_read(folder))
+    sweep(planned, tmp_path / "sweep", workers=1)
+    assert sent == [1] * 150 and len(read) <= 3
+    assert len(made) <= 10 * 150  # canonical forms, kinds of kernels, tasks
+
+
+def test_kernels_are_chosen_from_a_cell_of_each_kind():
+    """Cells that differ in what no kernel depends on are one kind; methods, links and starts make others."""
+    values = {"from": 1.0, "to": 9.0, "count": 100}
+    grid = {"links": [30, 44], "start": ["ellipse", "spinning"], "gravity": values, "frequency": [5, 9]}
+    planned = load_sweep(TINY | {"scene": {}, "samples": 1, "grid": grid})
+    kinds = {(setup.scene.links, setup.scene.start) for setup in runner.one_of_each_kind(planned)}
+    assert len(runner.one_of_each_kind(planned)) == len(kinds) == 4

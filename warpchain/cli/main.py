@@ -65,6 +65,12 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         if not isinstance(error, InputError):
             raise
         _refuse(error.args, FAILED if isinstance(error, DamagedFileError) else REFUSED)
+    except RuntimeError as error:
+        from warpchain.run.lost_workers import LostWorkersError
+
+        if not isinstance(error, LostWorkersError):
+            raise
+        _refuse([str(error)], FAILED)
     except KeyboardInterrupt:
         status = INTERRUPTED
     if status == INTERRUPTED:

@@ -1,5 +1,6 @@
 """What the command line shows and writes: progress, tables, and a folder with record and pictures."""
 
+import itertools
 import json
 import math
 import sys
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from warpchain.run.progress_bar import SweepProgress
     from warpchain.run.single_walk import Progress
     from warpchain.store.sweep_result import SweepResult
+
+_MOST_CELLS: Final = 1000
+"""Most cells of a sweep that a table lists; one of 100,000 would take minutes to lay out."""
 
 COMPILING: Final = "compiling kernels; later runs find them ready"
 
@@ -138,18 +142,24 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
         console.print(
             f"running: {rate:.2f} walks a second" + ("" if time_left is None else f", {_duration(time_left)} left")
         )
+    left = _MOST_CELLS
     for name, of_block in statistics.items():
+        if left == 0:
+            break
         table = Table(
             box=None, pad_edge=False, title=printable(name) if len(statistics) > 1 else None, title_justify="left"
         )
         for heading in (*map(printable, of_block.axes), "mean Δx / m", "s.d. / m", "at rest", "failed", "missing"):
             table.add_column(heading, justify="right")
-        for cell in np.ndindex(*of_block.mean.shape):
+        for cell in itertools.islice(np.ndindex(*of_block.mean.shape), left):
             place = [printable(str(values[index])) for values, index in zip(of_block.axes.values(), cell, strict=True)]
             lengths = [f"{array[cell]:.4f}" for array in (of_block.mean, of_block.sd)]
             walks = [str(array[cell]) for array in (of_block.count, of_block.failed, of_block.missing)]
             table.add_row(*place, *lengths, *walks)
         console.print(table)
+        left -= len(table.rows)
+    if more := sum(of_block.mean.size for of_block in statistics.values()) - _MOST_CELLS + left:
+        console.print(f"… and {more:,} more cells, which --json lists")
 
 
 def _plain(array: Any) -> Any:

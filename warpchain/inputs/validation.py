@@ -148,6 +148,10 @@ def validated(model: type[ModelT], values: Mapping[str, object], path: str) -> M
         raise InputError(_described(first, model, path) + count) from None
 
 
+_OWN: Final = frozenset((float, int, str, bool, type(None)))
+"""Python's own types; sweeps have millions of such values."""
+
+
 def plain(value: object, path: str = "value") -> Any:
     """A user's value in Python's own types, as a YAML file gives it; what is none of these is left as it is.
 
@@ -171,6 +175,8 @@ def plain(value: object, path: str = "value") -> Any:
     def converted(value: object, depth: int) -> Any:
         nonlocal left
         left -= 1
+        if type(value) in _OWN:
+            return value
         if isinstance(value, np.ndarray | list | tuple | range | Mapping) and depth > DEEPEST:
             raise InputError(f"{path}: more than {DEEPEST} lists or mappings inside of one another; give fewer")
         if isinstance(value, Mapping):

@@ -97,13 +97,13 @@ def _cells(result: SweepResult) -> str:
         found = block.statistics("dx")
         head = [with_unit(axis_symbol(name), unit_text(name)) for name in block.axes]
         head += ["mean Δx / m", "s.d. / m", "s.e. / m", "at rest", "failed"]
-        counts = [found.count, found.failed]
+        lengths, counts = [found.mean, found.sd, found.standard_error], [found.count, found.failed]
         if found.missing.any():
             head, counts = [*head, "not run yet"], [*counts, found.missing]
         rows = [
             [
                 *(_plain(value.item()) for value in cell_values(block.axes, place).values()),
-                *(_meters(float(values[place])) for values in (found.mean, found.sd, found.standard_error)),
+                *(_meters(float(values[place])) for values in lengths),
                 *(f"{values[place]}" for values in counts),
             ]
             for place in np.ndindex(*block.shape[:-1])

@@ -29,7 +29,7 @@ from warpchain.store.manifest import (
     NUMERICS_VERSION,
     Folder,
     Manifest,
-    read_manifest,
+    known_manifest,
     unreadable,
 )
 from warpchain.store.manifest_content import FORMAT, FORMAT_VERSION
@@ -81,7 +81,7 @@ def write_shard(
         InputError: the folder is not, or no longer, that of the sweep.
         ValueError: the rows or the motions are not those of the walks.
     """
-    manifest, name = read_manifest(directory), f"walks {places.start} to {places.stop - 1}"
+    manifest, name = known_manifest(directory), f"walks {places.start} to {places.stop - 1}"
     if (manifest.digest, manifest.numerics_version) != (digest, NUMERICS_VERSION):
         raise InputError(f"{directory}: belongs to another sweep now; these walks were not written")
     if places != manifest.shard_of(places.start):
