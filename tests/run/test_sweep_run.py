@@ -16,6 +16,7 @@ import yaml
 
 import warpchain
 import warpchain.run.sweep_run as runner
+from warpchain.cli.main import main
 from warpchain.engine.processors import processors
 from warpchain.inputs.setup import Setup
 from warpchain.run.single_walk import setup_walk
@@ -286,6 +287,47 @@ def test_a_dask_client_is_an_executor(tmp_path, uninterrupted):
         for name, executor in (("client", client), ("executor", client.get_executor())):
             sweep(TINY, tmp_path / name, executor=executor)
             assert data_of(tmp_path / name) == uninterrupted
+
+
+@pytest.mark.parametrize("address", ("tls://127.0.0.1:1", "ucx://127.0.0.1:1", "inproc://1", "http://a:1"))
+def test_a_scheduler_that_cannot_be_reached_is_refused(tmp_path, capsys, address):
+    """Whatever class of error Dask raises: one line, status 2, no folder."""
+    pytest.importorskip("distributed")
+    with pytest.raises(SystemExit) as caught:
+        main(["sweep", "quickstart", "-o", str(tmp_path / "sweep"), "--scheduler", address])
+    said = capsys.readouterr().err
+    assert caught.value.code == 2 and said.startswith(f"error: --scheduler: '{address}': ") and said.count("\n") == 1
+    assert not (tmp_path / "sweep").exists()
+
+
+@pytest.mark.slow
+def test_a_scheduler_may_be_closed_midway(tmp_path):
+    """The command ends in one line with status 1, and the shards that were written are kept."""
+    pytest.importorskip("distributed")
+    source, where, folder = tmp_path / "tiny.yaml", tmp_path / "scheduler.json", tmp_path / "sweep"
+    source.write_text(yaml.safe_dump(TINY | {"samples": 400}, sort_keys=False))
+    dask = [sys.executable, "-m", "dask"]
+    commands = [["scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]]
+    commands += [["worker", "--no-nanny", "--nthreads", "1", "--no-dashboard", "--local-directory", str(tmp_path)]]
+    processes = []
+    with (tmp_path / "dask.log").open("wb") as log:
+        try:
+            for command in commands:
+                command = [*dask, *command, "--scheduler-file", str(where)]
+                processes.append(subprocess.Popen(command, stdout=log, stderr=log))
+            address = wait_for_workers(where, 1)
+            command = [sys.executable, "-m", "warpchain", "sweep", str(source), "-o", str(folder)]
+            run = subprocess.Popen([*command, "--scheduler", address], stderr=subprocess.PIPE, encoding="utf-8")
+            while run.poll() is None and len(list((folder / "shards").glob("[0-9]*.h5"))) < 5:
+                time.sleep(0.05)
+            processes[0].kill()
+            _, said = run.communicate(timeout=60)
+        finally:
+            for process in reversed(processes):
+                process.kill()
+                process.wait()
+    assert run.returncode == 1 and said.startswith("error: the workers ended") and said.count("\n") == 1
+    assert len(data_of(folder)) >= 5
 
 
 def wait_for_workers(where: Path, count: int) -> str:

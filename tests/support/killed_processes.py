@@ -19,7 +19,7 @@ from typing import Any
 ROOT = Path(__file__).parents[2]
 PATIENCE = 5.0
 """Time [s] after which nothing of a killed parent may run any more."""
-LATEST = 8.0
+LATEST = 6.0
 """Latest moment of a kill [s] after the start of the parent, which takes about three to have its workers."""
 
 SWEEP: dict[str, Any] = {
@@ -27,7 +27,7 @@ SWEEP: dict[str, Any] = {
     "name": "killed",
     "seed": 7,
     "preset": "soft",
-    "samples": 300,
+    "samples": 150,
     "scene": {"start": "ellipse", "walk_limit": 0.01},
     "options": {"method": "dp5"},
     "grid": {"links": [30, 44], "frequency": [5, 15]},

@@ -261,9 +261,14 @@ def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[tuple[Execut
     Raises:
         InputError: there are not so many GPUs, Dask is not installed, or the scheduler does not answer.
     """
-    from warpchain.run.gpu_workers import gpu_workers
+    from warpchain.engine.devices import gpu_count
+    from warpchain.inputs.validation import InputError
+    from warpchain.run.gpu_workers import gpu_workers, visible_gpus
 
     if gpus is not None:
+        visible_gpus(gpus)
+        if gpus > (there := gpu_count()):
+            raise InputError(f"--gpus: {gpus} wanted, but this machine has {there}; give at most {there}")
         with gpu_workers(gpus) as executor:
             yield executor, gpus
     elif scheduler is not None:
