@@ -20,7 +20,8 @@ from warpchain.engine.tallies import LOST
 from warpchain.files import DISK_FAILURES, checked_output, failure, make_folder, remedy, remove_output
 from warpchain.inputs.validation import InputError, one_line, printable
 from warpchain.pictures.style import save_figure
-from warpchain.walks.walk_result import WalkResult
+from warpchain.run.progress_bar import counts_text
+from warpchain.walks.walk_result import ENERGY_REMEDY, MOST_ENERGY_ERROR, WalkResult
 
 if TYPE_CHECKING:
     from warpchain.run.progress_bar import SweepProgress
@@ -100,8 +101,8 @@ def sweep_progress_text(progress: "SweepProgress") -> str:
     if progress.compiling:
         return COMPILING
     left = "" if progress.time_left is None else f"   {_duration(progress.time_left)} left"
-    counts = ", ".join(f"{count} {label}" for label, count in sorted(progress.statuses.items()))
-    return f"{progress.done:,} of {progress.walks:,} walks   {progress.rate:.2f} a second{left}   {counts}"
+    rate = f"{progress.rate:.2f} a second{left}"
+    return f"{progress.done:,} of {progress.walks:,} walks   {rate}   {counts_text(progress)}"
 
 
 def _duration(seconds: float) -> str:
@@ -132,12 +133,15 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
             for name, of_block in statistics.items()
         }
         whole = {"name": result.name, "walks": result.walk_count, "statuses": summary}
+        whole["inaccurate"] = result.inaccurate_count
         whole |= {"rate": rate, "time_left": time_left, "blocks": blocks}
         print(json.dumps(whole, indent=2, allow_nan=False))
         return
     console = Console(highlight=False, markup=False)
     counts = ", ".join(f"{count:,} {label}" for label, count in summary.items() if count or label == "at_rest")
     console.print(f"{printable(result.name)}: {result.walk_count:,} walks, {counts}")
+    if inaccurate := result.inaccurate_count:
+        console.print(f"{inaccurate:,} inaccurate: {ENERGY_REMEDY}")
     if rate is not None:
         console.print(
             f"running: {rate:.2f} walks a second" + ("" if time_left is None else f", {_duration(time_left)} left")
@@ -207,6 +211,8 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
     left = energy["kinetic_at_end"] + energy["potential_at_end"]
     yield "energy at the end", f"{left:.5f} J, kinetic {energy['kinetic_at_end']:.5f} J"
     yield "unaccounted for", f"{energy['residual']:.1e} J"
+    if result.energy_error > MOST_ENERGY_ERROR:
+        yield "warning", ENERGY_REMEDY
 
 
 def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iterator[Path]:

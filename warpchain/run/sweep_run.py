@@ -15,6 +15,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from warpchain.engine.devices import start_device
 from warpchain.engine.kernel_choice import shared_threads
 from warpchain.engine.processors import processors
 from warpchain.inputs.keywords import OptionSettings, ParameterSettings, Preset, Sampler, SceneSettings, Whole
@@ -34,6 +35,7 @@ from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
 from warpchain.walks.motion import Motion
 from warpchain.walks.rows import fill_row, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
+from warpchain.walks.walk_result import MOST_ENERGY_ERROR
 
 SHARD_WALKS = 256
 """Most walks in a shard."""
@@ -206,6 +208,9 @@ def _run_in_folder(
     report: OnProgress,
 ) -> None:
     """Run what is missing in a folder."""
+    if executor is None:
+        for device in _devices(planned):
+            start_device(device)  # refuses one that is not there before anything is written
     at_once = workers or (GPU_WORKERS if _is_on_gpu(planned) else processors())
     with SweepFolder.open(folder, planned, fresh=fresh, shard_size=shard_size(planned.walk_count)) as store:
         missing = store.missing()
@@ -222,7 +227,7 @@ def _run_in_folder(
                 progress.compiling = False
                 with _threads(at_once) as (threads, stop):
                     _run(threads, stop, planned, store, missing, at_once, progress, report)
-        counts = counts_text(progress.statuses) or "nothing to do"
+        counts = counts_text(progress) or "nothing to do"
         store.log(f"complete after {progress.seconds:.1f} s: {counts}")
 
 
@@ -249,6 +254,12 @@ def on_device(planned: Sweep, device: str) -> Sweep:
 def _is_on_gpu(planned: Sweep) -> bool:
     """Whether all walks go to a GPU."""
     return all(str(block.sections["options"].get("device", "cpu")).startswith("cuda") for block in planned.blocks)
+
+
+def _devices(planned: Sweep) -> set[str]:
+    """Devices of all walks."""
+    given = [block.axes.get("device") or (block.sections["options"].get("device", "cpu"),) for block in planned.blocks]
+    return {str(device) for devices in given for device in devices}
 
 
 def shard_size(walks: int) -> int:
@@ -382,8 +393,9 @@ def _run(
                 task[:] = [shard for shard in task if shard not in there]
                 written += there
             for shard in written:
-                statuses = read_shard(store.directory, store.manifest, shard)["status"]
-                progress.statuses.update(Status(int(code)).label for code in statuses)
+                rows = read_shard(store.directory, store.manifest, shard)
+                progress.statuses.update(Status(int(code)).label for code in rows["status"])
+                progress.inaccurate += int((rows["energy_error"] > MOST_ENERGY_ERROR).sum())
                 progress.done += len(shard)
             progress.seconds = time.perf_counter() - began
             if written:

@@ -25,6 +25,7 @@ from warpchain.store.manifest import Folder, read_manifest
 from warpchain.store.manifest_content import FORMAT_VERSION
 from warpchain.store.walk_motion import MotionReader, WalkMotion
 from warpchain.walks.rows import COLUMNS, MISSING, Column, drawn_column, field_column, missing_rows, quantity_of
+from warpchain.walks.walk_result import MOST_ENERGY_ERROR
 
 if TYPE_CHECKING:
     import pandas
@@ -148,6 +149,12 @@ class BlockResult:
     def summary(self) -> dict[str, int]:
         """Number of walks by status label; `at_rest` and `missing` always, others if there are any."""
         return _summary(self.columns["status"])
+
+    @property
+    def inaccurate(self) -> NDArray[np.bool_]:
+        """Whether the energy error of a walk is above `MOST_ENERGY_ERROR`, shape `shape`."""
+        found: NDArray[np.bool_] = self.columns["energy_error"] > MOST_ENERGY_ERROR  # NaN is not
+        return found
 
     def statistics(self, name: str = "dx") -> CellStatistics:
         """Statistics of a column in each cell.
@@ -276,6 +283,11 @@ class SweepResult:
     def summary(self) -> dict[str, int]:
         """Number of walks by status label; `at_rest` and `missing` always, others if there are any."""
         return _summary(np.concatenate([block.columns["status"].ravel() for block in self.blocks.values()]))
+
+    @property
+    def inaccurate_count(self) -> int:
+        """Number of walks whose energy error is above 5 %, whatever their status."""
+        return sum(int(block.inaccurate.sum()) for block in self.blocks.values())
 
     def unit(self, name: str) -> str:
         """SI unit of a column or an axis of any block, "1" for pure numbers.

@@ -53,6 +53,23 @@ ENERGIES: Final = {
 }
 """Keys of `WalkResult.energy`. Losses count as positive."""
 
+ENERGY_ERROR: Final = "size of the energy unaccounted for, |residual|, relative to kinetic and potential at release"
+MOST_ENERGY_ERROR: Final = 0.05
+"""Greatest energy error of a walk that nothing warns of."""
+ENERGY_REMEDY: Final = (
+    f"more than {100 * MOST_ENERGY_ERROR:g} % of the energy at release is unaccounted for; lower options.tolerance"
+)
+
+
+def energy_error(energy: Mapping[str, float]) -> float:
+    """Size of the energy unaccounted for, relative to the energy at release, kinetic and potential; NaN before it.
+
+    Args:
+        energy: the ledger [J], with the keys `ENERGIES`.
+    """
+    at_release = energy["kinetic_at_release"] + energy["potential_at_release"]
+    return abs(energy["residual"]) / at_release if at_release > 0 else math.nan
+
 
 @dataclass(frozen=True)
 class Stored:
@@ -219,11 +236,17 @@ class WalkResult(Drawn):
 
     def __repr__(self) -> str:
         """One line with the most important numbers."""
-        scene = self.setup.scene
+        scene, error = self.setup.scene, self.energy_error
+        warning = f", energy error {error:.1e}" if error > MOST_ENERGY_ERROR else ""
         return (
             f"<WalkResult {self.status.label}: dx {self.dx:.4g} m in {self.walk_time:.4g} s, "
-            f"{self.bounces} bounces, {scene.links} links at {scene.frequency:g} Hz, {self.setup.preset}>"
+            f"{self.bounces} bounces, {scene.links} links at {scene.frequency:g} Hz, {self.setup.preset}{warning}>"
         )
+
+    @property
+    def energy_error(self) -> float:
+        """Size of the energy unaccounted for, relative to the energy at release; above 0.05 the walk is inaccurate."""
+        return energy_error(self.energy)
 
     def facts(self) -> list[tuple[str, str]]:
         """Names and values that a notebook shows beside the picture."""
@@ -234,6 +257,7 @@ class WalkResult(Drawn):
             ("bounces", str(self.bounces)),
             ("steps", f"{self.steps_accepted:,} accepted, {self.steps_rejected:,} rejected"),
             ("energy unaccounted for", f"{self.energy['residual']:.1e} J"),
+            *([("warning", ENERGY_REMEDY)] if self.energy_error > MOST_ENERGY_ERROR else []),
             ("computed in", f"{self.wall_time:.1f} s"),
         ]
 
@@ -246,6 +270,7 @@ class WalkResult(Drawn):
                 "status": self.status.label,
                 "status_sentence": self.status.sentence,
                 **summary,
+                "energy_error": self.energy_error,
                 **_setup_as_dict(self.setup),
                 "seed": self.seed,
                 "versions": self.versions,
