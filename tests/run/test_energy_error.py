@@ -13,7 +13,7 @@ from warpchain.cli.terminal import print_walk
 from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.sweep_run import sweep
 from warpchain.store.sweep_result import load
-from warpchain.walks.walk_result import ENERGY_REMEDY, energy_error
+from warpchain.walks.energy_error import ENERGY_REMEDY, energy_error
 
 COARSE = {
     "grid": {"tolerance": [1e-1, 1e-6]},

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
+PS = ["ps", "-eww", "-o"]
 PATIENCE = 5.0
 """Time [s] after which nothing of a killed parent may run any more."""
 LATEST = 6.0

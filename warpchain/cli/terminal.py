@@ -21,7 +21,8 @@ from warpchain.files import DISK_FAILURES, checked_output, failure, make_folder,
 from warpchain.inputs.validation import InputError, one_line, printable
 from warpchain.pictures.style import save_figure
 from warpchain.run.progress_bar import counts_text
-from warpchain.walks.walk_result import ENERGY_REMEDY, MOST_ENERGY_ERROR, WalkResult
+from warpchain.walks.energy_error import ENERGY_REMEDY, MOST_ENERGY_ERROR
+from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
     from warpchain.run.progress_bar import SweepProgress

@@ -26,8 +26,8 @@ from warpchain.store.sweep_result import BlockResult, SweepResult, load
 from warpchain.sweeps.plan import load_sweep
 from warpchain.sweeps.recording import Recording
 from warpchain.version import VERSION
+from warpchain.walks.energy_error import ENERGY_REMEDY
 from warpchain.walks.rows import MISSING, field_column
-from warpchain.walks.walk_result import ENERGY_REMEDY
 
 FRAME_INTERVAL: Final = 2e-3
 """Time between two frames of the walk in motion [s]."""

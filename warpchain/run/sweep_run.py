@@ -32,10 +32,10 @@ from warpchain.store.manifest import Manifest, known_manifest
 from warpchain.store.shards import read_shard, shard_name, write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
+from warpchain.walks.energy_error import MOST_ENERGY_ERROR
 from warpchain.walks.motion import Motion
 from warpchain.walks.rows import fill_row, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
-from warpchain.walks.walk_result import MOST_ENERGY_ERROR
 
 SHARD_WALKS = 256
 """Most walks in a shard."""

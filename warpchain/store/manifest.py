@@ -166,7 +166,7 @@ class Manifest:
         """The parts of all generations, in the order of their places."""
         return list(itertools.chain(*self._parts))
 
-    def _overlaps(self, places: range) -> Iterator[tuple[_Part, range]]:
+    def overlaps(self, places: range) -> Iterator[tuple[_Part, range]]:
         """The parts that hold some places, each with those of the places that it holds."""
         parts = self._parts_in_order
         first = max(0, bisect.bisect_right(parts, places.start, key=lambda part: part.places.start) - 1)
@@ -179,7 +179,7 @@ class Manifest:
     def walks(self, places: range) -> NDArray[np.int64]:
         """Numbers of the walks at some places, shape (len(places),)."""
         found = np.empty(len(places), np.int64)
-        for part, here in self._overlaps(places):
+        for part, here in self.overlaps(places):
             cell, added = np.divmod(np.arange(here.start, here.stop) - part.places.start, len(part.samples))
             numbers = part.block.first + cell * part.block.samples + part.samples.start + added
             found[here.start - places.start : here.stop - places.start] = numbers
@@ -216,7 +216,7 @@ class Manifest:
     def kept(self, places: range) -> list[int]:
         """Those of some places whose walks have their motion kept."""
         found = []
-        for part, here in self._overlaps(places):
+        for part, here in self.overlaps(places):
             kept = self._kept_samples(part.block)
             added = part.samples
             found += [place for place in here if added[(place - part.places.start) % len(added)] in kept]

@@ -24,8 +24,8 @@ from warpchain.store.folder import read_rows
 from warpchain.store.manifest import Folder, read_manifest
 from warpchain.store.manifest_content import FORMAT_VERSION
 from warpchain.store.walk_motion import MotionReader, WalkMotion
+from warpchain.walks.energy_error import MOST_ENERGY_ERROR
 from warpchain.walks.rows import COLUMNS, MISSING, Column, drawn_column, field_column, missing_rows, quantity_of
-from warpchain.walks.walk_result import MOST_ENERGY_ERROR
 
 if TYPE_CHECKING:
     import pandas

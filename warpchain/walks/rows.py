@@ -11,7 +11,8 @@ from warpchain.engine.tallies import CONTACTS, LOST
 from warpchain.inputs.distributions import DRAWABLE
 from warpchain.inputs.sections import SECTION_OF, SECTIONS
 from warpchain.inputs.validation import field_unit
-from warpchain.walks.walk_result import ENERGY_ERROR, MOST_ENERGY_ERROR, STORED, energy_error
+from warpchain.walks.energy_error import ENERGY_ERROR, MOST_ENERGY_ERROR, energy_error
+from warpchain.walks.walk_result import STORED
 
 Rows = NDArray[np.void]
 

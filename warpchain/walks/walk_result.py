@@ -31,6 +31,7 @@ from warpchain.inputs.validation import InputError
 from warpchain.loop.before_release import BeforeRelease, is_ascending, read_before_release, write_before_release
 from warpchain.status import Status
 from warpchain.walks.drawn import Drawn
+from warpchain.walks.energy_error import ENERGY_REMEDY, MOST_ENERGY_ERROR, energy_error
 from warpchain.walks.moving_plane import in_room
 
 if TYPE_CHECKING:
@@ -52,23 +53,6 @@ ENERGIES: Final = {
     "residual": "energy at release, less that at the end and all losses: the error of the integration",
 }
 """Keys of `WalkResult.energy`. Losses count as positive."""
-
-ENERGY_ERROR: Final = "size of the energy unaccounted for, |residual|, relative to kinetic and potential at release"
-MOST_ENERGY_ERROR: Final = 0.05
-"""Greatest energy error of a walk that nothing warns of."""
-ENERGY_REMEDY: Final = (
-    f"more than {100 * MOST_ENERGY_ERROR:g} % of the energy at release is unaccounted for; lower options.tolerance"
-)
-
-
-def energy_error(energy: Mapping[str, float]) -> float:
-    """Size of the energy unaccounted for, relative to the energy at release, kinetic and potential; NaN before it.
-
-    Args:
-        energy: the ledger [J], with the keys `ENERGIES`.
-    """
-    at_release = energy["kinetic_at_release"] + energy["potential_at_release"]
-    return abs(energy["residual"]) / at_release if at_release > 0 else math.nan
 
 
 @dataclass(frozen=True)
