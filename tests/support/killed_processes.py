@@ -48,14 +48,18 @@ if __name__ == "__main__":
 
 def processes_of(session: int) -> list[int]:
     """Numbers of the processes of a session that run: all that its first one has started."""
-    listing = subprocess.run(["ps", "-eww", "-o", "pid=,sess=,stat="], capture_output=True, check=True, text=True).stdout
+    listing = subprocess.run(
+        ["ps", "-eww", "-o", "pid=,sess=,stat="], capture_output=True, check=True, text=True
+    ).stdout
     rows = (line.split() for line in listing.splitlines())
     return [int(pid) for pid, owner, state in rows if int(owner) == session and not state.startswith("Z")]
 
 
 def workers_of(parent: int) -> list[int]:
     """The worker processes of a parent that run."""
-    listing = subprocess.run(["ps", "-eww", "-o", "pid=,ppid=,args="], capture_output=True, check=True, text=True).stdout
+    listing = subprocess.run(
+        ["ps", "-eww", "-o", "pid=,ppid=,args="], capture_output=True, check=True, text=True
+    ).stdout
     rows = (line.split(maxsplit=2) for line in listing.splitlines())
     return [int(pid) for pid, owner, command in rows if int(owner) == parent and "spawn_main" in command]
 

@@ -140,8 +140,10 @@ def validated(model: type[ModelT], values: Mapping[str, object], path: str) -> M
     Raises:
         InputError: some value is refused; the first is described, the others are counted.
     """
+    few = len(values) <= 2 * len(model.model_fields)
+    own = few and all(type(name) is str and type(value) in _OWN for name, value in values.items())
     try:
-        return model.model_validate(plain(values, path))
+        return model.model_validate(dict(values) if own else plain(values, path))
     except ValidationError as error:
         first, *others = error.errors()
         count = f" (and {len(others)} more)" if others else ""
