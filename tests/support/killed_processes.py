@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
-PS = ["ps", "-eww", "-o"]
 PATIENCE = 5.0
 """Time [s] after which nothing of a killed parent may run any more."""
 LATEST = 6.0
@@ -44,6 +43,12 @@ if __name__ == "__main__":
     with gpu_workers(2) as executor:
         sweep(SWEEP, sys.argv[1], executor=executor, workers=2)
 """
+
+
+def _listed(columns: str) -> list[str]:
+    """Some columns of all processes, as wide as they are."""
+    listing = subprocess.run(["ps", "-eww", "-o", columns], capture_output=True, check=True, text=True)
+    return listing.stdout.splitlines()
 
 
 def processes_of(session: int) -> list[int]:
