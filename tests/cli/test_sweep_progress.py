@@ -9,12 +9,14 @@ import pytest
 import yaml
 
 from tests.run.test_sweep_run import TINY
-from tests.support.synthetic_sweep import SWEEP, synthetic_rows, write
+from tests.support import synthetic_sweep
+from tests.support.synthetic_sweep import SWEEP, SyntheticSweep, synthetic_rows, write
 from warpchain.cli import sweep_commands
 from warpchain.cli.main import main
 from warpchain.engine.batch import Batch
 from warpchain.run.single_walk import walk
 from warpchain.store.folder import SweepFolder
+from warpchain.store.manifest import BlockLayout
 
 
 def run(*arguments: str) -> None:
@@ -74,3 +76,16 @@ def test_the_time_of_a_walk_is_without_compilation(monkeypatch: pytest.MonkeyPat
     result = walk(preset="soft", **settings)
     assert time.perf_counter() - began > 3.0
     assert 0 < result.wall_time < 2.5
+
+
+def test_info_lists_a_thousand_cells_at_most(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The table of more cells ends with a line that counts the others; JSON has them all."""
+    wide = SyntheticSweep(
+        blocks=(BlockLayout("main", {"gravity": tuple(map(float, range(1, 1201)))}, 1, 0, ("phase",)),)
+    )
+    synthetic_sweep.run(tmp_path, wide, shard_size=1200)
+    run("info", str(tmp_path))
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 1003 and lines[-1] == "… and 200 more cells, which --json lists"
+    run("info", str(tmp_path), "--json")
+    assert len(json.loads(capsys.readouterr().out)["blocks"]["main"]["dx"]["mean"]) == 1200

@@ -16,12 +16,14 @@ import yaml
 
 import warpchain
 import warpchain.run.sweep_run as runner
+from warpchain.cli.main import main
 from warpchain.engine.processors import processors
 from warpchain.inputs.setup import Setup
 from warpchain.run.single_walk import setup_walk
 from warpchain.run.sweep_run import run_shards, shard_size, sweep
 from warpchain.status import Status
-from warpchain.store.manifest import Manifest
+from warpchain.store.manifest import Manifest, read_manifest
+from warpchain.sweeps.block import Block
 from warpchain.sweeps.plan import load_sweep
 from warpchain.walks.scheduler import run_setups
 
@@ -287,6 +289,47 @@ def test_a_dask_client_is_an_executor(tmp_path, uninterrupted):
             assert data_of(tmp_path / name) == uninterrupted
 
 
+@pytest.mark.parametrize("address", ("tls://127.0.0.1:1", "ucx://127.0.0.1:1", "inproc://1", "http://a:1"))
+def test_a_scheduler_that_cannot_be_reached_is_refused(tmp_path, capsys, address):
+    """Whatever class of error Dask raises: one line, status 2, no folder."""
+    pytest.importorskip("distributed")
+    with pytest.raises(SystemExit) as caught:
+        main(["sweep", "quickstart", "-o", str(tmp_path / "sweep"), "--scheduler", address])
+    said = capsys.readouterr().err
+    assert caught.value.code == 2 and said.startswith(f"error: --scheduler: '{address}': ") and said.count("\n") == 1
+    assert not (tmp_path / "sweep").exists()
+
+
+@pytest.mark.slow
+def test_a_scheduler_may_be_closed_midway(tmp_path):
+    """The command ends in one line with status 1, and the shards that were written are kept."""
+    pytest.importorskip("distributed")
+    source, where, folder = tmp_path / "tiny.yaml", tmp_path / "scheduler.json", tmp_path / "sweep"
+    source.write_text(yaml.safe_dump(TINY | {"samples": 400}, sort_keys=False))
+    dask = [sys.executable, "-m", "dask"]
+    commands = [["scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]]
+    commands += [["worker", "--no-nanny", "--nthreads", "1", "--no-dashboard", "--local-directory", str(tmp_path)]]
+    processes = []
+    with (tmp_path / "dask.log").open("wb") as log:
+        try:
+            for command in commands:
+                command = [*dask, *command, "--scheduler-file", str(where)]
+                processes.append(subprocess.Popen(command, stdout=log, stderr=log))
+            address = wait_for_workers(where, 1)
+            command = [sys.executable, "-m", "warpchain", "sweep", str(source), "-o", str(folder)]
+            run = subprocess.Popen([*command, "--scheduler", address], stderr=subprocess.PIPE, encoding="utf-8")
+            while run.poll() is None and len(list((folder / "shards").glob("[0-9]*.h5"))) < 5:
+                time.sleep(0.05)
+            processes[0].kill()
+            _, said = run.communicate(timeout=60)
+        finally:
+            for process in reversed(processes):
+                process.kill()
+                process.wait()
+    assert run.returncode == 1 and said.startswith("error: the workers ended") and said.count("\n") == 1
+    assert len(data_of(folder)) >= 5
+
+
 def wait_for_workers(where: Path, count: int) -> str:
     """Address of the scheduler whose file is there, or soon will be, once it has so many workers."""
     from distributed import Client
@@ -340,3 +383,46 @@ def test_processors_are_those_of_this_process(monkeypatch: pytest.MonkeyPatch) -
     assert processors() == 7
     monkeypatch.setattr(os, "cpu_count", lambda: None)
     assert processors() == 1
+
+
+MANY = {
+    **{name: value for name, value in TINY.items() if name not in ("grid", "samples")},
+    "samples": 1,
+    "scene": BRIEF | {"links": 30},
+    "blocks": [{"name": f"b{number}", "scene": {"frequency": 5 + number / 10}} for number in range(150)],
+}
+"""A sweep of many blocks, each of one walk, and so with a task for each walk."""
+
+
+def test_a_task_checks_only_the_cells_of_its_walks(tmp_path, monkeypatch):
+    """Each of 150 tasks makes the setup of its own cell, is sent only its block and does not read sweep.json again."""
+    planned, made, sent, read = load_sweep(MANY), [], [], []
+    usual, usual_run, usual_read = Block.fixed_in, run_shards, read_manifest
+
+    def counted(block, cells):
+        for setup in usual(block, cells):
+            made.append(setup)
+            yield setup
+
+    def noted(part, *arguments):
+        sent.append(len(part.blocks))
+        before = len(made)
+        keys = usual_run(part, *arguments)
+        assert len(made) - before <= 2
+        return keys
+
+    monkeypatch.setattr(Block, "fixed_in", counted)
+    monkeypatch.setattr(runner, "run_shards", noted)
+    monkeypatch.setattr("warpchain.store.manifest.read_manifest", lambda folder: read.append(1) or usual_read(folder))
+    sweep(planned, tmp_path / "sweep", workers=1)
+    assert sent == [1] * 150 and len(read) <= 3
+    assert len(made) <= 10 * 150  # canonical forms, kinds of kernels, tasks
+
+
+def test_kernels_are_chosen_from_a_cell_of_each_kind():
+    """Cells that differ in what no kernel depends on are one kind; methods, links and starts make others."""
+    values = {"from": 1.0, "to": 9.0, "count": 100}
+    grid = {"links": [30, 44], "start": ["ellipse", "spinning"], "gravity": values, "frequency": [5, 9]}
+    planned = load_sweep(TINY | {"scene": {}, "samples": 1, "grid": grid})
+    kinds = {(setup.scene.links, setup.scene.start) for setup in runner.one_of_each_kind(planned)}
+    assert len(runner.one_of_each_kind(planned)) == len(kinds) == 4

@@ -81,6 +81,7 @@ def fill_row(walk: PlannedWalk, outcome: "float | Status", rows: Rows) -> None:
         elif name not in ("index", "status", "dx"):
             rows[name] = 7
     rows["dx"] = math.nan if failed else outcome
+    rows["energy_error"] = 1e-4
 
 
 def make_sweep(folder: Path, content: Mapping[str, object], outcome: Outcome = distance) -> SweepResult:

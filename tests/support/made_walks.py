@@ -49,7 +49,7 @@ def make_walk(links: int = 30, **changes: Any) -> WalkResult:
         "impulses": dict(zip(CONTACTS, (5, 7, 11), strict=True)),
         "greatest_opening": 1.1e-5,
         "greatest_penetration": dict(zip(CONTACTS, (1e-5, 0.0, 2e-5), strict=True)),
-        "energy": {key: 0.1 * number for number, key in enumerate(ENERGIES)},
+        "energy": {key: 0.1 * number for number, key in enumerate(ENERGIES)} | {"residual": 1e-6},
         "sprocket_center": np.array([0.0, 0.1]),
         "sprocket_radius": 0.0556,
         "setup": resolve("soft", scene={"links": links}, options={"method": "dp5"}, parameters={"floor_friction": 0.3}),

@@ -30,7 +30,7 @@ def test_columns_of_a_row() -> None:
         *("penetration_floor", "penetration_sprocket", "penetration_self", "energy_at_release"),
         *("loss_joint_friction", "loss_joint_damping", "loss_floor", "loss_self_contact", "loss_softening"),
         "loss_joint_switch",
-        "energy_residual",
+        *("energy_residual", "energy_error"),
     )
     assert ROW.itemsize == sum(ROW[name].itemsize for name in ROW.names)
     one, other = row_type(["clearance", "phase", "link_length"]), row_type(["link_length", "clearance", "phase"])

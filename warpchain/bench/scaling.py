@@ -29,7 +29,7 @@ from warpchain.files import checked_output, make_folder, write_whole
 from warpchain.inputs.validation import InputError
 from warpchain.run.gpu_workers import GpuWorkers, gpu_workers
 from warpchain.run.progress_bar import SweepProgress
-from warpchain.run.sweep_run import one_of_each_cell, prepare
+from warpchain.run.sweep_run import one_of_each_kind, prepare
 from warpchain.run.sweep_run import sweep as run_sweep
 from warpchain.status import Status
 from warpchain.store.folder import read_rows
@@ -248,7 +248,7 @@ def _costs(done: Sequence[_Measured]) -> list[PlaceCost]:
         rows = runs[0].rows
         seconds = statistics.median(run.seconds for run in runs)
         rate = len(rows) / seconds
-        options = {setup.options for setup in one_of_each_cell(sweep)}
+        options = {setup.options for setup in one_of_each_kind(sweep)}
         costs.append(
             PlaceCost(
                 name=place.name,

@@ -20,6 +20,7 @@ import typer
 from warpchain.cli import completions
 from warpchain.cli.bench_commands import bench_app
 from warpchain.cli.input_commands import parameters, schema
+from warpchain.cli.interrupts import INTERRUPTED, interrupts_heard
 from warpchain.cli.output_paths import output_path
 from warpchain.cli.sweep_commands import FAILED, add_commands
 from warpchain.cli.walk_commands import animate, setup_like
@@ -31,8 +32,7 @@ if TYPE_CHECKING:
     from warpchain.inputs.setup import Setup
 
 REFUSED: Final = 2
-INTERRUPTED: Final = 130
-"""Exit statuses beside `FAILED`; typer makes the last one of Ctrl-C."""
+"""Exit status beside `FAILED` and `INTERRUPTED`."""
 
 Sections = dict[str, dict[str, object]]
 
@@ -50,26 +50,37 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     for word in sys.argv[1:] if arguments is None else arguments:
         if not is_possible(word):
             _refuse([f"{ascii(word)[:100]}: has a NUL or a lone surrogate; leave it out"])
-    try:
-        with _warnings_on_one_line():
-            status = app(arguments, prog_name="warpchain", standalone_mode=False)
-    except typer.TyperException as error:
+    with interrupts_heard() as heard:
+        try:
+            with _warnings_on_one_line():
+                status = app(arguments, prog_name="warpchain", standalone_mode=False)
+        except KeyboardInterrupt:
+            status = INTERRUPTED
+        except Exception as error:
+            if not heard():  # else a library made another error of it
+                _refuse_for(error)
+                raise
+            status = INTERRUPTED
+        if status == INTERRUPTED:
+            print("interrupted", file=sys.stderr)
+    sys.exit(status)
+
+
+def _refuse_for(error: Exception) -> None:
+    """Print what was refused or failed, and exit; return if the error is a defect of the program."""
+    from warpchain.inputs.validation import DamagedFileError, InputError
+    from warpchain.run.lost_workers import LostWorkersError
+
+    if isinstance(error, typer.TyperException):
         context = getattr(error, "ctx", None)
         command = context.command_path if context is not None else "warpchain"
         _refuse([f"{error.format_message().rstrip('.')}; see {command} --help"], error.exit_code)
-    except OSError as error:
+    if isinstance(error, OSError):
         _refuse([str(error)], FAILED if error.errno in DISK_FAILURES else REFUSED)
-    except ValueError as error:
-        from warpchain.inputs.validation import DamagedFileError, InputError
-
-        if not isinstance(error, InputError):
-            raise
+    if isinstance(error, InputError):
         _refuse(error.args, FAILED if isinstance(error, DamagedFileError) else REFUSED)
-    except KeyboardInterrupt:
-        status = INTERRUPTED
-    if status == INTERRUPTED:
-        print("interrupted", file=sys.stderr)
-    sys.exit(status)
+    if isinstance(error, LostWorkersError):
+        _refuse([str(error)], FAILED)
 
 
 @contextlib.contextmanager

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import logging
 import os
 import sys
 from collections.abc import Iterator
@@ -260,16 +261,31 @@ def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[tuple[Execut
     Raises:
         InputError: there are not so many GPUs, Dask is not installed, or the scheduler does not answer.
     """
-    from warpchain.run.gpu_workers import gpu_workers
+    from warpchain.engine.devices import gpu_count
+    from warpchain.inputs.validation import InputError
+    from warpchain.run.gpu_workers import gpu_workers, visible_gpus
 
     if gpus is not None:
+        visible_gpus(gpus)
+        if gpus > (there := gpu_count()):
+            raise InputError(f"--gpus: {gpus} wanted, but this machine has {there}; give at most {there}")
         with gpu_workers(gpus) as executor:
             yield executor, gpus
     elif scheduler is not None:
-        with _dask_client(scheduler) as client:
+        with _without_logs(), _dask_client(scheduler) as client:
             yield client, None
     else:
         yield None, None
+
+
+@contextlib.contextmanager
+def _without_logs() -> Iterator[None]:
+    """Keep tracebacks that Dask logs off the terminal: what is wrong is said in one line."""
+    logging.disable(logging.ERROR)
+    try:
+        yield
+    finally:
+        logging.disable(logging.NOTSET)
 
 
 def _dask_client(address: str) -> Any:
@@ -281,8 +297,9 @@ def _dask_client(address: str) -> Any:
         raise InputError("--scheduler: Dask is not installed; pip install 'warpchain[dask]'") from None
     try:
         return Client(address, timeout=10)  # type: ignore[no-untyped-call]
-    except (OSError, ValueError) as error:
-        raise InputError(f"--scheduler: {shown(address)}: {error}; give the address of a running scheduler") from None
+    except Exception as error:  # of any class, by protocol: tls and ucx without their settings give a TypeError
+        problem = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(f"--scheduler: {shown(address)}: {problem}; give the address of a running scheduler") from None
 
 
 def _note_failures(result: "SweepResult") -> None:

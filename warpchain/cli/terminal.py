@@ -1,5 +1,6 @@
 """What the command line shows and writes: progress, tables, and a folder with record and pictures."""
 
+import itertools
 import json
 import math
 import sys
@@ -19,12 +20,17 @@ from warpchain.engine.tallies import LOST
 from warpchain.files import DISK_FAILURES, checked_output, failure, make_folder, remedy, remove_output
 from warpchain.inputs.validation import InputError, one_line, printable
 from warpchain.pictures.style import save_figure
+from warpchain.run.progress_bar import counts_text
+from warpchain.walks.energy_error import ENERGY_REMEDY, MOST_ENERGY_ERROR
 from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
     from warpchain.run.progress_bar import SweepProgress
     from warpchain.run.single_walk import Progress
     from warpchain.store.sweep_result import SweepResult
+
+_MOST_CELLS: Final = 1000
+"""Most cells of a sweep that a table lists; one of 100,000 would take minutes to lay out."""
 
 COMPILING: Final = "compiling kernels; later runs find them ready"
 
@@ -96,8 +102,8 @@ def sweep_progress_text(progress: "SweepProgress") -> str:
     if progress.compiling:
         return COMPILING
     left = "" if progress.time_left is None else f"   {_duration(progress.time_left)} left"
-    counts = ", ".join(f"{count} {label}" for label, count in sorted(progress.statuses.items()))
-    return f"{progress.done:,} of {progress.walks:,} walks   {progress.rate:.2f} a second{left}   {counts}"
+    rate = f"{progress.rate:.2f} a second{left}"
+    return f"{progress.done:,} of {progress.walks:,} walks   {rate}   {counts_text(progress)}"
 
 
 def _duration(seconds: float) -> str:
@@ -128,28 +134,37 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
             for name, of_block in statistics.items()
         }
         whole = {"name": result.name, "walks": result.walk_count, "statuses": summary}
+        whole["inaccurate"] = result.inaccurate_count
         whole |= {"rate": rate, "time_left": time_left, "blocks": blocks}
         print(json.dumps(whole, indent=2, allow_nan=False))
         return
     console = Console(highlight=False, markup=False)
     counts = ", ".join(f"{count:,} {label}" for label, count in summary.items() if count or label == "at_rest")
     console.print(f"{printable(result.name)}: {result.walk_count:,} walks, {counts}")
+    if inaccurate := result.inaccurate_count:
+        console.print(f"{inaccurate:,} inaccurate: {ENERGY_REMEDY}")
     if rate is not None:
         console.print(
             f"running: {rate:.2f} walks a second" + ("" if time_left is None else f", {_duration(time_left)} left")
         )
+    left = _MOST_CELLS
     for name, of_block in statistics.items():
+        if left == 0:
+            break
         table = Table(
             box=None, pad_edge=False, title=printable(name) if len(statistics) > 1 else None, title_justify="left"
         )
         for heading in (*map(printable, of_block.axes), "mean Δx / m", "s.d. / m", "at rest", "failed", "missing"):
             table.add_column(heading, justify="right")
-        for cell in np.ndindex(*of_block.mean.shape):
+        for cell in itertools.islice(np.ndindex(*of_block.mean.shape), left):
             place = [printable(str(values[index])) for values, index in zip(of_block.axes.values(), cell, strict=True)]
             lengths = [f"{array[cell]:.4f}" for array in (of_block.mean, of_block.sd)]
             walks = [str(array[cell]) for array in (of_block.count, of_block.failed, of_block.missing)]
             table.add_row(*place, *lengths, *walks)
         console.print(table)
+        left -= len(table.rows)
+    if more := sum(of_block.mean.size for of_block in statistics.values()) - _MOST_CELLS + left:
+        console.print(f"… and {more:,} more cells, which --json lists")
 
 
 def _plain(array: Any) -> Any:
@@ -197,6 +212,8 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
     left = energy["kinetic_at_end"] + energy["potential_at_end"]
     yield "energy at the end", f"{left:.5f} J, kinetic {energy['kinetic_at_end']:.5f} J"
     yield "unaccounted for", f"{energy['residual']:.1e} J"
+    if result.energy_error > MOST_ENERGY_ERROR:
+        yield "warning", ENERGY_REMEDY
 
 
 def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iterator[Path]:

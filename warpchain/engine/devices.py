@@ -47,6 +47,16 @@ def start_device(device: str) -> wp.Device:
     return wp.get_device(name)
 
 
+def gpu_count() -> int:
+    """Number of GPUs that this process may use, from 1 on.
+
+    Raises:
+        InputError: There is none.
+    """
+    start_device("cuda")
+    return int(wp.get_cuda_device_count())
+
+
 @contextlib.contextmanager
 def _without_driver_warning() -> Iterator[None]:
     """Remove the line about a missing NVIDIA driver from what Warp's native code writes to stderr.

@@ -158,15 +158,15 @@ def placed(distributions: Mapping[str, Distribution], setup: Setup) -> dict[str,
         distributions: name, one of `DRAWABLE` → distribution.
         setup: the chain's values.
     """
-    complete = {}
+    complete: dict[str, Distribution] = {}
     for name, distribution in distributions.items():
         if isinstance(distribution, Gaussian) and distribution.mean is None:
             value = getattr(getattr(setup, SECTION_OF[name]), name)
-            distribution = replace(distribution, mean=float(value))
-        if name == "link_length" and "circle_radius" not in distributions:
-            room = Bounds(2 * setup.parameters.circle_radius, lower_included=False)
-            distribution = replace(distribution, bounds=room)
+            distribution = Gaussian(float(value), distribution.sigma, distribution.bounds)
         complete[name] = distribution
+    if "link_length" in distributions and "circle_radius" not in distributions:
+        room = Bounds(2 * setup.parameters.circle_radius, lower_included=False)
+        complete["link_length"] = replace(complete["link_length"], bounds=room)
     return complete
 
 

@@ -13,7 +13,7 @@ from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import Scene, check_links_on_gpu, check_scene
-from warpchain.inputs.sections import SECTIONS, by_name, by_section
+from warpchain.inputs.sections import SECTION_OF, SECTIONS, by_name
 from warpchain.inputs.validation import InputError, shown, suggestion, validated
 from warpchain.inputs.yaml_files import read_yaml
 from warpchain.kernels.methods.method import find_method
@@ -47,9 +47,11 @@ class Setup:
         Raises:
             InputError: the values together make no possible walk.
         """
-        sections = by_section(drawn)
-        parameters = self.parameters.with_values(sections["parameters"])
-        scene = validated(Scene, {**self.scene.model_dump(), **sections["scene"]}, "scene")
+        sections: dict[str, dict[str, float]] = {"parameters": {}, "scene": {}}
+        for name, value in drawn.items():
+            sections[SECTION_OF[name]][name] = value
+        parameters = validated(Parameters, {**vars(self.parameters), **sections["parameters"]}, "parameters")
+        scene = validated(Scene, {**vars(self.scene), **sections["scene"]}, "scene")
         check_scene(scene, parameters)
         return Setup(self.preset, parameters, scene, self.options)
 
@@ -76,25 +78,44 @@ def resolve(
         if not isinstance(values, Mapping):
             raise InputError(f"{path}: {shown(values)} is not a mapping; give names with values")
     checked = validated(Scene, scene, "scene")
-    if checked.plane == "tilting" and options.get("method", "standard") == "standard":
+    changed = parameter_preset(preset).with_values(parameters)
+    return combined(preset, changed, checked, options_beside(checked.plane, options))
+
+
+def options_beside(plane: str, options: Mapping[str, object]) -> Options:
+    """The checked options of a scene with this `Scene.plane`, which may decide what method `standard` is.
+
+    Raises:
+        InputError: a value is refused.
+    """
+    if plane == "tilting" and options.get("method", "standard") == "standard":
         options = {**options, "method": "explicit"}
-    setup = Setup(
-        preset=preset,
-        parameters=parameter_preset(preset).with_values(parameters),
-        scene=checked,
-        options=validated(Options, options, "options"),
-    )
-    if checked.plane == "tilting":
-        check_can_tilt(setup.options)
-    check_scene(setup.scene, setup.parameters)
-    check_links_on_gpu(setup.scene.links, setup.options.device, "scene.links")
-    interval = setup.options.record_interval
-    if interval > LONGEST_DRIVE_INTERVAL and setup.scene.start != "ellipse" and setup.scene.load_factor != 1:
+    return validated(Options, options, "options")
+
+
+def combined(preset: str, parameters: Parameters, scene: Scene, options: Options) -> Setup:
+    """Check what parameters, scene and options must fulfil together.
+
+    Args:
+        preset: name of the preset that the parameters started from.
+        parameters: of the chain, its sprocket and the floor.
+        scene: what happens.
+        options: how it is computed.
+
+    Raises:
+        InputError: they contradict one another.
+    """
+    if scene.plane == "tilting":
+        check_can_tilt(options)
+    check_scene(scene, parameters)
+    check_links_on_gpu(scene.links, options.device, "scene.links")
+    interval = options.record_interval
+    if interval > LONGEST_DRIVE_INTERVAL and scene.start != "ellipse" and scene.load_factor != 1:
         raise InputError(
             f"options.record_interval: loads on the sprocket change at each, and {interval} s is too long for that; "
             f"give at most {LONGEST_DRIVE_INTERVAL} s, or scene.load_factor: 1"
         )
-    return setup
+    return Setup(preset, parameters, scene, options)
 
 
 def check_can_tilt(options: Options) -> None:

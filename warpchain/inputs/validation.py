@@ -140,12 +140,18 @@ def validated(model: type[ModelT], values: Mapping[str, object], path: str) -> M
     Raises:
         InputError: some value is refused; the first is described, the others are counted.
     """
+    few = len(values) <= 2 * len(model.model_fields)
+    own = few and all(type(name) is str and type(value) in _OWN for name, value in values.items())
     try:
-        return model.model_validate(plain(values, path))
+        return model.model_validate(dict(values) if own else plain(values, path))
     except ValidationError as error:
         first, *others = error.errors()
         count = f" (and {len(others)} more)" if others else ""
         raise InputError(_described(first, model, path) + count) from None
+
+
+_OWN: Final = frozenset((float, int, str, bool, type(None)))
+"""Python's own types; sweeps have millions of such values."""
 
 
 def plain(value: object, path: str = "value") -> Any:
@@ -171,6 +177,8 @@ def plain(value: object, path: str = "value") -> Any:
     def converted(value: object, depth: int) -> Any:
         nonlocal left
         left -= 1
+        if type(value) in _OWN:
+            return value
         if isinstance(value, np.ndarray | list | tuple | range | Mapping) and depth > DEEPEST:
             raise InputError(f"{path}: more than {DEEPEST} lists or mappings inside of one another; give fewer")
         if isinstance(value, Mapping):

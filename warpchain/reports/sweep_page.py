@@ -4,6 +4,7 @@ It has figures and tables of the walks that are there, the failed walks and what
 the software; on demand also one walk in motion. The same folder always gives the same page.
 """
 
+import itertools
 import math
 import os
 from collections.abc import Mapping
@@ -25,6 +26,7 @@ from warpchain.store.sweep_result import BlockResult, SweepResult, load
 from warpchain.sweeps.plan import load_sweep
 from warpchain.sweeps.recording import Recording
 from warpchain.version import VERSION
+from warpchain.walks.energy_error import ENERGY_REMEDY
 from warpchain.walks.rows import MISSING, field_column
 
 FRAME_INTERVAL: Final = 2e-3
@@ -63,6 +65,7 @@ def write_report(
         "Figures": _figures(result),
         "Cells": _cells(result),
         "Failed walks": _failed(result),
+        "Inaccurate walks": _inaccurate(result),
         "One walk": "" if animation_of is None else _walk(result, animation_of, device),
         "Parameters": _parameters(result),
         "Sweep": _sweep(result),
@@ -78,6 +81,8 @@ def _tiles(result: SweepResult) -> dict[str, tuple[int, str]]:
     rested, missing = counts[Status.AT_REST.label], counts["missing"]
     failed = result.walk_count - rested - missing
     tiles = {"walks": (result.walk_count, ""), "at rest": (rested, ""), "failed": (failed, "bad" if failed else "")}
+    inaccurate = result.inaccurate_count
+    tiles |= {"inaccurate": (inaccurate, "bad")} if inaccurate else {}
     return tiles | ({"not run yet": (missing, "")} if missing else {})
 
 
@@ -97,13 +102,13 @@ def _cells(result: SweepResult) -> str:
         found = block.statistics("dx")
         head = [with_unit(axis_symbol(name), unit_text(name)) for name in block.axes]
         head += ["mean Δx / m", "s.d. / m", "s.e. / m", "at rest", "failed"]
-        counts = [found.count, found.failed]
+        lengths, counts = [found.mean, found.sd, found.standard_error], [found.count, found.failed]
         if found.missing.any():
             head, counts = [*head, "not run yet"], [*counts, found.missing]
         rows = [
             [
                 *(_plain(value.item()) for value in cell_values(block.axes, place).values()),
-                *(_meters(float(values[place])) for values in (found.mean, found.sd, found.standard_error)),
+                *(_meters(float(values[place])) for values in lengths),
                 *(f"{values[place]}" for values in counts),
             ]
             for place in np.ndindex(*block.shape[:-1])
@@ -134,6 +139,25 @@ def _failed(result: SweepResult) -> str:
         if len(rows) > _MOST_FAILED:
             parts.append(f"<p>… and {len(rows) - _MOST_FAILED:,} more.</p>")
     return "\n".join(parts) or "<p>None.</p>"
+
+
+def _inaccurate(result: SweepResult) -> str:
+    """The walks whose energy error is above the limit, with what to try; empty if there is none."""
+    several = len(result.blocks) > 1
+    head = ["walk", *["block"] * several, "cell", "sample", "energy error"]
+    rows: list[list[str]] = []
+    for block in result.blocks.values():
+        for *place, sample in itertools.islice(np.argwhere(block.inaccurate), _MOST_FAILED - len(rows)):
+            values = {name: block.columns[name][(*place, sample)] for name in ("index", "energy_error")}
+            cell = cell_text(cell_values(block.axes, place)) or "–"
+            rows.append(
+                [f"{values['index']}", *[block.name] * several, cell, f"{sample}", f"{values['energy_error']:.1e}"]
+            )
+    if not rows:
+        return ""
+    parts = [f"<p>{result.inaccurate_count:,}: {escape(ENERGY_REMEDY)}</p>", table(head, rows, numbers_from=len(head))]
+    more = result.inaccurate_count - len(rows)
+    return "\n".join(parts + [f"<p>… and {more:,} more.</p>"] * (more > 0))
 
 
 def _walk(result: SweepResult, index: int, device: str | None) -> str:

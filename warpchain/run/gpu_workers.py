@@ -11,6 +11,7 @@ from multiprocessing.synchronize import Barrier
 from typing import Any, TypeVar
 
 from warpchain.inputs.validation import InputError
+from warpchain.run.parent_watch import end_with_parent
 
 Answer = TypeVar("Answer")
 
@@ -89,6 +90,7 @@ _meeting: "Barrier | None" = None
 def _take_gpu(free: "SimpleQueue[str]", meeting: "Barrier") -> None:
     """Let this process see only one GPU; at its start, because CUDA reads the variable only once, when Warp starts."""
     global _meeting
+    end_with_parent()
     os.environ["CUDA_VISIBLE_DEVICES"] = free.get()
     _meeting = meeting
 

@@ -20,6 +20,7 @@ class SweepProgress:
         before: Walks that were on disk when this run began.
         seconds: Wall time [s] of this run so far.
         statuses: Number of walks of this run by status label.
+        inaccurate: Walks of this run whose energy error is above 5 %.
         compiling: Kernels are being compiled, which takes seconds to minutes the first time on a machine.
     """
 
@@ -29,6 +30,7 @@ class SweepProgress:
     seconds: float = 0.0
     statuses: Counter[str] = field(default_factory=Counter)
     compiling: bool = False
+    inaccurate: int = 0
 
     @property
     def rate(self) -> float:
@@ -44,9 +46,10 @@ class SweepProgress:
 OnProgress = Callable[[SweepProgress], None]
 
 
-def counts_text(statuses: Counter[str]) -> str:
-    """Number of walks by status label, in one line."""
-    return ", ".join(f"{count} {label}" for label, count in sorted(statuses.items()))
+def counts_text(progress: SweepProgress) -> str:
+    """Number of walks of this run by status label, and of inaccurate ones, in one line."""
+    texts = [f"{count} {label}" for label, count in sorted(progress.statuses.items())]
+    return ", ".join(texts + [f"{progress.inaccurate} inaccurate"] * (progress.inaccurate > 0))
 
 
 @contextlib.contextmanager
@@ -109,4 +112,4 @@ def _notebook_bar() -> OnProgress:
 
 
 def _text(progress: SweepProgress) -> str:
-    return "compiling kernels" if progress.compiling else counts_text(progress.statuses)
+    return "compiling kernels" if progress.compiling else counts_text(progress)

@@ -13,6 +13,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
+import numpy as np
+
+from warpchain.engine.devices import start_device
 from warpchain.engine.kernel_choice import shared_threads
 from warpchain.engine.processors import processors
 from warpchain.inputs.keywords import OptionSettings, ParameterSettings, Preset, Sampler, SceneSettings, Whole
@@ -20,16 +23,18 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import warn_of_units
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, checked_path, plain, shown, validated
+from warpchain.run.lost_workers import losses_named
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text, progress_bar
 from warpchain.run.sweep_keywords import sweep_of_keywords
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
-from warpchain.store.manifest import Manifest, read_manifest
-from warpchain.store.shards import empty_rows, read_shard, shard_name, write_shard
+from warpchain.store.manifest import Manifest, known_manifest
+from warpchain.store.shards import read_shard, shard_name, write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
+from warpchain.walks.energy_error import MOST_ENERGY_ERROR
 from warpchain.walks.motion import Motion
-from warpchain.walks.rows import fill_row
+from warpchain.walks.rows import fill_row, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
 
 SHARD_WALKS = 256
@@ -125,6 +130,7 @@ def sweep(
     Raises:
         InputError: The sweep or the folder is refused; one line with the remedy for each value. It is a ``ValueError``.
         OSError: The folder cannot be read or written.
+        LostWorkersError: Worker processes were killed, or the scheduler of a Dask client was closed.
 
     Warns:
         InputWarning: A parameter looks like one in another unit.
@@ -202,6 +208,9 @@ def _run_in_folder(
     report: OnProgress,
 ) -> None:
     """Run what is missing in a folder."""
+    if executor is None:
+        for device in _devices(planned):
+            start_device(device)  # refuses one that is not there before anything is written
     at_once = workers or (GPU_WORKERS if _is_on_gpu(planned) else processors())
     with SweepFolder.open(folder, planned, fresh=fresh, shard_size=shard_size(planned.walk_count)) as store:
         missing = store.missing()
@@ -218,7 +227,7 @@ def _run_in_folder(
                 progress.compiling = False
                 with _threads(at_once) as (threads, stop):
                     _run(threads, stop, planned, store, missing, at_once, progress, report)
-        counts = counts_text(progress.statuses) or "nothing to do"
+        counts = counts_text(progress) or "nothing to do"
         store.log(f"complete after {progress.seconds:.1f} s: {counts}")
 
 
@@ -247,6 +256,12 @@ def _is_on_gpu(planned: Sweep) -> bool:
     return all(str(block.sections["options"].get("device", "cpu")).startswith("cuda") for block in planned.blocks)
 
 
+def _devices(planned: Sweep) -> set[str]:
+    """Devices of all walks."""
+    given = [block.axes.get("device") or (block.sections["options"].get("device", "cpu"),) for block in planned.blocks]
+    return {str(device) for devices in given for device in devices}
+
+
 def shard_size(walks: int) -> int:
     """Walks per shard; it depends on the sweep only, so that equal sweeps leave equal files."""
     return max(1, min(SHARD_WALKS, walks // SHARDS))
@@ -254,6 +269,7 @@ def shard_size(walks: int) -> int:
 
 def run_shards(
     planned: Sweep,
+    digest: str,
     directory: str,
     shards: Sequence[range],
     threads: int | None = None,
@@ -262,7 +278,8 @@ def run_shards(
     """Run the walks of some shards and write each shard as soon as its walks are over; what a worker does.
 
     Args:
-        planned: The sweep.
+        planned: The sweep, or a part of it that has these walks.
+        digest: Of the whole sweep.
         directory: The sweep's folder.
         shards: The places of each shard.
         threads: Of every block on a GPU; None: as many as its chain needs.
@@ -271,11 +288,11 @@ def run_shards(
     Returns:
         Keys of the shards written.
     """
-    digest, manifest = planned.digest(), read_manifest(directory)
+    manifest = known_manifest(directory)
     walks = list(planned.undrawn(index for shard in shards for index in manifest.walks(shard).tolist()))
     under_way: dict[int, PlannedWalk] = {}
     stored = [(shard, place) for shard in shards for place in shard]
-    rows = {shard: empty_rows(planned, shard) for shard in shards}
+    rows = {shard: missing_rows(manifest.row_type, shard) for shard in shards}
     left = {shard: len(shard) for shard in shards}
     motions: dict[range, dict[int, Motion]] = {shard: {} for shard in shards}
     setups, keeps = [walk.setup for walk in walks], [planned.keep(walk) for walk in walks]
@@ -310,22 +327,23 @@ def _threads(count: int) -> Iterator[tuple[Executor, threading.Event]]:
 
 def prepare(planned: Sweep) -> None:
     """Load every kernel that the walks of a sweep need into this process, compiled if need be."""
-    compile_kernels(one_of_each_cell(planned), _shared_threads(planned))
+    compile_kernels(one_of_each_kind(planned), _shared_threads(planned))
 
 
-def one_of_each_cell(planned: Sweep) -> list[Setup]:
-    """Setups with the options and links of every cell."""
-    firsts = (
-        first for block in planned.blocks for first in range(block.first, block.first + block.walk_count, block.samples)
-    )
-    return [walk.setup for walk in planned.undrawn(firsts)]
+def one_of_each_kind(planned: Sweep) -> list[Setup]:
+    """Setups with all options, numbers of links and starts that walks of a sweep have, but not with all else."""
+    return [setup for block in planned.blocks for setup in block.fixed_in(block.cells_along(_KIND))]
+
+
+_KIND = frozenset((*Options.model_fields, "links", "start", "plane"))
+"""Axes along which kernels or their threads may differ."""
 
 
 def _shared_threads(planned: Sweep) -> int | None:
     """Threads of every block if the sweep runs on a GPU with one method; None: as many as a chain needs."""
     if not _is_on_gpu(planned):
         return None
-    cells = one_of_each_cell(planned)
+    cells = one_of_each_kind(planned)
     methods = {setup.options.method for setup in cells}
     if len(methods) > 1:
         return None
@@ -346,14 +364,17 @@ def _run(
     report(progress)
     began = time.perf_counter()
     threads, waiting = _shared_threads(planned), _tasks(planned, store.manifest, missing, workers)
-    folder = store.directory / "shards"
+    folder, digest, manifest = store.directory / "shards", planned.digest(), store.manifest
     pending: dict[concurrent.futures.Future[list[str]], list[range]] = {}  # with the shards still to be counted
 
     def submit() -> bool:
         task = next(waiting, None)
         if task is None:
             return False
-        pending[executor.submit(run_shards, planned, str(store.directory), tuple(task), threads, stop)] = task
+        part = planned.part(np.concatenate([manifest.walks(shard) for shard in task]))
+        given = (part, digest, str(store.directory), tuple(task), threads, stop)
+        with losses_named():
+            pending[executor.submit(run_shards, *given)] = task
         return True
 
     while len(pending) < 2 * workers and submit():
@@ -364,15 +385,17 @@ def _run(
             written: list[range] = []
             for future in finished:
                 written += pending.pop(future)
-                future.result()
+                with losses_named():
+                    future.result()
                 submit()
             for task in pending.values():
                 there = [shard for shard in task if (folder / shard_name(shard)).exists()]
                 task[:] = [shard for shard in task if shard not in there]
                 written += there
             for shard in written:
-                statuses = read_shard(store.directory, store.manifest, shard)["status"]
-                progress.statuses.update(Status(int(code)).label for code in statuses)
+                rows = read_shard(store.directory, store.manifest, shard)
+                progress.statuses.update(Status(int(code)).label for code in rows["status"])
+                progress.inaccurate += int((rows["energy_error"] > MOST_ENERGY_ERROR).sum())
                 progress.done += len(shard)
             progress.seconds = time.perf_counter() - began
             if written:

@@ -13,7 +13,7 @@ import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Final, Self
 
@@ -137,12 +137,12 @@ class Manifest:
             versions=package_versions(),
         )
 
-    @property
+    @cached_property
     def row_type(self) -> np.dtype[np.void]:
         """Type of the rows: the quantities drawn by any block are columns in all."""
         return row_type([name for block in self.blocks for name in block.drawn])
 
-    @property
+    @cached_property
     def generations(self) -> tuple[Generation, ...]:
         """All generations, the present one last."""
         return *self.earlier, Generation(self.digest, tuple(block.samples for block in self.blocks), self.shard_size)
@@ -161,16 +161,25 @@ class Manifest:
             before = generation.samples
         return parts
 
-    def _overlaps(self, places: range) -> Iterator[tuple[_Part, range]]:
+    @cached_property
+    def _parts_in_order(self) -> list[_Part]:
+        """The parts of all generations, in the order of their places."""
+        return list(itertools.chain(*self._parts))
+
+    def overlaps(self, places: range) -> Iterator[tuple[_Part, range]]:
         """The parts that hold some places, each with those of the places that it holds."""
-        for part in (part for parts in self._parts for part in parts):
+        parts = self._parts_in_order
+        first = max(0, bisect.bisect_right(parts, places.start, key=lambda part: part.places.start) - 1)
+        for part in itertools.islice(parts, first, None):
+            if part.places.start >= places.stop:
+                break
             if here := range(max(places.start, part.places.start), min(places.stop, part.places.stop)):
                 yield part, here
 
     def walks(self, places: range) -> NDArray[np.int64]:
         """Numbers of the walks at some places, shape (len(places),)."""
         found = np.empty(len(places), np.int64)
-        for part, here in self._overlaps(places):
+        for part, here in self.overlaps(places):
             cell, added = np.divmod(np.arange(here.start, here.stop) - part.places.start, len(part.samples))
             numbers = part.block.first + cell * part.block.samples + part.samples.start + added
             found[here.start - places.start : here.stop - places.start] = numbers
@@ -207,7 +216,7 @@ class Manifest:
     def kept(self, places: range) -> list[int]:
         """Those of some places whose walks have their motion kept."""
         found = []
-        for part, here in self._overlaps(places):
+        for part, here in self.overlaps(places):
             kept = self._kept_samples(part.block)
             added = part.samples
             found += [place for place in here if added[(place - part.places.start) % len(added)] in kept]
@@ -309,6 +318,28 @@ def _layouts(sweep: Mapping[str, Any]) -> tuple[BlockLayout, ...]:
         found.append(BlockLayout(block["name"], axes, samples_of(block), first, drawn))
         first += walks_of(block)
     return tuple(found)
+
+
+def known_manifest(directory: Folder) -> Manifest:
+    """The manifest of a folder as of `read_manifest`, read anew only when the file is another; not to be changed.
+
+    A task asks for it again before it writes each shard, and that of a sweep with many blocks takes long to read.
+    """
+    try:
+        descriptor = os.open(Path(directory) / "sweep.json", os.O_RDONLY | os.O_NONBLOCK)
+    except OSError:
+        return read_manifest(directory)  # which says what is wrong
+    try:
+        now = os.fstat(descriptor)  # of the opened file, because shared file systems answer `stat` from memory
+    finally:
+        os.close(descriptor)
+    return _manifest_once(str(directory), now.st_dev, now.st_ino, now.st_size, now.st_mtime_ns, now.st_ctime_ns)
+
+
+@lru_cache(maxsize=8)
+def _manifest_once(directory: str, *identity: int) -> Manifest:
+    """The manifest of a folder, for the identity of its file."""
+    return read_manifest(directory)
 
 
 def check_not_own(directory: Folder, path: Path) -> None:

@@ -12,7 +12,6 @@ sweep leaves the same bytes however often it was killed.
 
 import errno
 import hashlib
-import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -29,7 +28,7 @@ from warpchain.store.manifest import (
     NUMERICS_VERSION,
     Folder,
     Manifest,
-    read_manifest,
+    known_manifest,
     unreadable,
 )
 from warpchain.store.manifest_content import FORMAT, FORMAT_VERSION
@@ -81,7 +80,7 @@ def write_shard(
         InputError: the folder is not, or no longer, that of the sweep.
         ValueError: the rows or the motions are not those of the walks.
     """
-    manifest, name = read_manifest(directory), f"walks {places.start} to {places.stop - 1}"
+    manifest, name = known_manifest(directory), f"walks {places.start} to {places.stop - 1}"
     if (manifest.digest, manifest.numerics_version) != (digest, NUMERICS_VERSION):
         raise InputError(f"{directory}: belongs to another sweep now; these walks were not written")
     if places != manifest.shard_of(places.start):
@@ -141,10 +140,10 @@ def _problem(rows: Rows, manifest: Manifest) -> str | None:
         return "has a distance without being at rest, or none at rest"
     if any((rows[column] < MISSING).any() for column in rows.dtype.names or () if rows[column].dtype.kind == "i"):
         return "has a negative count"
-    walks = manifest.walks(range(int(rows["index"][0]), int(rows["index"][-1]) + 1))
-    for block in manifest.blocks:
-        here = (block.first <= walks) & (walks < block.first + math.prod(block.shape))
-        if not all(np.isfinite(rows[drawn_column(name)][here]).all() for name in block.drawn):
+    places = range(int(rows["index"][0]), int(rows["index"][-1]) + 1)
+    for part, at in manifest.overlaps(places):
+        here = rows[at.start - places.start : at.stop - places.start]
+        if not all(np.isfinite(here[drawn_column(name)]).all() for name in part.block.drawn):
             return "lacks a quantity that was drawn for it"
     return None
 

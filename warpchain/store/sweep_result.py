@@ -8,6 +8,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -23,6 +24,7 @@ from warpchain.store.folder import read_rows
 from warpchain.store.manifest import Folder, read_manifest
 from warpchain.store.manifest_content import FORMAT_VERSION
 from warpchain.store.walk_motion import MotionReader, WalkMotion
+from warpchain.walks.energy_error import MOST_ENERGY_ERROR
 from warpchain.walks.rows import COLUMNS, MISSING, Column, drawn_column, field_column, missing_rows, quantity_of
 
 if TYPE_CHECKING:
@@ -101,7 +103,7 @@ class BlockResult:
             raise KeyError(f"{shown(name)}: {suggestion(name, (*self.columns, *self.axes))}")
         return COLUMNS[name] if name in COLUMNS else field_column(name)
 
-    @property
+    @cached_property
     def kept(self) -> NDArray[np.bool_]:
         """Whether the motion of a walk was kept and is there, shape `shape`."""
         series = None if self.motions is None else self.motions.manifest.recording.series
@@ -147,6 +149,12 @@ class BlockResult:
     def summary(self) -> dict[str, int]:
         """Number of walks by status label; `at_rest` and `missing` always, others if there are any."""
         return _summary(self.columns["status"])
+
+    @property
+    def inaccurate(self) -> NDArray[np.bool_]:
+        """Whether the energy error of a walk is above `MOST_ENERGY_ERROR`, shape `shape`."""
+        found: NDArray[np.bool_] = self.columns["energy_error"] > MOST_ENERGY_ERROR  # NaN is not
+        return found
 
     def statistics(self, name: str = "dx") -> CellStatistics:
         """Statistics of a column in each cell.
@@ -275,6 +283,11 @@ class SweepResult:
     def summary(self) -> dict[str, int]:
         """Number of walks by status label; `at_rest` and `missing` always, others if there are any."""
         return _summary(np.concatenate([block.columns["status"].ravel() for block in self.blocks.values()]))
+
+    @property
+    def inaccurate_count(self) -> int:
+        """Number of walks whose energy error is above 5 %, whatever their status."""
+        return sum(int(block.inaccurate.sum()) for block in self.blocks.values())
 
     def unit(self, name: str) -> str:
         """SI unit of a column or an axis of any block, "1" for pure numbers.

@@ -1,19 +1,30 @@
 """One block of a sweep: a grid of cells, and what the samples of a cell draw."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache
+from typing import Any, Final
+
+import numpy as np
 
 from warpchain.inputs.distributions import Distribution, Gaussian, Uniform, placed
+from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.parameters import preset as parameter_preset
+from warpchain.inputs.scene import Scene
 from warpchain.inputs.sections import SECTION_OF, SECTIONS
-from warpchain.inputs.setup import Setup, resolve
-from warpchain.inputs.validation import InputError
+from warpchain.inputs.setup import Setup, combined, options_beside
+from warpchain.inputs.validation import InputError, validated
 from warpchain.sweeps.designs import walks_per_sample
 
 Value = float | int | str
 """A value of a field; truth values are integers to Python."""
+_Place = tuple[tuple[str, Value], ...]
+"""Names and values of the axes of one section in a cell."""
+
+_KEPT: Final = 2**14
+"""Most values of a section that are kept while cells are gone through: more than an axis has."""
 
 
 @dataclass(frozen=True)
@@ -70,15 +81,42 @@ class Block:
         Raises:
             InputError: the values of the cell contradict one another.
         """
-        at = {name: values[place] for (name, values), place in zip(self.axes.items(), cell, strict=True)}
-        preset = str(at.pop("preset", self.preset))
-        sections = {section: dict(values) for section, values in self.sections.items()}
-        for name, value in at.items():
-            sections[SECTION_OF[name]][name] = value
-        try:
-            return resolve(preset, **sections)
-        except InputError as error:
-            raise InputError(self._located(error, cell)) from None
+        return next(self.fixed_in([cell]))
+
+    def fixed_in(self, cells: Iterable[tuple[int, ...]]) -> Iterator[Setup]:
+        """The `fixed` setups of some cells; those that are alike in a section share its checked values."""
+        given = self.sections
+
+        @lru_cache(_KEPT)
+        def parameters(preset: str, at: _Place) -> Parameters:
+            return parameter_preset(preset).with_values({**given["parameters"], **dict(at)})
+
+        @lru_cache(_KEPT)
+        def scene(at: _Place) -> Scene:
+            return validated(Scene, {**given["scene"], **dict(at)}, "scene")
+
+        @lru_cache(_KEPT)
+        def options(plane: str, at: _Place) -> Options:
+            return options_beside(plane, {**given["options"], **dict(at)})
+
+        for cell in cells:
+            at: dict[str, _Place] = dict.fromkeys(SECTIONS, ())
+            preset = str(self.preset)
+            for (name, values), place in zip(self.axes.items(), cell, strict=True):
+                if name == "preset":
+                    preset = str(values[place])
+                else:
+                    at[SECTION_OF[name]] += ((name, values[place]),)
+            try:
+                checked = scene(at["scene"])
+                changed = parameters(preset, at["parameters"])
+                yield combined(preset, changed, checked, options(checked.plane, at["options"]))
+            except InputError as error:
+                raise InputError(self._located(error, cell)) from None
+
+    def cells_along(self, names: Container[str]) -> Iterator[tuple[int, ...]]:
+        """The cells along some axes, at the first value of every other axis."""
+        return np.ndindex(*(len(values) if name in names else 1 for name, values in self.axes.items()))
 
     def _located(self, error: InputError, cell: tuple[int, ...]) -> str:
         """The text of an error about a cell, with the path of the value that it names."""

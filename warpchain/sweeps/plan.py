@@ -11,13 +11,15 @@ import bisect
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from warpchain.inputs.distributions import DRAW_LIMIT, draw, random_generator
+from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, random_generator
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.setup import Setup
@@ -74,10 +76,25 @@ class Sweep:
     blocks: tuple[Block, ...]
     recording: Recording
 
-    @property
+    @cached_property
     def walk_count(self) -> int:
         """Number of walks."""
         return sum(block.walk_count for block in self.blocks)
+
+    def part(self, indices: Collection[int] | NDArray[np.int64]) -> "Sweep":
+        """The sweep with the blocks of some walks only: all that a task needs, and less to be sent than the whole.
+
+        The walks keep their numbers; name, `walk_count` and `digest` of a part mean nothing.
+        """
+        if len(self.blocks) == 1:
+            return self
+        numbers = np.unique(np.searchsorted(self._firsts, np.asarray(indices), side="right") - 1)
+        return replace(self, blocks=tuple(self.blocks[number] for number in numbers))
+
+    @cached_property
+    def _firsts(self) -> NDArray[np.int64]:
+        """Number of the first walk of each block."""
+        return np.array([block.first for block in self.blocks])
 
     def planned(self, index: int) -> PlannedWalk:
         """The walk with a number.
@@ -106,7 +123,8 @@ class Sweep:
         if not block.drawn:
             return walk
         row, member = divmod(walk.sample, walks_per_sample(block.sampler, len(block.drawn)))
-        points, setups = self._first_possible(block, walk.cell, fixed, row, designed=block.sampler != "random")
+        distributions, designed = block.placed(fixed), block.sampler != "random"
+        points, setups = self._first_possible(block, walk.cell, fixed, distributions, row, designed=designed)
         return replace(walk, setup=setups[member], drawn=points[member])
 
     def undrawn(self, indices: Iterable[int]) -> Iterator[PlannedWalk]:
@@ -124,12 +142,17 @@ class Sweep:
 
     def _located(self, index: int) -> tuple[int, tuple[int, ...], int]:
         """Number of a walk's block, its cell and its sample."""
-        if not 0 <= index < self.walk_count:
-            raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
-        number = bisect.bisect_right(self.blocks, index, key=lambda block: block.first) - 1
+        number = self._block_of(index)
         block = self.blocks[number]
         *cell, sample = (int(place) for place in np.unravel_index(index - block.first, block.shape))
         return number, tuple(cell), sample
+
+    def _block_of(self, index: int) -> int:
+        """Number of a walk's block."""
+        number = bisect.bisect_right(self.blocks, index, key=lambda block: block.first) - 1
+        if number < 0 or index >= self.blocks[number].first + self.blocks[number].walk_count:
+            raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
+        return number
 
     def keep(self, walk: PlannedWalk) -> Keep:
         """What is kept of the motion of a walk."""
@@ -155,30 +178,50 @@ class Sweep:
                     f"give numbers from 0 to {most - 1}"
                 )
         for block in self.blocks:
-            first: Options | None = None
-            for cell in np.ndindex(block.shape[:-1]):
-                fixed = block.fixed(cell)
+            first = before = None
+            checked: dict[str, Distribution] = {}
+            cells = list(np.ndindex(block.shape[:-1]))
+            for cell, fixed in zip(cells, block.fixed_in(cells), strict=True):
                 first = first or fixed.options
-                for name in Options.model_fields:
-                    here, there = getattr(first, name), getattr(fixed.options, name)
-                    if here != there and name not in block.axes:
-                        raise InputError(
-                            f"{block.path}.grid: {name} is {here!r} in one cell and {there!r} in another, as methods "
-                            f"or devices have it; give {name} once for all, or each such method, and each kind of "
-                            "device, a block of its own"
-                        )
-                for name, choice in self.recording.choices.items():
-                    choice.steps(fixed.options, f"sweep.record.{name}")
-                for name, distribution in block.placed(fixed).items():
-                    if distribution.share() < LEAST_SHARE:
+                if fixed.options is not before:
+                    before = fixed.options
+                    self._check_options(block, first, before)
+                distributions = block.placed(fixed)
+                for name, distribution in distributions.items():
+                    if distribution != checked.get(name) and distribution.share() < LEAST_SHARE:
                         raise InputError(
                             f"{block.path}.distributions.{name}: less than {LEAST_SHARE:.0%} of the draws "
                             f"{distribution.described('')} are physical; give a uniform distribution"
                         )
-                self._first_possible(block, cell, fixed, 0, designed=False)
+                checked = distributions
+                self._first_possible(block, cell, fixed, distributions, 0, designed=False)
+
+    def _check_options(self, block: Block, first: Options, options: Options) -> None:
+        """Check the options of a cell beside those of the block's first cell.
+
+        Raises:
+            InputError: they are refused.
+        """
+        for name in Options.model_fields:
+            here, there = getattr(first, name), getattr(options, name)
+            if here != there and name not in block.axes:
+                raise InputError(
+                    f"{block.path}.grid: {name} is {here!r} in one cell and {there!r} in another, as methods "
+                    f"or devices have it; give {name} once for all, or each such method, and each kind of "
+                    "device, a block of its own"
+                )
+        for name, choice in self.recording.choices.items():
+            choice.steps(options, f"sweep.record.{name}")
 
     def _first_possible(
-        self, block: Block, cell: tuple[int, ...], fixed: Setup, row: int, *, designed: bool
+        self,
+        block: Block,
+        cell: tuple[int, ...],
+        fixed: Setup,
+        distributions: Mapping[str, Distribution],
+        row: int,
+        *,
+        designed: bool,
     ) -> tuple[list[Point], list[Setup]]:
         """The first candidate for sample `row` of a cell that makes possible walks only, and their setups.
 
@@ -186,7 +229,7 @@ class Sweep:
             InputError: there is none.
         """
         problem = ""
-        for points in self._candidates(block, cell, fixed, row, designed):
+        for points in self._candidates(block, cell, distributions, row, designed):
             try:
                 return points, [fixed.with_drawn(point) for point in points]
             except InputError as error:
@@ -194,10 +237,10 @@ class Sweep:
         raise InputError(f"{block.path}.distributions: {DRAW_LIMIT} samples made no possible walk; the last: {problem}")
 
     def _candidates(
-        self, block: Block, cell: tuple[int, ...], fixed: Setup, row: int, designed: bool
+        self, block: Block, cell: tuple[int, ...], distributions: Mapping[str, Distribution], row: int, designed: bool
     ) -> Iterator[list[Point]]:
         """Candidates for sample `row` of a cell, a point for each of its walks: the designed one, then random ones."""
-        distributions, stream = block.placed(fixed), self._stream(block, cell)
+        stream = self._stream(block, cell)
         if designed:
             matrix = design_points(block.sampler, self.seed, stream, block.samples_given, len(distributions))
             fractions = iter(matrix[row].tolist())
@@ -237,7 +280,11 @@ class Sweep:
         Args:
             samples: samples of each block, in place of the sweep's own.
         """
-        return digest_of(self.canonical(), samples)
+        return self._own_digest if samples is None else digest_of(self.canonical(), samples)
+
+    @cached_property
+    def _own_digest(self) -> str:
+        return digest_of(self.canonical())
 
 
 def digest_of(canonical: Mapping[str, Any], samples: Sequence[int] | None = None) -> str:

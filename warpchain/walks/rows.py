@@ -11,6 +11,7 @@ from warpchain.engine.tallies import CONTACTS, LOST
 from warpchain.inputs.distributions import DRAWABLE
 from warpchain.inputs.sections import SECTION_OF, SECTIONS
 from warpchain.inputs.validation import field_unit
+from warpchain.walks.energy_error import ENERGY_ERROR, MOST_ENERGY_ERROR, energy_error
 from warpchain.walks.walk_result import STORED
 
 Rows = NDArray[np.void]
@@ -48,6 +49,7 @@ _NOTES: Final = {
     "index": ("1", "number of the walk in its sweep"),
     "status": ("1", f"code of what ended the walk; {MISSING} while it is missing"),
     "energy_at_release": ("J", "energy at release, kinetic and potential"),
+    "energy_error": ("1", f"{ENERGY_ERROR}; above {MOST_ENERGY_ERROR} the walk is inaccurate"),
     **_flat(
         {
             name: {key: (stored.unit, meaning) for key, meaning in stored.keys.items()} or (stored.unit, stored.meaning)
@@ -64,7 +66,9 @@ _KINDS: Final = {
     "bounces": "<i4",
     **dict.fromkeys(("steps_accepted", "steps_rejected", *(f"impulses_{kind}" for kind in CONTACTS)), "<i8"),
     **dict.fromkeys(("greatest_opening", *(f"penetration_{kind}" for kind in CONTACTS)), "<f8"),
-    **dict.fromkeys(("energy_at_release", *(f"loss_{name}" for name in LOST), "energy_residual"), "<f8"),
+    **dict.fromkeys(
+        ("energy_at_release", *(f"loss_{name}" for name in LOST), "energy_residual", "energy_error"), "<f8"
+    ),
 }
 COLUMNS: Final = {name: Column(kind, *_NOTES[name]) for name, kind in _KINDS.items()}
 """Columns of every sweep; behind them comes one for each quantity that the sweep draws, see `drawn_column`.
@@ -87,6 +91,7 @@ def fill_row(row: Any, outcome: Mapping[str, Any], drawn: Mapping[str, float]) -
     """
     energy = outcome["energy"]
     values = _flat(outcome) | {"energy_at_release": energy["kinetic_at_release"] + energy["potential_at_release"]}
+    values["energy_error"] = energy_error(energy)
     for name in COLUMNS.keys() - {"index"}:
         row[name] = values[name]
     for name, value in drawn.items():

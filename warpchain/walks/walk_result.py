@@ -31,6 +31,7 @@ from warpchain.inputs.validation import InputError
 from warpchain.loop.before_release import BeforeRelease, is_ascending, read_before_release, write_before_release
 from warpchain.status import Status
 from warpchain.walks.drawn import Drawn
+from warpchain.walks.energy_error import ENERGY_REMEDY, MOST_ENERGY_ERROR, energy_error
 from warpchain.walks.moving_plane import in_room
 
 if TYPE_CHECKING:
@@ -219,11 +220,17 @@ class WalkResult(Drawn):
 
     def __repr__(self) -> str:
         """One line with the most important numbers."""
-        scene = self.setup.scene
+        scene, error = self.setup.scene, self.energy_error
+        warning = f", energy error {error:.1e}" if error > MOST_ENERGY_ERROR else ""
         return (
             f"<WalkResult {self.status.label}: dx {self.dx:.4g} m in {self.walk_time:.4g} s, "
-            f"{self.bounces} bounces, {scene.links} links at {scene.frequency:g} Hz, {self.setup.preset}>"
+            f"{self.bounces} bounces, {scene.links} links at {scene.frequency:g} Hz, {self.setup.preset}{warning}>"
         )
+
+    @property
+    def energy_error(self) -> float:
+        """Size of the energy unaccounted for, relative to the energy at release; above 0.05 the walk is inaccurate."""
+        return energy_error(self.energy)
 
     def facts(self) -> list[tuple[str, str]]:
         """Names and values that a notebook shows beside the picture."""
@@ -234,6 +241,7 @@ class WalkResult(Drawn):
             ("bounces", str(self.bounces)),
             ("steps", f"{self.steps_accepted:,} accepted, {self.steps_rejected:,} rejected"),
             ("energy unaccounted for", f"{self.energy['residual']:.1e} J"),
+            *([("warning", ENERGY_REMEDY)] if self.energy_error > MOST_ENERGY_ERROR else []),
             ("computed in", f"{self.wall_time:.1f} s"),
         ]
 
@@ -246,6 +254,7 @@ class WalkResult(Drawn):
                 "status": self.status.label,
                 "status_sentence": self.status.sentence,
                 **summary,
+                "energy_error": self.energy_error,
                 **_setup_as_dict(self.setup),
                 "seed": self.seed,
                 "versions": self.versions,

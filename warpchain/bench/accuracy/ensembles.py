@@ -191,8 +191,7 @@ def _walks_at_rest(result: SweepResult) -> tuple[Array, Array]:
     """Of the walks at rest: Δx [m], and what the energy ledger leaves open as a fraction of the energy at release."""
     (block,) = result.blocks.values()
     at_rest = block.columns["status"] == Status.AT_REST
-    ledgers = np.abs(block.columns["energy_residual"] / block.columns["energy_at_release"])
-    return block.columns["dx"][at_rest], ledgers[at_rest]
+    return block.columns["dx"][at_rest], block.columns["energy_error"][at_rest]
 
 
 def ledger_columns(errors: Sequence[float] | Array) -> dict[str, float]:

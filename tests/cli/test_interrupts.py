@@ -1,0 +1,91 @@
+"""Ctrl-C at any moment: exit status 130 and one line, or the whole result."""
+
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.run.test_sweep_run import TINY, data_of
+from tests.support.command_line import Command, command  # noqa: F401
+from warpchain.cli.interrupts import interrupts_heard
+from warpchain.cli.main import main
+from warpchain.run.sweep_run import sweep
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="other signals")
+
+
+class Interrupted:
+    """Python ignores what is raised when this is deleted."""
+
+    def __del__(self) -> None:
+        """Play Ctrl-C."""
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_an_interrupt_that_python_loses_is_raised_again(capfd: pytest.CaptureFixture[str]) -> None:
+    """Raised where exceptions are ignored, it comes again a moment later, and nothing is printed."""
+    before = signal.getsignal(signal.SIGINT), sys.unraisablehook
+    with pytest.raises(KeyboardInterrupt), interrupts_heard() as heard:
+        Interrupted()
+        assert heard()
+        time.sleep(10)
+    assert (signal.getsignal(signal.SIGINT), sys.unraisablehook) == before
+    assert capfd.readouterr().err == ""
+
+
+def test_an_error_that_a_library_makes_of_an_interrupt_is_one(
+    command: Command,  # noqa: F811
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """HDF5 calls a read that Ctrl-C breaks off a damaged file; the command says that it was interrupted."""
+
+    def broken_off(*_: object, **__: object) -> None:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            raise OSError("cannot read") from None
+
+    monkeypatch.setattr(sys.modules[main.__module__], "app", broken_off)
+    answer = command("info", "anything")
+    assert (answer.status, answer.err) == (130, "interrupted\n")
+
+
+@pytest.mark.slow
+def test_ctrl_c_at_any_moment_ends_a_sweep(tmp_path: Path) -> None:
+    """At 8 random moments: 130, or the sweep is complete; nothing else is printed, and the rest gives equal bytes."""
+    source, rng = tmp_path / "tiny.yaml", random.Random(3)
+    source.write_text(yaml.safe_dump(TINY | {"samples": 100}, sort_keys=False))
+    sweep(source, tmp_path / "whole", workers=1)
+    run = [sys.executable, "-m", "warpchain", "sweep", str(source), "-o"]
+    began = time.monotonic()
+    subprocess.run([*run, str(tmp_path / "timed")], capture_output=True, check=False)
+    duration, interrupted = time.monotonic() - began, 0
+    for number in range(8):
+        folder = tmp_path / f"{number}"
+        process = subprocess.Popen(
+            [*run, str(folder)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            encoding="utf-8",
+            # A shell may have set it to be ignored in its background jobs, which children inherit.
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        )
+        time.sleep(rng.uniform(0.3, duration))  # not while Python itself starts
+        process.send_signal(signal.SIGINT)
+        _, told = process.communicate(timeout=30)
+        # −2, which a shell shows as 130: Python ends itself so if an import was interrupted
+        if process.returncode in (130, -signal.SIGINT):
+            assert told == "interrupted\n"
+            interrupted += 1
+        else:
+            assert process.returncode == 1 and told.startswith("400 time_limit")  # complete; no walk was to rest
+            assert data_of(folder) == data_of(tmp_path / "whole")
+    assert interrupted > 1
+    for number in range(8):
+        sweep(source, tmp_path / f"{number}", workers=1)
+        assert data_of(tmp_path / f"{number}") == data_of(tmp_path / "whole")
