@@ -165,7 +165,7 @@ def plot(
     """Draw every figure that a sweep or a saved walk has something for.
 
     Of a sweep: Figures 6 and 5, grids, tolerance, sensitivity, statuses. Of a walk: figure5.png, film_strip.png,
-    loop.png and energy.png; a line says what is left out and why.
+    loop.png, energy.png and, if the plane tilts, tilt.png; a line says what is left out and why.
     """
     from warpchain.inputs.validation import InputError, printable
 

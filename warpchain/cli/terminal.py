@@ -36,7 +36,7 @@ COMPILING: Final = "compiling kernels; later runs find them ready"
 
 
 RECORD: Final = "walk.h5"
-PICTURES: Final = ("figure5.png", "film_strip.png", "loop.png")
+PICTURES: Final = ("figure5.png", "film_strip.png", "loop.png", "tilt.png")
 """Files of a walk, beside its animation."""
 
 
@@ -195,6 +195,11 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
         yield "loop held", f"{result.hold_time:.3f} s at full frequency{moved}"
     yield "walk time", f"{result.walk_time:.3f} s"
     yield "bounces", f"{result.bounces}"
+    if math.isfinite(result.greatest_tilt):
+        fell = f"fell over {result.fell_at:.3f} s after the release" if result.fell_over else "did not fall over"
+        yield "plane", f"{fell}, greatest tilt {math.degrees(result.greatest_tilt):.3g}°"
+    if math.isfinite(result.lateral_drift):
+        yield "lateral drift", f"{result.lateral_drift:+.4f} m, to the right"
     if math.isfinite(result.softened_at):
         yield "joints softened", f"{result.softened_at:.3f} s after the release"
     yield "steps", f"{result.steps_accepted:,} accepted, {result.steps_rejected:,} rejected"
@@ -229,7 +234,7 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
     record = folder / RECORD
     result.save(record)
     yield record
-    figure5, film_strip, loop = PICTURES
+    figure5, film_strip, loop, tilt = PICTURES
     pictures: dict[str, Callable[[WalkResult, Path], None]] = {
         figure5: partial(_draw, "figure5"),
         film_strip: partial(_draw, "film_strip"),
@@ -238,6 +243,10 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
         pictures[loop] = partial(_draw, "loop")
     else:
         remove_output(folder / loop)
+    if result.joints_in_room is not None:
+        pictures[tilt] = partial(_draw, "tilt")
+    else:
+        remove_output(folder / tilt)
     if animation is not None:
         from warpchain.pictures.animation import animate
 
@@ -255,5 +264,5 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
             yield path
 
 
-def _draw(kind: Literal["figure5", "film_strip", "loop"], result: WalkResult, path: Path) -> None:
+def _draw(kind: Literal["figure5", "film_strip", "loop", "tilt"], result: WalkResult, path: Path) -> None:
     save_figure(result.plot(kind), path)
