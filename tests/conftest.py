@@ -24,6 +24,5 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         type=float,
         default=0.0,
         metavar="MINUTES",
-        help="time of tests/test_fuzz.py, which else takes a fixed number of inputs; counts are printed, and failures "
-        "also written to fuzz-failures.txt",
+        help="time of tests/test_fuzz.py, which else takes a fixed number of inputs; counts and failures are printed",
     )

@@ -5,7 +5,6 @@ import json
 import time
 from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, Phase, given, seed, settings
@@ -37,20 +36,23 @@ def test_hostile_inputs_end_well(
     play, strategy = INPUTS[kind]
     counts: Counter[str] = Counter()
     failures: list[str] = []
+    seconds = megabytes = 0.0
 
     def ask(hostile: object) -> None:
+        nonlocal seconds, megabytes
         answer = watched.ask(play, hostile)
+        seconds, megabytes = max(seconds, answer.seconds), max(megabytes, answer.megabytes)
         counts[answer.outcome] += 1
         if answer.problem is not None:
             failures.append(f"{answer.outcome}: {json.dumps([play, hostile])}\n{answer.problem}")
             if minutes:
-                with Path("fuzz-failures.txt").open("a") as file:
-                    file.write(failures[-1] + "\n\n")
+                with capsys.disabled():
+                    print(f"\n{failures[-1]}", flush=True)
 
     end = time.monotonic() + 60 * minutes / len(INPUTS)
     for number in itertools.count():
         limits = settings(
-            max_examples=FEWER.get(kind, EXAMPLES),
+            max_examples=EXAMPLES if minutes else FEWER.get(kind, EXAMPLES),
             database=None,
             deadline=None,
             phases=[Phase.generate],
@@ -61,5 +63,6 @@ def test_hostile_inputs_end_well(
             break
     if minutes:
         with capsys.disabled():
-            print(f"\n{kind}: {counts.total()}; {', '.join(f'{name} {n}' for name, n in counts.most_common())}")
+            outcomes = ", ".join(f"{name} {number}" for name, number in counts.most_common())
+            print(f"\n{kind}: {counts.total()}; {outcomes}; at most {seconds:.2f} s, {megabytes:.0f} MB", flush=True)
     assert not failures, f"{len(failures)} of {counts.total()}\n" + "\n\n".join(failures[:3])

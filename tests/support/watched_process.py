@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -62,9 +62,10 @@ class WatchedProcess:
             )
         answer = Answer(**json.loads(line))
         if answer.problem is None and answer.seconds > SECONDS:
-            answer = Answer("slow", f"{answer.outcome} after {answer.seconds:.1f} s of processor time")
+            problem = f"{answer.outcome} after {answer.seconds:.1f} s of processor time"
+            answer = replace(answer, outcome="slow", problem=problem)
         if answer.problem is None and answer.megabytes > MEGABYTES:
-            answer = Answer("large", f"{answer.outcome} with {answer.megabytes:.0f} MB")
+            answer = replace(answer, outcome="large", problem=f"{answer.outcome} with {answer.megabytes:.0f} MB")
         if answer.problem is not None:
             self._end()  # whatever is wrong in this process is not to be blamed on the next input
         return answer
