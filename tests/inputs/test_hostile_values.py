@@ -57,6 +57,28 @@ class Liar(str):
     __str__ = __repr__
 
 
+class Silent:
+    """What a container has, all of which fails."""
+
+    def __len__(self) -> int:
+        """Fails."""
+        raise RuntimeError("no length")
+
+    __iter__ = __getitem__ = keys = values = items = copy = __len__  # type: ignore[assignment]
+
+
+class LyingList(Silent, list):  # type: ignore[type-arg, misc]
+    """A list that cannot be asked."""
+
+
+class LyingTuple(Silent, tuple):  # type: ignore[type-arg, misc]
+    """A tuple that cannot be asked."""
+
+
+class LyingDict(Silent, dict):  # type: ignore[type-arg, misc]
+    """A mapping that cannot be asked."""
+
+
 LEVELS = ("ab", "bc", "cd", "de", "ef", "fg")
 """Names of anchors, each with that of what it repeats before it."""
 
@@ -147,10 +169,14 @@ def test_a_hostile_value_in_a_sweep_is_refused_in_one_short_line(key: str, numbe
 
 
 def test_a_derived_class_means_its_value() -> None:
-    """Texts and numbers of derived classes are taken for what they are, whatever they override."""
+    """Texts, numbers, lists and mappings of derived classes are taken for what they are, whatever they override."""
     given = {"links": Whole.SIXTY, "start": Liar("ellipse")}
     scene = resolve(Liar("soft"), scene=given, options={}, parameters={}).scene
     assert (scene.links, type(scene.links), scene.start, type(scene.start)) == (60, int, "ellipse", str)
+    sweep = {"version": 1, "name": "x", "seed": 1, "samples": 1, "preset": "soft"}
+    grid = LyingDict({"links": LyingList([40, 60]), "frequency": LyingTuple([15.0])})
+    (block,) = load_sweep(LyingDict(sweep | {"grid": grid})).blocks
+    assert block.axes == {"links": (40, 60), "frequency": (15.0,)}
 
 
 def test_values_have_bounds_of_number_and_depth() -> None:

@@ -179,6 +179,9 @@ def plain(value: object, path: str = "value") -> Any:
         left -= 1
         if type(value) in _OWN:
             return value
+        for kind, copied in _OWN_CONTAINERS:
+            if isinstance(value, kind) and type(value) is not kind:
+                value = copied(value)
         if isinstance(value, np.ndarray | list | tuple | range | Mapping) and depth > DEEPEST:
             raise InputError(f"{path}: more than {DEEPEST} lists or mappings inside of one another; give fewer")
         if isinstance(value, Mapping):
@@ -215,6 +218,13 @@ _OWN_TYPES: Final[Sequence[tuple[type, Callable[[Any], object]]]] = (
     (str, str.__str__),
 )
 """Types of numbers, truth values and texts → what makes Python's own of them, past what a derived class overrides."""
+
+_OWN_CONTAINERS: Final[Sequence[tuple[type, Callable[[Any], object]]]] = (
+    (dict, dict.copy),
+    (list, list.copy),
+    (tuple, lambda items: tuple.__getitem__(items, slice(None))),
+)
+"""Likewise of lists and mappings."""
 
 
 def checked_whole(value: object, path: str, least: int, most: int) -> int:
