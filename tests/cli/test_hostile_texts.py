@@ -21,12 +21,14 @@ LEVELS = "".join(f", &{b} [{', '.join([f'*{a}'] * 9)}]" for a, b in zip("abcdefg
 BOMB = f"version: 1\nname: [&a [x, x, x, x, x, x, x, x, x]{LEVELS}]\n"
 
 MEASURED = """
-import resource, sys
+import sys
 from warpchain.cli.main import main
 try:
     main(sys.argv[1:])
 finally:
-    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+    # ru_maxrss would begin with what the process had from which this one was forked
+    status = open("/proc/self/status", encoding="utf-8").read()
+    print(int(status.partition("VmHWM:")[2].split()[0]))
 """
 
 

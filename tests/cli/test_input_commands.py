@@ -50,7 +50,7 @@ def test_parameters_lists_everything(command: Command) -> None:
                 "upper_included": True,
             },
             "choices": None,
-            "source": "chosen here" if name == "circle_radius" else f"Table 1, {quantity.source}",
+            "source": "chosen here" if quantity.source == "assumed" else f"Table 1, {quantity.source}",
             "meaning": quantity.meaning,
         }
     for name, value in Scene().model_dump().items():
@@ -109,10 +109,10 @@ def test_parameters_as_tables(command: Command) -> None:
         ("schema -o no/schema.json", "no/schema.json: cannot be written"),
         ("sweep", "FILE.yaml: missing; give a sweep file, or --new FILE.yaml"),
         ("sweep figure6", "--output: missing; give a folder for the results with -o DIR"),
-        ("sweep figur6 -o new", "figur6: neither a file nor a sweep that comes with warpchain; did you mean figure6?"),
+        ("sweep figur6 -o new", "figur6: neither a file nor a shipped sweep; did you mean figure6?"),
         (
             "sweep x -o new",
-            f"x: neither a file nor a sweep that comes with warpchain; give one of {', '.join(shipped_sweeps())}",
+            f"x: neither a file nor a shipped sweep; give one of {', '.join(shipped_sweeps()[:10])}, ...",
         ),
         ("sweep x.yaml -o new", "x.yaml: No such file or directory;"),
         ("sweep --new no/new.yaml", "--new: no/new.yaml: cannot be written (No such file or directory); give"),

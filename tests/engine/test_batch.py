@@ -141,7 +141,9 @@ def test_tasks_of_a_sweep_run_in_the_blocks_that_are_compiled(tmp_path: Path) ->
     class Executor:
         """Notes the first task and does none."""
 
-        def submit(self, function: object, planned: Sweep, folder: str, shards: Sequence[range], *how: Any) -> Any:
+        def submit(
+            self, function: object, planned: Sweep, digest: str, folder: str, shards: Sequence[range], *how: Any
+        ) -> Any:
             asked.append(({planned.planned(index).setup.scene.links for shard in shards for index in shard}, how[0]))
             raise InterruptedError
 

@@ -32,7 +32,7 @@ def sweep_path(source: str | os.PathLike[str]) -> Path:
         return path
     known = shipped_sweeps()
     if name not in known:
-        raise InputError(f"{name}: neither a file nor a sweep that comes with warpchain; {suggestion(name, known)}")
+        raise InputError(f"{name}: neither a file nor a shipped sweep; {suggestion(name, known)}")
     return _SHIPPED / f"{name}.yaml"
 
 
