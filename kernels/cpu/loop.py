@@ -247,27 +247,27 @@ def make_advance(features: Features):
                     first_stage(K, chain)
                     has_first_stage = int(1)
 
-            seen = chain
+            here = chain
             if wp.static(tilts):
-                seen = on_plane(chain, P, 0)
-            h = wp.min(step, bound_of_step(K, L, seen, control, is_rigid != 0, gap, slack, longest))
+                here = on_plane(chain, P, 0)
+            h = wp.min(step, bound_of_step(K, L, here, control, is_rigid != 0, gap, slack, longest))
             reaches_stop = time + h >= stop_time
             if reaches_stop:
                 h = stop_time - time
 
-            feeling = chain
+            felt = chain
             if wp.static(tilts):
                 before = on_plane(chain, P, wp.static(layout.PLANE_MID))
                 half_step(P, 0, wp.static(layout.PLANE_MID), chain.gravity, h)
-                feeling = on_plane(chain, P, wp.static(layout.PLANE_MID))
+                felt = on_plane(chain, P, wp.static(layout.PLANE_MID))
                 if has_first_stage == 0:
-                    first_stage(K, feeling)
+                    first_stage(K, felt)
                     has_first_stage = int(1)
                 else:
-                    shift_first_stage(K, before, feeling)
+                    shift_first_stage(K, before, felt)
             error_bits = wp.int64(0)
             if is_rigid == 0:
-                error_bits = attempt(K, feeling, h, tolerance)
+                error_bits = attempt(K, felt, h, tolerance)
             if wp.static(has_flight):
                 if is_rigid != 0:
                     error_bits = attempt_flight(K, chain, h, control.flight_tolerance)
@@ -311,7 +311,7 @@ def make_advance(features: Features):
                     half_step(P, 0, 0, chain.gravity, h)
                 if wp.static(has_fixed):
                     if wp.static(tilts):
-                        gap = tilting_gap(K, feeling)
+                        gap = tilting_gap(K, felt)
                     else:
                         gap = fixed_gap(K, chain)
                     if gap < ZERO:

@@ -89,7 +89,7 @@ def in_room(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), chai
 
 
 @wp.func
-def write_plane(row: wp.array(dtype=wp.float64), P: wp.array(dtype=wp.float64), flat: Summary):
+def write_plane_columns(row: wp.array(dtype=wp.float64), P: wp.array(dtype=wp.float64), flat: Summary):
     """Writes the further columns of a sample."""
     k = int(0)
     while k < PLANE_VALUES:
@@ -112,11 +112,11 @@ def write_tilting_sample(
 ):
     """Writes a sample: the sums in the room (``seen``), and the plane."""
     if state.last_sample[world, TIME] < ZERO:
-        write_plane(state.first_sample[world], P, flat)
-    write_plane(state.last_sample[world], P, flat)
+        write_plane_columns(state.first_sample[world], P, flat)
+    write_plane_columns(state.last_sample[world], P, flat)
     if record.samples.shape[1] > 0:
         samples = record.samples[world]
-        write_plane(samples[record.sample_count[world]], P, flat)
+        write_plane_columns(samples[record.sample_count[world]], P, flat)
     write_sample(state, record, world, time, seen)
 
 
