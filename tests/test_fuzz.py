@@ -9,8 +9,11 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import HealthCheck, Phase, given, seed, settings
 
+from tests.support import watched_process
 from tests.support.fuzzed_inputs import INPUTS
 from tests.support.watched_process import WatchedProcess
+
+pytestmark = pytest.mark.slow
 
 EXAMPLES = 60
 """Inputs of each kind."""
@@ -68,3 +71,25 @@ def test_hostile_inputs_end_well(
             outcomes = ", ".join(f"{name} {number}" for name, number in counts.most_common())
             print(f"\n{kind}: {counts.total()}; {outcomes}; at most {seconds:.2f} s, {megabytes:.0f} MB", flush=True)
     assert not failures, f"{len(failures)} of {counts.total()}\n" + "\n\n".join(failures[:3])
+
+
+@pytest.mark.parametrize(
+    ("given", "outcome", "words"),
+    [
+        ("__import__('time').sleep(60)", "hung", "no answer within 3 s"),
+        ("__import__('os').abort()", "crashed", "Fatal Python error: Aborted"),
+        ("sum(range(5 * 10**6))", "slow", "s of processor time"),
+        ("b'x' * 6 * 10**8", "large", "MB"),
+        ("1 / 0", "traceback", "ZeroDivisionError"),
+        ("walk(links=3)", "exit 2", None),
+    ],
+)
+def test_the_watched_process_is_watched(
+    watched: WatchedProcess, monkeypatch: pytest.MonkeyPatch, given: str, outcome: str, words: str | None
+) -> None:
+    """What must not happen is told, and the next input finds a process that answers."""
+    monkeypatch.setattr(watched_process, "PATIENCE", 3)
+    monkeypatch.setattr(watched_process, "SECONDS", 0.01 if outcome == "slow" else 5.0)
+    answer = watched.ask("python", given)
+    assert answer.outcome == outcome
+    assert answer.problem is None if words is None else words in str(answer.problem)

@@ -87,7 +87,7 @@ def forge(file: h5py.File, steps: Steps) -> None:
 def _number(file: h5py.File, name: str, at: int, value: float) -> None:
     """Another number in a dataset, in one of its columns."""
     dataset = file[name]
-    if not isinstance(dataset, h5py.Dataset) or not dataset.size:
+    if not isinstance(dataset, h5py.Dataset) or not 0 < (dataset.size or 0) < 10**6:
         return
     values = np.array(dataset[()])
     flat = values.reshape(-1)
@@ -96,7 +96,7 @@ def _number(file: h5py.File, name: str, at: int, value: float) -> None:
     if target.dtype.kind not in "if":
         return
     with np.errstate(all="ignore"):
-        target[at % len(flat)] = np.array(value).astype(target.dtype)
+        target[at % len(flat)] = np.float64(value).astype(target.dtype)
     dataset[...] = values
 
 

@@ -53,13 +53,13 @@ class WatchedProcess:
         child.stdin.flush()
         line = self._line(PATIENCE)
         if line is None:
-            hangs = child.poll() is None
-            os.kill(child.pid, signal.SIGABRT)  # Python then says where it is
+            outcome, problem = "crashed", f"died with exit status {child.poll()}"
+            if child.poll() is None:
+                outcome, problem = "hung", f"no answer within {PATIENCE} s"
+                child.send_signal(signal.SIGABRT)  # Python then says where it is
             self._end()
             said = (self.scratch / f"stderr-{self._started}").read_text(errors="replace")
-            return Answer(
-                "hung" if hangs else "crashed", f"no answer within {PATIENCE} s\n{said}" if hangs else f"died\n{said}"
-            )
+            return Answer(outcome, f"{problem}\n{said}")
         answer = Answer(**json.loads(line))
         if answer.problem is None and answer.seconds > SECONDS:
             problem = f"{answer.outcome} after {answer.seconds:.1f} s of processor time"

@@ -220,7 +220,7 @@ _OWN_TYPES: Final[Sequence[tuple[type, Callable[[Any], object]]]] = (
 """Types of numbers, truth values and texts → what makes Python's own of them, past what a derived class overrides."""
 
 _OWN_CONTAINERS: Final[Sequence[tuple[type, Callable[[Any], object]]]] = (
-    (dict, dict.copy),
+    (dict, lambda items: dict(dict.items(items))),
     (list, list.copy),
     (tuple, lambda items: tuple.__getitem__(items, slice(None))),
 )

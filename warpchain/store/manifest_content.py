@@ -27,7 +27,7 @@ FORMAT_VERSION: Final = 4
 MOST_BYTES: Final = 2**24
 """Size of the largest sweep.json that is read; 12 axes of 10,000 values take 3 MB."""
 MOST_WALKS: Final = 2**24
-"""Walks of the largest sweep that is read: some 300 bytes each have to fit into memory."""
+"""Walks of the largest sweep that is read: some 700 bytes each have to fit into memory."""
 
 _CHECKSUM: Final = "sha256"
 _Count = Annotated[int, Field(ge=1, le=MOST_WALKS)]

@@ -13,7 +13,7 @@ CELL_LIMIT: Final = 100_000
 """Most cells of a sweep, because each is checked when the sweep is loaded."""
 
 WALK_LIMIT: Final = 2**24
-"""Most walks of a sweep, 17 million: results are read as a whole, some 300 bytes a walk, and have to fit into memory.
+"""Most walks of a sweep, 17 million: results are read as a whole, some 700 bytes a walk, and have to fit into memory.
 
 A power of two, because numbers of designed samples are.
 """
