@@ -45,6 +45,7 @@ class ParameterSymbols(TypedDict, total=False):
     omega_c: Number
     e_t: Number
     r: Number
+    h: Number
 
 
 class ParameterSettings(ParameterSymbols, total=False):
@@ -70,6 +71,7 @@ class ParameterSettings(ParameterSymbols, total=False):
     friction_smoothing: Number
     tangential_restitution: Number
     circle_radius: Number
+    half_width: Number
 
 
 class OtherScene(TypedDict, total=False):
@@ -88,6 +90,11 @@ class OtherScene(TypedDict, total=False):
     further_hold: Number
     hold_limit: Number
     walk_limit: Number
+    plane: Literal["fixed", "tilting"]
+    lateral_speed: Number
+    tilt: Number
+    tilt_rate: Number
+    yaw_rate: Number
 
 
 class SceneSettings(OtherScene, total=False):
