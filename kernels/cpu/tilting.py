@@ -45,7 +45,9 @@ LANES = 8
 SUMS = STAGES + STAGE_ROWS
 """First of the rows for terms of sums: those of the second to fourth stage, which are free between attempts."""
 SUMMED_IN_CONTACT = 4
+"""Impulse on the plane, its two moments, and the work of the copies."""
 TOUCHES = SUMS + SUMMED_IN_CONTACT
+"""Row of 1 for links that touch the floor, 0 for others."""
 
 
 @wp.func_native("""
