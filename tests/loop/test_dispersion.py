@@ -13,6 +13,7 @@ from warpchain.loop.dispersion import (
     UPPER_FORWARD,
     band_gap,
     continuous_ring,
+    equivalent_friction,
     long_wave_speed,
     ring_spin,
     ring_waves,
@@ -21,7 +22,7 @@ from warpchain.loop.dispersion import (
 )
 from warpchain.loop.mode_fit import find_packet, fit_rates, mode_amplitudes
 from warpchain.oracle.circular_loop import circular_loop_force, tapped_loop
-from warpchain.oracle.motion_equations import acceleration
+from warpchain.oracle.motion_equations import acceleration, friction_torque
 from warpchain.oracle.ring_modes import ring_modes
 
 PAPER = preset("paper").with_values({"coulomb_friction": 0.0})
@@ -228,13 +229,13 @@ def from_tap(links):
 
 def test_modes_of_a_tapped_ring():
     """Slow and fast modes of 60 links ring at the rates of theory: frequencies to 0.1 %, damping to 1 %."""
-    links, interval, numbers = 60, 4e-4, np.arange(2, 13)
+    links, interval, numbers = 60, 8e-4, np.arange(2, 13)
     place = from_tap(links)
-    angles = tapped(links, 0.1 * place * np.exp(-(place**2) / 4.5), interval * np.arange(200))
+    angles = tapped(links, 0.1 * place * np.exp(-(place**2) / 4.5), interval * np.arange(100))
     wanted = ring_waves(SOFT, links, SPEED, numbers).rate[:, [LOWER_BACKWARD, LOWER_FORWARD]]
     found = []
     for number, rates in zip(numbers, wanted, strict=True):
-        instants = min(200, int(-6 / rates[0].real / interval))  # before it has died
+        instants = min(100, int(-6 / rates[0].real / interval))  # before it has died
         found.append(fit_rates(mode_amplitudes(angles, number)[:instants], interval, 4))
     measured = nearest(wanted, np.array(found))
     assert_allclose(measured.imag, wanted.imag, rtol=1e-3)
@@ -280,6 +281,40 @@ def test_two_packets_run_at_their_group_speeds():
     assert_allclose(in_room, [0.0, 2.0], atol=0.04)
 
 
+# --- Coulomb friction ---
+
+
+@pytest.mark.parametrize("amplitude", [1e-3, 0.1, 1.0, 60.0])
+def test_equivalent_friction_takes_as_much_energy(amplitude):
+    """β_eq W²/2 is the mean power of the NumPy model's friction in a joint that swings with amplitude W."""
+    chain = preset("soft")
+    spin = amplitude * np.cos(2 * np.pi * (np.arange(200_000) + 0.5) / 200_000)
+    power = np.mean(friction_torque(spin, chain) * spin)
+    assert equivalent_friction(chain, amplitude) * amplitude**2 / 2 == pytest.approx(power, rel=1e-4)
+
+
+def test_limits_of_equivalent_friction():
+    """β + τ_c/ω_c in small swings, β + 4τ_c/πW in large ones, with the paper's sharp ω_c too."""
+    chain = preset("paper")
+    assert equivalent_friction(chain, 1e-6) == pytest.approx(9e-5 + 1.1e-4 / 1e-3, rel=1e-4)
+    assert equivalent_friction(chain, 60.0) == pytest.approx(9e-5 + 4 * 1.1e-4 / (np.pi * 60), rel=1e-4)
+
+
+def test_coulomb_friction_damps_a_tapped_ring():
+    """Waves whose joints swing at 3 rad/s decay half as fast again, as equivalent friction has it to 12 %."""
+    chain, links, number, times = preset("soft"), 60, 5, 4e-4 * np.arange(100)
+    spins = 10 * np.cos(2 * np.pi * number * np.arange(links) / links)
+    angles = tapped(links, spins, times, chain)
+    rates = np.gradient(angles, times, axis=0)
+    amplitude = float(np.mean(np.sqrt(2 * np.mean(np.diff(rates, axis=1) ** 2, axis=1))))
+    equivalent = chain.with_values({"viscous_friction": equivalent_friction(chain, amplitude)})
+    wanted = ring_waves(equivalent, links, SPEED, [number]).rate[:, [LOWER_BACKWARD, LOWER_FORWARD]]
+    without = ring_waves(chain, links, SPEED, [number]).rate[:, [LOWER_BACKWARD, LOWER_FORWARD]]
+    found = nearest(wanted, fit_rates(mode_amplitudes(angles, number), 4e-4, 4)[None, :])
+    assert_allclose(found.real, wanted.real, rtol=0.12)
+    assert np.all(found.real < 1.3 * without.real)
+
+
 # --- inputs ---
 
 
@@ -287,6 +322,7 @@ def test_two_packets_run_at_their_group_speeds():
     ("call", "message"),
     [
         (lambda: straight_waves(PAPER, -1.0, [0.5]), "^tension: -1.0 N is not positive; give a greater one$"),
+        (lambda: equivalent_friction(PAPER, 0.0), "^amplitude: 0.0 rad/s is not positive"),
         (lambda: straight_waves(PAPER, 1.0, [0.0]), r"^phase: outside of \(0, π/2\]"),
         (lambda: straight_waves(PAPER, 1.0, [2.0]), "π minus itself$"),
         (lambda: straight_waves(PAPER, 1.0, [np.nan]), "^phase: not a row of finite numbers"),

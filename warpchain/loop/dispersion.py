@@ -35,9 +35,8 @@ T = m̄ v² cos α/ℓ, Ω = 2v sin α/ℓ (v is the speed of the joints, `circu
 With j = β = 0 it is a string, whose modes are λ = inΩ and λ = −in (n² − 3)/(n² + 1) Ω: in the room, where rates are
 λ − inΩ, the slow family stands still and the fast one runs at 2v (n² − 1)/(n² + 1).
 
-Coulomb friction is left out: it is not linear. Joints that turn to and fro with the amplitude W feel it as a further
-viscous friction 4τ_c/πW (harmonic balance); joints that turn slower than ω_c as τ_c/ω_c; joints that keep their sense
-of rotation, because the loop bends there, not at all.
+Coulomb friction is left out: it is not linear. `equivalent_friction` replaces it in joints that only swing. Joints that
+keep their sense of rotation, because the loop bends there, do not feel it in small waves.
 """
 
 from collections.abc import Callable
@@ -63,6 +62,8 @@ FRICTION_STEPS: Final = 64
 """Friction rises from nothing in so many steps, while the branches are followed."""
 PHASE_STEP: Final = 1e-5
 """Step of a central difference with respect to the phase [rad]."""
+QUADRATURE_POINTS: Final = 2001
+"""Points of the integral of Coulomb friction over a period: good to 1e-5."""
 FIRST_MODE: Final = 2
 """The least mode number that bends a ring: 0 turns it, ±1 move it."""
 
@@ -249,6 +250,30 @@ def long_wave_speed(parameters: Parameters, tension: float) -> float:
 def ring_spin(parameters: Parameters, links: int, speed: float) -> float:
     """Ω = 2 v sin(π/N)/ℓ, at which a ring turns whose joints move at `speed` [m/s], in rad/s."""
     return float(2 * speed * np.sin(np.pi / links) / parameters.link_length)
+
+
+def equivalent_friction(parameters: Parameters, amplitude: float) -> float:
+    """Viscous friction [N m s] that takes as much energy as joint friction does where joints swing about rest.
+
+    Harmonic balance: (2/W) times the mean of f(W cos φ) cos φ over a period, with f(w) = β w + τ_c tanh(w/ω_c). It is
+    β + 4τ_c/πW for W far above ω_c and β + τ_c/ω_c far below.
+
+    Args:
+        parameters: of the chain.
+        amplitude: W, of the relative angular velocity of two links [rad/s].
+
+    Raises:
+        InputError: the amplitude is not positive.
+    """
+    _check_positive("amplitude", amplitude, "rad/s")
+    ratio = amplitude / parameters.friction_smoothing
+    # By parts the mean of tanh(ratio · cos φ) cos φ is 2/π ∫ sin φ d tanh, over cos φ from 0, where it rises, to 1.
+    cosine = np.sinh(np.linspace(0.0, np.arcsinh(ratio), QUADRATURE_POINTS)) / ratio
+    cosine[-1] = 1.0
+    sine = np.sqrt(1 - cosine**2)
+    steps = np.diff(np.tanh(ratio * cosine))
+    mean = 2 / np.pi * float(np.sum((sine[1:] + sine[:-1]) / 2 * steps))
+    return parameters.viscous_friction + 2 * parameters.coulomb_friction * mean / amplitude
 
 
 def _mean_mass(parameters: Parameters) -> float:
