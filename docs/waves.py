@@ -161,6 +161,11 @@ def show_ring(speed: float, angles: Array, numbers: Array) -> None:
         )
     greatest = 100 * np.array(worst).max(axis=(0, 2))
     print(f"  simulated against exact: ω within {greatest[0]:.3f} %, γ within {greatest[1]:.2f} %")
+    for name in ("soft", "paper"):
+        chain = preset(name).with_values({"coulomb_friction": 0.0})
+        rates, found = waves.rate[:, BOTH], ring_modes(LINKS, chain, speed, numbers).bending
+        apart = np.abs(rates[:, :, None] - found[:, None, :]).min(axis=2) / np.abs(rates)
+        print(f"  NumPy model with the joints of {name} against exact: rates within {apart.max():.1e}")
 
 
 def row(rates: NDArray[np.complex128]) -> str:
