@@ -126,6 +126,13 @@ def test_long_waves_run_at_the_speed_of_a_string():
     assert waves.loss_per_wavelength[0, LOWER_FORWARD] == pytest.approx(lost, rel=1e-3)
 
 
+def test_waves_without_friction_run_for_ever():
+    """Without friction the reach is infinite and nothing is lost over a wavelength."""
+    waves = straight_waves(FREE, TENSION, PHASES[:-1])
+    assert np.all(np.isinf(waves.reach))
+    assert_allclose(waves.loss_per_wavelength, 0)
+
+
 def test_bands_end_at_the_edges_of_the_gap():
     """At κ = π/2 both bands end at the gap's edges and stand still; the upper one begins at ω² = Tℓ/Ī."""
     waves = straight_waves(FREE, TENSION, [np.pi / 2])

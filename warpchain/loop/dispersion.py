@@ -64,6 +64,8 @@ PHASE_STEP: Final = 1e-5
 """Step of a central difference with respect to the phase [rad]."""
 QUADRATURE_POINTS: Final = 2001
 """Points of the integral of Coulomb friction over a period: good to 1e-5."""
+ROUNDING: Final = 1e-12
+"""Damping below this part of a rate is rounding."""
 FIRST_MODE: Final = 2
 """The least mode number that bends a ring: 0 turns it, ±1 move it."""
 
@@ -105,13 +107,21 @@ class Waves:
 
     @property
     def reach(self) -> Array:
-        """How far a packet runs along the chain until its amplitude is 1/e of what it was [links], shape (k, 4)."""
-        return np.abs(self.group_speed) / self.damping
+        """How far a packet runs along the chain until its amplitude is 1/e of what it was [links], shape (k, 4).
+
+        Infinite for waves whose damping is nothing but rounding.
+        """
+        damped = self.damping > ROUNDING * np.abs(self.rate)
+        return np.where(damped, np.abs(self.group_speed) / np.where(damped, self.damping, 1.0), np.inf)
 
     @property
     def loss_per_wavelength(self) -> Array:
-        """By how much the logarithm of the amplitude falls while a packet runs one wavelength, shape (k, 4)."""
-        return 2 * np.pi / self.phase[:, None] / self.reach
+        """By how much the logarithm of the amplitude falls while a packet runs one wavelength, shape (k, 4).
+
+        Infinite for waves that decay where they are.
+        """
+        with np.errstate(divide="ignore"):
+            return 2 * np.pi / self.phase[:, None] / self.reach
 
 
 def straight_waves(parameters: Parameters, tension: float, phase: ArrayLike) -> Waves:
