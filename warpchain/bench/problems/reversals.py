@@ -1,13 +1,14 @@
 """Joints that reverse within a step: which methods see the kink that this makes in the right-hand side.
 
-Joint friction τ_c tanh(w/ω_c) changes its sign while the relative angular velocity w of two links passes ±ω_c. At Table
-1's ω_c = 1e-3 rad/s, springs that ring after an impact reverse joints within less than a nanosecond, and a step takes
-microseconds: the right-hand side jumps inside the step.
+Joint friction τ_c tanh(w/ω_c) changes its sign while the relative angular velocity w of two links passes from −ω_c to
+ω_c. At Table 1's ω_c, springs that ring after an impact reverse joints in a small fraction of a step: the right-hand
+side jumps inside the step.
 
-Fehlberg's estimate of a step's error is h · 41/840 · (k₁ + k₁₁ − k₁₂ − k₁₃), of stages at the times 0, 1, 0 and 1 of the
-step. If the right-hand side depends on the time only, k₁ = k₁₂ and k₁₁ = k₁₃: the estimate is zero, whatever the error.
-A jump at a given time is of this kind. So `rkf78` accepts steps whose error is thousands of tolerances. The estimates
-of the other methods have weights at stages within the step.
+Fehlberg's estimate of a step's error is h · 41/840 · (k₁ + k₁₁ − k₁₂ − k₁₃), of stages at the times 0, 1, 0 and 1 of
+the step. If the right-hand side depends on the time only, k₁ = k₁₂ and k₁₁ = k₁₃: the estimate is zero, whatever the
+error. A jump at a given time is of this kind. What `rkf78` sees of it is what comes back through the springs in the
+later stages: less, the shorter the step. So it accepts steps whose error is thousands of tolerances. The estimates of
+the other methods have weights at stages within the step.
 
 Flights of 1 ms without floor are compared with `dp5` at 1e-13. How far `rodas5p` at 1e-12, which has another kind of
 stages and of steps, is from that says how far the reference can be trusted.
@@ -71,8 +72,8 @@ class Reversal:
         str,
         Column(
             "1",
-            "struck: a circular loop that turns at 60 rad/s, just after it hit the floor at 2 m/s; reversing: one whose "
-            "links turn at 60 (1 + 0.2 sin 2θ) rad/s; 40 links each",
+            "struck: a circular loop that turns at 60 rad/s, just after it hit the floor at 2 m/s; reversing: one "
+            "whose links turn at 60 (1 + 0.2 sin 2θ) rad/s; 40 links each",
         ),
     ]
     friction_smoothing: Annotated[float, Column("rad/s", "ω_c; the other parameters are Table 1's")]
@@ -84,7 +85,8 @@ class Reversal:
     ]
     greatest_error: Annotated[float, Column("rad/s", "the same, greatest over the starts")]
     trust: Annotated[
-        float, Column("rad/s", "distance of the reference, dp5 at 1e-13, from rodas5p at 1e-12, greatest over the starts")
+        float,
+        Column("rad/s", "distance of the reference, dp5 at 1e-13, from rodas5p at 1e-12, greatest over the starts"),
     ]
     step_error: Annotated[
         float,
