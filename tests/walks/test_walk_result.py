@@ -162,7 +162,7 @@ def test_provenance(tmp_path: Path) -> None:
     walk = make_walk()
     walk.save(tmp_path / "walk.h5")
     with h5py.File(tmp_path / "walk.h5") as file:
-        assert file.attrs["format"] == b"warpchain walk" and file.attrs["format_version"] == 5
+        assert file.attrs["format"] == b"warpchain walk" and file.attrs["format_version"] == 6
         assert file.attrs["status"] == b"at_rest"
         setup = json.loads(file.attrs["setup"])
         assert json.loads(file.attrs["seed"]) == walk.seed
