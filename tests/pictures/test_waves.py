@@ -89,6 +89,8 @@ def test_a_wave_follows_its_characteristic(speed: float) -> None:
     power = [stacked_power(bend, ratio * (path - path[0])) for ratio in ratios]
     assert ratios[np.argmax(power)] == pytest.approx(1.0)
     assert max(power) > 0.97 and min(power) < 0.2
+    assert stacked_power(bend, path - path[0], (3, 3)) > 0.97 > 0.2 > stacked_power(bend, path[0] - path, (3, 3))
+    assert stacked_power(np.ones((5, LINKS)), np.arange(5.0)) == 0.0
 
 
 def test_in_the_room_one_wave_stands_and_one_runs_twice_as_fast() -> None:
@@ -205,6 +207,16 @@ def test_without_forces_waves_run_at_the_speed_of_the_loop() -> None:
     """Curvature needs frames only; the legend then says c = v."""
     figure = waves_figure(bouncing_ring(), colour="curvature")
     assert any("c = v" in text.get_text() for text in figure.legends[0].get_texts())
+
+
+def test_a_flight_has_no_lines() -> None:
+    """Without an impact in the window there are no characteristics, after three no more than twelve."""
+    assert drawn_lines(waves_figure(bouncing_ring(), colour="velocity", window=(0.0, 0.06))) == 0
+    walk = bouncing_ring()
+    joints = walk.frame_joints.copy()
+    joints[..., 1] -= 0.02 * (np.abs(np.cos(20 * walk.frame_time)) - np.abs(np.cos(60 * walk.frame_time)))[:, None]
+    many = make_walk(LINKS, frame_time=walk.frame_time, frame_joints=joints)
+    assert drawn_lines(waves_figure(many, colour="velocity")) == 12
 
 
 @pytest.mark.parametrize(

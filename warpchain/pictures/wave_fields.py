@@ -126,24 +126,22 @@ def moving_average(time: Array, values: Array, width: float) -> Array:
     return mean
 
 
-def stacked_power(values: Array, way: Array) -> float:
-    """Part of a field's variance that runs along given paths around the loop, 0 to 1.
+def stacked_power(values: Array, way: Array, modes: tuple[int, int] | None = None) -> float:
+    """Part of a field's variance along the loop that runs along given paths around it, 0 to 1.
 
     The field is moved back by the way of each frame and averaged over the frames: what runs along adds up.
 
     Args:
-        values: at joints, shape (f, n); their mean over the joints of a frame does not count.
+        values: at joints, shape (f, n).
         way: how far the paths have come at each frame [links], shape (f,).
+        modes: first and last number of waves around the loop that count, from 1 to below n/2; None: all of these.
     """
     links = values.shape[1]
-    waves = np.fft.rfft(values - values.mean(axis=1, keepdims=True), axis=1)
-    waves *= np.exp(2j * np.pi * np.arange(waves.shape[1]) * way[:, None] / links)
-    weight = np.full(waves.shape[1], 2.0)
-    weight[0] = 1.0
-    if links % 2 == 0:
-        weight[-1] = 1.0
-    whole = float(np.sum(weight * np.abs(waves) ** 2)) / len(values)
-    return float(np.sum(weight * np.abs(waves.mean(axis=0)) ** 2)) / whole if whole > 0 else 0.0
+    first, last = (1, (links - 1) // 2) if modes is None else modes
+    waves = np.fft.rfft(values, axis=1)[:, first : last + 1]
+    moved = waves * np.exp(2j * np.pi * np.arange(first, last + 1) * way[:, None] / links)
+    whole = float(np.mean(np.sum(np.abs(waves) ** 2, axis=1)))
+    return float(np.sum(np.abs(moved.mean(axis=0)) ** 2)) / whole if whole > 0 else 0.0
 
 
 def bin_means(time: Array, values: Array, most: int) -> tuple[Array, Array]:

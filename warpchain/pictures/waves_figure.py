@@ -244,7 +244,7 @@ def _draw_characteristics(axes: Axes, waves: _Waves, look: _Look, place: Place, 
     """Both families from beginning and end of each of the first impacts, until the next one begins."""
     found = impacts(waves.time, waves.joints, waves.floor)
     ends = [impact.frame for impact in found[1:]] + [len(waves.time)]
-    for impact, end in list(zip(found, ends, strict=True))[:FIRST_IMPACTS]:
+    for impact, end in zip(found[:FIRST_IMPACTS], ends, strict=False):
         starts = ((impact.frame, impact.joint, "-"), (impact.last_frame, impact.last_joint, _DASHES))
         for frame, joint, line in starts:
             for sign in (1.0, -1.0):
@@ -253,7 +253,7 @@ def _draw_characteristics(axes: Axes, waves: _Waves, look: _Look, place: Place, 
                 places = place(path, frame)
                 jumps = np.abs(np.diff(places, prepend=places[:1])) > half
                 places = np.where(jumps, np.nan, places)
-                halo = [withStroke(linewidth=1.6, foreground=look.halo, alpha=0.35)]
+                halo = [withStroke(linewidth=1.8, foreground=look.halo, alpha=0.6)]
                 times = waves.time[frame : frame + len(places)]
                 axes.plot(times, places, color=look.wave, linewidth=0.8, linestyle=line, path_effects=halo)
 
