@@ -53,6 +53,7 @@ def print_speeds(walk: warpchain.WalkResult, begin: float, end: float) -> None:
     bend = curvatures(walk.frame_joints, length)[shown]
     across = normal_velocities(time, walk.frame_joints, masses)[shown]
     print(f"{scene.links} links, {scene.frequency:g} Hz, {begin} s to {end} s, c = {speed.mean():.2f} m/s:")
+    print(f"stretching: {length * np.sqrt(parameters.joint_stiffness / masses.mean()):.0f} m/s")
     print("waves around the loop | slow, curvature | part | fast, velocity | part")
     for mode in MODES:
         cells = []

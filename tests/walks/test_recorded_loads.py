@@ -111,6 +111,16 @@ def test_they_change_no_bit_of_the_walk(start: str) -> None:
         np.testing.assert_allclose(np.diff(before.frame_time), 1e-3, atol=1e-4)
 
 
+def test_planes_come_with_fine_frames() -> None:
+    """Each fine frame of a plane that tilts has the plane of its moment: it turns a little from frame to frame."""
+    walk = flight(plane="tilting", tilt=0.1, tilt_rate=3.0)
+    assert len(walk.frame_axes) == len(walk.frame_forces) == len(walk.frame_time) > 700
+    lean = np.arctan2(-walk.frame_axes[:, 1, 2], walk.frame_axes[:, 1, 1])
+    assert abs(lean[0]) == pytest.approx(0.1, rel=1e-6)
+    assert np.abs(np.diff(lean)).max() < 1.5 * 3.0 * 2 * FINE
+    assert abs(lean[-1]) == pytest.approx(abs(walk.final_tilt), abs=3.0 * 2 * FINE)
+
+
 def test_standard_is_explicit_where_loads_are_recorded() -> None:
     """Rigid joints have no forces: standard changes, hybrid and setups of hybrid walks are refused."""
     brief = FLIGHT | {"walk_limit": 1e-3}
