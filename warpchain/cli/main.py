@@ -240,8 +240,8 @@ def walk(
         str | None,
         typer.Option(
             metavar="SECONDS",
-            help="Simulated time between two recorded pictures of the chain, in s; needs a folder. Default: 0.002, "
-            "with --record-loads 0.0001.",
+            help="Simulated time between two recorded pictures of the chain, in s; needs a folder; with --record-loads "
+            "by default 0.0001. Default: 0.002.",
         ),
     ] = None,
     record_loads: Annotated[
