@@ -80,6 +80,7 @@ class State:
     other_step: wp.array(dtype=wp.float64)  # last step proposed for the other model of the joints [s]
     closing_time: wp.array(dtype=wp.float64)  # earliest time at which joints may close [s]
     next_sample: wp.array(dtype=wp.int64)  # index of the next sample mark
+    next_frame: wp.array(dtype=wp.int64)  # index of the next frame mark; −1: frames are taken with samples
     status: wp.array(dtype=wp.int32)
     watch: wp.array2d(dtype=wp.float64)  # (W, WATCH_ROWS): memory of the watches
     plane: wp.array2d(dtype=wp.float64)  # (W, PLANE_ROWS): the plane of the chain, if it tilts, see layout
@@ -122,6 +123,7 @@ class Control:
     launch_time: wp.float64  # after which a block stops at its next sample [s]
     sample_interval: wp.float64  # [s]
     frame_every: wp.int64  # samples per frame
+    frame_interval: wp.float64  # between frame marks, for chains that have them [s]
     rest_speed: wp.float64  # [m/s]
     rest_time: wp.float64  # [s]
     soft_stiffness: wp.float64  # k of soft joints [N/m]

@@ -36,7 +36,7 @@ from warpchain.kernels.cpu.tilting import (
 )
 from warpchain.kernels.events.present_chain import has_changed, present_chain
 from warpchain.kernels.events.record import lacks_last_sample, record_is_full, write_sample
-from warpchain.kernels.events.sample import sampling
+from warpchain.kernels.events.sample import next_mark, sampling
 from warpchain.kernels.events.softening import book_softening, contact_step, spring_tolerance
 from warpchain.kernels.events.summary import summarise
 from warpchain.kernels.events.tallies import (
@@ -209,7 +209,7 @@ def make_advance(features: Features):
         other_step = state.other_step[world]
         attempts = int(0)
         while status == RUNNING and attempts < control.attempts and not record_is_full(record, world):
-            if time >= wp.float64(state.next_sample[world]) * control.sample_interval:
+            if time >= next_mark(state, control, world):
                 softness = state.softness[world]
                 load_factor = state.load_factor[world]
                 status = sample(K, chain, drive, state, record, control, world, time)

@@ -1,4 +1,4 @@
-"""One sample of a chain: record it, then evaluate every watch."""
+"""One sample of a chain: record it, then evaluate every watch. Frames may have closer marks of their own."""
 
 import functools
 
@@ -19,11 +19,21 @@ from warpchain.kernels.types import Chain, Control, Drive, Record, State
 wp.set_module_options({"enable_backward": False})
 
 
+@wp.func
+def next_mark(state: State, control: Control, world: int):
+    """Time [s] from which the next sample or frame is due."""
+    due = wp.float64(state.next_sample[world]) * control.sample_interval
+    if state.next_frame[world] >= wp.int64(0):
+        due = wp.min(due, wp.float64(state.next_frame[world]) * control.frame_interval)
+    return due
+
+
 @functools.cache
 def sampling(watch: str, softens: bool = False, tilts: bool = False):
     """Warp function ``sample`` of a chain whose ends are placed: time series, frame, watches; returns the status.
 
-    With ``"steady"`` it may also change the chain's loads and the velocities of its links.
+    It is called at or after :func:`next_mark`. If only a frame is due, nothing but the record changes. With
+    ``"steady"`` it may also change the chain's loads and the velocities of its links.
 
     Args:
         watch: ``"rest"``, ``"steady"`` or ``"none"``.
@@ -44,7 +54,16 @@ def sampling(watch: str, softens: bool = False, tilts: bool = False):
         world: int,
         time: wp.float64,
     ):
+        frame_mark = state.next_frame[world]
+        if frame_mark >= wp.int64(0) and time >= wp.float64(frame_mark) * control.frame_interval:
+            write_frame(record, K, chain, world, time)
+            if wp.static(tilts):
+                write_frame_plane(state.plane[world], record, world)
+            frames_passed = wp.int64(wp.floor(time / control.frame_interval))
+            state.next_frame[world] = wp.max(frame_mark, frames_passed) + wp.int64(1)
         mark = state.next_sample[world]
+        if time < wp.float64(mark) * control.sample_interval:
+            return RUNNING
         last_time = state.last_sample[world, TIME]
         is_first = last_time < ZERO
         summary = summarise(K, chain)
@@ -55,7 +74,7 @@ def sampling(watch: str, softens: bool = False, tilts: bool = False):
             write_tilting_sample(P, state, record, world, time, flat, summary)
         else:
             write_sample(state, record, world, time, summary)
-        if mark % control.frame_every == wp.int64(0):
+        if frame_mark < wp.int64(0) and mark % control.frame_every == wp.int64(0):
             write_frame(record, K, chain, world, time)
             if wp.static(tilts):
                 write_frame_plane(P, record, world)

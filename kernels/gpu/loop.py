@@ -36,7 +36,7 @@ from warpchain.kernels.gpu.contacts.proximity import block_proximity, upper_boun
 from warpchain.kernels.gpu.contacts.self_contacts import block_self_contacts, touch_layout
 from warpchain.kernels.gpu.explicit import explicit_attempt
 from warpchain.kernels.gpu.functions import shares_board
-from warpchain.kernels.gpu.sample import block_sample, write_step_bounds
+from warpchain.kernels.gpu.sample import block_sample, write_marks, write_step_bounds
 from warpchain.kernels.gpu.stage import Place, block_stage, error_of, read_link, vec3d, vec5d, write_first_stage
 from warpchain.kernels.gpu.threads import barrier, barrier_if_any, block_maxima, clock, tile_address, vec4i
 from warpchain.kernels.gpu.tilting import block_tilting, copy_plane, write_felt_plane
@@ -216,8 +216,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             K[chain_values, layout.VALUE_OPENING] = state.extremes[world, layout.OPENING]
             K[chain_values, layout.VALUE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
             K[chain_values, layout.VALUE_LAST_IMPULSE] = state.watch[world, layout.LAST_FLOOR_IMPULSE]
-            K[chain_values, layout.VALUE_STOP_TIME] = state.stop_time[world]
-            K[chain_values, layout.VALUE_NEXT_SAMPLE] = wp.float64(state.next_sample[world]) * control.sample_interval
+            write_marks(K, state, control, world)
             T[wp.static(touch.fixed_hits)] = 0
             T[wp.static(touch.self_hits)] = 0
             T[wp.static(touch.deepest)] = 0

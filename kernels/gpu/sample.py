@@ -5,7 +5,7 @@ import functools
 import warp as wp
 
 from warpchain.kernels.events.present_chain import has_changed, present_chain
-from warpchain.kernels.events.sample import sampling
+from warpchain.kernels.events.sample import next_mark, sampling
 from warpchain.kernels.events.softening import book_softening, contact_step, spring_tolerance
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import write_constants
@@ -32,6 +32,13 @@ def write_step_bounds(
     """Writes the bounds of steps on springs after the last sample on the board."""
     K[BOARD_VALUES, VALUE_CONTACT_STEP] = contact_step(state, control, world, is_driven)
     K[BOARD_VALUES, VALUE_TOLERANCE] = spring_tolerance(drive, state, control, world, is_driven)
+
+
+@wp.func
+def write_marks(K: wp.array2d(dtype=wp.float64), state: State, control: Control, world: int):
+    """Writes when the run stops and when the next sample or frame is due on the board."""
+    K[BOARD_VALUES, VALUE_STOP_TIME] = state.stop_time[world]
+    K[BOARD_VALUES, VALUE_NEXT_SAMPLE] = next_mark(state, control, world)
 
 
 @functools.cache
@@ -70,8 +77,7 @@ def block_sample(features: Features, touch: TouchLayout):
                 if wp.static(is_driven):
                     write_inertias(K, after)
             write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
-        K[BOARD_VALUES, VALUE_STOP_TIME] = state.stop_time[world]
-        K[BOARD_VALUES, VALUE_NEXT_SAMPLE] = wp.float64(state.next_sample[world]) * control.sample_interval
+        write_marks(K, state, control, world)
         if clock() > K[BOARD_VALUES, VALUE_DEADLINE]:
             T[wp.static(touch.is_late)] = 1
 

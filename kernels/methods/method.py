@@ -43,6 +43,11 @@ class Method:
         return self.kind == "explicit" and not self.has_rigid_flight
 
     @property
+    def has_joint_forces(self) -> bool:
+        """Whether a force stands in every joint at any time: rigid flights have no springs that could be read."""
+        return not self.has_rigid_flight
+
+    @property
     def can_tilt(self) -> bool:
         """Whether it carries chains whose plane tilts: implicit steps and rigid flights know nothing of the plane."""
         return self.kind == "explicit" and not self.has_rigid_flight

@@ -90,9 +90,10 @@ def test_a_walk_and_a_trajectory_of_numpy_numbers():
             seed=whole(2),
             frame_interval=real(0.02),
             record_before=real(0.0),
+            record_loads=truth(True),
             walk_limit=real(0.05),
         )
-        for whole, real in ((int, float), (np.int64, np.float64))
+        for whole, real, truth in ((int, float, bool), (np.int64, np.float64, np.bool_))
     ]
     assert type(walks[1].seed) is int
     assert walks[0].setup == walks[1].setup

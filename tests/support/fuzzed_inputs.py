@@ -395,7 +395,7 @@ HDF5_STEPS = st.lists(
 def python_calls() -> Inputs:
     """Calls of `walk` and `sweep`."""
     hostile = values(PYTHON_TEXTS)
-    named = {"seed", "frame_interval", "record_before", "preset", "setup"}
+    named = {"seed", "frame_interval", "record_before", "record_loads", "preset", "setup"}
     fields = sorted(name for name in (*SECTION_OF, *named) if name.isidentifier())
 
     def call(function: str) -> Callable[[Mapping[str, Any]], str]:

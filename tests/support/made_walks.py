@@ -65,6 +65,8 @@ def make_walk(links: int = 30, **changes: Any) -> WalkResult:
         "rms_speed": rng.random(801),
         "frame_time": frame_time,
         "frame_joints": offset + middle[:, None],
+        "frame_forces": np.empty((0, links, 2)),
+        "frame_moments": np.empty((0, links)),
         "center_z": np.empty(0),
         "tilt": np.empty(0),
         "yaw": np.empty(0),

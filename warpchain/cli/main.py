@@ -228,8 +228,8 @@ def walk(
             "--output",
             metavar="DIR",
             parser=output_path,
-            help="Write walk.h5, figure5.png, film_strip.png, of a chain on a sprocket loop.png and, if its plane "
-            "tilts, tilt.png to this folder; files of these names are replaced.",
+            help="Write walk.h5, figure5.png, film_strip.png, of a chain on a sprocket loop.png, if its plane tilts "
+            "tilt.png, and with --record-loads waves.png to this folder; files of these names are replaced.",
         ),
     ] = None,
     animation: Annotated[
@@ -240,9 +240,18 @@ def walk(
         str | None,
         typer.Option(
             metavar="SECONDS",
-            help="Simulated time between two recorded pictures of the chain, in s; needs a folder. Default: 0.002.",
+            help="Simulated time between two recorded pictures of the chain, in s; needs a folder; with --record-loads "
+            "by default 0.0001. Default: 0.002.",
         ),
     ] = None,
+    record_loads: Annotated[
+        bool,
+        typer.Option(
+            "--record-loads",
+            help="Record forces and moments of the joints with each picture after the release, and draw waves.png; "
+            "needs a folder. standard then is explicit: rigid joints have no forces.",
+        ),
+    ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object, in SI units, instead of the table.")
     ] = False,
@@ -264,13 +273,13 @@ def walk(
     given = _given_values({name: text for name, text in named.items() if text is not None}, assignments or [])
     if like is None:
         chosen_seed = None if seed is None else checked_whole(_parsed("seed", seed), "seed", 0, LARGEST_SEED)
-        setup = _setup(config, preset, given, chosen_seed)
+        setup = _setup(config, preset, given, chosen_seed, record_loads)
     else:
         for option, value in (("--config", config), ("--preset", preset), ("--seed", seed)):
             if value is not None:
                 raise InputError(f"{option}: given together with --like, and a saved walk has its own; leave one out")
         setup, chosen_seed = setup_like(like, given)
-    interval = _frame_interval(output, animation, frame_interval)
+    interval = _frame_interval(output, animation, frame_interval, record_loads)
     if output is not None:
         try_walk_folder(output, animation)
 
@@ -279,6 +288,7 @@ def walk(
             setup,
             seed=chosen_seed,
             frame_interval=interval,
+            record_loads=record_loads,
             on_progress=lambda progress: show(progress_text(progress)),
         )
     if as_json:
@@ -343,7 +353,7 @@ def _parsed(path: str, text: str) -> Any:
         raise InputError(f"{path}: {shown(text)} cannot be read; give a number, true, false or a name") from None
 
 
-def _setup(config: Path | None, preset: str | None, given: Sections, seed: int | None) -> "Setup":
+def _setup(config: Path | None, preset: str | None, given: Sections, seed: int | None, records_loads: bool) -> "Setup":
     """The setup of a walk: the file's values, the command line's over them, and the sample of the seed.
 
     Raises:
@@ -361,12 +371,18 @@ def _setup(config: Path | None, preset: str | None, given: Sections, seed: int |
     for section, values in given.items():
         if isinstance(sections[section], Mapping):  # `resolve` refuses anything else
             sections[section] = {**sections[section], **values}
-    setup = resolve(preset, **sections)
+    setup = resolve(
+        preset,
+        scene=sections["scene"],
+        options=sections["options"],
+        parameters=sections["parameters"],
+        records_loads=records_loads,
+    )
     warn_of_units((f"parameters.{name}", name, value) for name, value in sections["parameters"].items())
     return setup if seed is None else sampled(setup, random_generator(seed), kept=sections["scene"])
 
 
-def _frame_interval(output: Path | None, animation: str | None, text: str | None) -> float | None:
+def _frame_interval(output: Path | None, animation: str | None, text: str | None, records_loads: bool) -> float | None:
     """Time between two frames [s]; None without a folder to write them to.
 
     Raises:
@@ -376,10 +392,12 @@ def _frame_interval(output: Path | None, animation: str | None, text: str | None
 
     from warpchain.inputs.validation import InputError, checked_positive
 
-    for option, value in (("--animate", animation), ("--frame-interval", text)):
+    needing = (("--animate", animation), ("--frame-interval", text), ("--record-loads", records_loads or None))
+    for option, value in needing:
         if value is not None and output is None:
             raise InputError(f"{option}: there is no folder to write to; add -o DIR")
     if animation == "mp4" and find_spec("imageio_ffmpeg") is None:
         raise InputError("--animate mp4: imageio-ffmpeg is not installed; pip install 'warpchain[video]'")
-    interval = 2e-3 if text is None else _parsed("--frame-interval", text)
+    usual = 1e-4 if records_loads else 2e-3
+    interval = usual if text is None else _parsed("--frame-interval", text)
     return float(checked_positive(interval, "--frame-interval", "time in s")) if output is not None else None

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from rich.console import Console
@@ -20,6 +20,7 @@ from warpchain.engine.tallies import LOST
 from warpchain.files import DISK_FAILURES, checked_output, failure, make_folder, remedy, remove_output
 from warpchain.inputs.validation import InputError, one_line, printable
 from warpchain.pictures.style import save_figure
+from warpchain.pictures.walk_shape import Kind
 from warpchain.run.progress_bar import counts_text
 from warpchain.walks.energy_error import ENERGY_REMEDY, MOST_ENERGY_ERROR
 from warpchain.walks.walk_result import WalkResult
@@ -36,7 +37,7 @@ COMPILING: Final = "compiling kernels; later runs find them ready"
 
 
 RECORD: Final = "walk.h5"
-PICTURES: Final = ("figure5.png", "film_strip.png", "loop.png", "tilt.png")
+PICTURES: Final = ("figure5.png", "film_strip.png", "loop.png", "tilt.png", "waves.png")
 """Files of a walk, beside its animation."""
 
 
@@ -234,7 +235,7 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
     record = folder / RECORD
     result.save(record)
     yield record
-    figure5, film_strip, loop, tilt = PICTURES
+    figure5, film_strip, loop, tilt, waves = PICTURES
     pictures: dict[str, Callable[[WalkResult, Path], None]] = {
         figure5: partial(_draw, "figure5"),
         film_strip: partial(_draw, "film_strip"),
@@ -247,6 +248,10 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
         pictures[tilt] = partial(_draw, "tilt")
     else:
         remove_output(folder / tilt)
+    if len(result.frame_forces):
+        pictures[waves] = partial(_draw, "waves")
+    else:
+        remove_output(folder / waves)
     if animation is not None:
         from warpchain.pictures.animation import animate
 
@@ -256,7 +261,7 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
         try:
             draw(result, path)
         except ValueError as error:
-            if result.status.ok and name != loop:
+            if result.status.ok and name not in (loop, waves):
                 raise
             remove_output(path)
             print(one_line(f"{path}: not drawn; {error}"), file=sys.stderr)
@@ -264,5 +269,5 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
             yield path
 
 
-def _draw(kind: Literal["figure5", "film_strip", "loop", "tilt"], result: WalkResult, path: Path) -> None:
+def _draw(kind: Kind, result: WalkResult, path: Path) -> None:
     save_figure(result.plot(kind), path)

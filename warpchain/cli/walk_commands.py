@@ -11,14 +11,24 @@ from warpchain.cli.output_paths import output_path
 
 if TYPE_CHECKING:
     from warpchain.inputs.setup import Setup
+    from warpchain.pictures.walk_shape import Colour, Kind
 
 
-def plot_walk(path: Path, output: Path | None) -> bool:
+def plot_walk(
+    path: Path,
+    output: Path | None,
+    kind: "Kind | None" = None,
+    colour: "Colour | None" = None,
+    window: tuple[float, float] | None = None,
+) -> bool:
     """Draw every figure that a saved walk has something for, and say on stderr what is left out and why.
 
     Args:
         path: file of the walk.
         output: folder of the figures; None: that of the file.
+        kind: the only figure to draw; None: all.
+        colour: what the colours of `waves` show; None: tension.
+        window: times of `waves` [s]; None: its default.
 
     Returns:
         Whether anything was drawn.
@@ -29,18 +39,22 @@ def plot_walk(path: Path, output: Path | None) -> bool:
     """
     from warpchain.cli.terminal import try_folder
     from warpchain.files import make_folder
-    from warpchain.inputs.validation import one_line, printable
+    from warpchain.inputs.validation import InputError, one_line, printable
     from warpchain.pictures.style import save_figure
     from warpchain.pictures.walk_shape import kinds_of
     from warpchain.walks.walk_result import load_walk
 
+    if kind != "waves":
+        for name, value in (("--colour", colour), ("--window", window)):
+            if value is not None:
+                raise InputError(f"{name}: only waves has one; add --kind waves, or leave it out")
     walk, folder, drawn = load_walk(path), path.parent if output is None else output, False
     try_folder(folder)
     make_folder(folder)
-    for kind in kinds_of(walk):
-        target = folder / f"{kind}.png"
+    for each in kinds_of(walk) if kind is None else (kind,):
+        target = folder / f"{each}.png"
         try:
-            figure = walk.plot(kind)
+            figure = walk.plot(each, colour=colour, window=window)
         except ValueError as error:
             print(one_line(f"{target}: not drawn; {error}"), file=sys.stderr)
             continue
@@ -113,6 +127,11 @@ def setup_like(path: Path, given: Mapping[str, Mapping[str, object]]) -> "tuple[
         section: {**getattr(saved.setup, section).model_dump(exclude=replaced), **values}
         for section, values in given.items()
     }
-    setup = resolve(saved.setup.preset, **sections)
+    setup = resolve(
+        saved.setup.preset,
+        scene=sections["scene"],
+        options=sections["options"],
+        parameters=sections["parameters"],
+    )
     warn_of_units((f"parameters.{name}", name, value) for name, value in given["parameters"].items())
     return setup, saved.seed

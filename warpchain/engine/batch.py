@@ -53,6 +53,7 @@ class Batch:
         *,
         keeps_samples: bool = False,
         frame_every: int | None = None,
+        frame_interval: float = 0.0,
         keeps_loads: bool = False,
         tilts: bool = False,
         threads: int | None = None,
@@ -65,6 +66,7 @@ class Batch:
             options: Shared by all worlds.
             keeps_samples: Keep the time series.
             frame_every: Keep all joint positions at every so many samples; None keeps none.
+            frame_interval: Time [s] between the frames of chains that are loaded with frame marks of their own.
             keeps_loads: Keep force and moment of every joint with each frame.
             tilts: Keep the plane of the chain with samples and frames.
             threads: Threads of every block on a GPU, at least as many as links; None: as many as each chain needs.
@@ -108,6 +110,7 @@ class Batch:
         self.control = control_of(options)
         self.control.launch_time = LAUNCH_SECONDS
         self.control.frame_every = frame_every or 1
+        self.control.frame_interval = frame_interval
 
         self._attempts = 500
         self.scratch = wp.zeros((worlds, rows, self.columns), dtype=wp.float64, device=self.device)
@@ -165,6 +168,7 @@ class Batch:
         stop_status: Status,
         attempts_before: int = 0,
         softness: float = 0.0,
+        has_frame_marks: bool = False,
     ) -> None:
         """Set the state of a world's chain and start its clock at zero; its statistics and watches start anew.
 
@@ -176,22 +180,16 @@ class Batch:
             stop_status: Status it ends with.
             attempts_before: Attempts of earlier phases, which count towards the option `step_limit`.
             softness: Softness of the joints, see :mod:`warpchain.kernels.events.softening`.
+            has_frame_marks: Whether frames are `frame_interval` apart, instead of taken with samples.
         """
         state = self.state
         n = self.links[world]
         self._edit(state.links)[world, :3, :n] = position.T
         self._edit(state.links)[world, 3:, :n] = velocity.T
-        for array in (
-            state.time,
-            state.gap,
-            state.time_to_contact,
-            state.slack,
-            state.counts,
-            state.extremes,
-            state.losses,
-            state.next_sample,
-        ):
+        clocks = (state.time, state.gap, state.time_to_contact, state.slack, state.next_sample)
+        for array in (*clocks, state.counts, state.extremes, state.losses):
             self._edit(array)[world] = 0
+        self._edit(state.next_frame)[world] = 0 if has_frame_marks else -1
         self._edit(state.watch)[world] = 0
         self._edit(state.watch)[world, list(UNSET_WATCHES)] = -1.0
         self._edit(state.softness)[world] = softness

@@ -62,6 +62,7 @@ def resolve(
     scene: Mapping[str, object],
     options: Mapping[str, object],
     parameters: Mapping[str, object],
+    records_loads: bool = False,
 ) -> Setup:
     """Check a user's values and complete them.
 
@@ -70,6 +71,7 @@ def resolve(
         scene: fields of `Scene` that differ from their defaults.
         options: fields of `Options` that differ from their defaults.
         parameters: fields of `Parameters` that differ from the preset.
+        records_loads: whether joint forces of the walk will be recorded.
 
     Raises:
         InputError: anything is wrong; one line with the field's path and the remedy.
@@ -79,16 +81,18 @@ def resolve(
             raise InputError(f"{path}: {shown(values)} is not a mapping; give names with values")
     checked = validated(Scene, scene, "scene")
     changed = parameter_preset(preset).with_values(parameters)
-    return combined(preset, changed, checked, options_beside(checked.plane, options))
+    return combined(preset, changed, checked, options_beside(checked.plane, options, records_loads))
 
 
-def options_beside(plane: str, options: Mapping[str, object]) -> Options:
-    """The checked options of a scene with this `Scene.plane`, which may decide what method `standard` is.
+def options_beside(plane: str, options: Mapping[str, object], records_loads: bool = False) -> Options:
+    """The checked options of a scene with this `Scene.plane`.
+
+    The plane, and whether joint forces are recorded, may decide what method `standard` is.
 
     Raises:
         InputError: a value is refused.
     """
-    if plane == "tilting" and options.get("method", "standard") == "standard":
+    if (plane == "tilting" or records_loads) and options.get("method", "standard") == "standard":
         options = {**options, "method": "explicit"}
     return validated(Options, options, "options")
 
@@ -128,6 +132,19 @@ def check_can_tilt(options: Options) -> None:
         raise InputError(
             f"options.method: {shown(options.method)} keeps the plane of a chain fixed; "
             "give explicit or an explicit method, or scene.plane: fixed"
+        )
+
+
+def check_has_joint_forces(options: Options) -> None:
+    """Check that the method has forces in the joints that can be recorded.
+
+    Raises:
+        InputError: it does not.
+    """
+    if not find_method(options.method).has_joint_forces:
+        raise InputError(
+            f"options.method: {shown(options.method)} makes joints rigid between impulses, without forces that "
+            "record_loads could keep; give explicit or an integrator other than hybrid"
         )
 
 

@@ -19,8 +19,8 @@ from warpchain.pictures.room_player import ROOM, room_data
 from warpchain.pictures.room_stage import RoomStage
 from warpchain.pictures.strip_parts import center_at
 from warpchain.pictures.style import FAINT, GROUND, INK
-from warpchain.pictures.walk_figures import check_frames, extent
-from warpchain.pictures.walk_shape import Walk, setting, tilting
+from warpchain.pictures.walk_figures import extent
+from warpchain.pictures.walk_shape import Walk, check_frames, setting, tilting
 
 if TYPE_CHECKING:
     from PIL.Image import Image

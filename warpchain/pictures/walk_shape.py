@@ -11,8 +11,10 @@ from warpchain.status import Status
 
 Array = NDArray[np.float64]
 
-Kind = Literal["figure5", "film_strip", "loop", "energy", "tilt"]
-"""Figures of a walk; `tilt` only of one whose plane tilts."""
+Kind = Literal["figure5", "film_strip", "loop", "energy", "tilt", "waves"]
+"""Figures of a walk; `tilt` only of one whose plane tilts, `waves` only of fine frames."""
+Colour = Literal["tension", "curvature", "velocity"]
+"""What the colours of `waves` show."""
 
 
 @dataclass(frozen=True, kw_only=True)  # frozen: its attributes are only read
@@ -81,9 +83,29 @@ def tilting(walk: Walk) -> TiltingWalk | None:
 
 
 def kinds_of(walk: Walk) -> tuple[Kind, ...]:
-    """The figures that a walk of this kind has, if it was recorded."""
+    """The figures that a walk of this kind has, if it was recorded; `waves` if its joint forces were."""
     kinds: tuple[Kind, ...] = get_args(Kind)
-    return kinds if tilting(walk) is not None else tuple(kind for kind in kinds if kind != "tilt")
+    left_out = {"tilt"} if tilting(walk) is None else set()
+    left_out |= {"waves"} if joint_forces(walk) is None else set()
+    return tuple(kind for kind in kinds if kind not in left_out)
+
+
+def joint_forces(walk: Walk) -> Array | None:
+    """Force in each joint on the link that it ends [N], shape (f, n, 2); None if it was not recorded."""
+    forces: Array | None = getattr(walk, "frame_forces", None)
+    return None if forces is None or len(forces) == 0 else forces
+
+
+def check_frames(walk: Walk) -> None:
+    """Refuse a walk that cannot be drawn.
+
+    Raises:
+        ValueError: the walk has no frames or broken ones.
+    """
+    if len(walk.frame_time) == 0:
+        raise ValueError(f"walk: it has no frames ({walk.status.label}); run it again with a frame_interval")
+    if not np.all(np.isfinite(walk.frame_joints)):
+        raise ValueError(f"walk: its frames are not all finite numbers. {walk.status.sentence}")
 
 
 def setting(walk: Walk) -> str:

@@ -8,11 +8,11 @@ from typing import Literal, Unpack
 
 from warpchain.engine.devices import versions
 from warpchain.inputs.distributions import LARGEST_SEED, random_generator, sampled
-from warpchain.inputs.keywords import Method, Number, Preset, WalkSettings, Whole
+from warpchain.inputs.keywords import Method, Number, Preset, Truth, WalkSettings, Whole
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import warn_of_units
 from warpchain.inputs.sections import NAME_OF_SYMBOL, by_section
-from warpchain.inputs.setup import DEFAULT_PRESET, Setup, resolve
+from warpchain.inputs.setup import DEFAULT_PRESET, Setup, check_has_joint_forces, resolve
 from warpchain.inputs.symbols import full_name
 from warpchain.inputs.validation import InputError, checked_whole, plain, shown
 from warpchain.walks.motion import LONGEST_INTERVAL, Keep
@@ -20,6 +20,8 @@ from warpchain.walks.scheduler import run_setups
 from warpchain.walks.walk_phases import WalkRun
 from warpchain.walks.walk_result import WalkResult
 
+SHORTEST_INTERVAL = 1e-6
+"""Least time [s] between two frames, as between two samples."""
 RECORD_BEFORE = 0.5
 """Time [s] before the release that is kept if frames are, unless told otherwise."""
 
@@ -56,6 +58,7 @@ def walk(
     seed: Whole | None = None,
     frame_interval: Number | None = 2e-3,
     record_before: Number | None = None,
+    record_loads: Truth = False,
     on_progress: OnProgress | None = None,
     **settings: Unpack[WalkSettings],
 ) -> WalkResult:
@@ -66,19 +69,23 @@ def walk(
         frequency: Turns of the sprocket per second [Hz]; None: 15.
         preset: None or ``"paper"`` (Table 1), or ``"soft"`` (softer joints, 10 to 15 times fewer steps).
         method: None or ``"standard"`` (``"hybrid"`` at 1e-3, with joints softened on the sprocket and in the pile; on a
-            GPU the next), ``"explicit"`` (``"os32"`` at 1e-3, softened likewise), ``"reference"`` (``"rkf78"`` at 1e-6,
-            as in the paper), or an integrator: a key of ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
+            GPU, and with ``record_loads``, the next), ``"explicit"`` (``"os32"`` at 1e-3, softened likewise),
+            ``"reference"`` (``"rkf78"`` at 1e-6, as in the paper), or an integrator: a key of
+            ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
         tolerance: Error allowed in a step, absolute (SI units) and relative alike; None: the method's, 1e-6 for an
             integrator, 1e-4 for ``"hybrid"``, and of ``"standard"`` and ``"explicit"`` 3e-3 while joints are soft.
         start: None or ``"rest"``, ``"spinning"`` or ``"ellipse"``.
         setup: ``setup`` of another walk, which is repeated to the bit, whatever was drawn for it. It is complete: no
             other setting is taken beside it, nothing is drawn, and ``seed`` is only noted in the result.
         seed: Draw parameters, phase and clearance from their distributions; None: Table 1's means, phase 0.
-        frame_interval: Time between kept frames of all joints [s], rounded to whole samples; None keeps none. Frames
-            and samples do not change the walk: they are taken at the end of the first step after their time.
+        frame_interval: Time between kept frames of all joints [s], at least 1e-6; None keeps none. It is rounded to
+            whole samples; less than a ``record_interval`` holds after the release. Frames and samples do not change
+            the walk: they are taken at the end of the first step after their time.
         record_before: Time [s] before the release of which frames and samples are kept as well, as ``before_release``
             of the result, with the forces in the joints; None: 0.5 s if frames are kept; 0: none. Nothing is kept of
             a loop under multiplied loads; ``further_hold`` makes room for more.
+        record_loads: Whether ``frame_forces`` and ``frame_moments``, the loads of the joints, are kept with each frame
+            after the release. No method with rigid joints has them: ``"standard"`` then is ``"explicit"``.
         on_progress: Called before kernels are compiled and after each launch, several times a second.
         settings: Any other field of :class:`Parameters`, :class:`Scene` or :class:`Options`, by its name or the
             paper's symbol, such as ``mu_fc``; ``warpchain parameters`` lists them.
@@ -99,14 +106,20 @@ def walk(
             raise InputError(f"{symbol}: an argument of its own has this value; give {name}=…")
     given: dict[str, object] = {name: value for name, value in named.items() if value is not None}
     given.update(settings)
+    loads = _truth(record_loads, "record_loads")
     if setup is None:
-        setup = setup_walk(DEFAULT_PRESET if preset is None else preset, given, seed)
+        setup = setup_walk(DEFAULT_PRESET if preset is None else preset, given, seed, loads)
     else:
         _check_repeated(setup, given if preset is None else {"preset": preset, **given}, seed)
     parameters = by_section(plain(settings, "settings"))["parameters"]
     warn_of_units((f"parameters.{name}", name, value) for name, value in parameters.items())
     return run_walk(
-        setup, seed=seed, frame_interval=frame_interval, record_before=record_before, on_progress=on_progress
+        setup,
+        seed=seed,
+        frame_interval=frame_interval,
+        record_before=record_before,
+        record_loads=loads,
+        on_progress=on_progress,
     )
 
 
@@ -122,17 +135,17 @@ def _check_repeated(setup: object, others: Mapping[str, object], seed: Whole | N
         checked_whole(plain(seed, "seed"), "seed", 0, LARGEST_SEED)
 
 
-def setup_walk(preset: str, settings: Mapping[str, object], seed: Whole | None) -> Setup:
+def setup_walk(preset: str, settings: Mapping[str, object], seed: Whole | None, records_loads: bool = False) -> Setup:
     """Sort settings by name into parameters, scene and options, check them, and draw the sample of a seed.
 
     From the seed's generator come first the parameters, then phase and clearance. A phase or clearance that is
-    set is drawn as well; then the set value counts.
+    set is drawn as well; then the set value counts. `records_loads` is as in :func:`resolve`.
 
     Raises:
         InputError: A name is unknown or a value is refused.
     """
     sections = by_section(settings)
-    setup = resolve(preset, **sections)
+    setup = resolve(preset, **sections, records_loads=records_loads)
     return setup if seed is None else sampled(setup, random_generator(plain(seed, "seed")), kept=sections["scene"])
 
 
@@ -142,28 +155,35 @@ def run_walk(
     seed: Whole | None = None,
     frame_interval: Number | None = 2e-3,
     record_before: Number | None = None,
+    record_loads: bool = False,
     on_progress: OnProgress | None = None,
 ) -> WalkResult:
     """Run a walk whose setup is complete, samples drawn; the seed is only noted. The rest is as of :func:`walk`."""
     started = time.perf_counter()
-    frame_every = (
-        None if frame_interval is None else _samples_per_frame(plain(frame_interval, "frame_interval"), setup.options)
-    )
+    frame_every, between = _frame_marks(plain(frame_interval, "frame_interval"), setup.options)
     before = _time_before(plain(record_before, "record_before"), frame_every) if setup.scene.start != "ellipse" else 0.0
+
+    if record_loads:
+        check_has_joint_forces(setup.options)
+        if frame_every is None:
+            raise InputError("record_loads: loads are kept with frames, but frame_interval is None; give one")
 
     def watch(run: WalkRun, compiling: bool) -> None:
         if on_progress is not None:
             phase = "compile" if compiling else run.phase.value
             on_progress(Progress(phase, run.walk_time or run.simulated_time, run.speed, run.attempts))
 
-    keep = Keep(series_every=1, frame_every=frame_every, before=before)
+    keep = Keep(series_every=1, frame_every=frame_every, frame_interval=between, loads=record_loads, before=before)
     ((_, run),) = run_setups([setup], keeps=[keep], watch=watch)
     frame_time, frame_joints = run.recorder.frames()
+    frame_forces, frame_moments = run.recorder.frame_loads()
     return WalkResult(
         **run.outcome(),
         **run.recorder.series(),
         frame_time=frame_time,
         frame_joints=frame_joints,
+        frame_forces=frame_forces,
+        frame_moments=frame_moments,
         **run.recorder.frame_planes(),
         before_release=run.recorder.before,
         setup=setup,
@@ -173,17 +193,23 @@ def run_walk(
     )
 
 
-def _samples_per_frame(frame_interval: float, options: Options) -> int:
-    """Whole samples between two kept frames, or an `InputError`."""
+def _frame_marks(frame_interval: float | None, options: Options) -> tuple[int | None, float]:
+    """Whole samples between two kept frames, None for no frames, and their time if it is less than a sample, else 0.
+
+    Raises:
+        InputError: it is no such time.
+    """
+    if frame_interval is None:
+        return None, 0.0
     if not (_is_number(frame_interval) and 0 < frame_interval < math.inf):
         raise InputError(f"frame_interval: {shown(frame_interval)} is not a positive time in s; give one, or None")
-    samples = frame_interval / options.record_interval if frame_interval < LONGEST_INTERVAL else math.inf
-    if not 0.999 < samples < math.inf:
+    if not SHORTEST_INTERVAL <= frame_interval < LONGEST_INTERVAL:
         raise InputError(
-            f"frame_interval: {shown(frame_interval)} is not between options.record_interval "
-            f"{options.record_interval} s and {LONGEST_INTERVAL} s; give a time between, or None"
+            f"frame_interval: {shown(frame_interval)} is not between {SHORTEST_INTERVAL} s and {LONGEST_INTERVAL} s; "
+            "give a time between, or None"
         )
-    return round(samples)
+    samples = frame_interval / options.record_interval
+    return (round(samples), 0.0) if samples > 0.999 else (1, float(frame_interval))
 
 
 def _time_before(record_before: float | None, frame_every: int | None) -> float:
@@ -197,6 +223,14 @@ def _time_before(record_before: float | None, frame_every: int | None) -> float:
     if record_before > 0 and frame_every is None:
         raise InputError("record_before: a time is given, but frame_interval is None; give a frame_interval as well")
     return float(record_before)
+
+
+def _truth(value: object, name: str) -> bool:
+    """A truth value, NumPy's included, or an `InputError`."""
+    value = plain(value, name)
+    if not isinstance(value, bool):
+        raise InputError(f"{name}: {shown(value)} is not a truth value; give True or False")
+    return value
 
 
 def _is_number(value: object) -> bool:

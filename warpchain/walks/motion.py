@@ -41,12 +41,17 @@ class Keep:
     Attributes:
         series_every: a sample is kept at every so many sample marks; None: no series.
         frame_every: a frame is kept at every so many sample marks; None: no frames.
+        frame_interval: time [s] between two frames after the release, instead, if it is shorter than that between two
+            sample marks; 0: as `frame_every` says.
+        loads: whether force and moment of each joint are kept with the frames after the release.
         before: time [s] before the release of which samples and frames are kept as well, with the loads of the
             joints; 0: none.
     """
 
     series_every: int | None = None
     frame_every: int | None = None
+    frame_interval: float = 0.0
+    loads: bool = False
     before: float = 0.0
 
 

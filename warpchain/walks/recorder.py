@@ -44,6 +44,7 @@ class Recorder:
 
     Attributes:
         before: What is kept of the time before the release; None: nothing.
+        keep: Which of the samples and frames are kept.
     """
 
     def __init__(self, batch: Batch, world: int, keep: Keep, tilts: bool = False) -> None:
@@ -56,7 +57,7 @@ class Recorder:
             tilts: Whether the plane of the chain moves; the batch then keeps it.
         """
         self.before: BeforeRelease | None = None
-        self._batch, self._world, self._keep = batch, world, keep
+        self._batch, self._world, self.keep = batch, world, keep
         self._has_samples, self._has_frames = batch.record.samples.size > 0, batch.record.frames.size > 0
         self._place = -1.0
         self._width = batch.record.samples.shape[2]
@@ -66,22 +67,25 @@ class Recorder:
         self._samples: list[Array] = []
         self._frame_times: list[Array] = []
         self._frames: list[Array] = []
+        self._loads: list[Array] = []
         self._drive: list[_Piece] = []
 
     def drain(self, released: bool) -> None:
         """Take what the last launch wrote; before the release only what `release` may want is kept."""
-        if not released and self._keep.before > 0:
+        if not released and self.keep.before > 0:
             self._drain_drive()
             return
         if self._has_samples:
             samples = self._batch.drain_samples(self._world)
-            if released and self._keep.series_every is not None and len(samples):
-                self._samples.append(self._thinned(samples, self._keep.series_every))
+            if released and self.keep.series_every is not None and len(samples):
+                self._samples.append(self._thinned(samples, self.keep.series_every))
                 self._last = samples[-1:]
         if self._has_frames:
             planes = self._batch.frame_planes(self._world)
+            if released and self.keep.loads:
+                self._loads.append(self._batch.frame_loads(self._world))
             times, frames = self._batch.drain_frames(self._world)
-            if released and self._keep.frame_every is not None:
+            if released and self.keep.frame_every is not None:
                 self._frame_times.append(times)
                 self._frames.append(frames)
                 self._planes.append(planes)
@@ -93,7 +97,7 @@ class Recorder:
         loads = self._batch.frame_loads(world)
         times, frames = self._batch.drain_frames(world)
         self._drive.append(_Piece(samples, times, frames, loads))
-        oldest = self._batch.time(world) - self._keep.before
+        oldest = self._batch.time(world) - self.keep.before
         while self._drive and _ends_before(self._drive[0], oldest):
             del self._drive[0]
 
@@ -112,7 +116,7 @@ class Recorder:
             np.concatenate([getattr(piece, name) for piece in pieces])
             for name in ("samples", "frame_times", "frames", "loads")
         )
-        oldest = max(moment - self._keep.before, earliest)
+        oldest = max(moment - self.keep.before, earliest)
         is_wanted = (samples[:, layout.TIME] >= oldest) & (samples[:, layout.TIME] < moment)
         samples = samples[is_wanted][:, MOTION_COLUMNS]
         wanted = (times >= oldest) & (times < moment)
@@ -165,6 +169,11 @@ class Recorder:
             np.concatenate([np.empty(0), *self._frame_times]),
             np.concatenate([np.empty((0, self._batch.links[self._world], 2)), *self._frames]),
         )
+
+    def frame_loads(self) -> tuple[Array, Array]:
+        """Joint forces (f, n, 2) [N] and moments (f, n) [N m] of each frame; f = 0 if they are not kept."""
+        loads = np.concatenate([np.empty((0, self._batch.links[self._world], 3)), *self._loads])
+        return loads[:, :, :2], loads[:, :, 2]
 
     def motion(self, sprocket_height: float) -> Motion:
         """What a sweep keeps of the walk."""

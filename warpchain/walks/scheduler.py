@@ -91,7 +91,7 @@ def _batches(
     longest, on_gpu = max(links), options.device.startswith("cuda")
     # Every batch keeps what any walk wants, although most may want nothing: separate batches would each wait for their
     # own slowest walk.
-    samples, loads = any(keep.series_every for keep in keeps), any(keep.before > 0 for keep in keeps)
+    samples, loads = any(keep.series_every for keep in keeps), any(keep.before > 0 or keep.loads for keep in keeps)
     frame_every = next((keep.frame_every for keep in keeps if keep.frame_every), None)
     if slots is None and on_gpu:
         frames = frame_every is not None
@@ -102,6 +102,7 @@ def _batches(
     slots = slots or 1
     worlds = -(-slots // BATCHES_PER_GPU) if on_gpu else slots
     kept: dict[str, Any] = {"keeps_samples": samples, "frame_every": frame_every, "keeps_loads": loads, "tilts": tilts}
+    kept["frame_interval"] = max((keep.frame_interval for keep in keeps), default=0.0)
     return [
         Batch(min(worlds, slots - first), longest, options, threads=threads, **kept)
         for first in range(0, slots, worlds)

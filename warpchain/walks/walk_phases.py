@@ -316,6 +316,7 @@ class WalkRun:
             stop_status=Status.TIME_LIMIT,
             attempts_before=self.drive_counts["accepted"] + self.drive_counts["rejected"],
             softness=self._hold_softness,
+            has_frame_marks=self.recorder.keep.frame_interval > 0,
         )
         if self._tilts:
             self._batch.set_plane(self._world, released_plane(self.setup, position))

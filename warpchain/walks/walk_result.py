@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 FORMAT: Final = "warpchain walk"
-FORMAT_VERSION: Final = 5
+FORMAT_VERSION: Final = 6
 
 BEFORE: Final = "before_release"
 
@@ -162,6 +162,21 @@ class WalkResult(Drawn):
     frame_joints: Annotated[
         Array, Stored("frames", "m", "joints x, y, shape (f, n, 2); joint i ends link i, even links inner")
     ]
+    frame_forces: Annotated[
+        Array,
+        Stored(
+            "frames",
+            "N",
+            "force x, y in each joint on the link that it ends, with the stiffness and damping of the moment, softened "
+            "after a collapse, shape (f, n, 2); (0, n, 2) if not recorded",
+        ),
+    ]
+    frame_moments: Annotated[
+        Array,
+        Stored(
+            "frames", "N m", "friction moment in each joint on the link that it ends, (f, n); (0, n) if not recorded"
+        ),
+    ]
     center_z: Annotated[
         Array, Stored("series", "m", "centre of mass z, to the right, shape (t,); (0,) if the plane is fixed")
     ]
@@ -203,6 +218,8 @@ class WalkResult(Drawn):
         shapes["frame_time"] = (frames,)
         shapes["frame_joints"] = (frames, self.setup.scene.links, 2)
         links, before = self.setup.scene.links, self.before_release
+        loaded = frames if len(self.frame_forces) else 0
+        shapes["frame_forces"], shapes["frame_moments"] = (loaded, links, 2), (loaded, links)
         if before is not None and before.frame_joints.shape[1] != links:
             raise ValueError(f"before_release: its frames are not of {links} links; give those of this walk")
         if self.sprocket_center is not None:
@@ -282,6 +299,8 @@ _DIMENSIONS: Final = {
     **{name: 1 for name, stored in STORED.items() if stored.group in ("series", "frames")},
     **dict.fromkeys(("center", "center_velocity"), 2),
     "frame_joints": 3,
+    "frame_forces": 3,
+    "frame_moments": 2,
     "frame_origin": 2,
     "frame_axes": 3,
     "sprocket_center": 1,

@@ -177,6 +177,35 @@ def test_samples_frames_and_rest_equal_a_cpu_kernel() -> None:
     assert our_loads.shape == (len(our_times), LINKS, 3) and np.array_equal(our_loads, their_loads)
 
 
+def test_frames_between_samples_equal_a_cpu_kernel() -> None:
+    """Frames with marks of their own come at the same steps with the same loads as in a CPU kernel, however cut.
+
+    The run is that without such marks, to the bit.
+    """
+    runs = []
+    for launch, attempts in ((launch_blocks, 7), (launch_chains, 100), (launch_chains, 100)):
+        batch = bounded_heaps(2)
+        batch.control.frame_interval = 2.5 * FIXED_STEP
+        batch.state.next_frame.numpy()[1] = 0 if len(runs) < 2 else -1
+        features = features_of(batch, fixed_body="floor", watch="rest")
+        while batch.status(1) == Status.RUNNING:
+            if launch is launch_blocks:
+                launch_blocks(batch, features, attempts, block_dim=LINKS)
+            else:
+                launch_chains(batch, features, attempts)
+        runs.append(batch)
+    ours, theirs, coarse = runs
+    assert_same(ours, theirs)
+    assert_same(theirs, coarse)
+    assert np.array_equal(ours.frame_loads(1), theirs.frame_loads(1))
+    few, _ = coarse.drain_frames(1)
+    our_times, our_frames = ours.drain_frames(1)
+    their_times, their_frames = theirs.drain_frames(1)
+    assert np.array_equal(our_times, their_times) and np.array_equal(our_frames, their_frames)
+    marks = np.floor(our_times / (2.5 * FIXED_STEP) + 1e-9)
+    assert len(few) < 6 and len(our_times) > 12 and np.all(np.diff(marks) >= 1)
+
+
 @pytest.mark.parametrize("broad_phase", ["grid", "all_pairs"])
 def test_neighbour_list_holds_the_same_pairs(broad_phase: str) -> None:
     """The list built in parallel holds the pairs of the list built by one thread."""

@@ -1,0 +1,251 @@
+"""Waves along a chain: computations on made frames, and the space–time picture."""
+
+from typing import Any
+
+import matplotlib.figure
+import numpy as np
+import pytest
+
+from tests.support.made_walks import make_unreleased, make_walk
+from warpchain.pictures.walk_figures import draw
+from warpchain.pictures.wave_fields import (
+    Impact,
+    bin_means,
+    characteristic,
+    curvatures,
+    floor_contacts,
+    impacts,
+    in_room,
+    joints_below,
+    loop_speeds,
+    moving_average,
+    normal_velocities,
+    self_contacts,
+    stacked_power,
+    tensions,
+    wave_speeds,
+)
+from warpchain.pictures.waves_figure import waves_figure
+from warpchain.walks.walk_result import WalkResult
+
+LINKS = 40
+MASSES = np.tile([0.003, 0.002], LINKS // 2)
+RADIUS = 0.1  # m, of the ring
+LENGTH = 2 * RADIUS * np.sin(np.pi / LINKS)  # m, of a link
+SPEED = 3.0  # m/s, of the ring's joints
+MIDDLE = 0.13  # m, height of the ring's centre
+
+
+def ring(time: np.ndarray, *, speed: float = SPEED, bumps: Any = 0.0) -> np.ndarray:
+    """A ring that turns clockwise and moves on at 1 m/s: joints (f, n, 2); ``bumps`` [m] add to its radius."""
+    angle = -2 * np.pi * np.arange(LINKS) / LINKS - speed / RADIUS * time[:, None]
+    radius = RADIUS + bumps
+    return np.stack([radius * np.cos(angle) + time[:, None], radius * np.sin(angle) + MIDDLE], axis=2)
+
+
+def wave(time: np.ndarray, speed: float, height: float = 1e-3) -> np.ndarray:
+    """A bump [m] that is at joint 10 at time 0 and runs at this speed along the chain, (f, n)."""
+    place = 10 + speed * time[:, None] / LENGTH
+    apart = (np.arange(LINKS) - place + LINKS / 2) % LINKS - LINKS / 2
+    return height * np.exp(-((apart / 2) ** 2))
+
+
+def test_a_ring_has_constant_fields() -> None:
+    """Of a turning ring: curvature 1/R to (π/n)², no velocity across it, its speed along it, the tension put on it."""
+    time = np.linspace(0.0, 0.02, 201)
+    joints = ring(time)
+    center = np.array([0.0, MIDDLE]) + np.stack([time, 0 * time], axis=1)[:, None] * np.array([1.0, 0.0])
+    outward = (joints - center) / RADIUS
+    along = np.stack([outward[..., 1], -outward[..., 0]], axis=2)
+    np.testing.assert_allclose(tensions(joints, 7.0 * along + 2.0 * outward), 7.0, rtol=1e-9)
+    np.testing.assert_allclose(tensions(joints, -7.0 * along), -7.0, rtol=1e-9)
+    np.testing.assert_allclose(curvatures(joints, LENGTH), 1 / RADIUS, rtol=2e-3)
+    np.testing.assert_allclose(curvatures(joints[:, ::-1], LENGTH), 1 / RADIUS, rtol=2e-3)
+    inner = slice(1, -1)  # one-sided differences at both ends are less accurate
+    assert np.abs(normal_velocities(time, joints, MASSES)[inner]).max() < 1e-4 * SPEED
+    np.testing.assert_allclose(loop_speeds(time, joints, MASSES)[inner], SPEED, rtol=1e-4)
+
+
+def test_velocity_across_counts_outwards() -> None:
+    """A ring that grows has the rate of its radius as velocity across the chain, in either order of its joints."""
+    time = np.linspace(0.0, 0.01, 101)
+    joints = ring(time, bumps=0.5 * time[:, None])
+    for order in (slice(None), slice(None, None, -1)):
+        np.testing.assert_allclose(normal_velocities(time, joints[:, order], MASSES)[1:-1], 0.5, rtol=1e-3)
+
+
+@pytest.mark.parametrize("speed", [2.2, -2.2])
+def test_a_wave_follows_its_characteristic(speed: float) -> None:
+    """Of bumps that run at a known speed, the crest of the curvature stays on the line; the stack finds the speed."""
+    time = np.linspace(0.0, 0.08, 161)
+    joints = ring(time, bumps=wave(time, speed))
+    bend = curvatures(joints, LENGTH)
+    path = characteristic(time, np.full(161, speed), 0, 10, LENGTH)
+    assert path[-1] - path[0] == pytest.approx(speed * 0.08 / LENGTH)
+    crest = np.argmax(bend, axis=1)
+    apart = (crest - path + LINKS / 2) % LINKS - LINKS / 2
+    assert np.abs(apart).max() <= 0.75
+    ratios = np.arange(-1.5, 1.55, 0.05)
+    power = [stacked_power(bend, ratio * (path - path[0])) for ratio in ratios]
+    assert ratios[np.argmax(power)] == pytest.approx(1.0)
+    assert max(power) > 0.97 and min(power) < 0.2
+    assert stacked_power(bend, path - path[0], (3, 3)) > 0.97 > 0.2 > stacked_power(bend, path[0] - path, (3, 3))
+    assert stacked_power(np.ones((5, LINKS)), np.arange(5.0)) == 0.0
+
+
+def test_in_the_room_one_wave_stands_and_one_runs_twice_as_fast() -> None:
+    """On a ring at v with waves at ±v along the chain, one stays at its place in the room, the other moves at 2v."""
+    time = np.linspace(0.0, 0.05, 101)
+    joints = ring(time, bumps=wave(time, -SPEED))
+    below = joints_below(joints, MASSES)
+    # joints run past the lowest point: the joint below has ever lower numbers
+    np.testing.assert_allclose(np.diff(below).mean(), -SPEED * 0.05 / 100 / LENGTH, rtol=0.02)
+    still = in_room(curvatures(joints, LENGTH), below, 2 * LINKS)
+    crests = np.argmax(still, axis=1)
+    assert np.ptp(crests) <= 2
+    fast = in_room(curvatures(ring(time, bumps=wave(time, SPEED)), LENGTH), below, 2 * LINKS)
+    moved = np.unwrap(np.argmax(fast, axis=1).astype(float), period=2 * LINKS)
+    assert (moved[-1] - moved[0]) / 2 * LENGTH == pytest.approx(2 * SPEED * 0.05, rel=0.03)
+
+
+def test_speed_of_waves() -> None:
+    """c = √(Tℓ/m̄), which is v under the tension m̄v²/ℓ of a ring; no speed under pressure."""
+    tension = np.array([0.0025 * 3.0**2 / LENGTH, 0.0, -4.0])
+    np.testing.assert_allclose(wave_speeds(tension, LENGTH, 0.0025), [3.0, 0.0, 0.0], rtol=1e-12)
+
+
+def test_moving_averages_and_bins() -> None:
+    """Averages of a straight line are its middle, also at uneven times; a bin has the mean of its own frames."""
+    time = np.concatenate([np.linspace(0.0, 1.0, 50), np.linspace(1.001, 2.0, 400)])
+    mean = moving_average(time, 3 * time, 0.5)
+    inside = (time > 0.25) & (time < 1.75)
+    np.testing.assert_allclose(mean[inside], 3 * time[inside], rtol=3e-4)
+    np.testing.assert_allclose(mean[[0, -1]], [0.375, 5.625], rtol=2e-3)
+    assert np.array_equal(moving_average(time, time**2, 0.0), time**2)
+    edges, means = bin_means(np.array([0.0, 1.0, 2.0, 3.0, 8.0]), np.array([[1.0], [3.0], [5.0], [9.0], [2.0]]), 4)
+    assert edges.tolist() == [0, 2, 4, 6, 8] and means[:, 0].tolist() == [2, 7, 7, 2]
+
+
+def test_contacts_and_impacts() -> None:
+    """The floor touches within 2 % of the radius; neighbours do not touch each other; 10 ms without contact end one."""
+    time = np.arange(50) * 1e-3
+    joints = ring(0.0 * time)
+    joints[..., 1] += 1.0
+    assert not floor_contacts(joints, 0.004).any() and not self_contacts(joints, 0.004).any()
+    joints[5:9, 3, 1], joints[12, 7, 1], joints[30, 8, 1], joints[31, 8, 1] = 0.00407, 0.004, 0.003, 0.0041
+    touching = floor_contacts(joints, 0.004)
+    assert list(zip(*np.nonzero(touching), strict=True)) == [
+        *((frame, 3) for frame in (5, 6, 7, 8)),
+        (12, 7),
+        (30, 8),
+    ]
+    assert impacts(time, joints, touching) == [Impact(5, 3, 12, 7), Impact(30, 8, 30, 8)]
+    assert impacts(time, joints, np.zeros_like(touching)) == []
+    outwards = (joints[0] - joints[0].mean(axis=0)) / RADIUS
+    for frame, joint, other, distance in (
+        (20, 30, 10, 0.0081),
+        (21, 11, 10, 0.001),
+        (22, 0, 39, 0.001),
+        (23, 12, 10, 0),
+    ):
+        joints[frame, joint] = joints[frame, other] + distance * outwards[other]
+    assert list(zip(*np.nonzero(self_contacts(joints, 0.004)), strict=True)) == [(20, 10), (20, 30), (23, 10), (23, 12)]
+
+
+def bouncing_ring(interval: float = 2e-4, **changes: Any) -> WalkResult:
+    """A made walk of a ring that is twice at the floor, with a wave and with joint forces."""
+    time = np.arange(0.0, 0.3, interval)
+    joints = ring(time, bumps=wave(time, SPEED))
+    joints[..., 1] += 0.0042 - MIDDLE + RADIUS + 0.02 * np.abs(np.cos(20 * time))[:, None] - 1e-5
+    return make_walk(LINKS, frame_time=time, frame_joints=joints, **changes)
+
+
+def with_forces(walk: WalkResult) -> dict[str, Any]:
+    """Forces of 9 N along the chain, and moments, for all frames of a walk."""
+    joints = walk.frame_joints
+    ahead = np.roll(joints, -1, axis=1) - np.roll(joints, 1, axis=1)
+    forces = 9.0 * ahead / np.linalg.norm(ahead, axis=2, keepdims=True)
+    return {"frame_forces": forces, "frame_moments": np.zeros(joints.shape[:2])}
+
+
+def drawn_lines(figure: matplotlib.figure.Figure) -> int:
+    """Number of characteristics on the upper panel."""
+    return len(figure.axes[0].lines)
+
+
+@pytest.mark.parametrize("colour", ["tension", "curvature", "velocity"])
+def test_the_picture(colour: Any) -> None:
+    """Two panels with a colour bar; four characteristics from each impact; nothing lies outside the paper."""
+    walk = bouncing_ring(**with_forces(bouncing_ring()))
+    figure = walk.plot("waves", colour=colour, window=(0.02, 0.28))
+    figure.draw_without_rendering()
+    own, room, bar = figure.axes
+    assert drawn_lines(figure) == len(room.lines) == 8
+    assert len(own.images) == len(room.images) == 1
+    assert own.get_xlim() == pytest.approx((0.02, 0.28), abs=3e-4)
+    assert own.get_ylim() == (-0.5, LINKS - 0.5)
+    length = LINKS * walk.setup.parameters.link_length
+    assert room.get_ylim() == pytest.approx((-length / 2, length / 2))
+    units = {"tension": "N", "curvature": "m$^{-1}$", "velocity": "(m/s)"}
+    assert bar.get_ylabel().endswith(f"/ {units[colour]}")
+    low, high = own.images[0].get_clim()
+    if colour == "tension":
+        assert low < 9.0 < high
+        np.testing.assert_allclose(own.images[0].get_array(), 9.0, rtol=1e-9)
+    if colour == "velocity":
+        assert low == -high
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert any("sqrt" in text for text in texts) and len(texts) == 4
+    paper = figure.bbox
+    for axes in figure.axes:
+        box = axes.get_tightbbox()
+        assert box is not None
+        assert box.x0 >= 0 and box.y0 >= 0 and box.x1 <= paper.x1 and box.y1 <= paper.y1
+
+
+def test_without_forces_waves_run_at_the_speed_of_the_loop() -> None:
+    """Curvature needs frames only; the legend then says c = v."""
+    figure = waves_figure(bouncing_ring(), colour="curvature")
+    assert any("c = v" in text.get_text() for text in figure.legends[0].get_texts())
+
+
+def test_a_flight_has_no_lines() -> None:
+    """Without an impact in the window there are no characteristics, after three no more than twelve."""
+    assert drawn_lines(waves_figure(bouncing_ring(), colour="velocity", window=(0.0, 0.06))) == 0
+    walk = bouncing_ring()
+    joints = walk.frame_joints.copy()
+    joints[..., 1] -= 0.02 * (np.abs(np.cos(20 * walk.frame_time)) - np.abs(np.cos(60 * walk.frame_time)))[:, None]
+    many = make_walk(LINKS, frame_time=walk.frame_time, frame_joints=joints)
+    assert drawn_lines(waves_figure(many, colour="velocity")) == 12
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({}, r"joint forces were not recorded; run it again with record_loads, or give colour 'curvature' or"),
+        ({"colour": "blue"}, r"colour: 'blue' is unknown; give 'tension', 'curvature', 'velocity'"),
+        ({"colour": "curvature", "window": (0.2, 0.1)}, r"window: 0.2 s to 0.1 s is no span of time; give"),
+        ({"colour": "curvature", "window": (float("nan"), 1.0)}, r"window: nan s to 1 s is no span of time"),
+        ({"colour": "velocity", "window": (0.5, 0.6)}, r"window: fewer than 3 frames are from .* frames to 0.3 s"),
+    ],
+)
+def test_what_the_picture_lacks_is_said(given: dict[str, Any], message: str) -> None:
+    """One line says what is missing and what records it."""
+    with pytest.raises(ValueError, match=message) as refused:
+        waves_figure(bouncing_ring(), **given)
+    assert "\n" not in str(refused.value)
+
+
+def test_frames_too_far_apart_are_refused_with_an_interval() -> None:
+    """At most half a link a frame: else the refusal gives a tenth of a link; no frames are refused as everywhere."""
+    with pytest.raises(ValueError, match=r"frames are 0.005 s apart, in which a wave runs 1\.\d links; .* of 0.0004 s"):
+        waves_figure(bouncing_ring(5e-3), colour="curvature")
+    with pytest.raises(ValueError, match=r"no frames .*; run it again with a frame_interval"):
+        waves_figure(make_unreleased(), colour="curvature")
+
+
+def test_other_figures_have_no_colour_and_no_window() -> None:
+    """Both belong to waves."""
+    for given in ({"colour": "tension"}, {"window": (0.0, 0.1)}):
+        with pytest.raises(ValueError, match=r"(colour|window): only waves has one; .*"):
+            draw(make_walk(), "figure5", **given)
