@@ -60,8 +60,12 @@ LEAST_SPEED, GREATEST_SPEED = 16, 17
 HOLD_LOAD, LOADED_SINCE, UNLOADED_SINCE, DRIFT = range(18, 22)
 REST_SINCE, LAST_FLOOR_IMPULSE = 22, 23
 SOFTENED_AT = 24
-COLLAPSED_AT, FELL_AT, GREATEST_LEAN = 25, 26, 27
-WATCH_ROWS = 28
+FELL_AT, GREATEST_LEAN = 25, 26
+# The first sample after the first self-contact, and that after which the loop encloses less than half of its area at
+# the release: time, bounces begun, time since the last impulse on the floor.
+SELF_CONTACT_AT, SELF_CONTACT_BOUNCES, SELF_CONTACT_FLIGHT = 27, 28, 29
+COLLAPSED_AT, COLLAPSE_BOUNCES, COLLAPSE_FLIGHT = 30, 31, 32
+WATCH_ROWS = 33
 
 # State.plane. First the plane itself: lateral speed u [m/s], rates ω1, ω2 [rad/s] about e1 and e2, the components of
 # the room's X and Y axes along e1, e2, e3, and the room's coordinates of the plane's origin [m].

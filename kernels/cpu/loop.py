@@ -212,7 +212,9 @@ def make_advance(features: Features):
             if time >= next_mark(state, control, world):
                 softness = state.softness[world]
                 load_factor = state.load_factor[world]
-                status = sample(K, chain, drive, state, record, control, world, time)
+                self_impulses = state.counts[world, layout.SELF_IMPULSES]
+                last_impulse = state.watch[world, layout.LAST_FLOOR_IMPULSE]
+                status = sample(K, chain, drive, state, record, control, world, time, self_impulses, last_impulse)
                 if wp.static(softens):
                     longest = contact_step(state, control, world, wp.static(is_driven))
                 if wp.static(softens or is_driven):

@@ -5,6 +5,7 @@ import functools
 import warp as wp
 
 from warpchain.kernels.codes import RUNNING
+from warpchain.kernels.events.ending import watch_ending
 from warpchain.kernels.events.record import write_frame, write_sample
 from warpchain.kernels.events.release import drag_rate, load_at, watch_steadiness
 from warpchain.kernels.events.rest import watch_rest
@@ -33,7 +34,8 @@ def sampling(watch: str, softens: bool = False, tilts: bool = False):
     """Warp function ``sample`` of a chain whose ends are placed: time series, frame, watches; returns the status.
 
     It is called at or after :func:`next_mark`. If only a frame is due, nothing but the record changes. With
-    ``"steady"`` it may also change the chain's loads and the velocities of its links.
+    ``"steady"`` it may also change the chain's loads and the velocities of its links. Impulses between links so far, and
+    the time of the last one on the floor [s], are arguments: on a GPU they are not in the state.
 
     Args:
         watch: ``"rest"``, ``"steady"`` or ``"none"``.
@@ -53,6 +55,8 @@ def sampling(watch: str, softens: bool = False, tilts: bool = False):
         control: Control,
         world: int,
         time: wp.float64,
+        self_impulses: wp.int64,
+        last_floor_impulse: wp.float64,
     ):
         frame_mark = state.next_frame[world]
         if frame_mark >= wp.int64(0) and time >= wp.float64(frame_mark) * control.frame_interval:
@@ -80,11 +84,13 @@ def sampling(watch: str, softens: bool = False, tilts: bool = False):
                 write_frame_plane(P, record, world)
         passed = wp.int64(wp.floor(time / control.sample_interval))
         state.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
+        if wp.static(not watches_steadiness):
+            watch_ending(state, world, time, summary.area, self_impulses, last_floor_impulse, is_first)
         if wp.static(softens and watches_rest):
             watch_stiffening(state, drive, control, world, time)
-            watch_collapse(K, chain, state, control, world, time, is_first)
+            watch_collapse(chain, state, control, world, time, summary.area, is_first)
         if wp.static(tilts):
-            watch_fall(K, P, chain, state, world, time, is_first)
+            watch_fall(P, state, world, time)
         if wp.static(watches_rest):
             return watch_rest(state, control, world, time, summary)
         if wp.static(watches_steadiness):

@@ -24,11 +24,7 @@ import warp as wp
 
 from warpchain.kernels.layout import (
     HOLD_LOAD,
-    LEFT_X,
-    LEFT_Y,
     LOSS_SOFTENING,
-    RIGHT_X,
-    RIGHT_Y,
     SOFTENED_AT,
     SPRING,
     TIME,
@@ -76,39 +72,21 @@ def book_softening(before: Chain, after: Chain, state: State, world: int):
 
 
 @wp.func
-def enclosed_area(K: wp.array2d(dtype=wp.float64), chain: Chain):
-    """Area [m²] inside a placed loop, positive if it runs counter-clockwise: ½ Σ left end × right end."""
-    area = ZERO
-    i = int(0)
-    while i < chain.link_count:
-        area += K[LEFT_X, i] * K[RIGHT_Y, i] - K[RIGHT_X, i] * K[LEFT_Y, i]
-        i += 1
-    return HALF * area
-
-
-@wp.func
 def watch_collapse(
-    K: wp.array2d(dtype=wp.float64),
-    chain: Chain,
-    state: State,
-    control: Control,
-    world: int,
-    time: wp.float64,
-    is_first: bool,
+    chain: Chain, state: State, control: Control, world: int, time: wp.float64, area: wp.float64, is_first: bool
 ):
-    """Makes joints soft, for good, when the loop's area has fallen below a fraction of that at the first sample.
+    """Makes joints soft, for good, when the loop's area [m²] has fallen below a fraction of that at the first sample.
 
     Below half of that fraction they become softest. Joints of a model that is as soft itself stay as they are, and no
     time of softening is noted.
     """
     if is_first:
-        state.first_area[world] = enclosed_area(K, chain)
         return
     softness = state.softness[world]
     is_collapsed = state.watch[world, SOFTENED_AT] >= ZERO
     if softness >= TWO or (softness > ZERO and not is_collapsed):
         return
-    share = enclosed_area(K, chain) / state.first_area[world]
+    share = area / state.first_area[world]
     wanted = ZERO
     if share < control.soften_area:
         wanted = ONE

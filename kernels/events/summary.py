@@ -1,4 +1,4 @@
-"""Sums over one chain at one moment: centre of mass, energies, extent, speeds."""
+"""Sums over one chain at one moment: centre of mass, energies, extent, speeds, area."""
 
 import warp as wp
 
@@ -25,11 +25,16 @@ class Summary:
     height: wp.float64
     width: wp.float64
     loop_speed: wp.float64
+    area: wp.float64
 
 
 @wp.func
 def summarise(K: wp.array2d(dtype=wp.float64), chain: Chain) -> Summary:
-    """Sums over the placed links. Loop speed: mean of v·u over links, positive from link i towards link i + 1."""
+    """Sums over the placed links.
+
+    Loop speed: mean of v·u over links, positive from link i towards link i + 1. Area [m²] inside the loop, positive if
+    it runs counter-clockwise: ½ Σ left end × right end.
+    """
     n = chain.link_count
     mass = ZERO
     mx = ZERO
@@ -40,6 +45,7 @@ def summarise(K: wp.array2d(dtype=wp.float64), chain: Chain) -> Summary:
     spring = ZERO
     along = ZERO
     square = ZERO
+    area = ZERO
     left = order_key(K[RIGHT_X, 0])
     right = left
     bottom = order_key(K[RIGHT_Y, 0])
@@ -59,6 +65,7 @@ def summarise(K: wp.array2d(dtype=wp.float64), chain: Chain) -> Summary:
         cx = K[LEFT_X, i + 1] - K[RIGHT_X, i]
         cy = K[LEFT_Y, i + 1] - K[RIGHT_Y, i]
         spring += HALF * chain.joint_stiffness * (cx * cx + cy * cy)
+        area += K[LEFT_X, i] * K[RIGHT_Y, i] - K[RIGHT_X, i] * K[LEFT_Y, i]
         left = wp.min(left, order_key(K[RIGHT_X, i]))
         right = wp.max(right, order_key(K[RIGHT_X, i]))
         bottom = wp.min(bottom, wp.min(order_key(K[LEFT_Y, i]), order_key(K[RIGHT_Y, i])))
@@ -77,4 +84,5 @@ def summarise(K: wp.array2d(dtype=wp.float64), chain: Chain) -> Summary:
     summary.height = from_order_key(top) - from_order_key(bottom)
     summary.width = from_order_key(right) - from_order_key(left)
     summary.loop_speed = along / wp.float64(n)
+    summary.area = HALF * area
     return summary

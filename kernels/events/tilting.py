@@ -1,15 +1,13 @@
-"""A sample of a chain whose plane may tilt: sums in the room, not in the plane, and when it collapsed and fell."""
+"""A sample of a chain whose plane may tilt: sums in the room, not in the plane, and when it fell."""
 
 import warp as wp
 
 from warpchain.kernels.events.record import write_sample
-from warpchain.kernels.events.softening import enclosed_area
 from warpchain.kernels.events.summary import Summary
 from warpchain.kernels.layout import (
     AHEAD,
     CENTER_W,
     CENTER_Z,
-    COLLAPSED_AT,
     FELL_AT,
     GREATEST_LEAN,
     LEFT_X,
@@ -28,7 +26,7 @@ from warpchain.kernels.layout import (
     X,
     Y,
 )
-from warpchain.kernels.physics.elementary import HALF, ZERO, from_order_key, order_key
+from warpchain.kernels.physics.elementary import ZERO, from_order_key, order_key
 from warpchain.kernels.physics.plane import plane_energy
 from warpchain.kernels.types import Chain, Record, State
 
@@ -134,22 +132,8 @@ def write_frame_plane(P: wp.array(dtype=wp.float64), record: Record, world: int)
 
 
 @wp.func
-def watch_fall(
-    K: wp.array2d(dtype=wp.float64),
-    P: wp.array(dtype=wp.float64),
-    chain: Chain,
-    state: State,
-    world: int,
-    time: wp.float64,
-    is_first: bool,
-):
-    """Notes when the loop first encloses less than half of its area at the release, and when it tilts by 45°."""
-    area = enclosed_area(K, chain)
-    if is_first:
-        state.first_area[world] = area
-    # a loop that is numbered clockwise has negative areas
-    if state.watch[world, COLLAPSED_AT] < ZERO and area / state.first_area[world] < HALF:
-        state.watch[world, COLLAPSED_AT] = time
+def watch_fall(P: wp.array(dtype=wp.float64), state: State, world: int, time: wp.float64):
+    """Notes when the plane first tilts by 45°, and how far it tilts."""
     lean = wp.abs(P[UP + 2])
     state.watch[world, GREATEST_LEAN] = wp.max(state.watch[world, GREATEST_LEAN], lean)
     if state.watch[world, FELL_AT] < ZERO and lean > FALLEN:

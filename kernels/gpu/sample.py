@@ -13,8 +13,10 @@ from warpchain.kernels.gpu.contacts.self_contacts import TouchLayout
 from warpchain.kernels.gpu.threads import clock
 from warpchain.kernels.layout import (
     BOARD_VALUES,
+    SELF_IMPULSES,
     VALUE_CONTACT_STEP,
     VALUE_DEADLINE,
+    VALUE_LAST_IMPULSE,
     VALUE_NEXT_SAMPLE,
     VALUE_STOP_TIME,
     VALUE_TOLERANCE,
@@ -68,7 +70,11 @@ def block_sample(features: Features, touch: TouchLayout):
         softness = state.softness[world]
         load_factor = state.load_factor[world]
         chain = present(model, state, control, world)
-        T[wp.static(touch.mailbox)] = sample(K, chain, drive, state, record, control, world, time)
+        self_impulses = state.counts[world, SELF_IMPULSES] + wp.int64(T[wp.static(touch.self_hits)])
+        last_impulse = K[BOARD_VALUES, VALUE_LAST_IMPULSE]
+        T[wp.static(touch.mailbox)] = sample(
+            K, chain, drive, state, record, control, world, time, self_impulses, last_impulse
+        )
         if wp.static(softens or is_driven):
             if has_changed(state, world, softness, load_factor):
                 after = present(model, state, control, world)

@@ -30,6 +30,7 @@ PLANAR = [name for name in Parameters.model_fields if name != "half_width"]
         ("figure6", {"rest": (5, 6, 12), "ellipse": (2, 6, 12)}),
         ("tolerance", {"main": (2, 2, 2, 12)}),
         ("montecarlo", {"main": (7, 8, 1800)}),
+        ("phase_diagram", {"main": (22, 20, 2273)}),
         ("kink", {"main": (5, 6, 1)}),
         (
             "steadiness",
@@ -67,7 +68,7 @@ def test_every_shipped_sweep_is_tested() -> None:
     names = {path.stem for path in SWEEPS.iterdir()}
     assert names == {
         *("quickstart", "figure6", "tolerance", "montecarlo", "sensitivity", "kink", "tilt"),
-        *("steadiness", "unsoftened_hold", "softened_drive", "floor_friction"),
+        *("steadiness", "unsoftened_hold", "softened_drive", "floor_friction", "phase_diagram"),
     }
 
 

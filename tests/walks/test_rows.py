@@ -23,9 +23,11 @@ def test_columns_of_a_row() -> None:
     """A row has the agreed columns, without padding, and the drawn quantities in the order of the table."""
     assert ROW.names == (
         *("index", "status", "dx", "walk_time", "simulated_time", "hold_time", "drift", "softened_at"),
-        *("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at", "collapsed_at"),
+        *("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at"),
         *("fell_over", "fell_before_collapse"),
-        *("bounces", "steps_accepted", "steps_rejected"),
+        *("self_contact_at", "flight_before_self_contact", "collapsed_at", "flight_before_collapse"),
+        *("bounces", "bounces_before_self_contact", "bounces_before_collapse"),
+        *("steps_accepted", "steps_rejected"),
         *("impulses_floor", "impulses_sprocket", "impulses_self", "greatest_opening"),
         *("penetration_floor", "penetration_sprocket", "penetration_self", "energy_at_release"),
         *("loss_joint_friction", "loss_joint_damping", "loss_floor", "loss_self_contact", "loss_softening"),

@@ -34,7 +34,9 @@ LANES = 3
 LAUNCH_SECONDS = 0.1  # s, wanted duration of a launch, after which progress is shown and Ctrl-C noticed
 UNSET_WATCHES = (
     *(layout.WINDOW_START, layout.STEADY_SINCE, layout.LOADED_SINCE, layout.UNLOADED_SINCE, layout.DRIFT),
-    *(layout.REST_SINCE, layout.SOFTENED_AT, layout.COLLAPSED_AT, layout.FELL_AT),
+    *(layout.REST_SINCE, layout.SOFTENED_AT, layout.FELL_AT),
+    *(layout.SELF_CONTACT_AT, layout.SELF_CONTACT_BOUNCES, layout.SELF_CONTACT_FLIGHT),
+    *(layout.COLLAPSED_AT, layout.COLLAPSE_BOUNCES, layout.COLLAPSE_FLIGHT),
 )
 """Entries of :attr:`State.watch` that are −1 until set."""
 
@@ -387,15 +389,10 @@ class Batch:
         """The chain's latest sample: (SAMPLE_COLUMNS,), that of the final state if its run has ended."""
         return np.array(self._view(self.state.last_sample)[world])
 
-    def softened_at(self, world: int) -> float:
-        """Time [s] since loading at which the joints of a collapsed loop were softened; NaN if they were not."""
-        moment = float(self._view(self.state.watch)[world, layout.SOFTENED_AT])
-        return moment if moment >= 0 else math.nan
-
-    def drift(self, world: int) -> float:
-        """Drift of a held loop in its last watch, relative to its height or width; NaN if no window has ended."""
-        drift = float(self._view(self.state.watch)[world, layout.DRIFT])
-        return drift if drift >= 0 else math.nan
+    def watched(self, world: int, row: int) -> float:
+        """An entry of :attr:`State.watch` that is −1 until it is set, and then not negative; NaN while it is not."""
+        entry = float(self._view(self.state.watch)[world, row])
+        return entry if entry >= 0 else math.nan
 
     def unloaded_at(self, world: int) -> float:
         """Time [s] since loading from which a held loop has been under its own loads; −∞ if it was not watched."""
@@ -427,12 +424,9 @@ class Batch:
         first = 2 * self.state.links.shape[2]
         return self._view(self.record.frames)[world, :count, first:].copy()
 
-    def fall(self, world: int) -> tuple[float, float, float]:
-        """Of a plane that tilts, since loading: time [s] of collapse and of fall, NaN if never; greatest tilt [rad]."""
-        watch = self._view(self.state.watch)[world]
-        collapsed, fell = (float(watch[row]) for row in (layout.COLLAPSED_AT, layout.FELL_AT))
-        lean = min(1.0, float(watch[layout.GREATEST_LEAN]))
-        return collapsed if collapsed >= 0 else math.nan, fell if fell >= 0 else math.nan, math.asin(lean)
+    def greatest_tilt(self, world: int) -> float:
+        """Greatest size of the tilt [rad] of a plane since loading."""
+        return math.asin(min(1.0, float(self._view(self.state.watch)[world, layout.GREATEST_LEAN])))
 
     def drain_frames(self, world: int) -> tuple[Array, Array]:
         """Take the frames kept so far: times (f,) [s], joint positions (f, n, 2) [m]."""

@@ -21,7 +21,7 @@ from warpchain.inputs.validation import STRICT, DamagedFileError, InputError
 from warpchain.sweeps.designs import SAMPLERS, walks_per_sample
 
 FORMAT: Final = "warpchain sweep"
-FORMAT_VERSION: Final = 4
+FORMAT_VERSION: Final = 5
 """Of the manifest and of the shards."""
 
 MOST_BYTES: Final = 2**24

@@ -61,9 +61,10 @@ _KINDS: Final = {
     "index": "<i8",
     "status": "<i1",
     **dict.fromkeys(("dx", "walk_time", "simulated_time", "hold_time", "drift", "softened_at"), "<f8"),
-    **dict.fromkeys(("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at", "collapsed_at"), "<f8"),
+    **dict.fromkeys(("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at"), "<f8"),
     **dict.fromkeys(("fell_over", "fell_before_collapse"), "<i1"),
-    "bounces": "<i4",
+    **dict.fromkeys(("self_contact_at", "flight_before_self_contact", "collapsed_at", "flight_before_collapse"), "<f8"),
+    **dict.fromkeys(("bounces", "bounces_before_self_contact", "bounces_before_collapse"), "<i4"),
     **dict.fromkeys(("steps_accepted", "steps_rejected", *(f"impulses_{kind}" for kind in CONTACTS)), "<i8"),
     **dict.fromkeys(("greatest_opening", *(f"penetration_{kind}" for kind in CONTACTS)), "<f8"),
     **dict.fromkeys(

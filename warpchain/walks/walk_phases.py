@@ -45,7 +45,7 @@ BY_ITSELF = -1.0
 """As `steady_time` means: the kernel chooses how long to watch, see :mod:`warpchain.kernels.events.release`."""
 
 
-PLANE_OUTCOME = ("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at", "collapsed_at")
+PLANE_OUTCOME = ("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at")
 """Numbers of a walk's outcome that only a plane that tilts has."""
 
 
@@ -230,16 +230,32 @@ class WalkRun:
             return {**dict.fromkeys(PLANE_OUTCOME, math.nan), "fell_over": -1, "fell_before_collapse": -1}
         last = self._batch.last_sample(self._world)
         tilt, yaw = angles(last[layout.PLANE_COLUMN :])
-        collapsed_at, fell_at, greatest = self._batch.fall(self._world)
+        collapsed_at, fell_at = (self._batch.watched(self._world, row) for row in (layout.COLLAPSED_AT, layout.FELL_AT))
         return {
             "lateral_drift": float(last[layout.CENTER_Z]) if is_at_rest else math.nan,
             "final_tilt": float(tilt),
             "final_yaw": float(yaw),
-            "greatest_tilt": greatest,
+            "greatest_tilt": self._batch.greatest_tilt(self._world),
             "fell_at": fell_at,
-            "collapsed_at": collapsed_at,
             "fell_over": int(not math.isnan(fell_at)),
             "fell_before_collapse": int(fell_at < (math.inf if math.isnan(collapsed_at) else collapsed_at)),
+        }
+
+    def _ending(self, moment: str, event: str, first: int) -> dict[str, Any]:
+        """When self-contact or collapse came, after how many bounces and how long after the last floor impulse.
+
+        Args:
+            moment: name of the field that says when.
+            event: as the names of the other two have it.
+            first: of the three entries of :attr:`State.watch`.
+        """
+        at, bounces, flight = (
+            self._batch.watched(self._world, row) if self._released else math.nan for row in range(first, first + 3)
+        )
+        return {
+            moment: at,
+            f"bounces_before_{event}": -1 if math.isnan(bounces) else int(bounces),
+            f"flight_before_{event}": flight if math.isfinite(flight) else math.nan,
         }
 
     def outcome(self) -> dict[str, Any]:
@@ -254,7 +270,7 @@ class WalkRun:
             "simulated_time": self.simulated_time,
             "hold_time": self.hold_time,
             "drift": self.drift,
-            "softened_at": self._batch.softened_at(self._world),
+            "softened_at": self._batch.watched(self._world, layout.SOFTENED_AT),
             "bounces": counts["bounces"],
             "steps_accepted": counts["accepted"],
             "steps_rejected": counts["rejected"],
@@ -263,6 +279,8 @@ class WalkRun:
             "greatest_penetration": {kind: extremes[kind] for kind in CONTACTS},
             "energy": self.energy(),
             **self._fall(is_at_rest),
+            **self._ending("self_contact_at", "self_contact", layout.SELF_CONTACT_AT),
+            **self._ending("collapsed_at", "collapse", layout.COLLAPSED_AT),
             "sprocket_center": np.array([0.0, self.raised]) if self._has_sprocket else None,
             "sprocket_radius": contact_radius(setup.scene, setup.parameters) if self._has_sprocket else math.nan,
         }
@@ -280,7 +298,7 @@ class WalkRun:
         """Start the next phase of a world that has stopped; False if the run is over."""
         status = self._batch.status(self._world)
         if not self._released:
-            self.drift = self._batch.drift(self._world)
+            self.drift = self._batch.watched(self._world, layout.DRIFT)
         if self._released or status != Status.FINISHED:
             self.status = status
             return False

@@ -44,6 +44,9 @@ FORMAT_VERSION: Final = 6
 
 BEFORE: Final = "before_release"
 
+SINCE_FLOOR: Final = "time since the last impulse on the floor; NaN if there was none before, or never such a sample"
+"""Meaning of two fields of `WalkResult`."""
+
 ENERGIES: Final = {
     "kinetic_at_release": "kinetic energy at release",
     "potential_at_release": "energy of gravity and joint springs at release",
@@ -117,21 +120,33 @@ class WalkResult(Drawn):
     fell_at: Annotated[
         float, Stored("summary", "s", "from the release until the plane was first tilted by 45°; NaN if it never was")
     ]
-    collapsed_at: Annotated[
-        float,
-        Stored(
-            "summary",
-            "s",
-            "from the release until the loop enclosed less than half of its area; NaN if it never did, or if the plane "
-            "is fixed",
-        ),
-    ]
     fell_over: Annotated[
         int, Stored("summary", "1", "1 if the plane was ever tilted by 45°, 0 if not; −1 if the plane is fixed")
     ]
     fell_before_collapse: Annotated[
         int, Stored("summary", "1", "1 if it fell over before its loop collapsed, 0 if not; −1 if the plane is fixed")
     ]
+    self_contact_at: Annotated[
+        float,
+        Stored("summary", "s", "from the release to the sample after the first impulse between links; or NaN"),
+    ]
+    bounces_before_self_contact: Annotated[
+        int, Stored("summary", "1", "bounces begun when links first touched one another; −1 if they never did")
+    ]
+    flight_before_self_contact: Annotated[
+        float,
+        Stored("summary", "s", f"at self_contact_at, {SINCE_FLOOR}"),
+    ]
+    collapsed_at: Annotated[
+        float,
+        Stored(
+            "summary", "s", "from the release until the loop enclosed less than half of its area; NaN if it never did"
+        ),
+    ]
+    bounces_before_collapse: Annotated[
+        int, Stored("summary", "1", "bounces begun when the loop collapsed, see collapsed_at; −1 if it never did")
+    ]
+    flight_before_collapse: Annotated[float, Stored("summary", "s", f"at collapsed_at, {SINCE_FLOOR}")]
     softened_at: Annotated[
         float, Stored("summary", "s", "from the release to the softening of the joints; NaN if they were not")
     ]

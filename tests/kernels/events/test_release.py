@@ -13,6 +13,7 @@ from warpchain import Status, preset
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import start_device
 from warpchain.inputs.options import Options
+from warpchain.kernels import layout
 from warpchain.kernels.events.release import (
     LEAST_LOAD,
     LITTLE_SLIP,
@@ -107,7 +108,7 @@ class Watched:
     @property
     def drift(self) -> float:
         """DRIFT of the watch."""
-        return self.batch.drift(0)
+        return self.batch.watched(0, layout.DRIFT)
 
 
 def crossing(load: float, gravity: float = SOFT.gravity) -> float:

@@ -18,7 +18,8 @@ from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
 from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.loop import load_state
-from warpchain.kernels.events.softening import contact_step, enclosed_area, spring_tolerance
+from warpchain.kernels.events.softening import contact_step, spring_tolerance
+from warpchain.kernels.events.summary import summarise
 from warpchain.kernels.physics.softness import softened
 from warpchain.kernels.types import Chain, Control, Drive, Model, State, read_chain
 from warpchain.run.single_walk import setup_walk
@@ -37,11 +38,11 @@ def _area(model: Model, state: State, scratch: wp.array3d(dtype=wp.float64), are
     chain = read_chain(model, world)
     load_state(scratch[world], state, chain, world)
     place_ends(scratch[world], chain)
-    areas[world] = enclosed_area(scratch[world], chain)
+    areas[world] = summarise(scratch[world], chain).area
 
 
 def area_of(position: np.ndarray) -> float:
-    """`enclosed_area` of a chain (n, 3)."""
+    """Area of a chain (n, 3)."""
     batch = Batch(1, len(position), setup_walk("paper", {}, None).options)
     batch.set_chain(0, PAPER, len(position))
     batch.load(0, position, np.zeros_like(position), stop_time=1.0, stop_status=Status.FINISHED)

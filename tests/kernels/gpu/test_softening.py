@@ -123,7 +123,7 @@ def test_a_gpu_kernel_softens_a_pile_as_a_cpu_kernel_does(
     ours, theirs = heaps(area), heaps(area)
     features = softening_features(ours, "floor", "rest")
     launch_both(ours, theirs, features, cut)
-    first, second = (theirs.softened_at(world) for world in range(2))
+    first, second = (theirs.watched(world, layout.SOFTENED_AT) for world in range(2))
     assert 0 < first <= second < theirs.time(0)
     assert theirs.state.softness.numpy().tolist() == [softness, softness]
     assert np.all(theirs.state.losses.numpy()[:, layout.LOSS_SOFTENING] > 0)

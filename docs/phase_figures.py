@@ -1,0 +1,167 @@
+"""Draws the maps and the master curves of the phase diagram."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import phase_scaling
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from warpchain.pictures.maps import draw_failed
+from warpchain.pictures.style import FAINT, GROUND, INK, save_figure, tidy
+from warpchain.walks.endings import Ending
+
+Array = NDArray[Any]
+
+COLORS: Final = {
+    Ending.KEPT: "#999999",
+    Ending.IN_FLIGHT: "#CC79A7",
+    Ending.FIRST: "#000000",
+    Ending.SECOND: "#0072B2",
+    Ending.LATER: "#56B4E9",
+    Ending.FOLDED_AT_FIRST: "#D55E00",
+    Ending.FOLDED_AT_SECOND: "#E69F00",
+    Ending.FOLDED_LATER: "#F0E442",
+}
+"""Of the ways of ending; those of Okabe and Ito."""
+
+
+class Grid:
+    """Cells as tables of frequency × links.
+
+    Attributes:
+        links: in order, shape (n,).
+        frequency: in order [Hz], shape (f,).
+    """
+
+    def __init__(self, cells: Mapping[str, Array]) -> None:
+        """Find the grid of the cells; it may have gaps."""
+        self._cells = cells
+        self.links, self._column = np.unique(cells["links"], return_inverse=True)
+        self.frequency, self._row = np.unique(cells["frequency"], return_inverse=True)
+
+    def table(self, values: Array) -> Array:
+        """Values of the cells as a table (f, n); NaN in gaps."""
+        table = np.full((len(self.frequency), len(self.links)), np.nan)
+        table[self._row, self._column] = values
+        return table
+
+    def map(self, axes: Axes, values: Array, title: str, **colors: Any) -> Any:
+        """Draw values of the cells; returns the image."""
+        image = axes.imshow(self.table(values), origin="lower", aspect="auto", interpolation="nearest", **colors)
+        for axis, numbers in ((axes.xaxis, self.links), (axes.yaxis, self.frequency)):
+            every = max(1, -(-len(numbers) // 8))
+            axis.set_ticks(range(len(numbers))[::every], [f"{number:g}" for number in numbers[::every]])
+        axes.set_facecolor(GROUND)
+        axes.spines[:].set_visible(False)
+        axes.tick_params(color=FAINT)
+        axes.set_title(title, loc="left", color=INK, fontsize="medium")
+        axes.set_xlabel("links")
+        axes.set_ylabel("frequency / Hz")
+        return image
+
+
+def draw_maps(cells: Mapping[str, Array], path: Path) -> None:
+    """Mean of Δx, its spread, bounces, and ways of ending with their shares; red dots: share of walks that failed."""
+    grid = Grid(cells)
+    walks = np.maximum(cells["walks"], 1)
+    failed = np.where(cells["walks"] > 0, 1 - cells["at_rest"] / walks, 0.0)
+    figure = Figure(figsize=(11, 8.6), layout="constrained")
+    (upper_left, upper_right), (lower_left, lower_right) = figure.subplots(2, 2)
+    shown: list[tuple[Axes, Array, str, dict[str, Any]]] = [
+        (upper_left, cells["dx_mean"], "mean Δx / m", {"norm": LogNorm(), "cmap": "viridis"}),
+        (
+            upper_right,
+            100 * cells["dx_sd"] / cells["dx_mean"],
+            "standard deviation of Δx over its mean / %",
+            {"cmap": "magma"},
+        ),
+        (lower_left, cells["bounces_mean"], "mean number of bounces", {"norm": LogNorm(), "cmap": "viridis"}),
+    ]
+    for axes, values, title, colors in shown:
+        if np.isfinite(values).any():
+            figure.colorbar(grid.map(axes, values, title, **colors), ax=axes, pad=0.02)
+        else:
+            grid.map(axes, values, f"{title}: too few walks")
+        draw_failed(axes, np.nan_to_num(grid.table(failed)))
+    draw_endings(lower_right, grid, cells)
+    draw_failed(lower_right, np.nan_to_num(grid.table(failed)))
+    save_figure(figure, path)
+
+
+def draw_endings(axes: Axes, grid: Grid, cells: Mapping[str, Array]) -> None:
+    """Each cell as a bar of the shares of its endings, the legend below."""
+    ways = list(COLORS)
+    counts = np.stack([cells[way.label] for way in ways], axis=1)
+    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    # a table of fine columns: each cell is a bar from left to right
+    parts = 20
+    filled = np.cumsum(shares, axis=1)
+    middles = (np.arange(parts) + 0.5) / parts
+    codes = (middles[None, :, None] > filled[:, None, :]).sum(axis=2).astype(float)
+    codes[counts.sum(axis=1) == 0] = np.nan
+    codes[codes >= len(ways)] = np.nan
+    table = np.concatenate([grid.table(codes[:, part])[:, :, None] for part in range(parts)], axis=2)
+    table = table.reshape(len(grid.frequency), -1)
+    grid.map(axes, np.full(len(counts), np.nan), "how the loop was lost: shares of the walks of a cell", vmin=0, vmax=1)
+    axes.imshow(
+        table,
+        origin="lower",
+        aspect="auto",
+        interpolation="nearest",
+        extent=(-0.5, len(grid.links) - 0.5, -0.5, len(grid.frequency) - 0.5),
+        cmap=ListedColormap([COLORS[way] for way in ways]),
+        norm=BoundaryNorm(np.arange(len(ways) + 1) - 0.5, len(ways)),
+    )
+    seen = [way for way, number in zip(ways, counts.sum(axis=0), strict=True) if number > 0]
+    handles = [Patch(color=COLORS[way], label=way.meaning) for way in seen]
+    if handles:
+        axes.legend(handles=handles, fontsize="x-small", loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False)
+
+
+def draw_scaling(cells: Mapping[str, Array], path: Path) -> None:
+    """Three laws: points of the cells, coloured by links, and their master curves."""
+    points = phase_scaling.points_of(cells)
+    if len(points.links) < phase_scaling.FEWEST:
+        print(f"{path.name}: not drawn, {len(points.links)} cells are too few")
+        return
+    c, d = phase_scaling.best_powers(points)
+    only = phase_scaling.best_variable(points)
+    panels: list[tuple[str, str, Array, Array]] = [
+        (law.name.split(" over ")[1], law.name.split(" over ")[0], law.x(points), law.y(points))
+        for law in phase_scaling.CANDIDATES[:2]
+    ]
+    panels += [
+        (f"ν n^({only:.2f}) / Hz", "Δx/(nℓ)", points.frequency * points.links**only, points.distance / points.length),
+        (
+            f"ν n^({c:.2f}) / Hz",
+            f"Δx/n^({d:.2f}) / m",
+            points.frequency * points.links**c,
+            points.distance / points.links**d,
+        ),
+    ]
+    figure = Figure(figsize=(11, 8), layout="constrained")
+    grid: list[Axes] = list(figure.subplots(2, 2).flat)
+    for axes, (x_name, y_name, x, y) in zip(grid, panels, strict=True):
+        image = draw_law(axes, points.links, x, y, phase_scaling.master_curve(x, y))
+        axes.set_xlabel(x_name)
+        axes.set_ylabel(y_name)
+        axes.set_title(f"scatter {phase_scaling.scatter(x, y):.1f} %", loc="left", color=INK, fontsize="medium")
+    figure.colorbar(image, ax=grid, label="links", pad=0.02)
+    save_figure(figure, path)
+
+
+def draw_law(axes: Axes, links: Array, x: Array, y: Array, curve: Callable[[Array], Array]) -> Any:
+    """Cells and master curve on logarithmic axes; returns the coloured points."""
+    image = axes.scatter(x, y, c=links, s=12, cmap="viridis")
+    fine = np.geomspace(x.min(), x.max(), 200)
+    axes.plot(fine, np.exp(curve(fine)), color=INK, linewidth=1)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    tidy(axes, grid="both")
+    return image
