@@ -210,8 +210,18 @@ class Batch:
         self._edit(self.record.frame_count)[world] = 0
         self.resume(world, stop_time, stop_status)
 
-    def resume(self, world: int, stop_time: float, stop_status: Status) -> None:
-        """Let a world that has stopped run on to a later time, as if it had not stopped there."""
+    def set_velocities(self, worlds: Sequence[int], velocity: Array) -> None:
+        """Give chains of n links that have stopped other velocities, (w, n, 3); the ledger of energy does not know."""
+        self._edit(self.state.links)[worlds, 3:, : velocity.shape[1]] = velocity.transpose(0, 2, 1)
+        self._edit(self.state.is_fresh)[worlds] = 1
+
+    def motions(self, worlds: Sequence[int], links: int) -> tuple[Array, Array]:
+        """Positions and velocities, (w, n, 3) each, of chains that all have n links."""
+        rows = self._view(self.state.links)[worlds, :, :links].transpose(0, 2, 1)
+        return rows[..., :3], rows[..., 3:]
+
+    def resume(self, world: int | Sequence[int], stop_time: float, stop_status: Status) -> None:
+        """Let worlds that have stopped run on to a later time, as if they had not stopped there."""
         self._edit(self.state.stop_time)[world] = stop_time
         self._edit(self.state.stop_status)[world] = int(stop_status)
         self._edit(self.state.status)[world] = int(Status.RUNNING)
