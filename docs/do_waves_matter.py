@@ -7,6 +7,7 @@ drag on waves (see `warpchain.loop.wave_drag`), and with other viscous friction 
 
 import argparse
 import csv
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,13 +39,13 @@ class Variant:
     Attributes:
         name: for people.
         drag: rate [1/s] at which fast waves die of it.
-        least_mode: waves with fewer crests around the loop are not dragged.
+        longest: longest waves that are dragged, in links.
         friction: factor of the viscous friction of the joints.
     """
 
     name: str
     drag: float = 0.0
-    least_mode: int = 0
+    longest: float = math.inf
     friction: float = 1.0
 
 
@@ -52,8 +53,8 @@ VARIANTS = (
     Variant("plain"),
     Variant("drag 1e-9/s: chaos alone", drag=1e-9),
     Variant("drag 50/s", drag=50.0),
-    Variant("drag 50/s on 5 crests and more", drag=50.0, least_mode=5),
-    Variant("drag 200/s on 5 crests and more", drag=200.0, least_mode=5),
+    Variant("drag 50/s, waves of up to 24 links", drag=50.0, longest=24.0),
+    Variant("drag 50/s, waves of up to 12 links", drag=50.0, longest=12.0),
     Variant("joint friction × 0.1", friction=0.1),
     Variant("joint friction × 10", friction=10.0),
 )
@@ -115,7 +116,7 @@ def drag(batch: Batch, walkers: Sequence[Walker], worlds: Sequence[int], links: 
     variants = [VARIANTS[walkers[w].variant] for w in worlds]
     share = np.array([1 - np.exp(-variant.drag * STEP) for variant in variants])
     length = np.array([c.link_length for c in chains])
-    least = np.array([variant.least_mode for variant in variants])
+    least = np.array([links / variant.longest for variant in variants])
     changed, energy, speed = drag_waves(position, velocity, inertia, length, share, least)
     is_dragged = np.flatnonzero(share > 0)
     batch.set_velocities([worlds[k] for k in is_dragged], changed[is_dragged])

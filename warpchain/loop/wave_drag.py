@@ -1,10 +1,10 @@
-"""A drag that lets waves of a free loop die and leaves all else: momenta, and the run of the loop along itself.
+"""A drag on the waves of a free loop that leaves its momenta and its run along itself.
 
 A loop that runs along itself, however fast, has no velocity across its path, seen from its centre of mass. A wave has:
-it moves the path. (A path that turns as a whole is a wave here, too.) Of the two waves that a push starts, the one that runs with the links (at about twice their speed in
-the room) has twice the velocity across that it has in the frame of the links; the other stands nearly still in the room
-and has nearly none. So a drag on the velocity across the path acts on the fast wave, and hardly on the slow one, which
-is a lasting change of the loop's shape.
+it moves the path. (So does a path that turns as a whole.) Of the two waves that a push starts, the fast one, which runs
+at about twice the links' speed in the room, has twice the velocity across that it has in the frame of the links; the
+slow one nearly stands still in the room and has nearly none. So a drag on the velocity across the path takes the fast
+wave and hardly touches the slow one, which is a lasting change of the loop's shape.
 
 The drag is an experiment, no physics of the chain: with it one asks whether the waves matter for how far a chain walks.
 """
@@ -71,8 +71,8 @@ def drag_waves(
 ) -> tuple[Array, Array, Array]:
     """Take a share of the waves out of the velocities of W loops of n links.
 
-    Momentum and angular momentum stay, and very nearly the speed along the path. What goes is the velocity across the path, as seen from
-    the centre of mass, with the rotation of the links that belongs to it.
+    Momentum and angular momentum stay, and very nearly the speed along the path. What goes is the velocity across the
+    path, as seen from the centre of mass, with the rotation of the links that belongs to it.
 
     Args:
         position: (W, n, 3): x, y [m], θ [rad] of each link's centre.
