@@ -1,0 +1,207 @@
+"""The paper's claims in its order, each with what tests it and with reasons, by verdict.
+
+A reason is written by hand for the verdicts that were expected. For any other the page admits that none is known.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from paper_page import findings
+from paper_page.findings import Check, Finding, Numbers
+from paper_page.verdicts import Verdict
+
+AGREES, PART, DIFFERS, OPEN = Verdict
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A sentence of the paper.
+
+    Attributes:
+        sentence: what it says, in short.
+        source: sweep or page whose numbers test it, in Markdown.
+        check: what came out.
+        reasons: verdict → why.
+    """
+
+    sentence: str
+    source: str
+    check: Check
+    reasons: Mapping[Verdict, str] = field(default_factory=dict)
+
+    def reason(self, verdict: Verdict) -> str:
+        """Why the verdict is what it is."""
+        if verdict is Verdict.OPEN and verdict not in self.reasons:
+            return "The numbers are missing."
+        if verdict in self.reasons:
+            return self.reasons[verdict]
+        return "" if verdict is Verdict.AGREES else "No reason is known."
+
+
+def _left_open(check: Check) -> Check:
+    """The same numbers without a verdict, because it is not clear what the paper says."""
+
+    def left(numbers: Numbers) -> Finding:
+        return Finding(check(numbers).text, Verdict.OPEN)
+
+    return left
+
+
+STARTS: Final = "`start`"
+SHAPES: Final = "`paper_shapes`"
+TOLERANCE: Final = "`paper_tolerance`"
+
+SLOW: Final = "At 5 Hz a loop collapses in its first impact and slides to rest."
+
+CLAIMS: Final = (
+    Claim(
+        "The chain bounces along the floor; number and size of the bounces vary",
+        STARTS,
+        findings.bounces,
+        {PART: SLOW},
+    ),
+    Claim(
+        "The shape of the chain does not change significantly in the collision",
+        SHAPES,
+        findings.shape,
+        {verdict: f"{SLOW} Of faster loops see [the first impact](#the-first-impact)." for verdict in (PART, DIFFERS)},
+    ),
+    Claim(
+        "The rotational speed is slightly reduced in the collision",
+        SHAPES,
+        findings.speed,
+        {verdict: f"{SLOW} Of faster loops see [the first impact](#the-first-impact)." for verdict in (PART, DIFFERS)},
+    ),
+    Claim("Δx rises with ν (Figure 6)", STARTS, findings.faster),
+    Claim("Δx falls with n (Figure 6)", STARTS, findings.longer),
+    Claim("With n and ν constant Δx varies only moderately", STARTS, findings.moderate),
+    Claim(
+        "From rest, Δx of n = 150 and 180 is an underestimate; a wider ellipse walks further",
+        STARTS,
+        findings.underestimate,
+    ),
+    Claim(
+        "The cause is a premature collision of the chain with itself right after the second collision with the floor",
+        STARTS,
+        findings.self_collision,
+    ),
+    Claim("The ellipse delays this collision (150 and 180 links)", STARTS, findings.delay),
+    Claim("The ellipse walks further at all lengths (the paper has it for 150 and 180)", STARTS, findings.ellipse),
+    Claim(
+        "Most simulated points lie within two standard deviations of the measured ones",
+        "Figure 6",
+        findings.stated("The measured points are published as a picture.", OPEN),
+        {OPEN: "There is no table of them."},
+    ),
+    Claim(
+        "A thousand times more precise, single walks differ by up to 10 %",
+        TOLERANCE,
+        findings.single_walks,
+        {
+            PART: "A walk amplifies any perturbation, so the greatest difference grows with the number of walks "
+            "looked at.",
+            DIFFERS: "A walk amplifies any perturbation; the greatest difference grows with the number of walks.",
+        },
+    ),
+    Claim(
+        "… and means of 12 walks by less than a few per cent",
+        TOLERANCE,
+        findings.means,
+        {
+            PART: "Means of 12 chaotic walks differ by their own standard error, 2 to 4 %, whatever the tolerance.",
+            DIFFERS: "Means of 12 chaotic walks differ by their own standard error, 2 to 4 %, whatever the tolerance.",
+        },
+    ),
+    Claim(
+        "High-order explicit methods are 40 times faster than implicit ones",
+        "[accuracy](accuracy.md#error-against-cost)",
+        findings.stated(
+            "the implicit `rodas5p` takes 14.5 times less time than `rkf78` at 1e-6 in free flight, for errors of "
+            "3e-10 m",
+            DIFFERS,
+        ),
+        {
+            DIFFERS: "Its matrix is cyclic block-tridiagonal and is solved in a time proportional to n. A general "
+            "solver takes a time proportional to n³."
+        },
+    ),
+    Claim(
+        "Longer links ℓ make the chain rigid, and it loses its shape more easily",
+        "`link_length`",
+        findings.collapse,
+    ),
+    Claim(
+        "Masses and moments of inertia varied over two orders of magnitude",
+        "`inner_mass`, `outer_mass`",
+        _left_open(findings.MASSES),
+        {OPEN: "The sentence is garbled in the copy of the paper that was at hand."},
+    ),
+    Claim(
+        "… moments of inertia",
+        "`inner_inertia`, `outer_inertia`",
+        _left_open(findings.INERTIAS),
+        {OPEN: "As above. Loops with ten times the inertia of Table 1 never become stationary."},
+    ),
+    Claim(
+        "The floor's restitution e_fc, over two orders of magnitude: no dependence",
+        "`floor_restitution`",
+        findings.NO_RESTITUTION,
+    ),
+    Claim(
+        "Less friction of the floor, μ_fc, lets the chain walk further",
+        "`floor_friction`",
+        findings.falling("floor_friction"),
+        {
+            verdict: "Friction turns rotation into walking, and it is what makes a loop run into itself. Between them "
+            "lies a [best friction](stationary-loop.md#friction-of-the-floor), for long loops below Table 1's."
+            for verdict in (PART, DIFFERS)
+        },
+    ),
+    Claim("Greater gravity shortens Δx", "`gravity`", findings.falling("gravity")),
+    Claim(
+        "The adjusted parameters had little effect",
+        "`paper_joints`, `tangential_restitution`, `sprocket_restitution`, `sprocket_friction`",
+        findings.LITTLE_EFFECT,
+    ),
+    Claim("The motion depends unnoticeably on the damping b", "`joint_damping`", findings.UNNOTICED_DAMPING),
+    Claim(
+        "Besides Table 1's parameters, time and height of the release are drawn, which varies Δx further",
+        "`gravity`, `release_only`, `parameters_only`",
+        findings.spread,
+        {
+            verdict: "A walk amplifies any perturbation: either alone spreads Δx about as far as both."
+            for verdict in (PART, DIFFERS)
+        },
+    ),
+    Claim(
+        "A planar chain walks about as far as one that falls over",
+        "[tilting plane](tilting-plane.md#does-the-distance-change)",
+        findings.stated(
+            "a tilt of 0.001 rad at the release lengthens Δx by 1.0 ± 0.2 %, 0.01 rad by 2.7 %, 0.1 rad by 8 %", AGREES
+        ),
+        {AGREES: "Chains fall over, but as a rule after their loop has collapsed."},
+    ),
+    Claim(
+        "A plane that tilts needs only six more degrees of freedom",
+        "[tilting plane](tilting-plane.md)",
+        findings.stated("three: across the plane, tilt and heading", AGREES),
+        {AGREES: "The other three, two of the centre of mass and the rotation in the plane, the links have already."},
+    ),
+    Claim(
+        "The kink of the loop on its sprocket",
+        "[stationary loop](stationary-loop.md#the-shape-of-the-loop)",
+        findings.stated(
+            "a bending wave that stands still in the room: −11.2 1/m at 13.5 cm from the lowest point with 120 links "
+            "at 20 Hz, theory −10.9 at 13.5 cm",
+            AGREES,
+        ),
+    ),
+    Claim(
+        "An impact creates two shockwaves, which spread in opposite directions",
+        "[stationary loop](stationary-loop.md#why-loads-are-multiplied)",
+        findings.stated(
+            "waves run along the loop at v ± √(T/ρ): one kind at about 2v, the other at 0.3 to 0.5 m/s", AGREES
+        ),
+    ),
+)
