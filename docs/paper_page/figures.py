@@ -1,9 +1,10 @@
 """Figures of the page docs/paper.md."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
@@ -12,11 +13,14 @@ from paper_page.findings import changes
 from paper_page.impacts import impacts
 from paper_page.statistics import summary
 from warpchain.inputs.parameters import Parameters
-from warpchain.pictures.labels import DISTANCE, FREQUENCY, math_symbol
+from warpchain.pictures.labels import DISTANCE, FREQUENCY, math_symbol, number_text
 from warpchain.pictures.style import BLUE, DASHES, FAINT, GREEN, INK, LINE_COLORS, RED, tidy
 from warpchain.store.sweep_result import SweepResult
 
 Numbers = Mapping[str, Any]
+
+PALE: Final = "#BBBBBB"
+"""Dots of cells in which nothing is significant."""
 
 REACH: Final = 0.6
 """Greatest relative effect on the axis of the figure; greater ones stand at its edge."""
@@ -55,7 +59,7 @@ def distances(numbers: Numbers) -> Figure:
         axes.set_title(f"$n$ = {links[place]}", fontsize="medium", loc="left")
         axes.set_xticks(frequencies, [f"{each:g}" for each in frequencies])
         tidy(axes, grid="y")
-    panels[0].legend(frameon=False, fontsize="small", loc="upper left")
+    panels[-1].legend(frameon=False, fontsize="small", loc="upper left")
     panels[0].set_ylim(bottom=0)
     figure.supxlabel(FREQUENCY, fontsize="medium")
     panels[0].set_ylabel(DISTANCE)
@@ -70,9 +74,28 @@ def effects(numbers: Numbers) -> Figure:
         for name in numbers[sweep]["effects"]
         if name not in ("start", "tolerance")
     ]
-    count = sum(len(changes(numbers, name)) for name in names)
-    figure = Figure(figsize=(8, 0.8 + 0.21 * (count + 0.5 * len(names))), layout="constrained")
-    axes = figure.subplots()
+    lines = {name: len(changes(numbers, name)) + 0.5 for name in names}
+    half = next(place for place in range(len(names)) if sum(lines[name] for name in names[: place + 1]) > _half(lines))
+    columns = (names[: half + 1], names[half + 1 :])
+    longest = max(sum(lines[name] for name in column) for column in columns)
+    figure = Figure(figsize=(10, 0.9 + 0.21 * longest), layout="constrained")
+    for axes, column in zip(figure.subplots(1, 2), columns, strict=True):
+        _draw_effects(axes, numbers, column)
+        axes.set_ylim(longest - 0.25, -0.75)
+    for text, color in (("rises", BLUE), ("falls", RED), ("neither at 95 %", PALE)):
+        axes.plot([], [], ".", color=color, label=text)
+    axes.legend(frameon=False, fontsize="x-small", loc="lower right", title="a cell", title_fontsize="x-small")
+    figure.supxlabel("change of the mean distance walked against Table 1's value", fontsize="medium")
+    return figure
+
+
+def _half(lines: Mapping[str, float]) -> float:
+    """Half of the height of all lines."""
+    return sum(lines.values()) / 2 - 1.5
+
+
+def _draw_effects(axes: Axes, numbers: Numbers, names: Sequence[str]) -> None:
+    """The effects of some quantities, one line for each value."""
     rng = np.random.default_rng(0)
     y, places, texts = 0.0, [], []
     for number, name in enumerate(names):
@@ -81,30 +104,23 @@ def effects(numbers: Numbers) -> Figure:
             found, sign = summary(effect), effect.sign[effect.known]
             relative = np.clip(effect.relative[effect.known], -REACH, REACH)
             height = y + rng.uniform(-0.25, 0.25, len(relative))
-            for chosen, color in ((sign == 0, "#BBBBBB"), (sign > 0, BLUE), (sign < 0, RED)):
+            for chosen, color in ((sign == 0, PALE), (sign > 0, BLUE), (sign < 0, RED)):
                 axes.plot(relative[chosen], height[chosen], ".", color=color, markersize=4, alpha=0.6, linewidth=0)
             if found.cells:
-                axes.errorbar(
-                    np.clip(found.mean, -REACH, REACH), y, xerr=found.half_width, fmt="|", color=INK, markersize=9
-                )
+                mean = float(np.clip(found.mean, -REACH, REACH))
+                axes.errorbar(mean, y, xerr=found.half_width, fmt="|", color=INK, markersize=9)
             places.append(y)
             symbol = math_symbol(name) if name in Parameters.model_fields else name
-            texts.append(f"{symbol} = {value:g}")
+            texts.append(f"{symbol} = {number_text(value)}")
             y += 1.0
         if number % 2:
             axes.axhspan(top, y - 0.5, color="#F4F4F4", zorder=-2)
         y += 0.5
     axes.axvline(0, color=FAINT, linewidth=0.8, linestyle=DASHES, zorder=-1)
     axes.set_yticks(places, texts, fontsize="x-small")
-    axes.set_ylim(y - 0.5, -0.75)
     axes.set_xlim(-1.03 * REACH, 1.03 * REACH)
     axes.xaxis.set_major_formatter(PercentFormatter(1.0, 0))
-    axes.set_xlabel("change of the mean distance walked against Table 1")
-    for text, color in (("rises", BLUE), ("falls", RED), ("neither at 95 %", "#BBBBBB")):
-        axes.plot([], [], ".", color=color, label=text)
-    axes.legend(frameon=False, fontsize="x-small", loc="lower right", title="a cell", title_fontsize="x-small")
     tidy(axes, grid="x")
-    return figure
 
 
 def friction(numbers: Numbers) -> Figure:

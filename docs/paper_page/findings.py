@@ -36,6 +36,8 @@ Check = Callable[[Numbers], Finding]
 
 def percent(value: float, half_width: float | None = None, *, sign: bool = True) -> str:
     """A share in per cent with two significant digits of its interval, such as ``+3.1 ± 0.4 %``."""
+    if not np.isfinite(value):
+        return "—"
     number = 100 * value
     if half_width is None or not np.isfinite(half_width) or half_width == 0:
         digits = 0 if abs(number) >= 10 else 1
@@ -78,7 +80,7 @@ def bounces(numbers: Numbers) -> Finding:
     """Chains bounce."""
     table = np.array(numbers["paper_claims"]["starts"]["rest"]["bounces"], np.float64)
     several = int((table >= 2).sum())
-    text = f"{table.min():.1f} to {table.max():.1f} bounces on average; at least two in {several} of {table.size} cells"
+    text = f"{np.nanmin(table):.1f} to {np.nanmax(table):.1f} bounces on average; at least two in {several} of {table.size} cells"
     return Finding(text, share(several, table.size))
 
 
@@ -130,8 +132,9 @@ def moderate(numbers: Numbers) -> Finding:
     relative = np.array(rest["sd"], np.float64) / np.array(rest["mean"], np.float64)
     within = int((relative <= MODERATE).sum())
     text = (
-        f"standard deviation of a walk {percent(relative.min(), sign=False)} to {percent(relative.max(), sign=False)} "
-        f"of the mean, median {percent(float(np.median(relative)), sign=False)}"
+        f"standard deviation of a walk {percent(np.nanmin(relative), sign=False)} to "
+        f"{percent(np.nanmax(relative), sign=False)} of the mean, median "
+        f"{percent(float(np.nanmedian(relative)), sign=False)}"
     )
     return Finding(text, share(within, relative.size))
 

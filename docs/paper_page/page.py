@@ -94,19 +94,30 @@ def distances_table(numbers: Numbers) -> str:
 
 
 def contacts_table(numbers: Numbers) -> str:
-    """When loops first touch themselves, by start and links; a sentence where the sweep does not say."""
+    """When loops first touch themselves and collapse, by start and links; a sentence where the sweep does not say."""
     content = numbers["paper_claims"]
-    head = ["start", "links", "before", "after 1", "after 2", "after 3", "later", "never", "Δx, early over late"]
+    head = [
+        "start",
+        "links",
+        "the loop",
+        "before",
+        "after 1",
+        "after 2",
+        "after 3",
+        "later",
+        "never",
+        "early over late",
+    ]
     rows = []
     for start in ("rest", "ellipse"):
         for links, each in zip(content["cells"]["links"], content["starts"][start].get("by_links", ()), strict=False):
-            total = max(1, sum(each["contact"]))
             ratio = "—"
             if "early_over_late" in each:
                 effect = effect_of(each["early_over_late"])
                 ratio = percent(float(effect.relative), float(effect.half_width))
-            shares = (percent(count / total, sign=False) for count in each["contact"])
-            rows.append([start, str(links), *shares, ratio])
+            for event, text, last in (("contact", "touches itself", ratio), ("collapse", "collapses", "")):
+                total = max(1, sum(each[event]))
+                rows.append([start, str(links), text, *(f"{100 * count / total:.0f} %" for count in each[event]), last])
     return table(head, rows) if rows else "The sweep has no columns of self-contacts; run it again."
 
 

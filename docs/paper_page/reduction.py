@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paper_page.impacts import impacts
-from paper_page.statistics import Effect, paired, spread, unpaired
+from paper_page.statistics import Effect, mean, paired, spread, unpaired
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.validation import InputError
@@ -119,15 +119,11 @@ def starts(block: BlockResult) -> Numbers:
     content: Numbers = {}
     for number, start in enumerate(values):
         here = table[:, :, number]
-        count = np.isfinite(here).sum(axis=-1)
-        with np.errstate(invalid="ignore"):
-            mean = np.nanmean(here, axis=-1)
-        bounces = np.nanmean(at_rest(block, "bounces")[:, :, number], axis=-1)
         content[start] = {
-            "count": count.tolist(),
-            "mean": mean.tolist(),
-            "sd": (spread(here) * mean).tolist(),
-            "bounces": bounces.tolist(),
+            "count": np.isfinite(here).sum(axis=-1).tolist(),
+            "mean": mean(here).tolist(),
+            "sd": (spread(here) * mean(here)).tolist(),
+            "bounces": mean(at_rest(block, "bounces")[:, :, number]).tolist(),
             "faster": _content(unpaired(here[:, 1:], here[:, :-1])),
             "longer": _content(unpaired(here[1:], here[:-1])),
         }
@@ -150,7 +146,7 @@ def self_contact(block: BlockResult, start: int) -> Numbers:
     """
     contact, collapse, distance = (at_rest(block, name)[:, :, start] for name in (CONTACT, COLLAPSE, "dx"))
     # Relative to the mean of the cell, so that walks of all frequencies of one number of links can be put together.
-    relative = distance / np.nanmean(distance, axis=-1, keepdims=True)
+    relative = distance / mean(distance)[..., np.newaxis]
     by_links = []
     for links in range(len(contact)):
         there, ratio = contact[links][np.isfinite(contact[links])], relative[links]
@@ -186,10 +182,9 @@ def bounces_until_collapse(block: BlockResult) -> Array:
 
 def friction(block: BlockResult) -> Numbers:
     """The friction of the floor with which chains walk farthest, cell by cell."""
-    table = at_rest(block)
-    mean = np.nanmean(table, axis=-1)
-    values = block.axes["floor_friction"]
-    return {"values": values.tolist(), "best": values[np.argmax(mean, axis=-1)].tolist(), "mean": mean.tolist()}
+    means, values = mean(at_rest(block)), block.axes["floor_friction"]
+    best = values[np.argmax(np.nan_to_num(means, nan=-np.inf), axis=-1)]
+    return {"values": values.tolist(), "best": best.tolist(), "mean": means.tolist()}
 
 
 def spreads(blocks: Mapping[str, BlockResult]) -> Numbers:

@@ -153,6 +153,18 @@ def by_chance(cells: int) -> int:
     return int(binom.ppf(_TAIL, cells, 1 - CONFIDENCE)) if cells else 0
 
 
+def mean(values: Array) -> Array:
+    """Mean over the samples of each cell, shape (...,); NaN without a walk.
+
+    Args:
+        values: shape (..., samples), NaN for walks that did not come to rest.
+    """
+    there = np.isfinite(values)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        means: Array = np.where(there, values, 0.0).sum(axis=-1) / there.sum(axis=-1)
+    return means
+
+
 def spread(values: Array) -> Array:
     """Standard deviation of a walk over the mean of its cell, shape (...,); NaN with fewer than two walks.
 
@@ -162,8 +174,7 @@ def spread(values: Array) -> Array:
     there = np.isfinite(values)
     count = there.sum(axis=-1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        mean = np.where(there, values, 0.0).sum(axis=-1) / count
-        relative: Array = _standard_error(values, there) * np.sqrt(count) / mean
+        relative: Array = _standard_error(values, there) * np.sqrt(count) / mean(values)
     return relative
 
 

@@ -1,7 +1,10 @@
 """The page docs/paper.md: its statistics, its rules, its reduction, and that it is made of the committed numbers."""
 
+import dataclasses
 import importlib
 import json
+import os
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,9 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+import warpchain
 from tests.docs.code_blocks import ROOT
 from tests.support.made_sweeps import make_sweep
 from warpchain.inputs.validation import InputError
+from warpchain.inputs.yaml_files import read_yaml
 from warpchain.status import Status
 from warpchain.sweeps.plan import PlannedWalk, load_sweep
 
@@ -216,6 +221,88 @@ def test_an_outline_that_only_turns_has_not_moved() -> None:
     moved = part("impacts")._moved
     assert moved(loop, np.roll(loop, 17, axis=0)) < 1e-12
     assert moved(loop, np.roll(loop, 17, axis=0) + np.array([0.03, 0.0])) == pytest.approx(0.03, rel=1e-6)
+
+
+def cells_reduced(content: Any) -> Any:
+    """The content of a shipped sweep with four cells and two samples."""
+    small = dict(content)
+    if "grid" in small:
+        small["grid"] = dict(small["grid"]) | {"links": [60, 180], "frequency": [10, 20]}
+    if "samples" in small:
+        small["samples"] = 2
+    if "blocks" in small:
+        small["blocks"] = [cells_reduced(block) for block in small["blocks"]]
+    return small
+
+
+def test_self_contacts_are_counted_and_compared(tmp_path: Path) -> None:
+    """Walks that touch themselves before the third bounce, and walk half as far, are counted so and found so."""
+    reduction = part("reduction")
+    content = {
+        "version": 1,
+        "name": "paper_claims",
+        "seed": 2,
+        "preset": "soft",
+        "samples": 8,
+        "same_samples_along": ["start"],
+        "grid": {"links": [60, 180], "frequency": [10, 20], "start": ["rest", "spinning", "ellipse"]},
+    }
+
+    def is_early(walk: PlannedWalk) -> bool:
+        return walk.setup.scene.links == 180 and walk.setup.scene.start == "rest" and walk.sample % 2 == 0
+
+    def outcome(walk: PlannedWalk) -> float:
+        return walk.setup.scene.frequency * (1.0 if is_early(walk) else 2.0) * (1 + 0.001 * (walk.sample // 2))
+
+    result = make_sweep(tmp_path / "made", content, outcome)
+    block = result.blocks["main"]
+    early = np.zeros(block.shape, bool)
+    early[1, :, 0, ::2] = True
+    touches = np.where(early, 2, 5)
+    touches[0, 0, 2, 3] = -1
+    columns = block.columns | {reduction.CONTACT: touches, reduction.COLLAPSE: touches + 1}
+    found = reduction.starts(dataclasses.replace(block, columns=columns))
+    short, long = found["rest"]["by_links"]
+    assert (short["contact"], long["contact"]) == ([0, 0, 0, 0, 16, 0], [0, 0, 8, 0, 8, 0])
+    assert long["collapse"] == [0, 0, 0, 8, 8, 0] and found["ellipse"]["by_links"][0]["contact"][-1] == 1
+    assert "early_over_late" not in short
+    ratio = reduction.effect_of(long["early_over_late"])
+    assert float(ratio.relative) == pytest.approx(-0.5, abs=1e-9) and int(ratio.sign) == -1
+    delay = reduction.effect_of(found["delay"])
+    assert delay.relative[1] == pytest.approx([5 / 3.5 - 1] * 2) and delay.lost == 1
+    faster = reduction.effect_of(found["rest"]["faster"])
+    assert faster.relative == pytest.approx(1.0) and faster.sign.tolist() == [[1], [1]]
+
+
+@pytest.mark.slow
+def test_the_command_makes_page_numbers_and_figures(tmp_path: Path) -> None:
+    """Sweeps in, page out: the numbers are enough to write the page again; foreign folders end in one line."""
+    folders = []
+    for name in ("paper_claims", "paper_joints", "paper_tolerance"):
+        folders.append(tmp_path / name)
+        make_sweep(folders[-1], cells_reduced(read_yaml(ROOT / f"sweeps/{name}.yaml")))
+    folders.append(tmp_path / "paper_shapes")
+    warpchain.sweep(cells_reduced(read_yaml(ROOT / "sweeps/paper_shapes.yaml")), folders[-1], progress=False)
+    out = tmp_path / "out"
+
+    def command(*words: str | Path) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, ROOT / "docs/paper_claims.py", *words, "-o", out],
+            capture_output=True,
+            encoding="utf-8",
+            env=os.environ | {"PYTHONPATH": str(ROOT)},
+        )
+
+    done = command(*folders)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    text = (out / "paper.md").read_text(encoding="utf-8")
+    assert "{{" not in text and "nan" not in text
+    drawn = {path.stem for path in (out / "figures").iterdir()}
+    assert drawn == {"paper_distances", "paper_effects", "paper_friction", "paper_impacts"}
+    (out / "paper.md").unlink()
+    assert command().returncode == 0 and (out / "paper.md").read_text(encoding="utf-8") == text
+    refused = command(tmp_path)
+    assert refused.returncode == 2 and len(refused.stderr.splitlines()) == 1
 
 
 def test_the_page_is_made_of_the_committed_numbers() -> None:
