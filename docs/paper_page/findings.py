@@ -80,7 +80,8 @@ def bounces(numbers: Numbers) -> Finding:
     """Chains bounce."""
     table = np.array(numbers["paper_claims"]["starts"]["rest"]["bounces"], np.float64)
     several = int((table >= 2).sum())
-    text = f"{np.nanmin(table):.1f} to {np.nanmax(table):.1f} bounces on average; at least two in {several} of {table.size} cells"
+    ends = f"{np.nanmin(table):.1f} to {np.nanmax(table):.1f}"
+    text = f"{ends} bounces on average; at least two in {several} of {table.size} cells"
     return Finding(text, share(several, table.size))
 
 
