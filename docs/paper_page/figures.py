@@ -22,7 +22,7 @@ Numbers = Mapping[str, Any]
 PALE: Final = "#BBBBBB"
 """Dots of cells in which nothing is significant."""
 
-REACH: Final = 0.6
+REACH: Final = 1.0
 """Greatest relative effect on the axis of the figure; greater ones stand at its edge."""
 
 _CONTACT: Final = ("before the 1st bounce", "after the 1st", "after the 2nd", "after the 3rd", "later", "never")
