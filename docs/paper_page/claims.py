@@ -85,9 +85,19 @@ CLAIMS: Final = (
         "The cause is a premature collision of the chain with itself right after the second collision with the floor",
         STARTS,
         findings.self_collision,
+        {
+            verdict: "What the paper saw by eye is counted here from the first impulse between links that are not "
+            "neighbours, however weak. Long loops are narrow: [when](#when-the-loop-touches-itself)."
+            for verdict in (PART, DIFFERS)
+        },
     ),
     Claim("The ellipse delays this collision (150 and 180 links)", STARTS, findings.delay),
-    Claim("The ellipse walks further at all lengths (the paper has it for 150 and 180)", STARTS, findings.ellipse),
+    Claim(
+        "The ellipse walks further at all lengths (the paper has it for 150 and 180)",
+        STARTS,
+        findings.ellipse,
+        {verdict: "Short loops hang wide on their sprocket already." for verdict in (PART, DIFFERS)},
+    ),
     Claim(
         "Most simulated points lie within two standard deviations of the measured ones",
         "Figure 6",
@@ -139,6 +149,11 @@ CLAIMS: Final = (
         "Longer links ℓ make the chain rigid, and it loses its shape more easily",
         "`link_length`",
         findings.collapse,
+        {
+            verdict: "The number of links stays, so longer links also make a longer chain: stiffness and size are not "
+            "told apart."
+            for verdict in (PART, DIFFERS)
+        },
     ),
     Claim(
         "Masses and moments of inertia varied over two orders of magnitude",

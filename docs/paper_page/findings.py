@@ -235,14 +235,17 @@ def collapse(numbers: Numbers) -> Finding:
     found = numbers["paper_claims"].get("collapse")
     if found is None:
         return NOT_RECORDED
-    return _monotonic(numbers, "ℓ", [(each["value"], effect_of(each)) for each in found["values"]], -1, "bounces")
+    steps = [(each["value"], effect_of(each)) for each in found["values"]]
+    bounced = _monotonic(numbers, "link_length", steps, -1, "bounces before the collapse")
+    distances = (f"{value:g}: {percent(summary(effect).mean)}" for value, effect in changes(numbers, "link_length"))
+    return Finding(f"{bounced.text}; Δx at {', '.join(distances)}", bounced.verdict)
 
 
 def _monotonic(
     numbers: Numbers, name: str, steps: Sequence[tuple[float, Effect]], slope: int, what: str = "Δx"
 ) -> Finding:
     """Whether a quantity has a slope: a greater value changes it one way, a smaller one the other."""
-    reference = numbers["paper_claims"]["effects"].get(name, {"reference": 0.01268})["reference"]
+    reference = numbers["paper_claims"]["effects"][name]["reference"]
     agreeing = against = cells = 0
     texts = []
     for value, effect in steps:
