@@ -146,6 +146,15 @@ CLAIMS: Final = (
         },
     ),
     Claim(
+        "… and 5 times faster than standard explicit methods, for the same error",
+        "[methods](#further-remarks)",
+        findings.stated("`dp5` takes 0.6 times the time of `rkf78`, for errors of 4e-12 and 9e-12 m", DIFFERS),
+        {
+            DIFFERS: "The stiff joints bound the steps of both methods, so what counts is the number of stages: six "
+            "against thirteen."
+        },
+    ),
+    Claim(
         "Longer links ℓ make the chain rigid, and it loses its shape more easily",
         "`link_length`",
         findings.collapse,
