@@ -3,6 +3,7 @@
 The numbers are plain and rounded, so that a small file of JSON holds them.
 """
 
+import hashlib
 import json
 import re
 from collections.abc import Mapping
@@ -48,7 +49,8 @@ def reduced(result: SweepResult) -> Numbers:
     if result.missing_count:
         raise InputError(f"{result.name}: {result.missing_count} walks are missing; run the sweep to its end")
     content: Numbers = {
-        "digest": result.provenance["digest"],
+        "sweep": content_digest(result.sweep),
+        "samples": {block.name: block.shape[-1] for block in result.blocks.values()},
         "numerics_version": result.provenance["numerics_version"],
         "walks": result.summary(),
         "inaccurate": result.inaccurate_count,
@@ -77,6 +79,20 @@ def reduced(result: SweepResult) -> Numbers:
         content["impacts"] = first_impacts(result.blocks["main"])
     rounded_content: Numbers = rounded(content)
     return rounded_content
+
+
+def content_digest(sweep: Mapping[str, Any]) -> str:
+    """SHA-256 of what a sweep varies and draws, whatever computes it and however many samples it has.
+
+    Args:
+        sweep: in canonical form, as `Sweep.canonical` and `SweepResult.sweep` have it.
+    """
+    content = dict(sweep)
+    content["blocks"] = [
+        {name: value for name, value in block.items() if name not in ("options", "samples")}
+        for block in sweep["blocks"]
+    ]
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def at_rest(block: BlockResult, quantity: str = "dx") -> Array:

@@ -51,7 +51,7 @@ PLANAR = [name for name in Parameters.model_fields if name != "half_width"]
             | dict.fromkeys(("chain_restitution", "chain_friction", "sprocket_restitution"), (5, 6, 3, 16))
             | {"tangential_restitution": (5, 6, 3, 16)},
         ),
-        ("paper_joints", dict.fromkeys(("joint_stiffness", "joint_damping", "friction_smoothing"), (5, 6, 3, 16))),
+        ("paper_joints", dict.fromkeys(("joint_stiffness", "joint_damping", "friction_smoothing"), (5, 6, 3, 8))),
         ("paper_tolerance", {"main": (5, 6, 2, 12)}),
         ("paper_shapes", {"main": (5, 6, 4)}),
         (
