@@ -119,6 +119,8 @@ def _draw_effects(axes: Axes, numbers: Numbers, names: Sequence[str]) -> None:
     axes.axvline(0, color=FAINT, linewidth=0.8, linestyle=DASHES, zorder=-1)
     axes.set_yticks(places, texts, fontsize="x-small")
     axes.set_xlim(-1.03 * REACH, 1.03 * REACH)
+    axes.set_xticks(np.arange(-1.0, 1.01, 0.25))
+    axes.tick_params(axis="x", labelsize="x-small")
     axes.xaxis.set_major_formatter(PercentFormatter(1.0, 0))
     tidy(axes, grid="x")
 

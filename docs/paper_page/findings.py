@@ -122,8 +122,13 @@ def faster(numbers: Numbers) -> Finding:
 
 def longer(numbers: Numbers) -> Finding:
     """Δx falls with the number of links."""
-    found = summary(effect_of(numbers["paper_claims"]["starts"]["rest"]["longer"]))
-    text = f"from one number of links to the next: {found.falls} of {found.cells} steps fall, {found.rises} rise"
+    found, ellipses = (
+        summary(effect_of(numbers["paper_claims"]["starts"][start]["longer"])) for start in ("rest", "ellipse")
+    )
+    text = (
+        f"from one number of links to the next: {found.falls} of {found.cells} steps fall, {found.rises} rise; as an "
+        f"ellipse {ellipses.falls} fall, {ellipses.rises} rise"
+    )
     return Finding(text, direction(found.falls, found.rises, found.cells))
 
 

@@ -36,6 +36,7 @@ def page(numbers: Numbers) -> str:
         "verdicts": verdict_counts(numbers),
         "reasons": reasons(numbers),
         "distances": distances_table(numbers),
+        "ellipses": ellipses_text(numbers),
         "contacts": contacts_table(numbers),
         "impacts": impacts_table(numbers),
         "effects": effects_table(numbers),
@@ -91,6 +92,15 @@ def distances_table(numbers: Numbers) -> str:
             pairs = zip(starts[start]["mean"][place], starts[start]["sd"][place], strict=True)
             rows.append([str(links), start, *(f"{_number(mean, 3)} ± {_number(sd, 3)}" for mean, sd in pairs)])
     return table(head, rows)
+
+
+def ellipses_text(numbers: Numbers) -> str:
+    """Greatest relative difference of ellipses of 90 links or more from their mean over the links, from 10 Hz on."""
+    content = numbers["paper_claims"]
+    links, frequencies = (np.array(content["cells"][name]) for name in ("links", "frequency"))
+    means = np.array(content["starts"]["ellipse"]["mean"], np.float64)[links >= 90][:, frequencies >= 10]
+    difference = np.abs(means / means.mean(axis=0) - 1)
+    return f"{percent(float(np.nanmax(difference)), sign=False)} from 10 Hz on"
 
 
 def contacts_table(numbers: Numbers) -> str:

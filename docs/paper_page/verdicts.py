@@ -36,7 +36,8 @@ def direction(with_claim: int, against: int, comparisons: int) -> Verdict:
         return Verdict.OPEN
     if with_claim >= MOST * comparisons and against <= FEW * comparisons:
         return Verdict.AGREES
-    return Verdict.PART if with_claim > FEW * comparisons else Verdict.DIFFERS
+    in_part = with_claim > FEW * comparisons and with_claim >= against
+    return Verdict.PART if in_part else Verdict.DIFFERS
 
 
 def smallness(exceeding: int, comparisons: int) -> Verdict:

@@ -119,7 +119,8 @@ def test_verdicts_follow_their_rules() -> None:
         (15, 3): agrees,
         (14, 3): in_part,
         (15, 4): in_part,
-        (4, 20): in_part,
+        (4, 20): differs,
+        (20, 10): in_part,
         (3, 0): differs,
         (0, 30): differs,
     }
