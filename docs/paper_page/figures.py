@@ -189,7 +189,9 @@ def outlines(result: SweepResult) -> Figure:
                 fontsize="small",
                 loc="left",
             )
-            if (row, column) in found:
+            if (row, column) not in found:
+                axes.text(0.5, 0.5, "does not\nrise again", ha="center", va="center", transform=axes.transAxes)
+            else:
                 impact = found[row, column][0]
                 for outline, color, style, label in (
                     (impact.before, FAINT, "-", "before"),

@@ -86,7 +86,7 @@ def bounces(numbers: Numbers) -> Finding:
 
 
 def shape(numbers: Numbers) -> Finding:
-    """A loop keeps its shape in its first impact; one that does not rise again has lost it."""
+    """A loop that rises again keeps its shape in its first impact."""
     found = numbers["paper_shapes"]["impacts"]
     names = ("area", "height", "width")
     kept = {name: found[f"{name}_of_walks"] for name in names}
@@ -97,11 +97,11 @@ def shape(numbers: Numbers) -> Finding:
         f"medians of {count} loops: {', '.join(texts)}; within 10 % in {', '.join(map(str, within))}; "
         f"{without} more loops do not rise again"
     )
-    return Finding(text, together([share(each, count + without) for each in within]))
+    return Finding(text, together([share(each, count) for each in within]))
 
 
 def speed(numbers: Numbers) -> Finding:
-    """The speed along the loop falls slightly in the first impact."""
+    """The speed along a loop that rises again falls slightly in the first impact."""
     found = numbers["paper_shapes"]["impacts"]
     of_walks, count, without = found["speed_of_walks"], found["walks"], found["without"]
     low, median, high = (percent(each) for each in of_walks["quantiles"])
@@ -110,7 +110,7 @@ def speed(numbers: Numbers) -> Finding:
         f"median {median}, {low} to {high} in nine of ten loops; falls by up to 20 % in {slightly} of {count}, "
         f"rises in {count - of_walks['falls']}; {without} more loops do not rise again"
     )
-    return Finding(text, share(slightly, count + without))
+    return Finding(text, share(slightly, count))
 
 
 def faster(numbers: Numbers) -> Finding:

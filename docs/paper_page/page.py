@@ -128,27 +128,29 @@ def contacts_table(numbers: Numbers) -> str:
             for event, text, last in (("contact", "touches itself", ratio), ("collapse", "collapses", "")):
                 total = max(1, sum(each[event]))
                 rows.append([start, str(links), text, *(f"{100 * count / total:.0f} %" for count in each[event]), last])
-    return table(head, rows) if rows else "The sweep has no columns of self-contacts; run it again."
+    if not rows:
+        return "The sweep has no columns of self-contacts; run it again."
+    return f"![When loops first touch themselves](figures/paper_self_contacts.png)\n\n{table(head, rows)}"
 
 
 def impacts_table(numbers: Numbers) -> str:
-    """Changes in the first impact: means over the frequencies of each number of links, and their range."""
+    """Changes in the first impact: means over the numbers of links at each frequency, and their range."""
     content = numbers["paper_shapes"]
     found = content["impacts"]
     names = ("area", "height", "width", "speed", "moved")
     rows = []
-    for place, links in enumerate(content["cells"]["links"]):
-        row = [str(links)]
+    for place, frequency in enumerate(content["cells"]["frequency"]):
+        row = [f"{frequency:g} Hz"]
         for name in names:
-            values = np.array(found[name][place], np.float64)
-            values, signed = values[np.isfinite(values)], name != "moved"
+            values, signed = np.array(found[name], np.float64)[:, place], name != "moved"
+            values = values[np.isfinite(values)]
             if not len(values):
                 row.append("—")
                 continue
             ends = " to ".join(percent(float(each), sign=signed) for each in (values.min(), values.max()))
             row.append(f"{percent(float(values.mean()), sign=signed)} ({ends})")
         rows.append(row)
-    return table(["links", "area", "height", "width", "speed along the loop", "outline moved"], rows)
+    return table(["", "area", "height", "width", "speed along the loop", "outline moved"], rows)
 
 
 def effects_table(numbers: Numbers) -> str:
