@@ -179,7 +179,7 @@ CLAIMS: Final = (
         _left_open(findings.MASSES),
         {
             OPEN: "The sentence is garbled in the copy of the paper that was at hand; if it says that nothing depends "
-            "on them, it differs. On the sprocket some such loops never become stationary, so these start as an ellipse."
+            "on them, it differs. On the sprocket some such loops never become stationary, so all start as an ellipse."
         },
     ),
     Claim(
