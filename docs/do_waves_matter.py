@@ -17,6 +17,7 @@ import numpy as np
 from warpchain.engine.batch import Batch
 from warpchain.inputs.distributions import random_generator, sampled
 from warpchain.inputs.setup import Setup, resolve
+from warpchain.kernels import layout
 from warpchain.loop.wave_drag import drag_waves
 from warpchain.status import Status
 from warpchain.walks.walk_phases import WalkRun
@@ -148,7 +149,9 @@ def walk_all(cells: Sequence[tuple[int, float]], samples: int, device: str) -> l
             drag(batch, walkers, [w for w in looping if batch.links[w] == links], links)
         time += STEP
         carry_on(batch, looping, walkers, time, Status.FINISHED)
-        looping = [w for w in looping if batch.status(w) == Status.FINISHED and np.isnan(batch.softened_at(w))]
+        looping = [
+            w for w in looping if batch.status(w) == Status.FINISHED and np.isnan(batch.watched(w, layout.SOFTENED_AT))
+        ]
     unfinished = [w for w in waiting if batch.status(w) == Status.FINISHED]
     if unfinished:
         carry_on(batch, unfinished, walkers, planned[0][2].scene.walk_limit, Status.TIME_LIMIT)

@@ -34,8 +34,8 @@ def sampling(watch: str, softens: bool = False, tilts: bool = False):
     """Warp function ``sample`` of a chain whose ends are placed: time series, frame, watches; returns the status.
 
     It is called at or after :func:`next_mark`. If only a frame is due, nothing but the record changes. With
-    ``"steady"`` it may also change the chain's loads and the velocities of its links. Impulses between links so far, and
-    the time of the last one on the floor [s], are arguments: on a GPU they are not in the state.
+    ``"steady"`` it may also change the chain's loads and the velocities of its links. Impulses between links so far and
+    the time of the last one on the floor [s] are arguments: on a GPU they are not in the state.
 
     Args:
         watch: ``"rest"``, ``"steady"`` or ``"none"``.

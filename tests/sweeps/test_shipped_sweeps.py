@@ -42,6 +42,20 @@ PLANAR = [name for name in Parameters.model_fields if name != "half_width"]
         ("floor_friction", {"spinning": (5, 3, 7, 100), "rest": (5, 3, 7, 100)}),
         ("tilt", {"fixed": (5, 5, 200), "tilted": (5, 5, 4, 200)}),
         (
+            "paper_claims",
+            {"start": (5, 6, 3, 24)}
+            | dict.fromkeys(("release_only", "parameters_only"), (5, 6, 24))
+            | {"link_length": (5, 6, 4, 24), "floor_restitution": (5, 6, 4, 24), "gravity": (5, 6, 3, 24)}
+            | {"floor_friction": (5, 6, 6, 24), "sprocket_friction": (5, 6, 2, 16), "phase": (5, 6, 4, 16)}
+            | dict.fromkeys(("sprocket_radius", "inner_mass", "outer_mass", "inner_inertia"), (5, 6, 3, 16))
+            | dict.fromkeys(("outer_inertia", "viscous_friction", "coulomb_friction", "clearance"), (5, 6, 3, 16))
+            | dict.fromkeys(("chain_restitution", "chain_friction", "sprocket_restitution"), (5, 6, 3, 16))
+            | {"tangential_restitution": (5, 6, 3, 16)},
+        ),
+        ("paper_joints", dict.fromkeys(("joint_stiffness", "joint_damping", "friction_smoothing"), (5, 6, 3, 8))),
+        ("paper_tolerance", {"main": (5, 6, 2, 12)}),
+        ("paper_shapes", {"main": (5, 6, 4)}),
+        (
             "sensitivity",
             {"ranges": (64 * 17,), "measured": (32 * 14,)} | {name: (3, 8) for name in PLANAR},
         ),
@@ -55,7 +69,7 @@ def test_shipped_sweeps(name: str, shapes: dict[str, tuple[int, ...]]) -> None:
     walks = sum(math.prod(shape) for shape in shapes.values())
     assert sweep.walk_count == walks
     stiff = {"figure6": list(shapes), "steadiness": ["paper", "paper_undamped"], "unsoftened_hold": list(shapes)}
-    stiff["tilt"] = list(shapes)
+    stiff |= {"tilt": list(shapes), "paper_claims": ["start"], "paper_joints": list(shapes)}
     for block in sweep.blocks:
         preset = "paper" if block.name in stiff.get(name, []) else "soft"
         walks = math.prod(block.shape)
@@ -69,6 +83,7 @@ def test_every_shipped_sweep_is_tested() -> None:
     assert names == {
         *("quickstart", "figure6", "tolerance", "montecarlo", "sensitivity", "kink", "tilt"),
         *("steadiness", "unsoftened_hold", "softened_drive", "floor_friction", "phase_diagram"),
+        *("paper_claims", "paper_joints", "paper_tolerance", "paper_shapes"),
     }
 
 
@@ -180,3 +195,24 @@ def test_softened_drive_repeats_the_same_samples() -> None:
             soft, stiff = (sweep.planned(400 * cell + 200 * place + sample).setup for place in (0, 1))
             assert (soft.options.soften_drive, stiff.options.soften_drive) == (True, False)
             assert (soft.scene, soft.parameters) == (stiff.scene, stiff.parameters)
+
+
+@pytest.mark.parametrize("name", ["paper_claims", "paper_joints", "paper_tolerance"])
+def test_sweeps_of_the_paper_vary_one_quantity_at_a_time(name: str) -> None:
+    """Each block has the paper's 30 cells; walks along its further axis share all but what stands there."""
+    sweep = load_sweep(SWEEPS / f"{name}.yaml")
+    for block in sweep.blocks:
+        links, frequency, *others = block.axes
+        assert (links, frequency) == ("links", "frequency")
+        assert block.axes["links"] == (60, 90, 120, 150, 180) and block.axes["frequency"] == (5, 10, 15, 20, 25, 30)
+        for other in others:
+            values, samples = block.axes[other], block.samples
+            assert other not in block.drawn and other in sweep.same_samples_along
+            first = block.first + 17 * len(values) * samples + 3
+            setups = [sweep.planned(first + place * samples).setup for place in range(len(values))]
+            flat = [
+                {**setup.scene.model_dump(), **setup.options.model_dump(), **setup.parameters.model_dump()}
+                for setup in setups
+            ]
+            assert [each[other] for each in flat] == list(values)
+            assert all({**each, other: values[0]} == flat[0] for each in flat)
