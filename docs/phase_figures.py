@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
 from warpchain.pictures.maps import draw_failed
@@ -88,19 +88,14 @@ def draw_maps(cells: Mapping[str, Array], path: Path) -> None:
         if np.isfinite(values).any():
             bar = figure.colorbar(grid.map(axes, values, title, **colors), ax=axes, pad=0.02)
             bar.ax.yaxis.set_major_formatter("{x:g}")
-            bar.ax.yaxis.set_minor_formatter("{x:g}" if _spans_little(values) else NullFormatter())
+            bar.ax.yaxis.set_minor_locator(LogLocator(subs=(2, 3, 5)))
+            bar.ax.yaxis.set_minor_formatter("{x:g}")
         else:
             grid.map(axes, values, f"{title}: too few walks")
         draw_failed(axes, np.nan_to_num(grid.table(failed)))
     draw_endings(lower_right, grid, cells)
     draw_failed(lower_right, np.nan_to_num(grid.table(failed)))
     save_figure(figure, path)
-
-
-def _spans_little(values: Array) -> bool:
-    """Whether a logarithmic scale of the values has room for numbers between powers of ten."""
-    known = values[np.isfinite(values) & (values > 0)]
-    return len(known) > 0 and bool(known.max() / known.min() < 50)
 
 
 def draw_endings(axes: Axes, grid: Grid, cells: Mapping[str, Array]) -> None:

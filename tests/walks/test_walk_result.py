@@ -162,7 +162,7 @@ def test_provenance(tmp_path: Path) -> None:
     walk = make_walk()
     walk.save(tmp_path / "walk.h5")
     with h5py.File(tmp_path / "walk.h5") as file:
-        assert file.attrs["format"] == b"warpchain walk" and file.attrs["format_version"] == 5
+        assert file.attrs["format"] == b"warpchain walk" and file.attrs["format_version"] == 6
         assert file.attrs["status"] == b"at_rest"
         setup = json.loads(file.attrs["setup"])
         assert json.loads(file.attrs["seed"]) == walk.seed
@@ -245,10 +245,10 @@ def test_foreign_files_are_refused(tmp_path: Path) -> None:
         file["x"] = 1.0
     assert "no checksums at its end; older versions wrote none" in _refused(path)
     make_walk().save(path)
-    for version, remedy in ((4, "run the walk again, or use the warpchain that wrote it"), (6, "update warpchain")):
+    for version, remedy in ((5, "run the walk again, or use the warpchain that wrote it"), (7, "update warpchain")):
         with forged(path) as file:
             file.attrs["format_version"] = version
-        assert f"format version {version}, but this warpchain reads 5; {remedy}" in _refused(path)
+        assert f"format version {version}, but this warpchain reads 6; {remedy}" in _refused(path)
     with forged(path) as file:
         put_text(file, "format", "another")
     assert "HDF5, but not a walk" in _refused(path)
