@@ -88,7 +88,7 @@ def test_the_watched_process_is_watched(
     watched: WatchedProcess, monkeypatch: pytest.MonkeyPatch, given: str, outcome: str, words: str | None
 ) -> None:
     """What must not happen is told, and the next input finds a process that answers."""
-    monkeypatch.setattr(watched_process, "PATIENCE", 3)
+    monkeypatch.setattr(watched_process, "PATIENCE", 3 if outcome == "hung" else 60)
     monkeypatch.setattr(watched_process, "SECONDS", 0.01 if outcome == "slow" else 5.0)
     answer = watched.ask("python", given)
     assert answer.outcome == outcome

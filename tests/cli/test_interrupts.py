@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,14 @@ from warpchain.cli.main import main
 from warpchain.run.sweep_run import sweep
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="other signals")
+
+
+@pytest.fixture(autouse=True)
+def heard_signal() -> Iterator[None]:
+    """Ctrl-C is heard as in a terminal, also where the tests run as a background job, which ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 class Interrupted:

@@ -123,7 +123,7 @@ def accuracy(
     ],
     parts: Annotated[
         str, typer.Option(metavar="NAME,…", help="Parts to run.")
-    ] = "work-precision,walks,ensembles,hard-cases",
+    ] = "work-precision,reversals,walks,ensembles,hard-cases",
     chosen: Annotated[
         str | None,
         typer.Option(
@@ -138,7 +138,9 @@ def accuracy(
     tolerances: Annotated[
         str | None, typer.Option(metavar="TOL,…", help="Of the work–precision diagrams. Default: 1e-3 … 1e-9.")
     ] = None,
-    links: Annotated[str, typer.Option(metavar="N,…", help="Links, in all parts but the hard cases.")] = "60,150",
+    links: Annotated[
+        str, typer.Option(metavar="N,…", help="Links, in all parts but reversals and hard-cases.")
+    ] = "60,150",
     problems: Annotated[
         str, typer.Option(metavar="NAME,…", help="What the diagrams are about.")
     ] = "flight,impact,sprocket",
@@ -175,14 +177,15 @@ def accuracy(
         bool, typer.Option("--json", help="Print the results as one JSON object instead of the paths of the files.")
     ] = False,
 ) -> None:
-    """Measure error against cost of every method; time walks; compare ensembles of them; run the hard cases.
+    """Measure error against cost of every method, also where joints reverse; time and compare walks; run hard cases.
 
-    Results go to accuracy.json, figures and a page beside it; what is run again replaces just its own rows. Ensembles
-    are sweeps: killed ones go on. At release, chains below 100 links turn at 15 Hz, longer ones at 20 Hz. The walks
-    that are timed start as an ellipse at Table 1's values.
+    Results go to accuracy.json, figures and a page beside it; what is run again replaces just its own rows. The table
+    of reversals is printed as well. Ensembles are sweeps: killed ones go on. At release, chains below 100 links turn at
+    15 Hz, longer ones at 20 Hz. The walks that are timed start as an ellipse at Table 1's values.
     """
     from warpchain.bench.accuracy.page import write_pictures_and_page
     from warpchain.bench.accuracy.plan import FILE, Plan, run_accuracy
+    from warpchain.cli.bench_tables import print_table
     from warpchain.cli.terminal import status_line, try_folder
 
     texts = {"parts": parts, "problems": problems, "presets": presets, "methods": chosen, "cases": cases}
@@ -207,6 +210,9 @@ def accuracy(
     if as_json:
         print((output / FILE).read_text(encoding="utf-8"))
         return
+    if "reversals" in plan.parts and document["reversals"]:
+        print_table("reversals", document["reversals"])
+        print()
     from warpchain.inputs.validation import printable
 
     for path in (output / FILE, *paths):

@@ -1,8 +1,10 @@
 """What the benchmarks print on a terminal: the machine, tables and lines."""
 
+import math
 import sys
 from collections.abc import Mapping, Sequence
-from typing import Final
+from types import SimpleNamespace
+from typing import Any, Final
 
 from rich.console import Console
 from rich.table import Table
@@ -41,6 +43,17 @@ TABLES: Final = {
         "blocks": "{0.blocks:d} ({0.occupancy:.0%})",
         "of peak": "{.peak:.0%}",
     },
+    "reversals": {
+        "start": "{.start}",
+        "ω_c": "{.friction_smoothing:g}",
+        "method": "{.method}",
+        "tolerance": "{.tolerance:g}",
+        "attempts": "{.attempts:,.0f}",
+        "error of ω, rad/s": "{.error:.1e}",
+        "greatest": "{.greatest_error:.1e}",
+        "references": "{.trust:.1e}",
+        "step error / tolerance": "{.step_error:.2g}",
+    },
     "tilting": {
         "scene": "{.scene}",
         "links": "{.links}",
@@ -76,11 +89,27 @@ def print_bench(machine: Mapping[str, str], *parts: str | tuple[str, Sequence[ob
         machine: Name and value of all that is known of the machine.
         parts: Lines, or a name in :data:`TABLES` with the rows of that table.
     """
-    console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else WIDE)
+    console = _console()
     console.print(", ".join(f"{name} {value}" for name, value in machine.items()))
     for part in parts:
         console.print()
         console.print(part if isinstance(part, str) else _table(TABLES[part[0]], part[1]))
+
+
+def print_table(name: str, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Print one of :data:`TABLES` on standard output.
+
+    Args:
+        name: Its key.
+        rows: Its rows as JSON has them: null is no number, and left out.
+    """
+    filled = [{key: math.nan if value is None else value for key, value in row.items()} for row in rows]
+    _console().print(_table(TABLES[name], [SimpleNamespace(**row) for row in filled]))
+
+
+def _console() -> Console:
+    """Standard output, wide where it is no terminal."""
+    return Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else WIDE)
 
 
 def _table(columns: Mapping[str, str], rows: Sequence[object]) -> Table:

@@ -79,7 +79,7 @@ def acceleration(position: Array, velocity: Array, parameters: Parameters, *, gr
     torque = np.sum(lever * (here + before), axis=1)
     torque -= friction_torque(spin - np.roll(spin, 1), parameters)
     torque -= friction_torque(spin - np.roll(spin, -1), parameters)
-    result = np.empty((n, 3))
+    result = np.empty((n, 3), dtype=torque.dtype)  # complex steps differentiate these equations
     result[:, :2] = (here - before) / link_masses(n, parameters)[:, None]
     result[:, 2] = torque / link_inertias(n, parameters)
     if gravity:

@@ -6,6 +6,7 @@ from typing import Final
 from warpchain.bench.accuracy.ensembles import Ensemble
 from warpchain.bench.accuracy.method_settings import SETTING_COLUMNS
 from warpchain.bench.problems.hard_cases import Outcome
+from warpchain.bench.problems.reversals import Reversal
 from warpchain.bench.problems.work_precision import Errors, Point
 from warpchain.bench.record import Column, columns_of
 
@@ -28,6 +29,7 @@ _TABLES: Final[dict[str, Mapping[str, tuple[str, str]]]] = {
         },
     },
     "points": _POINT,
+    "reversals": columns_of(Reversal),
     "walks": {
         "links": ("1", "number of links"),
         "frequency": ("Hz", "turns of a sprocket per second that the speed along the ellipse stands for"),

@@ -37,7 +37,7 @@ def write_pictures_and_page(folder: Path, document: dict[str, Any]) -> list[Path
 def _page(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
     """The whole page; a part that has not been run has no section."""
     walks = [*document["walks"], *(one for row in document["ensembles"] for one in row["methods"])]
-    methods = {row["method"] for row in (*document["points"], *document["hard_cases"], *walks)}
+    methods = {row["method"] for row in (*document["points"], *document["reversals"], *document["hard_cases"], *walks)}
     bad = sum(not row["sound"] for row in document["hard_cases"])
     tiles = {
         "methods": (len({name for name in methods if "SciPy" not in name}), ""),
@@ -48,6 +48,7 @@ def _page(document: dict[str, Any], pictures: Sequence[Picture]) -> str:
     }
     sections = {
         "Work and precision": _work_precision(document, pictures) if document["points"] else "",
+        "Reversing joints": _reversals(document["reversals"], pictures) if document["reversals"] else "",
         "Whole walks": _walks(document["walks"], pictures) if document["walks"] else "",
         "Ensembles": _ensembles(document["ensembles"], pictures) if document["ensembles"] else "",
         "Hard cases": _hard_cases(document["hard_cases"], pictures) if document["hard_cases"] else "",
@@ -83,6 +84,29 @@ def _work_precision(document: dict[str, Any], pictures: Sequence[Picture]) -> st
     drawn = _drawn(pictures, "work_precision_*")
     marked = [row["status"] != "finished" for row in points]
     return "\n".join([*notes, *drawn, text, table(head, rows, numbers_from=3, marked=marked)])
+
+
+def _reversals(found: Sequence[Row], pictures: Sequence[Picture]) -> str:
+    """The figure and a table of all rows."""
+    ordered = _together(found, "start", "friction_smoothing", "method")
+    text = (
+        "<p>Flights of 1 ms at Table 1's values but for ω_c, from 8 starts each. Error: greatest of a link's angular "
+        "velocity, median over the starts and greatest. Error of a step: greatest true error of an accepted step in "
+        "the first 0.1 ms of one start, in tolerances; it is about 1 if the method's estimate sees all. What is below "
+        "the distance of two references from each other is not certain.</p>"
+    )
+    head = ["start", "ω_c / (rad/s)", "method", "tolerance", "attempts"]
+    head += ["error / (rad/s)", "greatest / (rad/s)", "references / (rad/s)", "error of a step / tolerance"]
+    rows = [
+        [
+            *(row["start"], f"{row['friction_smoothing']:g}", row["method"], f"{row['tolerance']:g}"),
+            f"{row['attempts']:,.0f}",
+            *(_number(row[name], ".1e") for name in ("error", "greatest_error", "trust")),
+            _number(row["step_error"], ".2g"),
+        ]
+        for row in ordered
+    ]
+    return "\n".join([*_drawn(pictures, "reversals"), text, table(head, rows, numbers_from=3)])
 
 
 def _walks(walks: Sequence[Row], pictures: Sequence[Picture]) -> str:

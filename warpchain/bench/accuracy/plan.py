@@ -1,6 +1,6 @@
-"""``warpchain bench accuracy``: error against cost of every method, its walks and ensembles of them, the hard cases.
+"""``warpchain bench accuracy``: error against cost of every method, its walks, ensembles, reversing joints, hard cases.
 
-There are four parts, and each can be run by itself: what the others have left in the folder stays. Numbers are kept in
+There are five parts, and each can be run by itself: what the others have left in the folder stays. Numbers are kept in
 one JSON file with the machine they were measured on; figures and a page are drawn from it.
 """
 
@@ -18,6 +18,7 @@ from warpchain.bench.accuracy.ensembles import Ensemble, default_samples, run_en
 from warpchain.bench.accuracy.method_settings import LOOSE, TIGHT, MethodSetting, default_method_settings
 from warpchain.bench.accuracy.walk_costs import walk_costs
 from warpchain.bench.problems.hard_cases import HARD_CASES
+from warpchain.bench.problems.reversals import reversals
 from warpchain.bench.problems.scipy_solvers import PATIENCE, scipy_points
 from warpchain.bench.problems.work_precision import PROBLEMS, TOLERANCES, make_problem, make_reference, points
 from warpchain.bench.record import machine, plain
@@ -30,11 +31,11 @@ from warpchain.inputs.validation import InputError, shown, suggestion, validated
 from warpchain.kernels.methods.method import method_names
 from warpchain.sweeps.plan import load_sweep
 
-PARTS: Final = ("work-precision", "walks", "ensembles", "hard-cases")
+PARTS: Final = ("work-precision", "reversals", "walks", "ensembles", "hard-cases")
 CASES: Final = tuple(case.name for case in HARD_CASES)
 FILE: Final = "accuracy.json"
 FORMAT: Final = "warpchain accuracy"
-VERSION: Final = 3
+VERSION: Final = 4
 SCIPY_TOLERANCES: Final = (1e-3, 1e-6, 1e-9)
 """Those of the tolerances that SciPy's solvers, which take a minute each, are run at."""
 WITH_SCIPY: Final = (
@@ -50,6 +51,7 @@ WITHOUT_SCIPY: Final = (
 KEYS: Final = {
     "references": ("problem", "links"),
     "points": ("problem", "links", "method", "tolerance"),
+    "reversals": ("start", "friction_smoothing", "method", "tolerance"),
     "walks": ("links", "name"),
     "ensembles": ("name",),
     "hard_cases": ("case", "method"),
@@ -172,6 +174,9 @@ def run_accuracy(folder: Path, plan: Plan, report: Report) -> Document:
     for links in plan.links if "work-precision" in plan.parts else ():
         for name in plan.problems:
             _record(folder, here, _problem_rows(plan, name, links, report))
+    if "reversals" in plan.parts:
+        for found in reversals(plan.method_names, plan.scipy and find_spec("scipy") is not None, report):
+            _record(folder, here, {"reversals": [asdict(row) for row in found]})
     for links in plan.links if "walks" in plan.parts else ():
         _record(folder, here, {"walks": walk_costs(links, plan.method_settings, plan.rounds, report)})
     for case in HARD_CASES if "hard-cases" in plan.parts else ():

@@ -26,6 +26,7 @@ from warpchain.bench.problems.hard_starts import (
     ledger_error,
     overlapping,
     pulled_apart,
+    reversing_loop,
     turning_joints,
 )
 from warpchain.bench.record import Column
@@ -317,6 +318,10 @@ _CASES: Final[dict[str, dict[str, tuple[str, Subject]]]] = {
         "sharp-friction": (
             "joints stop turning with ω_c = 1e-6 rad/s",
             Flight(PAPER.with_values({"friction_smoothing": 1e-6, "gravity": 0.0}), turning_joints, 1e-4),
+        ),
+        "reversing-joints": (
+            "joints of a loop reverse within the first microseconds (paper)",
+            Flight(PAPER, reversing_loop, 1e-3),
         ),
     },
     "no dissipation": {
