@@ -1,9 +1,11 @@
 """Reduces the sweep ``phase_diagram`` to statistics of its cells, draws them, and writes the tables of its page.
 
-    python docs/phase_diagram.py FOLDER…   # parts of the sweep → docs/results/phase_diagram.csv, and all below
-    python docs/phase_diagram.py           # that file → figures, tables of docs/phase-diagram.md, printed numbers
+    python docs/phase_diagram.py PART…               # parts of the sweep → docs/results/phase_diagram.csv; then:
+    python docs/phase_diagram.py                     # that file → figures, tables of docs/phase-diagram.md, numbers
+    python docs/phase_diagram.py --keep FILE FOLDER  # columns of a part → FILE.npz, which is a part, too
 
-Parts are folders of ``warpchain sweep`` with other seeds, also unfinished ones; their grids may differ. The second
+Parts have other seeds; they may be unfinished, and their grids may differ. A part is a folder of ``warpchain sweep``,
+or such an .npz file of its columns, 8 MB for 100,000 walks, which is quickly fetched from a far machine. The second
 command repeats every number and figure of the page. It needs warpchain[scipy] and takes about a minute.
 """
 
@@ -12,6 +14,7 @@ import csv
 import json
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,13 +24,13 @@ import phase_scaling
 from numpy.typing import NDArray
 
 import warpchain
-from warpchain.files import write_whole
+from warpchain.files import replacing, write_whole
 from warpchain.inputs.validation import InputError
 from warpchain.status import Status
 from warpchain.store.sweep_result import SweepResult
 from warpchain.walks.endings import Ending, endings
 from warpchain.walks.energy_error import MOST_ENERGY_ERROR
-from warpchain.walks.rows import MISSING
+from warpchain.walks.rows import COLUMNS, MISSING
 
 Array = NDArray[Any]
 Cell = tuple[int, float]
@@ -49,52 +52,125 @@ AVERAGED: Final = {
     "self_contact_at": "self_contact_at",
 }
 """Further means over the walks at rest: column of the file, before `_mean` → column of the sweep. NaNs are left out."""
-NEEDED: Final = (
-    *("status", "dx", "steps_accepted", "steps_rejected", "energy_error", "flight_before_collapse"),
+NEEDED: Final = ("status", "dx")
+"""Columns that every part has."""
+WANTED: Final = (
+    *("steps_accepted", "steps_rejected", "energy_error", "flight_before_collapse"),
     *("bounces_before_collapse", "bounces_before_self_contact", *AVERAGED.values()),
 )
-"""Columns of the sweep that are read."""
+"""Columns that are read if a part has them; else they count as unknown: NaN, or −1 in columns of integers."""
+
+TOLD: Final = "is_told"
+"""Further column of a part: whether the ending of the walk is known."""
 
 
-def walks_by_cell(results: Iterable[SweepResult]) -> dict[Cell, dict[str, Array]]:
-    """The walks of all parts by cell: columns of `NEEDED`, shape (walks,), missing walks included.
+@dataclass(frozen=True)
+class Part:
+    """Walks over links and frequencies.
+
+    Attributes:
+        name: for messages.
+        settings: what all parts must share, see `settings_of`; None if that is not known.
+        links: values of the first axis.
+        frequency: values of the second one [Hz].
+        columns: `NEEDED`, `WANTED` and `TOLD`, shape (links, frequencies, samples).
+    """
+
+    name: str
+    settings: str | None
+    links: Array
+    frequency: Array
+    columns: dict[str, Array]
+
+
+def read_part(path: str) -> list[Part]:
+    """The part in a folder or an .npz file, one for each block.
 
     Raises:
-        InputError: a part has other axes than links and frequency, other settings than the first, or cells and the
-            seed of another one.
+        InputError: it has other axes than links and frequency, or lacks a needed column.
+        OSError: it cannot be read.
     """
-    parts: dict[Cell, list[dict[str, Array]]] = {}
-    seeds: dict[Cell, set[int]] = {}
-    first: str | None = None
-    for result in results:
-        for block in result.blocks.values():
-            if set(block.axes) != {"links", "frequency"}:
-                raise InputError(
-                    f"{result.name}: axes are {', '.join(block.axes)}; give a sweep of links and frequency"
-                )
-        settings = _settings(result)
-        first = settings if first is None else first
-        if settings != first:
-            raise InputError(f"{result.name}, seed {result.seed}: other settings than the first part; reduce it alone")
-        for block in result.blocks.values():
-            # the samples are the last axis
-            order = [list(block.axes).index(name) for name in ("links", "frequency")] + [2]
-            columns = {name: block.columns[name].transpose(order) for name in NEEDED}
-            for i, links in enumerate(block.axes["links"]):
-                for j, frequency in enumerate(block.axes["frequency"]):
-                    cell = (int(links), float(frequency))
-                    if result.seed in seeds.setdefault(cell, set()):
-                        raise InputError(f"{result.name}: another part has its seed {result.seed}, too; leave one out")
-                    seeds[cell].add(result.seed)
-                    walks = {name: column[i, j].copy() for name, column in columns.items()}
-                    parts.setdefault(cell, []).append(walks)
+    if Path(path).suffix != ".npz":
+        result = warpchain.load(path)
+        return [part_of(path, settings_of(result), block.axes, block.columns) for block in result.blocks.values()]
+    with np.load(path, allow_pickle=False) as file:
+        content = {name: file[name] for name in file.files}
+    settings = str(content.pop("settings")) if "settings" in content else None
+    axes = {name: content.pop(name) for name in ("links", "frequency") if name in content}
+    return [part_of(path, settings, axes, content)]
+
+
+def part_of(name: str, settings: str | None, axes: Mapping[str, Array], columns: Mapping[str, Array]) -> Part:
+    """A part whose columns have the axes in any order, the samples last; see `read_part` for errors."""
+    if set(axes) != {"links", "frequency"}:
+        raise InputError(f"{name}: axes are {', '.join(axes) or 'missing'}; give a sweep of links and frequency")
+    if lacking := [column for column in NEEDED if column not in columns]:
+        raise InputError(f"{name}: no column {lacking[0]}; give a folder of a sweep, or what --keep has written of one")
+    order = [list(axes).index(axis) for axis in ("links", "frequency")] + [2]
+    shape = columns["dx"].transpose(order).shape
+    taken = {
+        column: columns[column].transpose(order)
+        if column in columns
+        else np.full(shape, np.nan if COLUMNS[column].kind == "<f8" else MISSING)
+        for column in (*NEEDED, *WANTED)
+    }
+    # without these columns it would seem that every loop was kept
+    taken[TOLD] = np.full(shape, {"bounces_before_collapse", "bounces_before_self_contact"} <= columns.keys())
+    return Part(name, settings, axes["links"], axes["frequency"], taken)
+
+
+def keep(directory: str, path: Path) -> None:
+    """Write the columns of a folder as a part of its own.
+
+    Raises:
+        InputError: the folder has several blocks, or see `read_part`.
+        OSError: it cannot be read, or the file not be written.
+    """
+    parts = read_part(directory)
+    if len(parts) > 1:
+        raise InputError(f"{directory}: {len(parts)} blocks; a file has the columns of one")
+    (part,) = parts
+    small = {
+        name: values.astype(np.int32 if values.dtype.kind == "i" else np.float32)
+        for name, values in part.columns.items()
+        if name != TOLD
+    }
+    with replacing(path) as target, target.open("wb") as file:
+        np.savez_compressed(file, settings=part.settings, links=part.links, frequency=part.frequency, **small)
+
+
+def walks_by_cell(parts: Iterable[Part]) -> dict[Cell, dict[str, Array]]:
+    """The walks of all parts by cell: columns of `Part`, shape (walks,), missing walks included.
+
+    Raises:
+        InputError: a part has other settings than the first that has any, or the same walks as another one.
+    """
+    found: dict[Cell, list[dict[str, Array]]] = {}
+    settings: str | None = None
+    for part in parts:
+        settings = part.settings if settings is None else settings
+        if part.settings not in (None, settings):
+            raise InputError(f"{part.name}: other settings than the parts before; reduce it alone")
+        for i, links in enumerate(part.links):
+            for j, frequency in enumerate(part.frequency):
+                walks = {name: column[i, j].copy() for name, column in part.columns.items()}
+                others = found.setdefault((int(links), float(frequency)), [])
+                if any(are_same(walks["dx"], other["dx"]) for other in others):
+                    raise InputError(f"{part.name}: walks of another part, the seed is the same; leave one out")
+                others.append(walks)
     return {
-        cell: {name: np.concatenate([part[name] for part in found]) for name in NEEDED}
-        for cell, found in sorted(parts.items())
+        cell: {name: np.concatenate([walks[name] for walks in cells]) for name in cells[0]}
+        for cell, cells in sorted(found.items())
     }
 
 
-def _settings(result: SweepResult) -> str:
+def are_same(dx: Array, others: Array) -> bool:
+    """Whether most distances [m] occur among others to seven digits: by chance hardly one does."""
+    known = np.float32(dx[np.isfinite(dx)])
+    return len(known) > 1 and bool(np.isin(known, np.float32(others)).mean() > 0.5)
+
+
+def settings_of(result: SweepResult) -> str:
     """What all parts must share: everything but names, seed, samples, grid, device and what is kept."""
     blocks = []
     for block in result.sweep["blocks"]:
@@ -110,11 +186,11 @@ def reduced(links: int, frequency: float, walks: Mapping[str, Array]) -> dict[st
     Args:
         links: of the chain.
         frequency: of the sprocket [Hz].
-        walks: columns of `NEEDED`, shape (walks,).
+        walks: columns of `Part`, shape (walks,).
     """
     status = walks["status"]
     rest = status == Status.AT_REST
-    dx, codes = walks["dx"][rest], endings(walks)[rest]
+    dx, codes = walks["dx"][rest].astype(float), np.where(walks[TOLD], endings(walks), Ending.UNKNOWN)[rest]
     count = len(dx)
     attempts = (walks["steps_accepted"] + walks["steps_rejected"])[status != MISSING]
     deciles = np.quantile(dx, [0.1, 0.5, 0.9]) if count else np.full(3, np.nan)
@@ -125,6 +201,8 @@ def reduced(links: int, frequency: float, walks: Mapping[str, Array]) -> dict[st
         "missing": int((status == MISSING).sum()),
         "at_rest": count,
         **{code.label: int((status == code).sum()) for code in FAILURES},
+        "told": int((codes != Ending.UNKNOWN).sum()),
+        "flight_told": int(np.isfinite(walks["flight_before_collapse"][rest]).sum()),
         "inaccurate": int((walks["energy_error"][rest] > MOST_ENERGY_ERROR).sum()),
         "dx_mean": _mean(dx),
         "dx_sd": _sd(dx),
@@ -211,8 +289,10 @@ def table_of_endings(cells: Mapping[str, Array]) -> str:
             np.nansum(weight * cells[f"dx_{way.label}"] / cells["dx_mean"]) / weight.sum() if weight.sum() else np.nan
         )
         text = "" if np.isnan(ratio) else f"{ratio:.3f}"
-        lines.append(f"| {way.meaning} | {100 * share:.2g} % | {np.sum(most == number)} | {text} |")
-    return "\n".join(lines)
+        known = way != Ending.IN_FLIGHT or cells["flight_told"].any()
+        percent = f"{100 * share:.2g} %" if known else "not recorded"
+        lines.append(f"| {way.meaning} | {percent} | {np.sum(most == number)} | {text} |")
+    return "\n".join([*lines, "", f"{cells['told'].sum():,.0f} walks of which this is known."])
 
 
 def table_of_failures(cells: Mapping[str, Array]) -> str:
@@ -259,10 +339,10 @@ TABLES: Final[Mapping[str, Callable[[Mapping[str, Array]], str]]] = {
 """Tables of the page by the names of their markers."""
 
 
-def main(folders: Sequence[str]) -> None:
-    """Reduce the folders, if there are any, into the committed file; then draw, print and write all that is in it."""
-    if folders:
-        walks = walks_by_cell(warpchain.load(folder) for folder in folders)
+def main(parts: Sequence[str]) -> None:
+    """Reduce the parts, if there are any, into the committed file; then draw, print and write all that is in it."""
+    if parts:
+        walks = walks_by_cell(part for path in parts for part in read_part(path))
         write_csv([reduced(*cell, columns) for cell, columns in walks.items()], CSV)
     cells = read_csv(CSV)
     tables = {name: render(cells) for name, render in TABLES.items()}
@@ -275,8 +355,15 @@ def main(folders: Sequence[str]) -> None:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("folders", nargs="*", metavar="FOLDER", help="parts of the sweep; none: the committed file")
+    parser.add_argument("parts", nargs="*", metavar="PART", help="folders or .npz files; none: the committed file")
+    parser.add_argument("--keep", metavar="FILE", type=Path, help="write the columns of one folder to this .npz file")
+    arguments = parser.parse_args()
     try:
-        main(parser.parse_args().folders)
+        if arguments.keep is None:
+            main(arguments.parts)
+        elif len(arguments.parts) == 1:
+            keep(arguments.parts[0], arguments.keep)
+        else:
+            parser.error("--keep: give one folder")
     except (InputError, OSError) as error:
         sys.exit(str(error))

@@ -7,9 +7,10 @@ from typing import Any, Final
 import numpy as np
 import phase_scaling
 from matplotlib.axes import Axes
-from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
+from matplotlib.colors import LogNorm, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
 from warpchain.pictures.maps import draw_failed
@@ -79,13 +80,16 @@ def draw_maps(cells: Mapping[str, Array], path: Path) -> None:
             upper_right,
             100 * cells["dx_sd"] / cells["dx_mean"],
             "standard deviation of Δx over its mean / %",
-            {"cmap": "magma"},
+            {"norm": LogNorm(), "cmap": "magma"},
         ),
         (lower_left, cells["bounces_mean"], "mean number of bounces", {"norm": LogNorm(), "cmap": "viridis"}),
     ]
     for axes, values, title, colors in shown:
         if np.isfinite(values).any():
-            figure.colorbar(grid.map(axes, values, title, **colors), ax=axes, pad=0.02)
+            bar = figure.colorbar(grid.map(axes, values, title, **colors), ax=axes, pad=0.02)
+            bar.ax.yaxis.set_major_formatter("{x:g}")
+            bar.ax.yaxis.set_minor_locator(LogLocator(subs=(2, 3, 5)))
+            bar.ax.yaxis.set_minor_formatter("{x:g}")
         else:
             grid.map(axes, values, f"{title}: too few walks")
         draw_failed(axes, np.nan_to_num(grid.table(failed)))
@@ -95,64 +99,52 @@ def draw_maps(cells: Mapping[str, Array], path: Path) -> None:
 
 
 def draw_endings(axes: Axes, grid: Grid, cells: Mapping[str, Array]) -> None:
-    """Each cell as a bar of the shares of its endings, the legend below."""
+    """The most frequent ending of each cell; the paler, the smaller its share. The legend is below."""
     ways = list(COLORS)
     counts = np.stack([cells[way.label] for way in ways], axis=1)
-    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-    # a table of fine columns: each cell is a bar from left to right
-    parts = 20
-    filled = np.cumsum(shares, axis=1)
-    middles = (np.arange(parts) + 0.5) / parts
-    codes = (middles[None, :, None] > filled[:, None, :]).sum(axis=2).astype(float)
-    codes[counts.sum(axis=1) == 0] = np.nan
-    codes[codes >= len(ways)] = np.nan
-    table = np.concatenate([grid.table(codes[:, part])[:, :, None] for part in range(parts)], axis=2)
-    table = table.reshape(len(grid.frequency), -1)
-    grid.map(axes, np.full(len(counts), np.nan), "how the loop was lost: shares of the walks of a cell", vmin=0, vmax=1)
+    total = counts.sum(axis=1)
+    most = counts.argmax(axis=1)
+    share = counts.max(axis=1) / np.maximum(total, 1)
+    colors = 1 - share[:, None] * (1 - np.array([to_rgb(COLORS[ways[index]]) for index in most]))
+    colors[total == 0] = np.nan
+    grid.map(axes, np.full(len(total), np.nan), "how the loop was lost; paler: a smaller share", vmin=0)
+    image = np.ma.masked_invalid(np.stack([grid.table(channel) for channel in colors.T], axis=2))
+    opaque = (~np.isnan(image.filled(np.nan)).any(axis=2)).astype(float)
     axes.imshow(
-        table,
+        np.dstack([image.filled(0.0), opaque]),
         origin="lower",
         aspect="auto",
         interpolation="nearest",
-        extent=(-0.5, len(grid.links) - 0.5, -0.5, len(grid.frequency) - 0.5),
-        cmap=ListedColormap([COLORS[way] for way in ways]),
-        norm=BoundaryNorm(np.arange(len(ways) + 1) - 0.5, len(ways)),
     )
-    seen = [way for way, number in zip(ways, counts.sum(axis=0), strict=True) if number > 0]
+    seen = [way for number, way in enumerate(ways) if np.any((most == number) & (total > 0))]
     handles = [Patch(color=COLORS[way], label=way.meaning) for way in seen]
     if handles:
         axes.legend(handles=handles, fontsize="x-small", loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False)
 
 
 def draw_scaling(cells: Mapping[str, Array], path: Path) -> None:
-    """Three laws: points of the cells, coloured by links, and their master curves."""
+    """Laws of Δx/(nℓ): cells coloured by links, and master curves; where the last one fails."""
     points = phase_scaling.points_of(cells)
     if len(points.links) < phase_scaling.FEWEST:
         print(f"{path.name}: not drawn, {len(points.links)} cells are too few")
         return
-    c, d = phase_scaling.best_powers(points)
-    only = phase_scaling.best_variable(points)
-    panels: list[tuple[str, str, Array, Array]] = [
-        (law.name.split(" over ")[1], law.name.split(" over ")[0], law.x(points), law.y(points))
-        for law in phase_scaling.CANDIDATES[:2]
-    ]
-    panels += [
-        (f"ν n^({only:.2f}) / Hz", "Δx/(nℓ)", points.frequency * points.links**only, points.distance / points.length),
-        (
-            f"ν n^({c:.2f}) / Hz",
-            f"Δx/n^({d:.2f}) / m",
-            points.frequency * points.links**c,
-            points.distance / points.links**d,
-        ),
-    ]
-    figure = Figure(figsize=(11, 8), layout="constrained")
+    laws = [law for law in phase_scaling.CANDIDATES if law.y(points)[0] == (points.distance / points.length)[0]]
+    figure = Figure(figsize=(11, 8.2), layout="constrained")
     grid: list[Axes] = list(figure.subplots(2, 2).flat)
-    for axes, (x_name, y_name, x, y) in zip(grid, panels, strict=True):
+    for axes, law in zip(grid, laws, strict=False):
+        x, y = law.x(points), law.y(points)
         image = draw_law(axes, points.links, x, y, phase_scaling.master_curve(x, y))
-        axes.set_xlabel(x_name)
+        y_name, x_name = law.name.split(" over ")
+        axes.set_xlabel(x_name.replace("turns of the loop per second", "turns of the loop / s⁻¹"))
         axes.set_ylabel(y_name)
-        axes.set_title(f"scatter {phase_scaling.scatter(x, y):.1f} %", loc="left", color=INK, fontsize="medium")
-    figure.colorbar(image, ax=grid, label="links", pad=0.02)
+        axes.set_title(f"residual {phase_scaling.rms_residual(x, y):.1f} %", loc="left", color=INK, fontsize="medium")
+    figure.colorbar(image, ax=grid[:2], label="links", pad=0.02)
+    left = 100 * np.expm1(phase_scaling.residuals(x, y))
+    used = Grid({"links": points.links, "frequency": points.frequency})
+    limit = float(np.quantile(np.abs(left), 0.98))
+    title = "Δx over its curve in v/(nℓ), less 1 / %"
+    shades = used.map(grid[3], left, title, cmap="RdBu_r", vmin=-limit, vmax=limit)
+    figure.colorbar(shades, ax=grid[3], pad=0.02)
     save_figure(figure, path)
 
 

@@ -2,7 +2,7 @@
 
 Only the number of links n and the frequency ν vary in the sweep, so that x is a power law ν n^c but for constants; its
 own power is a part of F. F is a cubic spline, fitted to ln Δx/(nℓ) by least squares. What the spline leaves is the
-scatter of the law, in per cent of Δx.
+residual of the law, in per cent of Δx.
 """
 
 from collections.abc import Callable, Mapping
@@ -33,6 +33,10 @@ FEWEST: Final = 3 * NUMBERS
 """Cells that are enough for one."""
 MOST_FAILED: Final = 0.05
 """Cells of which more walks failed are left out: those at rest may be another kind of walks than the rest."""
+FAST: Final = 12.0
+"""Frequency [Hz] from which most chains survive their second bounce."""
+PLACES: Final = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+"""Turns of the loop per second at which a curve is described."""
 ROUNDS: Final = 100
 """Samples of the bootstrap over cells."""
 
@@ -124,17 +128,17 @@ def residuals(x: Array, y: Array) -> Array:
     return np.log(y) - master_curve(x, y)(x)
 
 
-def scatter(x: Array, y: Array) -> float:
-    """Scatter of a law in per cent."""
+def rms_residual(x: Array, y: Array) -> float:
+    """Residual of a law, root mean square in per cent."""
     return root_mean_square(residuals(x, y), NUMBERS)
 
 
 def best_variable(points: Points, power: float = 1.0) -> float:
-    """Exponent c of x = ν n^c with the least scatter of Δx/n^power."""
+    """Exponent c of x = ν n^c with the least residual of Δx/n^power."""
     y = points.distance / points.links**power
 
     def cost(c: float) -> float:
-        return scatter(points.frequency * points.links**c, y)
+        return rms_residual(points.frequency * points.links**c, y)
 
     starts = np.linspace(-1.5, 1.0, 26)
     first = starts[int(np.argmin([cost(c) for c in starts]))]
@@ -142,12 +146,12 @@ def best_variable(points: Points, power: float = 1.0) -> float:
 
 
 def best_powers(points: Points, start: tuple[float, float] | None = None) -> tuple[float, float]:
-    """Exponents (c, d) of Δx/n^d over ν n^c with the least scatter."""
+    """Exponents (c, d) of Δx/n^d over ν n^c with the least residual."""
     if start is None:
         powers = np.linspace(-1.0, 2.0, 13)
         variables = [best_variable(points, power) for power in powers]
         costs = [
-            scatter(points.frequency * points.links**c, points.distance / points.links**d)
+            rms_residual(points.frequency * points.links**c, points.distance / points.links**d)
             for c, d in zip(variables, powers, strict=True)
         ]
         at = int(np.argmin(costs))
@@ -155,7 +159,7 @@ def best_powers(points: Points, start: tuple[float, float] | None = None) -> tup
 
     def cost(exponents: Array) -> float:
         c, d = exponents
-        return scatter(points.frequency * points.links**c, points.distance / points.links**d)
+        return rms_residual(points.frequency * points.links**c, points.distance / points.links**d)
 
     found = minimize(cost, start, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-5})
     return float(found.x[0]), float(found.x[1])
@@ -187,7 +191,7 @@ def _logarithms(points: Points) -> Array:
 
 
 def root_mean_square(left: Array, numbers: int) -> float:
-    """Scatter in per cent of residuals that a fit of so many numbers leaves."""
+    """Root mean square in per cent of residuals that a fit of so many numbers leaves."""
     return float(100 * np.sqrt(np.sum(left**2) / max(len(left) - numbers, 1)))
 
 
@@ -200,22 +204,40 @@ def worst(points: Points, left: Array, count: int = 3) -> str:
 
 
 def table(cells: Mapping[str, Array]) -> str:
-    """Markdown: for all cells, then for the paper's range, the scatter of each law and where it fails."""
+    """Markdown: for all cells, fast ones and the paper's range, the residual of each law and where it fails."""
     points = points_of(cells)
-    papers = (points.links >= 60) & (points.links <= 180) & (points.frequency <= 30)
-    parts = ((f"all {len(points.links)} cells", points), (f"{papers.sum()} cells of the paper's range", points[papers]))
+    papers = points[(points.links >= 60) & (points.links <= 180) & (points.frequency >= 5) & (points.frequency <= 30)]
+    fast = points[points.frequency >= FAST]
+    parts = (
+        (f"all {len(points.links)} cells", points),
+        (f"{len(fast.links)} cells from {FAST:g} Hz on", fast),
+        (f"{len(papers.links)} cells of the paper's range", papers),
+    )
     lines = []
     for title, chosen in parts:
         if len(chosen.links) < FEWEST:
             lines.append(f"{title}: too few for a curve of {NUMBERS} numbers.\n")
             continue
-        lines += [f"| law, {title} | scatter | farthest cells |", "|---|---|---|"]
+        lines += [f"| law, {title} | residual | farthest cells |", "|---|---|---|"]
         lines += [
             f"| {name} | {root_mean_square(left, numbers):.1f} % | {worst(chosen, left)} |"
             for name, left, numbers in laws_of(chosen)
         ]
-        lines.append("")
+        lines += ["", slopes(chosen), ""]
     return "\n".join(lines).rstrip()
+
+
+def slopes(points: Points) -> str:
+    """Steepness of the curve of Δx/(nℓ) over v/(nℓ) at some places, in words."""
+    x, y = points.speed / points.length, points.distance / points.length
+    curve, width = master_curve(x, y), 1.05
+    places = np.array([place for place in PLACES if x.min() * width < place < x.max() / width])
+    rise = (curve(places * width) - curve(places / width)) / (2 * np.log(width))
+    texts = [
+        f"{np.exp(value):.2g} at {place:g}/s (slope {slope:.1f})"
+        for place, value, slope in zip(places, curve(places), rise, strict=True)
+    ]
+    return f"Δx/(nℓ) over v/(nℓ) is {', '.join(texts)}."
 
 
 def laws_of(points: Points) -> list[tuple[str, Array, int]]:

@@ -61,7 +61,7 @@ def test_parts_are_reduced_together(script: ModuleType, tmp_path: Path) -> None:
     """Means, deviations and counts are those of the walks of all parts; failed and missing ones are counted."""
     other = SWEEP | {"seed": 2, "name": "other", "grid": {"frequency": [15, 24], "links": [60, 90]}}
     parts = [make_sweep(tmp_path / str(number), sweep, outcome) for number, sweep in enumerate((SWEEP, other))]
-    walks = script.walks_by_cell(parts)
+    walks = script.walks_by_cell(part for number in "01" for part in script.read_part(str(tmp_path / number)))
     assert list(walks) == [(30, 3.0), (30, 15.0), (60, 3.0), (60, 15.0), (60, 24.0), (90, 3.0), (90, 15.0), (90, 24.0)]
     both = script.reduced(60, 15.0, walks[60, 15.0])
     dx = np.concatenate([parts[0].dx[1, 1, :4], parts[1].dx[0, 0, :4]])
@@ -74,18 +74,54 @@ def test_parts_are_reduced_together(script: ModuleType, tmp_path: Path) -> None:
     assert math.isnan(failed["dx_mean"]) and math.isnan(failed["dx_sd"]) and math.isnan(failed["dx_50"])
 
 
+def read(script: ModuleType, *paths: Path) -> dict[tuple[int, float], dict[str, np.ndarray]]:
+    """The walks of some parts by cell."""
+    walks: dict[tuple[int, float], dict[str, np.ndarray]] = script.walks_by_cell(
+        part for path in paths for part in script.read_part(str(path))
+    )
+    return walks
+
+
 def test_parts_that_do_not_belong_together_are_refused(script: ModuleType, tmp_path: Path) -> None:
     """The same walks twice, or walks of another kind, would make wrong statistics; the device does not matter."""
-    first = make_sweep(tmp_path / "first", SWEEP)
+    first = tmp_path / "first"
+    make_sweep(first, SWEEP)
     for name, change, message in (
-        ("again", {"name": "again"}, "another part has its seed 1, too"),
-        ("scene", {"seed": 2, "scene": {"start": "rest"}}, "other settings than the first part"),
+        ("again", {"name": "again"}, "walks of another part, the seed is the same"),
+        ("scene", {"seed": 2, "scene": {"start": "rest"}}, "other settings than the parts before"),
         ("axes", {"seed": 2, "grid": {"links": [60]}}, "give a sweep of links and frequency"),
     ):
+        make_sweep(tmp_path / name, SWEEP | change)
         with pytest.raises(InputError, match=message):
-            script.walks_by_cell([first, make_sweep(tmp_path / name, SWEEP | change)])
+            read(script, first, tmp_path / name)
     apart = {"grid": {"links": [120], "frequency": [3]}, "options": {"device": "cpu"}}
-    assert len(script.walks_by_cell([first, make_sweep(tmp_path / "apart", SWEEP | apart)])) == 7
+    make_sweep(tmp_path / "apart", SWEEP | apart)
+    assert len(read(script, first, tmp_path / "apart")) == 7
+
+
+def test_a_kept_part_is_reduced_as_its_folder(script: ModuleType, tmp_path: Path) -> None:
+    """The file has the columns in single precision and the settings; the walks are those of the folder."""
+    make_sweep(tmp_path / "folder", SWEEP, outcome)
+    script.keep(str(tmp_path / "folder"), tmp_path / "part.npz")
+    folder, file = (read(script, tmp_path / name) for name in ("folder", "part.npz"))
+    for cell, walks in folder.items():
+        one, other = (script.reduced(*cell, columns) for columns in (walks, file[cell]))
+        assert one == pytest.approx(other, rel=1e-6, nan_ok=True)
+    with pytest.raises(InputError, match="walks of another part"):
+        read(script, tmp_path / "folder", tmp_path / "part.npz")
+
+
+def test_a_part_may_lack_columns(script: ModuleType, tmp_path: Path) -> None:
+    """Without the columns of the collapse no ending is known; without Δx it is no part."""
+    status, dx = np.ones((1, 1, 3), np.int8), np.array([[[1.0, 2.0, 3.0]]])
+    np.savez(tmp_path / "few.npz", links=[60], frequency=[15.0], status=status, dx=dx)
+    ((cell, walks),) = read(script, tmp_path / "few.npz").items()
+    row = script.reduced(*cell, walks)
+    assert (row["at_rest"], row["dx_mean"], row["told"], row["kept"]) == (3, 2.0, 0, 0)
+    assert math.isnan(row["hold_time_mean"])
+    np.savez(tmp_path / "none.npz", links=[60], frequency=[15.0], status=status)
+    with pytest.raises(InputError, match="no column dx"):
+        script.read_part(str(tmp_path / "none.npz"))
 
 
 def test_a_cell_counts_its_endings(script: ModuleType) -> None:
@@ -104,6 +140,7 @@ def test_a_cell_counts_its_endings(script: ModuleType) -> None:
         "hold_time": [1.0] * 5,
         "collapsed_at": [0.1, 0.5, 0.7, 0.4, np.nan],
         "self_contact_at": [0.1, 0.2, 0.2, np.nan, np.nan],
+        script.TOLD: [True] * 5,
     }
     row = script.reduced(60, 15.0, {name: np.array(values) for name, values in columns.items()})
     assert {way.label: row[way.label] for way in script.WAYS if row[way.label]} == {
@@ -164,7 +201,7 @@ def test_the_search_finds_the_exponent_of_a_made_law(scaling: ModuleType, expone
     points = scaling.points_of(made_cells(exponent, 1.0))
     assert scaling.best_variable(points) == pytest.approx(exponent, abs=0.002)
     fitting = {-0.5: "Δx/(nℓ) over v²/(g nℓ)", 0.0: "Δx/(nℓ) over ν²ℓ/g"}.get(exponent)
-    left = {law.name: scaling.scatter(law.x(points), law.y(points)) for law in scaling.CANDIDATES}
+    left = {law.name: scaling.rms_residual(law.x(points), law.y(points)) for law in scaling.CANDIDATES}
     assert all((value < 0.5) == (name == fitting) for name, value in left.items()), left
 
 
@@ -175,16 +212,16 @@ def test_both_exponents_are_found(scaling: ModuleType) -> None:
 
 
 def test_errors_are_those_of_the_noise(scaling: ModuleType) -> None:
-    """The scatter is that of the noise in per cent, and the exponent is right within a few of its errors."""
+    """The residual is that of the noise in per cent, and the exponent is right within a few of its errors."""
     points = scaling.points_of(made_cells(-0.5, 1.0, noise=0.05))
     x = points.frequency * points.links**-0.5
-    assert scaling.scatter(x, points.distance / points.length) == pytest.approx(5.0, rel=0.1)
+    assert scaling.rms_residual(x, points.distance / points.length) == pytest.approx(5.0, rel=0.1)
     (error,) = scaling.bootstrap(points, scaling.best_variable)
     assert 0 < error < 0.05 and abs(scaling.best_variable(points) + 0.5) < 4 * error
 
 
 def test_a_power_law_is_found(scaling: ModuleType) -> None:
-    """Both exponents of a pure power law, without scatter."""
+    """Both exponents of a pure power law, without residual."""
     cells = made_cells(0.0, 1.0)
     cells["dx_mean"] = 3e-3 * cells["frequency"] ** 1.7 * cells["links"] ** -0.9
     points = scaling.points_of(cells)
@@ -208,7 +245,8 @@ def test_the_page_has_the_tables_of_the_file(script: ModuleType) -> None:
     page = script.PAGE.read_text(encoding="utf-8")
     tables = {name: render(cells) for name, render in script.TABLES.items() if name != "scaling"}
     assert script.with_tables(page, tables) == page, "out of date; run python docs/phase_diagram.py"
-    assert np.array_equal(cells["at_rest"], sum(cells[way.label] for way in script.WAYS))
+    assert np.array_equal(cells["told"], sum(cells[way.label] for way in script.WAYS))
+    assert np.all(cells["told"] <= cells["at_rest"])
     assert np.array_equal(cells["walks"], cells["at_rest"] + sum(cells[code.label] for code in script.FAILURES))
 
 

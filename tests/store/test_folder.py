@@ -344,14 +344,14 @@ def test_a_damaged_manifest_is_refused(tmp_path: Path, text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("version", "remedy"), [(3, "run it again in another folder, or use the warpchain that wrote it"), (5, "update")]
+    ("version", "remedy"), [(4, "run it again in another folder, or use the warpchain that wrote it"), (6, "update")]
 )
 def test_other_formats_are_refused(tmp_path: Path, version: int, remedy: str) -> None:
     """A folder of an older or later version of the format says so, and what to do; starting anew spares it, too."""
     run(tmp_path)
     path = tmp_path / "sweep.json"
-    path.write_text(path.read_text().replace('"format_version": 4', f'"format_version": {version}'))
-    message = f"{path}: format version {version}, but this warpchain reads 4; {remedy}"
+    path.write_text(path.read_text().replace('"format_version": 5', f'"format_version": {version}'))
+    message = f"{path}: format version {version}, but this warpchain reads 5; {remedy}"
     for attempt in (read_manifest, open_folder, lambda place: open_folder(place, fresh=True)):
         with refused(InputError, tmp_path, message):
             attempt(tmp_path)

@@ -30,7 +30,7 @@ PLANAR = [name for name in Parameters.model_fields if name != "half_width"]
         ("figure6", {"rest": (5, 6, 12), "ellipse": (2, 6, 12)}),
         ("tolerance", {"main": (2, 2, 2, 12)}),
         ("montecarlo", {"main": (7, 8, 1800)}),
-        ("phase_diagram", {"main": (22, 20, 2273)}),
+        ("phase_diagram", {"main": (22, 20, 100)}),
         ("kink", {"main": (5, 6, 1)}),
         (
             "steadiness",

@@ -127,6 +127,7 @@ def test_a_gpu_kernel_softens_a_pile_as_a_cpu_kernel_does(
     assert 0 < first <= second < theirs.time(0)
     assert theirs.state.softness.numpy().tolist() == [softness, softness]
     assert np.all(theirs.state.losses.numpy()[:, layout.LOSS_SOFTENING] > 0)
+    assert all(theirs.watched(world, layout.SELF_CONTACT_AT) > 0 for world in range(2))  # its bits are compared, too
     assert_same_bits(ours, theirs)
 
 
