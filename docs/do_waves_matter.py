@@ -1,20 +1,23 @@
-"""Whether waves matter for the distance walked: prints the tables of waves.md from pairs of walks that differ in them.
+"""Whether waves matter for the distance walked: pairs of walks that differ in them, and the table of waves.md.
 
-Run it as ``python docs/do_waves_matter.py --device cuda``; it takes a few minutes on a GPU. Every walk of Table 1's
-chain with soft joints is held and released as ever. Then it walks several times from the same state: as it is, with a
-drag on waves (see `warpchain.loop.wave_drag`), and with other viscous friction in its joints.
+    python docs/do_waves_matter.py --device cuda   # three minutes → docs/results/do_waves_matter.csv, table
+    python docs/do_waves_matter.py                 # that file → table
+
+Every walk of Table 1's chain with soft joints is held and released as ever. Then it walks several times from the same
+state: as it is, with a drag on waves (see `warpchain.loop.wave_drag`), and with other viscous friction in its joints.
 """
 
 import argparse
 import csv
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from warpchain.engine.batch import Batch
+from warpchain.files import write_whole
 from warpchain.inputs.distributions import random_generator, sampled
 from warpchain.inputs.setup import Setup, resolve
 from warpchain.kernels import layout
@@ -30,7 +33,10 @@ LATEST = 5.0
 CLOSE = 0.06
 """The energy of waves is averaged over this time [s] after the first impact."""
 SEED = 20180607
-RESULTS = Path(__file__).parent / "results" / "do_waves_matter.csv"
+FOLDER = Path(__file__).parent
+RESULTS = FOLDER / "results" / "do_waves_matter.csv"
+PAGE = FOLDER / "waves.md"
+MARKERS = "<!-- matter -->", "<!-- end of matter -->"
 
 
 @dataclass(frozen=True)
@@ -52,10 +58,10 @@ class Variant:
 
 VARIANTS = (
     Variant("plain"),
-    Variant("drag 1e-9/s: chaos alone", drag=1e-9),
+    Variant("drag 1e-9/s", drag=1e-9),
     Variant("drag 50/s", drag=50.0),
-    Variant("drag 50/s, waves of up to 24 links", drag=50.0, longest=24.0),
-    Variant("drag 50/s, waves of up to 12 links", drag=50.0, longest=12.0),
+    Variant("drag 50/s on waves of up to 24 links", drag=50.0, longest=24.0),
+    Variant("drag 50/s on waves of up to 12 links", drag=50.0, longest=12.0),
     Variant("joint friction × 0.1", friction=0.1),
     Variant("joint friction × 10", friction=10.0),
 )
@@ -161,8 +167,10 @@ def walk_all(cells: Sequence[tuple[int, float]], samples: int, device: str) -> l
 
 
 def mean_error(values: np.ndarray) -> tuple[float, float]:
-    """Mean of what is a number, and its standard error."""
+    """Mean of what is a number, and its standard error; NaN of fewer than two."""
     known = values[~np.isnan(values)]
+    if len(known) < 2:
+        return float(np.sum(known)) if len(known) else math.nan, math.nan
     return float(known.mean()), float(known.std(ddof=1) / np.sqrt(len(known)))
 
 
@@ -202,23 +210,44 @@ def table(cells: Sequence[tuple[int, float]], samples: int, walkers: Sequence[Wa
     return rows
 
 
+def read(path: Path) -> list[dict[str, str]]:
+    """The rows of a file."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def text(rows: Sequence[Mapping[str, str]]) -> str:
+    """Markdown: mean Δx of the plain walks, and what each variant changes in pairs, ± standard error."""
+    names = list(dict.fromkeys(row["variant"] for row in rows))
+    lines = ["| links, Hz | Δx / m | " + " | ".join(names[1:]) + " |", "|" + "---|" * (len(names) + 1)]
+    for plain in (row for row in rows if row["variant"] == names[0]):
+        cell = [row for row in rows if all(row[key] == plain[key] for key in ("links", "frequency"))][1:]
+        changes = (f"{float(r['change_percent']):+.1f} ± {float(r['change_error_percent']):.1f} %" for r in cell)
+        title = f"{plain['links']}, {float(plain['frequency']):g}"
+        distance = f"{float(plain['dx']):.3f} ± {float(plain['dx_error']):.3f}"
+        lines.append(f"| {title} | {distance} | " + " | ".join(changes).replace("-", "−") + " |")
+    return "\n".join(lines)
+
+
+def with_table(page: str, table: str) -> str:
+    """A page with this table between its markers."""
+    before, rest = page.split(MARKERS[0])
+    return f"{before}{MARKERS[0]}\n\n{table}\n\n{MARKERS[1]}{rest.split(MARKERS[1])[1]}"
+
+
 def main() -> None:
-    """Runs all walks, prints the table and writes it."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--device", default="cpu")
-    parser.add_argument("--samples", type=int, default=200)
-    parser.add_argument("--cells", type=int, default=len(CELLS), help="the first so many cells")
-    parser.add_argument("--output", type=Path, default=RESULTS)
+    """Walk if a device is given; then write the table."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--device", help="where to walk; none: the committed file")
+    parser.add_argument("--samples", type=int, default=100)
     given = parser.parse_args()
-    cells = CELLS[: given.cells]
-    rows = table(cells, given.samples, walk_all(cells, given.samples, given.device))
-    for row in rows:
-        print(*row.values(), sep="\t")
-    given.output.parent.mkdir(exist_ok=True)
-    with given.output.open("w", newline="") as file:
-        writer = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    if given.device:
+        rows = table(CELLS, given.samples, walk_all(CELLS, given.samples, given.device))
+        lines = [",".join(rows[0]), *(",".join(map(str, row.values())) for row in rows)]
+        write_whole(RESULTS, "\n".join(lines) + "\n")
+    found = text(read(RESULTS))
+    print(found)
+    write_whole(PAGE, with_table(PAGE.read_text(encoding="utf-8"), found))
 
 
 if __name__ == "__main__":
