@@ -29,7 +29,7 @@ CELLS = ((60, 15.0), (60, 25.0), (120, 20.0), (120, 30.0), (180, 20.0), (180, 30
 STEP = 2e-3
 """Time [s] between two applications of the drag."""
 LATEST = 5.0
-"""Time [s] after which the drag ends, whatever the loop does; it ends before if the loop collapses."""
+"""Time [s] after which the drag ends; it ends earlier when the loop collapses and its joints soften."""
 CLOSE = 0.06
 """The energy of waves is averaged over this time [s] after the first impact."""
 SEED = 20180607
@@ -177,11 +177,11 @@ def mean_error(values: np.ndarray) -> tuple[float, float]:
 def table(cells: Sequence[tuple[int, float]], samples: int, walkers: Sequence[Walker]) -> list[dict[str, object]]:
     """A row for each cell and variant: distance, its change against the plain walk in pairs, energy of the waves."""
     shape = (len(cells), samples, len(VARIANTS))
-    dx, early, bounces, collapse = (np.full(shape, np.nan) for _ in range(4))
+    dx, early, bounces, softened = (np.full(shape, np.nan) for _ in range(4))
     places = iter(np.ndindex(shape))
     for walker, place in zip(walkers, places, strict=True):
         outcome = walker.run.outcome()
-        dx[place], collapse[place] = outcome["dx"], outcome["softened_at"]
+        dx[place], softened[place] = outcome["dx"], outcome["softened_at"]
         if outcome["status"] == Status.AT_REST:
             bounces[place] = outcome["bounces"]
         if walker.floor_at >= 0:
@@ -204,7 +204,7 @@ def table(cells: Sequence[tuple[int, float]], samples: int, walkers: Sequence[Wa
                     "change_error_percent": round(100 * change_error / np.nanmean(dx[cell, :, 0]), 2),
                     "wave_energy_percent": round(100 * float(np.nanmean(early[cell, :, k])), 3),
                     "bounces": round(float(np.nanmean(bounces[cell, :, k])), 2),
-                    "collapse": round(float(np.nanmean(collapse[cell, :, k])), 3),
+                    "softened_at": round(float(np.nanmean(softened[cell, :, k])), 3),
                 }
             )
     return rows
@@ -217,7 +217,7 @@ def read(path: Path) -> list[dict[str, str]]:
 
 
 def text(rows: Sequence[Mapping[str, str]]) -> str:
-    """Markdown: mean Δx of the plain walks, and what each variant changes in pairs, ± standard error."""
+    """Markdown: mean Δx of the plain walks and its changes in pairs, ± standard error; and the energy of the waves."""
     names = list(dict.fromkeys(row["variant"] for row in rows))
     lines = ["| links, Hz | Δx / m | " + " | ".join(names[1:]) + " |", "|" + "---|" * (len(names) + 1)]
     for plain in (row for row in rows if row["variant"] == names[0]):
@@ -226,6 +226,11 @@ def text(rows: Sequence[Mapping[str, str]]) -> str:
         title = f"{plain['links']}, {float(plain['frequency']):g}"
         distance = f"{float(plain['dx']):.3f} ± {float(plain['dx_error']):.3f}"
         lines.append(f"| {title} | {distance} | " + " | ".join(changes).replace("-", "−") + " |")
+    lines += ["", "| links, Hz | " + " | ".join(names) + " |", "|" + "---|" * (len(names) + 1)]
+    for plain in (row for row in rows if row["variant"] == names[0]):
+        cell = [row for row in rows if all(row[key] == plain[key] for key in ("links", "frequency"))]
+        shares = (f"{float(row['wave_energy_percent']):.2g} %" for row in cell)
+        lines.append(f"| {plain['links']}, {float(plain['frequency']):g} | " + " | ".join(shares) + " |")
     return "\n".join(lines)
 
 

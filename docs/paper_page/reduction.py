@@ -132,6 +132,7 @@ def effects(table: Array, block: BlockResult, name: str, reference: float | str)
 def starts(block: BlockResult) -> Numbers:
     """Distances by start, their steps along both axes of the cells, and when loops first ran into themselves."""
     table, values = at_rest(block), block.axes["start"].tolist()
+    losses = shares_of_losses(block)
     content: Numbers = {}
     for number, start in enumerate(values):
         here = table[:, :, number]
@@ -143,6 +144,7 @@ def starts(block: BlockResult) -> Numbers:
             "faster": _content(unpaired(here[:, 1:], here[:, :-1])),
             "longer": _content(unpaired(here[1:], here[:-1])),
         }
+        content[start]["losses"] = {name: value[:, :, number].tolist() for name, value in losses.items()}
         if CONTACT in block.columns:
             content[start] |= self_contact(block, number)
     if CONTACT in block.columns:
@@ -151,6 +153,13 @@ def starts(block: BlockResult) -> Numbers:
         ends = (before[:, :, values.index(start)] for start in ("ellipse", "rest"))
         content["delay"] = _content(paired(*ends))
     return content
+
+
+def shares_of_losses(block: BlockResult) -> dict[str, Array]:
+    """Mean share of each loss in the energy that a walk loses from its release to rest, cells in front."""
+    lost = {name: at_rest(block, name) for name in block.columns if name.startswith("loss_")}
+    total = np.sum(list(lost.values()), axis=0)
+    return {name.removeprefix("loss_"): mean(each / total) for name, each in lost.items()}
 
 
 def self_contact(block: BlockResult, start: int) -> Numbers:
