@@ -244,10 +244,12 @@ def main() -> None:
     """Walk if a device is given; then write the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--device", help="where to walk; none: the committed file")
-    parser.add_argument("--samples", type=int, default=100)
+    parser.add_argument("--samples", type=int, help="of each cell; 100 if not given")
     given = parser.parse_args()
+    if given.samples and not given.device:
+        parser.error("--samples: has no effect without --device; give one")
     if given.device:
-        rows = table(CELLS, given.samples, walk_all(CELLS, given.samples, given.device))
+        rows = table(CELLS, given.samples or 100, walk_all(CELLS, given.samples or 100, given.device))
         lines = [",".join(rows[0]), *(",".join(map(str, row.values())) for row in rows)]
         write_whole(RESULTS, "\n".join(lines) + "\n")
     found = text(read(RESULTS))

@@ -136,7 +136,8 @@ def keep(directory: str, path: Path) -> None:
         if name != TOLD
     }
     with replacing(path) as target, target.open("wb") as file:
-        np.savez_compressed(file, settings=part.settings, links=part.links, frequency=part.frequency, **small)
+        settings = {} if part.settings is None else {"settings": part.settings}
+        np.savez_compressed(file, links=part.links, frequency=part.frequency, **settings, **small)
 
 
 def walks_by_cell(parts: Iterable[Part]) -> dict[Cell, dict[str, Array]]:
@@ -192,7 +193,7 @@ def reduced(links: int, frequency: float, walks: Mapping[str, Array]) -> dict[st
     rest = status == Status.AT_REST
     dx, codes = walks["dx"][rest].astype(float), np.where(walks[TOLD], endings(walks), Ending.UNKNOWN)[rest]
     count = len(dx)
-    attempts = (walks["steps_accepted"] + walks["steps_rejected"])[status != MISSING]
+    attempts = (_known(walks["steps_accepted"]) + _known(walks["steps_rejected"]))[status != MISSING]
     deciles = np.quantile(dx, [0.1, 0.5, 0.9]) if count else np.full(3, np.nan)
     row: dict[str, float] = {
         "links": links,
@@ -208,13 +209,18 @@ def reduced(links: int, frequency: float, walks: Mapping[str, Array]) -> dict[st
         "dx_sd": _sd(dx),
         "dx_se": _sd(dx) / np.sqrt(count) if count > 1 else np.nan,
         **dict(zip(("dx_10", "dx_50", "dx_90"), map(float, deciles), strict=True)),
-        **{f"{name}_mean": _mean(walks[column][rest]) for name, column in AVERAGED.items()},
-        "bounces_sd": _sd(walks["bounces"][rest].astype(float)),
+        **{f"{name}_mean": _mean(_known(walks[column])[rest]) for name, column in AVERAGED.items()},
+        "bounces_sd": _sd(_known(walks["bounces"])[rest]),
         "attempts_mean": _mean(attempts),
         **{way.label: int((codes == way).sum()) for way in WAYS},
         **{f"dx_{way.label}": _mean(dx[codes == way]) for way in WAYS},
     }
     return row
+
+
+def _known(values: Array) -> Array:
+    """As floats, NaN where a number is missing or a part lacks the column."""
+    return np.where(values == MISSING, np.nan, values)
 
 
 def _mean(values: Array) -> float:
@@ -224,8 +230,9 @@ def _mean(values: Array) -> float:
 
 
 def _sd(values: Array) -> float:
-    """Standard deviation of a sample; NaN of fewer than two."""
-    return float(values.std(ddof=1)) if len(values) > 1 else float("nan")
+    """Standard deviation of what is not NaN; NaN of fewer than two."""
+    known = values[np.isfinite(values)]
+    return float(known.std(ddof=1)) if len(known) > 1 else float("nan")
 
 
 def write_csv(rows: Sequence[Mapping[str, float]], path: Path) -> None:
@@ -282,17 +289,20 @@ def table_of_endings(cells: Mapping[str, Array]) -> str:
         "| way of ending | share | cells where it is the most frequent | Δx over the mean of its cells |",
         "|---|---|---|---|",
     ]
+    flights = int(cells["flight_told"].sum())
     for number, way in enumerate(WAYS):
-        share = counts[:, number].sum() / max(counts.sum(), 1)
+        # without the time since the last impulse a collapse in flight counts as one of its bounce
+        base = flights if way is Ending.IN_FLIGHT else counts.sum()
+        share = counts[:, number].sum() / max(base, 1)
         weight = counts[:, number] * np.isfinite(cells[f"dx_{way.label}"])
         ratio = (
             np.nansum(weight * cells[f"dx_{way.label}"] / cells["dx_mean"]) / weight.sum() if weight.sum() else np.nan
         )
         text = "" if np.isnan(ratio) else f"{ratio:.3f}"
-        known = way != Ending.IN_FLIGHT or cells["flight_told"].any()
-        percent = f"{100 * share:.2g} %" if known else "not recorded"
+        percent = "not recorded" if way is Ending.IN_FLIGHT and not flights else f"{100 * share:.2g} %"
         lines.append(f"| {way.meaning} | {percent} | {np.sum(most == number)} | {text} |")
-    return "\n".join([*lines, "", f"{cells['told'].sum():,.0f} walks of which this is known."])
+    text = f"{counts.sum():,.0f} walks of which this is known; a collapse in flight is known of {flights:,} of them."
+    return "\n".join([*lines, "", text])
 
 
 def table_of_failures(cells: Mapping[str, Array]) -> str:

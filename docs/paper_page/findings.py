@@ -230,7 +230,7 @@ def delay(numbers: Numbers) -> Finding:
         return NOT_RECORDED
     effect = part(effect_of(numbers["paper_claims"]["starts"]["delay"]), long_chains(numbers))
     found = summary(effect)
-    text = f"bounces before the first touch, ellipse against rest: {counted(effect)}"
+    text = f"bounces before the first touch, ellipse against rest, pairs in which both touch: {counted(effect)}"
     return Finding(text, direction(found.rises, found.falls, found.cells))
 
 

@@ -70,7 +70,9 @@ def reduced(result: SweepResult) -> Numbers:
         if name in result.blocks:
             content[key] = reduce(result.blocks[name])
     if "link_length" in result.blocks and CONTACT in (block := result.blocks["link_length"]).columns:
-        content["collapse"] = effects(bounces_until_collapse(block), block, "link_length", 0.01268)
+        content["collapse"] = effects(
+            bounces_until_collapse(block), block, "link_length", _reference(result, block, "link_length")
+        )
     if "gravity" in result.blocks:
         content["spread"] = spreads(result.blocks)
     if result.name == "paper_tolerance":

@@ -112,7 +112,7 @@ def test_parameters_as_tables(command: Command) -> None:
         ("sweep figur6 -o new", "figur6: neither a file nor a shipped sweep; did you mean figure6?"),
         (
             "sweep x -o new",
-            f"x: neither a file nor a shipped sweep; give one of {', '.join(shipped_sweeps()[:10])}, ...",
+            f"x: neither a file nor a shipped sweep; give one of {', '.join(shipped_sweeps()[:9])}, ...",
         ),
         ("sweep x.yaml -o new", "x.yaml: No such file or directory;"),
         ("sweep --new no/new.yaml", "--new: no/new.yaml: cannot be written (No such file or directory); give"),

@@ -299,7 +299,7 @@ def test_the_command_makes_page_numbers_and_figures(tmp_path: Path) -> None:
     text = (out / "paper.md").read_text(encoding="utf-8")
     assert "{{" not in text and "nan" not in text
     drawn = {path.stem for path in (out / "figures").iterdir()}
-    assert drawn == {"paper_distances", "paper_effects", "paper_friction", "paper_impacts"}
+    assert drawn == {f"paper_{name}" for name in ("distances", "effects", "friction", "impacts", "self_contacts")}
     (out / "paper.md").unlink()
     assert command().returncode == 0 and (out / "paper.md").read_text(encoding="utf-8") == text
     refused = command(tmp_path)

@@ -118,7 +118,7 @@ def test_a_part_may_lack_columns(script: ModuleType, tmp_path: Path) -> None:
     ((cell, walks),) = read(script, tmp_path / "few.npz").items()
     row = script.reduced(*cell, walks)
     assert (row["at_rest"], row["dx_mean"], row["told"], row["kept"]) == (3, 2.0, 0, 0)
-    assert math.isnan(row["hold_time_mean"])
+    assert all(math.isnan(row[name]) for name in ("hold_time_mean", "bounces_mean", "bounces_sd", "attempts_mean"))
     np.savez(tmp_path / "none.npz", links=[60], frequency=[15.0], status=status)
     with pytest.raises(InputError, match="no column dx"):
         script.read_part(str(tmp_path / "none.npz"))

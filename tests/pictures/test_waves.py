@@ -6,6 +6,7 @@ import matplotlib.figure
 import numpy as np
 import pytest
 
+from tests.support.made_tilting_walks import make_tilting_walk
 from tests.support.made_walks import make_unreleased, make_walk
 from warpchain.pictures.walk_figures import draw
 from warpchain.pictures.wave_fields import (
@@ -194,6 +195,9 @@ def test_the_picture(colour: Any) -> None:
         np.testing.assert_allclose(own.images[0].get_array(), 9.0, rtol=1e-9)
     if colour == "velocity":
         assert low == -high
+    for axes, around in ((own, LINKS), (room, length)):  # no contact is drawn across its panel
+        drawn = [segment for lines in axes.collections for segment in lines.get_segments()]
+        assert drawn and max(np.abs(np.diff(segment[:, 1])).max(initial=0.0) for segment in drawn) < around / 2
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
     assert any("sqrt" in text for text in texts) and len(texts) == 4
     paper = figure.bbox
@@ -242,6 +246,14 @@ def test_frames_too_far_apart_are_refused_with_an_interval() -> None:
         waves_figure(bouncing_ring(5e-3), colour="curvature")
     with pytest.raises(ValueError, match=r"no frames .*; run it again with a frame_interval"):
         waves_figure(make_unreleased(), colour="curvature")
+
+
+def test_a_walk_whose_plane_tilts_is_refused() -> None:
+    """Its frames are places in the plane, which says nothing about the floor."""
+    with pytest.raises(
+        ValueError, match=r"walk: its plane tilts; waves are drawn of walks whose scene.plane is 'fixed'"
+    ):
+        waves_figure(make_tilting_walk(), colour="curvature")
 
 
 def test_other_figures_have_no_colour_and_no_window() -> None:

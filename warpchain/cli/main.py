@@ -249,7 +249,7 @@ def walk(
         typer.Option(
             "--record-loads",
             help="Record forces and moments of the joints with each picture after the release, and draw waves.png; "
-            "needs a folder. standard then is explicit: rigid joints have no forces.",
+            "needs a folder. standard then is explicit: rigid joints have no forces. 60 links take 24 MB a second.",
         ),
     ] = False,
     as_json: Annotated[
@@ -278,7 +278,7 @@ def walk(
         for option, value in (("--config", config), ("--preset", preset), ("--seed", seed)):
             if value is not None:
                 raise InputError(f"{option}: given together with --like, and a saved walk has its own; leave one out")
-        setup, chosen_seed = setup_like(like, given)
+        setup, chosen_seed = setup_like(like, given, record_loads)
     interval = _frame_interval(output, animation, frame_interval, record_loads)
     if output is not None:
         try_walk_folder(output, animation)

@@ -248,7 +248,7 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
         pictures[tilt] = partial(_draw, "tilt")
     else:
         remove_output(folder / tilt)
-    if len(result.frame_forces):
+    if len(result.frame_forces) and result.joints_in_room is None:
         pictures[waves] = partial(_draw, "waves")
     else:
         remove_output(folder / waves)

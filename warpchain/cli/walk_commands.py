@@ -100,7 +100,9 @@ def animate(
     print(printable(str(output)))
 
 
-def setup_like(path: Path, given: Mapping[str, Mapping[str, object]]) -> "tuple[Setup, int | None]":
+def setup_like(
+    path: Path, given: Mapping[str, Mapping[str, object]], records_loads: bool
+) -> "tuple[Setup, int | None]":
     """Setup of a saved walk with other values in place of some of its own, and its seed.
 
     A method that is given brings its own settings, and a tolerance also holds where joints are soft, as in a new walk.
@@ -108,6 +110,7 @@ def setup_like(path: Path, given: Mapping[str, Mapping[str, object]]) -> "tuple[
     Args:
         path: file of the walk.
         given: section → field → value.
+        records_loads: whether joint forces are recorded; `standard` then is another integrator.
 
     Raises:
         InputError: the file is no walk, or a value is refused.
@@ -132,6 +135,7 @@ def setup_like(path: Path, given: Mapping[str, Mapping[str, object]]) -> "tuple[
         scene=sections["scene"],
         options=sections["options"],
         parameters=sections["parameters"],
+        records_loads=records_loads,
     )
     warn_of_units((f"parameters.{name}", name, value) for name, value in given["parameters"].items())
     return setup, saved.seed

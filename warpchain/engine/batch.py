@@ -211,7 +211,7 @@ class Batch:
         self.resume(world, stop_time, stop_status)
 
     def set_velocities(self, worlds: Sequence[int], velocity: Array) -> None:
-        """Give chains of n links that have stopped other velocities, (w, n, 3); the ledger of energy does not know."""
+        """Give chains of n links that have stopped other velocities, (w, n, 3); their losses of energy start anew."""
         self._edit(self.state.links)[worlds, 3:, : velocity.shape[1]] = velocity.transpose(0, 2, 1)
         self._edit(self.state.is_fresh)[worlds] = 1
 

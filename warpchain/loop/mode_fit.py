@@ -34,7 +34,7 @@ def fit_rates(signals: Complex, interval: float, count: int) -> Complex:
     Args:
         signals: s signals at t instants, shape (t, s).
         interval: time from one instant to the next [s]; the frequencies must be below π/interval.
-        count: number of exponentials, below t/3.
+        count: number of exponentials, at most t/3.
 
     Returns:
         λ [1/s], by falling imaginary part, shape (count,).
@@ -44,7 +44,7 @@ def fit_rates(signals: Complex, interval: float, count: int) -> Complex:
     """
     instants = len(signals)
     stretch = 2 * instants // 3
-    if count > instants - stretch:
+    if instants < 3 * count:
         raise ValueError(f"{instants} instants do not tell {count} exponentials apart; give at least {3 * count}")
     rows = np.concatenate(
         [np.lib.stride_tricks.sliding_window_view(column, stretch) for column in signals.T]

@@ -83,10 +83,10 @@ def tilting(walk: Walk) -> TiltingWalk | None:
 
 
 def kinds_of(walk: Walk) -> tuple[Kind, ...]:
-    """The figures that a walk of this kind has, if it was recorded; `waves` if its joint forces were."""
+    """The figures that a walk has, if it was recorded; `waves` if its forces were, too, and its plane is fixed."""
     kinds: tuple[Kind, ...] = get_args(Kind)
     left_out = {"tilt"} if tilting(walk) is None else set()
-    left_out |= {"waves"} if joint_forces(walk) is None else set()
+    left_out |= {"waves"} if joint_forces(walk) is None or tilting(walk) is not None else set()
     return tuple(kind for kind in kinds if kind not in left_out)
 
 

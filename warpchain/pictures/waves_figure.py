@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.style import INK, tidy
-from warpchain.pictures.walk_shape import Colour, Walk, check_frames, joint_forces, setting
+from warpchain.pictures.walk_shape import Colour, Walk, check_frames, joint_forces, setting, tilting
 from warpchain.pictures.wave_fields import (
     FEWEST_FRAMES,
     Truths,
@@ -128,8 +128,8 @@ def waves_figure(
         figure: an empty figure to draw into; by default a new one.
 
     Raises:
-        ValueError: the walk lacks frames or joint forces, its frames are too far apart, or colour or window are
-            impossible.
+        ValueError: the plane of the walk tilts, the walk lacks frames or joint forces, its frames are too far apart,
+            or colour or window are impossible.
     """
     if colour not in _LOOKS:
         raise ValueError(f"colour: {colour!r} is unknown; give {', '.join(map(repr, get_args(Colour)))}")
@@ -164,8 +164,8 @@ def waves_figure(
 
     for axes, place, thick in ((own, as_joint, 1.0), (room, as_place, waves.link_length)):
         _draw_characteristics(axes, waves, look, place, thick * half)
-        _draw_contacts(axes, waves, waves.floor, place, "black")
-        _draw_contacts(axes, waves, waves.touch, place, look.touch)
+        _draw_contacts(axes, waves, waves.floor, place, thick * half, "black")
+        _draw_contacts(axes, waves, waves.touch, place, thick * half, look.touch)
         axes.set(xlim=span)
         tidy(axes)
     own.set(ylabel="number of the joint", ylim=(-0.5, waves.links - 0.5))
@@ -185,6 +185,8 @@ def waves_figure(
 def _waves(walk: Walk, colour: Colour, window: tuple[float, float]) -> _Waves:
     """What is drawn of a walk, or a `ValueError`."""
     check_frames(walk)
+    if tilting(walk) is not None:
+        raise ValueError("walk: its plane tilts; waves are drawn of walks whose scene.plane is 'fixed'")
     forces, parameters = joint_forces(walk), walk.setup.parameters
     if colour == "tension" and forces is None:
         raise ValueError(
@@ -258,15 +260,17 @@ def _draw_characteristics(axes: Axes, waves: _Waves, look: _Look, place: Place, 
                 axes.plot(times, places, color=look.wave, linewidth=0.8, linestyle=line, path_effects=halo)
 
 
-def _draw_contacts(axes: Axes, waves: _Waves, touching: Truths, place: Place, color: str) -> None:
-    """A short line for as long as a joint touches."""
-    segments = []
+def _draw_contacts(axes: Axes, waves: _Waves, touching: Truths, place: Place, half: float, color: str) -> None:
+    """A line for as long as a joint touches, broken where it passes from one end of the panel to the other."""
+    segments: list[Array] = []
     for joint in np.flatnonzero(touching.any(axis=0)):
         edges = np.flatnonzero(np.diff(touching[:, joint].astype(np.int8), prepend=0, append=0))
         for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
             y = place(np.full(last - first + 1, float(joint)), int(first))
-            segments.append([(waves.time[first], y[0]), (waves.time[last], y[-1])])
-    segments = [segment for segment in segments if abs(segment[0][1] - segment[1][1]) < waves.links / 4]
+            path = np.stack([waves.time[first : last + 1], y], axis=1)
+            if len(path) == 1:
+                path = np.repeat(path, 2, axis=0)
+            segments += np.split(path, np.flatnonzero(np.abs(np.diff(path[:, 1])) > half) + 1)
     axes.add_collection(LineCollection(segments, colors=color, linewidths=1.4, capstyle="projecting", zorder=4))
 
 

@@ -89,7 +89,7 @@ def accepted_steps(
         length = min(proposed, duration - now)
         step = attempt(tableau, acceleration, state, length)
         error = step.ratio(step.estimate) / tolerance
-        if error > 1:
+        if not error <= 1:
             shrinkage = SAFETY * error ** (-1 / (tableau.error_order - 1))
             proposed = length * max(shrinkage, float(LEAST_SHRINKAGE))
             continue
