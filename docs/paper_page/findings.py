@@ -4,8 +4,10 @@ A function takes the numbers of all sweeps, name → content, and gives a senten
 `paper_page.verdicts`.
 """
 
+import csv
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -19,6 +21,8 @@ Numbers = Mapping[str, Any]
 
 MODERATE: Final = 0.2
 """Greatest standard deviation of a walk over the mean of its cell that "varies only moderately" may mean."""
+PAIRS: Final = Path(__file__).parents[1] / "results" / "do_waves_matter.csv"
+"""Pairs of walks with and without a drag on waves."""
 LONG: Final = 150
 """Chains of so many links or more are those that the paper's start from rest underestimates."""
 
@@ -326,6 +330,26 @@ def spread(numbers: Numbers) -> Finding:
         f"of {found['both'].size} cells"
     )
     return Finding(text, share(greater, found["both"].size))
+
+
+def waves(numbers: Numbers) -> Finding:
+    """Waves influence the distance: from the pairs of walks of docs/do_waves_matter.py, not from this page's sweeps."""
+    with PAIRS.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    changes = {
+        name: [
+            (float(row["change_percent"]), float(row["change_error_percent"])) for row in rows if row["variant"] == name
+        ]
+        for name in ("drag 50/s on waves of up to 24 links", "drag 50/s")
+    }
+    short, every = changes.values()
+    known = sum(abs(change) > 1.96 * error for change, error in short)
+    ends = [percent(end([change for change, _ in found]) / 100) for found in (short, every) for end in (min, max)]
+    text = (
+        f"with a drag on fast waves of up to 24 links Δx changes by {ends[0]} to {ends[1]}, significantly in {known} of "
+        f"{len(short)} cells; on all, long swings of the loop included, by {ends[2]} to {ends[3]}"
+    )
+    return Finding(text, share(known, len(short)))
 
 
 def stated(text: str, verdict: Verdict) -> Check:
