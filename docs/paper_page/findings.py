@@ -346,8 +346,8 @@ def waves(numbers: Numbers) -> Finding:
     known = sum(abs(change) > 1.96 * error for change, error in short)
     ends = [percent(end([change for change, _ in found]) / 100) for found in (short, every) for end in (min, max)]
     text = (
-        f"with a drag on fast waves of up to 24 links Δx changes by {ends[0]} to {ends[1]}, significantly in {known} of "
-        f"{len(short)} cells; on all, long swings of the loop included, by {ends[2]} to {ends[3]}"
+        f"with a drag on fast waves of up to 24 links Δx changes by {ends[0]} to {ends[1]}, significantly in {known} "
+        f"of {len(short)} cells; on all, long swings of the loop included, by {ends[2]} to {ends[3]}"
     )
     return Finding(text, share(known, len(short)))
 
