@@ -242,8 +242,8 @@ def test_the_number_and_the_limit_are_said(tmp_path: Path) -> None:
     ("name", "value", "words"),
     [
         ("summary/dx", math.nan, "status at_rest and distance nan"),
-        ("series/time", np.linspace(0.8, 0.0, 801), ""),
-        ("series/time", np.linspace(0.0, 0.8, 800), ""),
+        ("series/time", np.linspace(0.8, 0.0, 801), "damaged or cut short"),
+        ("series/time", np.linspace(0.0, 0.8, 800), "damaged or cut short"),
         ("series/time", np.linspace(0.0, 0.8, 801, dtype=np.float32), "of another type"),
         ("summary/bounces", 3.5, "of another type"),
         ("frames/joints", np.zeros((41, 30)), "has the shape"),
