@@ -20,6 +20,7 @@ from paper_page.figures import figures
 from paper_page.page import page
 from paper_page.reduction import SWEEPS, reduced, text_of
 
+from warpchain.files import write_whole
 from warpchain.inputs.validation import InputError
 from warpchain.pictures.style import save_figure
 from warpchain.store.sweep_result import SweepResult, load
@@ -55,10 +56,10 @@ def make(folders: list[Path], out: Path) -> None:
     for path in (results, out / FIGURES / "figure.png"):
         path.parent.mkdir(parents=True, exist_ok=True)
     if folders:
-        results.write_text(text_of(numbers), encoding="utf-8")
+        write_whole(results, text_of(numbers))
     for name, figure in figures(numbers, sweeps):
         save_figure(figure, out / FIGURES / f"{name}.png")
-    (out / PAGE).write_text(page(json.loads(text_of(numbers))), encoding="utf-8")
+    write_whole(out / PAGE, page(json.loads(text_of(numbers))))
 
 
 def main(arguments: list[str] | None = None) -> int:

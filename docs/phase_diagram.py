@@ -13,6 +13,7 @@ import argparse
 import csv
 import json
 import sys
+import zipfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -87,14 +88,17 @@ def read_part(path: str) -> list[Part]:
     """The part in a folder or an .npz file, one for each block.
 
     Raises:
-        InputError: it has other axes than links and frequency, or lacks a needed column.
+        InputError: it has other axes than links and frequency, lacks a needed column, or is damaged.
         OSError: it cannot be read.
     """
     if Path(path).suffix != ".npz":
         result = warpchain.load(path)
         return [part_of(path, settings_of(result), block.axes, block.columns) for block in result.blocks.values()]
-    with np.load(path, allow_pickle=False) as file:
-        content = {name: file[name] for name in file.files}
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            content = {name: file[name] for name in file.files}
+    except (ValueError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path}: damaged, or no part ({error}); write it again with --keep") from None
     settings = str(content.pop("settings")) if "settings" in content else None
     axes = {name: content.pop(name) for name in ("links", "frequency") if name in content}
     return [part_of(path, settings, axes, content)]

@@ -124,6 +124,16 @@ def test_a_part_may_lack_columns(script: ModuleType, tmp_path: Path) -> None:
         script.read_part(str(tmp_path / "none.npz"))
 
 
+def test_a_damaged_part_is_refused(script: ModuleType, tmp_path: Path) -> None:
+    """Cut short, or another kind of file."""
+    path = tmp_path / "cut.npz"
+    np.savez(path, links=[60], frequency=[15.0])
+    for content in (path.read_bytes()[:-40], b"text"):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=r"cut\.npz: damaged, or no part"):
+            script.read_part(str(path))
+
+
 def test_a_cell_counts_its_endings(script: ModuleType) -> None:
     """Each walk at rest has one ending; means over those of an ending are of these alone."""
     columns = {

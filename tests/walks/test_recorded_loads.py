@@ -11,6 +11,8 @@ import pytest
 import warpchain
 from tests.support.made_walks import assert_same, make_walk
 from warpchain.inputs.validation import InputError
+from warpchain.walks.motion import Keep
+from warpchain.walks.scheduler import run_setups
 from warpchain.walks.walk_result import WalkResult
 
 FLIGHT: dict[str, Any] = {"preset": "soft", "start": "ellipse", "links": 24, "clearance": 0.03, "walk_limit": 0.04}
@@ -164,3 +166,11 @@ def test_loads_fit_the_frames() -> None:
     for name, shape in (("frame_forces", (40, 30, 2)), ("frame_forces", (41, 29, 2)), ("frame_moments", (41, 30))):
         with pytest.raises(ValueError, match=r"frame_(forces|moments): its shape is .*; give an array of shape"):
             make_walk(**{name: np.zeros(shape)})
+
+
+def test_walks_that_run_together_have_one_frame_interval() -> None:
+    """Another one would be taken for all without a word."""
+    setup = make_walk().setup
+    keeps = [Keep(frame_every=1, frame_interval=interval) for interval in (1e-4, 2e-4)]
+    with pytest.raises(ValueError, match=r"keeps: frame intervals \[0\.0001, 0\.0002\] s; walks that run together"):
+        next(run_setups([setup, setup], keeps=keeps))

@@ -102,7 +102,10 @@ def _batches(
     slots = slots or 1
     worlds = -(-slots // BATCHES_PER_GPU) if on_gpu else slots
     kept: dict[str, Any] = {"keeps_samples": samples, "frame_every": frame_every, "keeps_loads": loads, "tilts": tilts}
-    kept["frame_interval"] = max((keep.frame_interval for keep in keeps), default=0.0)
+    intervals = {keep.frame_interval for keep in keeps if keep.frame_interval > 0}
+    if len(intervals) > 1:
+        raise ValueError(f"keeps: frame intervals {sorted(intervals)} s; walks that run together have one")
+    kept["frame_interval"] = max(intervals, default=0.0)
     return [
         Batch(min(worlds, slots - first), longest, options, threads=threads, **kept)
         for first in range(0, slots, worlds)
