@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from page_tables import with_tables
 
 from warpchain.engine.batch import Batch
 from warpchain.files import write_whole
@@ -36,7 +37,6 @@ SEED = 20180607
 FOLDER = Path(__file__).parent
 RESULTS = FOLDER / "results" / "do_waves_matter.csv"
 PAGE = FOLDER / "waves.md"
-MARKERS = "<!-- matter -->", "<!-- end of matter -->"
 
 
 @dataclass(frozen=True)
@@ -234,12 +234,6 @@ def text(rows: Sequence[Mapping[str, str]]) -> str:
     return "\n".join(lines)
 
 
-def with_table(page: str, table: str) -> str:
-    """A page with this table between its markers."""
-    before, rest = page.split(MARKERS[0])
-    return f"{before}{MARKERS[0]}\n\n{table}\n\n{MARKERS[1]}{rest.split(MARKERS[1])[1]}"
-
-
 def main() -> None:
     """Walk if a device is given; then write the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
@@ -249,12 +243,13 @@ def main() -> None:
     if given.samples and not given.device:
         parser.error("--samples: has no effect without --device; give one")
     if given.device:
-        rows = table(CELLS, given.samples or 100, walk_all(CELLS, given.samples or 100, given.device))
+        samples = given.samples or 100
+        rows = table(CELLS, samples, walk_all(CELLS, samples, given.device))
         lines = [",".join(rows[0]), *(",".join(map(str, row.values())) for row in rows)]
         write_whole(RESULTS, "\n".join(lines) + "\n")
     found = text(read(RESULTS))
     print(found)
-    write_whole(PAGE, with_table(PAGE.read_text(encoding="utf-8"), found))
+    write_whole(PAGE, with_tables(PAGE.read_text(encoding="utf-8"), {"matter": found}))
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ import numpy as np
 import phase_figures
 import phase_scaling
 from numpy.typing import NDArray
+from page_tables import with_tables
 
 import warpchain
 from warpchain.files import replacing, write_whole
@@ -327,21 +328,6 @@ def span(values: Array) -> str:
     """The least and the greatest of some values."""
     least, greatest = (f"{value:g}" for value in (values.min(), values.max()))
     return least if least == greatest else f"{least} to {greatest}"
-
-
-def with_tables(text: str, tables: Mapping[str, str]) -> str:
-    """A page with these tables between its markers ``<!-- NAME -->`` and ``<!-- end of NAME -->``.
-
-    Raises:
-        ValueError: the page lacks a marker.
-    """
-    for name, table in tables.items():
-        begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
-        if text.count(begin) != 1 or text.count(end) != 1:
-            raise ValueError(f"{PAGE.name}: needs {begin} and {end} once each")
-        before, rest = text.split(begin)
-        text = f"{before}{begin}\n\n{table}\n\n{end}{rest.split(end)[1]}"
-    return text
 
 
 TABLES: Final[Mapping[str, Callable[[Mapping[str, Array]], str]]] = {

@@ -23,7 +23,8 @@ def experiment() -> Iterator[ModuleType]:
 def test_the_page_has_the_table_of_the_committed_numbers(experiment: ModuleType) -> None:
     """Both come from one command."""
     page = experiment.PAGE.read_text(encoding="utf-8")
-    assert experiment.with_table(page, experiment.text(experiment.read(experiment.RESULTS))) == page
+    table = experiment.text(experiment.read(experiment.RESULTS))
+    assert experiment.with_tables(page, {"matter": table}) == page
 
 
 def test_walks_of_a_sample_share_their_release_and_the_drag_takes_their_waves(experiment: ModuleType) -> None:
