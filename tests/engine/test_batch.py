@@ -1,5 +1,6 @@
 """Batches side by side, their memory, and the copies of their arrays on the host; what of it needs no GPU."""
 
+import itertools
 import threading
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -9,19 +10,29 @@ import numpy as np
 import pytest
 import warp as wp
 
-from tests.run.test_sweep_run import brief_setup, outcomes
+from tests.run.test_sweep_run import brief_setup, outcome, outcomes
 from warpchain.cli.terminal import sweep_progress_text
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import CAPACITY_FRAMES, CAPACITY_SAMPLES, start_device, world_bytes
-from warpchain.engine.kernel_choice import block_threads, features_of, kernels_of, shared_threads
+from warpchain.engine.kernel_choice import (
+    block_threads,
+    features_of,
+    kernels_of,
+    most_registers,
+    resident_blocks,
+    shared_threads,
+)
 from warpchain.engine.mirror import Mirror
 from warpchain.inputs.options import Options
+from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.sweep_run import prepare, sweep
 from warpchain.sweeps.plan import Sweep, load_sweep
 from warpchain.walks import scheduler
+from warpchain.walks.motion import Keep
+from warpchain.walks.walk_phases import WalkRun
 
 FEW = {"version": 1, "name": "few", "seed": 1, "preset": "soft", "samples": 2, "grid": {"links": [60, 150]}}
 """Content of a sweep of two lengths."""
@@ -53,9 +64,9 @@ class SlowBatch(Batch):
         return self.asked % 3 == 0
 
 
-def several_batches(options: Options, links: Sequence[int], *_: object) -> list[Batch]:
+def several_batches(options: Options, links: Sequence[int], *_: object) -> tuple[list[Batch], int]:
     """As many as a GPU gets, one larger than the others."""
-    return [SlowBatch(worlds, max(links), options) for worlds in (1, 3, 1, 1)]
+    return [SlowBatch(worlds, max(links), options) for worlds in (1, 3, 1, 1)], 6
 
 
 def test_walks_do_not_depend_on_the_batches_they_are_spread_over(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -68,11 +79,54 @@ def test_walks_do_not_depend_on_the_batches_they_are_spread_over(monkeypatch: py
     assert outcomes(setups) == alone
 
 
+def test_groups_follow_one_another_without_a_gap(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The walks of the next group begin when the first of the last ones of a group is over, and not before."""
+    tolerances = (1e-6, 2e-6, 5e-6)  # walks with other options are another group
+    setups = [brief_setup(seed, tolerance=tolerance) for tolerance in tolerances for seed in range(7)]
+    alone = outcomes(setups, slots=1)
+    events: list[tuple[str, float]] = []
+
+    class NotedRun(WalkRun):
+        """A run that notes when it begins."""
+
+        def __init__(self, batch: Batch, world: int, setup: Setup, keep: Keep) -> None:
+            """As its parent does."""
+            super().__init__(batch, world, setup, keep)
+            events.append(("begins", setup.options.tolerance))
+
+    monkeypatch.setattr(scheduler, "_batches", several_batches)  # six at a time
+    monkeypatch.setattr(scheduler, "WalkRun", NotedRun)
+    found = {}
+    for place, run in scheduler.run_setups(setups):
+        found[place] = outcome(run)
+        events.append(("ends", run.setup.options.tolerance))
+    assert [found[place] for place in range(len(setups))] == alone
+    for group, following in itertools.pairwise(tolerances):
+        before = events[: events.index(("begins", following))]
+        assert before.count(("begins", group)) == 7, "none of the former group waits any more"
+        assert 2 <= before.count(("ends", group)) < 7, "some of it are over, some are under way"
+
+
+@pytest.mark.parametrize("threads", [32, 64, 96, 128, 160, 192, 224, 256, 512, 1024])
+def test_resident_blocks_are_those_whose_registers_fit(threads: int) -> None:
+    """A multiprocessor has 65,536 registers; one block more would not fit, and one always does."""
+    blocks, registers = resident_blocks(threads), most_registers(threads) * threads
+    assert blocks >= 1
+    assert blocks == 1 or blocks * registers <= 65536
+    assert (blocks + 1) * registers > 65536
+
+
 def test_a_stop_ends_all_batches(monkeypatch: pytest.MonkeyPatch) -> None:
     """Once stopped, no further walk is begun, and every launch has been waited for."""
     made: list[Batch] = []
     finished: list[Batch] = []
-    monkeypatch.setattr(scheduler, "_batches", lambda *how: made.extend(several_batches(*how)) or made)
+
+    def noted_batches(*how: Any) -> tuple[list[Batch], int]:
+        batches, capacity = several_batches(*how)
+        made.extend(batches)
+        return batches, capacity
+
+    monkeypatch.setattr(scheduler, "_batches", noted_batches)
     monkeypatch.setattr(SlowBatch, "finish", lambda batch: finished.append(batch))
     stop = threading.Event()
     over = []
@@ -80,7 +134,8 @@ def test_a_stop_ends_all_batches(monkeypatch: pytest.MonkeyPatch) -> None:
         over.append(place)
         stop.set()
     assert 0 < len(over) < 10
-    assert finished[-4:] == made
+    assert len(made) == 4
+    assert set(finished[-4:]) == set(made)
 
 
 @pytest.mark.parametrize(("keeps_samples", "frame_every"), [(False, None), (True, 2)])

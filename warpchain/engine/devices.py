@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import warp as wp
 
-from warpchain.engine.kernel_choice import block_threads
+from warpchain.engine.kernel_choice import block_threads, resident_blocks
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError
@@ -21,7 +21,11 @@ from warpchain.kernels.gpu import functions as gpu_functions
 from warpchain.version import package_versions
 
 CONNECTIONS = "32"  # queues between host and GPU; with fewer than streams, streams wait for one another
-BLOCKS_OF_MULTIPROCESSOR = 32  # most that an NVIDIA multiprocessor holds
+WORLDS_OF_BLOCK = 2
+"""Chains under way for each block that a GPU holds: while some are with the host, the others fill it.
+
+More would only make every walk last longer, and so the time in which the GPU runs empty after the last has begun.
+"""
 CAPACITY_SAMPLES = 512
 """Samples of a chain that a device can hold between two launches, if the time series is kept."""
 CAPACITY_FRAMES = 64
@@ -127,12 +131,14 @@ def most_worlds(
     keeps_frames: bool,
     keeps_loads: bool = False,
     tilts: bool = False,
+    threads: int | None = None,
 ) -> int:
-    """Chains that a GPU should carry on together: as many as can reside on it and fit into half of the free memory.
+    """Chains that a GPU should carry on together: enough to fill it that fit into half of the free memory.
 
     The other half is left to others, such as batches of other threads.
     """
     device = start_device(options.device)
     samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * keeps_frames
     fitting = int(device.free_memory) // 2 // world_bytes(longest, options, samples, frames, device, keeps_loads, tilts)
-    return max(1, min(BLOCKS_OF_MULTIPROCESSOR * int(device.sm_count), fitting))
+    filling = WORLDS_OF_BLOCK * resident_blocks(threads or block_threads(longest)) * int(device.sm_count)
+    return max(1, min(filling, fitting))

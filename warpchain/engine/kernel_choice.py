@@ -12,17 +12,19 @@ from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.loop import make_advance_block
 from warpchain.kernels.methods.method import find_method
 
+WARP = 32
+"""Threads that a GPU carries on together."""
+SCHEDULERS, SCHEDULER_REGISTERS = 4, 16384
+"""Of a multiprocessor, and registers of each."""
 REGISTERS = 168
 """Most registers of a thread."""
 FEWER_REGISTERS = {160: 128, 224: 128, 256: 128}
 """Most registers, by threads of a block, where fewer let another block onto a multiprocessor.
 
-A multiprocessor has four schedulers with 16384 registers each, so that a block's number of warps of 32 threads and the
-registers decide how many blocks it holds. Measured on an H200 with slightly older kernels, 4000 chains in flight, ns
-per attempt and chain, with 128 and 168: 60 links 12.0, 6.2, 5.5 and 11.5, 5.5, 4.9 (rkf78, dp5, os32); 150 links 15.5,
-13.3 and 16.8, 15.4 (dp5, os32). Without a bound, few chains run up to 15 % faster and many slower. No bit of a walk
-depends on it: the compiler fuses the same products and sums (`tests/kernels/gpu/test_on_gpu.py`, walks in blocks of
-their own and of 192 threads).
+Measured on an H200 with slightly older kernels, 4000 chains in flight, ns per attempt and chain, with 128 and 168: 60
+links 12.0, 6.2, 5.5 and 11.5, 5.5, 4.9 (rkf78, dp5, os32); 150 links 15.5, 13.3 and 16.8, 15.4 (dp5, os32). Without a
+bound, few chains run up to 15 % faster and many slower. No bit of a walk depends on it: the compiler fuses the same
+products and sums (`tests/kernels/gpu/test_on_gpu.py`, walks in blocks of their own and of 192 threads).
 """
 SHARED_THREADS = 192
 """Most threads of a block that chains of several lengths share."""
@@ -30,14 +32,25 @@ SHARED_WALKS = 2000
 """Most walks of a sweep that share such blocks; with 2016 it made no difference."""
 
 
+def most_registers(threads: int) -> int:
+    """Most registers of each thread in blocks of this many."""
+    return FEWER_REGISTERS.get(threads, REGISTERS)
+
+
 def block_kernel(features: Features, threads: int) -> wp.Kernel:
     """The GPU kernel for blocks of this many threads."""
-    return make_advance_block(features, threads, FEWER_REGISTERS.get(threads, REGISTERS))
+    return make_advance_block(features, threads, most_registers(threads))
 
 
 def block_threads(links: int) -> int:
-    """Threads of a GPU's block that carries a chain: one per link, rounded up to whole warps of 32."""
-    return -(-links // 32) * 32
+    """Threads of a GPU's block that carries a chain: one per link, rounded up to whole warps."""
+    return -(-links // WARP) * WARP
+
+
+def resident_blocks(threads: int) -> int:
+    """Blocks of this many threads that a multiprocessor carries on at a time: its registers decide."""
+    warps = SCHEDULERS * (SCHEDULER_REGISTERS // (most_registers(threads) * WARP))
+    return max(1, warps // (threads // WARP))
 
 
 def shared_threads(method: str, links: Iterable[int], walks: int) -> int | None:

@@ -39,7 +39,7 @@ from warpchain.walks.scheduler import compile_kernels, run_setups
 
 SHARD_WALKS = 256
 """Most walks in a shard."""
-GPU_TASK_WALKS = 65536
+GPU_TASK_WALKS = 262144
 """Upper bound on the walks of a GPU's task, about; the GPU idles while the last walks finish."""
 POLL = 1.0
 """Time [s] between two checks for shards that tasks under way have written."""

@@ -2,8 +2,9 @@
 
 import threading
 import time
-from collections import defaultdict
+from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from warpchain.engine.batch import Batch
@@ -61,22 +62,28 @@ def run_setups(
         stop: When set, the walks are abandoned after the launch that is under way.
         watch: For progress. With it, each kernel is loaded when it is first needed, and ``watch`` is called before.
     """
-    buckets: dict[tuple[Options, int], list[int]] = defaultdict(list)
+    alike: dict[tuple[Options, int, int], list[int]] = defaultdict(list)
     for place, setup in enumerate(setups):
-        buckets[setup.options, layout.padded_width(setup.scene.links)].append(place)
+        on_gpu, links = setup.options.device.startswith("cuda"), setup.scene.links
+        size = (threads or block_threads(links)) if on_gpu else 1
+        alike[setup.options, layout.padded_width(links), size].append(place)
 
     def begin(place: int, batch: Batch, world: int) -> WalkRun:
         setup = setups[place] if draw is None else draw(place)
         return WalkRun(batch, world, setup, NOTHING if keeps is None else keeps[place])
 
-    for (options, _), places in buckets.items():
-        # long chains take longest: they begin first, so that the run does not wait for them in the end
+    def group(places: list[int]) -> Group:
         places.sort(key=lambda place: -setups[place].scene.links)
         links = [setups[place].scene.links for place in places]
         wanted = [] if keeps is None else [keeps[place] for place in places]
         tilts = any(setups[place].scene.plane == "tilting" for place in places)
-        batches = _batches(options, links, wanted, slots, threads, tilts)
-        yield from _run_batches(batches, iter(places), begin, stop, watch)
+        waiting = deque(places)
+        batches, capacity = _batches(setups[places[0]].options, links, wanted, slots, threads, tilts)
+        return Group(waiting, [BatchRun(batch, waiting, begin, watch) for batch in batches], capacity)
+
+    # long chains take longest: they begin first, so that the run does not wait for them in the end
+    longest_first = sorted(alike.items(), key=lambda item: item[0][1:], reverse=True)
+    yield from _run_groups((group(places) for _, places in longest_first), stop)
 
 
 def _batches(
@@ -86,8 +93,11 @@ def _batches(
     slots: int | None,
     threads: int | None,
     tilts: bool,
-) -> list[Batch]:
-    """Batches for walks: on a CPU one, on a GPU several, with as many worlds in all as are of use and fit."""
+) -> tuple[list[Batch], int]:
+    """Batches for walks, and how many chains would fill the device.
+
+    On a CPU it is one batch, on a GPU several, with as many worlds in all as are of use and fit.
+    """
     longest, on_gpu = max(links), options.device.startswith("cuda")
     # Every batch keeps what any walk wants, although most may want nothing: separate batches would each wait for their
     # own slowest walk.
@@ -96,20 +106,28 @@ def _batches(
     if slots is None and on_gpu:
         frames = frame_every is not None
         slots = most_worlds(
-            longest, options, keeps_samples=samples, keeps_frames=frames, keeps_loads=loads, tilts=tilts
+            longest,
+            options,
+            keeps_samples=samples,
+            keeps_frames=frames,
+            keeps_loads=loads,
+            tilts=tilts,
+            threads=threads,
         )
+    capacity = slots = slots or 1
+    if on_gpu:
         slots = min(slots, len(links))
-    slots = slots or 1
     worlds = -(-slots // BATCHES_PER_GPU) if on_gpu else slots
     kept: dict[str, Any] = {"keeps_samples": samples, "frame_every": frame_every, "keeps_loads": loads, "tilts": tilts}
     intervals = {keep.frame_interval for keep in keeps if keep.frame_interval > 0}
     if len(intervals) > 1:
         raise ValueError(f"keeps: frame intervals {sorted(intervals)} s; walks that run together have one")
     kept["frame_interval"] = max(intervals, default=0.0)
-    return [
+    batches = [
         Batch(min(worlds, slots - first), longest, options, threads=threads, **kept)
         for first in range(0, slots, worlds)
     ]
+    return batches, capacity
 
 
 def compile_kernels(setups: Iterable[Setup], threads: int | None = None) -> None:
@@ -134,8 +152,8 @@ def compile_kernels(setups: Iterable[Setup], threads: int | None = None) -> None
 class BatchRun:
     """A batch and the walks on its worlds."""
 
-    def __init__(self, batch: Batch, waiting: Iterator[int], begin: Begin, watch: Watch | None) -> None:
-        """Prepare to run waiting walks, given by their places."""
+    def __init__(self, batch: Batch, waiting: deque[int], begin: Begin, watch: Watch | None) -> None:
+        """Prepare to run waiting walks, given by their places; those that have begun are taken away."""
         self.batch = batch
         self._waiting, self._begin, self._watch = waiting, begin, watch
         self._loaded: set[Features] = set()
@@ -143,10 +161,15 @@ class BatchRun:
         self._running: dict[int, tuple[int, WalkRun]] = {}
         self._features: dict[int, Features] = {}
 
+    @property
+    def running(self) -> int:
+        """Number of walks under way."""
+        return len(self._running)
+
     def start(self) -> bool:
         """Give waiting walks the free worlds and begin a launch; False if there is nothing to carry on."""
-        while self._free and (place := next(self._waiting, None)) is not None:
-            world = self._free.pop()
+        while self._free and self._waiting:
+            place, world = self._waiting.popleft(), self._free.pop()
             run = self._begin(place, self.batch, world)
             self._running[world] = place, run
             self._features[world] = run.features
@@ -183,18 +206,41 @@ class BatchRun:
             self._free.append(world)
 
 
-def _run_batches(
-    batches: Sequence[Batch],
-    waiting: Iterator[int],
-    begin: Begin,
-    stop: threading.Event | None,
-    watch: Watch | None,
-) -> Iterator[tuple[int, WalkRun]]:
-    """Run the walks at these places, which share options and the width of their arrays."""
-    runs = [BatchRun(batch, waiting, begin, watch) for batch in batches]
+@dataclass(frozen=True)
+class Group:
+    """Walks that run on the same kernels.
+
+    Attributes:
+        waiting: Places of the walks that have not begun.
+        runs: What runs them.
+        capacity: Number of such walks that would fill the device.
+    """
+
+    waiting: deque[int]
+    runs: list[BatchRun]
+    capacity: int
+
+    @property
+    def load(self) -> float:
+        """Share of the device that its walks fill."""
+        return sum(run.running for run in self.runs) / self.capacity
+
+
+def _run_groups(groups: Iterator[Group], stop: threading.Event | None) -> Iterator[tuple[int, WalkRun]]:
+    """Run groups one after the other; when the last walks of some leave the device empty, the next one joins in."""
+    begun: list[Group] = []
+    under_way: list[BatchRun] = []
     try:
-        under_way = [run for run in runs if run.start()]
-        while under_way and not (stop is not None and stop.is_set()):
+        while not (stop is not None and stop.is_set()):
+            begun = [group for group in begun if group.waiting or group.load > 0]
+            while not (begun and begun[-1].waiting) and sum(group.load for group in begun) < 1:
+                group = next(groups, None)
+                if group is None:
+                    break
+                begun.append(group)
+                under_way += [run for run in group.runs if run.start()]
+            if not under_way:
+                return
             ready = next((run for run in under_way if run.batch.is_done()), None)
             if ready is None:
                 time.sleep(NAP)
@@ -204,5 +250,5 @@ def _run_batches(
             if ready.start():
                 under_way.append(ready)
     finally:
-        for run in runs:
+        for run in under_way:
             run.batch.finish()
