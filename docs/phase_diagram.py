@@ -240,21 +240,26 @@ def _sd(values: Array) -> float:
     return float(known.std(ddof=1)) if len(known) > 1 else float("nan")
 
 
-def write_csv(rows: Sequence[Mapping[str, float]], path: Path) -> None:
+def write_csv(rows: Sequence[Mapping[str, float | str]], path: Path) -> None:
     """Write the rows, whole or not at all; numbers that are not whole have six digits."""
     names = list(rows[0])
     lines = [",".join(names)]
     for row in rows:
         values = (row[name] for name in names)
-        lines.append(",".join(str(value) if isinstance(value, int) else f"{value:.6g}" for value in values))
+        lines.append(",".join(f"{value:.6g}" if isinstance(value, float) else str(value) for value in values))
     path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, "\n".join(lines) + "\n")
 
 
+def read_rows(path: Path) -> list[dict[str, str]]:
+    """The rows of a file, as texts by column."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
 def read_csv(path: Path) -> dict[str, Array]:
     """The columns of the file, shape (cells,) each."""
-    with path.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = read_rows(path)
     return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
 
 

@@ -31,6 +31,11 @@ PLANAR = [name for name in Parameters.model_fields if name != "half_width"]
         ("tolerance", {"main": (2, 2, 2, 12)}),
         ("montecarlo", {"main": (7, 8, 1800)}),
         ("phase_diagram", {"main": (22, 20, 100)}),
+        (
+            "scaling",
+            {"sprocket_radius": (4, 4, 3, 16), "gravity": (4, 4, 3, 16)}
+            | dict.fromkeys(("links_of_9_mm", "links_of_18_mm", "links_of_25_mm"), (4, 3, 16)),
+        ),
         ("kink", {"main": (5, 6, 1)}),
         (
             "steadiness",
@@ -82,7 +87,7 @@ def test_every_shipped_sweep_is_tested() -> None:
     names = {path.stem for path in SWEEPS.iterdir()}
     assert names == {
         *("quickstart", "figure6", "tolerance", "montecarlo", "sensitivity", "kink", "tilt"),
-        *("steadiness", "unsoftened_hold", "softened_drive", "floor_friction", "phase_diagram"),
+        *("steadiness", "unsoftened_hold", "softened_drive", "floor_friction", "phase_diagram", "scaling"),
         *("paper_claims", "paper_joints", "paper_tolerance", "paper_shapes"),
     }
 
