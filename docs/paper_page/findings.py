@@ -280,6 +280,13 @@ def collapse(numbers: Numbers) -> Finding:
     return Finding(f"{bounced.text}; Δx at {', '.join(distances)}", bounced.verdict)
 
 
+def lost_on_floor(numbers: Numbers) -> Finding:
+    """Less friction of the floor takes less energy in collisions with it."""
+    found = numbers["paper_claims"]["lost_on_floor"]
+    steps = [(each["value"], effect_of(each)) for each in found["values"]]
+    return _monotonic(numbers, "floor_friction", steps, 1, "energy lost in collisions with the floor")
+
+
 def _monotonic(
     numbers: Numbers, name: str, steps: Sequence[tuple[float, Effect]], slope: int, what: str = "Δx"
 ) -> Finding:

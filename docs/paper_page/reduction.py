@@ -73,6 +73,10 @@ def reduced(result: SweepResult) -> Numbers:
         content["collapse"] = effects(
             bounces_until_collapse(block), block, "link_length", _reference(result, block, "link_length")
         )
+    if "floor_friction" in result.blocks:
+        block, name = result.blocks["floor_friction"], "floor_friction"
+        lost = at_rest(block, "loss_floor")
+        content["lost_on_floor"] = effects(lost, block, name, _reference(result, block, name))
     if "gravity" in result.blocks:
         content["spread"] = spreads(result.blocks)
     if result.name == "paper_tolerance":

@@ -238,7 +238,9 @@ def _run_groups(groups: Iterator[Group], stop: threading.Event | None) -> Iterat
                 if group is None:
                     break
                 begun.append(group)
-                under_way += [run for run in group.runs if run.start()]
+                for run in group.runs:
+                    if run.start():
+                        under_way.append(run)
             if not under_way:
                 return
             ready = next((run for run in under_way if run.batch.is_done()), None)
