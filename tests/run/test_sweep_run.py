@@ -1,6 +1,7 @@
 """Sweeps as they are run: on slots, threads, processes and a Dask cluster, killed and resumed."""
 
 import concurrent.futures
+import gc
 import multiprocessing
 import os
 import random
@@ -291,13 +292,15 @@ def test_a_dask_client_is_an_executor(tmp_path, uninterrupted):
 
 @pytest.mark.parametrize("address", ("tls://127.0.0.1:1", "ucx://127.0.0.1:1", "inproc://1", "http://a:1"))
 def test_a_scheduler_that_cannot_be_reached_is_refused(tmp_path, capsys, address):
-    """Whatever class of error Dask raises: one line, status 2, no folder."""
-    pytest.importorskip("distributed")
+    """Whatever class of error Dask raises: one line, status 2, no folder, and no client that closes itself later."""
+    distributed = pytest.importorskip("distributed")
     with pytest.raises(SystemExit) as caught:
         main(["sweep", "quickstart", "-o", str(tmp_path / "sweep"), "--scheduler", address])
     said = capsys.readouterr().err
     assert caught.value.code == 2 and said.startswith(f"error: --scheduler: '{address}': ") and said.count("\n") == 1
     assert not (tmp_path / "sweep").exists()
+    clients = [each for each in gc.get_objects() if isinstance(each, distributed.Client)]
+    assert clients and all(client.status == "closed" for client in clients)
 
 
 @pytest.mark.slow

@@ -314,9 +314,14 @@ def _dask_client(address: str) -> Any:
         from distributed import Client
     except ImportError:
         raise InputError("--scheduler: Dask is not installed; pip install 'warpchain[dask]'") from None
+    # A client that does not connect has to be closed. Left to itself it closes when it is collected as garbage; if that
+    # is while this thread starts another one, it waits for ever.
+    client = Client.__new__(Client)
     try:
-        return Client(address, timeout=10)  # type: ignore[no-untyped-call]
+        client.__init__(address, timeout=10)  # type: ignore[misc]
+        return client
     except Exception as error:  # of any class, by protocol: tls and ucx without their settings give a TypeError
+        client.close()  # type: ignore[no-untyped-call]
         problem = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"--scheduler: {shown(address)}: {problem}; give the address of a running scheduler") from None
 
