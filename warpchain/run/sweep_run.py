@@ -23,7 +23,6 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import warn_of_units
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, checked_path, plain, shown, validated
-from warpchain.run.gpu_workers import GpuWorkers
 from warpchain.run.lost_workers import losses_named
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text, progress_bar
 from warpchain.run.sweep_keywords import sweep_of_keywords
@@ -219,18 +218,13 @@ def _run_in_folder(
         progress = SweepProgress(walks=planned.walk_count, done=before, before=before)
         store.log(f"{len(missing)} shards to do, {before} of {planned.walk_count} walks done")
         if missing:
-            if executor is None or isinstance(executor, GpuWorkers):
-                progress.compiling = True
-                report(progress)
-                if executor is None:
-                    prepare(planned)
-                else:
-                    with losses_named():
-                        executor.in_each(prepare, planned)
-                progress.compiling = False
             if executor is not None:
                 _run(executor, None, planned, store, missing, at_once, progress, report)
             else:
+                progress.compiling = True
+                report(progress)
+                prepare(planned)
+                progress.compiling = False
                 with _threads(at_once) as (threads, stop):
                     _run(threads, stop, planned, store, missing, at_once, progress, report)
         counts = counts_text(progress) or "nothing to do"
