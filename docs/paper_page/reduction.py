@@ -74,9 +74,10 @@ def reduced(result: SweepResult) -> Numbers:
             bounces_until_collapse(block), block, "link_length", _reference(result, block, "link_length")
         )
     if "floor_friction" in result.blocks:
-        block, name = result.blocks["floor_friction"], "floor_friction"
-        lost = at_rest(block, "loss_floor")
-        content["lost_on_floor"] = effects(lost, block, name, _reference(result, block, name))
+        block = result.blocks["floor_friction"]
+        content["lost_on_floor"] = effects(
+            at_rest(block, "loss_floor"), block, "floor_friction", _reference(result, block, "floor_friction")
+        )
     if "gravity" in result.blocks:
         content["spread"] = spreads(result.blocks)
     if result.name == "paper_tolerance":

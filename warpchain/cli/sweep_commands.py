@@ -314,8 +314,8 @@ def _dask_client(address: str) -> Any:
         from distributed import Client
     except ImportError:
         raise InputError("--scheduler: Dask is not installed; pip install 'warpchain[dask]'") from None
-    # A client that does not connect has to be closed. Left to itself it closes when it is collected as garbage; if that
-    # is while this thread starts another one, it waits for ever.
+    # A client that does not connect has to be closed. Left alone, it closes itself when it is collected as garbage. If
+    # that happens while this thread starts another client, the thread waits for ever.
     client = Client.__new__(Client)
     try:
         client.__init__(address, timeout=10)  # type: ignore[misc]

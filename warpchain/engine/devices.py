@@ -24,7 +24,7 @@ CONNECTIONS = "32"  # queues between host and GPU; with fewer than streams, stre
 WORLDS_OF_BLOCK = 2
 """Chains under way for each block that a GPU holds: while some are with the host, the others fill it.
 
-More would only make every walk last longer, and so the time in which the GPU runs empty after the last has begun.
+With more, every walk takes longer, and so does the end of a run, when the GPU empties.
 """
 CAPACITY_SAMPLES = 512
 """Samples of a chain that a device can hold between two launches, if the time series is kept."""

@@ -227,7 +227,7 @@ class Group:
 
 
 def _run_groups(groups: Iterator[Group], stop: threading.Event | None) -> Iterator[tuple[int, WalkRun]]:
-    """Run groups one after the other; when the last walks of some leave the device empty, the next one joins in."""
+    """Run groups one after the other; when the last walks of a group no longer fill the device, the next joins in."""
     begun: list[Group] = []
     under_way: list[BatchRun] = []
     try:
