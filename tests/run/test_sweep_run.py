@@ -8,6 +8,7 @@ import random
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -17,6 +18,7 @@ import yaml
 
 import warpchain
 import warpchain.run.sweep_run as runner
+import warpchain.walks.scheduler as scheduler
 from warpchain.cli.main import main
 from warpchain.engine.processors import processors
 from warpchain.inputs.setup import Setup
@@ -375,6 +377,52 @@ def test_tasks_of_gpus_are_alike(monkeypatch: pytest.MonkeyPatch) -> None:
         assert max(sum(map(len, task)) for task in tasks) <= most + 8
         means = [np.mean([planned.planned(shard.start).setup.scene.links for shard in task]) for task in tasks]
         assert workers > 4 or np.ptp(means) <= 12
+
+
+@pytest.mark.parametrize(("device", "at_most"), [("cuda", 1), ("cpu", 2)])
+def test_threads_take_turns_on_a_gpu(monkeypatch: pytest.MonkeyPatch, device: str, at_most: int) -> None:
+    """Tasks of two threads run at the same time on a CPU, one after the other on a GPU."""
+    planned = load_sweep(TINY | {"options": {"method": "dp5", "device": device}})
+    inside, most = [], []
+
+    def run_walks(*given: object) -> list[str]:
+        inside.append(given)
+        time.sleep(0.2)
+        most.append(len(inside))
+        inside.pop()
+        return []
+
+    monkeypatch.setattr(runner, "known_manifest", lambda directory: Manifest.of(planned, 8))
+    monkeypatch.setattr(runner, "compile_kernels", lambda setups, threads: None)
+    monkeypatch.setattr(runner, "_run_shards", run_walks)
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        tasks = [pool.submit(run_shards, planned, "", "", [range(first, first + 8)]) for first in (0, 8)]
+        assert [task.result() for task in tasks] == [[], []]
+    assert max(most) == at_most and len(most) == 2
+
+
+def test_a_task_frees_what_it_made_on_a_device(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """When a task ends, so do its batches, in its thread and without garbage collection: their turn on a GPU is over."""
+    made, freed = [], []
+
+    class Watched(scheduler.Batch):
+        def __init__(self, *given: object, **named: object) -> None:
+            made.append(threading.get_ident())
+            super().__init__(*given, **named)
+
+        def __del__(self) -> None:
+            freed.append(threading.get_ident())
+
+    monkeypatch.setattr(scheduler, "Batch", Watched)
+    sweep(TINY, tmp_path / "sweep", workers=1)
+    planned = load_sweep(TINY)
+    gc.disable()
+    try:
+        shards = read_manifest(tmp_path / "sweep").shards
+        run_shards(planned, planned.digest(), str(tmp_path / "sweep"), [shards[0], shards[-1]])
+        assert made == freed and made.count(threading.get_ident()) > 0
+    finally:
+        gc.enable()
 
 
 def test_processors_are_those_of_this_process(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,8 @@ import os
 import platform
 import sys
 import tempfile
-from collections.abc import Iterator
+import threading
+from collections.abc import Iterable, Iterator
 
 import warp as wp
 
@@ -30,6 +31,7 @@ CAPACITY_SAMPLES = 512
 """Samples of a chain that a device can hold between two launches, if the time series is kept."""
 CAPACITY_FRAMES = 64
 """Frames of a chain that a device can hold between two launches, if frames are kept."""
+_gpu_lock = threading.RLock()
 
 
 @functools.cache
@@ -59,6 +61,17 @@ def gpu_count() -> int:
     """
     start_device("cuda")
     return int(wp.get_cuda_device_count())
+
+
+@contextlib.contextmanager
+def gpu_turn(devices: Iterable[str]) -> Iterator[None]:
+    """Keep other threads of this process off its GPUs, if one of these devices is one; CPUs need no turns.
+
+    Warp's CUDA runtime has no locks (its issue 1491): a process in which two threads make and free streams and arrays
+    may crash. So whatever is on a GPU must be made and freed within a turn.
+    """
+    with _gpu_lock if any(device.startswith("cuda") for device in devices) else contextlib.nullcontext():
+        yield
 
 
 @contextlib.contextmanager

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.engine.batch import Batch
+from warpchain.engine.devices import gpu_turn
 from warpchain.engine.tallies import LOST
 from warpchain.inputs.keywords import Method, Number, OtherOptions, Preset, Truth
 from warpchain.inputs.options import Options
@@ -94,6 +95,14 @@ def simulate(
             f"times: {len(instants)} instants of {len(start)} links are too many; "
             f"give at most {MOST_PLACES // len(start)}"
         )
+    with gpu_turn([options.device]):
+        return _follow(options, chain, start, rates, instants, end, bool(floor))
+
+
+def _follow(
+    options: Options, chain: Parameters, start: Array, rates: Array, instants: Array, end: float, floor: bool
+) -> Trajectory:
+    """Integrate a chain whose values are checked, see `simulate`."""
     batch = Batch(1, len(start), options)
     batch.set_chain(0, chain, len(start))
     batch.load(0, start, rates, stop_time=instants[0], stop_status=Status.FINISHED)

@@ -15,7 +15,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from warpchain.engine.devices import start_device
+from warpchain.engine.devices import gpu_turn, start_device
 from warpchain.engine.kernel_choice import shared_threads
 from warpchain.engine.processors import processors
 from warpchain.inputs.keywords import OptionSettings, ParameterSettings, Preset, Sampler, SceneSettings, Whole
@@ -34,7 +34,7 @@ from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
 from warpchain.walks.energy_error import MOST_ENERGY_ERROR
 from warpchain.walks.motion import Motion
-from warpchain.walks.rows import fill_row, missing_rows
+from warpchain.walks.rows import Rows, fill_row, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
 
 SHARD_WALKS = 256
@@ -43,8 +43,6 @@ GPU_TASK_WALKS = 262144
 """Upper bound on the walks of a GPU's task, about; the GPU idles while the last walks finish."""
 POLL = 1.0
 """Time [s] between two checks for shards that tasks under way have written."""
-GPU_WORKERS = 2
-"""Tasks at a time on a GPU: while the last walks of one come to rest, the other fills the device."""
 SHARDS = 128
 """Least number of shards of a sweep, about, if it has as many walks: the grain of progress and of a restart."""
 
@@ -120,9 +118,8 @@ def sweep(
             it means there; the ``sweep.yaml`` of a folder names the method that was run, which stays.
         executor: Where shards are run, an executor or a Dask client; its workers must see ``out``. Default: threads of
             this process.
-        workers: Number of tasks at a time. Default: the processors of this machine, and two on a GPU, each of which
-            runs thousands of walks; with a Dask client the threads of its workers. With an executor, at least the
-            number of its workers.
+        workers: Number of tasks at a time. Default: the processors of this machine; with a Dask client the threads of
+            its workers. With an executor, at least the number of its workers. Without one, a GPU has one task.
         fresh: Delete what another sweep left in the folder.
         progress: Show a bar in a terminal or a notebook, unless ``on_progress`` is given; elsewhere nothing is printed.
         on_progress: Called before kernels are compiled, when the walks begin and after each shard.
@@ -211,7 +208,7 @@ def _run_in_folder(
     if executor is None:
         for device in _devices(planned):
             start_device(device)  # refuses one that is not there before anything is written
-    at_once = workers or (GPU_WORKERS if _is_on_gpu(planned) else processors())
+    at_once = workers or processors()
     with SweepFolder.open(folder, planned, fresh=fresh, shard_size=shard_size(planned.walk_count)) as store:
         missing = store.missing()
         before = planned.walk_count - sum(len(shard) for shard in missing)
@@ -290,9 +287,27 @@ def run_shards(
     """
     manifest = known_manifest(directory)
     walks = list(planned.undrawn(index for shard in shards for index in manifest.walks(shard).tolist()))
-    under_way: dict[int, PlannedWalk] = {}
-    stored = [(shard, place) for shard in shards for place in shard]
     rows = {shard: missing_rows(manifest.row_type, shard) for shard in shards}
+    with gpu_turn(walk.setup.options.device for walk in walks):
+        if _is_on_gpu(planned):
+            # all at once, and in this process: a walk that needs one would wait for it alone
+            compile_kernels(one_of_each_kind(planned), threads)
+        return _run_shards(planned, walks, rows, digest, directory, threads, stop)
+
+
+def _run_shards(
+    planned: Sweep,
+    walks: Sequence[PlannedWalk],
+    rows: dict[range, Rows],
+    digest: str,
+    directory: str,
+    threads: int | None,
+    stop: threading.Event | None,
+) -> list[str]:
+    """Run the walks of some shards, in which their rows are missing, see `run_shards`."""
+    under_way: dict[int, PlannedWalk] = {}
+    shards = list(rows)
+    stored = [(shard, place) for shard in shards for place in shard]
     left = {shard: len(shard) for shard in shards}
     motions: dict[range, dict[int, Motion]] = {shard: {} for shard in shards}
     setups, keeps = [walk.setup for walk in walks], [planned.keep(walk) for walk in walks]
@@ -363,7 +378,8 @@ def _run(
     """Give each worker two tasks at a time, so that memory does not grow with the sweep."""
     report(progress)
     began = time.perf_counter()
-    threads, waiting = _shared_threads(planned), _tasks(planned, store.manifest, missing, workers)
+    threads = _shared_threads(planned)
+    waiting = _tasks(planned, store.manifest, missing, workers if stop is None else 1)  # threads take turns on a GPU
     folder, digest, manifest = store.directory / "shards", planned.digest(), store.manifest
     pending: dict[concurrent.futures.Future[list[str]], list[range]] = {}  # with the shards still to be counted
 
@@ -405,7 +421,7 @@ def _run(
             future.cancel()
 
 
-def _tasks(planned: Sweep, manifest: Manifest, missing: Sequence[range], workers: int) -> Iterator[list[range]]:
+def _tasks(planned: Sweep, manifest: Manifest, missing: Sequence[range], gpus: int) -> Iterator[list[range]]:
     """The shards of each task: one on a CPU; on a GPU enough to fill it, if there are enough.
 
     Neighbouring shards are alike, and a GPU has few tasks. So each task takes every n-th shard, and all take equally
@@ -418,6 +434,6 @@ def _tasks(planned: Sweep, manifest: Manifest, missing: Sequence[range], workers
             on_gpu.append(shard)
         else:
             yield [shard]
-    count = workers * -(-sum(map(len, on_gpu)) // (workers * GPU_TASK_WALKS))
+    count = gpus * -(-sum(map(len, on_gpu)) // (gpus * GPU_TASK_WALKS))
     for number in range(min(count, len(on_gpu))):
         yield on_gpu[number::count]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from warpchain.engine.batch import Batch
-from warpchain.engine.devices import most_worlds, start_device
+from warpchain.engine.devices import gpu_turn, most_worlds, start_device
 from warpchain.engine.kernel_choice import block_threads, features_of, load_kernels
 from warpchain.inputs.options import Options
 from warpchain.inputs.setup import Setup
@@ -146,7 +146,8 @@ def compile_kernels(setups: Iterable[Setup], threads: int | None = None) -> None
             features = features_of(setup.options, columns, fixed_body=fixed_body, watch=watch, tilts=tilts)
             size = (threads or block_threads(setup.scene.links)) if setup.options.device.startswith("cuda") else 1
             wanted.add((setup.options.device, features, size))
-    load_kernels((start_device(device), features, size) for device, features, size in wanted)
+    with gpu_turn(device for device, _, _ in wanted):
+        load_kernels((start_device(device), features, size) for device, features, size in wanted)
 
 
 class BatchRun:
