@@ -87,6 +87,19 @@ def test_walks_do_not_depend_on_their_batch():
     assert len(set(alone)) == len(alone)
 
 
+def test_long_chains_begin_first():
+    """Those take longest, and a run should not wait for them in the end; each walk is drawn once, when it begins."""
+    setups = [brief_setup(seed, links=links) for seed, links in enumerate((30, 240, 60, 32, 120, 238))]
+    begun: list[int] = []
+
+    def draw(place: int) -> Setup:
+        begun.append(setups[place].scene.links)
+        return setups[place]
+
+    assert len(list(run_setups(setups, draw=draw))) == 6
+    assert begun == [240, 238, 120, 60, 32, 30]
+
+
 def test_one_broken_walk_among_a_thousand_changes_no_other():
     """A chain whose mass is forced to NaN ends as not_finite; the other 999 are what they are without it."""
     setups = [brief_setup(seed, walk_limit=5e-4) for seed in range(1000)]
