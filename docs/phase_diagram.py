@@ -291,28 +291,66 @@ def chosen(values: Array) -> Array:
     return known[np.unique(np.linspace(0, len(known) - 1, 6).round().astype(int))]
 
 
+FEW: Final = 100
+"""Walks that each of two groups has in a cell in which they are compared, at least."""
+
+
+def over_others(cells: Mapping[str, Array], ways: Sequence[Ending], others: Sequence[Ending] | None = None) -> Array:
+    """Mean Δx of walks that ended in some ways over that of the others of their cell; NaN where either are few.
+
+    Args:
+        cells: Columns of the file.
+        ways: How the walks ended.
+        others: How those ended that they are compared with; None: in any other way.
+    """
+    numbers = {way: cells[way.label] for way in WAYS}
+    distances = {way: number * np.nan_to_num(cells[f"dx_{way.label}"]) for way, number in numbers.items()}
+    rest = [way for way in WAYS if way not in ways] if others is None else others
+    (walks, dx), (walks_of_rest, dx_of_rest) = (
+        (sum(numbers[way] for way in group), sum(distances[way] for way in group)) for group in (ways, rest)
+    )
+    compared = (walks >= FEW) & (walks_of_rest >= FEW)
+    ratio = np.full(len(compared), np.nan)
+    np.divide(dx * walks_of_rest, dx_of_rest * walks, out=ratio, where=compared)
+    return ratio
+
+
+def text_of_ratios(ratios: Array) -> str:
+    """Their mean over cells, and the least and the greatest."""
+    known = ratios[np.isfinite(ratios)]
+    if not len(known):
+        return ""
+    if len(known) == 1:
+        return f"{known[0]:.3f} (one cell)"
+    return f"{known.mean():.3f} ({known.min():.2f} to {known.max():.2f}, {len(known)} cells)"
+
+
 def table_of_endings(cells: Mapping[str, Array]) -> str:
-    """Markdown: share of each ending among all walks at rest, and where it is the most frequent one."""
+    """Markdown: share of each ending among all walks at rest, where it is the most frequent one, how far they went."""
     counts = np.stack([cells[way.label] for way in WAYS], axis=1)
     most = np.where(counts.sum(axis=1) > 0, counts.argmax(axis=1), -1)
     lines = [
-        "| way of ending | share | cells where it is the most frequent | Δx over the mean of its cells |",
-        "|---|---|---|---|",
+        "| way of ending | share | cells where it is the most frequent | Δx, paper's range | elsewhere |",
+        "|---|---|---|---|---|",
     ]
+    inside = phase_scaling.in_papers_range(cells["links"], cells["frequency"])
     flights = int(cells["flight_told"].sum())
     for number, way in enumerate(WAYS):
         # without the time since the last impulse a collapse in flight counts as one of its bounce
         base = flights if way is Ending.IN_FLIGHT else counts.sum()
         share = counts[:, number].sum() / max(base, 1)
-        weight = counts[:, number] * np.isfinite(cells[f"dx_{way.label}"])
-        ratio = (
-            np.nansum(weight * cells[f"dx_{way.label}"] / cells["dx_mean"]) / weight.sum() if weight.sum() else np.nan
-        )
-        text = "" if np.isnan(ratio) else f"{ratio:.3f}"
+        ratios = over_others(cells, [way])
+        texts = " | ".join(text_of_ratios(ratios[where]) for where in (inside, ~inside))
         percent = "not recorded" if way is Ending.IN_FLIGHT and not flights else f"{100 * share:.2g} %"
-        lines.append(f"| {way.meaning} | {percent} | {np.sum(most == number)} | {text} |")
+        lines.append(f"| {way.meaning} | {percent} | {np.sum(most == number)} | {texts} |")
     text = f"{counts.sum():,.0f} walks of which this is known; a collapse in flight is known of {flights:,} of them."
-    return "\n".join([*lines, "", text])
+    early = over_others(cells, [Ending.FOLDED_AT_FIRST, Ending.FOLDED_AT_SECOND], [Ending.FOLDED_LATER])
+    touched = (
+        "Walks that touched themselves by their second bounce, over those that first did so in a later one: "
+        f"{text_of_ratios(early[inside]) or 'too few'} in the paper's range, "
+        f"{text_of_ratios(early[~inside]) or 'too few'} elsewhere."
+    )
+    return "\n".join([*lines, "", text, "", touched])
 
 
 def table_of_failures(cells: Mapping[str, Array]) -> str:

@@ -55,9 +55,10 @@ class Grid:
     def map(self, axes: Axes, values: Array, title: str, **colors: Any) -> Any:
         """Draw values of the cells; returns the image."""
         image = axes.imshow(self.table(values), origin="lower", aspect="auto", interpolation="nearest", **colors)
-        for axis, numbers in ((axes.xaxis, self.links), (axes.yaxis, self.frequency)):
-            every = max(1, -(-len(numbers) // 8))
+        for axis, numbers, most in ((axes.xaxis, self.links, 8), (axes.yaxis, self.frequency, 20)):
+            every = max(1, -(-len(numbers) // most))
             axis.set_ticks(range(len(numbers))[::every], [f"{number:g}" for number in numbers[::every]])
+        axes.tick_params(axis="y", labelsize="small")
         axes.set_facecolor(GROUND)
         axes.spines[:].set_visible(False)
         axes.tick_params(color=FAINT)
@@ -68,7 +69,7 @@ class Grid:
 
 
 def draw_maps(cells: Mapping[str, Array], path: Path) -> None:
-    """Mean of Δx, its spread, bounces, and ways of ending with their shares; red dots: share of walks that failed."""
+    """Mean of Δx, its spread, bounces, and ways of ending with their shares; dots: share of walks that failed."""
     grid = Grid(cells)
     walks = np.maximum(cells["walks"], 1)
     failed = np.where(cells["walks"] > 0, 1 - cells["at_rest"] / walks, 0.0)
@@ -94,7 +95,7 @@ def draw_maps(cells: Mapping[str, Array], path: Path) -> None:
             grid.map(axes, values, f"{title}: too few walks")
         draw_failed(axes, np.nan_to_num(grid.table(failed)))
     draw_endings(lower_right, grid, cells)
-    draw_failed(lower_right, np.nan_to_num(grid.table(failed)))
+    draw_failed(lower_right, np.nan_to_num(grid.table(failed)), color="white", rim=INK)  # red is one of its colours
     save_figure(figure, path)
 
 
@@ -144,7 +145,7 @@ def draw_scaling(cells: Mapping[str, Array], path: Path) -> None:
     limit = float(np.quantile(np.abs(left), 0.98))
     title = "Δx over its curve in v/(nℓ), less 1 / %"
     shades = used.map(grid[3], left, title, cmap="RdBu_r", vmin=-limit, vmax=limit)
-    figure.colorbar(shades, ax=grid[3], pad=0.02)
+    figure.colorbar(shades, ax=grid[3], pad=0.02, extend="both")
     save_figure(figure, path)
 
 

@@ -41,6 +41,11 @@ ROUNDS: Final = 100
 """Samples of the bootstrap over cells."""
 
 
+def in_papers_range(links: Array, frequency: Array) -> Array:
+    """Whether cells lie within 60 to 180 links and 5 to 30 Hz."""
+    return (links >= 60) & (links <= 180) & (frequency >= 5) & (frequency <= 30)
+
+
 @dataclass(frozen=True)
 class Points:
     """Cells as the laws take them, shape (cells,) each: links, speed of the loop [m/s], mean Δx [m]."""
@@ -206,7 +211,7 @@ def worst(points: Points, left: Array, count: int = 3) -> str:
 def table(cells: Mapping[str, Array]) -> str:
     """Markdown: for all cells, fast ones and the paper's range, the residual of each law and where it fails."""
     points = points_of(cells)
-    papers = points[(points.links >= 60) & (points.links <= 180) & (points.frequency >= 5) & (points.frequency <= 30)]
+    papers = points[in_papers_range(points.links, points.frequency)]
     fast = points[points.frequency >= FAST]
     parts = (
         (f"all {len(points.links)} cells", points),

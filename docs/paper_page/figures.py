@@ -61,7 +61,7 @@ def distances(numbers: Numbers) -> Figure:
         tidy(axes, grid="y")
     panels[-1].legend(frameon=False, fontsize="small", loc="upper left")
     panels[0].set_ylim(bottom=0)
-    figure.supxlabel(FREQUENCY, fontsize="medium")
+    figure.supxlabel(f"{FREQUENCY}; boxes: one standard deviation of a walk, bars: two", fontsize="medium")
     panels[0].set_ylabel(DISTANCE)
     return figure
 

@@ -203,9 +203,10 @@ def cause(numbers: Numbers) -> Finding:
         if "early_over_late" not in each:
             texts.append(f"{links} links: no walk touched itself later")
             continue
-        effect = summary(effect_of(each["early_over_late"]))
-        texts.append(f"{links} links: {percent(effect.mean, effect.half_width)}")
-        falls, known = falls + effect.falls, known + effect.cells
+        effect = effect_of(each["early_over_late"])
+        change = percent(float(effect.relative), float(effect.half_width))
+        texts.append(f"{links} links: {change} ({each['early']} and {each['late']} walks)")
+        falls, known = falls + int(effect.sign < 0), known + 1
     text = (
         "Δx of walks that touched themselves by their second bounce against the others of their cell, from rest: "
         f"{'; '.join(texts)}"

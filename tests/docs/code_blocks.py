@@ -12,7 +12,7 @@ from typing import Final
 ROOT: Final = Path(__file__).parents[2]
 PAGES: Final = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
-REASONS: Final = ("needs a GPU", "needs a cluster", "takes half an hour", "sets up an environment")
+REASONS: Final = ("needs a GPU", "needs a cluster", "takes minutes", "sets up an environment")
 """Why a block may not be run."""
 
 _FENCE: Final = re.compile(

@@ -163,6 +163,24 @@ def test_a_cell_counts_its_endings(script: ModuleType) -> None:
     assert row["self_contact_at_mean"] == pytest.approx(0.5 / 3)
 
 
+def test_an_ending_is_compared_with_the_others_of_its_cell(script: ModuleType) -> None:
+    """Its walks are none of the others; a cell with few walks on either side tells nothing."""
+    cells = {f"{dx}{way.label}": np.zeros(3) for way in script.WAYS for dx in ("", "dx_")}
+    cells |= {f"dx_{way.label}": np.full(3, math.nan) for way in script.WAYS}
+    for way, number, distance_ in (
+        (Ending.FIRST, [200, 99, 900], [1.0, 1.0, 3.0]),
+        (Ending.SECOND, [100, 500, 0], [2.0, 2.0, math.nan]),
+        (Ending.LATER, [300, 500, 99], [4.0, 2.0, 1.0]),
+    ):
+        cells[way.label], cells[f"dx_{way.label}"] = np.array(number, float), np.array(distance_)
+    np.testing.assert_allclose(script.over_others(cells, [Ending.FIRST]), [1 / 3.5, math.nan, math.nan])
+    np.testing.assert_allclose(script.over_others(cells, [Ending.SECOND], [Ending.LATER]), [0.5, 1.0, math.nan])
+    both = script.over_others(cells, [Ending.FIRST, Ending.SECOND])
+    np.testing.assert_allclose(both, [4 / 3 / 4, (99 + 1000) / 599 / 2, math.nan])
+    assert script.text_of_ratios(both) == "0.625 (0.33 to 0.92, 2 cells)"
+    assert script.text_of_ratios(both[2:]) == "" and script.text_of_ratios(both[1:]) == "0.917 (one cell)"
+
+
 def test_the_file_keeps_the_rows(script: ModuleType, tmp_path: Path) -> None:
     """What is written comes back to six digits, NaN included."""
     rows = [{"links": 30, "dx_mean": 1.23456789, "dx_sd": math.nan}, {"links": 40, "dx_mean": 2.0, "dx_sd": 0.5}]

@@ -415,7 +415,7 @@ def test_threads_take_turns_on_a_gpu(monkeypatch: pytest.MonkeyPatch, device: st
 
 
 def test_a_task_frees_what_it_made_on_a_device(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """When a task ends, so do its batches, in its thread and without garbage collection: their turn on a GPU is over."""
+    """When a task ends, so do its batches, in its thread and without garbage collection: its turn on a GPU is over."""
     made, freed = [], []
 
     class Watched(scheduler.Batch):

@@ -65,7 +65,7 @@ def write_values(axes: Axes, image: AxesImage, table: Array, count: Array, faile
             axes.text(column, row, "\n".join(parts), ha="center", va="top", color=color, fontsize="xx-small")
 
 
-def draw_failed(axes: Axes, share: Array) -> None:
+def draw_failed(axes: Axes, share: Array, color: str = RED, rim: str = "white") -> None:
     """Mark cells of a map in which walks failed by a dot, whose area is proportional to the share that failed."""
     rows, columns = np.nonzero(share > 0)
     sizes = _LARGEST_DOT * np.sqrt(share[rows, columns])
@@ -76,8 +76,8 @@ def draw_failed(axes: Axes, share: Array) -> None:
         units="xy",
         offsets=np.stack([columns, rows], axis=1),
         offset_transform=axes.transData,
-        facecolor=RED,
-        edgecolor="white",
+        facecolor=color,
+        edgecolor=rim,
         linewidth=0.5,
     )
     axes.add_collection(dots, autolim=False)
