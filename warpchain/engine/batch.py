@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from warpchain.engine.control import control_of
 from warpchain.engine.devices import CAPACITY_FRAMES, CAPACITY_SAMPLES, scratch_rows, start_device
-from warpchain.engine.kernel_choice import block_kernel, block_threads, features_of, kernels_of
+from warpchain.engine.kernel_choice import block_kernel, block_threads, features_of, load_kernels
 from warpchain.engine.mirror import Mirror
 from warpchain.engine.tallies import COUNTS, EXTREMES, LOSSES
 from warpchain.inputs.options import Options
@@ -276,8 +276,8 @@ class Batch:
             features: What they are compiled for.
             links: Numbers of links; on a GPU each may need its own kernel.
         """
-        for kernel, threads in kernels_of(self.device, features, map(self.block_size, links)):
-            wp.load_module(kernel.module, device=self.device, block_dim=threads)
+        sizes = set(map(self.block_size, links)) if self.device.is_cuda else {1}
+        load_kernels((self.device, features, size) for size in sizes)
 
     def block_size(self, links: int) -> int:
         """Threads of the block that carries a chain of this many links on a GPU."""

@@ -1,5 +1,6 @@
 """Devices: starting one, and how many chains fit into its memory."""
 
+import concurrent.futures
 import contextlib
 import functools
 import os
@@ -7,6 +8,7 @@ import platform
 import sys
 import tempfile
 import threading
+import traceback
 from collections.abc import Iterable, Iterator
 
 import warp as wp
@@ -31,16 +33,27 @@ CAPACITY_SAMPLES = 512
 """Samples of a chain that a device can hold between two launches, if the time series is kept."""
 CAPACITY_FRAMES = 64
 """Frames of a chain that a device can hold between two launches, if frames are kept."""
+TURN_POLL = 0.2
+"""Time [s] between two looks at whether a thread that waits for its turn on a GPU should stop."""
+_start_lock = threading.Lock()
 _gpu_lock = threading.RLock()
+_gpu_users: list[int] = []
+"""The thread whose turn it is, once for each turn within its turn."""
 
 
-@functools.cache
 def start_device(device: str) -> wp.Device:
     """Start Warp and return the device.
 
     Raises:
         InputError: This machine has no such device.
     """
+    with _start_lock:
+        return _started(device)
+
+
+@functools.cache
+def _started(device: str) -> wp.Device:
+    """The device, see `start_device`; two threads at once would start Warp twice and mix up stderr."""
     wp.config.log_level = wp.LOG_ERROR
     os.environ.setdefault("CUDA_DEVICE_MAX_CONNECTIONS", CONNECTIONS)  # CUDA reads both when it starts
     os.environ.setdefault("CUDA_MODULE_LOADING", "EAGER")  # else a kernel's first launch waits for those under way
@@ -64,14 +77,53 @@ def gpu_count() -> int:
 
 
 @contextlib.contextmanager
-def gpu_turn(devices: Iterable[str]) -> Iterator[None]:
+def gpu_turn(devices: Iterable[str], stop: threading.Event | None = None) -> Iterator[None]:
     """Keep other threads of this process off its GPUs, if one of these devices is one; CPUs need no turns.
 
     Warp's CUDA runtime has no locks (its issue 1491): a process in which two threads make and free streams and arrays
-    may crash. So whatever is on a GPU must be made and freed within a turn.
+    may crash. So whatever is on a GPU must be made and freed within a turn. An error that ends it loses the local
+    variables of its frames, which would keep arrays beyond the turn.
+
+    Args:
+        devices: Where the work is done.
+        stop: When set, a thread that still waits for its turn does so no longer.
+
+    Raises:
+        CancelledError: `stop` was set before the turn came.
     """
-    with _gpu_lock if any(device.startswith("cuda") for device in devices) else contextlib.nullcontext():
+    if not any(device.startswith("cuda") for device in devices):
         yield
+        return
+    while not _gpu_lock.acquire(timeout=TURN_POLL):
+        if stop is not None and stop.is_set():
+            raise concurrent.futures.CancelledError
+    try:
+        _gpu_users.append(threading.get_ident())
+        try:
+            yield
+        except BaseException as error:
+            _clear_frames(error)
+            raise
+        finally:
+            _gpu_users.pop()
+    finally:
+        _gpu_lock.release()
+
+
+def has_gpu_turn() -> bool:
+    """Whether this thread is within a :func:`gpu_turn` on a GPU."""
+    return threading.get_ident() in _gpu_users
+
+
+def _clear_frames(error: BaseException) -> None:
+    """Drop the local variables of the frames that have ended, of an error and of those behind it."""
+    waiting, seen = [error], set()
+    while waiting:
+        one = waiting.pop()
+        if id(one) not in seen:
+            seen.add(id(one))
+            traceback.clear_frames(one.__traceback__)
+            waiting += [other for other in (one.__cause__, one.__context__) if other is not None]
 
 
 @contextlib.contextmanager
@@ -80,6 +132,9 @@ def _without_driver_warning() -> Iterator[None]:
 
     Every machine without a GPU prints it, also if no GPU is asked for. Who asks for a missing GPU gets an error.
     """
+    if sys.stderr is None:  # it was closed before Python began
+        yield
+        return
     sys.stderr.flush()
     kept = os.dup(2)
     with tempfile.TemporaryFile() as caught:

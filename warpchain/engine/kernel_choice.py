@@ -1,5 +1,6 @@
 """The choice of kernels: by device, features and numbers of links."""
 
+import threading
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 
@@ -30,6 +31,9 @@ SHARED_THREADS = 192
 """Most threads of a block that chains of several lengths share."""
 SHARED_WALKS = 2000
 """Most walks of a sweep that share such blocks; with 2016 it made no difference."""
+_loading = threading.Lock()
+"""Held by the thread that makes kernels. Two that parse their source at once can fail (Python 3.11: SystemError), and
+two that want the same one would both compile it."""
 
 
 def most_registers(threads: int) -> int:
@@ -101,15 +105,18 @@ def load_kernels(wanted: Iterable[tuple[wp.Device, Features, int]]) -> None:
     Args:
         wanted: Device, features and threads of a block of each kernel.
     """
-    kernels = [
-        (device, kernel, threads)
-        for device, features, size in wanted
-        for kernel, threads in kernels_of(device, features, [size])
-    ]
 
     def load(item: tuple[wp.Device, wp.Kernel, int]) -> None:
         device, kernel, threads = item
         wp.load_module(kernel.module, device=device, block_dim=threads)
 
-    with ThreadPoolExecutor(processors()) as pool:
-        list(pool.map(load, kernels))
+    with _loading:
+        kernels = [
+            (device, kernel, threads)
+            for device, features, size in wanted
+            for kernel, threads in kernels_of(device, features, [size])
+        ]
+        for device in {device for device, _, _ in kernels if device.is_cuda}:
+            _ = device.stream  # Warp makes a GPU's streams when it is first used, which should not be by the pool
+        with ThreadPoolExecutor(processors()) as pool:
+            list(pool.map(load, kernels))

@@ -11,6 +11,7 @@ from multiprocessing.synchronize import Barrier
 from typing import Any, TypeVar
 
 from warpchain.inputs.validation import InputError
+from warpchain.run.lost_workers import losses_named
 from warpchain.run.parent_watch import end_with_parent
 
 Answer = TypeVar("Answer")
@@ -34,12 +35,14 @@ class GpuWorkers(ProcessPoolExecutor):
 
         Raises:
             Exception: What one of them raised; the workers can then only be shut down.
+            LostWorkersError: One of them was killed.
         """
-        # a worker that is done waits for the others, so that none runs it twice
-        futures = [self.submit(_meet_after, function, *arguments) for _ in range(self.count)]
-        errors = [error for future in futures if (error := future.exception()) is not None]
-        for error in sorted(errors, key=lambda error: isinstance(error, threading.BrokenBarrierError)):
-            raise error
+        with losses_named():
+            # a worker that is done waits for the others, so that none runs it twice
+            futures = [self.submit(_meet_after, function, *arguments) for _ in range(self.count)]
+            errors = [error for future in futures if (error := future.exception()) is not None]
+            for error in sorted(errors, key=lambda error: isinstance(error, threading.BrokenBarrierError)):
+                raise error
         return [future.result() for future in futures]
 
     def stop(self) -> None:

@@ -15,7 +15,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from warpchain.engine.devices import gpu_turn, start_device
+from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
 from warpchain.engine.kernel_choice import shared_threads
 from warpchain.engine.processors import processors
 from warpchain.inputs.keywords import OptionSettings, ParameterSettings, Preset, Sampler, SceneSettings, Whole
@@ -59,7 +59,7 @@ class Executor(Protocol):
 class DaskClient(Protocol):
     """What is used of ``distributed.Client``, which has no such method ``submit`` as executors have."""
 
-    def get_executor(self) -> Executor:
+    def get_executor(self, *, pure: bool) -> Executor:
         """An executor on the workers."""
         ...
 
@@ -153,7 +153,7 @@ def sweep(
     count = plain(workers, "workers")
     if isinstance(executor, DaskClient):
         count = count or sum(executor.nthreads().values())
-        executor = executor.get_executor()
+        executor = executor.get_executor(pure=False)  # pure: a task that failed would fail again, unrun
     with contextlib.ExitStack() as shown:
         if on_progress is None:
             on_progress = shown.enter_context(progress_bar()) if progress else lambda progress: None
@@ -205,10 +205,14 @@ def _run_in_folder(
     report: OnProgress,
 ) -> None:
     """Run what is missing in a folder."""
+    at_once = workers or processors()
     if executor is None:
+        if has_gpu_turn():
+            raise InputError("device: this thread is in the middle of a walk on a GPU; begin a sweep when it is over")
         for device in _devices(planned):
             start_device(device)  # refuses one that is not there before anything is written
-    at_once = workers or processors()
+        if _is_on_gpu(planned):
+            at_once = 1  # the others would wait for it
     with SweepFolder.open(folder, planned, fresh=fresh, shard_size=shard_size(planned.walk_count)) as store:
         missing = store.missing()
         before = planned.walk_count - sum(len(shard) for shard in missing)
@@ -288,10 +292,9 @@ def run_shards(
     manifest = known_manifest(directory)
     walks = list(planned.undrawn(index for shard in shards for index in manifest.walks(shard).tolist()))
     rows = {shard: missing_rows(manifest.row_type, shard) for shard in shards}
-    with gpu_turn(walk.setup.options.device for walk in walks):
-        if _is_on_gpu(planned):
-            # all at once, and in this process: a walk that needs one would wait for it alone
-            compile_kernels(one_of_each_kind(planned), threads)
+    with gpu_turn((walk.setup.options.device for walk in walks), stop):
+        # all at once, and in this process: a walk that needs one would wait for it alone
+        compile_kernels(one_of_each_kind(planned) if _is_on_gpu(planned) else [walk.setup for walk in walks], threads)
         return _run_shards(planned, walks, rows, digest, directory, threads, stop)
 
 

@@ -50,6 +50,11 @@ SHORT_WALK: Final = 0.5
 SAMPLE_BYTES: Final = 8 * len(SERIES)
 """Bytes of a sample of a series."""
 
+LOCK_TRIES: Final = 5
+"""Tries to lock a folder: `running_rate` of another process holds the lock for a moment."""
+LOCK_PAUSE: Final = 0.02
+"""Time [s] between two of them."""
+
 _PART: Final = re.compile(r"\.(?:sweep|\d{9,}-\d{9,})\.[0-9a-f]{8}\.part\.(?:json|yaml|h5)")
 _DISCARDED: Final = re.compile(r"\.discarded-[0-9a-f]{8}")
 
@@ -347,12 +352,16 @@ def _locked(folder: Path) -> int:
         holder = os.pread(descriptor, 200, 0).decode(errors="replace").strip()
         if holder and not _HOLDER.fullmatch(holder):
             raise InputError(f"{path}: in the way of a sweep; give another folder")
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError(
-                f"{folder}: in use by {holder or 'another process'}; wait for it to end, or give another folder"
-            ) from None
+        for tries_left in reversed(range(LOCK_TRIES)):
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                if not tries_left:
+                    raise InputError(
+                        f"{folder}: in use by {holder or 'another process'}; wait for it to end, or give another folder"
+                    ) from None
+                time.sleep(LOCK_PAUSE)
         os.ftruncate(descriptor, 0)
         os.pwrite(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
     except BaseException:
