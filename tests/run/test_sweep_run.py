@@ -468,6 +468,8 @@ def test_a_sweep_on_a_gpu_is_refused_within_a_walk_there(tmp_path: Path) -> None
     ):
         sweep(TINY, tmp_path / "sweep", device="cuda")
     assert not (tmp_path / "sweep").exists()
+    with gpu_turn(["cuda"]):
+        assert sweep(TINY | {"samples": 1}, tmp_path / "sweep").summary()["missing"] == 0
 
 
 def test_kernels_are_made_by_one_thread_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -34,8 +34,8 @@ class GpuWorkers(ProcessPoolExecutor):
         """Run ``function(*arguments)`` once in every worker, while nothing else is running; what they returned.
 
         Raises:
-            Exception: What one of them raised; the workers can then only be shut down.
             LostWorkersError: One of them was killed.
+            Exception: What one of them raised. In both cases the workers can then only be shut down.
         """
         with losses_named():
             # a worker that is done waits for the others, so that none runs it twice

@@ -207,9 +207,10 @@ def _run_in_folder(
     """Run what is missing in a folder."""
     at_once = workers or processors()
     if executor is None:
-        if has_gpu_turn():
+        devices = _devices(planned)
+        if has_gpu_turn() and any(device.startswith("cuda") for device in devices):
             raise InputError("device: this thread is in the middle of a walk on a GPU; begin a sweep when it is over")
-        for device in _devices(planned):
+        for device in devices:
             start_device(device)  # refuses one that is not there before anything is written
         if _is_on_gpu(planned):
             at_once = 1  # the others would wait for it
