@@ -218,29 +218,36 @@ def test_memory_does_not_grow_with_the_sweep():
 @pytest.mark.slow
 def test_killed_at_any_moment_a_sweep_goes_on(tmp_path, uninterrupted):
     """SIGKILL at 20 random moments, resumed each time: the data are those of a run never interrupted, to the byte."""
-    source, folder = tmp_path / "tiny.yaml", tmp_path / "sweep"
-    source.write_text(yaml.safe_dump(TINY, sort_keys=False))
-    command = [sys.executable, "-m", "warpchain", "sweep", str(source), "-o", str(folder), "--workers", "2"]
-    generator = random.Random(20)
+    folder, generator = tmp_path / "sweep", random.Random(20)
+    context = multiprocessing.get_context("forkserver")  # whose processes need not import anything
+    context.set_forkserver_preload(["warpchain.run.sweep_run"])
+
+    def begun() -> multiprocessing.process.BaseProcess:
+        process = context.Process(target=sweep, args=(TINY, folder), kwargs={"workers": 2})
+        process.start()
+        return process
+
+    begun().join()  # starts the server, too
+    for shard in (folder / "shards").glob("[0-9]*.h5"):
+        shard.unlink()
     began = time.monotonic()
-    first = subprocess.Popen(command, stdout=subprocess.DEVNULL)
-    first.wait()
+    begun().join()
     whole = time.monotonic() - began
     assert data_of(folder) == uninterrupted
     for shard in (folder / "shards").glob("[0-9]*.h5"):
         shard.unlink()
     killed = 0
     while killed < 20:
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        time.sleep(generator.uniform(0.3, 1.0) * whole)
-        process.send_signal(signal.SIGKILL)
-        process.wait()
+        process = begun()
+        time.sleep(generator.uniform(0.0, 1.0) * whole)
+        process.kill()
+        process.join()
         killed += 1
         if len(data_of(folder)) == len(uninterrupted):  # it was complete: begin again
             assert data_of(folder) == uninterrupted
             for shard in sorted((folder / "shards").glob("[0-9]*.h5"))[::2]:
                 shard.unlink()
-    subprocess.run(command, check=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    begun().join()
     assert data_of(folder) == uninterrupted
 
 
