@@ -1,0 +1,160 @@
+"""Threads of one process: they take turns on a GPU, and one at a time starts Warp and makes kernels."""
+
+import concurrent.futures
+import gc
+import subprocess
+import sys
+import threading
+import time
+import weakref
+from pathlib import Path
+
+import pytest
+import warp as wp
+
+import warpchain
+import warpchain.engine.kernel_choice as kernel_choice
+import warpchain.run.sweep_run as runner
+import warpchain.walks.scheduler as scheduler
+from tests.run.test_sweep_run import TINY, brief_setup
+from warpchain.engine.devices import gpu_turn, has_gpu_turn
+from warpchain.run.sweep_run import run_shards, sweep
+from warpchain.store.manifest import Manifest, read_manifest
+from warpchain.sweeps.plan import load_sweep
+from warpchain.walks.scheduler import compile_kernels
+
+
+@pytest.mark.parametrize(("device", "at_most"), [("cuda", 1), ("cpu", 2)])
+def test_threads_take_turns_on_a_gpu(monkeypatch: pytest.MonkeyPatch, device: str, at_most: int) -> None:
+    """Tasks of two threads run at the same time on a CPU, one after the other on a GPU."""
+    planned = load_sweep(TINY | {"options": {"method": "dp5", "device": device}})
+    inside, most = [], []
+
+    def run_walks(*given: object) -> list[str]:
+        inside.append(given)
+        time.sleep(0.2)
+        most.append(len(inside))
+        inside.pop()
+        return []
+
+    monkeypatch.setattr(runner, "known_manifest", lambda directory: Manifest.of(planned, 8))
+    monkeypatch.setattr(runner, "compile_kernels", lambda setups, threads: None)
+    monkeypatch.setattr(runner, "_run_shards", run_walks)
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        tasks = [pool.submit(run_shards, planned, "", "", [range(first, first + 8)]) for first in (0, 8)]
+        assert [task.result() for task in tasks] == [[], []]
+    assert max(most) == at_most and len(most) == 2
+
+
+def test_a_thread_that_waits_for_its_turn_can_be_stopped() -> None:
+    """It gives up within a moment; a turn within one's own turn comes at once, and none is needed on a CPU."""
+    stop = threading.Event()
+
+    def wait(device: str) -> bool:
+        with gpu_turn([device], stop):
+            return has_gpu_turn()
+
+    with concurrent.futures.ThreadPoolExecutor(1) as pool:
+        with gpu_turn(["cpu", "cuda"]):
+            assert wait("cuda:1") and has_gpu_turn() and not pool.submit(wait, "cpu").result(5)
+            task = pool.submit(wait, "cuda")
+            time.sleep(0.05)
+            assert not task.done()
+            stop.set()
+            with pytest.raises(concurrent.futures.CancelledError):
+                task.result(5)
+        assert pool.submit(wait, "cuda").result(5) and not has_gpu_turn()
+
+
+def test_an_error_keeps_nothing_of_a_turn() -> None:
+    """What the frames of an error held is gone when the turn ends, also of the error that it arose from."""
+    held = []
+
+    class Stream:
+        """Stands for one on a GPU."""
+
+    def fail(depth: int) -> None:
+        stream = Stream()
+        held.append(weakref.ref(stream))
+        try:
+            if depth:
+                fail(depth - 1)
+        finally:
+            raise ValueError(str(depth))
+
+    with pytest.raises(ValueError, match="2") as caught, gpu_turn(["cuda"]):
+        fail(2)
+    assert caught.value.__context__ is not None and len(held) == 3
+    assert [reference() for reference in held] == [None] * 3
+
+
+def test_a_sweep_on_a_gpu_is_refused_within_a_walk_there(tmp_path: Path) -> None:
+    """Its task would wait for a turn that the walk does not end."""
+    with (
+        gpu_turn(["cuda"]),
+        pytest.raises(warpchain.InputError, match="device: this thread is in the middle of a walk"),
+    ):
+        sweep(TINY, tmp_path / "sweep", device="cuda")
+    assert not (tmp_path / "sweep").exists()
+    with gpu_turn(["cuda"]):
+        assert sweep(TINY | {"samples": 1}, tmp_path / "sweep").summary()["missing"] == 0
+
+
+def test_a_task_frees_what_it_made_on_a_device(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """When a task ends, so do its batches, in its thread and without garbage collection: its turn on a GPU is over."""
+    made, freed = [], []
+
+    class Watched(scheduler.Batch):
+        def __init__(self, *given: object, **named: object) -> None:
+            made.append(threading.get_ident())
+            super().__init__(*given, **named)
+
+        def __del__(self) -> None:
+            freed.append(threading.get_ident())
+
+    monkeypatch.setattr(scheduler, "Batch", Watched)
+    sweep(TINY, tmp_path / "sweep", workers=1)
+    planned = load_sweep(TINY)
+    gc.disable()
+    try:
+        shards = read_manifest(tmp_path / "sweep").shards
+        run_shards(planned, planned.digest(), str(tmp_path / "sweep"), [shards[0], shards[-1]])
+        assert made == freed and made.count(threading.get_ident()) > 0
+    finally:
+        gc.enable()
+
+
+def test_kernels_are_made_by_one_thread_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tasks of several threads each load what they need, but not at once."""
+    inside, most = [], []
+
+    def make(features: object) -> wp.Kernel:
+        inside.append(features)
+        time.sleep(0.1)
+        most.append(len(inside))
+        inside.pop()
+        return made(features)
+
+    made = kernel_choice.make_advance
+    monkeypatch.setattr(kernel_choice, "make_advance", make)
+    setups = [brief_setup(seed) for seed in range(2)]
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        list(pool.map(compile_kernels, [[setup] for setup in setups]))
+    assert most == [1] * len(most) and len(most) >= 2
+
+
+def test_threads_start_a_device_once() -> None:
+    """Four first calls at the same time give one device and leave stderr as it was; so does a closed stderr."""
+    program = (
+        "import os, sys, threading\n"
+        "from warpchain.engine.devices import start_device\n"
+        "before = os.fstat(2).st_ino if sys.stderr else None\n"
+        "found = []\n"
+        "threads = [threading.Thread(target=lambda: found.append(start_device('cpu'))) for _ in range(4)]\n"
+        "[thread.start() for thread in threads], [thread.join() for thread in threads]\n"
+        "print(len(found), len({id(device) for device in found}), before is None or before == os.fstat(2).st_ino)\n"
+    )
+    for end in ("", " 2>&-"):
+        shell = f'"$0" -c "$1"{end}'
+        done = subprocess.run(["sh", "-c", shell, sys.executable, program], capture_output=True, text=True)
+        assert (done.returncode, done.stdout) == (0, "4 1 True\n"), done
