@@ -15,7 +15,7 @@ import warp as wp
 
 from warpchain.bench.chain_timer import ChainTimer, together
 from warpchain.bench.starts import flying, piled
-from warpchain.engine.devices import start_device, versions
+from warpchain.engine.devices import Fibers, Gpu, start_device, versions
 from warpchain.engine.kernel_choice import block_kernel, block_threads, features_of, load_kernels
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
@@ -131,7 +131,7 @@ def gpu_costs(
                 names = ", ".join(known)
                 raise InputError(f"bench.{name}: {shown(value)} is not measured on a GPU; give one of {names}")
     found = start_device(device)
-    if not found.is_cuda:
+    if not isinstance(found, Gpu) or isinstance(found, Fibers):
         raise InputError(f"bench.device: {device} is not a GPU; give cuda or cuda:N")
     report("compiling kernels")
     options = {method: Options.model_validate({"method": method, "device": device}) for method in methods}
@@ -157,7 +157,7 @@ def _gpu_cost(scene: str, method: str, timer: ChainTimer, rounds: int) -> GpuCos
     """Cost of an attempt from several measurements of :data:`SECONDS` each."""
     attempts = round(SECONDS / timer.settled.seconds)
     whole = together(scene, [timer.measure(attempts) for _ in range(rounds)])
-    threads, device = block_threads(timer.links), timer.batches[0].device
+    threads, device = block_threads(timer.links), timer.batches[0].device.warp
     registers, spilled, blocks = _kernel_needs(block_kernel(timer.features, threads), threads, device)
     peak = 2 * FP64_LANES.get(device.arch, math.nan) * device.sm_count * highest_clock(device)
     links = timer.links * timer.chains
@@ -180,7 +180,7 @@ def _gpu_cost(scene: str, method: str, timer: ChainTimer, rounds: int) -> GpuCos
 
 def gpu_machine(device: str) -> dict[str, str]:
     """GPU, driver and versions, for the record of a measurement."""
-    found = start_device(device)
+    found = start_device(device).warp
     major, minor = wp.get_cuda_driver_version()
     return {
         "gpu": found.name,

@@ -12,8 +12,9 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpchain.engine.control import control_of
-from warpchain.engine.devices import CAPACITY_FRAMES, CAPACITY_SAMPLES, scratch_rows, start_device
+from warpchain.engine.devices import Gpu, start_device
 from warpchain.engine.kernel_choice import block_kernel, block_threads, features_of, load_kernels
+from warpchain.engine.memory import CAPACITY_FRAMES, CAPACITY_SAMPLES, scratch_rows
 from warpchain.engine.mirror import Mirror
 from warpchain.engine.tallies import COUNTS, EXTREMES, LOSSES
 from warpchain.inputs.options import Options
@@ -78,16 +79,18 @@ class Batch:
         self.device = start_device(options.device)
         self.links = [0] * worlds
         self._mirrors: dict[int, Mirror] = {}
-        self._stream = wp.Stream(self.device) if self.device.is_cuda else None
-        self._done: wp.Event | None = None
-        self._lanes = [wp.Stream(self.device) for _ in range(LANES)] if self.device.is_cuda else []
+        self._gpu = self.device if isinstance(self.device, Gpu) else None
+        self._stream: Any = self._gpu.stream() if self._gpu else None
+        self._done: Any = None
+        self._lanes = [self._gpu.stream() for _ in range(LANES)] if self._gpu else []
         self.columns = layout.padded_width(longest)
         rows = scratch_rows(options, longest, self.device, threads)
 
         self.model = self._arrays(Model)
         self.drive = self._arrays(Drive)
         self._constant = set(self._mirrors)
-        self._order = Mirror(np.zeros(worlds, dtype=np.int32), self.device, self._stream)
+        if self._gpu:
+            self._order = Mirror(np.zeros(worlds, dtype=np.int32), self._gpu, self._stream)
         self.state = self._arrays(
             State,
             links=(6, longest),
@@ -115,8 +118,8 @@ class Batch:
         self.control.frame_interval = frame_interval
 
         self._attempts = 500
-        self.scratch = wp.zeros((worlds, rows, self.columns), dtype=wp.float64, device=self.device)
-        self.lists = wp.zeros((worlds, list_layout(self.columns).size), dtype=wp.int32, device=self.device)
+        self.scratch = wp.zeros((worlds, rows, self.columns), dtype=wp.float64, device=self.device.warp)
+        self.lists = wp.zeros((worlds, list_layout(self.columns).size), dtype=wp.int32, device=self.device.warp)
 
     def _arrays(self, struct: Any, **shapes: tuple[int, ...]) -> Any:
         """A struct of arrays of zeros; ``shapes``: further axes of an array, after that of the worlds."""
@@ -128,9 +131,9 @@ class Batch:
 
     def _array(self, values: NDArray[np.generic]) -> wp.array:
         """An array on the device that the host will read or write."""
-        if not self.device.is_cuda or values.size == 0:
-            return wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device=self.device)
-        mirror = Mirror(values, self.device, self._stream)
+        if self._gpu is None or values.size == 0:
+            return wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device=self.device.warp)
+        mirror = Mirror(values, self._gpu, self._stream)
         self._mirrors[mirror.array.ptr] = mirror
         return mirror.array
 
@@ -276,7 +279,7 @@ class Batch:
             features: What they are compiled for.
             links: Numbers of links; on a GPU each may need its own kernel.
         """
-        sizes = set(map(self.block_size, links)) if self.device.is_cuda else {1}
+        sizes = set(map(self.block_size, links)) if self._gpu else {1}
         load_kernels((self.device, features, size) for size in sizes)
 
     def block_size(self, links: int) -> int:
@@ -301,10 +304,13 @@ class Batch:
         """
         self.control.attempts = attempts
         arrays = [self.model, self.drive, self.state, self.record, self.scratch, self.lists, self.control]
-        if self._stream is None:
+        if self._gpu is None:
             for features, worlds in groups.items():
-                inputs = [wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device), *arrays]
-                wp.launch(make_advance(features), dim=len(worlds), inputs=inputs, device=self.device)
+                inputs = [
+                    wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device.warp),
+                    *arrays,
+                ]
+                wp.launch(make_advance(features), dim=len(worlds), inputs=inputs, device=self.device.warp)
             return
         blocks: dict[tuple[Features, int], list[int]] = defaultdict(list)
         for features, worlds in groups.items():
@@ -313,7 +319,7 @@ class Batch:
         order = np.array([world for worlds in blocks.values() for world in worlds], dtype=np.int32)
         if not np.array_equal(self._order.view()[: len(order)], order):
             self._order.edit()[: len(order)] = order
-        self._stream.wait_stream(self.device.stream)  # where new arrays are filled
+        self._stream.wait_stream(self._gpu.filling)
         for mirror in (self._order, *self._mirrors.values()):
             mirror.upload()
         ready = self._stream.record_event()
@@ -321,14 +327,8 @@ class Batch:
             lane.wait_event(ready)
         first = 0
         for ((features, threads), worlds), lane in zip(blocks.items(), itertools.cycle(self._lanes), strict=False):
-            wp.launch_tiled(
-                block_kernel(features, threads),
-                dim=[len(worlds)],
-                inputs=[self._order.array[first : first + len(worlds)], *arrays],
-                block_dim=threads,
-                device=self.device,
-                stream=lane,
-            )
+            inputs = [self._order.array[first : first + len(worlds)], *arrays]
+            self._gpu.launch(block_kernel(features, threads), len(worlds), inputs, threads, lane)
             first += len(worlds)
         for lane in self._lanes:
             self._stream.wait_event(lane.record_event())
@@ -343,8 +343,8 @@ class Batch:
 
     def finish(self) -> None:
         """Wait for the launch that was begun, if there is one."""
-        if self._done is not None:
-            wp.synchronize_event(self._done)
+        if self._gpu and self._done is not None:
+            self._gpu.wait(self._done)
             self._done = None
 
     def listed_pairs(self, world: int) -> int:

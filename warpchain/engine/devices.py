@@ -1,4 +1,4 @@
-"""Devices: starting one, and how many chains fit into its memory."""
+"""Devices: starting one, what differs between a CPU and a GPU, and turns on a GPU."""
 
 import concurrent.futures
 import contextlib
@@ -9,30 +9,18 @@ import sys
 import tempfile
 import threading
 import traceback
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 import warp as wp
+from numpy.typing import NDArray
 
-from warpchain.engine.kernel_choice import block_threads, resident_blocks
-from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import Parameters
+from warpchain.engine.fibers import HeldStream
+from warpchain.inputs.options import FIBERS, on_gpu
 from warpchain.inputs.validation import InputError
-from warpchain.kernels import layout
-from warpchain.kernels.contacts.pair_list import list_layout
-from warpchain.kernels.cpu import functions as cpu_functions
-from warpchain.kernels.gpu import functions as gpu_functions
 from warpchain.version import package_versions
 
 CONNECTIONS = "32"  # queues between host and GPU; with fewer than streams, streams wait for one another
-WORLDS_OF_BLOCK = 2
-"""Chains under way for each block that a GPU holds: while some are with the host, the others fill it.
-
-With more, every walk takes longer, and so does the end of a run, when the GPU empties.
-"""
-CAPACITY_SAMPLES = 512
-"""Samples of a chain that a device can hold between two launches, if the time series is kept."""
-CAPACITY_FRAMES = 64
-"""Frames of a chain that a device can hold between two launches, if frames are kept."""
 TURN_POLL = 0.2
 """Time [s] between two looks at whether a thread that waits for its turn on a GPU should stop."""
 _start_lock = threading.Lock()
@@ -41,7 +29,113 @@ _gpu_users: list[int] = []
 """The thread whose turn it is, once for each turn within its turn."""
 
 
-def start_device(device: str) -> wp.Device:
+class Device:
+    """A CPU: a launch carries on its chains one after the other, in one thread each.
+
+    Attributes:
+        warp: What Warp calls the device.
+    """
+
+    def __init__(self, warp: wp.Device) -> None:
+        """Prepare to use it."""
+        self.warp = warp
+
+    def prepare(self) -> None:
+        """Make what the first use would make, before several threads use it at once."""
+
+    def host_array(self, values: NDArray[Any]) -> wp.array:
+        """A copy of values on the host, from and to which the device can copy."""
+        return wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device="cpu")
+
+    def load(self, kernel: wp.Kernel, threads: int) -> None:
+        """Load a kernel for blocks of this many threads; it is compiled if the cache does not have it."""
+        wp.load_module(kernel.module, device=self.warp, block_dim=threads)
+
+
+class Gpu(Device):
+    """A GPU: a block of threads carries on a chain; copies and launches wait in streams."""
+
+    def prepare(self) -> None:
+        """Make Warp's streams of the device."""
+        _ = self.warp.stream
+
+    @property
+    def multiprocessors(self) -> int:
+        """Number of multiprocessors."""
+        return int(self.warp.sm_count)
+
+    @property
+    def free_memory(self) -> int:
+        """Free memory [B]."""
+        return int(self.warp.free_memory)
+
+    @property
+    def filling(self) -> Any:
+        """The stream in which new arrays are filled."""
+        return self.warp.stream
+
+    def host_array(self, values: NDArray[Any]) -> wp.array:
+        """As on a CPU, but in pinned memory, so that copies wait in streams as well."""
+        return wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device="cpu", pinned=True)
+
+    def stream(self) -> Any:
+        """A new stream."""
+        return wp.Stream(self.warp)
+
+    def copy(self, target: wp.array, source: wp.array, stream: Any) -> None:
+        """Begin a copy between host and device."""
+        wp.copy(target, source, stream=stream)
+
+    def launch(self, kernel: wp.Kernel, blocks: int, inputs: Sequence[Any], threads: int, stream: Any) -> None:
+        """Begin a launch."""
+        wp.launch_tiled(kernel, dim=[blocks], inputs=inputs, block_dim=threads, device=self.warp, stream=stream)
+
+    def wait(self, event: Any) -> None:
+        """Wait until a stream has come to an event."""
+        wp.synchronize_event(event)
+
+
+class Fibers(Gpu):
+    """A CPU that runs a GPU's kernels, each thread of a block as a fiber: slow, for tests.
+
+    The host does all that it does for a GPU. What waits in a stream is done when the host waits for it.
+    """
+
+    multiprocessors = 1
+    free_memory = 2**28
+    filling = HeldStream()  # arrays on a CPU are filled at once
+
+    def __init__(self, warp: wp.Device) -> None:
+        """Let Warp run blocks of several threads on a CPU."""
+        super().__init__(warp)
+        wp.config.enable_cpu_blocks = True
+
+    def prepare(self) -> None:
+        """There is nothing to make."""
+
+    def host_array(self, values: NDArray[Any]) -> wp.array:
+        """As on a CPU: memory cannot be pinned without CUDA."""
+        return Device.host_array(self, values)
+
+    def stream(self) -> HeldStream:
+        """A new stream."""
+        return HeldStream()
+
+    def copy(self, target: wp.array, source: wp.array, stream: HeldStream) -> None:
+        """Let a copy wait in a stream."""
+        stream.hold(lambda: wp.copy(target, source))
+
+    def launch(self, kernel: wp.Kernel, blocks: int, inputs: Sequence[Any], threads: int, stream: HeldStream) -> None:
+        """Let a launch wait in a stream."""
+        launch = functools.partial(wp.launch_tiled, kernel, dim=[blocks], inputs=inputs, block_dim=threads)
+        stream.hold(lambda: launch(device=self.warp))
+
+    def wait(self, event: Any) -> None:
+        """Do what comes before an event."""
+        event.reach()
+
+
+def start_device(device: str) -> Device:
     """Start Warp and return the device.
 
     Raises:
@@ -52,18 +146,21 @@ def start_device(device: str) -> wp.Device:
 
 
 @functools.cache
-def _started(device: str) -> wp.Device:
+def _started(device: str) -> Device:
     """The device, see `start_device`; two threads at once would start Warp twice and mix up stderr."""
     wp.config.log_level = wp.LOG_ERROR
     os.environ.setdefault("CUDA_DEVICE_MAX_CONNECTIONS", CONNECTIONS)  # CUDA reads both when it starts
     os.environ.setdefault("CUDA_MODULE_LOADING", "EAGER")  # else a kernel's first launch waits for those under way
     with _without_driver_warning():
         wp.init()
+    if device == FIBERS:
+        return Fibers(wp.get_device("cpu"))
     name = "cuda:0" if device == "cuda" else device
     known = [found.alias for found in wp.get_devices()]
     if name not in known:
         raise InputError(f"options.device: there is no {device} on this machine; give one of {', '.join(known)}")
-    return wp.get_device(name)
+    found = wp.get_device(name)
+    return Gpu(found) if found.is_cuda else Device(found)
 
 
 def gpu_count() -> int:
@@ -91,7 +188,7 @@ def gpu_turn(devices: Iterable[str], stop: threading.Event | None = None) -> Ite
     Raises:
         CancelledError: `stop` was set before the turn came.
     """
-    if not any(device.startswith("cuda") for device in devices):
+    if not any(map(on_gpu, devices)):
         yield
         return
     while not _gpu_lock.acquire(timeout=TURN_POLL):
@@ -153,60 +250,3 @@ def _without_driver_warning() -> Iterator[None]:
 def versions() -> dict[str, str]:
     """Versions of the packages that may change a number, for the provenance of a result."""
     return package_versions() | {"python": platform.python_version()}
-
-
-def scratch_rows(options: Options, longest: int, device: wp.Device, threads: int | None = None) -> int:
-    """Rows of a chain's scratch on a device, for chains of up to this many links; ``threads`` as in a batch."""
-    columns = layout.padded_width(longest)
-    if device.is_cuda:
-        return gpu_functions.board_rows(threads or block_threads(longest), columns)
-    return cpu_functions.scratch_rows(options.method, columns)
-
-
-def world_bytes(
-    longest: int,
-    options: Options,
-    samples: int,
-    frames: int,
-    device: wp.Device,
-    keeps_loads: bool = False,
-    tilts: bool = False,
-) -> int:
-    """Memory [B] that a batch takes on a device for each of its worlds.
-
-    Args:
-        longest: Greatest number of links.
-        options: Options of the batch.
-        samples: Capacity of the time series.
-        frames: Capacity of the frames.
-        device: Device of the batch.
-        keeps_loads: Whether loads of joints are kept with the frames.
-        tilts: Whether the plane of the chain is kept with samples and frames.
-    """
-    columns = layout.padded_width(longest)
-    few = len(Parameters.model_fields) + 184  # numbers of a world in model, drive and state
-    numbers = columns * scratch_rows(options, longest, device) + 6 * longest + few
-    numbers += samples * (layout.ALL_COLUMNS if tilts else layout.SAMPLE_COLUMNS)
-    numbers += frames * ((2 + 3 * keeps_loads) * longest + layout.PLANE_VALUES * tilts + 1)
-    return 8 * numbers + 4 * list_layout(columns).size
-
-
-def most_worlds(
-    longest: int,
-    options: Options,
-    *,
-    keeps_samples: bool,
-    keeps_frames: bool,
-    keeps_loads: bool = False,
-    tilts: bool = False,
-    threads: int | None = None,
-) -> int:
-    """Chains that a GPU should carry on together: enough to fill it that fit into half of the free memory.
-
-    The other half is left to others, such as batches of other threads.
-    """
-    device = start_device(options.device)
-    samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * keeps_frames
-    fitting = int(device.free_memory) // 2 // world_bytes(longest, options, samples, frames, device, keeps_loads, tilts)
-    filling = WORLDS_OF_BLOCK * resident_blocks(threads or block_threads(longest)) * int(device.sm_count)
-    return max(1, min(filling, fitting))

@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import warp as wp
 
+from warpchain.engine.devices import Device, Gpu
 from warpchain.engine.processors import processors
 from warpchain.inputs.options import Options
 from warpchain.kernels.cpu.loop import make_advance
@@ -92,23 +93,23 @@ def features_of(
     )
 
 
-def kernels_of(device: wp.Device, features: Features, threads: Iterable[int]) -> list[tuple[wp.Kernel, int]]:
+def kernels_of(device: Device, features: Features, threads: Iterable[int]) -> list[tuple[wp.Kernel, int]]:
     """(Kernel, threads of a block) for each of these numbers of threads; on a CPU one kernel, with 1."""
-    if not device.is_cuda:
+    if not isinstance(device, Gpu):
         return [(make_advance(features), 1)]
     return [(block_kernel(features, size), size) for size in sorted(set(threads))]
 
 
-def load_kernels(wanted: Iterable[tuple[wp.Device, Features, int]]) -> None:
+def load_kernels(wanted: Iterable[tuple[Device, Features, int]]) -> None:
     """Compile kernels that are not in the cache yet, several at a time.
 
     Args:
         wanted: Device, features and threads of a block of each kernel.
     """
 
-    def load(item: tuple[wp.Device, wp.Kernel, int]) -> None:
+    def load(item: tuple[Device, wp.Kernel, int]) -> None:
         device, kernel, threads = item
-        wp.load_module(kernel.module, device=device, block_dim=threads)
+        device.load(kernel, threads)
 
     with _loading:
         kernels = [
@@ -116,7 +117,7 @@ def load_kernels(wanted: Iterable[tuple[wp.Device, Features, int]]) -> None:
             for device, features, size in wanted
             for kernel, threads in kernels_of(device, features, [size])
         ]
-        for device in {device for device, _, _ in kernels if device.is_cuda}:
-            _ = device.stream  # Warp makes a GPU's streams when it is first used, which should not be by the pool
+        for device, _, _ in kernels:
+            device.prepare()
         with ThreadPoolExecutor(processors()) as pool:
             list(pool.map(load, kernels))

@@ -10,6 +10,8 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpchain.engine.devices import Gpu
+
 
 class Mirror:
     """One array, which the host reads and edits through its copy between launches.
@@ -18,12 +20,12 @@ class Mirror:
         array: The array on the device.
     """
 
-    def __init__(self, values: NDArray[np.generic], device: wp.Device, stream: wp.Stream | None) -> None:
-        """Copy values to a device; later copies use this stream, on a GPU from and to pinned memory."""
-        dtype = wp.dtype_from_numpy(values.dtype)
-        self.array = wp.array(values, dtype=dtype, device=device)
-        self._host = wp.array(values, dtype=dtype, device="cpu", pinned=device.is_cuda)
+    def __init__(self, values: NDArray[np.generic], device: Gpu, stream: Any) -> None:
+        """Copy values to a device; later copies wait in this stream."""
+        self.array = wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device=device.warp)
+        self._host = device.host_array(values)
         self._values: NDArray[Any] = self._host.numpy()
+        self._device = device
         self._stream = stream
         self._is_edited = False
 
@@ -39,9 +41,9 @@ class Mirror:
     def upload(self) -> None:
         """Begin a copy to the device if the host has edited the elements."""
         if self._is_edited:
-            wp.copy(self.array, self._host, stream=self._stream)
+            self._device.copy(self.array, self._host, self._stream)
             self._is_edited = False
 
     def download(self) -> None:
         """Begin a copy to the host."""
-        wp.copy(self._host, self.array, stream=self._stream)
+        self._device.copy(self._host, self.array, self._stream)

@@ -16,6 +16,14 @@ LONGEST_DRIVE_INTERVAL: Final = 2e-3
 
 TOLERANCES: Final = {"ge": 1e-13, "le": 1e-1}
 
+FIBERS: Final = "fibers"
+"""Device that runs a GPU's kernels on a CPU, slowly, so that tests pass through all that the host does for a GPU."""
+
+
+def on_gpu(device: str) -> bool:
+    """Whether a device runs a GPU's kernels."""
+    return device != "cpu"
+
 
 class Options(BaseModel):
     """How a walk is computed.
@@ -101,7 +109,7 @@ class Options(BaseModel):
                 raise refusal("method", f"{shown(word)} was removed; give {FORMER_METHODS[word]}")
             raise refusal("method", f"{shown(word)} is unknown; {suggestion(word, known)}")
         device = values.get("device")
-        if word == "standard" and isinstance(device, str) and device.startswith("cuda"):
+        if word == "standard" and isinstance(device, str) and on_gpu(device):
             word = "explicit"
         defaults = {"method": word, **METHODS_BY_NEED.get(word, {})}
         if word == HYBRID:
@@ -113,13 +121,13 @@ class Options(BaseModel):
     @field_validator("device")
     @classmethod
     def _device_supported(cls, device: str) -> str:
-        if not re.fullmatch(r"cpu|cuda(:\d{1,3})?", device):
+        if not re.fullmatch(rf"cpu|cuda(:\d{{1,3}})?|{FIBERS}", device):
             raise refusal("device", f"{shown(device)} is no device; give cpu, cuda or cuda:N")
         return device
 
     @model_validator(mode="after")
     def _method_runs_on_device(self) -> Self:
-        if self.device != "cpu" and not find_method(self.method).runs_on_gpus:
+        if on_gpu(self.device) and not find_method(self.method).runs_on_gpus:
             raise refusal("method", f"{shown(self.method)} runs on a CPU only; give explicit, or device: cpu")
         return self
 

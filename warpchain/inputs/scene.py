@@ -5,6 +5,7 @@ from typing import Final, Literal, Self
 
 from pydantic import BaseModel, Field, field_validator, model_validator
 
+from warpchain.inputs.options import on_gpu
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import STRICT, InputError, number_field, refusal
 
@@ -230,7 +231,7 @@ def check_links_on_gpu(links: int, device: str, field: str) -> None:
     Raises:
         InputError: it cannot; the message begins with the field that says how many links there are.
     """
-    if device != "cpu" and links > MOST_LINKS_ON_GPU:
+    if on_gpu(device) and links > MOST_LINKS_ON_GPU:
         raise InputError(
             f"{field}: {links} links are more than a GPU's block has threads; "
             f"give {MOST_LINKS_ON_GPU} or less, or device: cpu"

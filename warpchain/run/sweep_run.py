@@ -19,7 +19,7 @@ from warpchain.engine.devices import gpu_turn, has_gpu_turn, start_device
 from warpchain.engine.kernel_choice import shared_threads
 from warpchain.engine.processors import processors
 from warpchain.inputs.keywords import OptionSettings, ParameterSettings, Preset, Sampler, SceneSettings, Whole
-from warpchain.inputs.options import Options
+from warpchain.inputs.options import Options, on_gpu
 from warpchain.inputs.parameters import warn_of_units
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, checked_path, plain, shown, validated
@@ -208,7 +208,7 @@ def _run_in_folder(
     at_once = workers or processors()
     if executor is None:
         devices = _devices(planned)
-        if has_gpu_turn() and any(device.startswith("cuda") for device in devices):
+        if has_gpu_turn() and any(map(on_gpu, devices)):
             raise InputError("device: this thread is in the middle of a walk on a GPU; begin a sweep when it is over")
         for device in devices:
             start_device(device)  # refuses one that is not there before anything is written
@@ -255,7 +255,7 @@ def on_device(planned: Sweep, device: str) -> Sweep:
 
 def _is_on_gpu(planned: Sweep) -> bool:
     """Whether all walks go to a GPU."""
-    return all(str(block.sections["options"].get("device", "cpu")).startswith("cuda") for block in planned.blocks)
+    return all(on_gpu(str(block.sections["options"].get("device", "cpu"))) for block in planned.blocks)
 
 
 def _devices(planned: Sweep) -> set[str]:
@@ -431,13 +431,13 @@ def _tasks(planned: Sweep, manifest: Manifest, missing: Sequence[range], gpus: i
     Neighbouring shards are alike, and a GPU has few tasks. So each task takes every n-th shard, and all take equally
     long.
     """
-    on_gpu: list[range] = []
+    for_gpus: list[range] = []
     firsts = planned.undrawn(int(manifest.walks(shard)[0]) for shard in missing)
     for shard, first in zip(missing, firsts, strict=True):
-        if first.setup.options.device.startswith("cuda"):
-            on_gpu.append(shard)
+        if on_gpu(first.setup.options.device):
+            for_gpus.append(shard)
         else:
             yield [shard]
-    count = gpus * -(-sum(map(len, on_gpu)) // (gpus * GPU_TASK_WALKS))
-    for number in range(min(count, len(on_gpu))):
-        yield on_gpu[number::count]
+    count = gpus * -(-sum(map(len, for_gpus)) // (gpus * GPU_TASK_WALKS))
+    for number in range(min(count, len(for_gpus))):
+        yield for_gpus[number::count]

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from warpchain.engine.batch import Batch
-from warpchain.engine.devices import gpu_turn, most_worlds, start_device
+from warpchain.engine.devices import gpu_turn, start_device
 from warpchain.engine.kernel_choice import block_threads, features_of, load_kernels
-from warpchain.inputs.options import Options
+from warpchain.engine.memory import most_worlds
+from warpchain.inputs.options import Options, on_gpu
 from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
@@ -64,8 +65,8 @@ def run_setups(
     """
     alike: dict[tuple[Options, int, int], list[int]] = defaultdict(list)
     for place, setup in enumerate(setups):
-        on_gpu, links = setup.options.device.startswith("cuda"), setup.scene.links
-        size = (threads or block_threads(links)) if on_gpu else 1
+        links = setup.scene.links
+        size = (threads or block_threads(links)) if on_gpu(setup.options.device) else 1
         alike[setup.options, layout.padded_width(links), size].append(place)
 
     def begin(place: int, batch: Batch, world: int) -> WalkRun:
@@ -98,12 +99,12 @@ def _batches(
 
     On a CPU it is one batch, on a GPU several, with as many worlds in all as are of use and fit.
     """
-    longest, on_gpu = max(links), options.device.startswith("cuda")
+    longest, blocks = max(links), on_gpu(options.device)
     # Every batch keeps what any walk wants, although most may want nothing: separate batches would each wait for their
     # own slowest walk.
     samples, loads = any(keep.series_every for keep in keeps), any(keep.before > 0 or keep.loads for keep in keeps)
     frame_every = next((keep.frame_every for keep in keeps if keep.frame_every), None)
-    if slots is None and on_gpu:
+    if slots is None and blocks:
         frames = frame_every is not None
         slots = most_worlds(
             longest,
@@ -115,9 +116,9 @@ def _batches(
             threads=threads,
         )
     capacity = slots = slots or 1
-    if on_gpu:
+    if blocks:
         slots = min(slots, len(links))
-    worlds = -(-slots // BATCHES_PER_GPU) if on_gpu else slots
+    worlds = -(-slots // BATCHES_PER_GPU) if blocks else slots
     kept: dict[str, Any] = {"keeps_samples": samples, "frame_every": frame_every, "keeps_loads": loads, "tilts": tilts}
     intervals = {keep.frame_interval for keep in keeps if keep.frame_interval > 0}
     if len(intervals) > 1:
@@ -144,7 +145,7 @@ def compile_kernels(setups: Iterable[Setup], threads: int | None = None) -> None
         for fixed_body, watch in bodies:
             tilts = fixed_body == "floor" and setup.scene.plane == "tilting"
             features = features_of(setup.options, columns, fixed_body=fixed_body, watch=watch, tilts=tilts)
-            size = (threads or block_threads(setup.scene.links)) if setup.options.device.startswith("cuda") else 1
+            size = (threads or block_threads(setup.scene.links)) if on_gpu(setup.options.device) else 1
             wanted.add((setup.options.device, features, size))
     with gpu_turn(device for device, _, _ in wanted):
         load_kernels((start_device(device), features, size) for device, features, size in wanted)
@@ -186,7 +187,7 @@ class BatchRun:
                 for _, run in self._running.values():
                     run.compile_time += time.perf_counter() - began
                 self._loaded.add(features)
-        self.batch.start(together, ATTEMPTS["cuda" if self.batch.device.is_cuda else "cpu"])
+        self.batch.start(together, ATTEMPTS["cuda" if on_gpu(self.batch.options.device) else "cpu"])
         return bool(together)
 
     def finish(self) -> Iterator[tuple[int, WalkRun]]:

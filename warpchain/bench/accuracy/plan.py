@@ -185,7 +185,7 @@ def run_accuracy(folder: Path, plan: Plan, report: Report) -> Document:
             about = {"group": case.group, "case": case.name, "what": case.what, "method": method}
             _record(folder, here, {"hard_cases": [about | asdict(case.outcome(method))]})
     for ensemble in plan.ensembles if "ensembles" in plan.parts else ():
-        on = here if ensemble.device == "cpu" else here | {"device": start_device(ensemble.device).name}
+        on = here if ensemble.device == "cpu" else here | {"device": start_device(ensemble.device).warp.name}
         references = (LOOSE, TIGHT) if plan.tight else (LOOSE,)
         for one in dict.fromkeys((*references, *plan.method_settings)):
             run_ensemble(folder / "ensembles", ensemble, one, report)
