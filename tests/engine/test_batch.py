@@ -13,7 +13,7 @@ import warp as wp
 from tests.run.test_sweep_run import brief_setup, outcome, outcomes
 from warpchain.cli.terminal import sweep_progress_text
 from warpchain.engine.batch import Batch
-from warpchain.engine.devices import CAPACITY_FRAMES, CAPACITY_SAMPLES, start_device, world_bytes
+from warpchain.engine.devices import Device, Fibers, start_device
 from warpchain.engine.kernel_choice import (
     block_threads,
     features_of,
@@ -22,6 +22,7 @@ from warpchain.engine.kernel_choice import (
     resident_blocks,
     shared_threads,
 )
+from warpchain.engine.memory import CAPACITY_FRAMES, CAPACITY_SAMPLES, world_bytes
 from warpchain.engine.mirror import Mirror
 from warpchain.inputs.options import Options
 from warpchain.inputs.setup import Setup
@@ -40,16 +41,22 @@ FEW = {"version": 1, "name": "few", "seed": 1, "preset": "soft", "samples": 2, "
 
 def test_a_mirror_carries_edits_and_changes() -> None:
     """Edits reach the device with the next upload, and changes made there the host with the next download."""
-    mirror = Mirror(np.arange(4.0), start_device("cpu"), None)
+    device = start_device("fibers")
+    assert isinstance(device, Fibers)
+    stream = device.stream()
+    mirror = Mirror(np.arange(4.0), device, stream)
     mirror.edit()[1] = 7.0
-    assert mirror.array.numpy().tolist() == [0.0, 1.0, 2.0, 3.0]
     mirror.upload()
+    assert mirror.array.numpy().tolist() == [0.0, 1.0, 2.0, 3.0], "the copy waits in its stream"
+    device.wait(stream.record_event())
     assert mirror.array.numpy().tolist() == [0.0, 7.0, 2.0, 3.0]
     mirror.array.fill_(5.0)
     mirror.upload()
+    device.wait(stream.record_event())
     assert mirror.array.numpy().tolist() == [5.0] * 4, "nothing was edited since"
-    assert mirror.view().tolist() == [0.0, 7.0, 2.0, 3.0]
     mirror.download()
+    assert mirror.view().tolist() == [0.0, 7.0, 2.0, 3.0]
+    device.wait(stream.record_event())
     assert mirror.view().tolist() == [5.0] * 4
 
 
@@ -177,7 +184,7 @@ def test_kernels_of_a_sweep_are_those_that_its_walks_ask_for(monkeypatch: pytest
     """What is compiled beforehand for few walks on a GPU is one kernel for the drive and one for the walk."""
     loaded: set[tuple[str, str, int]] = set()
 
-    def note(wanted: Iterable[tuple[wp.Device, Features, int]]) -> None:
+    def note(wanted: Iterable[tuple[Device, Features, int]]) -> None:
         loaded.update((features.method, features.fixed_body, threads) for _, features, threads in wanted)
 
     monkeypatch.setattr(scheduler, "load_kernels", note)

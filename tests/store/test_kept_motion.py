@@ -20,7 +20,7 @@ import yaml
 
 import warpchain
 from tests.run.test_sweep_run import BRIEF, TINY, brief_setup, data_of
-from warpchain.engine.devices import CAPACITY_SAMPLES
+from warpchain.engine.memory import CAPACITY_SAMPLES
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.pictures.style import NothingToShow
 from warpchain.reports.figure5 import MOST_CELLS, sweep_figure5

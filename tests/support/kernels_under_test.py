@@ -34,7 +34,7 @@ from warpchain.kernels.types import Chain, Model, State, read_chain
 
 Array = NDArray[np.float64]
 
-DEVICE = start_device("cpu")
+DEVICE = start_device("cpu").warp
 POISONED_JOINT = 2**30
 
 _compiled = functools.partial(

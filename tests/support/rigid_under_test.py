@@ -18,7 +18,7 @@ from warpchain.kernels.types import Model, State, read_chain
 
 Array = NDArray[np.float64]
 
-DEVICE = start_device("cpu")
+DEVICE = start_device("cpu").warp
 
 
 @dataclass(frozen=True)

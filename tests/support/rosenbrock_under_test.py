@@ -19,7 +19,7 @@ from warpchain.kernels.types import Model, State, read_chain
 
 Array = NDArray[np.float64]
 
-DEVICE = start_device("cpu")
+DEVICE = start_device("cpu").warp
 _compiled = functools.partial(
     wp.kernel, module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS}
 )

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 Start = tuple[Array, Array, Plane]
 """Position (n, 3), velocity (n, 3) and plane."""
 
-DEVICE = start_device("cpu")
+DEVICE = start_device("cpu").warp
 
 
 def row_of(plane: Plane) -> Array:

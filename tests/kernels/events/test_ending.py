@@ -16,7 +16,7 @@ from warpchain.kernels import layout
 from warpchain.kernels.events.ending import watch_ending
 from warpchain.kernels.types import State
 
-CPU = start_device("cpu")
+CPU = start_device("cpu").warp
 NEVER = -math.inf
 
 # --- the watch, fed with made-up samples ---

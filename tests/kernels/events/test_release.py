@@ -31,7 +31,7 @@ from warpchain.kernels.types import Drive, Model, State, read_chain
 Array = NDArray[np.float64]
 
 SOFT = preset("soft")
-CPU = start_device("cpu")
+CPU = start_device("cpu").warp
 STEP = 1 / 1024  # s between two samples; sums of it are exact
 HEIGHT, WIDTH, SPEED = 0.5, 0.125, 5.0
 USUAL = {"height": HEIGHT, "width": WIDTH, "x": 0.01, "y": -0.2, "speed": SPEED}

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 PAPER, SOFT = preset("paper"), preset("soft")
 FIELDS = tuple(Chain.vars)
-CPU = start_device("cpu")
+CPU = start_device("cpu").warp
 
 
 # --- what is multiplied ---

@@ -46,7 +46,7 @@ def area_of(position: np.ndarray) -> float:
     batch = Batch(1, len(position), setup_walk("paper", {}, None).options)
     batch.set_chain(0, PAPER, len(position))
     batch.load(0, position, np.zeros_like(position), stop_time=1.0, stop_status=Status.FINISHED)
-    areas = wp.full(1, np.nan, dtype=wp.float64, device=start_device("cpu"))
+    areas = wp.full(1, np.nan, dtype=wp.float64, device=start_device("cpu").warp)
     wp.launch(_area, dim=1, inputs=[batch.model, batch.state, batch.scratch, areas], device="cpu")
     return float(areas.numpy()[0])
 
@@ -134,7 +134,7 @@ def _bounds(drive: Drive, state: State, control: Control, is_driven: bool, bound
 
 def bounds_of(batch: Batch, *, is_driven: bool) -> np.ndarray:
     """`contact_step` and `spring_tolerance` (W, 2) of the worlds of a batch."""
-    bounds = wp.full((len(batch.links), 2), np.nan, dtype=wp.float64, device=start_device("cpu"))
+    bounds = wp.full((len(batch.links), 2), np.nan, dtype=wp.float64, device=start_device("cpu").warp)
     inputs = [batch.drive, batch.state, batch.control, is_driven, bounds]
     wp.launch(_bounds, dim=len(batch.links), inputs=inputs, device="cpu")
     return bounds.numpy()

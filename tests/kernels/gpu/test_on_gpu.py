@@ -1,6 +1,7 @@
-"""What can only be seen on a GPU; skipped where there is none, for what is shared with the CPU is tested there.
+"""What a GPU computes, and all that the host does for it. Without a GPU, the host's part runs on CPU fibers.
 
-Nothing here needs a Warp that can compile for the CPU, except the tests that compare with it.
+Numbers of real walks and comparisons with the CPU need a GPU, and are skipped where there is none. With one, nothing
+here needs a Warp that can compile for the CPU, except the tests that compare with it.
 """
 
 import signal
@@ -20,6 +21,7 @@ from tests.support.blocks_under_test import FIXED_STEP, SOFT, heap
 from warpchain import simulate, sweep, walk
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
+from warpchain.run.gpu_workers import gpu_workers
 from warpchain.status import Status
 from warpchain.walks import scheduler
 
@@ -61,7 +63,13 @@ def compare(ours: dict[str, np.ndarray], theirs: dict[str, np.ndarray]) -> float
 CASES = [("rkf78", "floor"), ("dp5", "sprocket"), ("bs32", "floor"), ("os32", "floor"), ("dp5", "floor")]
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
+def device() -> str:
+    """The first GPU, or CPU fibers where there is none."""
+    return "cuda" if wp.is_cuda_available() else "fibers"
+
+
+@pytest.fixture
 def gpu() -> None:
     """Skips where there is none."""
     if not wp.is_cuda_available():
@@ -75,7 +83,7 @@ def cpu() -> None:
         pytest.skip("this Warp cannot compile for the CPU, which is compared with")
 
 
-@pytest.mark.usefixtures("cpu")
+@pytest.mark.usefixtures("gpu", "cpu")
 @pytest.mark.parametrize(("method", "fixed_body"), CASES)
 def test_fixed_steps_agree_with_the_cpu(method: str, fixed_body: str) -> None:
     """Three hundred steps with hundreds of impulses end in the same state, to 1e-9."""
@@ -83,17 +91,19 @@ def test_fixed_steps_agree_with_the_cpu(method: str, fixed_body: str) -> None:
 
 
 @pytest.mark.parametrize("method", ["dp5", "os32"])
-def test_a_walk_gives_the_same_bits_in_any_batch(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_walk_gives_the_same_bits_in_any_batch(device: str, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Alone, among others of other lengths, in few or many slots and launches, after whatever ran before."""
-    settings = {"device": "cuda", "method": method}
-    setups = [brief_setup(seed, links=links, **settings) for seed in range(3) for links in (30, 60, 90)]
+    settings = {"device": device, "method": method}
+    setups = [brief_setup(seed, links=links, **settings) for seed in range(3) for links in (30, 60)]
     together = outcomes(setups)
     assert [outcomes([setup])[0] for setup in setups] == together
     assert outcomes(setups[::-1], slots=2)[::-1] == together
+    assert outcomes(setups, threads=64) == together
     monkeypatch.setattr("warpchain.engine.batch.LAUNCH_SECONDS", 0.0)
     assert outcomes(setups * 3) == together * 3
 
 
+@pytest.mark.usefixtures("gpu")
 @pytest.mark.parametrize("method", ["explicit", "os32", "rkf78", "dp5", "bs32"])
 def test_a_walk_gives_the_same_bits_in_any_block(method: str) -> None:
     """In the block of its own size, or in one that it shares with the longest chain, see `shared_threads`."""
@@ -101,31 +111,36 @@ def test_a_walk_gives_the_same_bits_in_any_block(method: str) -> None:
     assert outcomes(setups, threads=192) == outcomes(setups)
 
 
-def test_memory_that_holds_few_chains_only_takes_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_memory_that_holds_few_chains_only_takes_longer(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where memory is short, walks wait for one another."""
-    setups = [brief_setup(seed, device="cuda") for seed in range(5)]
+    setups = [brief_setup(seed, device=device) for seed in range(5)]
     together = outcomes(setups)
     monkeypatch.setattr(scheduler, "most_worlds", lambda *_, **__: 2)
     assert outcomes(setups) == together
 
 
-ON_GPU = {"device": "cuda"}
-BRIEF_AND_LONG = {
-    "version": 1,
-    "name": "brief and long",
-    "seed": 1,
-    "preset": "soft",
-    "samples": 20,
-    "scene": {"links": 30, "frequency": 12.0, "start": "ellipse"},
-    "options": {"method": "dp5", "rest_time": 100.0},
-    "grid": {"walk_limit": [0.02, 1.0]},
-    "record": {"series": {"samples": [0]}},
-}
-"""Half of the walks are over at once; the others take a second or so."""
+def content_of(device: str, long: float) -> dict[str, object]:
+    """A sweep that needs several kernels: walks that fly, briefly or long [s], or lean, and loops on the sprocket."""
+    scene = {"links": 30, "frequency": 12.0, "start": "ellipse"}
+    return {
+        "version": 1,
+        "name": "several kernels",
+        "seed": 1,
+        "preset": "soft",
+        "samples": 20,
+        "scene": scene,
+        "options": {"method": "dp5", "rest_time": 100.0, "device": device},
+        "blocks": [
+            {"name": "flying", "grid": {"walk_limit": [0.002, long]}},
+            {"name": "leaning", "scene": {"plane": "tilting", "tilt": 0.1, "clearance": 1e-4, "walk_limit": 0.01}},
+            {"name": "driven", "scene": {"start": "spinning", "hold_limit": 0.002}},
+        ],
+        "record": {"series": {"samples": [0]}, "frames": {"interval": 0.002, "samples": [0]}},
+    }
 
 
-def interrupted_sweep(source: Path, folder: Path, shards: int) -> int:
-    """Run a sweep in a process of its own, press Ctrl-C when so many shards are there; its exit status."""
+def broken_off(source: Path, folder: Path, how: signal.Signals) -> int:
+    """Run a sweep in a process of its own, send it a signal when two shards are there; its exit status."""
     process = subprocess.Popen(
         [sys.executable, "-m", "warpchain", "sweep", str(source), "-o", str(folder), "--workers", "2"],
         stdout=subprocess.DEVNULL,
@@ -133,40 +148,46 @@ def interrupted_sweep(source: Path, folder: Path, shards: int) -> int:
     )
     try:
         until = time.monotonic() + 120
-        while len(list((folder / "shards").glob("[0-9]*.h5"))) < shards:
+        while len(list((folder / "shards").glob("[0-9]*.h5"))) < 2:
             assert process.poll() is None, "it ended by itself"
             assert time.monotonic() < until, "no shards"
             time.sleep(0.005)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(how)
         return process.wait(60)
     finally:
         process.kill()
         process.wait()
 
 
-def test_a_sweep_ended_by_ctrl_c_goes_on(tmp_path: Path) -> None:
-    """It leaves whole shards and exit status 130, and ends with the same bytes; its series are those of a walk."""
-    content = BRIEF_AND_LONG | {"options": BRIEF_AND_LONG["options"] | ON_GPU}
+def test_a_sweep_gives_the_same_bytes_however_it_is_run(device: str, tmp_path: Path) -> None:
+    """In this process, by a worker of a GPU, or ended by Ctrl-C or killed and begun again; its series are a walk's."""
+    content = content_of(device, long=1.0 if device == "cuda" else 0.04)
     source = tmp_path / "sweep.yaml"
     source.write_text(yaml.safe_dump(content, sort_keys=False))
     whole = sweep(source, tmp_path / "whole")
-    assert whole.summary() == {"time_limit": 40, "at_rest": 0, "missing": 0}
+    assert whole.summary() == {"time_limit": 60, "not_steady": 20, "at_rest": 0, "missing": 0}
+    assert whole.blocks["leaning"].greatest_tilt.max() > 0.1004
     expected = data_of(tmp_path / "whole")
-    assert interrupted_sweep(source, tmp_path / "cut", shards=2) == 130
-    kept = data_of(tmp_path / "cut")
-    assert 2 <= len(kept) < len(expected)
-    assert kept.items() <= expected.items()
-    sweep(source, tmp_path / "cut")
-    assert data_of(tmp_path / "cut") == expected
+    with gpu_workers(1) as executor:
+        sweep(source, tmp_path / "worker", executor=executor, workers=1)
+    assert data_of(tmp_path / "worker") == expected
+    for how, status in ((signal.SIGINT, 130), (signal.SIGKILL, -signal.SIGKILL)):
+        cut = tmp_path / how.name
+        assert broken_off(source, cut, how) == status
+        kept = data_of(cut)
+        assert 2 <= len(kept) < len(expected)
+        assert kept.items() <= expected.items()
+        sweep(source, cut)
+        assert data_of(cut) == expected
 
-    series = whole.series(walk_limit=0.02, sample=0)
-    values = BRIEF_AND_LONG["scene"] | BRIEF_AND_LONG["options"] | ON_GPU
-    alone = walk(preset="soft", seed=1, walk_limit=0.02, **values)
-    assert len(series.time) == 21
+    series = whole.blocks["flying"].series(walk_limit=0.002, sample=0)
+    alone = walk(preset="soft", seed=1, walk_limit=0.002, **content["scene"], **content["options"])
+    assert len(series.time) == 3
     assert np.array_equal(series.time, alone.time)
     assert np.array_equal(series.center, alone.center)
 
 
+@pytest.mark.usefixtures("gpu")
 @pytest.mark.parametrize(("method", "within"), [("rkf78", 1e-8), ("dp5", 1e-8), ("bs32", 1e-7), ("os32", 1e-7)])
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_flights_agree_with_scipy(name: str, method: str, within: float) -> None:
@@ -180,7 +201,7 @@ def test_flights_agree_with_scipy(name: str, method: str, within: float) -> None
     assert flight.losses["joint_friction"] > 1e-4
 
 
-@pytest.mark.usefixtures("cpu")
+@pytest.mark.usefixtures("gpu", "cpu")
 def test_simulations_agree_with_the_cpu() -> None:
     """The same call with another device: the same statuses, samples at the same times, and nearly the same motion."""
     position, velocity = heap(12, 3)
@@ -191,6 +212,7 @@ def test_simulations_agree_with_the_cpu() -> None:
     assert np.allclose(motions[0].position[:4], motions[1].position[:4], rtol=0, atol=1e-6)
 
 
+@pytest.mark.usefixtures("gpu")
 def test_a_walk_comes_to_rest_and_its_ledger_closes() -> None:
     """Spun up, released, walked and at rest: the distance is that of such chains, no energy is unaccounted for."""
     found = walk(preset="soft", links=60, frequency=15.0, start="spinning", device="cuda")
@@ -202,6 +224,7 @@ def test_a_walk_comes_to_rest_and_its_ledger_closes() -> None:
     assert found.impulses["floor"] > 1000
 
 
+@pytest.mark.usefixtures("gpu")
 def test_the_last_moments_on_the_sprocket_are_kept() -> None:
     """Frames before the release carry the joints' forces: the mean tension is ρ v² and the weight's share, to 3 %."""
     links = 40
@@ -220,6 +243,7 @@ def test_the_last_moments_on_the_sprocket_are_kept() -> None:
     assert np.abs(before.frame_moments).max() > SOFT.coulomb_friction
 
 
+@pytest.mark.usefixtures("gpu")
 def test_joint_forces_are_recorded_in_fine_frames() -> None:
     """A round loop in flight has the tension ρ v² cos(π/n) in frames 0.1 ms apart, to 0.5 %."""
     links = 32

@@ -11,7 +11,7 @@ from warpchain.kernels.gpu.functions import board_rows, shares_board
 from warpchain.kernels.gpu.threads import barrier, block_maxima, tile_address, vec4i
 from warpchain.kernels.physics.elementary import order_bits_single
 
-DEVICE = start_device("cpu")
+DEVICE = start_device("cpu").warp
 THREADS = 24
 GREATEST, WRITE_MAXIMA, READ_MAXIMA = block_maxima(THREADS)
 ADDRESS = tile_address(vec4i, THREADS)

@@ -10,7 +10,7 @@ from warpchain.kernels.physics.elementary import LARGEST_TURN, cos_sin, small_tu
 
 Array = NDArray[np.float64]
 
-DEVICE = start_device("cpu")
+DEVICE = start_device("cpu").warp
 ROUNDING = np.finfo(np.float64).eps
 
 
