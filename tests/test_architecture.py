@@ -46,8 +46,10 @@ ONLY_FOR = {"oracle": {"bench"}, "bench": {"cli"}}
 """Wings that only some others may import."""
 KERNELS_FOR_ALL = {"codes", "features", "layout", "methods"}
 """Wings of kernels/ that hold data; all others are for engine/ alone …"""
-LAUNCHERS = {"warpchain.engine.batch"}
+LAUNCHERS = {"warpchain.engine.batch", "warpchain.engine.devices"}
 """… which launches kernels."""
+GPU_OR_NOT = "warpchain.engine.devices"
+"""The only module that asks Warp whether a device is a GPU: what differs stands there, with a form for CPU fibers."""
 LAUNCHES = ("launch", "launch_tiled", "capture_launch")
 TOP_LEVEL = {
     ".ci",
@@ -245,6 +247,7 @@ def test_a_file_is_short_and_does_not_launch(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert len(text.splitlines()) <= LONGEST_FILE
     assert not launches(text) or module_of(path) in LAUNCHERS
+    assert "is_cuda" not in text or module_of(path) == GPU_OR_NOT
 
 
 def test_the_package_exports_little() -> None:
