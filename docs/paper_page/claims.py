@@ -283,9 +283,9 @@ CLAIMS: Final = (
         "[waves](waves.md#do-they-matter)",
         findings.waves,
         {
-            PART: "One rate of the drag and one way of applying it are no waves switched off: by hand, a drag of 250/s "
-            "turns the sign, and without drag during impacts little is left ([waves](waves.md#do-they-matter)). Long "
-            "waves cannot be told apart from the loop's change of shape."
+            PART: "That was one drag. By hand: with 120 links at 30 Hz one of 250/s turns the sign, and without drag during "
+            "impacts less is left ([waves](waves.md#do-they-matter)). Long waves cannot be told apart from the loop's "
+            "change of shape."
         },
     ),
 )
