@@ -108,7 +108,7 @@ CLAIMS: Final = (
     Claim(
         "From rest, long chains collide with themselves right after their second collision with the floor",
         STARTS,
-        _left_open(findings.self_collision),
+        findings.self_collision,
         {OPEN: CREASES},
     ),
     Claim(
@@ -116,9 +116,9 @@ CLAIMS: Final = (
         STARTS,
         _left_open(findings.cause),
         {
-            OPEN: "Within a cell the first crease does not set the distance. Collisions of the strands are not counted, "
-            "and what all walks of a cell share, such as the narrow loop from which they start, this comparison cannot "
-            "show."
+            OPEN: "Within a cell the first crease does not set the distance. Collisions of the strands are not "
+            "counted, and what all walks of a cell share, such as the narrow loop from which they start, this "
+            "comparison cannot show."
         },
     ),
     Claim(
@@ -156,8 +156,9 @@ CLAIMS: Final = (
         "High-order explicit methods are 40 times faster than implicit ones",
         "[accuracy](accuracy.md#error-against-cost), [methods](#further-remarks)",
         findings.stated(
-            "a whole walk of 60 links: `rkf78` at 1e-6 takes 3.95 s, the implicit `rodas5p` 16.7 s at 1e-6 and 6.3 s at "
-            "1e-4, so 4.2 and 1.6 times as long; 150 links in free flight: `rodas5p` takes 7.4 times less, both at 1e-6",
+            "a whole walk of 60 links: `rkf78` at 1e-6 takes 3.95 s, the implicit `rodas5p` 16.7 s at 1e-6 and 6.3 s "
+            "at 1e-4, so 4.2 and 1.6 times as long; 150 links in free flight: `rodas5p` takes 7.4 times less, both at "
+            "1e-6",
             PART,
         ),
         {
@@ -169,8 +170,8 @@ CLAIMS: Final = (
         "… and 5 times faster than standard explicit methods, for the same error",
         "[methods](#further-remarks)",
         findings.stated(
-            "a whole walk of 60 links, both at 1e-6: `dp5` 3.7 s, `rkf78` 3.95 s, so `dp5` is 1.06 times faster; in free "
-            "flight 1.6 times, for errors of 4e-12 and 9e-12 m",
+            "a whole walk of 60 links, both at 1e-6: `dp5` 3.7 s, `rkf78` 3.95 s, so `dp5` is 1.06 times faster; in "
+            "free flight 1.6 times, for errors of 4e-12 and 9e-12 m",
             DIFFERS,
         ),
         {
@@ -213,8 +214,8 @@ CLAIMS: Final = (
         "`floor_friction`",
         findings.floor_friction,
         {
-            verdict: "Friction turns rotation into walking: Δx rises with it until links at the floor stick. Then it is "
-            "flat for short or slow loops and falls for long fast ones, which friction stops and "
+            verdict: "Friction turns rotation into walking: Δx rises with it until links at the floor stick. Then it "
+            "is flat for short or slow loops and falls for long fast ones, which friction stops and "
             "[folds](#friction-of-the-floor)."
             for verdict in (PART, DIFFERS)
         },
@@ -283,9 +284,9 @@ CLAIMS: Final = (
         "[waves](waves.md#do-they-matter)",
         findings.waves,
         {
-            PART: "That was one drag. By hand: with 120 links at 30 Hz one of 250/s turns the sign, and without drag during "
-            "impacts less is left ([waves](waves.md#do-they-matter)). Long waves cannot be told apart from the loop's "
-            "change of shape."
+            PART: "That was one drag. By hand: with 120 links at 30 Hz one of 250/s turns the sign, and without "
+            "drag during impacts less is left ([waves](waves.md#do-they-matter)). Long waves cannot be told apart "
+            "from the loop's change of shape."
         },
     ),
 )
