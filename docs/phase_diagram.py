@@ -6,7 +6,7 @@
 
 Parts have other seeds; they may be unfinished, and their grids may differ. A part is a folder of ``warpchain sweep``,
 or such an .npz file of its columns, 8 MB for 100,000 walks, which is quickly fetched from a far machine. The second
-command repeats every number and figure of the page. It needs warpchain[scipy] and takes about a minute.
+command repeats every number and figure of the page. It needs warpchain[scipy] and takes 10 to 25 s.
 """
 
 import argparse

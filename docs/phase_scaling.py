@@ -228,7 +228,7 @@ def table(cells: Mapping[str, Array]) -> str:
             f"| {name} | {root_mean_square(left, numbers):.1f} % | {worst(chosen, left)} |"
             for name, left, numbers in laws_of(chosen)
         ]
-        lines += ["", slopes(chosen), ""]
+        lines += ["", f"{slopes(chosen)} {drift(chosen)}".rstrip(), ""]
     return "\n".join(lines).rstrip()
 
 
@@ -245,6 +245,19 @@ def slopes(points: Points) -> str:
     return f"Δx/(nℓ) over v/(nℓ) is {', '.join(texts)}."
 
 
+def drift(points: Points) -> str:
+    """Exponent c of Δx/(nℓ) over ν n^c for the slower and the faster half of the frequencies, in words."""
+    frequencies = np.unique(points.frequency)
+    half = len(frequencies) // 2
+    if not half:
+        return ""
+    slow, fast = points.frequency <= frequencies[half - 1], points.frequency >= frequencies[-half]
+    if min(slow.sum(), fast.sum()) < FEWEST:
+        return ""
+    (low, high), (until, since) = (best_variable(points[part]) for part in (slow, fast)), frequencies[[half - 1, -half]]
+    return f"With d = 1 given, c is {low:.2f} up to {until:g} Hz and {high:.2f} from {since:g} Hz on."
+
+
 def laws_of(points: Points) -> list[tuple[str, Array, int]]:
     """Each law with its exponents and their standard errors, its residuals, and the numbers that it has fitted."""
     laws = [(law.name, residuals(law.x(points), law.y(points)), NUMBERS) for law in CANDIDATES]
@@ -253,7 +266,7 @@ def laws_of(points: Points) -> list[tuple[str, Array, int]]:
     laws.append((name, power_law_residuals(points), 3))
     c, (error,) = best_variable(points), bootstrap(points, best_variable)
     left = residuals(points.frequency * points.links**c, points.distance / points.length)
-    laws.append((f"Δx/(nℓ) over ν n^c, c = {c:.3f} ± {error:.3f}", left, NUMBERS + 1))
+    laws.append((f"Δx/(nℓ) over ν n^c, d = 1 given, c = {c:.3f} ± {error:.3f}", left, NUMBERS + 1))
     c, d = both = best_powers(points)
     c_error, d_error = bootstrap(points, lambda sample: best_powers(sample, both))
     left = residuals(points.frequency * points.links**c, points.distance / points.links**d)

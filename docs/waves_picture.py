@@ -1,6 +1,6 @@
 """Draws docs/figures/waves.png and prints how fast the two waves of the picture run, for waves.md.
 
-Run it as ``python docs/waves_picture.py``; it takes about a minute.
+Run it as ``python docs/waves_picture.py``; it takes 10 to 25 s.
 """
 
 from pathlib import Path

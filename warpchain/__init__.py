@@ -1,7 +1,7 @@
 """warpchain: ensembles of walking roller chains on NVIDIA Warp.
 
     import warpchain
-    walk = warpchain.walk(links=60, frequency=15.0, preset="soft")
+    walk = warpchain.walk(links=60, frequency=15.0)
     print(walk.status.label, walk.dx, "m")
 
 Importing the package starts no device and reads no heavy library; the first walk compiles its kernels.

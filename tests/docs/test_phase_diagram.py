@@ -228,6 +228,7 @@ def test_the_search_finds_the_exponent_of_a_made_law(scaling: ModuleType, expone
     """One variable puts all cells on a curve, and the search finds it; the candidate of that exponent fits as well."""
     points = scaling.points_of(made_cells(exponent, 1.0))
     assert scaling.best_variable(points) == pytest.approx(exponent, abs=0.002)
+    assert scaling.drift(points).count(f"{exponent:.2f}") == 2  # no drift: the slower and the faster half agree
     fitting = {-0.5: "Δx/(nℓ) over v²/(g nℓ)", 0.0: "Δx/(nℓ) over ν²ℓ/g"}.get(exponent)
     left = {law.name: scaling.rms_residual(law.x(points), law.y(points)) for law in scaling.CANDIDATES}
     assert all((value < 0.5) == (name == fitting) for name, value in left.items()), left

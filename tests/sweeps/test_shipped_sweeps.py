@@ -74,7 +74,7 @@ def test_shipped_sweeps(name: str, shapes: dict[str, tuple[int, ...]]) -> None:
     walks = sum(math.prod(shape) for shape in shapes.values())
     assert sweep.walk_count == walks
     stiff = {"figure6": list(shapes), "steadiness": ["paper", "paper_undamped"], "unsoftened_hold": list(shapes)}
-    stiff |= {"tilt": list(shapes), "paper_claims": ["start"], "paper_joints": list(shapes)}
+    stiff |= {"quickstart": list(shapes), "tilt": list(shapes), "paper_claims": ["start"], "paper_joints": list(shapes)}
     for block in sweep.blocks:
         preset = "paper" if block.name in stiff.get(name, []) else "soft"
         walks = math.prod(block.shape)

@@ -159,8 +159,8 @@ def walk(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Parameters to start from. paper: Table 1 of the paper; soft: softer joints, many times "
-            "faster. Default: paper.",
+            help="Parameters to start from. paper: Table 1 of the paper; soft: softer joints, 10 to 15 "
+            "times fewer steps with reference, about as many with standard. Default: paper.",
             autocompletion=completions.presets,
         ),
     ] = None,

@@ -182,8 +182,8 @@ PRESETS: Final[dict[str, Parameters]] = {
     "soft": _TABLE_1.with_values({"joint_stiffness": 1e7, "joint_damping": 100.0, "friction_smoothing": 0.1}),
 }
 """Named sets of parameters. `paper` is Table 1 as it is. `soft` has softer joints and a smoother joint
-friction, which take far fewer steps; the paper found that these adjusted values matter little, but they make
-another model."""
+friction, which take far fewer steps with `reference`, not with `standard`; the paper found that these adjusted
+values matter little, but they make another model."""
 
 
 def warn_of_units(given: Iterable[tuple[str, str, Any]]) -> None:
