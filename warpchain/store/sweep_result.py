@@ -157,19 +157,23 @@ class BlockResult:
         return found
 
     def statistics(self, name: str = "dx") -> CellStatistics:
-        """Statistics of a column in each cell.
+        """Statistics of a column in each cell, over the walks at rest that have a number there.
+
+        NaN and −1 stand for none, such as `bounces_before_collapse` of a loop that never collapsed: such walks are in
+        no mean, and `absent` counts them.
 
         Raises:
             KeyError: there is no such column.
         """
         unit = self.unit(name)
         status = self.columns["status"]
-        rested = status == Status.AT_REST
-        count = rested.sum(axis=-1)
-        values = np.where(rested, self.columns[name], 0.0)
+        column, rested = self.columns[name], status == Status.AT_REST
+        had = rested & (column != MISSING if column.dtype.kind == "i" else ~np.isnan(column))
+        count = had.sum(axis=-1)
+        values = np.where(had, column, 0.0)
         with np.errstate(invalid="ignore", divide="ignore"):
             mean = values.sum(axis=-1) / count
-            deviation = np.where(rested, values - mean[..., np.newaxis], 0.0)
+            deviation = np.where(had, values - mean[..., np.newaxis], 0.0)
             sd = np.sqrt((deviation**2).sum(axis=-1) / (count - 1))
         return CellStatistics(
             axes=self.axes,
@@ -177,6 +181,7 @@ class BlockResult:
             mean=mean,
             sd=np.where(count > 1, sd, np.nan),
             count=count,
+            absent=(rested & ~had).sum(axis=-1),
             failed=(~rested & (status != MISSING)).sum(axis=-1),
             missing=(status == MISSING).sum(axis=-1),
         )
