@@ -233,8 +233,8 @@ def results_page() -> str:
         + table(("field", "unit", "meaning"), fields)
         + "\n## A sweep\n\nColumns of `warpchain.SweepResult`; each drawn quantity has a column, too. "
         "What a walk does not have is NaN, or −1 in columns of whole numbers, such as `bounces_before_collapse` of a "
-        "loop that never collapsed. `cell_statistics` and figures leave such walks out, column by column: `count` is the "
-        "number of walks that were averaged, `absent` that of walks at rest without the quantity. Averages of your own "
+        "loop that never collapsed. `cell_statistics` and figures leave such walks out, column by column: `count` is "
+        "the number of walks that were averaged, `absent` that of walks at rest without the quantity. Averages of your own "
         "must do so, too.\n\n" + table(("column", "unit", "meaning"), columns)
     )
 
