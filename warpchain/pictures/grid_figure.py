@@ -186,7 +186,11 @@ def _set_ticks(axes: Axes, across: Axis, panels: Sequence[Panel]) -> None:
         if len(across.values) > label_room(axes, across.texts)[0]:
             axes.tick_params(axis="x", rotation=30)
         return
-    values = np.unique(np.concatenate([item.across.values for item in panels if item.across.name == across.name]))
+    values = np.unique(
+        np.concatenate(
+            [item.across.values for item in panels if item.across.name == across.name and item.across.is_numeric]
+        )
+    )
     placed = values.astype(float)
     if values[0] > 0 and values[-1] >= _DECADES * values[0] and _unevenness(np.log(placed)) <= _unevenness(placed):
         axes.set_xscale("log")

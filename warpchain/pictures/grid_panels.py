@@ -143,7 +143,8 @@ def line_values(panels: Iterable[Panel]) -> dict[str, Array]:
         if panel.along is not None and panel.kind == "lines":
             earlier = found.get(panel.along.name, panel.along.values[:0])
             values = dict.fromkeys([*earlier.tolist(), *panel.along.values.tolist()])
-            found[panel.along.name] = np.array(sorted(values) if panel.along.is_numeric else list(values))
+            rising = panel.along.is_numeric and None not in values
+            found[panel.along.name] = np.array(sorted(values) if rising else list(values))
     return found
 
 

@@ -219,6 +219,13 @@ def _checked(name: str, value: object, path: str) -> Value:
         raise InputError(path + str(error).removeprefix(".").removeprefix(name)) from None
 
 
+def _number(name: str, value: object, path: str) -> float:
+    """The same for a field that can be drawn, which is a number and never null."""
+    number = _checked(name, value, path)
+    assert number is not None
+    return float(number)
+
+
 def _axes(level: Mapping[str, Any], level_path: str) -> dict[str, tuple[Value, ...]]:
     """The axes of a level's grid; an axis whose name also has a fixed value there is refused."""
     axes = {}
@@ -311,7 +318,7 @@ def _distribution(name: str, content: object, path: str) -> Distribution | str:
         return Uniform(lower, upper, bounds)
     path += ".gaussian"
     gaussian = _keys(forms["gaussian"], path, ("mean", "sigma"))
-    mean = float(_checked(name, gaussian["mean"], f"{path}.mean")) if "mean" in gaussian else None
+    mean = _number(name, gaussian["mean"], f"{path}.mean") if "mean" in gaussian else None
     sigma = checked_positive(_needed(gaussian, "sigma", path, "give the standard deviation"), f"{path}.sigma")
     return Gaussian(mean, sigma, bounds)
 
@@ -319,7 +326,7 @@ def _distribution(name: str, content: object, path: str) -> Distribution | str:
 def _end(name: str, value: object, path: str, bounds: Bounds, inwards: float) -> float:
     """An end of an interval; it may be a bound that is itself not physical, as 1 is for a phase."""
     try:
-        return float(_checked(name, value, path))
+        return _number(name, value, path)
     except InputError:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise
