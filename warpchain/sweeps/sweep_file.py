@@ -342,8 +342,9 @@ def _drawn(
 ) -> dict[str, Distribution]:
     """What a block draws, in the order of drawing.
 
-    A parameter with a given value is drawn about it, phase and clearance are then not drawn. A given value beside a
-    distribution with a mean or ends of its own is refused.
+    Values on an axis are exact, and so are those given of phase and clearance; a parameter with one given value is
+    drawn about it. A distribution of the quantity's own name is drawn about each of them, and refused if it has a mean
+    or ends of its own.
     """
     _, default = given.get("all", ("", "table"))
     drawn: dict[str, Distribution] = {}
@@ -351,7 +352,7 @@ def _drawn(
         home = "grid" if name in axes else SECTION_OF[name] if name in sections[SECTION_OF[name]] else None
         path, choice = given.get(name, ("", None))
         if choice is None:
-            is_set = home is not None and name in Scene.model_fields
+            is_set = home == "grid" or (home is not None and name in Scene.model_fields)
             if default == "table" and name in TABLE and not is_set:
                 drawn[name] = TABLE[name]
         elif choice != "fixed":
