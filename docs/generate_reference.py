@@ -188,10 +188,14 @@ def sweep_file_page() -> str:
         + table(("key", "stands in", "meaning"), ((f"`{key}`", *row) for key, row in KEYS.items()))
         + "\n## Grid\n\nEach key is `preset` or a field of scene, options or parameters. Each value is a list, such as "
         "`[10, 15, 20]`, or a range with both ends: `{from: 5, to: 30, step: 5}` or `{from: 5, to: 30, count: 6}`. The "
-        "last axis varies fastest.\n"
+        "last axis varies fastest. `null` stands for itself where a field may be null, such as `load_factor: [null, "
+        "1]`; in merged files, xarray and pandas it is NaN.\n"
         "\n## Distributions\n\nThe key `all` says what is drawn of the other quantities: `table` (the default) or "
         "`fixed`, nothing. Each quantity takes one of `table`, `fixed`, `{uniform: [lower, upper]}` and "
-        "`{gaussian: {mean: …, sigma: …}}`; without `mean` the Gaussian lies about the chain's value. Distributions "
+        "`{gaussian: {mean: …, sigma: …}}`; without `mean` the Gaussian lies about the chain's value. The values "
+        "of an axis are exact: `all` does not hold for them. Only a distribution of their own name, such as "
+        "`floor_friction: table`, draws about each. A parameter given once, under `parameters`, is drawn about like "
+        "any other; `fixed` keeps it. Distributions "
         f"can be given for every parameter and for {', '.join(numbers)}. `table` draws:\n\n"
         + table(("quantity", "distribution"), drawn)
         + "\n## Samplers\n\n"
@@ -231,8 +235,11 @@ def results_page() -> str:
         + "\n## A walk\n\nFields of `warpchain.WalkResult`, and datasets of the file that `save` writes. "
         "Losses of energy are positive.\n\n"
         + table(("field", "unit", "meaning"), fields)
-        + "\n## A sweep\n\nColumns of `warpchain.SweepResult`; each drawn quantity has a column, too.\n\n"
-        + table(("column", "unit", "meaning"), columns)
+        + "\n## A sweep\n\nColumns of `warpchain.SweepResult`; each drawn quantity has a column, too. "
+        "What a walk does not have is NaN, or −1 in columns of whole numbers, such as `bounces_before_collapse` of a "
+        "loop that never collapsed. `cell_statistics` and figures leave such walks out, column by column: `count` is "
+        "the number of walks that were averaged, `absent` that of walks at rest without the quantity. Averages of your "
+        "own must do so, too.\n\n" + table(("column", "unit", "meaning"), columns)
     )
 
 

@@ -317,6 +317,33 @@ def test_what_cannot_be_drawn_is_refused(tmp_path: Path) -> None:
         one_cell.plot()
 
 
+def test_what_a_walk_does_not_have_is_in_no_mean(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """−1 and NaN of walks without a quantity are not averaged; figures say how many have none."""
+
+    def columns(walk: PlannedWalk) -> dict[str, float]:
+        """All walks of the first cell collapse, one of the second and of the third, and no ellipse has a hold."""
+        bounces = walk.sample if walk.index < 3 else 4 if walk.index in (4, 7) else -1
+        collapsed_at = 0.25 * bounces if bounces >= 0 else np.nan
+        return {"bounces_before_collapse": bounces, "collapsed_at": collapsed_at, "hold_time": np.nan}
+
+    content = sweep({"frequency": [10, 20, 30, 40]}, scene={"start": "ellipse"})
+    failing = {5: Status.TIME_LIMIT}
+    result = make_sweep(tmp_path, content, lambda walk: failing.get(walk.index, distance(walk)), columns)
+    for quantity, each in (("bounces_before_collapse", 1.0), ("collapsed_at", 0.25)):
+        found = result.cell_statistics(quantity)["main"]
+        np.testing.assert_array_equal(found.mean, [1 * each, 4 * each, 4 * each, np.nan])
+        np.testing.assert_array_equal(found.sd, [each, np.nan, np.nan, np.nan])
+        assert found.count.tolist() == [3, 1, 1, 0] and found.absent.tolist() == [0, 1, 2, 3]
+        assert found.failed.tolist() == [0, 1, 0, 0]
+        assert result.plot(quantity=quantity).axes[0].get_xlabel() == "1 of 12 walks failed, 6 of 12 have none"
+    assert result.statistics().count.tolist() == [3, 2, 3, 3] and not result.statistics().absent.any()
+    with pytest.raises(NothingToShow, match=r"^no walk at rest has this quantity$"):
+        result.plot(quantity="hold_time")
+    with pytest.raises(SystemExit, match="2"):
+        main(["plot", str(tmp_path), "--quantity", "hold_time"])
+    assert capsys.readouterr().err.startswith("error: --quantity: hold_time: no walk at rest has one")
+
+
 # All figures of a sweep
 
 

@@ -15,7 +15,9 @@ from tests.run.test_sweep_run import BRIEF, TINY
 from tests.support.made_sweeps import make_sweep
 from tests.support.sweep_content import blocks, content
 from warpchain.cli.main import main
+from warpchain.inputs.validation import InputError
 from warpchain.run.sweep_run import sweep
+from warpchain.store.merged_file import merge as merge_folders
 from warpchain.store.sweep_result import load
 
 
@@ -77,6 +79,18 @@ def test_folders_that_do_not_fit_are_refused(
     assert "error: b: " in error and message in error and "\n" not in error
     assert not (tmp_path / "both.h5").exists()
     assert yaml.safe_load((tmp_path / "b/sweep.yaml").read_text())["name"] == "small"
+
+
+def test_a_folder_given_twice_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its walks would be counted twice, whatever the path that leads to it again."""
+    make_sweep(tmp_path / "a", content())
+    (tmp_path / "link").symlink_to("a")
+    monkeypatch.chdir(tmp_path)
+    folder = Path("a")
+    for again in (folder, "a", "./a", tmp_path / "a", Path("link")):
+        with pytest.raises(InputError, match=f"^{again}: given twice; give each folder once$"):
+            merge_folders([folder, again], "both.h5")
+    assert not Path("both.h5").exists()
 
 
 def test_a_merge_of_many_blocks_has_room_or_is_refused(tmp_path: Path) -> None:

@@ -71,8 +71,8 @@ def distance(walk: PlannedWalk) -> float:
     )
 
 
-def fill_row(walk: PlannedWalk, outcome: "float | Status", rows: Rows) -> None:
-    """Fill the row of a walk that came to rest at a distance [m], or failed."""
+def fill_row(walk: PlannedWalk, outcome: "float | Status", rows: Rows, **own: float) -> None:
+    """Fill the row of a walk that came to rest at a distance [m], or failed, with own values of some columns."""
     failed = isinstance(outcome, Status)
     rows["status"] = outcome if failed else Status.AT_REST
     for name in rows.dtype.names or ():
@@ -82,10 +82,17 @@ def fill_row(walk: PlannedWalk, outcome: "float | Status", rows: Rows) -> None:
             rows[name] = 7
     rows["dx"] = math.nan if failed else outcome
     rows["energy_error"] = 1e-4
+    for name, value in own.items():
+        rows[name] = value
 
 
-def make_sweep(folder: Path, content: Mapping[str, object], outcome: Outcome = distance) -> SweepResult:
-    """A folder in which every walk has its outcome; in shards of one walk each, if some are not to be there."""
+def make_sweep(
+    folder: Path,
+    content: Mapping[str, object],
+    outcome: Outcome = distance,
+    columns: Callable[[PlannedWalk], Mapping[str, float]] = lambda walk: {},
+) -> SweepResult:
+    """A folder in which every walk has its outcome and columns; in shards of one walk, if some are not to be there."""
     sweep = load_sweep(content)
     walks = [sweep.planned(index) for index in range(sweep.walk_count)]
     outcomes = [outcome(walk) for walk in walks]
@@ -95,7 +102,7 @@ def make_sweep(folder: Path, content: Mapping[str, object], outcome: Outcome = d
             indices = store.manifest.walks(shard).tolist()
             for row, index in enumerate(indices):
                 if (given := outcomes[index]) is not None:
-                    fill_row(walks[index], given, rows[row : row + 1])
+                    fill_row(walks[index], given, rows[row : row + 1], **columns(walks[index]))
             if outcomes[indices[0]] is not None:
                 write_shard(store.directory, store.manifest.digest, shard, rows)
     return load(folder)

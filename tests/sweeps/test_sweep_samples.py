@@ -12,6 +12,7 @@ from scipy import stats
 
 from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content, drawn
 from warpchain.inputs.distributions import Gaussian, Uniform, random_generator, sampled
+from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import check_scene, fewest_links
 from warpchain.inputs.setup import resolve
 from warpchain.inputs.validation import Bounds, InputError
@@ -113,7 +114,8 @@ def test_same_samples_along_axes() -> None:
 
 def test_same_samples_about_different_means() -> None:
     """Along an axis of means, the same standard normal numbers are drawn about each."""
-    sweep = load_sweep(content(grid={"floor_friction": [0.3, 0.5]}, same_samples_along=["floor_friction"]))
+    given = content(grid={"floor_friction": [0.3, 0.5]}, distributions={"floor_friction": "table"})
+    sweep = load_sweep(given | {"same_samples_along": ["floor_friction"]})
     values = drawn(sweep, 6).reshape(2, 3, -1)
     friction = sweep.blocks[0].drawn.index("floor_friction")
     assert values[1, :, friction] - values[0, :, friction] == pytest.approx(np.full(3, 0.2), rel=1e-12)
@@ -123,6 +125,31 @@ def test_same_samples_about_different_means() -> None:
 # Distributions
 
 
+@pytest.mark.parametrize("name", TABLE_1)
+@pytest.mark.parametrize("others", [{}, {"all": "table"}])
+def test_values_on_an_axis_are_exact_unless_scatter_is_asked_for(name: str, others: dict[str, Any]) -> None:
+    """Every walk has the very value of its cell, and all else is drawn; the name with `table` draws about the value."""
+    value = Parameters.quantities()[name].value
+    given = content(samples=20, grid={name: [1.1 * value, 1.2 * value]})
+    exact = load_sweep(given | {"distributions": others})
+    found = [getattr(exact.planned(index).setup.parameters, name) for index in range(40)]
+    assert found == [1.1 * value] * 20 + [1.2 * value] * 20
+    assert list(exact.blocks[0].drawn) == [*(other for other in TABLE_1 if other != name), "phase", "clearance"]
+    scattered = load_sweep(given | {"distributions": {**others, name: "table"}})
+    assert scattered.blocks[0].drawn == (*TABLE_1, "phase", "clearance") and scattered.digest() != exact.digest()
+    assert len({getattr(scattered.planned(index).setup.parameters, name) for index in range(40)}) == 40
+
+
+def test_a_grid_from_zero_simulates_zero() -> None:
+    """About 0 and 0.01 negative draws were repeated, so means were 0.016 and 0.019; `table` still asks for that."""
+    given = content(samples=200, grid={"floor_friction": [0, 0.01]})
+    for distributions, means in (({}, [0.0, 0.01]), ({"floor_friction": "table"}, [0.016, 0.019])):
+        sweep = load_sweep(given | {"distributions": distributions})
+        values = [sweep.planned(index).setup.parameters.floor_friction for index in range(400)]
+        tolerance = 0.0 if not distributions else 0.0015
+        assert np.mean(np.reshape(values, (2, 200)), axis=1) == pytest.approx(means, rel=1e-12, abs=tolerance)
+
+
 @pytest.mark.parametrize(
     ("changes", "names"),
     [
@@ -130,7 +157,8 @@ def test_same_samples_about_different_means() -> None:
         ({"distributions": {"all": "table"}}, [*TABLE_1, "phase", "clearance"]),
         ({"scene": {"phase": 0.5}}, [*TABLE_1, "clearance"]),
         ({"grid": {"clearance": [0.01]}}, [*TABLE_1, "phase"]),
-        ({"grid": {"link_length": [0.013]}}, [*TABLE_1, "phase", "clearance"]),
+        ({"grid": {"link_length": [0.013]}}, [*TABLE_1[1:], "phase", "clearance"]),
+        ({"parameters": {"link_length": 0.013}}, [*TABLE_1, "phase", "clearance"]),
         ({"distributions": {"all": "fixed", "phase": "table"}}, ["phase"]),
         ({"distributions": {"all": "fixed"}, "samples": 1}, []),
         (
@@ -153,7 +181,7 @@ def test_same_samples_about_different_means() -> None:
     ],
 )
 def test_what_is_drawn(changes: dict[str, Any], names: list[str]) -> None:
-    """Table 1, phase and clearance unless said otherwise; a set phase or clearance stays, a set parameter is a mean."""
+    """Table 1, phase and clearance unless said otherwise; an axis and a set phase stay, a set parameter is a mean."""
     sweep = load_sweep(content(**changes))
     assert list(sweep.blocks[0].drawn) == names == list(sweep.planned(0).drawn)
     setup = sweep.planned(0).setup

@@ -158,7 +158,8 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
         for heading in (*map(printable, of_block.axes), "mean Δx / m", "s.d. / m", "at rest", "failed", "missing"):
             table.add_column(heading, justify="right")
         for cell in itertools.islice(np.ndindex(*of_block.mean.shape), left):
-            place = [printable(str(values[index])) for values, index in zip(of_block.axes.values(), cell, strict=True)]
+            at = (values[index] for values, index in zip(of_block.axes.values(), cell, strict=True))
+            place = ["null" if value is None else printable(str(value)) for value in at]
             lengths = [f"{array[cell]:.4f}" for array in (of_block.mean, of_block.sd)]
             walks = [str(array[cell]) for array in (of_block.count, of_block.failed, of_block.missing)]
             table.add_row(*place, *lengths, *walks)
@@ -170,9 +171,9 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
 
 def _plain(array: Any) -> Any:
     """An array as JSON has it; a number that is NaN is null."""
-    values = array.tolist()
+    values = np.asarray(array).tolist()
     if isinstance(values, list):
-        return [_plain(part) for part in array]
+        return [_plain(part) for part in values]
     return None if values != values else values
 
 

@@ -71,7 +71,7 @@ def draw_grid(
 
     Raises:
         ValueError: the kind is unknown, or `ax` is given together with `figure` or for several panels.
-        NothingToShow: no block has an axis of several values, or two for a map, or no walk has come to rest.
+        NothingToShow: no block has an axis of several values, or two for a map, or there is no mean.
     """
     if kind not in (None, "lines", "map"):
         raise ValueError(f"kind: {kind!r} is unknown; give 'lines', 'map' or None")
@@ -186,7 +186,11 @@ def _set_ticks(axes: Axes, across: Axis, panels: Sequence[Panel]) -> None:
         if len(across.values) > label_room(axes, across.texts)[0]:
             axes.tick_params(axis="x", rotation=30)
         return
-    values = np.unique(np.concatenate([item.across.values for item in panels if item.across.name == across.name]))
+    values = np.unique(
+        np.concatenate(
+            [item.across.values for item in panels if item.across.name == across.name and item.across.is_numeric]
+        )
+    )
     placed = values.astype(float)
     if values[0] > 0 and values[-1] >= _DECADES * values[0] and _unevenness(np.log(placed)) <= _unevenness(placed):
         axes.set_xscale("log")
@@ -234,7 +238,7 @@ def _draw_maps(maps: Sequence[tuple[Axes, Panel]], label: str, *, with_numbers: 
         assert panel.along is not None
         image = draw_map(axes, panel.mean, panel.across.texts, panel.along.texts, **colors)
         if with_numbers:
-            write_values(axes, image, panel.mean, panel.count, panel.failed, panel.missing)
+            write_values(axes, image, panel.mean, panel.count + panel.absent, panel.failed, panel.missing)
         else:
             draw_failed(axes, panel.failed_share)
     areas = [axes for axes, _ in maps]

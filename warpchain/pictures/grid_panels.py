@@ -32,7 +32,7 @@ class Cells(Counts, Protocol):
     Attributes:
         axes: name of each axis → its values.
         unit: unit of the quantity.
-        mean: mean of the walks at rest; NaN without any.
+        mean: mean of the walks at rest that have the quantity; NaN without any.
         sd: standard deviation; NaN with fewer than two.
     """
 
@@ -43,7 +43,7 @@ class Cells(Counts, Protocol):
 
     @property
     def standard_error(self) -> Array:
-        """Standard error of the mean; NaN with fewer than two walks at rest."""
+        """Standard error of the mean; NaN with fewer than two such walks."""
         ...
 
 
@@ -90,13 +90,14 @@ class Panel:
     sd: Array
     standard_error: Array
     count: Array
+    absent: Array
     failed: Array
     missing: Array
 
     @property
     def failed_share(self) -> Array:
         """Share of the walks of a cell that failed, of those that were run."""
-        share: Array = self.failed / np.maximum(self.count + self.failed, 1)
+        share: Array = self.failed / np.maximum(self.count + self.absent + self.failed, 1)
         return share
 
     @property
@@ -115,7 +116,7 @@ def grid_panels(blocks: Mapping[str, Cells], kind: Kind | None) -> tuple[list[Pa
         kind: of all panels; None for what shows a grid best.
 
     Raises:
-        NothingToShow: no block has an axis of several values, or two for a map, or no walk has come to rest.
+        NothingToShow: no block has an axis of several values, or two for a map, or there is no mean.
     """
     several = [frozenset(_axes(cells)) for cells in blocks.values()]
     panels: list[Panel] = []
@@ -130,7 +131,8 @@ def grid_panels(blocks: Mapping[str, Cells], kind: Kind | None) -> tuple[list[Pa
         axes = "two axes of several values" if kind == "map" else "an axis of several values"
         raise NothingToShow(f"a figure of a grid takes a block with {axes}")
     if not any(np.isfinite(panel.mean).any() for panel in panels):
-        raise NothingToShow("no walk has come to rest")
+        rested = any(panel.absent.any() for panel in panels)
+        raise NothingToShow("no walk at rest has this quantity" if rested else "no walk has come to rest")
     return panels, left_out
 
 
@@ -141,7 +143,8 @@ def line_values(panels: Iterable[Panel]) -> dict[str, Array]:
         if panel.along is not None and panel.kind == "lines":
             earlier = found.get(panel.along.name, panel.along.values[:0])
             values = dict.fromkeys([*earlier.tolist(), *panel.along.values.tolist()])
-            found[panel.along.name] = np.array(sorted(values) if panel.along.is_numeric else list(values))
+            rising = panel.along.is_numeric and None not in values
+            found[panel.along.name] = np.array(sorted(values) if rising else list(values))
     return found
 
 
@@ -166,7 +169,7 @@ def _panels(cells: Cells, kind: Kind | None, block: str) -> Iterator[Panel]:
         table = table.reshape([len(axis.values) for axis in axes.values()]).transpose(order)
         return table[..., np.newaxis, :] if along is None else table
 
-    names = ("mean", "sd", "standard_error", "count", "failed", "missing")
+    names = ("mean", "sd", "standard_error", "count", "absent", "failed", "missing")
     tables = [arranged(getattr(cells, name)) for name in names]
     for place in np.ndindex(*(len(axis.values) for axis in others)):
         values = (

@@ -30,12 +30,14 @@ class Counts(Protocol):
     """Numbers of walks of one cell or several.
 
     Attributes:
-        count: walks at rest.
+        count: walks at rest that have the quantity.
+        absent: walks at rest that have none.
         failed: walks that ended otherwise.
         missing: walks not computed yet.
     """
 
     count: Any
+    absent: Any
     failed: Any
     missing: Any
 
@@ -133,9 +135,13 @@ def cell_text(values: Mapping[str, Any]) -> str:
 
 def lost_note(cells: Sequence[Counts]) -> str:
     """Number of walks that are not in the means of some cells; empty if all are."""
-    rested, failed, missing = (
-        sum(int(np.sum(getattr(cell, name))) for cell in cells) for name in ("count", "failed", "missing")
+    counted, absent, failed, missing = (
+        sum(int(np.sum(getattr(cell, name))) for cell in cells) for name in ("count", "absent", "failed", "missing")
     )
-    walks = rested + failed + missing
-    texts = {f"{failed} of {walks} walks failed": failed, f"{missing} of {walks} not run yet": missing}
+    walks = counted + absent + failed + missing
+    texts = {
+        f"{failed} of {walks} walks failed": failed,
+        f"{absent} of {walks} have none": absent,
+        f"{missing} of {walks} not run yet": missing,
+    }
     return ", ".join(text for text, count in texts.items() if count)

@@ -42,7 +42,7 @@ def grid_picture(result: SweepResult, quantity: str, blocks: list[str]) -> Pictu
 
     Raises:
         InputError: there is no such column.
-        NothingToShow: no walk has come to rest in them.
+        NothingToShow: no walk at rest has the quantity in them.
     """
     statistics = result.cell_statistics(quantity)
     varied = [name for name in result.blocks[blocks[0]].axes if name in several(result.blocks[blocks[0]])]
@@ -53,7 +53,8 @@ def grid_picture(result: SweepResult, quantity: str, blocks: list[str]) -> Pictu
     if len(varied) == 1:
         name, over = "responses", "the one quantity that a block varies"
     text = quantity_name(quantity_of(quantity))
-    caption = f"{text[:1].upper()}{text[1:]} against {over}: means of the walks at rest."
+    those = "" if quantity == "dx" else " that have it"
+    caption = f"{text[:1].upper()}{text[1:]} against {over}: means of the walks at rest{those}."
     return Picture(named(name, quantity), caption, figure)
 
 

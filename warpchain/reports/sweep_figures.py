@@ -130,7 +130,8 @@ def heat_map(result: SweepResult, quantity: str = "dx") -> Picture:
 
     Raises:
         InputError: there is no such column.
-        NothingToShow: no walk has come to rest in a block that has several links and frequencies, and no other axes.
+        NothingToShow: no walk at rest has the quantity in a block that has several links and frequencies, and no other
+            axes.
     """
     series = [item for item in all_series(result, quantity) if item.is_map]
     if not any(cell.count for item in series for cell in item.cells.values()):
@@ -155,13 +156,15 @@ def heat_map(result: SweepResult, quantity: str = "dx") -> Picture:
             if len(series) > 1 and not column:
                 axes.set_title(item.label, fontsize="medium", loc="left")
             if has_numbers:
-                walks = (item.table(name, links, frequencies) for name in ("count", "failed", "missing"))
-                write_values(axes, image, table, *walks)
+                names = ("count", "absent", "failed", "missing")
+                count, absent, *others = (item.table(name, links, frequencies) for name in names)
+                write_values(axes, image, table, count + absent, *others)
         label = with_unit(f"{title} {symbol}", series[0].unit)
         figure.colorbar(image, ax=list(grid[:, column]), label=label).outline.set_visible(False)
     figure.supxlabel(FREQUENCY, fontsize="medium")
     figure.supylabel(LINKS, fontsize="medium")
-    caption = f"Mean and standard deviation of the {name}, over the walks at rest in each cell."
+    over = "the walks at rest" if quantity == "dx" else "the walks at rest that have it"
+    caption = f"Mean and standard deviation of the {name}, over {over} in each cell."
     return Picture(named("heat_map", quantity), caption, figure)
 
 

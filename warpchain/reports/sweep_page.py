@@ -107,7 +107,7 @@ def _cells(result: SweepResult) -> str:
             head, counts = [*head, "not run yet"], [*counts, found.missing]
         rows = [
             [
-                *(_plain(value.item()) for value in cell_values(block.axes, place).values()),
+                *(_plain(np.asarray(value).item()) for value in cell_values(block.axes, place).values()),
                 *(_meters(float(values[place])) for values in lengths),
                 *(f"{values[place]}" for values in counts),
             ]
@@ -244,8 +244,8 @@ def _value(block: Mapping[str, Any], section: str, name: str) -> str:
     if name in block["grid"]:
         values = [_plain(value) for value in block["grid"][name]]
         return ", ".join(values) if len(values) <= 12 else f"{values[0]} … {values[-1]} ({len(values)} values)"
-    fixed = block.get(name) if name == "preset" else block[section].get(name)
-    plain = "of the preset" if fixed is None else _plain(fixed)
+    own = block if name == "preset" else block[section]
+    plain = _plain(own[name]) if name in own else "of the preset"
     distribution = block["distributions"].get(name, {})
     if "gaussian" in distribution:
         gaussian = distribution["gaussian"]
@@ -284,8 +284,8 @@ def _provenance(result: SweepResult) -> str:
 
 def _plain(value: object) -> str:
     """A value as in a sweep file."""
-    if isinstance(value, bool):
-        return str(value).lower()
+    if value is None or isinstance(value, bool):
+        return "null" if value is None else str(value).lower()
     return number_text(value) if isinstance(value, float) else str(value)
 
 

@@ -32,6 +32,7 @@ class Cell:
     mean: float
     sd: float
     count: int
+    absent: int
     failed: int
     missing: int
 
@@ -53,7 +54,7 @@ class Series:
 
     def table(self, name: str, links: Sequence[int], frequencies: Sequence[float]) -> Array:
         """A statistic, NaN where there is no cell, shape (links, frequencies)."""
-        empty = Cell(np.nan, np.nan, 0, 0, 0)
+        empty = Cell(np.nan, np.nan, 0, 0, 0, 0)
         cells = [[self.cells.get((number, frequency), empty) for frequency in frequencies] for number in links]
         return np.array([[getattr(cell, name) for cell in row] for row in cells])
 
@@ -88,6 +89,7 @@ def all_series(result: SweepResult, quantity: str = "dx") -> list[Series]:
                 mean=float(found.mean[place]),
                 sd=float(found.sd[place]),
                 count=int(found.count[place]),
+                absent=int(found.absent[place]),
                 failed=int(found.failed[place]),
                 missing=int(found.missing[place]),
             )

@@ -11,14 +11,17 @@ Array = NDArray[Any]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CellStatistics:
-    """Statistics of a quantity over the walks of each cell that came to rest; arrays over the axes of the grid.
+    """Statistics of a quantity over the walks of each cell that came to rest and have it; arrays over the grid's axes.
+
+    A walk that never collapsed, say, has no `collapsed_at`: it is in no mean of that, and `count` is what was averaged.
 
     Attributes:
         axes: name of each axis → its values.
         unit: unit of `mean` and `sd`.
-        mean: mean; NaN without a walk at rest.
-        sd: standard deviation of a sample (divisor count − 1); NaN with fewer than two walks at rest.
-        count: number of walks at rest.
+        mean: mean; NaN without such a walk.
+        sd: standard deviation of a sample (divisor count − 1); NaN with fewer than two.
+        count: number of walks that came to rest and have the quantity: those in the mean.
+        absent: number of walks that came to rest and have none, NaN or −1 in their column.
         failed: number of walks that ended otherwise.
         missing: number of walks not computed yet.
     """
@@ -28,6 +31,7 @@ class CellStatistics:
     mean: NDArray[np.float64]
     sd: NDArray[np.float64]
     count: NDArray[np.int64]
+    absent: NDArray[np.int64]
     failed: NDArray[np.int64]
     missing: NDArray[np.int64]
 

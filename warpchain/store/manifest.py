@@ -50,7 +50,7 @@ class BlockLayout:
     """
 
     name: str
-    axes: dict[str, tuple[float | int | str, ...]]
+    axes: dict[str, tuple[float | int | str | None, ...]]
     samples: int
     first: int
     drawn: tuple[str, ...]

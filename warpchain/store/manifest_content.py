@@ -53,7 +53,7 @@ class _Block(BaseModel):
     samples: _Count
     sampler: Literal[*SAMPLERS]  # type: ignore[valid-type]
     distributions: dict[Literal["all", *DRAWABLE], Any]  # type: ignore[valid-type]
-    grid: dict[Literal["preset", *SECTION_OF], Annotated[list[bool | int | float | str], Field(min_length=1)]]  # type: ignore[valid-type]
+    grid: dict[Literal["preset", *SECTION_OF], Annotated[list[bool | int | float | str | None], Field(min_length=1)]]  # type: ignore[valid-type]
 
 
 class _Sweep(BaseModel):

@@ -113,11 +113,14 @@ def _check_fit(folders: Sequence[Folder]) -> None:
     for folder in folders if len(folders) > 1 else ():
         manifest = read_manifest(folder)
         sweep = load_sweep(manifest.sweep)
-        if (other := seeds.setdefault(manifest.seed, folder)) is not folder:
+        if (other := seeds.get(manifest.seed)) is not None:
+            if os.path.samefile(other, folder):
+                raise InputError(f"{folder}: given twice; give each folder once")
             raise InputError(
                 f"{folder}: has seed {manifest.seed}, as {other} has, so that walks are the same; "
                 "give sweeps with different seeds"
             )
+        seeds[manifest.seed] = folder
         for block in sweep.blocks:
             if not block.drawn:
                 raise InputError(f"{folder}: block {block.name} draws nothing, so that more samples are the same walks")

@@ -50,7 +50,7 @@ class BlockResult:
 
     Attributes:
         name: name of the block.
-        axes: name of each axis of the grid → its values, in order; the samples are one more axis.
+        axes: name of each axis of the grid → its values, in order; null is None. The samples are one more axis.
         drawn: names of the quantities that samples draw; the values are in the columns NAME_drawn.
         columns: name → values.
         motions: reads the motions of walks; None if none was kept.
@@ -111,7 +111,7 @@ class BlockResult:
         kept: NDArray[np.bool_] = np.array(chosen) & (self.columns["status"] != MISSING)
         return kept
 
-    def series(self, *, sample: int = 0, **at: float | str) -> WalkMotion:
+    def series(self, *, sample: int = 0, **at: float | str | None) -> WalkMotion:
         """The motion of one walk: `series(links=60, frequency=15, sample=2).time`.
 
         Args:
@@ -157,19 +157,23 @@ class BlockResult:
         return found
 
     def statistics(self, name: str = "dx") -> CellStatistics:
-        """Statistics of a column in each cell.
+        """Statistics of a column in each cell, over the walks at rest that have a number there.
+
+        NaN and −1 stand for none, such as `bounces_before_collapse` of a loop that never collapsed: such walks are in
+        no mean, and `absent` counts them.
 
         Raises:
             KeyError: there is no such column.
         """
         unit = self.unit(name)
         status = self.columns["status"]
-        rested = status == Status.AT_REST
-        count = rested.sum(axis=-1)
-        values = np.where(rested, self.columns[name], 0.0)
+        column, rested = self.columns[name], status == Status.AT_REST
+        had = rested & (column != MISSING if column.dtype.kind == "i" else ~np.isnan(column))
+        count = had.sum(axis=-1)
+        values = np.where(had, column, 0.0)
         with np.errstate(invalid="ignore", divide="ignore"):
             mean = values.sum(axis=-1) / count
-            deviation = np.where(rested, values - mean[..., np.newaxis], 0.0)
+            deviation = np.where(had, values - mean[..., np.newaxis], 0.0)
             sd = np.sqrt((deviation**2).sum(axis=-1) / (count - 1))
         return CellStatistics(
             axes=self.axes,
@@ -177,6 +181,7 @@ class BlockResult:
             mean=mean,
             sd=np.where(count > 1, sd, np.nan),
             count=count,
+            absent=(rested & ~had).sum(axis=-1),
             failed=(~rested & (status != MISSING)).sum(axis=-1),
             missing=(status == MISSING).sum(axis=-1),
         )
@@ -197,16 +202,21 @@ class BlockResult:
         Raises:
             ImportError: pandas is not installed.
         """
-        grid = np.meshgrid(*self.axes.values(), np.arange(self.shape[-1]), indexing="ij")
+        grid = np.meshgrid(*self._places().values(), indexing="ij")
         places = dict(zip(self.dims, grid, strict=True))
         table = {name: values.ravel() for name, values in (places | self.columns).items()}
         return _package("pandas").DataFrame(table)
 
     def variables(self) -> tuple[_Variables, _Variables]:
         """Coordinates and variables."""
-        places = {**self.axes, "sample": np.arange(self.shape[-1])}
-        coordinates: _Variables = {name: ((name,), values, self.notes(name)) for name, values in places.items()}
+        places = self._places().items()
+        coordinates: _Variables = {name: ((name,), values, self.notes(name)) for name, values in places}
         return coordinates, {name: (self.dims, values, self.notes(name)) for name, values in self.columns.items()}
+
+    def _places(self) -> dict[str, Array]:
+        """Values of each axis and numbers of the samples; an axis with null has numbers, and NaN for it."""
+        numbers = {name: given.astype(float) if given.dtype.kind == "O" else given for name, given in self.axes.items()}
+        return {**numbers, "sample": np.arange(self.shape[-1])}
 
     def notes(self, name: str) -> dict[str, Any]:
         """Attributes of a variable."""

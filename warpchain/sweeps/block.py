@@ -18,8 +18,8 @@ from warpchain.inputs.setup import Setup, combined, options_beside
 from warpchain.inputs.validation import InputError, validated
 from warpchain.sweeps.designs import walks_per_sample
 
-Value = float | int | str
-"""A value of a field; truth values are integers to Python."""
+Value = float | int | str | None
+"""A value of a field; truth values are integers to Python, and None is null."""
 _Place = tuple[tuple[str, Value], ...]
 """Names and values of the axes of one section in a cell."""
 
@@ -139,7 +139,7 @@ class Block:
             elif distribution.mean is not None:
                 given.append((f"distributions.{name}.gaussian.mean", name, distribution.mean))
         for where, name, value in given:
-            if name in Parameters.model_fields:
+            if name in Parameters.model_fields and value is not None:
                 yield f"{self.path}.{where}", name, float(value)
 
     def placed(self, fixed: Setup) -> dict[str, Distribution]:

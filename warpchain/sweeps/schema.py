@@ -75,7 +75,10 @@ def sweep_schema() -> Schema:
             "distributions": _object(
                 {"all": _enumerated(("table", "fixed")), **_named(DRAWABLE, "distributions", _distribution)}
             ),
-            "grid": _object({"preset": _listed({"$ref": "#/definitions/preset"}), **_named(SECTION_OF, "grid", _axis)}),
+            "grid": {
+                **_object({"preset": _listed({"$ref": "#/definitions/preset"}), **_named(SECTION_OF, "grid", _axis)}),
+                "description": "axes; their values are exact unless distributions name the quantity",
+            },
         },
     }
 

@@ -219,6 +219,13 @@ def _checked(name: str, value: object, path: str) -> Value:
         raise InputError(path + str(error).removeprefix(".").removeprefix(name)) from None
 
 
+def _number(name: str, value: object, path: str) -> float:
+    """The same for a field that can be drawn, which is a number and never null."""
+    number = _checked(name, value, path)
+    assert number is not None
+    return float(number)
+
+
 def _axes(level: Mapping[str, Any], level_path: str) -> dict[str, tuple[Value, ...]]:
     """The axes of a level's grid; an axis whose name also has a fixed value there is refused."""
     axes = {}
@@ -311,7 +318,7 @@ def _distribution(name: str, content: object, path: str) -> Distribution | str:
         return Uniform(lower, upper, bounds)
     path += ".gaussian"
     gaussian = _keys(forms["gaussian"], path, ("mean", "sigma"))
-    mean = float(_checked(name, gaussian["mean"], f"{path}.mean")) if "mean" in gaussian else None
+    mean = _number(name, gaussian["mean"], f"{path}.mean") if "mean" in gaussian else None
     sigma = checked_positive(_needed(gaussian, "sigma", path, "give the standard deviation"), f"{path}.sigma")
     return Gaussian(mean, sigma, bounds)
 
@@ -319,7 +326,7 @@ def _distribution(name: str, content: object, path: str) -> Distribution | str:
 def _end(name: str, value: object, path: str, bounds: Bounds, inwards: float) -> float:
     """An end of an interval; it may be a bound that is itself not physical, as 1 is for a phase."""
     try:
-        return float(_checked(name, value, path))
+        return _number(name, value, path)
     except InputError:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise
@@ -335,8 +342,9 @@ def _drawn(
 ) -> dict[str, Distribution]:
     """What a block draws, in the order of drawing.
 
-    A parameter with a given value is drawn about it, phase and clearance are then not drawn. A given value beside a
-    distribution with a mean or ends of its own is refused.
+    Values on an axis are exact, and so are those given of phase and clearance; a parameter with one given value is
+    drawn about it. A distribution of the quantity's own name is drawn about each of them, and refused if it has a mean
+    or ends of its own.
     """
     _, default = given.get("all", ("", "table"))
     drawn: dict[str, Distribution] = {}
@@ -344,7 +352,7 @@ def _drawn(
         home = "grid" if name in axes else SECTION_OF[name] if name in sections[SECTION_OF[name]] else None
         path, choice = given.get(name, ("", None))
         if choice is None:
-            is_set = home is not None and name in Scene.model_fields
+            is_set = home == "grid" or (home is not None and name in Scene.model_fields)
             if default == "table" and name in TABLE and not is_set:
                 drawn[name] = TABLE[name]
         elif choice != "fixed":
