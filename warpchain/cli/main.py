@@ -201,8 +201,8 @@ def walk(
         str | None,
         typer.Option(
             metavar="S",
-            help="Draw parameters, phase and clearance at random: one Monte Carlo sample for each whole "
-            "number. Without it: the means of Table 1, phase 0.",
+            help="Draw the parameters, phase and clearance that are not given at random: one Monte Carlo sample for "
+            "each whole number. Without it: the means of Table 1, phase 0.",
         ),
     ] = None,
     config: Annotated[
@@ -379,7 +379,8 @@ def _setup(config: Path | None, preset: str | None, given: Sections, seed: int |
         records_loads=records_loads,
     )
     warn_of_units((f"parameters.{name}", name, value) for name, value in sections["parameters"].items())
-    return setup if seed is None else sampled(setup, random_generator(seed), kept=sections["scene"])
+    kept = {*sections["scene"], *sections["parameters"]}
+    return setup if seed is None else sampled(setup, random_generator(seed), kept=kept)
 
 
 def _frame_interval(output: Path | None, animation: str | None, text: str | None, records_loads: bool) -> float | None:
