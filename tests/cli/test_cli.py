@@ -284,7 +284,7 @@ def test_values_from_file_line_and_seed(command: Command) -> None:
         "parameters: {gravity: 9.7, chain_friction: 0.5, mu_fc: 0.3}\n",
         encoding="utf-8",
     )
-    line = "--config walk.yaml --links 32 --set parameters.chain_friction=0.4 --set ℓ=0.013 --set walk_limit=0.02 --seed 7"
+    line = "--config walk.yaml --links 32 --set chain_friction=0.4 --set ℓ=0.013 --seed 7 --set walk_limit=0.02"
     drawn = json.loads(command("walk", *line.split(), "--json").out)
     assert drawn["preset"] == "soft" and drawn["seed"] == 7
     scene, parameters = drawn["scene"], drawn["parameters"]
