@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator
 
 import warp as wp
 
+from warpchain.engine.kernel_cache import cache_refusal
 from warpchain.engine.kernel_choice import block_threads, resident_blocks
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
@@ -58,7 +59,10 @@ def _started(device: str) -> wp.Device:
     os.environ.setdefault("CUDA_DEVICE_MAX_CONNECTIONS", CONNECTIONS)  # CUDA reads both when it starts
     os.environ.setdefault("CUDA_MODULE_LOADING", "EAGER")  # else a kernel's first launch waits for those under way
     with _without_driver_warning():
-        wp.init()
+        try:
+            wp.init()
+        except OSError as error:
+            raise cache_refusal(error) from None
     name = "cuda:0" if device == "cuda" else device
     known = [found.alias for found in wp.get_devices()]
     if name not in known:

@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import warp as wp
 
+from warpchain.engine.kernel_cache import load_checked
 from warpchain.engine.processors import processors
 from warpchain.inputs.options import Options
 from warpchain.kernels.cpu.loop import make_advance
@@ -108,7 +109,7 @@ def load_kernels(wanted: Iterable[tuple[wp.Device, Features, int]]) -> None:
 
     def load(item: tuple[wp.Device, wp.Kernel, int]) -> None:
         device, kernel, threads = item
-        wp.load_module(kernel.module, device=device, block_dim=threads)
+        load_checked(kernel.module, device, threads)
 
     with _loading:
         kernels = [
