@@ -1,5 +1,6 @@
 """`python -m warpchain` is the command `warpchain`."""
 
+import os
 import sys
 from typing import NoReturn
 
@@ -9,6 +10,7 @@ from warpchain.cli.interrupts import INTERRUPTED, ignore_interrupts
 def run() -> NoReturn:
     """Run the command line and exit; Ctrl-C is heard from here on, also while libraries are imported."""
     try:
+        _open_closed_outputs()
         from warpchain.cli.main import main
 
         main()
@@ -18,6 +20,19 @@ def run() -> NoReturn:
         sys.exit(INTERRUPTED)
     finally:
         ignore_interrupts()
+
+
+def _open_closed_outputs() -> None:
+    """Let what was closed before the start (`2>&-`) lead nowhere, instead of to the next file that is opened."""
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        if getattr(sys, name) is None:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            try:
+                os.fstat(number)
+            except OSError:  # it is free
+                os.dup2(nowhere, number)
+            os.set_inheritable(nowhere, True)
+            setattr(sys, name, os.fdopen(nowhere, "w"))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,8 @@
-"""The end of a walk: a chain that has been slow for a while is at rest."""
+"""The end of a walk: a chain that has been slow for a while, on the floor, is at rest.
+
+What lies on the floor touches it all the time. A chain that is slow in mid-air, at the top of a bounce or under little
+gravity, is not at rest: an impulse on the floor must be at most as long ago as the rest time.
+"""
 
 import warp as wp
 
@@ -12,13 +16,16 @@ wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def watch_rest(state: State, control: Control, world: int, time: wp.float64, summary: Summary):
-    """Status AT_REST once the centre's speed and the rms speed have both been low for the rest time, else RUNNING."""
+def watch_rest(
+    state: State, control: Control, world: int, time: wp.float64, summary: Summary, last_floor_impulse: wp.float64
+):
+    """Status AT_REST once both speeds, the centre's and the rms, have been low for the rest time, else RUNNING."""
     speed = wp.sqrt(summary.center_u * summary.center_u + summary.center_v * summary.center_v)
     if wp.max(speed, summary.rms_speed) < control.rest_speed:
         if state.watch[world, REST_SINCE] < ZERO:
             state.watch[world, REST_SINCE] = time
-        if time - state.watch[world, REST_SINCE] >= control.rest_time:
+        is_held = time - last_floor_impulse <= control.rest_time
+        if is_held and time - state.watch[world, REST_SINCE] >= control.rest_time:
             return AT_REST
     else:
         state.watch[world, REST_SINCE] = wp.float64(-1.0)

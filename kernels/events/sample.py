@@ -92,7 +92,7 @@ def sampling(watch: str, softens: bool = False, tilts: bool = False):
         if wp.static(tilts):
             watch_fall(P, state, world, time)
         if wp.static(watches_rest):
-            return watch_rest(state, control, world, time, summary)
+            return watch_rest(state, control, world, time, summary, last_floor_impulse)
         if wp.static(watches_steadiness):
             if state.load_factor[world] > wp.float64(1.0):
                 rate = drag_rate(chain, state, drive, world, summary.height)

@@ -281,16 +281,17 @@ def test_values_from_file_line_and_seed(command: Command) -> None:
         "preset: soft\n"
         "scene: {links: 40, start: ellipse, frequency: 5.0, clearance: 0.004}\n"
         "options: {method: dp5, self_contact: true}\n"
-        "parameters: {gravity: 9.7, chain_friction: 0.5}\n",
+        "parameters: {gravity: 9.7, chain_friction: 0.5, mu_fc: 0.3}\n",
         encoding="utf-8",
     )
-    line = "--config walk.yaml --links 32 --set parameters.chain_friction=0.4 --set walk_limit=0.02 --seed 7"
+    line = "--config walk.yaml --links 32 --set chain_friction=0.4 --set ℓ=0.013 --seed 7 --set walk_limit=0.02"
     drawn = json.loads(command("walk", *line.split(), "--json").out)
     assert drawn["preset"] == "soft" and drawn["seed"] == 7
     scene, parameters = drawn["scene"], drawn["parameters"]
     assert (scene["links"], scene["clearance"], scene["walk_limit"]) == (32, 0.004, 0.02)
     assert (parameters["gravity"], parameters["chain_friction"]) == (9.7, 0.4)
-    assert scene["phase"] > 0 and parameters["link_length"] != preset("soft").link_length
+    assert (parameters["floor_friction"], parameters["link_length"]) == (0.3, 0.013)
+    assert scene["phase"] > 0 and parameters["inner_mass"] != preset("soft").inner_mass
     again = json.loads(command("walk", *line.split(), "--json").out)
     del drawn["wall_time"], again["wall_time"]
     assert drawn == again

@@ -297,6 +297,8 @@ def test_mp4_frames(tmp_path: Path) -> None:
         ("walk.gif", {"fps": 0}, "fps: 0 is not a positive number"),
         ("walk.html", {"slow": math.nan}, "slow: nan is not a positive number"),
         ("walk.gif", {"fps": 60}, "fps: 60 is too fast for a GIF"),
+        ("walk.gif", {"fps": 0.001}, "fps: 0.001 is too slow for a GIF; give 0.002 to 50"),
+        ("walk.gif", {"slow": 1e6, "fps": 0.01}, "slow: 1000000.0 shows a picture for more than 500 s"),
     ],
 )
 def test_animation_refusals(name: str, settings: dict[str, float], message: str, tmp_path: Path) -> None:

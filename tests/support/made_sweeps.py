@@ -78,6 +78,8 @@ def fill_row(walk: PlannedWalk, outcome: "float | Status", rows: Rows, **own: fl
     for name in rows.dtype.names or ():
         if (quantity := quantity_of(name)) in walk.drawn:
             rows[name] = walk.drawn[quantity]
+        elif name.startswith("penetration_") or name == "greatest_opening":
+            rows[name] = 7e-6
         elif name not in ("index", "status", "dx"):
             rows[name] = 7
     rows["dx"] = math.nan if failed else outcome

@@ -252,6 +252,15 @@ def test_setup_records_what_a_seed_drew():
     assert fixed.setup.parameters == walk.setup.parameters
 
 
+@pytest.mark.parametrize("name", ["floor_friction", "mu_fc", "μ_fc"])
+def test_a_seed_draws_only_what_is_not_named(name):
+    """A parameter that is given keeps its value beside a seed, by whatever name, and the others are drawn as ever."""
+    drawn, named = short_walk(seed=1, walk_limit=1e-3).setup, short_walk(seed=1, **{name: 0.3}, walk_limit=1e-3).setup
+    assert named.parameters.floor_friction == 0.3
+    assert named.parameters == drawn.parameters.with_values({"floor_friction": 0.3})
+    assert named.scene == drawn.scene
+
+
 @pytest.mark.slow
 def test_samples_scatter_about_an_independent_mean():
     """The mean of 16 samples is about the 0.66 m of another implementation, one walk differing by 2 to 9 %.

@@ -9,6 +9,7 @@ them, so that help is quick.
 import contextlib
 import io
 import json
+import os
 import sys
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -75,12 +76,23 @@ def _refuse_for(error: Exception) -> None:
         context = getattr(error, "ctx", None)
         command = context.command_path if context is not None else "warpchain"
         _refuse([f"{error.format_message().rstrip('.')}; see {command} --help"], error.exit_code)
+    if isinstance(error, FileNotFoundError) and not _is_somewhere():
+        _refuse(["working directory: it was deleted; change to another one"])
     if isinstance(error, OSError):
         _refuse([str(error)], FAILED if error.errno in DISK_FAILURES else REFUSED)
     if isinstance(error, InputError):
         _refuse(error.args, FAILED if isinstance(error, DamagedFileError) else REFUSED)
     if isinstance(error, LostWorkersError):
         _refuse([str(error)], FAILED)
+
+
+def _is_somewhere() -> bool:
+    """Whether the working directory of this process is still there."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return False
+    return True
 
 
 @contextlib.contextmanager
@@ -201,8 +213,8 @@ def walk(
         str | None,
         typer.Option(
             metavar="S",
-            help="Draw parameters, phase and clearance at random: one Monte Carlo sample for each whole "
-            "number. Without it: the means of Table 1, phase 0.",
+            help="Draw the parameters, phase and clearance that are not given at random: one Monte Carlo sample for "
+            "each whole number. Without it: the means of Table 1, phase 0.",
         ),
     ] = None,
     config: Annotated[
@@ -379,7 +391,8 @@ def _setup(config: Path | None, preset: str | None, given: Sections, seed: int |
         records_loads=records_loads,
     )
     warn_of_units((f"parameters.{name}", name, value) for name, value in sections["parameters"].items())
-    return setup if seed is None else sampled(setup, random_generator(seed), kept=sections["scene"])
+    kept = {*sections["scene"], *sections["parameters"]}
+    return setup if seed is None else sampled(setup, random_generator(seed), kept=kept)
 
 
 def _frame_interval(output: Path | None, animation: str | None, text: str | None, records_loads: bool) -> float | None:

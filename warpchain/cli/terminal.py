@@ -22,7 +22,7 @@ from warpchain.inputs.validation import InputError, one_line, printable
 from warpchain.pictures.style import save_figure
 from warpchain.pictures.walk_shape import Kind
 from warpchain.run.progress_bar import counts_text
-from warpchain.walks.energy_error import ENERGY_REMEDY, MOST_ENERGY_ERROR
+from warpchain.walks.faulty_rows import fault_remedies
 from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
@@ -142,8 +142,8 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
     console = Console(highlight=False, markup=False)
     counts = ", ".join(f"{count:,} {label}" for label, count in summary.items() if count or label == "at_rest")
     console.print(f"{printable(result.name)}: {result.walk_count:,} walks, {counts}")
-    if inaccurate := result.inaccurate_count:
-        console.print(f"{inaccurate:,} inaccurate: {ENERGY_REMEDY}")
+    for remedy_of_fault, number in fault_remedies(block.faults for block in result.blocks.values()).items():
+        console.print(f"{number:,} inaccurate: {remedy_of_fault}")
     if rate is not None:
         console.print(
             f"running: {rate:.2f} walks a second" + ("" if time_left is None else f", {_duration(time_left)} left")
@@ -210,17 +210,16 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
     depths = (f"{kind} {1e3 * depth:.3g} mm" for kind, depth in result.greatest_penetration.items())
     yield "greatest penetration", ", ".join(depths)
     released = energy["kinetic_at_release"] + energy["potential_at_release"]
-    if math.isnan(released):
-        return  # the chain never got so far
-    yield "energy at release", f"{released:.5f} J, kinetic {energy['kinetic_at_release']:.5f} J"
-    for cause in LOST:
-        if energy[cause] or cause not in ("softening", "joint_switch"):
-            yield f"  lost to {cause.replace('_', ' ')}", f"{energy[cause]:.5f} J"
-    left = energy["kinetic_at_end"] + energy["potential_at_end"]
-    yield "energy at the end", f"{left:.5f} J, kinetic {energy['kinetic_at_end']:.5f} J"
-    yield "unaccounted for", f"{energy['residual']:.1e} J"
-    if result.energy_error > MOST_ENERGY_ERROR:
-        yield "warning", ENERGY_REMEDY
+    if not math.isnan(released):  # else the chain never got so far
+        yield "energy at release", f"{released:.5f} J, kinetic {energy['kinetic_at_release']:.5f} J"
+        for cause in LOST:
+            if energy[cause] or cause not in ("softening", "joint_switch"):
+                yield f"  lost to {cause.replace('_', ' ')}", f"{energy[cause]:.5f} J"
+        left = energy["kinetic_at_end"] + energy["potential_at_end"]
+        yield "energy at the end", f"{left:.5f} J, kinetic {energy['kinetic_at_end']:.5f} J"
+        yield "unaccounted for", f"{energy['residual']:.1e} J"
+    for warning in result.warnings():
+        yield "warning", warning
 
 
 def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iterator[Path]:

@@ -16,6 +16,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpchain.engine.fibers import HeldStream
+from warpchain.engine.kernel_cache import cache_refusal, load_checked
 from warpchain.inputs.options import FIBERS, on_gpu
 from warpchain.inputs.validation import InputError
 from warpchain.version import package_versions
@@ -49,7 +50,7 @@ class Device:
 
     def load(self, kernel: wp.Kernel, threads: int) -> None:
         """Load a kernel for blocks of this many threads; it is compiled if the cache does not have it."""
-        wp.load_module(kernel.module, device=self.warp, block_dim=threads)
+        load_checked(kernel.module, self.warp, threads)
 
 
 class Gpu(Device):
@@ -152,7 +153,10 @@ def _started(device: str) -> Device:
     os.environ.setdefault("CUDA_DEVICE_MAX_CONNECTIONS", CONNECTIONS)  # CUDA reads both when it starts
     os.environ.setdefault("CUDA_MODULE_LOADING", "EAGER")  # else a kernel's first launch waits for those under way
     with _without_driver_warning():
-        wp.init()
+        try:
+            wp.init()
+        except OSError as error:
+            raise cache_refusal(error) from None
     if device == FIBERS:
         return Fibers(wp.get_device("cpu"))
     name = "cuda:0" if device == "cuda" else device

@@ -34,6 +34,9 @@ _GIF_PICTURES: Final = 1200
 _PLAYER_FRAMES: Final = 2000
 """Most frames of a page, which then has about 1 MB with 60 links."""
 
+_SLOWEST_GIF, _FASTEST_GIF = 0.002, 50
+"""Pictures per second of a GIF, whose delays are 16-bit numbers of hundredths of a second."""
+
 
 def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
     """Write a moving picture of a walk; the suffix of `path` gives the format: .gif, .mp4 or .html.
@@ -50,7 +53,7 @@ def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow
 
     Raises:
         ValueError: the suffix is unknown, the walk has no frames or broken ones, fps or slow is not positive, or a
-            GIF would have too many pictures, in all or per second: viewers slow down over 50.
+            GIF would have too many pictures, in all or per second (viewers slow down over 50), or too few.
         ImportError: an .mp4 is asked for and `imageio-ffmpeg` is not installed.
         OSError: the file cannot be written, or something else than a regular file is there.
     """
@@ -61,8 +64,9 @@ def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow
     for name, value in (("fps", fps), ("slow", slow)):
         if not (math.isfinite(value) and value > 0):
             raise ValueError(f"{name}: {value} is not a positive number; give one such as 30")
-    if suffix == ".gif" and fps > 50:
-        raise ValueError(f"fps: {fps} is too fast for a GIF; give at most 50")
+    if suffix == ".gif" and not _SLOWEST_GIF <= fps <= _FASTEST_GIF:
+        problem = "fast" if fps > _FASTEST_GIF else "slow"
+        raise ValueError(f"fps: {fps} is too {problem} for a GIF; give {_SLOWEST_GIF} to {_FASTEST_GIF}")
     check_frames(walk)
     writers[suffix](walk, checked_output(path), fps, slow)
 
@@ -87,6 +91,8 @@ def _write_gif(walk: Walk, path: Path, fps: float, slow: float) -> None:
     ends = np.rint(np.cumsum([0, *repeats]) * 100 / fps)
     durations = [int(hundredths) * 10 for hundredths in np.diff(ends)]
     durations[-1] = int(_HOLD * 1000)
+    if max(durations) >= 1000 / _SLOWEST_GIF:
+        raise ValueError(f"slow: {slow} shows a picture for more than {1 / _SLOWEST_GIF:g} s; give a smaller number")
     stage = _stage(walk)
     # One palette for all, from the first, the middle and the last picture; otherwise each picture has its own.
     samples = [np.asarray(stage.picture(pictures[round(part * (len(pictures) - 1))])) for part in (0, 0.5, 1)]

@@ -26,7 +26,7 @@ from warpchain.store.sweep_result import BlockResult, SweepResult, load
 from warpchain.sweeps.plan import load_sweep
 from warpchain.sweeps.recording import Recording
 from warpchain.version import VERSION
-from warpchain.walks.energy_error import ENERGY_REMEDY
+from warpchain.walks.faulty_rows import fault_remedies
 from warpchain.walks.rows import MISSING, field_column
 
 FRAME_INTERVAL: Final = 2e-3
@@ -142,20 +142,22 @@ def _failed(result: SweepResult) -> str:
 
 
 def _inaccurate(result: SweepResult) -> str:
-    """The walks whose energy error is above the limit, with what to try; empty if there is none."""
+    """The inaccurate walks, with what to try; empty if there is none."""
     several = len(result.blocks) > 1
-    head = ["walk", *["block"] * several, "cell", "sample", "energy error"]
+    head = ["walk", *["block"] * several, "cell", "sample", "energy error", "opening / m", "penetration / m"]
     rows: list[list[str]] = []
     for block in result.blocks.values():
         for *place, sample in itertools.islice(np.argwhere(block.inaccurate), _MOST_FAILED - len(rows)):
-            values = {name: block.columns[name][(*place, sample)] for name in ("index", "energy_error")}
+            values = {name: column[(*place, sample)] for name, column in block.columns.items()}
+            deepest = max(value for name, value in values.items() if name.startswith("penetration_"))
+            numbers = [f"{size:.1e}" for size in (values["energy_error"], values["greatest_opening"], deepest)]
             cell = cell_text(cell_values(block.axes, place)) or "–"
-            rows.append(
-                [f"{values['index']}", *[block.name] * several, cell, f"{sample}", f"{values['energy_error']:.1e}"]
-            )
+            rows.append([f"{values['index']}", *[block.name] * several, cell, f"{sample}", *numbers])
     if not rows:
         return ""
-    parts = [f"<p>{result.inaccurate_count:,}: {escape(ENERGY_REMEDY)}</p>", table(head, rows, numbers_from=len(head))]
+    counts = fault_remedies(block.faults for block in result.blocks.values())
+    parts = [f"<p>{count:,}: {escape(remedy)}</p>" for remedy, count in counts.items()]
+    parts.append(table(head, rows, numbers_from=len(head)))
     more = result.inaccurate_count - len(rows)
     return "\n".join(parts + [f"<p>… and {more:,} more.</p>"] * (more > 0))
 

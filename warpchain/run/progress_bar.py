@@ -20,7 +20,7 @@ class SweepProgress:
         before: Walks that were on disk when this run began.
         seconds: Wall time [s] of this run so far.
         statuses: Number of walks of this run by status label.
-        inaccurate: Walks of this run whose energy error is above 5 %.
+        inaccurate: Walks of this run that are inaccurate, see `warpchain.walks.faults`.
         compiling: Kernels are being compiled, which takes seconds to minutes the first time on a machine.
     """
 

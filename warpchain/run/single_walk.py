@@ -78,7 +78,8 @@ def walk(
         start: None or ``"rest"``, ``"spinning"`` or ``"ellipse"``.
         setup: ``setup`` of another walk, which is repeated to the bit, whatever was drawn for it. It is complete: no
             other setting is taken beside it, nothing is drawn, and ``seed`` is only noted in the result.
-        seed: Draw parameters, phase and clearance from their distributions; None: Table 1's means, phase 0.
+        seed: Draw those parameters, phase and clearance that are not given from their distributions; None: Table 1's
+            means, phase 0.
         frame_interval: Time between kept frames of all joints [s], at least 1e-6; None keeps none. It is rounded to
             whole samples; less than a ``record_interval`` holds after the release. Frames and samples do not change
             the walk: they are taken at the end of the first step after their time.
@@ -140,15 +141,16 @@ def _check_repeated(setup: object, others: Mapping[str, object], seed: Whole | N
 def setup_walk(preset: str, settings: Mapping[str, object], seed: Whole | None, records_loads: bool = False) -> Setup:
     """Sort settings by name into parameters, scene and options, check them, and draw the sample of a seed.
 
-    From the seed's generator come first the parameters, then phase and clearance. A phase or clearance that is
-    set is drawn as well; then the set value counts. `records_loads` is as in :func:`resolve`.
+    From the seed's generator come first the parameters, then phase and clearance. What is set is drawn as well, so that
+    the others stay what they are; then the set value counts. `records_loads` is as in :func:`resolve`.
 
     Raises:
         InputError: A name is unknown or a value is refused.
     """
     sections = by_section(settings)
     setup = resolve(preset, **sections, records_loads=records_loads)
-    return setup if seed is None else sampled(setup, random_generator(plain(seed, "seed")), kept=sections["scene"])
+    kept = {*sections["scene"], *sections["parameters"]}
+    return setup if seed is None else sampled(setup, random_generator(plain(seed, "seed")), kept=kept)
 
 
 def run_walk(

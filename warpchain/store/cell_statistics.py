@@ -6,6 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.status import Status
+from warpchain.walks.rows import MISSING
+
 Array = NDArray[Any]
 
 
@@ -34,6 +37,28 @@ class CellStatistics:
     absent: NDArray[np.int64]
     failed: NDArray[np.int64]
     missing: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, axes: dict[str, Array], unit: str, column: Array, status: Array) -> "CellStatistics":
+        """Statistics of a column over its last axis, that of the samples; ``status`` of the same walks."""
+        rested = status == Status.AT_REST
+        had = rested & (column != MISSING if column.dtype.kind == "i" else ~np.isnan(column))
+        count = had.sum(axis=-1)
+        values = np.where(had, column, 0.0)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            mean = values.sum(axis=-1) / count
+            deviation = np.where(had, values - mean[..., np.newaxis], 0.0)
+            sd = np.sqrt((deviation**2).sum(axis=-1) / (count - 1))
+        return cls(
+            axes=axes,
+            unit=unit,
+            mean=mean,
+            sd=np.where(count > 1, sd, np.nan),
+            count=count,
+            absent=(rested & ~had).sum(axis=-1),
+            failed=(~rested & (status != MISSING)).sum(axis=-1),
+            missing=(status == MISSING).sum(axis=-1),
+        )
 
     @property
     def standard_error(self) -> NDArray[np.float64]:

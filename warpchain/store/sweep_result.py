@@ -24,7 +24,8 @@ from warpchain.store.folder import read_rows
 from warpchain.store.manifest import Folder, read_manifest
 from warpchain.store.manifest_content import FORMAT_VERSION
 from warpchain.store.walk_motion import MotionReader, WalkMotion
-from warpchain.walks.energy_error import MOST_ENERGY_ERROR
+from warpchain.sweeps.plan import lengths_before_draws
+from warpchain.walks.faulty_rows import faults_of_columns
 from warpchain.walks.rows import COLUMNS, MISSING, Column, drawn_column, field_column, missing_rows, quantity_of
 
 if TYPE_CHECKING:
@@ -53,6 +54,7 @@ class BlockResult:
         axes: name of each axis of the grid → its values, in order; null is None. The samples are one more axis.
         drawn: names of the quantities that samples draw; the values are in the columns NAME_drawn.
         columns: name → values.
+        sweep: the resolved sweep.
         motions: reads the motions of walks; None if none was kept.
     """
 
@@ -60,6 +62,7 @@ class BlockResult:
     axes: dict[str, Array]
     drawn: tuple[str, ...]
     columns: dict[str, Array]
+    sweep: Mapping[str, Any]
     motions: MotionReader | None = None
 
     @property
@@ -150,10 +153,15 @@ class BlockResult:
         """Number of walks by status label; `at_rest` and `missing` always, others if there are any."""
         return _summary(self.columns["status"])
 
+    @cached_property
+    def faults(self) -> dict[str, NDArray[np.bool_]]:
+        """What makes walks inaccurate, a key of `warpchain.walks.faults.FAULTS` → whether each walk has it."""
+        return faults_of_columns(self.columns, lengths_before_draws(self.sweep, self.name))
+
     @property
     def inaccurate(self) -> NDArray[np.bool_]:
-        """Whether the energy error of a walk is above `MOST_ENERGY_ERROR`, shape `shape`."""
-        found: NDArray[np.bool_] = self.columns["energy_error"] > MOST_ENERGY_ERROR  # NaN is not
+        """Whether a walk has one of the `faults`, shape `shape`."""
+        found: NDArray[np.bool_] = np.any(list(self.faults.values()), axis=0)
         return found
 
     def statistics(self, name: str = "dx") -> CellStatistics:
@@ -165,26 +173,7 @@ class BlockResult:
         Raises:
             KeyError: there is no such column.
         """
-        unit = self.unit(name)
-        status = self.columns["status"]
-        column, rested = self.columns[name], status == Status.AT_REST
-        had = rested & (column != MISSING if column.dtype.kind == "i" else ~np.isnan(column))
-        count = had.sum(axis=-1)
-        values = np.where(had, column, 0.0)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            mean = values.sum(axis=-1) / count
-            deviation = np.where(had, values - mean[..., np.newaxis], 0.0)
-            sd = np.sqrt((deviation**2).sum(axis=-1) / (count - 1))
-        return CellStatistics(
-            axes=self.axes,
-            unit=unit,
-            mean=mean,
-            sd=np.where(count > 1, sd, np.nan),
-            count=count,
-            absent=(rested & ~had).sum(axis=-1),
-            failed=(~rested & (status != MISSING)).sum(axis=-1),
-            missing=(status == MISSING).sum(axis=-1),
-        )
+        return CellStatistics.of(self.axes, self.unit(name), self.columns[name], self.columns["status"])
 
     def to_xarray(self) -> "xarray.Dataset":
         """The block as a data set with named coordinates, units and meanings.
@@ -296,7 +285,7 @@ class SweepResult:
 
     @property
     def inaccurate_count(self) -> int:
-        """Number of walks whose energy error is above 5 %, whatever their status."""
+        """Number of walks with faults, whatever their status."""
         return sum(int(block.inaccurate.sum()) for block in self.blocks.values())
 
     def unit(self, name: str) -> str:
@@ -413,6 +402,7 @@ def load(directory: Folder) -> SweepResult:
             axes={name: np.array(values) for name, values in block.axes.items()},
             drawn=block.drawn,
             columns={name: np.ascontiguousarray(part[name]) for name in names},
+            sweep=manifest.sweep,
             motions=motions,
         )
     return SweepResult(

@@ -31,7 +31,8 @@ from warpchain.inputs.validation import InputError
 from warpchain.loop.before_release import BeforeRelease, is_ascending, read_before_release, write_before_release
 from warpchain.status import Status
 from warpchain.walks.drawn import Drawn
-from warpchain.walks.energy_error import ENERGY_REMEDY, MOST_ENERGY_ERROR, energy_error
+from warpchain.walks.energy_error import MOST_ENERGY_ERROR, energy_error
+from warpchain.walks.faults import FAULTS, faults
 from warpchain.walks.moving_plane import in_room
 
 if TYPE_CHECKING:
@@ -253,7 +254,7 @@ class WalkResult(Drawn):
     def __repr__(self) -> str:
         """One line with the most important numbers."""
         scene, error = self.setup.scene, self.energy_error
-        warning = f", energy error {error:.1e}" if error > MOST_ENERGY_ERROR else ""
+        warning = f", energy error {error:.1e}" if error > MOST_ENERGY_ERROR else ", inaccurate" * bool(self.warnings())
         return (
             f"<WalkResult {self.status.label}: dx {self.dx:.4g} m in {self.walk_time:.4g} s, "
             f"{self.bounces} bounces, {scene.links} links at {scene.frequency:g} Hz, {self.setup.preset}{warning}>"
@@ -264,6 +265,12 @@ class WalkResult(Drawn):
         """Size of the energy unaccounted for, relative to the energy at release; above 0.05 the walk is inaccurate."""
         return energy_error(self.energy)
 
+    def warnings(self) -> list[str]:
+        """Why the walk is inaccurate, each with what to try: energy, joints or contacts; empty if it is not."""
+        deepest, parameters = max(self.greatest_penetration.values()), self.setup.parameters
+        lengths = (self.greatest_opening, deepest, parameters.link_length, parameters.circle_radius)
+        return [FAULTS[name] for name, found in faults(self.energy_error, *lengths).items() if found]
+
     def facts(self) -> list[tuple[str, str]]:
         """Names and values that a notebook shows beside the picture."""
         return [
@@ -273,7 +280,7 @@ class WalkResult(Drawn):
             ("bounces", str(self.bounces)),
             ("steps", f"{self.steps_accepted:,} accepted, {self.steps_rejected:,} rejected"),
             ("energy unaccounted for", f"{self.energy['residual']:.1e} J"),
-            *([("warning", ENERGY_REMEDY)] if self.energy_error > MOST_ENERGY_ERROR else []),
+            *(("warning", remedy) for remedy in self.warnings()),
             ("computed in", f"{self.wall_time:.1f} s"),
         ]
 
