@@ -128,11 +128,15 @@ def board_size(threads: int) -> int:
     return BOARD_VALUES * (threads + 1) + max(threads + 1, VALUES)
 
 
+LANES = 8
+"""Columns that a CPU's vector holds. Loops over links go to the end of the last vector, and read a column beyond it."""
+
+
 def padded_width(link_count: int) -> int:
     """Static number of columns for a chain of this many links.
 
     200 columns serve every chain of the paper's range without a row stride that maps rows onto the same cache sets
     (powers of two are 1.3 to 2 times slower); longer chains get the next odd multiple of 200 that fits.
     """
-    blocks = -(-(link_count + 2) // 200)
+    blocks = -(-(-(-link_count // LANES) * LANES + 1) // 200)
     return 200 * (blocks + 1 - blocks % 2)

@@ -14,7 +14,7 @@ from warpchain.kernels.layout import STAGE_ROWS, STAGES, U, V, X, Y
 from warpchain.kernels.methods.controller import error_bits
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 from warpchain.kernels.physics.elementary import LARGEST_TURN, TWO, ZERO, cos_sin, order_bits
-from warpchain.kernels.physics.geometry import end_positions, end_velocities, turned
+from warpchain.kernels.physics.geometry import end_positions, end_velocities, turned, whole_lanes
 from warpchain.kernels.physics.joint import friction_torque, joint_force, link_acceleration
 from warpchain.kernels.physics.plane import plane_load
 from warpchain.kernels.types import Chain
@@ -26,9 +26,10 @@ wp.set_module_options({"enable_backward": False})
 def place_ends(K: wp.array2d(dtype=wp.float64), chain: Chain):
     """Directions and end positions of the links, exactly, from the state rows."""
     n = chain.link_count
+    lanes = whole_lanes(n)
     a = chain.half_length
     i = int(0)
-    while i < n:
+    while i < lanes:
         c, s = cos_sin(K[layout.THETA, i])
         K[layout.COSINE, i] = c
         K[layout.SINE, i] = s
@@ -46,9 +47,10 @@ def place_ends(K: wp.array2d(dtype=wp.float64), chain: Chain):
 def begin_stages(K: wp.array2d(dtype=wp.float64), chain: Chain):
     """Rows of the first stage from the state: arms, spins, end velocities; :func:`place_ends` has placed the ends."""
     n = chain.link_count
+    lanes = whole_lanes(n)
     a = chain.half_length
     i = int(0)
-    while i < n:
+    while i < lanes:
         arm_x = a * K[layout.COSINE, i]
         arm_y = a * K[layout.SINE, i]
         w = K[layout.OMEGA, i]
@@ -122,11 +124,12 @@ def explicit_method(name: str, tilts: bool = False):
     @wp.func
     def derivatives(K: wp.array2d(dtype=wp.float64), chain: Chain, row: int, needs_power: bool):
         n = chain.link_count
+        lanes = whole_lanes(n)
         weightless = chain
         if wp.static(tilts):
             weightless.gravity = ZERO
         i = int(0)
-        while i < n:
+        while i < lanes:
             cx = K[layout.LEFT_X, i + 1] - K[layout.RIGHT_X, i]
             cy = K[layout.LEFT_Y, i + 1] - K[layout.RIGHT_Y, i]
             cu = K[layout.LEFT_U, i + 1] - K[layout.RIGHT_U, i]
@@ -144,7 +147,7 @@ def explicit_method(name: str, tilts: bool = False):
         K[layout.FORCE_Y, 0] = K[layout.FORCE_Y, n]
         K[layout.TORQUE, 0] = K[layout.TORQUE, n]
         i = int(0)
-        while i < n:
+        while i < lanes:
             ax, ay, spin_rate = link_acceleration(
                 weightless,
                 K[layout.INVERSE_MASS, i],
@@ -182,12 +185,13 @@ def explicit_method(name: str, tilts: bool = False):
     @wp.func
     def attempt(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64, tolerance: wp.float64):
         n = chain.link_count
+        lanes = whole_lanes(n)
         a = chain.half_length
         hh = h * h
         for s in range(1, wp.static(stages)):
             ch = wp.static(wp.float64(nodes[s])) * h
             i = int(0)
-            while i < n:
+            while i < lanes:
                 du, dv, dw, dx, dy, turn = wp.static(stage_sums[s])(K, i)
                 turn = ch * K[layout.OMEGA, i] + hh * turn
                 arm_x, arm_y = turned(a * K[layout.COSINE, i], a * K[layout.SINE, i], turn)
@@ -218,7 +222,7 @@ def explicit_method(name: str, tilts: bool = False):
             derivatives(K, chain, wp.static(STAGES + STAGE_ROWS * s), wp.static(power_needed[s]))
         # new state and error ratio
         i = int(0)
-        while i < n:
+        while i < lanes:
             du, dv, dw, dx, dy, turn = new_state(K, i)
             eu, ev, ew, ex, ey, et = errors(K, i)
             u = K[U, i]
@@ -249,13 +253,14 @@ def explicit_method(name: str, tilts: bool = False):
                     error_bits(h * ew, w, K[wp.static(STAGES + 2), i], h),
                 ),
             )
+            worst = wp.where(i < n, worst, wp.int64(0))
             K[layout.ERROR, i] = wp.cast(worst, wp.float64) / tolerance  # wp.cast reads the bits back as a float
             i += 1
         # maxima over links: the longest turn and the greatest error ratio, as bits
         furthest = wp.int64(0)
         greatest = wp.int64(0)
         i = int(0)
-        while i < n:
+        while i < lanes:
             greatest = wp.max(greatest, order_bits(K[layout.ERROR, i]))
             furthest = wp.max(furthest, order_bits(K[layout.NEW_THETA, i] - K[layout.THETA, i]))
             i += 1
@@ -267,8 +272,9 @@ def explicit_method(name: str, tilts: bool = False):
     @wp.func
     def commit(K: wp.array2d(dtype=wp.float64), chain: Chain, h: wp.float64):
         n = chain.link_count
+        lanes = whole_lanes(n)
         i = int(0)
-        while i < n:
+        while i < lanes:
             friction = ZERO
             damping = ZERO
             for j in range(wp.static(stages)):

@@ -51,6 +51,7 @@ from warpchain.kernels.events.tilting import in_room, write_tilting_sample
 from warpchain.kernels.features import COMPILER_FLAGS, Features
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step
 from warpchain.kernels.physics.elementary import ONE, ZERO
+from warpchain.kernels.physics.geometry import whole_lanes
 from warpchain.kernels.physics.plane import accept_plane, half_step, on_plane
 from warpchain.kernels.physics.scaled_loads import write_inertias
 from warpchain.kernels.types import Chain, Control, Drive, Model, Record, State
@@ -73,6 +74,13 @@ def load_state(K: wp.array2d(dtype=wp.float64), state: State, chain: Chain, worl
         K[layout.LOST_FRICTION, i] = ZERO
         K[layout.LOST_DAMPING, i] = ZERO
         K[layout.LOST_FIXED, i] = ZERO
+        i += 1
+    # columns up to whole vectors: links without mass, which nothing moves
+    while i < whole_lanes(chain.link_count):
+        row = int(0)
+        while row < wp.static(layout.STAGES):
+            K[row, i] = ZERO
+            row += 1
         i += 1
     write_inertias(K, chain)
 

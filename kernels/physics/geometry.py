@@ -6,9 +6,18 @@ length a times its direction (cos θ, sin θ); the left end is at minus the arm.
 
 import warp as wp
 
+from warpchain.kernels import layout
 from warpchain.kernels.physics.elementary import small_turn
 
 wp.set_module_options({"enable_backward": False})
+
+LANES = wp.constant(layout.LANES)
+
+
+@wp.func
+def whole_lanes(n: int):
+    """The number of links, rounded up to whole vectors: loops over so many columns have no remainder."""
+    return (n + wp.static(LANES - 1)) & wp.static(-LANES)
 
 
 @wp.func

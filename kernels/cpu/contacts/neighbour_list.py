@@ -13,6 +13,7 @@ import warp as wp
 from warpchain.kernels.contacts.pair_list import bucket_of, list_layout, listing_reach
 from warpchain.kernels.layout import LISTED_X, LISTED_Y, RIGHT_X, RIGHT_Y
 from warpchain.kernels.physics.elementary import HALF, order_bits
+from warpchain.kernels.physics.geometry import whole_lanes
 from warpchain.kernels.types import Chain
 
 wp.set_module_options({"enable_backward": False})
@@ -23,10 +24,10 @@ def greatest_displacement(K: wp.array2d(dtype=wp.float64), chain: Chain):
     """Greatest displacement [m] of a joint since the list was built."""
     greatest = wp.int64(0)
     i = int(0)
-    while i < chain.link_count:
+    while i < whole_lanes(chain.link_count):
         dx = K[RIGHT_X, i] - K[LISTED_X, i]
         dy = K[RIGHT_Y, i] - K[LISTED_Y, i]
-        greatest = wp.max(greatest, order_bits(dx * dx + dy * dy))
+        greatest = wp.max(greatest, wp.where(i < chain.link_count, order_bits(dx * dx + dy * dy), wp.int64(0)))
         i += 1
     return wp.sqrt(wp.cast(greatest, wp.float64))
 
