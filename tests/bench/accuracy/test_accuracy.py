@@ -136,18 +136,23 @@ def test_evaluations_are_counted_by_stages() -> None:
 
 @pytest.mark.slow
 def test_impacts_and_sprocket_converge_to_what_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With contacts, impulse and angular momentum agree to the accuracy that the methods are told apart by."""
+    """With contacts, impulse and angular momentum agree to the accuracy that the methods are told apart by.
+
+    Impacts end after their first millisecond, before chaos: 1e-12 of a start is 2e-5 of the impulse then. At tolerances
+    of 0.5 to 2e-6 ``dp5`` errs by 0.4 to 0.8 %, SciPy by 1.6 % with a standard deviation of 0.2 %.
+    """
     monkeypatch.setattr(
         "warpchain.bench.problems.scipy_solvers.PATIENCE", math.inf
     )  # 30 s of a core alone are more of a shared one
-    for name, links, close in (("impact", 20, 0.03), ("sprocket", 60, 1e-3)):
-        problem = make_problem(name, links)
+    impact, sprocket = replace(make_problem("impact", 20), duration=1e-3), make_problem("sprocket", 60)
+    for problem, close in ((impact, 0.03), (sprocket, 1e-3)):
         true = make_reference(problem)
-        assert true.trust.momentum_error < close
+        assert true.trust.momentum_error < close / 3
         found = points(problem, true, ["dp5"], [1e-6], 1, silent) + scipy_points(problem, true, [1e-6], silent)
-        assert len(found) == (2 if name == "impact" else 1)
+        assert len(found) == (2 if problem is impact else 1)
         for point in found:
-            assert point.status == "finished" and abs(point.momentum_bias) <= point.momentum_error * 1.5 < close
+            assert point.status == "finished" and abs(point.momentum_bias) <= 1.5 * point.momentum_error
+            assert point.momentum_error < close
 
 
 # --- ensembles ---

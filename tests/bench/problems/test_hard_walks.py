@@ -139,5 +139,6 @@ def test_walks_at_the_ends_of_the_collision_law(method: str, friction: int, rest
     law = {"floor_restitution": restitution, "chain_restitution": restitution}
     done = walked(f"elastic-floor-friction-{friction}", method, 3e-4, **law)
     if friction == 0:
-        assert abs(done.dx) < 1e-12
+        # rounding moves the centre by at most 2e-12, and further with other processors and linear systems
+        assert abs(done.dx) < 1e-10
     assert abs(done.energy["joint_switch"]) < 1e-2 * done.energy["kinetic_at_release"]
