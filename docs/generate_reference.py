@@ -192,10 +192,9 @@ def sweep_file_page() -> str:
         "1]`; in merged files, xarray and pandas it is NaN.\n"
         "\n## Distributions\n\nThe key `all` says what is drawn of the other quantities: `table` (the default) or "
         "`fixed`, nothing. Each quantity takes one of `table`, `fixed`, `{uniform: [lower, upper]}` and "
-        "`{gaussian: {mean: …, sigma: …}}`; without `mean` the Gaussian lies about the chain's value. The values "
-        "of an axis are exact: `all` does not hold for them. Only a distribution of their own name, such as "
-        "`floor_friction: table`, draws about each. A parameter given once, under `parameters`, is drawn about like "
-        "any other; `fixed` keeps it. Distributions "
+        "`{gaussian: {mean: …, sigma: …}}`; without `mean` the Gaussian lies about the chain's value. Given values, "
+        "on an axis or not, are exact: `all` does not hold for them. Only a distribution of their own name, such as "
+        "`floor_friction: table`, draws about each. Distributions "
         f"can be given for every parameter and for {', '.join(numbers)}. `table` draws:\n\n"
         + table(("quantity", "distribution"), drawn)
         + "\n## Samplers\n\n"

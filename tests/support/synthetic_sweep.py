@@ -59,6 +59,7 @@ class SyntheticSweep:
         blocks = [
             {
                 "name": block.name,
+                "preset": "paper",
                 "samples": block.samples,
                 "sampler": "random",
                 "distributions": {"all": "fixed"} | {name: {"uniform": [0, 1]} for name in block.drawn},

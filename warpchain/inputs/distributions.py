@@ -219,10 +219,10 @@ def sampled(setup: Setup, rng: np.random.Generator, kept: Container[str] = ()) -
     Args:
         setup: the means; a quantity without an uncertainty is taken over.
         rng: the stream to draw from, see `random_generator`.
-        kept: quantities that are drawn as well, so that the others stay what they are, but keep their value.
+        kept: quantities that are not drawn.
 
     Raises:
         InputError: no draw of a quantity was physical, or the drawn values together make no possible walk.
     """
-    drawn = draw(placed(TABLE, setup), rng)
-    return setup.with_drawn({name: value for name, value in drawn.items() if name not in kept})
+    drawn = {name: distribution for name, distribution in TABLE.items() if name not in kept}
+    return setup.with_drawn(draw(placed(drawn, setup), rng))

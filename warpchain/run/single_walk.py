@@ -141,8 +141,8 @@ def _check_repeated(setup: object, others: Mapping[str, object], seed: Whole | N
 def setup_walk(preset: str, settings: Mapping[str, object], seed: Whole | None, records_loads: bool = False) -> Setup:
     """Sort settings by name into parameters, scene and options, check them, and draw the sample of a seed.
 
-    From the seed's generator come first the parameters, then phase and clearance. What is set is drawn as well, so that
-    the others stay what they are; then the set value counts. `records_loads` is as in :func:`resolve`.
+    From the seed's generator come first the parameters, then phase and clearance, of what is not set, as in the first
+    walk of a sweep. `records_loads` is as in :func:`resolve`.
 
     Raises:
         InputError: A name is unknown or a value is refused.

@@ -32,7 +32,7 @@ from warpchain.store.manifest import Manifest, known_manifest
 from warpchain.store.shards import read_shard, shard_name, write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
-from warpchain.walks.faulty_rows import faults_of_rows
+from warpchain.walks.faulty_rows import faults_of_rows, lengths_of_blocks
 from warpchain.walks.motion import Motion
 from warpchain.walks.rows import Rows, fill_row, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
@@ -397,6 +397,9 @@ def _run(
             pending[executor.submit(run_shards, *given)] = task
         return True
 
+    lengths = lengths_of_blocks(
+        (content, block.shape) for content, block in zip(planned.canonical()["blocks"], planned.blocks, strict=True)
+    )
     while len(pending) < 2 * workers and submit():
         pass
     try:
@@ -415,7 +418,7 @@ def _run(
             for shard in written:
                 rows = read_shard(store.directory, store.manifest, shard)
                 progress.statuses.update(Status(int(code)).label for code in rows["status"])
-                progress.inaccurate += int(np.any([*faults_of_rows(rows, planned.lengths).values()], axis=0).sum())
+                progress.inaccurate += int(np.any([*faults_of_rows(rows, lengths).values()], axis=0).sum())
                 progress.done += len(shard)
             progress.seconds = time.perf_counter() - began
             if written:

@@ -24,8 +24,7 @@ from warpchain.store.folder import read_rows
 from warpchain.store.manifest import Folder, read_manifest
 from warpchain.store.manifest_content import FORMAT_VERSION
 from warpchain.store.walk_motion import MotionReader, WalkMotion
-from warpchain.sweeps.plan import lengths_before_draws
-from warpchain.walks.faulty_rows import faults_of_columns
+from warpchain.walks.faulty_rows import faults_of_columns, lengths_of_block
 from warpchain.walks.rows import COLUMNS, MISSING, Column, drawn_column, field_column, missing_rows, quantity_of
 
 if TYPE_CHECKING:
@@ -156,7 +155,8 @@ class BlockResult:
     @cached_property
     def faults(self) -> dict[str, NDArray[np.bool_]]:
         """What makes walks inaccurate, a key of `warpchain.walks.faults.FAULTS` → whether each walk has it."""
-        return faults_of_columns(self.columns, lengths_before_draws(self.sweep, self.name))
+        (content,) = (block for block in self.sweep["blocks"] if block["name"] == self.name)
+        return faults_of_columns(self.columns, lengths_of_block(content, self.shape))
 
     @property
     def inaccurate(self) -> NDArray[np.bool_]:

@@ -7,7 +7,6 @@ from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpchain.inputs.distributions import Distribution, Gaussian, Uniform, placed
 from warpchain.inputs.options import Options
@@ -146,13 +145,6 @@ class Block:
     def placed(self, fixed: Setup) -> dict[str, Distribution]:
         """The distributions of a cell, given its `fixed` setup."""
         return placed(self.distributions, fixed)
-
-    def undrawn(self, parameter: str) -> NDArray[Any]:
-        """A parameter of each walk before anything is drawn, shape `shape`."""
-        along = {parameter, "preset"}
-        values = [getattr(fixed.parameters, parameter) for fixed in self.fixed_in(self.cells_along(along))]
-        sizes = (len(each) if axis in along else 1 for axis, each in self.axes.items())
-        return np.broadcast_to(np.reshape(values, (*sizes, 1)), self.shape)
 
     def canonical(self) -> dict[str, Any]:
         """The block as JSON-able content of a file, with every default and range written out.

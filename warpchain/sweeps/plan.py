@@ -37,10 +37,6 @@ LEAST_SHARE: Final = 0.05
 """Least share of a distribution that must be physical; where less is, redrawing would take too long."""
 
 
-_LENGTHS: Final = ("link_length", "circle_radius")
-"""Against which openings and penetrations of walks are held."""
-
-
 @dataclass(frozen=True)
 class PlannedWalk:
     """One walk of a sweep.
@@ -143,11 +139,6 @@ class Sweep:
             if (number, cell) != before:
                 before, fixed = (number, cell), self.blocks[number].fixed(cell)
             yield PlannedWalk(index, number, cell, sample, fixed, {})
-
-    @cached_property
-    def lengths(self) -> dict[str, NDArray[Any]]:
-        """Link length and circle radius [m] of each walk before anything is drawn."""
-        return {name: np.concatenate([block.undrawn(name).ravel() for block in self.blocks]) for name in _LENGTHS}
 
     def _located(self, index: int) -> tuple[int, tuple[int, ...], int]:
         """Number of a walk's block, its cell and its sample."""
@@ -332,12 +323,6 @@ def load_sweep(source: "str | os.PathLike[str] | Mapping[str, object] | Sweep") 
     sweep = Sweep(*read_sweep(source))
     sweep.check()
     return sweep
-
-
-def lengths_before_draws(canonical: Mapping[str, object], name: str) -> dict[str, NDArray[Any]]:
-    """`Sweep.lengths` of the block of that name, in its shape, given the canonical form of the sweep."""
-    (block,) = (block for block in Sweep(*read_sweep(canonical)).blocks if block.name == name)
-    return {name: block.undrawn(name) for name in _LENGTHS}
 
 
 def _points(block: Block, point: Callable[[], Point]) -> list[Point]:

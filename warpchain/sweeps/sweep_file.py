@@ -18,7 +18,6 @@ from pydantic import ValidationError
 from warpchain.inputs.distributions import DRAWABLE, LARGEST_SEED, TABLE, Distribution, Gaussian, Uniform
 from warpchain.inputs.methods import METHODS_BY_NEED
 from warpchain.inputs.parameters import Parameters, preset
-from warpchain.inputs.scene import Scene
 from warpchain.inputs.sections import NAME_OF_SYMBOL, SECTION_OF, SECTIONS, by_name
 from warpchain.inputs.symbols import full_name
 from warpchain.inputs.validation import (
@@ -342,9 +341,8 @@ def _drawn(
 ) -> dict[str, Distribution]:
     """What a block draws, in the order of drawing.
 
-    Values on an axis are exact, and so are those given of phase and clearance; a parameter with one given value is
-    drawn about it. A distribution of the quantity's own name is drawn about each of them, and refused if it has a mean
-    or ends of its own.
+    Given values are exact, on an axis or not. A distribution of the quantity's own name is drawn about each of them,
+    and refused if it has a mean or ends of its own.
     """
     _, default = given.get("all", ("", "table"))
     drawn: dict[str, Distribution] = {}
@@ -352,8 +350,7 @@ def _drawn(
         home = "grid" if name in axes else SECTION_OF[name] if name in sections[SECTION_OF[name]] else None
         path, choice = given.get(name, ("", None))
         if choice is None:
-            is_set = home == "grid" or (home is not None and name in Scene.model_fields)
-            if default == "table" and name in TABLE and not is_set:
+            if default == "table" and name in TABLE and home is None:
                 drawn[name] = TABLE[name]
         elif choice != "fixed":
             distribution = TABLE[name] if isinstance(choice, str) else choice
