@@ -36,10 +36,15 @@ def test_joints_are_soft_on_the_sprocket_and_stiff_soon_after_the_release() -> N
 
 
 def test_a_soft_drive_takes_fewer_steps_and_as_long() -> None:
-    """The release comes when it would have come, to a few samples 1 ms apart, after a drive of far fewer steps."""
+    """The release comes when it would have come, to a tenth of the loop's turn, after a drive of far fewer steps.
+
+    A start perturbed by 1e-12, or another processor, moves the release by up to 4 ms.
+    """
     stiff, soft = (warpchain.walk(**SPINNING, preset="paper", walk_limit=1e-3, soften_drive=on) for on in (False, True))
     assert soft.steps_accepted < 0.3 * stiff.steps_accepted
-    assert soft.simulated_time == pytest.approx(stiff.simulated_time, abs=3e-3)
+    speed = 2 * np.pi * 15.0 * (PAPER.sprocket_radius + PAPER.circle_radius)
+    turn = 30 * PAPER.link_length / speed
+    assert soft.simulated_time == pytest.approx(stiff.simulated_time, abs=0.1 * turn)
 
 
 @pytest.mark.parametrize(("frequency", "held"), [(9.0, 1e6), (15.0, 2.25e6), (35.0, 1e7)])
