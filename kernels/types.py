@@ -132,6 +132,7 @@ class Control:
     softest_stiffness: wp.float64  # k of the softest joints, whose ω_c is that of soft ones
     softest_damping: wp.float64  # b of the softest joints [N s/m]
     soft_contact_step: wp.float64  # contact_step of the softest joints, in the drive also of soft ones [s]
+    pile_push: wp.float64  # push_rate of a chain with soft or softer joints [1/s]
     soften_area: wp.float64  # joints soften when the area falls below this fraction of the first
     stiffening_time: wp.float64  # in which joints return to their own values after the release [s]
 
@@ -162,6 +163,7 @@ class Chain:
     sprocket_friction: wp.float64
     sprocket_radius: wp.float64
     half_width: wp.float64
+    push_rate: wp.float64  # speed at which floor and links push out sunken circles, per depth [1/s]
     # the plane that the links move in, if it tilts, see physics.plane: otherwise 0
     plane_speed: wp.float64
     turn_x: wp.float64

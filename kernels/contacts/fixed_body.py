@@ -37,17 +37,21 @@ def floor_circle(
     v: wp.float64,
     omega: wp.float64,
 ):
-    """One circle against the floor y = 0 (body A; n̂ = ŷ); ``arm`` leads from the link's centre to the circle's."""
+    """One circle against the floor y = 0 (body A; n̂ = ŷ); ``arm`` leads from the link's centre to the circle's.
+
+    At a depth d the floor moves up at ``chain.push_rate`` d.
+    """
     r = chain.circle_radius
+    gap = circle_y - r
     return fixed_contact(
         chain,
-        circle_y - r,
+        gap,
         ZERO,
         ONE,
         arm_x,
         arm_y - r,
         ZERO,
-        ZERO,
+        chain.push_rate * wp.max(ZERO, -gap),
         inverse_mass,
         inverse_inertia,
         chain.floor_restitution,

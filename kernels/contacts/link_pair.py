@@ -144,8 +144,14 @@ def collide(
     b_t: wp.float64,
     inverse_nn: wp.float64,
     inverse_determinant: wp.float64,
+    depth: wp.float64,
 ):
-    """Impulse between two overlapping links if they approach; returns energy lost [J] and number of impulses."""
+    """Impulse between two overlapping links; returns energy lost [J] and number of impulses.
+
+    They meet if they approach, or part more slowly than at ``chain.push_rate`` times the depth of the overlap [m]; the
+    impulse is that of links which approach by so much faster.
+    """
+    push = chain.push_rate * depth
     # all is read before anything is written: the compiler does not know that A is not B, and would read again
     u_a = K[U, link_a]
     v_a = K[V, link_a]
@@ -156,7 +162,7 @@ def collide(
     u = u_a - u_b
     v = v_a - v_b
     normal_speed = u * nx + v * ny
-    normal_speed += omega_a * a_n - omega_b * b_n
+    normal_speed += omega_a * a_n - omega_b * b_n + push
     lost = ZERO
     hits = wp.int64(0)
     if normal_speed > ZERO:
@@ -189,6 +195,6 @@ def collide(
         K[OMEGA, link_b] = omega_b + (b_n * jn + b_t * jt) * inertia_b
         changed_n = w_nn * jn + w_nt * jt
         changed_t = w_nt * jn + w_tt * jt
-        lost = jn * (normal_speed - HALF * changed_n) + jt * (tangential_speed - HALF * changed_t)
+        lost = jn * (normal_speed - push - HALF * changed_n) + jt * (tangential_speed - HALF * changed_t)
         hits = wp.int64(1)
     return lost, hits

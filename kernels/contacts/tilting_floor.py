@@ -6,6 +6,9 @@ lie on the rims at ζ = ±h, in the direction q = −(up1, up2)/ρ with ρ² = u
 a₋ > 0. Then the impulse acts between the rims, at ζ = h (a₊ − a₋)/(a₊ + a₋): at the middle of an upright roller, which
 thus meets the floor as in the plane; at a rim if it alone approaches.
 
+*Push.* Under softened joints the floor pushes out what has sunk in, as in the plane: at a depth d it rises at
+``chain.push_rate`` d. Then a± and the velocities of the law are those over the rising floor.
+
 *Law.* That of :mod:`contacts.impulse` with three components. The impulse J at (X, Y, ζ) changes the link as in the
 plane, by (J1, J2), and the plane by A⁻¹ Q with Q = (J3, Y J3 − ζ J2, ζ J1 − X J3) and the mass matrix A of
 :mod:`physics.plane`. So W is the link's 2 × 2 matrix plus Gᵀ A⁻¹ G.
@@ -126,8 +129,8 @@ def approaches(
     tipping = chain.half_width * (chain.up_y * link.turn_x - chain.up_x * link.turn_y)
     height = middle_height(chain, slope, x, y)
     rise = chain.half_width * chain.up_z
-    front = wp.where(height + rise < ZERO, wp.max(middle + tipping, ZERO), ZERO)
-    back = wp.where(height - rise < ZERO, wp.max(middle - tipping, ZERO), ZERO)
+    front = wp.where(height + rise < ZERO, wp.max(middle + tipping - chain.push_rate * (height + rise), ZERO), ZERO)
+    back = wp.where(height - rise < ZERO, wp.max(middle - tipping - chain.push_rate * (height - rise), ZERO), ZERO)
     return front, back
 
 
@@ -156,10 +159,14 @@ def meet_roller(
     total = front + back
     hit = total > ZERO
     z = chain.half_width * quotient(front - back, wp.where(hit, total, ONE))
-    # velocity over the floor of the point at (x, y, z), and W
-    v1 = before.u - before.omega * lever_y + z * before.turn_y
-    v2 = before.v + before.omega * lever_x - z * before.turn_x
-    v3 = before.plane_speed + before.turn_x * y - before.turn_y * x
+    # velocity over the rising floor of the point at (x, y, z), and W
+    n1 = chain.up_x
+    n2 = chain.up_y
+    n3 = chain.up_z
+    rise = chain.push_rate * wp.max(ZERO, -(middle_height(chain, slope, circle_x, circle_y) + z * n3))
+    v1 = before.u - before.omega * lever_y + z * before.turn_y - rise * n1
+    v2 = before.v + before.omega * lever_x - z * before.turn_x - rise * n2
+    v3 = before.plane_speed + before.turn_x * y - before.turn_y * x - rise * n3
     c0 = B.b00 + B.b01 * y - B.b02 * x
     c1 = B.b01 + B.b11 * y - B.b12 * x
     c2 = B.b02 + B.b12 * y - B.b22 * x
@@ -169,9 +176,6 @@ def meet_roller(
     w13 = z * c2
     w23 = -z * c1
     w33 = c0 + y * c1 - x * c2
-    n1 = chain.up_x
-    n2 = chain.up_y
-    n3 = chain.up_z
     wn1 = w11 * n1 + w12 * n2 + w13 * n3
     wn2 = w12 * n1 + w22 * n2 + w23 * n3
     wn3 = w13 * n1 + w23 * n2 + w33 * n3
@@ -215,7 +219,8 @@ def meet_roller(
     after.push = before.push + j3
     after.moment_x = before.moment_x + q1
     after.moment_y = before.moment_y + q2
-    gained = j1 * (v1 + HALF * (w11 * j1 + w12 * j2 + w13 * j3))
+    gained = rise * (n1 * j1 + n2 * j2 + n3 * j3)
+    gained += j1 * (v1 + HALF * (w11 * j1 + w12 * j2 + w13 * j3))
     gained += j2 * (v2 + HALF * (w12 * j1 + w22 * j2 + w23 * j3))
     gained += j3 * (v3 + HALF * (w13 * j1 + w23 * j2 + w33 * j3))
     after.lost = before.lost - gained

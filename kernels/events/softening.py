@@ -13,6 +13,8 @@ never above that of SOFT. Under multiplied loads (:mod:`physics.scaled_loads`) 0
 of soft joints another loop becomes stationary, because friction determines its width. *Release.* Soft joints return to
 their own values before the chain reaches the floor. *Pile.* Joints become soft for good when the loop begins to
 collapse, and softest when its area is below half of that at which it began. Softest at once shifts Δx of long chains.
+From soft joints on, floor and links push out circles that have sunk in (:attr:`Chain.push_rate`): soft joints press on
+them for long, and an impulse stops a circle only after a step in which it has sunk in.
 
 A change of k at openings C releases the energy ½ (k_before − k_after) Σ C², which is booked. Softening is one jump: C
 grows to T/k_after within a few periods of the soft springs. When joints stiffen, C must shrink by a factor of 100 to
@@ -36,8 +38,8 @@ from warpchain.kernels.types import Chain, Control, Drive, State
 wp.set_module_options({"enable_backward": False})
 
 TEN = wp.constant(wp.float64(10.0))
-ROUGHEST = wp.constant(wp.float64(0.1))
-"""Greatest tolerance, that of the options."""
+ROUGHEST = wp.constant(wp.float64(0.05))
+"""Tolerance from which on the drive is no looser: at 0.1 circles sink half as deep again into the sprocket."""
 
 
 @wp.func
@@ -60,7 +62,7 @@ def spring_tolerance(drive: Drive, state: State, control: Control, world: int, i
     if is_driven:
         is_spun_up = state.last_sample[world, TIME] >= drive.hold_start[world]
         if not is_spun_up or state.load_factor[world] > ONE:
-            tolerance = wp.min(TEN * tolerance, ROUGHEST)
+            tolerance = wp.max(tolerance, wp.min(TEN * tolerance, ROUGHEST))
     return tolerance
 
 

@@ -48,6 +48,7 @@ def write_constants(K: wp.array2d(dtype=wp.float64), chain: Chain):
     K[layout.BOARD_VALUES, layout.VALUE_SPROCKET_FRICTION] = chain.sprocket_friction
     K[layout.BOARD_VALUES, layout.VALUE_CHAIN_RESTITUTION] = chain.chain_restitution
     K[layout.BOARD_VALUES, layout.VALUE_CHAIN_FRICTION] = chain.chain_friction
+    K[layout.BOARD_VALUES, layout.VALUE_PUSH_RATE] = chain.push_rate
 
 
 @wp.func
@@ -65,6 +66,7 @@ def contact_constants(K: wp.array2d(dtype=wp.float64), n: int) -> Chain:
     chain.sprocket_friction = K[layout.BOARD_VALUES, layout.VALUE_SPROCKET_FRICTION]
     chain.chain_restitution = K[layout.BOARD_VALUES, layout.VALUE_CHAIN_RESTITUTION]
     chain.chain_friction = K[layout.BOARD_VALUES, layout.VALUE_CHAIN_FRICTION]
+    chain.push_rate = K[layout.BOARD_VALUES, layout.VALUE_PUSH_RATE]
     return chain
 
 

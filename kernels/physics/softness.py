@@ -32,6 +32,7 @@ def softened(own: Chain, control: Control, softness: wp.float64) -> Chain:
     chain.joint_stiffness = on_scale(own.joint_stiffness, control.soft_stiffness, control.softest_stiffness, softness)
     chain.joint_damping = on_scale(own.joint_damping, control.soft_damping, control.softest_damping, softness)
     chain.inverse_smoothing = between(own.inverse_smoothing, ONE / control.soft_smoothing, softness)
+    chain.push_rate = wp.where(softness >= ONE, control.pile_push, ZERO)
     return chain
 
 

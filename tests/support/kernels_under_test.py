@@ -137,7 +137,9 @@ def _link_pair(
     lost = wp.float64(0.0)
     hits = wp.int64(0)
     if depth > wp.float64(0.0):
-        lost, hits = collide(scratch[i], chain, 0, 1, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant)
+        lost, hits = collide(
+            scratch[i], chain, 0, 1, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant, depth
+        )
     results[i, 0] = depth
     results[i, 1] = lost
     results[i, 2] = wp.float64(hits)

@@ -39,6 +39,13 @@ FASTEST_PUSH = 5e3
 
 With it circles of 60 to 180 links at 5 to 30 Hz sink in by 0.1 mm at most under load, without it by 0.3 mm and more.
 """
+PILE_PUSH = 1e3
+"""Rate [1/s] of the push by floor and links while joints are soft or softer.
+
+Without it circles that joints press on sink deeper in every step. With `explicit` and the steps of `standard`, 12,800
+walks of 60 to 180 links at 5 to 30 Hz had 99th percentiles of the greatest depth of 0.30 mm (floor) and 0.22 mm (links),
+against 2.25 and 0.65 mm without it in steps half as long; at 300/s 0.38 and 0.22 mm. Mean Δx stayed the same to 0.1 %.
+"""
 
 
 def line_density(parameters: Parameters) -> float:
@@ -118,6 +125,7 @@ def control_of(options: Options) -> Control:
     control.softest_stiffness = SOFTEST.joint_stiffness
     control.softest_damping = SOFTEST.joint_damping
     control.soft_contact_step = options.soft_contact_step
+    control.pile_push = PILE_PUSH
     control.soften_area = options.soften_area if options.soften_pile else -math.inf
     control.stiffening_time = STIFFENING_TIME
     return control

@@ -22,8 +22,9 @@ BURST_TOLERANCE: Final = 1e-4
 """
 
 _LOOSE: Final = {
-    "tolerance": 1e-3,
-    "soft_tolerance": 3e-3,
+    "tolerance": 3e-3,
+    "soft_tolerance": 2e-2,
+    "skin": 3e-3,
     "controller": "pi",
     "soften_pile": True,
     "soften_drive": True,

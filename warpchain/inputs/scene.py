@@ -74,9 +74,9 @@ class Scene(BaseModel):
     )
     ellipse_aspect: float = number_field(1.5, "1", "height over width of the starting ellipse", ge=0.05, le=20)
     settle_time: float = number_field(
-        0.5, "s", "time for the chain to settle on the sprocket at rest", ge=0, le=LONGEST
+        0.1, "s", "time for the chain to settle on the sprocket at rest", ge=0, le=LONGEST
     )
-    spin_up_time: float = number_field(2.0, "s", "time in which the sprocket reaches its frequency", gt=0, le=LONGEST)
+    spin_up_time: float = number_field(0.3, "s", "time in which the sprocket reaches its frequency", gt=0, le=LONGEST)
     load_factor: float | None = number_field(
         None,
         "1",

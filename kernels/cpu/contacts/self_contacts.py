@@ -195,6 +195,7 @@ def self_contacts(columns: int):
                                 G[row + B_T, k],
                                 G[row + INVERSE_NN, k],
                                 G[row + INVERSE_DETERMINANT, k],
+                                depth,
                             )
                             lost += energy
                             impulses += hits

@@ -233,7 +233,11 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         second: int,
         lane: int,
     ):
-        """Stores the geometry of a thread's first contact; returns its key, or DONE if the circles do not overlap."""
+        """Stores the geometry of a thread's first contact but its depth [m].
+
+        Returns:
+            Its key, or DONE if the circles do not overlap, and its depth.
+        """
         depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = touching_circles(
             K, chain, first_joint(pair), second_joint(pair), half, second
         )
@@ -249,7 +253,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
             F[1, lane] = inverse_nn
             F[2, lane] = inverse_determinant
             raise_depth(T, depth)
-        return key
+        return key, depth
 
     @wp.func
     def resolve_prepared(
@@ -260,6 +264,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         link_a: int,
         link_b: int,
         lane: int,
+        depth: wp.float64,
     ):
         """Resolves a thread's first contact; returns the number of impulses."""
         lost_before = K[BOARD_LOST_SELF, link_a]
@@ -276,6 +281,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
             F[0, lane],
             F[1, lane],
             F[2, lane],
+            depth,
         )
         K[BOARD_LOST_SELF, link_a] = lost_before + lost
         return int(hits)
@@ -294,10 +300,12 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
     @wp.func
     def resolve_further(K: wp.array2d(dtype=wp.float64), chain: Chain, key: int, link_a: int, link_b: int):
         """Resolves a further contact; returns the number of impulses."""
-        _depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = touching_circles(
+        depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = touching_circles(
             K, chain, first_joint(pair_of(key)), second_joint(pair_of(key)), half_of(key), key & 1
         )
-        lost, hits = collide(K, chain, link_a, link_b, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant)
+        lost, hits = collide(
+            K, chain, link_a, link_b, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant, depth
+        )
         K[BOARD_LOST_SELF, link_a] = K[BOARD_LOST_SELF, link_a] + lost
         return int(hits)
 
@@ -330,10 +338,11 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         turn = int(0)
         while turn < wp.where(in_turn, 2, 1):
             own_key = int(DONE)
+            own_depth = wp.float64(0.0)
             if lane < contacts:
                 half = wp.where(lane < 2 * touching, turn, 1)
                 k = lane - wp.where(in_turn, 0, half * 2 * touching)
-                own_key = prepare(K, T, E, F, chain, pair_at(L, T, k >> 1), half, k & 1, lane)
+                own_key, own_depth = prepare(K, T, E, F, chain, pair_at(L, T, k >> 1), half, k & 1, lane)
             own_a, own_b = links_at(own_key, chain.link_count)
             left = wp.where(own_key == DONE, 0, 1)
             if own_key != DONE:
@@ -352,7 +361,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
             while barrier_if_any(T, wp.static(touch.votes), left > 0):
                 if own_key != DONE:
                     if owns_links(T, owners, own_a, own_b, own_key):
-                        impulses += resolve_prepared(K, E, F, chain, own_a, own_b, lane)
+                        impulses += resolve_prepared(K, E, F, chain, own_a, own_b, lane, own_depth)
                         left -= 1
                         own_key = DONE
                     else:
