@@ -1,6 +1,7 @@
 """What happens in a walk: how long the chain is, how fast it is spun, from which height it is released."""
 
 import math
+from collections.abc import Mapping
 from typing import Final, Literal, Self
 
 from pydantic import BaseModel, Field, field_validator, model_validator
@@ -25,6 +26,8 @@ LEAST_INERTIA: Final = 0.5
 """Part of its rotary inertia that a link must keep under multiplied loads."""
 FASTEST_TAP: Final = 1e3
 """Greatest speed [m/s] and rate [rad/s] of the plane at the release, far beyond that of any loop."""
+HANGING_SETTLE_TIME: Final = 2.0
+"""Default of `settle_time` [s] where the clearance is that of the hanging chain, which after 0.1 s still swings."""
 LONGEST: Final = 1e6
 """Greatest time, in which numbers still tell a nanosecond, a short step [s]."""
 
@@ -74,7 +77,7 @@ class Scene(BaseModel):
     )
     ellipse_aspect: float = number_field(1.5, "1", "height over width of the starting ellipse", ge=0.05, le=20)
     settle_time: float = number_field(
-        0.1, "s", "time for the chain to settle on the sprocket at rest", ge=0, le=LONGEST
+        0.1, "s", "time for the chain to settle on the sprocket at rest; 2 with clearance_of: hanging", ge=0, le=LONGEST
     )
     spin_up_time: float = number_field(0.3, "s", "time in which the sprocket reaches its frequency", gt=0, le=LONGEST)
     load_factor: float | None = number_field(
@@ -137,6 +140,13 @@ class Scene(BaseModel):
         ge=-FASTEST_TAP,
         le=FASTEST_TAP,
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _hanging_chain_comes_to_rest(cls, values: object) -> object:
+        if isinstance(values, Mapping) and values.get("clearance_of") == "hanging" and "settle_time" not in values:
+            return {**values, "settle_time": HANGING_SETTLE_TIME}
+        return values
 
     @field_validator("links")
     @classmethod
