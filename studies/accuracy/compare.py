@@ -1,7 +1,8 @@
 """Whether the walks of two sweeps of the same samples end elsewhere, cell by cell.
 
-``python studies/accuracy/compare.py FOLDER BASE``: the relative difference of the mean Δx of each cell, FOLDER less BASE,
-with the standard error of pairs of samples; over all cells their mean and χ², scatter and bounces; and how exact both are.
+``python studies/accuracy/compare.py FOLDER BASE`` prints the relative difference of the mean Δx of each cell, that of
+FOLDER less that of BASE, with the standard error of pairs of samples; over all cells their mean and χ², scatter and
+bounces; and how exact both are.
 """
 
 import sys
