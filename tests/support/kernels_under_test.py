@@ -120,6 +120,7 @@ def _link_pair(
     chain.chain_restitution = cases[i, 1]
     chain.chain_friction = cases[i, 2]
     chain.tangential_restitution = cases[i, 3]
+    chain.push_rate = cases[i, 8]
     depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = circles_of_links(
         chain.circle_radius,
         cases[i, 4],
@@ -145,7 +146,9 @@ def _link_pair(
     results[i, 2] = wp.float64(hits)
 
 
-def link_pairs(position: Array, velocity: Array, inverses: Array, cases: Array) -> tuple[Array, Array]:
+def link_pairs(
+    position: Array, velocity: Array, inverses: Array, cases: Array, push_rate: float = 0.0
+) -> tuple[Array, Array]:
     """`circles_of_links`, then `collide`, of many pairs A, B.
 
     Args:
@@ -153,6 +156,7 @@ def link_pairs(position: Array, velocity: Array, inverses: Array, cases: Array) 
         velocity: (N, 2, 3), ẋ, ẏ, ω.
         inverses: (N, 2, 2), 1/m and 1/I.
         cases: (N, 8), circle radius, e, μ, e_t, centres of A's and B's circle x, y.
+        push_rate: that of `Chain` [1/s].
 
     Returns:
         velocity (N, 2, 3) afterwards, and depth, energy lost and number of impulses (N, 3).
@@ -164,6 +168,7 @@ def link_pairs(position: Array, velocity: Array, inverses: Array, cases: Array) 
     block[:, [layout.INVERSE_MASS, layout.INVERSE_INERTIA]] = inverses.transpose(0, 2, 1)
     scratch = wp.array(block, dtype=wp.float64, device=DEVICE)
     results = _poisoned(len(cases), 3)
+    cases = np.column_stack([cases, np.full(len(cases), push_rate)])
     inputs = [scratch, wp.array(cases, dtype=wp.float64, device=DEVICE), results]
     wp.launch(_link_pair, dim=len(cases), inputs=inputs, device=DEVICE)
     return scratch.numpy()[:, rates].transpose(0, 2, 1), results.numpy()
@@ -207,6 +212,7 @@ def _contact_pass(columns: int) -> wp.Kernel:
     ):
         world = wp.tid()
         chain = read_chain(model, world)
+        chain.push_rate = push_rate
         block = scratch[world]
         row = lists[world]
         pairs = wp.array(ptr=row.ptr, shape=(wp.static(size),), dtype=wp.int32)

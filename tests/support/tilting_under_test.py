@@ -132,9 +132,11 @@ def _floor_pass(columns: int) -> wp.Kernel:
         state: State,
         scratch: wp.array3d(dtype=wp.float64),
         planes: wp.array2d(dtype=wp.float64),
+        push_rate: wp.float64,
         results: wp.array(dtype=wp.float64),
     ):
         chain = read_chain(model, 0)
+        chain.push_rate = push_rate
         block = scratch[0]
         row = planes[0]
         load_state(block, state, chain, 0)
@@ -147,7 +149,9 @@ def _floor_pass(columns: int) -> wp.Kernel:
     return floor_pass
 
 
-def floor_pass(position: Array, velocity: Array, plane: Plane, parameters: Parameters) -> FloorOutcome:
+def floor_pass(
+    position: Array, velocity: Array, plane: Plane, parameters: Parameters, push_rate: float = 0.0
+) -> FloorOutcome:
     """One pass over all rollers at the floor, in memory poisoned with NaN; the plane's width is that of parameters."""
     links = len(position)
     columns = layout.padded_width(links)
@@ -157,7 +161,7 @@ def floor_pass(position: Array, velocity: Array, plane: Plane, parameters: Param
     values[0, : layout.PLANE_VALUES] = row_of(plane)
     planes = wp.array(values, dtype=wp.float64, device=DEVICE)
     results = wp.full(2, np.nan, dtype=wp.float64, device=DEVICE)
-    wp.launch(_floor_pass(columns), dim=1, inputs=[model, state, scratch, planes, results], device=DEVICE)
+    wp.launch(_floor_pass(columns), dim=1, inputs=[model, state, scratch, planes, push_rate, results], device=DEVICE)
     rows = scratch.numpy()[0, :, :links]
     return FloorOutcome(
         velocity=rows[[layout.U, layout.V, layout.OMEGA]].T.copy(),

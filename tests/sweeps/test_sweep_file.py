@@ -245,7 +245,7 @@ def test_from_a_file(tmp_path: Path) -> None:
         (content(grid={"frequency": [5, 5.0]}), "sweep.grid.frequency[1]: 5.0 is given twice; leave one out"),
         (
             content(grid={"method": ["standard", "reference"]}),
-            "sweep.grid: tolerance is 0.001 in one cell and 1e-06 in another, as methods or devices have it; give",
+            "sweep.grid: tolerance is 0.003 in one cell and 1e-06 in another, as methods or devices have it; give",
         ),
         (
             content(grid={"method": ["rkf78", "hybrid"]}, options={}),

@@ -116,7 +116,7 @@ def test_they_change_no_bit_of_the_walk(start: str) -> None:
 def test_planes_come_with_fine_frames() -> None:
     """Each fine frame of a plane that tilts has the plane of its moment: it turns a little from frame to frame."""
     walk = flight(plane="tilting", tilt=0.1, tilt_rate=3.0)
-    assert len(walk.frame_axes) == len(walk.frame_forces) == len(walk.frame_time) > 700
+    assert len(walk.frame_axes) == len(walk.frame_forces) == len(walk.frame_time) > 500
     lean = np.arctan2(-walk.frame_axes[:, 1, 2], walk.frame_axes[:, 1, 1])
     assert abs(lean[0]) == pytest.approx(0.1, rel=1e-6)
     assert np.abs(np.diff(lean)).max() < 1.5 * 3.0 * 2 * FINE

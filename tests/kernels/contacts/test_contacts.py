@@ -186,6 +186,30 @@ def test_a_sunken_circle_leaves_at_push_rate_times_its_depth():
     assert seen > 10
 
 
+def test_floor_pushes_out_what_has_sunk_in():
+    """Without restitution a resting link's only sunken circle moves up at push_rate times its depth; work is booked."""
+    push_rate = 2000.0
+    dull = PAPER.with_values({"floor_restitution": 0.0})
+    seen = 0
+    for seed in range(20):
+        position, velocity = folded_chain(20, seed, dull.link_length)
+        position[:, 1] -= np.min(position[:, 1])
+        contact_pass = ContactPass([Placed(position, 0 * velocity, dull)], push_rate=push_rate)
+        contact_pass.run(FLOOR)
+        after = contact_pass.velocity(0)
+        ends = np.stack(motion_equations.link_ends(position, dull), axis=1)
+        depth = dull.circle_radius - ends[:, :, 1]
+        for link in np.flatnonzero((depth > 0).sum(axis=1) == 1):
+            end = int(np.argmax(depth[link]))
+            arm = ends[link, end] - position[link, :2]
+            assert after[link, 1] + after[link, 2] * arm[0] == pytest.approx(push_rate * depth[link, end], rel=1e-10)
+            seen += 1
+        assert np.all(after[np.all(depth <= 0, axis=1)] == 0)
+        gained = motion_equations.kinetic_energy(after, dull)
+        assert contact_pass.fixed_loss(0) == pytest.approx(-gained, rel=1e-12)
+    assert seen > 10
+
+
 def test_worlds_do_not_meet():
     """A chain's pass gives the same bits alone and among chains of other lengths and parameters."""
     heaps = [placed_heap(n, n, np.pi, with_random_coefficients(n)) for n in (4, 60, 8, 150, 20)]

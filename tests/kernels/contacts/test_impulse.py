@@ -91,8 +91,8 @@ class Pairs:
     Attributes hold one row per collision; axis 1 of position and velocity is the body, A or B.
     """
 
-    def __init__(self, cases, seed=0, distance=DISTANCE, swapped=False):
-        """Set up and resolve; `swapped` calls A what the collision calls B."""
+    def __init__(self, cases, seed=0, distance=DISTANCE, swapped=False, push_rate=0.0):
+        """Set up and resolve; `swapped` calls A what the collision calls B; `push_rate` is that of `Chain`."""
         generator = np.random.default_rng(seed)
         count = len(cases)
         self.normal = np.array([collision.normal for collision in cases])
@@ -119,6 +119,7 @@ class Pairs:
             self.velocity[:, order],
             inverses[:, order],
             np.hstack([law, ends[:, order].reshape(count, 4)]),
+            push_rate,
         )
         self.after = after[:, order]
         self.depth, self.lost, self.hits = results.T
@@ -270,6 +271,26 @@ def test_loss_of_a_ball_by_hand():
     spinless = fixed_contacts(np.array([fixed_arguments(replace(BALL, friction=1.0), (3.0, -4.0, 0.0), (0.0, 0.0))]))
     assert_allclose(spinless[0], [0.0, 2.0, 0.0, 21.0, 1.0], atol=1e-14)
     assert contact.lost[0] == pytest.approx(21.0, rel=1e-14)
+
+
+# --- what soft joints press into each other ---
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_overlapping_links_part_as_fast_as_they_are_pushed(sign):
+    """Links that part more slowly than push_rate times their depth meet as if they approached by so much faster."""
+    push_rate = 20.0
+    cases = [replace(c, v_rel=(sign * c.v_rel[0], sign * c.v_rel[1])) for c in MANY[:2000]]
+    pair = Pairs(cases, push_rate=push_rate)
+    push = push_rate * pair.depth
+    before, after = pair.relative(pair.velocity)[:, 0], pair.relative(pair.after)[:, 0]
+    meets = before + push > 0
+    assert_array_equal(pair.hits > 0, meets)
+    assert meets.sum() > 500
+    expected = np.where(meets, -pair.e * (before + push) - push, before)
+    assert_allclose((after - expected) / (pair.speed() + push), 0, atol=1e-9)
+    before, after = pair.energy(pair.velocity), pair.energy(pair.after)
+    assert_allclose((before - after - pair.lost) / (before + after), 0, atol=1e-9)
 
 
 # --- what is left alone ---
