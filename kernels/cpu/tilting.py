@@ -35,7 +35,7 @@ from warpchain.kernels.layout import (
     Y,
 )
 from warpchain.kernels.physics.elementary import TWO, ZERO, from_order_key, order_bits, order_key
-from warpchain.kernels.physics.plane import invert_plane_mass, motion_terms, on_plane, place_terms, plane_load
+from warpchain.kernels.physics.plane import invert_plane_mass, mass_of, motion_terms, on_plane, place_terms, plane_load
 from warpchain.kernels.types import Chain
 
 wp.set_module_options({"enable_backward": False})
@@ -100,9 +100,7 @@ def write_sums_of_motion(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.f
     count = whole_lanes(chain.link_count)
     i = int(0)
     while i < count:
-        terms = motion_terms(
-            K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[U, i], K[V, i], K[OMEGA, i], K[COSINE, i], K[SINE, i]
-        )
+        terms = motion_terms(K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[U, i], K[V, i], K[OMEGA, i])
         for k in range(wp.static(SUMS_OF_MOTION)):
             K[wp.static(SUMS + k), i] = terms[k]
         i += 1
@@ -112,18 +110,21 @@ def write_sums_of_motion(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.f
 
 @wp.func
 def write_plane_sums(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), chain: Chain):
-    """Writes the sums over the placed links, and the inverse of the plane's mass matrix."""
+    """Writes all sums over the placed links, and the inverse of the plane's mass matrix."""
     count = whole_lanes(chain.link_count)
     i = int(0)
     while i < count:
-        terms = place_terms(chain, K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[COSINE, i], K[SINE, i])
+        places = place_terms(chain, K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[COSINE, i], K[SINE, i])
+        motion = motion_terms(K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[U, i], K[V, i], K[OMEGA, i])
         for k in range(wp.static(SUMS_OF_PLACES)):
-            K[wp.static(SUMS + k), i] = terms[k]
+            K[wp.static(SUMS + k), i] = places[k]
+        for k in range(wp.static(SUMS_OF_MOTION)):
+            K[wp.static(SUMS + SUMS_OF_PLACES + k), i] = motion[k]
         i += 1
-    for k in range(wp.static(SUMS_OF_PLACES)):
+    for k in range(wp.static(SUMS_OF_PLACES + SUMS_OF_MOTION)):
         P[wp.static(layout.PLANE_SUMS + k)] = row_sum(K, wp.static(SUMS + k), count)
+    P[layout.SUM_MASS] = mass_of(chain)
     invert_plane_mass(P)
-    write_sums_of_motion(K, P, chain)
 
 
 @wp.func
@@ -201,7 +202,7 @@ def write_touches(K: wp.array2d(dtype=wp.float64), chain: Chain, slope: wp.float
 
 @wp.func
 def resolve_tilting_floor(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), own: Chain):
-    """Applies the impulses between rollers and floor to links and plane; returns their number.
+    """Applies the impulses between rollers and floor to links, plane and sums; returns their number.
 
     The sums must be those of the present places. Lanes of links of which none touches are passed over.
     """
@@ -262,4 +263,5 @@ def resolve_tilting_floor(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.
     moment_y = row_sum(K, wp.static(SUMS + 2), count)
     work = row_sum(K, wp.static(SUMS + 3), count)
     K[LOST_FIXED, 0] = K[LOST_FIXED, 0] + push_plane_by(P, push, moment_x, moment_y, work)
+    write_sums_of_motion(K, P, chain)
     return impulses
