@@ -339,7 +339,9 @@ def block_tilting(block_dim: int):
             if lane == 0:
                 if warp_width() > 1:
                     for k in range(wp.static(SUMS_OF_MOTION)):
-                        P[wp.static(layout.MOTION_SUMS + k)] = added_up(M, wp.static(sum_slot + k), wp.static(block_dim))
+                        P[wp.static(layout.MOTION_SUMS + k)] = added_up(
+                            M, wp.static(sum_slot + k), wp.static(block_dim)
+                        )
                 else:
                     add_motion_one_by_one(K, P, place.links)
                 lost = push_plane_by(

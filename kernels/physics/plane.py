@@ -27,11 +27,12 @@ momenta p = A (u, ω1, ω2),
 with the momentum within the plane, P = Σm(ẋ, ẏ), and its moment, L = Σm(xẏ − yẋ) + ΣI θ̇. Forces between links change
 none of P and L, and A is known from the places alone.
 
-*Splitting.* The plane changes in 0.1 to 1 s, links within microseconds. So a step is: the plane carried on to the middle of
-the step; a step of the links with the plane frozen there; the plane's own step by the midpoint rule, with the mean of the
-sums before and after; contacts. This is of second order in the step. The middle needs the rate of A: of Σmx and Σmy it is
-P, of the others their mean rate in the step before, which adds errors of third order. An upright plane at rest stays so
-exactly. Contacts before the plane's step would make it a method of first order.
+*Splitting.* The plane changes in 0.1 to 1 s, links within microseconds. So a step is: the plane carried on to its mean over
+the step; a step of the links with the plane frozen there; the plane's own step at the rates of that mean, with the mean
+of the sums before and after; contacts. This is of second order in the step. The mean ν̄ = ν + h ν̇/2 + h² ν̈/6 is that of a
+half step at the rates after h/3; they need Ȧ, of whose second moments the means in the last two steps are known. An
+upright plane at rest stays so exactly. Contacts before the plane's step would make it a method of first order: in a walk
+of 20 links at 1e-9 that falls over the ledger of energy would miss 8e-7 of the energy at the release, and 1e-9 as it is.
 
 Functions here work on one row of :attr:`State.plane`, see :mod:`layout`.
 """
@@ -46,6 +47,7 @@ from warpchain.kernels.layout import (
     INVERSE_11,
     INVERSE_12,
     INVERSE_22,
+    MEAN_RATE_XX,
     MOMENTUM,
     ORIGIN,
     PLANE_MID,
@@ -71,6 +73,7 @@ from warpchain.kernels.types import Chain
 wp.set_module_options({"enable_backward": False})
 
 THIRD = wp.constant(wp.float64(1.0 / 3.0))
+FIVE_SIXTHS = wp.constant(wp.float64(5.0 / 6.0))
 THREE_HALVES = wp.constant(wp.float64(1.5))
 
 
@@ -255,6 +258,24 @@ def moved(start: Plane, slope: Plane, h: wp.float64) -> Plane:
 
 
 @wp.func
+def pushed(P: wp.array(dtype=wp.float64), gravity: wp.float64, start: Plane, slope: Plane, h: wp.float64) -> Plane:
+    """The plane ``start`` and h times the rates that it has at ``slope``, with A ν̇ = ṗ − Ȧ ν."""
+    u = slope.speed
+    w1 = slope.turn_x
+    w2 = slope.turn_y
+    q0, q1, q2 = momentum_rates(P, gravity, slope)
+    q0 -= P[SUM_MV] * w1 - P[SUM_MU] * w2
+    q1 -= P[SUM_MV] * u + P[RATE_XX + 2] * w1 - P[RATE_XX + 1] * w2
+    q2 -= P[RATE_XX] * w2 - P[SUM_MU] * u - P[RATE_XX + 1] * w1
+    du, d1, d2 = plane_times_inverse(P, q0, q1, q2)
+    end = moved(start, slope, h)
+    end.speed = start.speed + h * du
+    end.turn_x = start.turn_x + h * d1
+    end.turn_y = start.turn_y + h * d2
+    return end
+
+
+@wp.func
 def straightened(plane: Plane) -> Plane:
     """The plane with room axes that are orthogonal unit vectors again, which they nearly are.
 
@@ -270,25 +291,13 @@ def straightened(plane: Plane) -> Plane:
 
 @wp.func
 def begin_plane_step(P: wp.array(dtype=wp.float64), gravity: wp.float64, h: wp.float64):
-    """Writes the plane of the middle of a step, and its momenta after the first half."""
+    """Writes the mean of the plane over a step, and its momenta after the first half."""
     half = HALF * h
     plane = read_plane(P, 0)
-    u = plane.speed
-    w1 = plane.turn_x
-    w2 = plane.turn_y
-    # A ν̇ = ṗ − Ȧ ν
-    q0, q1, q2 = momentum_rates(P, gravity, plane)
-    q0 -= P[SUM_MV] * w1 - P[SUM_MU] * w2
-    q1 -= P[SUM_MV] * u + P[RATE_XX + 2] * w1 - P[RATE_XX + 1] * w2
-    q2 -= P[RATE_XX] * w2 - P[SUM_MU] * u - P[RATE_XX + 1] * w1
-    du, d1, d2 = plane_times_inverse(P, q0, q1, q2)
-    middle = moved(plane, plane, half)
-    middle.speed = u + half * du
-    middle.turn_x = w1 + half * d1
-    middle.turn_y = w2 + half * d2
-    write_plane(P, PLANE_MID, middle)
+    mean = pushed(P, gravity, plane, pushed(P, gravity, plane, plane, THIRD * h), half)
+    write_plane(P, PLANE_MID, mean)
     p0, p1, p2 = momenta(P, plane)
-    f0, f1, f2 = momentum_rates(P, gravity, middle)
+    f0, f1, f2 = momentum_rates(P, gravity, mean)
     P[MOMENTUM] = p0 + half * f0
     P[MOMENTUM + 1] = p1 + half * f1
     P[MOMENTUM + 2] = p2 + half * f2
@@ -298,17 +307,20 @@ def begin_plane_step(P: wp.array(dtype=wp.float64), gravity: wp.float64, h: wp.f
 
 @wp.func
 def end_plane_step(P: wp.array(dtype=wp.float64), gravity: wp.float64, h: wp.float64):
-    """Carries the plane to the end of the step that has begun; the sums and the mass must be those of the links there."""
+    """Carries the plane to the end of the step that has begun; sums and mass matrix must be those of the links there."""
     half = HALF * h
     inverse = ONE / h
     for k in range(3):
-        P[RATE_XX + k] = inverse * (P[SUM_XX + k] - P[START_XX + k])
-    middle = read_plane(P, PLANE_MID)
-    end = straightened(moved(read_plane(P, 0), middle, h))
-    f0, f1, f2 = momentum_rates(P, gravity, middle)
+        # from the middle of this step to a third of the next, which is taken to be as long
+        rate = inverse * (P[SUM_XX + k] - P[START_XX + k])
+        P[RATE_XX + k] = rate + FIVE_SIXTHS * (rate - P[MEAN_RATE_XX + k])
+        P[MEAN_RATE_XX + k] = rate
+    mean = read_plane(P, PLANE_MID)
+    f0, f1, f2 = momentum_rates(P, gravity, mean)
     u, w1, w2 = plane_times_inverse(
         P, P[MOMENTUM] + half * f0, P[MOMENTUM + 1] + half * f1, P[MOMENTUM + 2] + half * f2
     )
+    end = straightened(moved(read_plane(P, 0), mean, h))
     end.speed = u
     end.turn_x = w1
     end.turn_y = w2
