@@ -175,15 +175,18 @@ def meet_roller(
     wn1 = w11 * n1 + w12 * n2 + w13 * n3
     wn2 = w12 * n1 + w22 * n2 + w23 * n3
     wn3 = w13 * n1 + w23 * n2 + w33 * n3
-    # first: the impulse along the normal that ends the approach; second: the one that ends all motion
-    first = -quotient(n1 * v1 + n2 * v2 + n3 * v3, n1 * wn1 + n2 * wn2 + n3 * wn3)
     m11 = w22 * w33 - w23 * w23
     m12 = w13 * w23 - w12 * w33
     m13 = w12 * w23 - w13 * w22
     m22 = w11 * w33 - w13 * w13
     m23 = w12 * w13 - w11 * w23
     m33 = w11 * w22 - w12 * w12
-    scale = -quotient(ONE, w11 * m11 + w12 * m12 + w13 * m13)
+    normal_w = n1 * wn1 + n2 * wn2 + n3 * wn3
+    determinant = w11 * m11 + w12 * m12 + w13 * m13
+    # first: the impulse along the normal that ends the approach; second: the one that ends all motion
+    inverse_both = quotient(-ONE, normal_w * determinant)
+    first = (n1 * v1 + n2 * v2 + n3 * v3) * (determinant * inverse_both)
+    scale = normal_w * inverse_both
     second_1 = scale * (m11 * v1 + m12 * v2 + m13 * v3)
     second_2 = scale * (m12 * v1 + m22 * v2 + m23 * v3)
     second_3 = scale * (m13 * v1 + m23 * v2 + m33 * v3)

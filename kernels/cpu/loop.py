@@ -27,7 +27,6 @@ from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.functions import cpu_method, rigid_flight, scratch_rows
 from warpchain.kernels.cpu.implicit.joint_switch import QUIET_TIME
 from warpchain.kernels.cpu.tilting import (
-    clear_padding,
     resolve_tilting_floor,
     shift_first_stage,
     tilting_gap,
@@ -193,7 +192,6 @@ def make_advance(features: Features):
             load_state(K, state, chain, world)
             place_ends(K, chain)
             if wp.static(tilts):
-                clear_padding(K, chain.link_count)
                 write_plane_sums(K, P, chain)
             if wp.static(has_floor and tilts):
                 state.gap[world] = tilting_gap(K, on_plane(chain, P, 0))

@@ -27,12 +27,13 @@ momenta p = A (u, ω1, ω2),
 with the momentum within the plane, P = Σm(ẋ, ẏ), and its moment, L = Σm(xẏ − yẋ) + ΣI θ̇. Forces between links change
 none of P and L, and A is known from the places alone.
 
-*Splitting.* The plane changes in 0.1 to 1 s, links within microseconds. So a step is: the plane carried on to its mean over
-the step; a step of the links with the plane frozen there; the plane's own step at the rates of that mean, with the mean
-of the sums before and after; contacts. This is of second order in the step. The mean ν̄ = ν + h ν̇/2 + h² ν̈/6 is that of a
-half step at the rates after h/3; they need Ȧ, of whose second moments the means in the last two steps are known. An
-upright plane at rest stays so exactly. Contacts before the plane's step would make it a method of first order: in a walk
-of 20 links at 1e-9 that falls over the ledger of energy would miss 8e-7 of the energy at the release, and 1e-9 as it is.
+*Splitting.* The plane changes in 0.1 to 1 s, links within microseconds. So a step is: the plane carried on to its mean
+over the step; a step of the links with the plane frozen there; the plane's own step at the rates of that mean, with the
+mean of the sums before and after; contacts. This is of second order in the step. The mean, ν + h ν̇/2 + h² ν̈/6, is that
+of a half step at the rates after h/3. They need Ȧ: for Σmx and Σmy that is P, for the second moments it is known from
+the last two steps. An upright plane at rest stays so exactly. With contacts before the plane's step, impulses make it a
+method of first order: in a walk of 20 links at 1e-9 that falls over the ledger of energy missed 8e-7 of the energy at
+the release, and misses 1e-9 as it is.
 
 Functions here work on one row of :attr:`State.plane`, see :mod:`layout`.
 """
@@ -307,7 +308,7 @@ def begin_plane_step(P: wp.array(dtype=wp.float64), gravity: wp.float64, h: wp.f
 
 @wp.func
 def end_plane_step(P: wp.array(dtype=wp.float64), gravity: wp.float64, h: wp.float64):
-    """Carries the plane to the end of the step that has begun; sums and mass matrix must be those of the links there."""
+    """Carries the plane to the end of the step that has begun; the sums must be those of the links there."""
     half = HALF * h
     inverse = ONE / h
     for k in range(3):
