@@ -80,8 +80,8 @@ PLANE_SUMS, MOTION_SUMS = 24, 29
 SUM_MX, SUM_MY, SUM_XX, SUM_XY, SUM_YY, SUM_MU, SUM_MV, SUM_MOMENT, SUM_MASS = range(24, 33)
 SUMS_OF_PLACES, SUMS_OF_MOTION = 5, 3
 INVERSE_00, INVERSE_01, INVERSE_02, INVERSE_11, INVERSE_12, INVERSE_22 = range(33, 39)
-# The plane's momenta after the first half of the step; of the sums SUM_XX … SUM_YY the values at its start, the rates that
-# are expected in it, and the mean rates in the step before.
+# The plane's momenta after the first half of the step; of SUM_XX … SUM_YY the values at its start, the rates that are
+# expected in it, and the mean rates in the step before.
 MOMENTUM, START_XX, RATE_XX, MEAN_RATE_XX = 39, 42, 45, 48
 PLANE_ROWS = 51
 

@@ -12,10 +12,9 @@ plane, by (J1, J2), and the plane by A⁻¹ Q with Q = (J3, Y J3 − ζ J2, ζ J
 
 *Many contacts at once.* All touching links share the plane. Each of N links gets a copy of it with the mass A/N, and
 afterwards the plane has the mean of their velocities: A⁻¹ ΣQ. Momentum is kept, since nothing else acts. Energy does
-not rise: no collision of a link and its copy adds any, and the meeting of the copies is inelastic; it loses ½ [Σ Δ·Q −
-Δ̄·ΣQ], with the change Δ = N A⁻¹ Q of a copy and that of the plane, Δ̄. The result depends neither on the order of the
-links, so that threads can take one each, nor on which side of the plane is which. Contacts one after the other,
-instead, tip an upright chain over: those on one side come first.
+not rise: no collision of a link and its copy adds any, and the meeting of the copies is inelastic. The result depends
+neither on the order of the links, so that threads can take one each, nor on which side of the plane is which. Contacts
+one after the other, instead, tip an upright chain over: those on one side come first.
 """
 
 import warp as wp
@@ -54,7 +53,7 @@ class TiltingLink:
     push: wp.float64  # Q, the generalised impulse on the plane [N s]
     moment_x: wp.float64  # [N m s]
     moment_y: wp.float64
-    lost: wp.float64  # energy [J]
+    lost: wp.float64  # energy [J] of its motion within the plane
     hits: wp.int64  # impulses
 
 
@@ -218,10 +217,6 @@ def meet_roller(
     after.push = before.push + j3
     after.moment_x = before.moment_x + q1
     after.moment_y = before.moment_y + q2
-    gained = j1 * (v1 + HALF * (w11 * j1 + w12 * j2 + w13 * j3))
-    gained += j2 * (v2 + HALF * (w12 * j1 + w22 * j2 + w23 * j3))
-    gained += j3 * (v3 + HALF * (w13 * j1 + w23 * j2 + w33 * j3))
-    after.lost = before.lost - gained
     after.hits = before.hits + wp.where(hit, wp.int64(1), wp.int64(0))
     return after
 
@@ -274,6 +269,8 @@ def meet_tilting_floor(
     right_y: wp.float64,
     x: wp.float64,
     y: wp.float64,
+    mass: wp.float64,
+    inertia: wp.float64,
     inverse_mass: wp.float64,
     inverse_inertia: wp.float64,
     u: wp.float64,
@@ -283,19 +280,20 @@ def meet_tilting_floor(
     """One link against the floor, its left roller first, together with its copy of the plane."""
     link = with_copy(chain, u, v, omega)
     link = meet_roller(chain, slope, B, link, inverse_mass, inverse_inertia, left_x, left_y, left_x - x, left_y - y)
-    return meet_roller(chain, slope, B, link, inverse_mass, inverse_inertia, right_x, right_y, right_x - x, right_y - y)
+    link = meet_roller(chain, slope, B, link, inverse_mass, inverse_inertia, right_x, right_y, right_x - x, right_y - y)
+    within = mass * ((u - link.u) * (u + link.u) + (v - link.v) * (v + link.v))
+    link.lost = HALF * (within + inertia * ((omega - link.omega) * (omega + link.omega)))
+    return link
 
 
 @wp.func
-def push_plane_by(
-    P: wp.array(dtype=wp.float64), push: wp.float64, moment_x: wp.float64, moment_y: wp.float64, work: wp.float64
-):
-    """Gives the plane the sum of the impulses on its copies; returns the energy [J] lost as they meet.
-
-    ``work``: Σ Δ·Q over the copies.
-    """
+def push_plane_by(P: wp.array(dtype=wp.float64), push: wp.float64, moment_x: wp.float64, moment_y: wp.float64):
+    """Gives the plane the sum of the impulses on its copies; returns the energy [J] that it loses."""
     du, d1, d2 = plane_times_inverse(P, push, moment_x, moment_y)
-    P[PLANE_SPEED] = P[PLANE_SPEED] + du
-    P[PLANE_TURN_X] = P[PLANE_TURN_X] + d1
-    P[PLANE_TURN_Y] = P[PLANE_TURN_Y] + d2
-    return HALF * (work - (du * push + d1 * moment_x + d2 * moment_y))
+    u = P[PLANE_SPEED]
+    w1 = P[PLANE_TURN_X]
+    w2 = P[PLANE_TURN_Y]
+    P[PLANE_SPEED] = u + du
+    P[PLANE_TURN_X] = w1 + d1
+    P[PLANE_TURN_Y] = w2 + d2
+    return -((u + HALF * du) * push + (w1 + HALF * d1) * moment_x + (w2 + HALF * d2) * moment_y)

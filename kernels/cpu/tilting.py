@@ -44,8 +44,8 @@ wp.set_module_options({"enable_backward": False})
 
 SUMS = STAGES + STAGE_ROWS
 """First of the rows for terms of sums: those of the second to fourth stage, which are free between attempts."""
-SUMMED_IN_CONTACT = 4
-"""Impulse on the plane, its two moments, and the work of the copies."""
+SUMMED_IN_CONTACT = 3
+"""Impulse on the plane and its two moments."""
 TOUCHES = SUMS + SUMMED_IN_CONTACT
 """Row of 1 for links that touch the floor, 0 for others."""
 
@@ -210,6 +210,8 @@ def resolve_tilting_floor(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.
                     K[RIGHT_Y, i],
                     K[X, i],
                     K[Y, i],
+                    K[MASS, i],
+                    K[INERTIA, i],
                     K[INVERSE_MASS, i],
                     K[INVERSE_INERTIA, i],
                     K[U, i],
@@ -224,19 +226,12 @@ def resolve_tilting_floor(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.
                 K[wp.static(SUMS), i] = wp.where(touches, link.push, ZERO)
                 K[wp.static(SUMS + 1), i] = wp.where(touches, link.moment_x, ZERO)
                 K[wp.static(SUMS + 2), i] = wp.where(touches, link.moment_y, ZERO)
-                work = (
-                    (link.plane_speed - chain.plane_speed) * link.push
-                    + (link.turn_x - chain.turn_x) * link.moment_x
-                    + (link.turn_y - chain.turn_y) * link.moment_y
-                )
-                K[wp.static(SUMS + 3), i] = wp.where(touches, work, ZERO)
                 impulses += wp.where(touches, link.hits, wp.int64(0))
                 lane += 1
         first += wp.static(LANES)
     push = row_sum(K, wp.static(SUMS), count)
     moment_x = row_sum(K, wp.static(SUMS + 1), count)
     moment_y = row_sum(K, wp.static(SUMS + 2), count)
-    work = row_sum(K, wp.static(SUMS + 3), count)
-    K[LOST_FIXED, 0] = K[LOST_FIXED, 0] + push_plane_by(P, push, moment_x, moment_y, work)
+    K[LOST_FIXED, 0] = K[LOST_FIXED, 0] + push_plane_by(P, push, moment_x, moment_y)
     write_sums_of_motion(K, P, chain)
     return impulses

@@ -232,7 +232,7 @@ def block_tilting(block_dim: int):
         P: the plane, in memory that all threads share, which the first one changes. M: the same for sums, which nobody
         else uses meanwhile. Each passes barriers, and there must be one before M is used otherwise.
     """
-    count_slot, contact_slot, sum_slot = 0, 1, 5
+    count_slot, sum_slot = 0, 1
 
     @wp.func
     def begin(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), place: Place, h: wp.float64):
@@ -295,7 +295,6 @@ def block_tilting(block_dim: int):
             push = ZERO
             moment_x = ZERO
             moment_y = ZERO
-            work = ZERO
             if touches > wp.int64(0):
                 met = meet_tilting_floor(
                     chain,
@@ -307,6 +306,8 @@ def block_tilting(block_dim: int):
                     right_y,
                     link.x,
                     link.y,
+                    K[MASS, lane],
+                    K[INERTIA, lane],
                     K[INVERSE_MASS, lane],
                     K[INVERSE_INERTIA, lane],
                     link.u,
@@ -320,36 +321,33 @@ def block_tilting(block_dim: int):
                 push = met.push
                 moment_x = met.moment_x
                 moment_y = met.moment_y
-                work = (
-                    (met.plane_speed - chain.plane_speed) * push
-                    + (met.turn_x - chain.turn_x) * moment_x
-                    + (met.turn_y - chain.turn_y) * moment_y
-                )
                 hits = int(met.hits)
-            summed = vec4d(push, moment_x, moment_y, work)
-            add_up_four(M, wp.static(contact_slot), lane, wp.static(block_dim), summed)
             if warp_width() > 1:
+                summed = vec8d()
+                summed[0] = push
+                summed[1] = moment_x
+                summed[2] = moment_y
                 motion = motion_of(K, place.column)
-                terms = vec4d()
                 if lane < place.links:
                     for k in range(wp.static(SUMS_OF_MOTION)):
-                        terms[k] = motion[k]
-                add_up_four(M, wp.static(sum_slot), lane, wp.static(block_dim), terms)
+                        summed[3 + k] = motion[k]
+                add_up_eight(M, wp.static(sum_slot), lane, wp.static(block_dim), summed)
+            else:
+                add_up_four(M, wp.static(sum_slot), lane, wp.static(block_dim), vec4d(push, moment_x, moment_y, ZERO))
             barrier()
             if lane == 0:
                 if warp_width() > 1:
                     for k in range(wp.static(SUMS_OF_MOTION)):
                         P[wp.static(layout.MOTION_SUMS + k)] = added_up(
-                            M, wp.static(sum_slot + k), wp.static(block_dim)
+                            M, wp.static(sum_slot + 3 + k), wp.static(block_dim)
                         )
                 else:
                     add_motion_one_by_one(K, P, place.links)
                 lost = push_plane_by(
                     P,
-                    added_up(M, wp.static(contact_slot), wp.static(block_dim)),
-                    added_up(M, wp.static(contact_slot + 1), wp.static(block_dim)),
-                    added_up(M, wp.static(contact_slot + 2), wp.static(block_dim)),
-                    added_up(M, wp.static(contact_slot + 3), wp.static(block_dim)),
+                    added_up(M, wp.static(sum_slot), wp.static(block_dim)),
+                    added_up(M, wp.static(sum_slot + 1), wp.static(block_dim)),
+                    added_up(M, wp.static(sum_slot + 2), wp.static(block_dim)),
                 )
                 K[layout.BOARD_LOST_FIXED, 0] = K[layout.BOARD_LOST_FIXED, 0] + lost
         return hits
