@@ -24,8 +24,8 @@ momenta p = A (u, ω1, ω2),
 
     ṗ0 = ω2 P1 − ω1 P2 − g up3 Σm,    ṗ1 = u P2 − ω2 L − g up3 Σmy,    ṗ2 = ω1 L − u P1 + g up3 Σmx
 
-with the momentum within the plane, P = Σm(ẋ, ẏ), and its moment, L = Σm(xẏ − yẋ) + ΣI θ̇. Forces between links change
-none of P and L, and A is known from the places alone.
+with the momentum within the plane, P = Σm(ẋ, ẏ), and its moment, L = Σm(xẏ − yẋ) + ΣI θ̇. Springs and impulses between
+links change neither, and A depends on places only.
 
 *Splitting.* The plane changes in 0.1 to 1 s, links within microseconds. So a step is: the plane carried on to its mean
 over the step; a step of the links with the plane frozen there; the plane's own step at the rates of that mean, with the

@@ -30,7 +30,7 @@ from warpchain.walks.rows import row_type
 
 Folder = str | os.PathLike[str]
 
-NUMERICS_VERSION: Final = 11
+NUMERICS_VERSION: Final = 12
 """Raised by every change that changes a number of any walk; shards of two versions never mix."""
 
 OWN: Final = ("sweep.json", "sweep.yaml", "shards", "log.txt")
