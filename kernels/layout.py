@@ -73,16 +73,18 @@ WATCH_ROWS = 33
 PLANE_SPEED, PLANE_TURN_X, PLANE_TURN_Y = 0, 1, 2
 AHEAD, UP, ORIGIN = 3, 6, 9
 PLANE_VALUES = 12
-# The plane half a step later, as the links feel it during the step, and in its first stage.
+# The plane in the middle of the step, as the links feel it, and in its first stage.
 PLANE_MID = 12
-# Sums over the links in one state, see physics.plane, and the inverse of the mass matrix, rows of its upper triangle.
-PLANE_SUMS, MOTION_SUMS = 24, 30
-SUM_MASS, SUM_MX, SUM_MY, SUM_XX, SUM_XY, SUM_YY = range(24, 30)
-SUM_MU, SUM_MV, SUM_XU, SUM_XV, SUM_YU, SUM_YV = range(30, 36)
-SUM_SPIN, SUM_SPIN_SINE, SUM_SPIN_COSINE = 36, 37, 38
-INVERSE_00, INVERSE_01, INVERSE_02, INVERSE_11, INVERSE_12, INVERSE_22 = range(39, 45)
-PLANE_ROWS = 45
-SUMS_OF_PLACES, SUMS_OF_MOTION = 6, 9
+# Sums over the links in one state, see physics.plane, their mass, and the inverse of the mass matrix, rows of its upper
+# triangle.
+PLANE_SUMS, MOTION_SUMS = 24, 29
+SUM_MX, SUM_MY, SUM_XX, SUM_XY, SUM_YY, SUM_MU, SUM_MV, SUM_MOMENT, SUM_MASS = range(24, 33)
+SUMS_OF_PLACES, SUMS_OF_MOTION = 5, 3
+INVERSE_00, INVERSE_01, INVERSE_02, INVERSE_11, INVERSE_12, INVERSE_22 = range(33, 39)
+# The plane's momenta after the first half of the step; of SUM_XX … SUM_YY the values at its start, the rates that are
+# expected in it, and the mean rates in the step before.
+MOMENTUM, START_XX, RATE_XX, MEAN_RATE_XX = 39, 42, 45, 48
+PLANE_ROWS = 51
 
 # State.counts
 ACCEPTED, REJECTED, FLOOR_IMPULSES, SPROCKET_IMPULSES, SELF_IMPULSES, BOUNCES, LIST_BUILDS = range(7)

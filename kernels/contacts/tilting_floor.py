@@ -15,10 +15,9 @@ plane, by (J1, J2), and the plane by A⁻¹ Q with Q = (J3, Y J3 − ζ J2, ζ J
 
 *Many contacts at once.* All touching links share the plane. Each of N links gets a copy of it with the mass A/N, and
 afterwards the plane has the mean of their velocities: A⁻¹ ΣQ. Momentum is kept, since nothing else acts. Energy does
-not rise: no collision of a link and its copy adds any, and the meeting of the copies is inelastic; it loses ½ [Σ Δ·Q −
-Δ̄·ΣQ], with the change Δ = N A⁻¹ Q of a copy and that of the plane, Δ̄. The result depends neither on the order of the
-links, so that threads can take one each, nor on which side of the plane is which. Contacts one after the other,
-instead, tip an upright chain over: those on one side come first.
+not rise: no collision of a link and its copy adds any, and the meeting of the copies is inelastic. The result depends
+neither on the order of the links, so that threads can take one each, nor on which side of the plane is which. Contacts
+one after the other, instead, tip an upright chain over: those on one side come first.
 """
 
 import warp as wp
@@ -57,7 +56,7 @@ class TiltingLink:
     push: wp.float64  # Q, the generalised impulse on the plane [N s]
     moment_x: wp.float64  # [N m s]
     moment_y: wp.float64
-    lost: wp.float64  # energy [J]
+    lost: wp.float64  # energy [J] of its motion within the plane
     hits: wp.int64  # impulses
 
 
@@ -179,15 +178,18 @@ def meet_roller(
     wn1 = w11 * n1 + w12 * n2 + w13 * n3
     wn2 = w12 * n1 + w22 * n2 + w23 * n3
     wn3 = w13 * n1 + w23 * n2 + w33 * n3
-    # first: the impulse along the normal that ends the approach; second: the one that ends all motion
-    first = -quotient(n1 * v1 + n2 * v2 + n3 * v3, n1 * wn1 + n2 * wn2 + n3 * wn3)
     m11 = w22 * w33 - w23 * w23
     m12 = w13 * w23 - w12 * w33
     m13 = w12 * w23 - w13 * w22
     m22 = w11 * w33 - w13 * w13
     m23 = w12 * w13 - w11 * w23
     m33 = w11 * w22 - w12 * w12
-    scale = -quotient(ONE, w11 * m11 + w12 * m12 + w13 * m13)
+    normal_w = n1 * wn1 + n2 * wn2 + n3 * wn3
+    determinant = w11 * m11 + w12 * m12 + w13 * m13
+    # first: the impulse along the normal that ends the approach; second: the one that ends all motion
+    inverse_both = quotient(-ONE, normal_w * determinant)
+    first = (n1 * v1 + n2 * v2 + n3 * v3) * (determinant * inverse_both)
+    scale = normal_w * inverse_both
     second_1 = scale * (m11 * v1 + m12 * v2 + m13 * v3)
     second_2 = scale * (m12 * v1 + m22 * v2 + m23 * v3)
     second_3 = scale * (m13 * v1 + m23 * v2 + m33 * v3)
@@ -219,11 +221,6 @@ def meet_roller(
     after.push = before.push + j3
     after.moment_x = before.moment_x + q1
     after.moment_y = before.moment_y + q2
-    gained = rise * (n1 * j1 + n2 * j2 + n3 * j3)
-    gained += j1 * (v1 + HALF * (w11 * j1 + w12 * j2 + w13 * j3))
-    gained += j2 * (v2 + HALF * (w12 * j1 + w22 * j2 + w23 * j3))
-    gained += j3 * (v3 + HALF * (w13 * j1 + w23 * j2 + w33 * j3))
-    after.lost = before.lost - gained
     after.hits = before.hits + wp.where(hit, wp.int64(1), wp.int64(0))
     return after
 
@@ -276,6 +273,8 @@ def meet_tilting_floor(
     right_y: wp.float64,
     x: wp.float64,
     y: wp.float64,
+    mass: wp.float64,
+    inertia: wp.float64,
     inverse_mass: wp.float64,
     inverse_inertia: wp.float64,
     u: wp.float64,
@@ -285,19 +284,20 @@ def meet_tilting_floor(
     """One link against the floor, its left roller first, together with its copy of the plane."""
     link = with_copy(chain, u, v, omega)
     link = meet_roller(chain, slope, B, link, inverse_mass, inverse_inertia, left_x, left_y, left_x - x, left_y - y)
-    return meet_roller(chain, slope, B, link, inverse_mass, inverse_inertia, right_x, right_y, right_x - x, right_y - y)
+    link = meet_roller(chain, slope, B, link, inverse_mass, inverse_inertia, right_x, right_y, right_x - x, right_y - y)
+    within = mass * ((u - link.u) * (u + link.u) + (v - link.v) * (v + link.v))
+    link.lost = HALF * (within + inertia * ((omega - link.omega) * (omega + link.omega)))
+    return link
 
 
 @wp.func
-def push_plane_by(
-    P: wp.array(dtype=wp.float64), push: wp.float64, moment_x: wp.float64, moment_y: wp.float64, work: wp.float64
-):
-    """Gives the plane the sum of the impulses on its copies; returns the energy [J] lost as they meet.
-
-    ``work``: Σ Δ·Q over the copies.
-    """
+def push_plane_by(P: wp.array(dtype=wp.float64), push: wp.float64, moment_x: wp.float64, moment_y: wp.float64):
+    """Gives the plane the sum of the impulses on its copies; returns the energy [J] that it loses."""
     du, d1, d2 = plane_times_inverse(P, push, moment_x, moment_y)
-    P[PLANE_SPEED] = P[PLANE_SPEED] + du
-    P[PLANE_TURN_X] = P[PLANE_TURN_X] + d1
-    P[PLANE_TURN_Y] = P[PLANE_TURN_Y] + d2
-    return HALF * (work - (du * push + d1 * moment_x + d2 * moment_y))
+    u = P[PLANE_SPEED]
+    w1 = P[PLANE_TURN_X]
+    w2 = P[PLANE_TURN_Y]
+    P[PLANE_SPEED] = u + du
+    P[PLANE_TURN_X] = w1 + d1
+    P[PLANE_TURN_Y] = w2 + d2
+    return -((u + HALF * du) * push + (w1 + HALF * d1) * moment_x + (w2 + HALF * d2) * moment_y)

@@ -27,12 +27,10 @@ from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.functions import cpu_method, rigid_flight, scratch_rows
 from warpchain.kernels.cpu.implicit.joint_switch import QUIET_TIME
 from warpchain.kernels.cpu.tilting import (
-    clear_padding,
     resolve_tilting_floor,
     shift_first_stage,
     tilting_gap,
     write_plane_sums,
-    write_sums_of_motion,
 )
 from warpchain.kernels.events.present_chain import has_changed, present_chain
 from warpchain.kernels.events.record import lacks_last_sample, record_is_full, write_sample
@@ -52,7 +50,7 @@ from warpchain.kernels.features import COMPILER_FLAGS, Features
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step
 from warpchain.kernels.physics.elementary import ONE, ZERO
 from warpchain.kernels.physics.geometry import whole_lanes
-from warpchain.kernels.physics.plane import accept_plane, half_step, on_plane
+from warpchain.kernels.physics.plane import begin_plane_step, end_plane_step, on_plane
 from warpchain.kernels.physics.scaled_loads import write_inertias
 from warpchain.kernels.types import Chain, Control, Drive, Model, Record, State
 
@@ -194,7 +192,6 @@ def make_advance(features: Features):
             load_state(K, state, chain, world)
             place_ends(K, chain)
             if wp.static(tilts):
-                clear_padding(K, chain.link_count)
                 write_plane_sums(K, P, chain)
             if wp.static(has_floor and tilts):
                 state.gap[world] = tilting_gap(K, on_plane(chain, P, 0))
@@ -268,7 +265,7 @@ def make_advance(features: Features):
             felt = chain
             if wp.static(tilts):
                 before = on_plane(chain, P, wp.static(layout.PLANE_MID))
-                half_step(P, 0, wp.static(layout.PLANE_MID), chain.gravity, h)
+                begin_plane_step(P, chain.gravity, h)
                 felt = on_plane(chain, P, wp.static(layout.PLANE_MID))
                 if has_first_stage == 0:
                     first_stage(K, felt)
@@ -316,9 +313,8 @@ def make_advance(features: Features):
                 raise_extreme(state, world, layout.OPENING, opening)
                 impulses = wp.int64(0)
                 if wp.static(tilts):
-                    accept_plane(P)
                     write_plane_sums(K, P, chain)
-                    half_step(P, 0, 0, chain.gravity, h)
+                    end_plane_step(P, chain.gravity, h)
                 if wp.static(has_fixed):
                     if wp.static(tilts):
                         gap = tilting_gap(K, felt)
@@ -358,8 +354,6 @@ def make_advance(features: Features):
                         impulses += hits
                 if impulses > wp.int64(0):
                     has_first_stage = int(0)
-                    if wp.static(tilts):
-                        write_sums_of_motion(K, P, chain)
                 if wp.static(has_flight):
                     if impulses > wp.int64(0) or not are_stiff:
                         closing_time = time + QUIET_TIME

@@ -12,6 +12,7 @@ from warpchain.kernels.contacts.tilting_floor import (
     push_plane_by,
     steepness,
 )
+from warpchain.kernels.cpu.contacts.proximity import FURTHEST
 from warpchain.kernels.layout import (
     COSINE,
     INERTIA,
@@ -35,17 +36,16 @@ from warpchain.kernels.layout import (
     Y,
 )
 from warpchain.kernels.physics.elementary import TWO, ZERO, from_order_key, order_bits, order_key
-from warpchain.kernels.physics.plane import invert_plane_mass, motion_terms, on_plane, place_terms, plane_load
+from warpchain.kernels.physics.geometry import LANES, whole_lanes
+from warpchain.kernels.physics.plane import invert_plane_mass, mass_of, motion_terms, on_plane, place_terms, plane_load
 from warpchain.kernels.types import Chain
 
 wp.set_module_options({"enable_backward": False})
 
-LANES = 8
-"""Columns that are summed side by side."""
 SUMS = STAGES + STAGE_ROWS
 """First of the rows for terms of sums: those of the second to fourth stage, which are free between attempts."""
-SUMMED_IN_CONTACT = 4
-"""Impulse on the plane, its two moments, and the work of the copies."""
+SUMMED_IN_CONTACT = 3
+"""Impulse on the plane and its two moments."""
 TOUCHES = SUMS + SUMMED_IN_CONTACT
 """Row of 1 for links that touch the floor, 0 for others."""
 
@@ -66,32 +66,12 @@ def row_sum(K: wp.array2d(dtype=wp.float64), row: int, count: int) -> wp.float64
 
 
 @wp.func
-def row_sum_of_lanes(K: wp.array2d(dtype=wp.float64), row: int, first: int):
-    """Sum of one lane each of a row, from column ``first`` on."""
-    total = ZERO
-    lane = int(0)
-    while lane < wp.static(LANES):
-        total += K[row, first + lane]
-        lane += 1
-    return total
-
-
-@wp.func
-def whole_lanes(n: int):
-    """The number of links, rounded up to a multiple of the lanes."""
-    return (n + wp.static(LANES - 1)) // wp.static(LANES) * wp.static(LANES)
-
-
-@wp.func
-def clear_padding(K: wp.array2d(dtype=wp.float64), n: int):
-    """Makes the columns behind the last link count as links without mass, up to a whole number of lanes."""
-    i = n
-    while i < whole_lanes(n):
-        row = int(0)
-        while row < layout.INVERSE_INERTIA + 1:
-            K[row, i] = ZERO
-            row += 1
-        i += 1
+def any_touches(K: wp.array2d(dtype=wp.float64), first: int):
+    """Whether a link of the vector that begins at this column touches the floor."""
+    greatest = ZERO
+    for lane in range(wp.static(LANES)):
+        greatest = wp.max(greatest, K[wp.static(TOUCHES), first + lane])
+    return greatest > ZERO
 
 
 @wp.func
@@ -100,11 +80,9 @@ def write_sums_of_motion(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.f
     count = whole_lanes(chain.link_count)
     i = int(0)
     while i < count:
-        terms = motion_terms(
-            K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[U, i], K[V, i], K[OMEGA, i], K[COSINE, i], K[SINE, i]
-        )
+        motion = motion_terms(K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[U, i], K[V, i], K[OMEGA, i])
         for k in range(wp.static(SUMS_OF_MOTION)):
-            K[wp.static(SUMS + k), i] = terms[k]
+            K[wp.static(SUMS + k), i] = wp.where(i < chain.link_count, motion[k], ZERO)
         i += 1
     for k in range(wp.static(SUMS_OF_MOTION)):
         P[wp.static(layout.MOTION_SUMS + k)] = row_sum(K, wp.static(SUMS + k), count)
@@ -112,18 +90,21 @@ def write_sums_of_motion(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.f
 
 @wp.func
 def write_plane_sums(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), chain: Chain):
-    """Writes the sums over the placed links, and the inverse of the plane's mass matrix."""
+    """Writes all sums over the placed links, and the inverse of the plane's mass matrix."""
     count = whole_lanes(chain.link_count)
     i = int(0)
     while i < count:
-        terms = place_terms(chain, K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[COSINE, i], K[SINE, i])
+        places = place_terms(chain, K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[COSINE, i], K[SINE, i])
+        motion = motion_terms(K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[U, i], K[V, i], K[OMEGA, i])
         for k in range(wp.static(SUMS_OF_PLACES)):
-            K[wp.static(SUMS + k), i] = terms[k]
+            K[wp.static(SUMS + k), i] = wp.where(i < chain.link_count, places[k], ZERO)
+        for k in range(wp.static(SUMS_OF_MOTION)):
+            K[wp.static(SUMS + SUMS_OF_PLACES + k), i] = wp.where(i < chain.link_count, motion[k], ZERO)
         i += 1
-    for k in range(wp.static(SUMS_OF_PLACES)):
+    for k in range(wp.static(SUMS_OF_PLACES + SUMS_OF_MOTION)):
         P[wp.static(layout.PLANE_SUMS + k)] = row_sum(K, wp.static(SUMS + k), count)
+    P[layout.SUM_MASS] = mass_of(chain)
     invert_plane_mass(P)
-    write_sums_of_motion(K, P, chain)
 
 
 @wp.func
@@ -131,7 +112,7 @@ def shift_first_stage(K: wp.array2d(dtype=wp.float64), before: Chain, now: Chain
     """Changes the stored first stage from one plane to another; links are the same."""
     a = now.half_length
     i = int(0)
-    while i < now.link_count:
+    while i < whole_lanes(now.link_count):
         arm_x = a * K[COSINE, i]
         arm_y = a * K[SINE, i]
         ax, ay, turn = plane_load(now, K[X, i], K[Y, i], arm_x, arm_y)
@@ -148,10 +129,10 @@ def tilting_gap(K: wp.array2d(dtype=wp.float64), chain: Chain):
     slope = steepness(chain)
     lowest = order_key(middle_height(chain, slope, K[LEFT_X, 0], K[LEFT_Y, 0]))
     i = int(0)
-    while i < chain.link_count:
+    while i < whole_lanes(chain.link_count):
         left = order_key(middle_height(chain, slope, K[LEFT_X, i], K[LEFT_Y, i]))
         right = order_key(middle_height(chain, slope, K[RIGHT_X, i], K[RIGHT_Y, i]))
-        lowest = wp.min(lowest, wp.min(left, right))
+        lowest = wp.min(lowest, wp.where(i < chain.link_count, wp.min(left, right), FURTHEST))
         i += 1
     return from_order_key(lowest) - chain.half_width * wp.abs(chain.up_z)
 
@@ -161,21 +142,21 @@ def greatest_tilting_speed(K: wp.array2d(dtype=wp.float64), chain: Chain):
     """A bound on the speed [m/s] of every point of a roller, across the plane too."""
     greatest = wp.int64(0)
     i = int(0)
-    while i < chain.link_count:
+    while i < whole_lanes(chain.link_count):
         turn = chain.half_length * K[OMEGA, i]
         across = greatest_across_speed(chain, K[X, i], K[Y, i])
         square = TWO * (K[U, i] * K[U, i] + K[V, i] * K[V, i] + turn * turn) + across * across
-        greatest = wp.max(greatest, order_bits(square))
+        greatest = wp.max(greatest, wp.where(i < chain.link_count, order_bits(square), wp.int64(0)))
         i += 1
     return wp.sqrt(wp.cast(greatest, wp.float64))
 
 
 @wp.func
 def write_touches(K: wp.array2d(dtype=wp.float64), chain: Chain, slope: wp.float64):
-    """Writes 1 for each link that touches the floor and 0 for others, padding included; returns their number."""
+    """Writes 1 for each link that touches the floor and 0 for others; returns their number."""
     touching = wp.int64(0)
     i = int(0)
-    while i < chain.link_count:
+    while i < whole_lanes(chain.link_count):
         touches = link_touches(
             chain,
             slope,
@@ -189,19 +170,16 @@ def write_touches(K: wp.array2d(dtype=wp.float64), chain: Chain, slope: wp.float
             K[V, i],
             K[OMEGA, i],
         )
+        touches = wp.where(i < chain.link_count, touches, wp.int64(0))
         K[wp.static(TOUCHES), i] = wp.float64(touches)
         touching += touches
-        i += 1
-    while i < whole_lanes(chain.link_count):
-        for k in range(wp.static(SUMMED_IN_CONTACT + 1)):
-            K[wp.static(SUMS) + k, i] = ZERO
         i += 1
     return touching
 
 
 @wp.func
 def resolve_tilting_floor(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), own: Chain):
-    """Applies the impulses between rollers and floor to links and plane; returns their number.
+    """Applies the impulses between rollers and floor to links, plane and sums; returns their number.
 
     The sums must be those of the present places. Lanes of links of which none touches are passed over.
     """
@@ -215,51 +193,45 @@ def resolve_tilting_floor(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.
     count = whole_lanes(chain.link_count)
     first = int(0)
     while first < count:
-        touched = row_sum_of_lanes(K, wp.static(TOUCHES), first)
-        lane = int(0)
-        while lane < wp.static(LANES):
-            for k in range(wp.static(SUMMED_IN_CONTACT)):
-                K[wp.static(SUMS) + k, first + lane] = ZERO
-            lane += 1
-        lane = wp.where(touched > ZERO, int(0), int(wp.static(LANES)))
-        while lane < wp.static(LANES):
-            i = first + lane
-            link = meet_tilting_floor(
-                chain,
-                slope,
-                B,
-                K[LEFT_X, i],
-                K[LEFT_Y, i],
-                K[RIGHT_X, i],
-                K[RIGHT_Y, i],
-                K[X, i],
-                K[Y, i],
-                K[INVERSE_MASS, i],
-                K[INVERSE_INERTIA, i],
-                K[U, i],
-                K[V, i],
-                K[OMEGA, i],
-            )
-            touches = K[wp.static(TOUCHES), i] > ZERO
-            K[U, i] = wp.where(touches, link.u, K[U, i])
-            K[V, i] = wp.where(touches, link.v, K[V, i])
-            K[OMEGA, i] = wp.where(touches, link.omega, K[OMEGA, i])
-            K[LOST_FIXED, i] = K[LOST_FIXED, i] + wp.where(touches, link.lost, ZERO)
-            K[wp.static(SUMS), i] = wp.where(touches, link.push, ZERO)
-            K[wp.static(SUMS + 1), i] = wp.where(touches, link.moment_x, ZERO)
-            K[wp.static(SUMS + 2), i] = wp.where(touches, link.moment_y, ZERO)
-            work = (
-                (link.plane_speed - chain.plane_speed) * link.push
-                + (link.turn_x - chain.turn_x) * link.moment_x
-                + (link.turn_y - chain.turn_y) * link.moment_y
-            )
-            K[wp.static(SUMS + 3), i] = wp.where(touches, work, ZERO)
-            impulses += wp.where(touches, link.hits, wp.int64(0))
-            lane += 1
+        for k in range(wp.static(SUMMED_IN_CONTACT)):
+            for lane in range(wp.static(LANES)):
+                K[wp.static(SUMS + k), first + lane] = ZERO
+        if any_touches(K, first):
+            lane = int(0)
+            while lane < wp.static(LANES):
+                i = first + lane
+                link = meet_tilting_floor(
+                    chain,
+                    slope,
+                    B,
+                    K[LEFT_X, i],
+                    K[LEFT_Y, i],
+                    K[RIGHT_X, i],
+                    K[RIGHT_Y, i],
+                    K[X, i],
+                    K[Y, i],
+                    K[MASS, i],
+                    K[INERTIA, i],
+                    K[INVERSE_MASS, i],
+                    K[INVERSE_INERTIA, i],
+                    K[U, i],
+                    K[V, i],
+                    K[OMEGA, i],
+                )
+                touches = K[wp.static(TOUCHES), i] > ZERO
+                K[U, i] = wp.where(touches, link.u, K[U, i])
+                K[V, i] = wp.where(touches, link.v, K[V, i])
+                K[OMEGA, i] = wp.where(touches, link.omega, K[OMEGA, i])
+                K[LOST_FIXED, i] = K[LOST_FIXED, i] + wp.where(touches, link.lost, ZERO)
+                K[wp.static(SUMS), i] = wp.where(touches, link.push, ZERO)
+                K[wp.static(SUMS + 1), i] = wp.where(touches, link.moment_x, ZERO)
+                K[wp.static(SUMS + 2), i] = wp.where(touches, link.moment_y, ZERO)
+                impulses += wp.where(touches, link.hits, wp.int64(0))
+                lane += 1
         first += wp.static(LANES)
     push = row_sum(K, wp.static(SUMS), count)
     moment_x = row_sum(K, wp.static(SUMS + 1), count)
     moment_y = row_sum(K, wp.static(SUMS + 2), count)
-    work = row_sum(K, wp.static(SUMS + 3), count)
-    K[LOST_FIXED, 0] = K[LOST_FIXED, 0] + push_plane_by(P, push, moment_x, moment_y, work)
+    K[LOST_FIXED, 0] = K[LOST_FIXED, 0] + push_plane_by(P, push, moment_x, moment_y)
+    write_sums_of_motion(K, P, chain)
     return impulses

@@ -44,7 +44,7 @@ from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step, ste
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.physics.elementary import ONE, ZERO
-from warpchain.kernels.physics.plane import accept_plane, half_step
+from warpchain.kernels.physics.plane import end_plane_step, mass_of
 from warpchain.kernels.physics.scaled_loads import under_load
 from warpchain.kernels.physics.softness import softened
 from warpchain.kernels.types import Control, Drive, Model, Record, State, read_chain
@@ -237,6 +237,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 if pairs > wp.static(lists.capacity):
                     status = int(LIST_OVERFLOW)
             if wp.static(tilts):
+                if lane == 0:
+                    P[layout.SUM_MASS] = mass_of(chain)
                 barrier()  # all have read the ends
                 sum_up(K, P, M, place)
         reach = time_to_contact(control, pairs, proximity.gap, slack, proximity.speed)
@@ -338,11 +340,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                         K[chain_values, layout.VALUE_OPENING], wp.float64(opening)
                     )
                 if wp.static(tilts):
-                    if lane == 0:
-                        accept_plane(P)
                     sum_up(K, P, M, place)
                     if lane == 0:
-                        half_step(P, 0, 0, K[chain_values, layout.VALUE_GRAVITY], h)
+                        end_plane_step(P, K[chain_values, layout.VALUE_GRAVITY], h)
                 is_hit = bool(False)
                 is_near = bool(False)
                 is_stale = bool(False)
@@ -393,11 +393,6 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                             if not is_hit:
                                 is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
                 reach = time_to_contact(control, pairs, gap, slack, proximity.speed)
-                if wp.static(tilts):
-                    if is_hit:
-                        barrier()  # contacts have left the memory of the sums
-                        sum_up(K, P, M, place)
-                        barrier()
                 if is_hit or wp.static(not reuses_last):
                     if is_hit:
                         next_end = exchange_ends(ends, place, read_link(K, lane))

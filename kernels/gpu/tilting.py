@@ -47,7 +47,7 @@ from warpchain.kernels.layout import (
 )
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.plane import (
-    half_step,
+    begin_plane_step,
     invert_plane_mass,
     motion_terms,
     on_plane,
@@ -63,14 +63,14 @@ FELT = 7
 
 
 vec4d = wp.types.vector(length=4, dtype=wp.float64)
-vec16d = wp.types.vector(length=16, dtype=wp.float64)
+vec8d = wp.types.vector(length=8, dtype=wp.float64)
 
 
 def sum_up_source(count: int) -> str:
     """Source of a native function that sums ``count`` values of each thread, a power of two up to 16.
 
-    In each round a thread keeps half of its values and passes the other half to its partner, which keeps those: 16
-    exchanges for 16 values, where a sum of each value by itself takes 80. Exchanges are what such sums cost on a GPU.
+    In each round a thread keeps half of its values and passes the other half to its partner, which keeps those: 9
+    exchanges for 8 values, where a sum of each value by itself takes 40. Exchanges are what such sums cost on a GPU.
     The rounds are written out, because a loop over them would keep the values in local memory.
     """
     lines = ["#if defined(__CUDA_ARCH__)", "int index = 0;"]
@@ -107,9 +107,9 @@ def add_up_four(memory: wp.array(dtype=wp.float64), slot: int, lane: int, block_
     ...
 
 
-@wp.func_native(sum_up_source(16))
-def add_up_sixteen(memory: wp.array(dtype=wp.float64), slot: int, lane: int, block_dim: int, x: vec16d):
-    """The same for sixteen values, which fibers have no memory for."""
+@wp.func_native(sum_up_source(8))
+def add_up_eight(memory: wp.array(dtype=wp.float64), slot: int, lane: int, block_dim: int, x: vec8d):
+    """The same for eight values, which fibers have no memory for."""
     ...
 
 
@@ -192,21 +192,29 @@ def places_of(K: wp.array2d(dtype=wp.float64), i: int):
 @wp.func
 def motion_of(K: wp.array2d(dtype=wp.float64), i: int):
     """The part of link i in those that depend on velocities."""
-    return motion_terms(
-        K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[U, i], K[V, i], K[OMEGA, i], K[COSINE, i], K[SINE, i]
-    )
+    return motion_terms(K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[U, i], K[V, i], K[OMEGA, i])
 
 
 @wp.func
-def add_one_by_one(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), n: int):
-    """Writes the sums over all links, by one fiber."""
-    for k in range(wp.static(SUMS_OF_PLACES + SUMS_OF_MOTION)):
+def add_places_one_by_one(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), n: int):
+    """Writes the sums over all links that depend on places, by one fiber."""
+    for k in range(wp.static(SUMS_OF_PLACES)):
         P[wp.static(layout.PLANE_SUMS + k)] = ZERO
     i = int(0)
     while i < n:
         places = places_of(K, i)
         for k in range(wp.static(SUMS_OF_PLACES)):
             P[wp.static(layout.PLANE_SUMS + k)] = P[wp.static(layout.PLANE_SUMS + k)] + places[k]
+        i += 1
+
+
+@wp.func
+def add_motion_one_by_one(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), n: int):
+    """Writes those that depend on velocities, by one fiber."""
+    for k in range(wp.static(SUMS_OF_MOTION)):
+        P[wp.static(layout.MOTION_SUMS + k)] = ZERO
+    i = int(0)
+    while i < n:
         motion = motion_of(K, i)
         for k in range(wp.static(SUMS_OF_MOTION)):
             P[wp.static(layout.MOTION_SUMS + k)] = P[wp.static(layout.MOTION_SUMS + k)] + motion[k]
@@ -224,12 +232,12 @@ def block_tilting(block_dim: int):
         P: the plane, in memory that all threads share, which the first one changes. M: the same for sums, which nobody
         else uses meanwhile. Each passes barriers, and there must be one before M is used otherwise.
     """
-    count_slot, contact_slot, sum_slot = 0, 1, 5
+    count_slot, sum_slot = 0, 1
 
     @wp.func
     def begin(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), place: Place, h: wp.float64):
         if place.lane == 0:
-            half_step(P, 0, wp.static(PLANE_MID), K[BOARD_VALUES, layout.VALUE_GRAVITY], h)
+            begin_plane_step(P, K[BOARD_VALUES, layout.VALUE_GRAVITY], h)
             write_felt_plane(K, P)
         barrier()
         if place.lane < place.links:
@@ -245,20 +253,21 @@ def block_tilting(block_dim: int):
         if warp_width() > 1:
             places = places_of(K, place.column)
             motion = motion_of(K, place.column)
-            terms = vec16d()
+            terms = vec8d()
             if place.lane < place.links:
                 for k in range(wp.static(SUMS_OF_PLACES)):
                     terms[k] = places[k]
                 for k in range(wp.static(SUMS_OF_MOTION)):
                     terms[wp.static(SUMS_OF_PLACES + k)] = motion[k]
-            add_up_sixteen(M, wp.static(sum_slot), place.lane, wp.static(block_dim), terms)
+            add_up_eight(M, wp.static(sum_slot), place.lane, wp.static(block_dim), terms)
         barrier()
         if place.lane == 0:
             if warp_width() > 1:
                 for k in range(wp.static(SUMS_OF_PLACES + SUMS_OF_MOTION)):
                     P[wp.static(layout.PLANE_SUMS + k)] = added_up(M, wp.static(sum_slot + k), wp.static(block_dim))
             else:
-                add_one_by_one(K, P, place.links)
+                add_places_one_by_one(K, P, place.links)
+                add_motion_one_by_one(K, P, place.links)
             invert_plane_mass(P)
 
     @wp.func
@@ -286,7 +295,6 @@ def block_tilting(block_dim: int):
             push = ZERO
             moment_x = ZERO
             moment_y = ZERO
-            work = ZERO
             if touches > wp.int64(0):
                 met = meet_tilting_floor(
                     chain,
@@ -298,6 +306,8 @@ def block_tilting(block_dim: int):
                     right_y,
                     link.x,
                     link.y,
+                    K[MASS, lane],
+                    K[INERTIA, lane],
                     K[INVERSE_MASS, lane],
                     K[INVERSE_INERTIA, lane],
                     link.u,
@@ -311,22 +321,33 @@ def block_tilting(block_dim: int):
                 push = met.push
                 moment_x = met.moment_x
                 moment_y = met.moment_y
-                work = (
-                    (met.plane_speed - chain.plane_speed) * push
-                    + (met.turn_x - chain.turn_x) * moment_x
-                    + (met.turn_y - chain.turn_y) * moment_y
-                )
                 hits = int(met.hits)
-            summed = vec4d(push, moment_x, moment_y, work)
-            add_up_four(M, wp.static(contact_slot), lane, wp.static(block_dim), summed)
+            if warp_width() > 1:
+                summed = vec8d()
+                summed[0] = push
+                summed[1] = moment_x
+                summed[2] = moment_y
+                motion = motion_of(K, place.column)
+                if lane < place.links:
+                    for k in range(wp.static(SUMS_OF_MOTION)):
+                        summed[3 + k] = motion[k]
+                add_up_eight(M, wp.static(sum_slot), lane, wp.static(block_dim), summed)
+            else:
+                add_up_four(M, wp.static(sum_slot), lane, wp.static(block_dim), vec4d(push, moment_x, moment_y, ZERO))
             barrier()
             if lane == 0:
+                if warp_width() > 1:
+                    for k in range(wp.static(SUMS_OF_MOTION)):
+                        P[wp.static(layout.MOTION_SUMS + k)] = added_up(
+                            M, wp.static(sum_slot + 3 + k), wp.static(block_dim)
+                        )
+                else:
+                    add_motion_one_by_one(K, P, place.links)
                 lost = push_plane_by(
                     P,
-                    added_up(M, wp.static(contact_slot), wp.static(block_dim)),
-                    added_up(M, wp.static(contact_slot + 1), wp.static(block_dim)),
-                    added_up(M, wp.static(contact_slot + 2), wp.static(block_dim)),
-                    added_up(M, wp.static(contact_slot + 3), wp.static(block_dim)),
+                    added_up(M, wp.static(sum_slot), wp.static(block_dim)),
+                    added_up(M, wp.static(sum_slot + 1), wp.static(block_dim)),
+                    added_up(M, wp.static(sum_slot + 2), wp.static(block_dim)),
                 )
                 K[layout.BOARD_LOST_FIXED, 0] = K[layout.BOARD_LOST_FIXED, 0] + lost
         return hits

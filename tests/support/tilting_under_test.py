@@ -16,7 +16,7 @@ from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
 from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.loop import load_state
-from warpchain.kernels.cpu.tilting import clear_padding, resolve_tilting_floor, tilting_gap, write_plane_sums
+from warpchain.kernels.cpu.tilting import resolve_tilting_floor, tilting_gap, write_plane_sums
 from warpchain.kernels.features import COMPILER_FLAGS
 from warpchain.kernels.physics.plane import on_plane
 from warpchain.kernels.types import Model, State, read_chain
@@ -141,7 +141,6 @@ def _floor_pass(columns: int) -> wp.Kernel:
         row = planes[0]
         load_state(block, state, chain, 0)
         place_ends(block, chain)
-        clear_padding(block, chain.link_count)
         write_plane_sums(block, row, chain)
         results[0] = tilting_gap(block, on_plane(chain, row, 0))
         results[1] = wp.float64(resolve_tilting_floor(block, row, chain))

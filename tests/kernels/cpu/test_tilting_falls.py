@@ -155,8 +155,8 @@ def test_mirrored_tap_gives_the_mirrored_walk_to_the_bit(tapped):
 def test_ledger_closes_with_the_tolerance():
     """What is lost to no cause falls with the tolerance, to 1e-8 of the energy: impulses keep the order of the steps.
 
-    Measured with 20 links: 1e-4, 4e-8 and 1e-9 at 1e-4, 1e-6 and 1e-9; 8e-7 at 1e-9 if impulses come before the last
-    half step of the plane.
+    Measured with 20 links: 1e-4, 3e-6 and 1e-9 at 1e-4, 1e-6 and 1e-9; 8e-7 at 1e-9 if impulses come before the
+    plane's own step.
     """
     for tolerance, bound in ((1e-4, 3e-4), (1e-9, 1e-8)):
         fallen = fall(released(20, **TAP), tolerance=tolerance)
