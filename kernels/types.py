@@ -7,6 +7,9 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
+LOADING_TIME = wp.constant(wp.float64(0.25))
+"""Time [s] in which multiplied loads fall to the loop's own."""
+
 
 @wp.struct
 class Model:

@@ -12,7 +12,7 @@ from tests.support.folded_chains import folded_chain
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
-from warpchain.kernels.contacts.pair_list import list_layout
+from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu import loop as cpu_loop
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu import loop as gpu_loop
