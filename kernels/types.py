@@ -203,3 +203,22 @@ def read_chain(model: Model, world: int) -> Chain:
     chain.sprocket_radius = model.sprocket_radius[world]
     chain.half_width = model.half_width[world]
     return chain
+
+
+def make_entry(module: wp.Module):
+    """Kernel without a body, with the name and the arguments of the step kernels, see :func:`cpu.loop.make_advance`."""
+
+    @wp.kernel(name="advance", module=module, enable_backward=False, grid_stride=False)
+    def advance(
+        worlds: wp.array(dtype=wp.int32),
+        model: Model,
+        drive: Drive,
+        state: State,
+        record: Record,
+        scratch: wp.array3d(dtype=wp.float64),
+        lists: wp.array2d(dtype=wp.int32),
+        control: Control,
+    ):
+        pass
+
+    return advance

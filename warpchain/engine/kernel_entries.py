@@ -15,7 +15,7 @@ import warp as wp
 
 import warpchain.kernels
 from warpchain.kernels.features import COMPILER_FLAGS, Features
-from warpchain.kernels.types import Control, Drive, Model, Record, State
+from warpchain.kernels.types import make_entry
 
 _making = threading.Lock()
 """Held by the thread that makes a kernel: two that parse their source at once can fail (Python 3.11: SystemError)."""
@@ -54,20 +54,7 @@ def kernel_entry(features: Features, threads: int, registers: int | None) -> wp.
     text = repr((*parts, sys.version, wp.__version__))
     module.name = f"advance_{hashlib.sha256(text.encode()).hexdigest()[:32]}"
 
-    @wp.kernel(name="advance", module=module, enable_backward=False, grid_stride=False)
-    def advance(
-        worlds: wp.array(dtype=wp.int32),
-        model: Model,
-        drive: Drive,
-        state: State,
-        record: Record,
-        scratch: wp.array3d(dtype=wp.float64),
-        lists: wp.array2d(dtype=wp.int32),
-        control: Control,
-    ):
-        pass
-
-    return advance
+    return make_entry(module)
 
 
 def step_module(features: Features, threads: int, registers: int | None) -> wp.Module:
