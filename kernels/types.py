@@ -205,10 +205,14 @@ def read_chain(model: Model, world: int) -> Chain:
     return chain
 
 
-def make_entry(module: wp.Module):
-    """Kernel without a body, with the name and the arguments of the step kernels, see :func:`cpu.loop.make_advance`."""
+def make_entry(module: wp.Module, is_block: bool):
+    """Kernel that does nothing, with name, arguments and threads of the step kernels, see :func:`cpu.loop.make_advance`.
 
-    @wp.kernel(name="advance", module=module, enable_backward=False, grid_stride=False)
+    Args:
+        module: Where it stands.
+        is_block: Whether it is launched with ``wp.launch_tiled``, one block a world.
+    """
+
     def advance(
         worlds: wp.array(dtype=wp.int32),
         model: Model,
@@ -219,6 +223,19 @@ def make_entry(module: wp.Module):
         lists: wp.array2d(dtype=wp.int32),
         control: Control,
     ):
-        pass
+        _world = wp.tid()
 
-    return advance
+    def advance_block(
+        worlds: wp.array(dtype=wp.int32),
+        model: Model,
+        drive: Drive,
+        state: State,
+        record: Record,
+        scratch: wp.array3d(dtype=wp.float64),
+        lists: wp.array2d(dtype=wp.int32),
+        control: Control,
+    ):
+        _block, _lane = wp.tid()
+
+    function = advance_block if is_block else advance
+    return wp.kernel(function, name="advance", module=module, enable_backward=False, grid_stride=False)

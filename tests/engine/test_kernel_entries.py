@@ -19,7 +19,7 @@ FEATURES = Features("dp5", layout.padded_width(60), "floor", True, "grid", "rest
 
 
 def test_an_entry_takes_what_its_kernel_takes() -> None:
-    """Key, types of arguments and options that a launch reads are those of the step kernels."""
+    """Key, types of arguments, dimensions and options that a launch reads are those of the step kernels."""
     for entry, kernel in (
         (kernel_entry(FEATURES, 1, None), make_advance(FEATURES)),
         (kernel_entry(FEATURES, 64, 168), make_advance_block(FEATURES, 64, 168)),
@@ -27,6 +27,7 @@ def test_an_entry_takes_what_its_kernel_takes() -> None:
         assert entry.key == kernel.key
         types = [[str(argument.type) for argument in each.adj.args] for each in (entry, kernel)]
         assert types[0] == types[1] and len(types[0]) == 8
+        assert entry.adj.kernel_dim == kernel.adj.kernel_dim
         assert entry.options["enable_backward"] == kernel.options["enable_backward"]
     assert kernel_entry(FEATURES, 64, 168).options["grid_stride"] == kernel.options["grid_stride"]
 

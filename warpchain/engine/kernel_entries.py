@@ -53,8 +53,7 @@ def kernel_entry(features: Features, threads: int, registers: int | None) -> wp.
     parts = (SOURCES, features, threads, registers, sorted(module.resolve_options(wp.config).items()))
     text = repr((*parts, sys.version, wp.__version__))
     module.name = f"advance_{hashlib.sha256(text.encode()).hexdigest()[:32]}"
-
-    return make_entry(module)
+    return make_entry(module, is_block=registers is not None)
 
 
 def step_module(features: Features, threads: int, registers: int | None) -> wp.Module:
