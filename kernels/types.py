@@ -206,7 +206,7 @@ def read_chain(model: Model, world: int) -> Chain:
 
 
 def make_entry(module: wp.Module, is_block: bool):
-    """Kernel that does nothing, with name, arguments and threads of the step kernels, see :func:`cpu.loop.make_advance`.
+    """Kernel that does nothing, with name, arguments and threads of a step kernel, see :func:`cpu.loop.make_advance`.
 
     Args:
         module: Where it stands.

@@ -24,6 +24,8 @@ def test_an_entry_takes_what_its_kernel_takes() -> None:
         (kernel_entry(FEATURES, 1, None), make_advance(FEATURES)),
         (kernel_entry(FEATURES, 64, 168), make_advance_block(FEATURES, 64, 168)),
     ):
+        for each in (entry, kernel):
+            each.module.get_module_hash()  # reads the source
         assert entry.key == kernel.key
         types = [[str(argument.type) for argument in each.adj.args] for each in (entry, kernel)]
         assert types[0] == types[1] and len(types[0]) == 8
