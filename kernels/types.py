@@ -7,6 +7,9 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
+LOADING_TIME = wp.constant(wp.float64(0.25))
+"""Time [s] in which multiplied loads fall to the loop's own."""
+
 
 @wp.struct
 class Model:
@@ -202,3 +205,39 @@ def read_chain(model: Model, world: int) -> Chain:
     chain.sprocket_radius = model.sprocket_radius[world]
     chain.half_width = model.half_width[world]
     return chain
+
+
+def make_entry(module: wp.Module, is_block: bool):
+    """Kernel that does nothing, with name, arguments and threads of a step kernel, see :func:`cpu.loop.make_advance`.
+
+    Args:
+        module: Where it stands.
+        is_block: Whether it is launched with ``wp.launch_tiled``, one block a world.
+    """
+
+    def advance(
+        worlds: wp.array(dtype=wp.int32),
+        model: Model,
+        drive: Drive,
+        state: State,
+        record: Record,
+        scratch: wp.array3d(dtype=wp.float64),
+        lists: wp.array2d(dtype=wp.int32),
+        control: Control,
+    ):
+        _world = wp.tid()
+
+    def advance_block(
+        worlds: wp.array(dtype=wp.int32),
+        model: Model,
+        drive: Drive,
+        state: State,
+        record: Record,
+        scratch: wp.array3d(dtype=wp.float64),
+        lists: wp.array2d(dtype=wp.int32),
+        control: Control,
+    ):
+        _block, _lane = wp.tid()
+
+    function = advance_block if is_block else advance
+    return wp.kernel(function, name="advance", module=module, enable_backward=False, grid_stride=False)

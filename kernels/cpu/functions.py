@@ -6,8 +6,8 @@ from typing import Any
 from warpchain.kernels import layout
 from warpchain.kernels.cpu.explicit import explicit_method
 from warpchain.kernels.cpu.implicit.joint_switch import joint_switch
-from warpchain.kernels.cpu.implicit.rigid_flight import flight_method, flight_rows
-from warpchain.kernels.cpu.implicit.rosenbrock import rosenbrock_method, rosenbrock_rows
+from warpchain.kernels.cpu.implicit.rigid_flight import flight_method
+from warpchain.kernels.cpu.implicit.rosenbrock import rosenbrock_method
 from warpchain.kernels.methods.controller import classical_controller, implicit_controller, step_controller
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.methods.w_tableaus import ROS34PW2
@@ -53,15 +53,6 @@ class RigidFlight:
     open_joints: Any
     growth: Any
     shrinkage: Any
-
-
-def scratch_rows(name: str, columns: int) -> int:
-    """Rows of a chain's scratch with this many columns."""
-    method = find_method(name)
-    if method.kind == "rosenbrock":
-        return rosenbrock_rows(method.tableau, columns)
-    rows = layout.scratch_rows(method.stages)
-    return rows + flight_rows(columns) if method.has_rigid_flight else rows
 
 
 def cpu_method(name: str, columns: int, tilts: bool = False) -> CpuMethod:

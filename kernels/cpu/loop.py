@@ -12,7 +12,7 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.codes import LIST_OVERFLOW, NOT_FINITE, RUNNING, STEP_LIMIT, STEP_TOO_SMALL
 from warpchain.kernels.contacts.fixed_body import sprocket_turning
-from warpchain.kernels.contacts.pair_list import list_layout
+from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu.contacts.neighbour_list import list_slack, neighbour_list
 from warpchain.kernels.cpu.contacts.proximity import (
     floor_gap,
@@ -24,8 +24,9 @@ from warpchain.kernels.cpu.contacts.proximity import (
 from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
 from warpchain.kernels.cpu.contacts.time_to_contact import FLIGHT_SKIN, LEAST_SLACK, step_bound
 from warpchain.kernels.cpu.explicit import place_ends
-from warpchain.kernels.cpu.functions import cpu_method, rigid_flight, scratch_rows
+from warpchain.kernels.cpu.functions import cpu_method, rigid_flight
 from warpchain.kernels.cpu.implicit.joint_switch import QUIET_TIME
+from warpchain.kernels.cpu.rows import scratch_rows
 from warpchain.kernels.cpu.tilting import (
     resolve_tilting_floor,
     shift_first_stage,
@@ -127,7 +128,7 @@ def make_advance(features: Features):
     """Kernel ``advance(worlds, model, drive, state, record, scratch, lists, control)``, one thread per chain.
 
     worlds: (launched,) int32, the worlds to carry on; those whose status is not RUNNING are left alone. scratch: (W,
-    rows, columns) float64, lists: (W, size) int32, see :mod:`layout` and :mod:`contacts.pair_list`; both belong to a
+    rows, columns) float64, lists: (W, size) int32, see :mod:`layout` and :mod:`contacts.list_layout`; both belong to a
     world until its run ends.
     """
     columns = features.columns
@@ -161,7 +162,12 @@ def make_advance(features: Features):
     resolve_self_contacts = self_contacts(columns)
     bound_of_step = step_bound(features, has_flight)
 
-    @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS})
+    @wp.kernel(
+        name="advance",
+        module="unique",
+        enable_backward=False,
+        module_options={"cpu_compiler_flags": COMPILER_FLAGS},
+    )
     def advance(
         worlds: wp.array(dtype=wp.int32),
         model: Model,

@@ -34,7 +34,7 @@ from warpchain.kernels.codes import FINISHED
 from warpchain.kernels.events.summary import Summary
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO
 from warpchain.kernels.physics.scaled_loads import DRAG_PER_CROSSING, DRAG_PER_TURN, crossing_time
-from warpchain.kernels.types import Chain, Drive, State
+from warpchain.kernels.types import LOADING_TIME, Chain, Drive, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -45,8 +45,6 @@ Loops of Table 1 slip on their sprocket by 0.1 to 0.6 % up to 45 Hz. The slip of
 """
 MOST_SLIP = wp.constant(wp.float64(0.25))
 """Slip above which a loop never counts as stationary."""
-LOADING_TIME = wp.constant(wp.float64(0.25))
-"""Time [s] in which loads fall to the loop's own."""
 LEAST_LOAD = wp.constant(wp.float64(3.0))
 """Least factor under which a loop is held again; below it the factor becomes 1."""
 MOST_CROSSINGS = wp.constant(wp.float64(8.0))

@@ -14,7 +14,7 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.codes import LIST_OVERFLOW, NOT_FINITE, RUNNING, STEP_LIMIT, STEP_TOO_SMALL
-from warpchain.kernels.contacts.pair_list import list_layout
+from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.events.present_chain import has_changed, present_chain
 from warpchain.kernels.events.record import lacks_last_sample, record_is_full, write_sample
 from warpchain.kernels.events.summary import summarise
@@ -137,6 +137,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         return next_end, read_proximity(maxima)
 
     @wp.kernel(
+        name="advance",
         module="unique",
         enable_backward=False,
         grid_stride=False,

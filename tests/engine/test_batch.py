@@ -16,8 +16,6 @@ from warpchain.engine.batch import Batch
 from warpchain.engine.devices import Device, Fibers, start_device
 from warpchain.engine.kernel_choice import (
     block_threads,
-    features_of,
-    kernels_of,
     most_registers,
     resident_blocks,
     shared_threads,
@@ -26,7 +24,6 @@ from warpchain.engine.memory import CAPACITY_FRAMES, CAPACITY_SAMPLES, world_byt
 from warpchain.engine.mirror import Mirror
 from warpchain.inputs.options import Options
 from warpchain.inputs.setup import Setup
-from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.sweep_run import prepare, sweep
@@ -164,9 +161,6 @@ def test_memory_of_a_world_is_what_a_batch_takes(keeps_samples: bool, frame_ever
 def test_a_block_has_a_thread_for_each_link() -> None:
     """Threads come in whole warps of 32, and chains of equal blocks share a kernel."""
     assert [block_threads(n) for n in (4, 32, 60, 64, 66, 180)] == [32, 32, 64, 64, 96, 192]
-    features = features_of(Options(), layout.padded_width(60), fixed_body="floor", watch="rest")
-    ((_, threads),) = kernels_of(start_device("cpu"), features, [64, 192])
-    assert threads == 1
 
 
 def test_few_walks_of_several_lengths_share_a_kernel() -> None:

@@ -16,14 +16,14 @@ import warp as wp
 from warpchain.engine.devices import start_device
 from warpchain.engine.kernel_cache import load_checked
 
-@wp.kernel(enable_backward=False, module="unique")
+@wp.kernel(enable_backward=False, module="unique", module_options={"block_dim": 1, "strip_hash": True})
 def root(x: wp.array(dtype=wp.float64)):
     for i in range(x.shape[0]):
         x[i] = wp.sqrt(wp.sin(x[i]) + wp.float64(2.0)) / (x[i] * x[i] + wp.float64(1.0))
 
 device = start_device("cpu").warp
 x = wp.array([0.1 * i for i in range(20)], dtype=wp.float64, device=device)
-load_checked(root.module, device, 1)
+load_checked(root.module, device, lambda: root.module)
 wp.launch(root, dim=1, inputs=[x], device=device)
 print(x.numpy().tobytes().hex())
 """

@@ -128,15 +128,22 @@ def test_kernels_are_made_by_one_thread_at_a_time(monkeypatch: pytest.MonkeyPatc
     """Tasks of several threads each load what they need, but not at once."""
     inside, most = [], []
 
-    def make(features: object) -> wp.Kernel:
+    class Forgetful(dict[object, wp.Kernel]):
+        """Kernels that are loaded again each time."""
+
+        def __contains__(self, key: object) -> bool:
+            return False
+
+    def make(features: object, *sizes: object) -> wp.Kernel:
         inside.append(features)
         time.sleep(0.1)
         most.append(len(inside))
         inside.pop()
-        return made(features)
+        return made(features, *sizes)
 
-    made = kernel_choice.make_advance
-    monkeypatch.setattr(kernel_choice, "make_advance", make)
+    made = kernel_choice.kernel_entry
+    monkeypatch.setattr(kernel_choice, "kernel_entry", make)
+    monkeypatch.setattr(kernel_choice, "_loaded", Forgetful())
     setups = [brief_setup(seed) for seed in range(2)]
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         list(pool.map(compile_kernels, [[setup] for setup in setups]))

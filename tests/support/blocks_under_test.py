@@ -12,7 +12,7 @@ from tests.support.folded_chains import folded_chain
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
-from warpchain.kernels.contacts.pair_list import list_layout
+from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu import loop as cpu_loop
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu import loop as gpu_loop
@@ -125,7 +125,10 @@ def launch_blocks(batch: Batch, features: Features, attempts: int, *, block_dim:
 
 def launch_chains(batch: Batch, features: Features, attempts: int) -> None:
     """Carry all worlds on in the CPU kernel for these features."""
-    batch.launch(range(len(batch.links)), features, attempts)
+    batch.control.attempts = attempts
+    arrays = [batch.model, batch.drive, batch.state, batch.record, batch.scratch, batch.lists, batch.control]
+    inputs = [wp.array(range(len(batch.links)), dtype=wp.int32, device="cpu"), *arrays]
+    wp.launch(cpu_loop.make_advance(features), dim=len(batch.links), inputs=inputs, device="cpu")
 
 
 def listed_pairs(batch: Batch, world: int = 0) -> set[tuple[int, int]]:

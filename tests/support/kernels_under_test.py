@@ -17,7 +17,7 @@ from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.impulse import collision_impulse, fixed_contact, inverse_masses
 from warpchain.kernels.contacts.link_pair import circles_of_links, collide
-from warpchain.kernels.contacts.pair_list import list_layout
+from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu.contacts.neighbour_list import greatest_displacement, list_slack, neighbour_list
 from warpchain.kernels.cpu.contacts.proximity import (
     floor_gap,

@@ -11,8 +11,9 @@ from tests.support.kernels_under_test import chain_on_cpu
 from warpchain.engine.devices import start_device
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
-from warpchain.kernels.cpu.functions import rigid_flight, scratch_rows
+from warpchain.kernels.cpu.functions import rigid_flight
 from warpchain.kernels.cpu.loop import load_state
+from warpchain.kernels.cpu.rows import scratch_rows
 from warpchain.kernels.features import COMPILER_FLAGS
 from warpchain.kernels.types import Model, State, read_chain
 

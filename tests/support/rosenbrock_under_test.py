@@ -11,9 +11,10 @@ from warpchain.engine.devices import start_device
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
 from warpchain.kernels.cpu.explicit import place_ends
-from warpchain.kernels.cpu.functions import cpu_method, scratch_rows
+from warpchain.kernels.cpu.functions import cpu_method
 from warpchain.kernels.cpu.implicit.solver import SegmentLayout, cyclic_solver, segment_columns, segment_places
 from warpchain.kernels.cpu.loop import load_state
+from warpchain.kernels.cpu.rows import scratch_rows
 from warpchain.kernels.features import COMPILER_FLAGS
 from warpchain.kernels.types import Model, State, read_chain
 

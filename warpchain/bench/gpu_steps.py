@@ -16,7 +16,7 @@ import warp as wp
 from warpchain.bench.chain_timer import ChainTimer, together
 from warpchain.bench.starts import flying, piled
 from warpchain.engine.devices import Fibers, Gpu, start_device, versions
-from warpchain.engine.kernel_choice import block_kernel, block_threads, features_of, load_kernels
+from warpchain.engine.kernel_choice import block_threads, features_of, load_kernels, step_kernel
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.validation import InputError, shown
@@ -157,8 +157,9 @@ def _gpu_cost(scene: str, method: str, timer: ChainTimer, rounds: int) -> GpuCos
     """Cost of an attempt from several measurements of :data:`SECONDS` each."""
     attempts = round(SECONDS / timer.settled.seconds)
     whole = together(scene, [timer.measure(attempts) for _ in range(rounds)])
-    threads, device = block_threads(timer.links), timer.batches[0].device.warp
-    registers, spilled, blocks = _kernel_needs(block_kernel(timer.features, threads), threads, device)
+    threads, gpu = block_threads(timer.links), timer.batches[0].device
+    device = gpu.warp
+    registers, spilled, blocks = _kernel_needs(step_kernel(gpu, timer.features, threads), threads, device)
     peak = 2 * FP64_LANES.get(device.arch, math.nan) * device.sm_count * highest_clock(device)
     links = timer.links * timer.chains
     return GpuCost(

@@ -13,18 +13,16 @@ from numpy.typing import NDArray
 
 from warpchain.engine.control import control_of
 from warpchain.engine.devices import Gpu, start_device
-from warpchain.engine.kernel_choice import block_kernel, block_threads, features_of, load_kernels
+from warpchain.engine.kernel_choice import block_threads, features_of, load_kernels, step_kernel
 from warpchain.engine.memory import CAPACITY_FRAMES, CAPACITY_SAMPLES, scratch_rows
 from warpchain.engine.mirror import Mirror
 from warpchain.engine.tallies import COUNTS, EXTREMES, LOSSES
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
-from warpchain.kernels.contacts.pair_list import list_layout
-from warpchain.kernels.cpu.loop import make_advance
-from warpchain.kernels.events.release import LOADING_TIME
+from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.features import Features
-from warpchain.kernels.types import Drive, Model, Record, State
+from warpchain.kernels.types import LOADING_TIME, Drive, Model, Record, State
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
@@ -310,7 +308,9 @@ class Batch:
                     wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device.warp),
                     *arrays,
                 ]
-                wp.launch(make_advance(features), dim=len(worlds), inputs=inputs, device=self.device.warp)
+                wp.launch(
+                    step_kernel(self.device, features, 1), dim=len(worlds), inputs=inputs, device=self.device.warp
+                )
             return
         blocks: dict[tuple[Features, int], list[int]] = defaultdict(list)
         for features, worlds in groups.items():
@@ -328,7 +328,7 @@ class Batch:
         first = 0
         for ((features, threads), worlds), lane in zip(blocks.items(), itertools.cycle(self._lanes), strict=False):
             inputs = [self._order.array[first : first + len(worlds)], *arrays]
-            self._gpu.launch(block_kernel(features, threads), len(worlds), inputs, threads, lane)
+            self._gpu.launch(step_kernel(self.device, features, threads), len(worlds), inputs, threads, lane)
             first += len(worlds)
         for lane in self._lanes:
             self._stream.wait_event(lane.record_event())

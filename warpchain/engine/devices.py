@@ -9,7 +9,7 @@ import sys
 import tempfile
 import threading
 import traceback
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import warp as wp
@@ -48,9 +48,9 @@ class Device:
         """A copy of values on the host, from and to which the device can copy."""
         return wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device="cpu")
 
-    def load(self, kernel: wp.Kernel, threads: int) -> None:
-        """Load a kernel for blocks of this many threads; it is compiled if the cache does not have it."""
-        load_checked(kernel.module, self.warp, threads)
+    def load(self, entry: wp.Kernel, make: Callable[[], wp.Module]) -> None:
+        """Load the kernel of an entry; it is made and compiled if the cache does not have it."""
+        load_checked(entry.module, self.warp, make)
 
 
 class Gpu(Device):

@@ -12,7 +12,7 @@ import json
 import os
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import warp as wp
@@ -24,18 +24,22 @@ LOADED = (".o", ".cubin", ".ptx", ".meta")
 """Endings of the files that are loaded from a module's folder."""
 LONGEST_WAIT = 120.0
 """Time [s] after which a process no longer waits for another: that one may have been stopped for good."""
-_loaded: set[tuple[str, str, int]] = set()
 
 
-def load_checked(module: wp.Module, device: wp.Device, threads: int) -> None:
-    """Load a module for blocks of so many threads; what does not fit its checksum is compiled anew.
+def load_checked(module: wp.Module, device: wp.Device, make: Callable[[], wp.Module]) -> None:
+    """Load a module for blocks of its threads; what is missing or does not fit its checksum is compiled.
+
+    Args:
+        module: Module with entries, without a hash in its names.
+        device: Where to load it.
+        make: Makes the module of the same name that is compiled.
 
     Raises:
         InputError: the folder of the cache cannot be used.
         OSError: its disk is full or broken.
     """
     try:
-        _load_checked(module, device, threads)
+        _load_checked(module, device, make)
     except OSError as error:
         raise cache_refusal(error) from error
 
@@ -49,21 +53,20 @@ def cache_refusal(error: OSError) -> Exception:
     return InputError(text)
 
 
-def _load_checked(module: wp.Module, device: wp.Device, threads: int) -> None:
-    name = module.get_module_identifier(threads)
-    if (name, device.alias, threads) in _loaded:
-        wp.load_module(module, device=device, block_dim=threads)
-        return
-    folder = Path(wp.config.kernel_cache_dir, name)
-    with _locked(folder.with_name(f"{name}.sha256")) as record:
+def _load_checked(module: wp.Module, device: wp.Device, make: Callable[[], wp.Module]) -> None:
+    folder = Path(wp.config.kernel_cache_dir, module.get_module_identifier())
+    with _locked(folder.with_name(f"{folder.name}.sha256")) as record:
         recorded = _recorded(record)
         if not _checksums(folder).items() <= recorded.items():
             shutil.rmtree(folder)
-        wp.load_module(module, device=device, block_dim=threads)
+        try:
+            wp.load_aot_module(module, device, module_dir=folder)
+        except FileNotFoundError:
+            wp.compile_aot_module(make(), device, module_dir=folder)
+            wp.load_aot_module(module, device, module_dir=folder)
         if (now := _checksums(folder)) != recorded:
             os.truncate(record, 0)
             os.pwrite(record, json.dumps(now).encode(), 0)  # cut short by a kill, it fits nothing
-    _loaded.add((name, device.alias, threads))
 
 
 @contextlib.contextmanager

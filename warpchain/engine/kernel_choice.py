@@ -7,11 +7,10 @@ from concurrent.futures import ThreadPoolExecutor
 import warp as wp
 
 from warpchain.engine.devices import Device, Gpu
+from warpchain.engine.kernel_entries import kernel_entry, step_module
 from warpchain.engine.processors import processors
 from warpchain.inputs.options import Options
-from warpchain.kernels.cpu.loop import make_advance
 from warpchain.kernels.features import Features
-from warpchain.kernels.gpu.loop import make_advance_block
 from warpchain.kernels.methods.method import find_method
 
 WARP = 32
@@ -33,18 +32,14 @@ SHARED_THREADS = 192
 SHARED_WALKS = 2000
 """Most walks of a sweep that share such blocks; with 2016 it made no difference."""
 _loading = threading.Lock()
-"""Held by the thread that makes kernels. Two that parse their source at once can fail (Python 3.11: SystemError), and
-two that want the same one would both compile it."""
+"""Held by the thread that loads kernels; two that want the same one would both compile it."""
+_loaded: dict[tuple[Device, Features, int], wp.Kernel] = {}
+"""Entries of loaded kernels, by what they were loaded for."""
 
 
 def most_registers(threads: int) -> int:
     """Most registers of each thread in blocks of this many."""
     return FEWER_REGISTERS.get(threads, REGISTERS)
-
-
-def block_kernel(features: Features, threads: int) -> wp.Kernel:
-    """The GPU kernel for blocks of this many threads."""
-    return make_advance_block(features, threads, most_registers(threads))
 
 
 def block_threads(links: int) -> int:
@@ -93,31 +88,37 @@ def features_of(
     )
 
 
-def kernels_of(device: Device, features: Features, threads: Iterable[int]) -> list[tuple[wp.Kernel, int]]:
-    """(Kernel, threads of a block) for each of these numbers of threads; on a CPU one kernel, with 1."""
-    if not isinstance(device, Gpu):
-        return [(make_advance(features), 1)]
-    return [(block_kernel(features, size), size) for size in sorted(set(threads))]
+def step_kernel(device: Device, features: Features, threads: int) -> wp.Kernel:
+    """The kernel for blocks of this many threads, on a CPU 1, loaded."""
+    if (device, features, threads) not in _loaded:
+        load_kernels([(device, features, threads)])
+    return _loaded[device, features, threads]
 
 
 def load_kernels(wanted: Iterable[tuple[Device, Features, int]]) -> None:
-    """Compile kernels that are not in the cache yet, several at a time.
+    """Load kernels, several at a time, and compile those that are not in the cache yet.
 
     Args:
-        wanted: Device, features and threads of a block of each kernel.
+        wanted: Device, features and threads of a block of each kernel; on a CPU 1.
     """
 
-    def load(item: tuple[Device, wp.Kernel, int]) -> None:
-        device, kernel, threads = item
-        device.load(kernel, threads)
+    def load(key: tuple[Device, Features, int], entry: wp.Kernel) -> None:
+        device, features, threads = key
+        device.load(entry, lambda: step_module(features, threads, _registers(device, threads)))
 
     with _loading:
-        kernels = [
-            (device, kernel, threads)
-            for device, features, size in wanted
-            for kernel, threads in kernels_of(device, features, [size])
-        ]
-        for device, _, _ in kernels:
+        entries = {
+            (device, features, threads): kernel_entry(features, threads, _registers(device, threads))
+            for device, features, threads in wanted
+            if (device, features, threads) not in _loaded
+        }
+        for device, _, _ in entries:
             device.prepare()
         with ThreadPoolExecutor(processors()) as pool:
-            list(pool.map(load, kernels))
+            list(pool.map(load, entries, entries.values()))
+        _loaded.update(entries)
+
+
+def _registers(device: Device, threads: int) -> int | None:
+    """Most registers of each thread; None on a CPU."""
+    return most_registers(threads) if isinstance(device, Gpu) else None

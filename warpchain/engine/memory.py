@@ -5,8 +5,8 @@ from warpchain.engine.kernel_choice import block_threads, resident_blocks
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
-from warpchain.kernels.contacts.pair_list import list_layout
-from warpchain.kernels.cpu import functions as cpu_functions
+from warpchain.kernels.contacts.list_layout import list_layout
+from warpchain.kernels.cpu import rows as cpu_rows
 from warpchain.kernels.gpu import functions as gpu_functions
 
 WORLDS_OF_BLOCK = 2
@@ -25,7 +25,7 @@ def scratch_rows(options: Options, longest: int, device: Device, threads: int | 
     columns = layout.padded_width(longest)
     if isinstance(device, Gpu):
         return gpu_functions.board_rows(threads or block_threads(longest), columns)
-    return cpu_functions.scratch_rows(options.method, columns)
+    return cpu_rows.scratch_rows(options.method, columns)
 
 
 def world_bytes(

@@ -10,7 +10,8 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.contacts.pair_list import bucket_of, list_layout, listing_reach
+from warpchain.kernels.contacts.list_layout import list_layout
+from warpchain.kernels.contacts.pair_list import bucket_of, listing_reach
 from warpchain.kernels.layout import LISTED_X, LISTED_Y, RIGHT_X, RIGHT_Y
 from warpchain.kernels.physics.elementary import HALF, order_bits
 from warpchain.kernels.physics.geometry import whole_lanes

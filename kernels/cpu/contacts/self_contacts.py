@@ -16,7 +16,7 @@ import functools
 import warp as wp
 
 from warpchain.kernels.contacts.link_pair import are_neighbours, circles_of_links, collide, links_of, natural
-from warpchain.kernels.contacts.pair_list import GEOMETRY_COLUMNS, GEOMETRY_ROWS, list_layout
+from warpchain.kernels.contacts.list_layout import GEOMETRY_COLUMNS, GEOMETRY_ROWS, list_layout
 from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y, X, Y
 from warpchain.kernels.physics.elementary import TWO, ZERO, order_bits
 from warpchain.kernels.types import Chain

@@ -9,7 +9,7 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.contacts.pair_list import list_layout
+from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu.contacts.proximity import greatest_speed
 from warpchain.kernels.cpu.tilting import greatest_tilting_speed
 from warpchain.kernels.features import Features

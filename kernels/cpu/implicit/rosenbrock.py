@@ -84,14 +84,6 @@ GREATEST_TURN = wp.constant(wp.float64(1.0))
 """Greatest turn of a link [rad] in one step: beyond it the error estimate, made from six places, is no estimate."""
 
 
-def rosenbrock_rows(name: str, columns: int) -> int:
-    """Rows of a chain's scratch of this width."""
-    segments = segments_of(columns)
-    rows = FIRST_STAGE_ROW + 3 * ROSENBROCK_TABLES[name].stages
-    doubles = rows * segments.columns + segments.separator_rows * LANES
-    return STAGES + STAGE_ROWS + -(-doubles // columns)
-
-
 @functools.cache
 def rosenbrock_method(name: str, columns: int):
     """Warp functions of one table: (evaluate the first stage, attempt a step, commit it), see :class:`CpuMethod`.

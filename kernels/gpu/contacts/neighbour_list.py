@@ -7,7 +7,8 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.contacts.pair_list import bucket_of, list_layout, listing_reach
+from warpchain.kernels.contacts.list_layout import list_layout
+from warpchain.kernels.contacts.pair_list import bucket_of, listing_reach
 from warpchain.kernels.gpu.threads import barrier
 from warpchain.kernels.layout import BOARD_LISTED_X, BOARD_LISTED_Y, RIGHT_X, RIGHT_Y
 from warpchain.kernels.types import Chain

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import warp as wp
 
 from warpchain.kernels.contacts.link_pair import collide, links_of, natural, touching_circles
-from warpchain.kernels.contacts.pair_list import list_layout
+from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.gpu.threads import barrier, barrier_if_any
 from warpchain.kernels.layout import BOARD_LOST_SELF, RIGHT_X, RIGHT_Y, consecutive_offsets
 from warpchain.kernels.physics.elementary import TWO, ZERO

@@ -14,7 +14,7 @@ from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.kernels import layout
-from warpchain.kernels.contacts.pair_list import list_layout
+from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.oracle import contact_equations, motion_equations
 from warpchain.oracle.circular_loop import circular_loop
 

@@ -26,7 +26,7 @@ from tests.support.blocks_under_test import (
     listed_pairs,
 )
 from warpchain.engine.batch import Batch
-from warpchain.engine.kernel_choice import block_kernel
+from warpchain.engine.kernel_choice import most_registers
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
@@ -263,7 +263,7 @@ def compiles_for_gpus(
     folder: Path, features: Features, block_dim: int, generations: Sequence[int] = GENERATIONS
 ) -> None:
     """Compile a kernel to machine code of GPU generations, which needs no GPU; the registers are the engine's."""
-    module = block_kernel(features, block_dim).module
+    module = make_advance_block(features, block_dim, most_registers(block_dim)).module
     module.options["block_dim"] = block_dim
     wp.compile_aot_module(module, arch=list(generations), module_dir=str(folder), use_ptx=False)
     assert len(list(folder.glob("*.cubin"))) == len(generations)

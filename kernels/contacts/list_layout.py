@@ -1,0 +1,80 @@
+"""Where the neighbour list of a chain lies in its memory."""
+
+import functools
+from dataclasses import dataclass
+
+from warpchain.kernels import layout
+
+GEOMETRY_ROWS = 34
+"""Rows of the CPU's scratch of contacts, see :mod:`cpu.contacts.self_contacts`."""
+GEOMETRY_COLUMNS = 64
+"""Pairs of joints whose contacts are evaluated together, a multiple of 8."""
+
+
+@dataclass(frozen=True)
+class ListLayout:
+    """Where a chain's neighbour list lies in one row of int32.
+
+    Attributes:
+        capacity: Greatest number of pairs; more is an overflow, which ends the walk with a status.
+        table: Number of hash buckets, a power of two.
+        count: Offset of the number of pairs (one integer). All below are offsets, too.
+        first: Lower joint of each pair; on a CPU in the order of contact resolution.
+        second: Higher joint of each pair.
+        touching: GPU scratch: pairs that touch now, beyond those in shared memory.
+        found_first: CPU scratch: lower joints as found, ordered by (p, q); then those of the pairs that touch now.
+        found_second: CPU scratch: higher joints, likewise.
+        bucket: Scratch: last joint put into each bucket, −1 for none.
+        next_joint: Scratch: the joint put into the same bucket before this one.
+        cell_x: Scratch: cell of each joint.
+        cell_y: Scratch: cell of each joint.
+        owners: GPU scratch of chains too long for shared memory, see :mod:`gpu.contacts.self_contacts`.
+        geometry: CPU scratch for contacts: doubles, on whole cache lines.
+        size: Integers in all.
+    """
+
+    capacity: int
+    table: int
+    count: int
+    first: int
+    second: int
+    touching: int
+    found_first: int
+    found_second: int
+    bucket: int
+    next_joint: int
+    cell_x: int
+    cell_y: int
+    owners: int
+    geometry: int
+    size: int
+
+    @property
+    def pending(self) -> int:
+        """GPU scratch: which contacts are still to be resolved; on the places of ``found_first`` and following."""
+        return self.found_first
+
+
+@functools.cache
+def list_layout(columns: int) -> ListLayout:
+    """Layout for chains in scratch of this width."""
+    capacity = layout.PAIRS_PER_LINK * columns
+    table = 1
+    while table < 2 * columns:
+        table *= 2
+    integers = layout.consecutive_offsets(
+        count=1,
+        first=capacity,
+        second=capacity,
+        touching=capacity + 1,
+        found_first=capacity,
+        found_second=capacity,
+        bucket=table,
+        next_joint=columns,
+        cell_x=columns,
+        cell_y=columns,
+        owners=3 * columns + 8,
+    )
+    geometry = -(-integers["size"] // 16) * 16
+    size = geometry + 2 * GEOMETRY_ROWS * GEOMETRY_COLUMNS
+    return ListLayout(capacity, table, **integers | {"geometry": geometry, "size": size})

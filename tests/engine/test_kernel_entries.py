@@ -1,0 +1,88 @@
+"""Entries launch the kernels that they stand for, and have other names where those would be compiled anew."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import warp as wp
+
+from warpchain.engine import kernel_entries
+from warpchain.engine.kernel_entries import kernel_entry, step_module
+from warpchain.kernels import layout
+from warpchain.kernels.cpu.loop import make_advance
+from warpchain.kernels.features import Features
+from warpchain.kernels.gpu.loop import make_advance_block
+
+FEATURES = Features("dp5", layout.padded_width(60), "floor", True, "grid", "rest")
+
+
+def test_an_entry_takes_what_its_kernel_takes() -> None:
+    """Key, types of arguments, dimensions and options that a launch reads are those of the step kernels."""
+    for entry, kernel in (
+        (kernel_entry(FEATURES, 1, None), make_advance(FEATURES)),
+        (kernel_entry(FEATURES, 64, 168), make_advance_block(FEATURES, 64, 168)),
+    ):
+        for each in (entry, kernel):
+            each.module.get_module_hash()  # reads the source
+        assert entry.key == kernel.key
+        types = [[str(argument.type) for argument in each.adj.args] for each in (entry, kernel)]
+        assert types[0] == types[1] and len(types[0]) == 8
+        assert entry.adj.kernel_dim == kernel.adj.kernel_dim
+        assert entry.options["enable_backward"] == kernel.options["enable_backward"]
+    assert kernel_entry(FEATURES, 64, 168).options["grid_stride"] == kernel.options["grid_stride"]
+
+
+def test_what_would_be_compiled_anew_has_another_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Features, block, registers, device, sources, Warp, Python and options of the compiler each change the name."""
+
+    def name(features: Features = FEATURES, threads: int = 1, registers: int | None = None) -> str:
+        return kernel_entry.__wrapped__(features, threads, registers).module.name
+
+    names = [name(), name(replace(FEATURES, tilts=True)), name(threads=64), name(threads=64, registers=128)]
+    names.append(name(threads=64, registers=168))
+    for target, attribute, value in (
+        (kernel_entries, "SOURCES", "others"),
+        (kernel_entries, "COMPILER_FLAGS", "-O1"),
+        (wp, "__version__", "0"),
+        (wp.config, "mode", "debug"),
+        (sys, "version", "0"),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(target, attribute, value)
+            names.append(name())
+    assert len(set(names)) == len(names)
+    assert name() == names[0]
+
+
+def test_the_digest_is_of_all_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It changes with a file's content and with its name."""
+    monkeypatch.setattr("warpchain.kernels.__path__", [str(tmp_path)])
+    digests = [kernel_entries.digest_of_sources()]
+    for file, content in (("a.py", "x = 1"), ("a.py", "x = 2"), ("b.py", "x = 2")):
+        Path(tmp_path, file).write_text(content)
+        digests.append(kernel_entries.digest_of_sources())
+    Path(tmp_path, "a.py").rename(tmp_path / "c.py")
+    digests.append(kernel_entries.digest_of_sources())
+    assert len(set(digests)) == len(digests)
+
+
+def test_sources_that_changed_are_not_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was imported before is not what a name would stand for."""
+    monkeypatch.setattr(kernel_entries, "digest_of_sources", lambda: "others")
+    with pytest.raises(RuntimeError, match="changed while this process ran"):
+        step_module(FEATURES, 1, None)
+
+
+def test_a_cached_kernel_is_loaded_without_its_source() -> None:
+    """The second of two processes imports no step loop."""
+    program = (
+        "import sys, warpchain\n"
+        "warpchain.walk(links=20, preset='soft', start='ellipse', method='bs32', walk_limit=0.05)\n"
+        "print([name for name in sys.modules if name.endswith(('cpu.loop', 'gpu.loop'))])\n"
+    )
+    for _ in range(2):
+        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+    assert done.stdout == "[]\n"

@@ -1,0 +1,78 @@
+"""Entries: kernels without a body, by which compiled step kernels are loaded and launched.
+
+Warp takes longer to read and hash the source of a step kernel than to load what it compiled, and importing that source
+takes as long again. So a compiled kernel is found by a name that stands for all it is compiled from, and its source is
+only imported if it must be compiled.
+"""
+
+import functools
+import hashlib
+import sys
+import threading
+from pathlib import Path
+
+import warp as wp
+
+import warpchain.kernels
+from warpchain.kernels.features import COMPILER_FLAGS, Features
+from warpchain.kernels.types import make_entry
+
+_making = threading.Lock()
+"""Held by the thread that makes a kernel: two that parse their source at once can fail (Python 3.11: SystemError)."""
+
+
+def digest_of_sources() -> str:
+    """SHA-256 of all source files of kernels, with their names."""
+    root = Path(*warpchain.kernels.__path__)
+    digest = hashlib.sha256()
+    for path in sorted(root.rglob("*.py")):
+        content = path.read_bytes()
+        digest.update(f"{path.relative_to(root)} {len(content)}\n".encode() + content)
+    return digest.hexdigest()
+
+
+SOURCES = digest_of_sources()
+"""What the source files were when this module was imported, before any of them that makes a kernel."""
+
+
+@functools.cache
+def kernel_entry(features: Features, threads: int, registers: int | None) -> wp.Kernel:
+    """The entry of a step kernel, in a module of its own.
+
+    The name of the module stands for source files, features, options of the compiler, Python and Warp; the processor or
+    the GPU's generation is in the names of files that Warp compiles.
+
+    Args:
+        features: What the kernel is compiled for.
+        threads: Of a block.
+        registers: Most registers of a thread on a GPU; None: a kernel for CPUs.
+    """
+    module = wp.Module("", None)
+    options = {"block_dim": threads, "strip_hash": True, "cpu_compiler_flags": COMPILER_FLAGS}
+    wp.set_module_options(options, module)
+    parts = (SOURCES, features, threads, registers, sorted(module.resolve_options(wp.config).items()))
+    text = repr((*parts, sys.version, wp.__version__))
+    module.name = f"advance_{hashlib.sha256(text.encode()).hexdigest()[:32]}"
+    return make_entry(module, is_block=registers is not None)
+
+
+def step_module(features: Features, threads: int, registers: int | None) -> wp.Module:
+    """The module with the step kernel that belongs to an entry, to be compiled.
+
+    Raises:
+        RuntimeError: Source files are not those from which the entry has its name.
+    """
+    with _making:
+        if registers is None:
+            from warpchain.kernels.cpu.loop import make_advance
+
+            kernel = make_advance(features)
+        else:
+            from warpchain.kernels.gpu.loop import make_advance_block
+
+            kernel = make_advance_block(features, threads, registers)
+        if digest_of_sources() != SOURCES:
+            raise RuntimeError("source files of kernels changed while this process ran; start it anew")
+        wp.set_module_options({"block_dim": threads, "strip_hash": True}, kernel.module)
+        kernel.module.name = kernel_entry(features, threads, registers).module.name
+        return kernel.module
