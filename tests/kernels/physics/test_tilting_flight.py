@@ -48,8 +48,8 @@ def greatest_errors(end, expected):
 # --- against SciPy ---
 
 
-# At tolerance 1e-9 alone dp5 steps by 13 µs, and what is left in plane and velocities is the splitting's: 2e-6 rad/s of
-# 27 rad/s with 20 links. It falls as h²: 3e-7 at 8 µs, 5e-9 at 1 µs. os32 is of third order, and needs 1e-11 for
+# At tolerance 1e-9 alone dp5 steps by 13 µs, and what is left in plane and velocities is the splitting's: 3e-6 rad/s of
+# 27 rad/s with 20 links. It falls as h²: 1e-6 at 8 µs, 2e-8 at 1 µs. os32 is of third order, and needs 1e-11 for
 # velocities to 1e-8.
 @pytest.mark.parametrize("links", TUMBLING)
 @pytest.mark.parametrize(("method", "tolerance"), [("dp5", 1e-9), ("rkf78", 1e-9), ("os32", 1e-11)])
