@@ -263,7 +263,7 @@ CLAIMS: Final = (
     ),
     Claim(
         "The kink of the loop on its sprocket",
-        "[stationary loop](../../docs/stationary-loop.md#the-shape-of-the-loop)",
+        "[stationary loop](../stationary_loop/README.md#the-shape-of-the-loop)",
         findings.stated(
             "a bending wave that stands still in the room: −11.2 1/m at 13.5 cm from the lowest point with 120 links "
             "at 20 Hz, theory −10.9 at 13.5 cm",
@@ -272,7 +272,7 @@ CLAIMS: Final = (
     ),
     Claim(
         "A collision or a tap creates two disturbances, which spread in opposite directions",
-        "[waves](../../docs/waves.md#the-picture)",
+        "[waves](../waves/README.md#the-picture)",
         findings.stated(
             "seen after an impact; packets on tapped rings at 20 Hz run both ways along the chain at 6.9 to 7.6 m/s, "
             "within 0.1 % of theory; "
@@ -282,11 +282,11 @@ CLAIMS: Final = (
     ),
     Claim(
         "It is possible that these disturbances influence the distance",
-        "[waves](../../docs/waves.md#do-they-matter)",
+        "[waves](../waves/README.md#do-they-matter)",
         findings.waves,
         {
             PART: "That was one drag. By hand: with 120 links at 30 Hz one of 250/s turns the sign, and without "
-            "drag during impacts less is left ([waves](../../docs/waves.md#do-they-matter)). Long waves cannot be told "
+            "drag during impacts less is left ([waves](../waves/README.md#do-they-matter)). Long waves cannot be told "
             "apart from the loop's change of shape."
         },
     ),

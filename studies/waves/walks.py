@@ -1,14 +1,12 @@
-"""Draws docs/figures/waves.png and prints how fast the two waves of the picture run, for waves.md.
-
-Run it as ``python docs/waves_picture.py``; it takes 10 to 25 s.
-"""
+"""Draws the picture of waves in a walk, and prints how fast the two waves in it run."""
 
 from pathlib import Path
 
 import numpy as np
 
 import warpchain
-from warpchain.pictures.wave_fields import (
+from studies.common import save_figure
+from studies.waves.fields import (
     characteristic,
     curvatures,
     moving_average,
@@ -17,9 +15,9 @@ from warpchain.pictures.wave_fields import (
     tensions,
     wave_speeds,
 )
-from warpchain.pictures.waves_figure import AVERAGED
+from studies.waves.picture import AVERAGED, waves_figure
 
-FIGURE = Path(__file__).parent / "figures" / "waves.png"
+FIGURE = Path(__file__).parent / "figures" / "picture.png"
 WALKS = ((120, 20.0, (0.10, 0.24)), (60, 15.0, (0.13, 0.33)))
 """Links, frequency [Hz], and times [s] between two impacts in which speeds are measured."""
 MODES = (2, 3, 4, 5, 6, 8, 10)
@@ -69,9 +67,5 @@ def main() -> None:
     for number, (links, frequency, (begin, end)) in enumerate(WALKS):
         walk = recorded(links, frequency)
         if number == 0:
-            walk.plot("waves", colour="curvature", window=(0.0, 0.25)).savefig(FIGURE, dpi=90)
+            save_figure(waves_figure(walk, colour="curvature", window=(0.0, 0.25)), FIGURE, dpi=90)
         print_speeds(walk, begin, end)
-
-
-if __name__ == "__main__":
-    main()

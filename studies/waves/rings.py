@@ -1,7 +1,4 @@
-"""Prints the tables of waves.md and draws its figure: waves along the chain in theory and in tapped rings.
-
-Run it as ``python docs/waves.py``; it takes 10 to 25 s.
-"""
+"""Prints the tables of the page on theory and rings and draws their figure: waves in theory and in tapped rings."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,9 +9,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import warpchain
-from warpchain.inputs.parameters import Parameters, preset
-from warpchain.inputs.scene import Scene, loop_speed
-from warpchain.loop.dispersion import (
+from studies.common import BLUE, FAINT, GREEN, GROUND, INK, RED, save_figure, tidy
+from studies.waves.dispersion import (
     LOWER_BACKWARD,
     LOWER_FORWARD,
     UPPER_BACKWARD,
@@ -28,10 +24,9 @@ from warpchain.loop.dispersion import (
     ring_waves,
     straight_waves,
 )
-from warpchain.loop.mode_fit import find_packet, fit_rates, mode_amplitudes
-from warpchain.oracle.circular_loop import tapped_loop
-from warpchain.oracle.ring_modes import ring_modes
-from warpchain.pictures.style import BLUE, FAINT, GREEN, GROUND, INK, RED, save_figure, tidy
+from studies.waves.mode_fit import find_packet, fit_rates, mode_amplitudes
+from studies.waves.tapped_ring import tapped_ring
+from warpchain import Parameters, preset
 
 Array = NDArray[np.float64]
 
@@ -54,12 +49,13 @@ INTERVAL = 2e-4
 
 def speed_at(frequency: float) -> float:
     """Speed along the loop [m/s] of a chain on its sprocket."""
-    return loop_speed(Scene(frequency=frequency), CHAIN)
+    half = np.arcsin(LENGTH / 2 / (CHAIN.sprocket_radius + CHAIN.circle_radius))  # links are chords of the sprocket
+    return float(np.pi * frequency * LENGTH / half)
 
 
 def tapped(links: int, speed: float, spins: Array, times: Array, chain: Parameters = CHAIN) -> Array:
     """Angles (t, n) [rad] of the links of a tapped ring, less those of the ring that turns on."""
-    position, velocity = tapped_loop(links, chain, speed, spins)
+    position, velocity = tapped_ring(links, chain, speed, spins)
     scene: Mapping[str, bool] = {"floor": False, "gravity": False, "self_contact": False}
     motion = warpchain.simulate(chain, position, velocity, float(times[-1]), times=times, tolerance=1e-8, **scene)
     if motion.status != warpchain.Status.FINISHED:
@@ -133,8 +129,8 @@ def show_coulomb() -> None:
 
 
 def show_ring(speed: float, angles: Array, numbers: Array) -> None:
-    """Modes of the ring: exact, NumPy model, simulation, straight chain, continuous ring, string."""
-    waves, modes = ring_waves(CHAIN, LINKS, speed, numbers), ring_modes(LINKS, CHAIN, speed, numbers)
+    """Modes of the ring: exact, simulation, straight chain, continuous ring, string."""
+    waves = ring_waves(CHAIN, LINKS, speed, numbers)
     straight = straight_waves(CHAIN, DENSITY * speed**2, waves.phase)
     found = measured(angles, waves, numbers, BOTH)
     continuous = continuous_ring(CHAIN, LINKS, speed, numbers)
@@ -143,7 +139,6 @@ def show_ring(speed: float, angles: Array, numbers: Array) -> None:
     worst = []
     for k, number in enumerate(numbers):
         theory = waves.rate[k, BOTH]
-        oracle = np.array([modes.bending[k, np.argmin(np.abs(modes.bending[k] - rate))] for rate in theory])
         worst.append([np.abs(found[k].imag / theory.imag - 1), np.abs(found[k].real / theory.real - 1)])
         room = (number * spin + waves.frequency[k, BOTH]) / number / spin
         groups = 1 + waves.group_speed[k, BOTH] * LENGTH / speed
@@ -153,7 +148,6 @@ def show_ring(speed: float, angles: Array, numbers: Array) -> None:
             f"  n {number:2d}: {LINKS / number:5.1f} links a wave\n"
             f"    exact      {row(theory)}; in the room crests {room[0]:6.3f} v, {room[1]:6.3f} v, packets "
             f"{groups[0]:6.3f} v, {groups[1]:6.3f} v\n"
-            f"    NumPy      {row(oracle)}\n"
             f"    simulated  {row(found[k])}\n"
             f"    straight   {row(straight.rate[k, BOTH])}\n"
             f"    continuous {row(continuous[k])}\n"
@@ -161,11 +155,6 @@ def show_ring(speed: float, angles: Array, numbers: Array) -> None:
         )
     greatest = 100 * np.array(worst).max(axis=(0, 2))
     print(f"  simulated against exact: ω within {greatest[0]:.3f} %, γ within {greatest[1]:.2f} %")
-    for name in ("soft", "paper"):
-        chain = preset(name).with_values({"coulomb_friction": 0.0})
-        rates, found = waves.rate[:, BOTH], ring_modes(LINKS, chain, speed, numbers).bending
-        apart = np.abs(rates[:, :, None] - found[:, None, :]).min(axis=2) / np.abs(rates)
-        print(f"  NumPy model with the joints of {name} against exact: rates within {apart.max():.1e}")
 
 
 def row(rates: NDArray[np.complex128]) -> str:
@@ -290,7 +279,8 @@ def draw_room(axes: Axes, speed: float, room: list[tuple[float, float]]) -> None
     axes.legend(frameon=False, fontsize="small", loc="center left")
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Print all tables and draw the figure."""
     show_bands()
     show_reach()
     show_coulomb()

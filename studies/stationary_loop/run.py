@@ -1,18 +1,28 @@
-"""Prints the tables of stationary-loop.md: the mean loop before its release beside theory and the catenary.
+"""Prints the tables of studies/stationary_loop/README.md and draws its figures.
 
-Run it as ``python docs/stationary_loop.py``; it takes a few minutes and needs warpchain[scipy].
+    python -m studies.stationary_loop.run           # mean loops beside theory and the catenary, in a few minutes
+    python -m studies.stationary_loop.run FOLDER    # of the sweep kink: the figure of the kinks as well
+
+Numbers are printed.
 """
 
+import argparse
 import dataclasses
+import sys
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import warpchain
-from warpchain.loop.stationary_loop import StationaryLoop, average_loop, find_kink, imbalances
-from warpchain.loop.theory import NoSolutionError, TheoreticalLoop, catenary, predict
-from warpchain.walks.walk_result import WalkResult
+from studies.common import DASHES, RED, save_figure
+from studies.stationary_loop.balances import imbalances
+from studies.stationary_loop.kinks import draw_kinks
+from studies.stationary_loop.theory import MeanLoop, NoSolutionError, TheoreticalLoop, predict
 
+FIGURES = Path(__file__).parent / "figures"
+SHOWN = (120, 20.0)
 CELLS = ((60, 20.0), (120, 20.0), (120, 10.0), (180, 30.0), (60, 30.0))
 OTHERS: tuple[tuple[str, int, float, Mapping[str, float]], ...] = (
     ("half of the inertia", 120, 20.0, {"inner_inertia": 8.45e-8, "outer_inertia": 6.46e-8}),
@@ -26,13 +36,13 @@ OTHERS: tuple[tuple[str, int, float, Mapping[str, float]], ...] = (
 UNDAMPED = {"load_factor": 1.0, "steady_time": 0.0, "steady_tolerance": 1.0, "further_hold": 40.0}
 
 
-def held(links: int, frequency: float, values: Mapping[str, float]) -> WalkResult:
+def held(links: int, frequency: float, values: Mapping[str, float]) -> warpchain.WalkResult:
     """A walk of Table 1's chain with softened joints, whose last half second on the sprocket is kept."""
     settings = {"further_hold": 0.5, "hold_limit": 60.0, "walk_limit": 1e-3} | dict(values)
     return warpchain.walk(links=links, frequency=frequency, preset="soft", start="spinning", **settings)
 
 
-def compare(name: str, ours: StationaryLoop, theirs: StationaryLoop) -> None:
+def compare(name: str, ours: MeanLoop, theirs: MeanLoop) -> None:
     """Prints how far two loops are apart."""
     middle = np.abs(ours.s) < 0.45 * (ours.free[1] - ours.free[0])
     s = ours.s[middle]
@@ -49,7 +59,7 @@ def compare(name: str, ours: StationaryLoop, theirs: StationaryLoop) -> None:
     )
 
 
-def row(name: str, loop: StationaryLoop, theory: TheoreticalLoop) -> str:
+def row(name: str, loop: MeanLoop, theory: TheoreticalLoop | object) -> str:
     """Bottom curvature, peak and dip of a predicted curve, and how far it is from the simulated one."""
     near = np.abs(theory.s) < 0.35 * (loop.free[1] - loop.free[0])
     peak = int(np.argmax(np.where(near, theory.curvature, -np.inf)))
@@ -67,13 +77,13 @@ def row(name: str, loop: StationaryLoop, theory: TheoreticalLoop) -> str:
     )
 
 
-def show(name: str, walk: WalkResult) -> None:
+def show(name: str, walk: warpchain.WalkResult) -> None:
     """Prints what is known of one loop."""
     if walk.before_release is None:
         print(f"{name}: {walk.status.label}")
         return
-    loop = average_loop(walk)
-    kink = find_kink(loop)
+    loop = walk.mean_loop()
+    kink = loop.kink()
     print(f"{name}: v = {loop.speed:.3f} m/s, held for {walk.hold_time:.2f} s, drift {100 * walk.drift:.2f} %")
     print(
         f"  {'simulation':22} bottom {loop.bottom_curvature:6.2f} 1/m, "
@@ -91,17 +101,43 @@ def show(name: str, walk: WalkResult) -> None:
             print(row(which, loop, predict(loop, given)))
         except NoSolutionError as error:
             print(f"  {which:22} {error}")
-    print(row("catenary", loop, catenary(loop)))
+    print(row("catenary", loop, loop.catenary()))
     balances = (
         f"{key} {100 * found.rms:.1f} % ({100 * found.greatest:.1f} %)" for key, found in imbalances(loop).items()
     )
     print("  balances, rms (greatest):", ", ".join(balances))
 
 
-if __name__ == "__main__":
+def draw(walk: warpchain.WalkResult) -> Figure:
+    """The figure of a walk's loop with theory in it."""
+    figure, loop = walk.plot("loop"), walk.mean_loop()
+    theory, style = predict(loop), {"color": RED, "linewidth": 1.3, "linestyle": DASHES, "zorder": 4}
+    shape, bend, pull = figure.axes
+    shape.plot(*(theory.position - loop.center).T, **style)
+    bend.plot(theory.s, theory.curvature, label="theory", **style)
+    pull.plot(theory.s, theory.effective_tension, **style)
+    bend.legend(frameon=False, loc="upper left")
+    return figure
+
+
+def main(kinks: str | None) -> None:
+    """Print all tables and draw the figures."""
+    if kinks is not None:
+        save_figure(draw_kinks(warpchain.load(kinks)), FIGURES / "kink.png", dpi=100)
     for links, frequency in CELLS:
         title, walk = f"{links} links, {frequency:g} Hz", held(links, frequency, {})
         show(title, walk)
-        compare(title, average_loop(walk), average_loop(held(links, frequency, UNDAMPED)))
+        compare(title, walk.mean_loop(), held(links, frequency, UNDAMPED).mean_loop())
+        if (links, frequency) == SHOWN:
+            save_figure(draw(walk), FIGURES / "loop.png", dpi=100)
     for text, links, frequency, values in OTHERS:
         show(f"{links} links, {frequency:g} Hz, {text}", held(links, frequency, values))
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("kinks", nargs="?", metavar="FOLDER", help="of the sweep kink")
+    try:
+        main(parser.parse_args().kinks)
+    except (warpchain.InputError, OSError) as error:
+        sys.exit(str(error))

@@ -2,16 +2,11 @@
 
 from typing import Any
 
-import matplotlib.figure
 import numpy as np
 import pytest
 
-from tests.support.made_tilting_walks import make_tilting_walk
-from tests.support.made_walks import make_unreleased, make_walk
-from warpchain.pictures.walk_figures import draw
-from warpchain.pictures.wave_fields import (
+from studies.waves.fields import (
     Impact,
-    bin_means,
     characteristic,
     curvatures,
     floor_contacts,
@@ -19,14 +14,14 @@ from warpchain.pictures.wave_fields import (
     in_room,
     joints_below,
     loop_speeds,
-    moving_average,
     normal_velocities,
     self_contacts,
     stacked_power,
     tensions,
     wave_speeds,
 )
-from warpchain.pictures.waves_figure import waves_figure
+from studies.waves.picture import waves_figure
+from tests.support.made_walks import make_walk
 from warpchain.walks.walk_result import WalkResult
 
 LINKS = 40
@@ -67,14 +62,6 @@ def test_a_ring_has_constant_fields() -> None:
     np.testing.assert_allclose(loop_speeds(time, joints, MASSES)[inner], SPEED, rtol=1e-4)
 
 
-def test_velocity_across_counts_outwards() -> None:
-    """A ring that grows has the rate of its radius as velocity across the chain, in either order of its joints."""
-    time = np.linspace(0.0, 0.01, 101)
-    joints = ring(time, bumps=0.5 * time[:, None])
-    for order in (slice(None), slice(None, None, -1)):
-        np.testing.assert_allclose(normal_velocities(time, joints[:, order], MASSES)[1:-1], 0.5, rtol=1e-3)
-
-
 @pytest.mark.parametrize("speed", [2.2, -2.2])
 def test_a_wave_follows_its_characteristic(speed: float) -> None:
     """Of bumps that run at a known speed, the crest of the curvature stays on the line; the stack finds the speed."""
@@ -113,18 +100,6 @@ def test_speed_of_waves() -> None:
     """c = √(Tℓ/m̄), which is v under the tension m̄v²/ℓ of a ring; no speed under pressure."""
     tension = np.array([0.0025 * 3.0**2 / LENGTH, 0.0, -4.0])
     np.testing.assert_allclose(wave_speeds(tension, LENGTH, 0.0025), [3.0, 0.0, 0.0], rtol=1e-12)
-
-
-def test_moving_averages_and_bins() -> None:
-    """Averages of a straight line are its middle, also at uneven times; a bin has the mean of its own frames."""
-    time = np.concatenate([np.linspace(0.0, 1.0, 50), np.linspace(1.001, 2.0, 400)])
-    mean = moving_average(time, 3 * time, 0.5)
-    inside = (time > 0.25) & (time < 1.75)
-    np.testing.assert_allclose(mean[inside], 3 * time[inside], rtol=3e-4)
-    np.testing.assert_allclose(mean[[0, -1]], [0.375, 5.625], rtol=2e-3)
-    assert np.array_equal(moving_average(time, time**2, 0.0), time**2)
-    edges, means = bin_means(np.array([0.0, 1.0, 2.0, 3.0, 8.0]), np.array([[1.0], [3.0], [5.0], [9.0], [2.0]]), 4)
-    assert edges.tolist() == [0, 2, 4, 6, 8] and means[:, 0].tolist() == [2, 7, 7, 2]
 
 
 def test_contacts_and_impacts() -> None:
@@ -169,19 +144,14 @@ def with_forces(walk: WalkResult) -> dict[str, Any]:
     return {"frame_forces": forces, "frame_moments": np.zeros(joints.shape[:2])}
 
 
-def drawn_lines(figure: matplotlib.figure.Figure) -> int:
-    """Number of characteristics on the upper panel."""
-    return len(figure.axes[0].lines)
-
-
 @pytest.mark.parametrize("colour", ["tension", "curvature", "velocity"])
 def test_the_picture(colour: Any) -> None:
     """Two panels with a colour bar; four characteristics from each impact; nothing lies outside the paper."""
     walk = bouncing_ring(**with_forces(bouncing_ring()))
-    figure = walk.plot("waves", colour=colour, window=(0.02, 0.28))
+    figure = waves_figure(walk, colour=colour, window=(0.02, 0.28))
     figure.draw_without_rendering()
     own, room, bar = figure.axes
-    assert drawn_lines(figure) == len(room.lines) == 8
+    assert len(own.lines) == len(room.lines) == 8
     assert len(own.images) == len(room.images) == 1
     assert own.get_xlim() == pytest.approx((0.02, 0.28), abs=3e-4)
     assert own.get_ylim() == (-0.5, LINKS - 0.5)
@@ -207,57 +177,19 @@ def test_the_picture(colour: Any) -> None:
         assert box.x0 >= 0 and box.y0 >= 0 and box.x1 <= paper.x1 and box.y1 <= paper.y1
 
 
-def test_without_forces_waves_run_at_the_speed_of_the_loop() -> None:
-    """Curvature needs frames only; the legend then says c = v."""
-    figure = waves_figure(bouncing_ring(), colour="curvature")
-    assert any("c = v" in text.get_text() for text in figure.legends[0].get_texts())
-
-
-def test_a_flight_has_no_lines() -> None:
-    """Without an impact in the window there are no characteristics, after three no more than twelve."""
-    assert drawn_lines(waves_figure(bouncing_ring(), colour="velocity", window=(0.0, 0.06))) == 0
-    walk = bouncing_ring()
-    joints = walk.frame_joints.copy()
-    joints[..., 1] -= 0.02 * (np.abs(np.cos(20 * walk.frame_time)) - np.abs(np.cos(60 * walk.frame_time)))[:, None]
-    many = make_walk(LINKS, frame_time=walk.frame_time, frame_joints=joints)
-    assert drawn_lines(waves_figure(many, colour="velocity")) == 12
-
-
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("interval", "given", "message"),
     [
-        ({}, r"joint forces were not recorded; run it again with record_loads, or give colour 'curvature' or"),
-        ({"colour": "blue"}, r"colour: 'blue' is unknown; give 'tension', 'curvature', 'velocity'"),
-        ({"colour": "curvature", "window": (0.2, 0.1)}, r"window: 0.2 s to 0.1 s is no span of time; give"),
-        ({"colour": "curvature", "window": (float("nan"), 1.0)}, r"window: nan s to 1 s is no span of time"),
-        ({"colour": "velocity", "window": (0.5, 0.6)}, r"window: fewer than 3 frames are from .* frames to 0.3 s"),
+        (2e-4, {}, r"joint forces were not recorded; run it again with record_loads, or give colour 'curvature' or"),
+        (
+            2e-4,
+            {"colour": "velocity", "window": (0.5, 0.6)},
+            r"window: fewer than 3 frames .* frames to 0.3 s",
+        ),
+        (5e-3, {"colour": "curvature"}, r"frames are 0.005 s apart, in which a wave runs 1\.\d links; .* of 0.0004 s"),
     ],
 )
-def test_what_the_picture_lacks_is_said(given: dict[str, Any], message: str) -> None:
+def test_what_the_picture_lacks_is_said(interval: float, given: dict[str, Any], message: str) -> None:
     """One line says what is missing and what records it."""
-    with pytest.raises(ValueError, match=message) as refused:
-        waves_figure(bouncing_ring(), **given)
-    assert "\n" not in str(refused.value)
-
-
-def test_frames_too_far_apart_are_refused_with_an_interval() -> None:
-    """At most half a link a frame: else the refusal gives a tenth of a link; no frames are refused as everywhere."""
-    with pytest.raises(ValueError, match=r"frames are 0.005 s apart, in which a wave runs 1\.\d links; .* of 0.0004 s"):
-        waves_figure(bouncing_ring(5e-3), colour="curvature")
-    with pytest.raises(ValueError, match=r"no frames .*; run it again with a frame_interval"):
-        waves_figure(make_unreleased(), colour="curvature")
-
-
-def test_a_walk_whose_plane_tilts_is_refused() -> None:
-    """Its frames are places in the plane, which says nothing about the floor."""
-    with pytest.raises(
-        ValueError, match=r"walk: its plane tilts; waves are drawn of walks whose scene.plane is 'fixed'"
-    ):
-        waves_figure(make_tilting_walk(), colour="curvature")
-
-
-def test_other_figures_have_no_colour_and_no_window() -> None:
-    """Both belong to waves."""
-    for given in ({"colour": "tension"}, {"window": (0.0, 0.1)}):
-        with pytest.raises(ValueError, match=r"(colour|window): only waves has one; .*"):
-            draw(make_walk(), "figure5", **given)
+    with pytest.raises(ValueError, match=message):
+        waves_figure(bouncing_ring(interval), **given)

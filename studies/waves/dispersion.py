@@ -26,7 +26,7 @@ place of κ/2 + α. With x = κ/2 + α, y = κ/2 − α, κ = 2αn the torques o
     A = Ī λ² + 4β s² λ + ¼ m̄ℓ²Ω² cot²α + ⅛ m̄ℓ² [(λ + iΩ)² cot²x + (λ − iΩ)² cot²y]
 
 and B the same with c² for s² and tan² for cot². This is exact. The straight chain is its limit α → 0 with
-T = m̄ v² cos α/ℓ, Ω = 2v sin α/ℓ (v is the speed of the joints, `circular_loop_force` in the NumPy model has T).
+T = m̄ v² cos α/ℓ, Ω = 2v sin α/ℓ; v is the speed of the joints.
 
 **The continuous ring** of density ρ, with j = (Ī − m̄ℓ²/6)/ℓ and the moment βℓ κ̇ of its curvature, obeys
 
@@ -47,8 +47,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.validation import InputError, shown
+from warpchain import InputError, Parameters
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -353,12 +352,12 @@ def _checked(name: str, values: ArrayLike) -> Array:
 
 def _check_positive(name: str, value: float, unit: str) -> None:
     if not 0 < value < np.inf:
-        raise InputError(f"{name}: {shown(value)} {unit} is not positive; give a greater one")
+        raise InputError(f"{name}: {value!r} {unit} is not positive; give a greater one")
 
 
 def _checked_ring(links: int, speed: float, number: ArrayLike) -> Array:
     if links < 4 * FIRST_MODE or links % 2:
-        raise InputError(f"links: {shown(links)} make no ring with bending modes; give an even number, at least 8")
+        raise InputError(f"links: {links!r} make no ring with bending modes; give an even number, at least 8")
     _check_positive("speed", speed, "m/s")
     numbers = _checked("number", number)
     if not np.all((numbers >= FIRST_MODE) & (numbers <= links / 4) & (numbers % 1 == 0)):

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final, get_args
+from typing import Any, Final, Literal, get_args
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,10 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from warpchain.pictures.inline import InlineFigure
-from warpchain.pictures.style import INK, tidy
-from warpchain.pictures.walk_shape import Colour, Walk, check_frames, joint_forces, setting, tilting
-from warpchain.pictures.wave_fields import (
+from studies.common import INK, tidy
+from studies.waves.fields import (
     FEWEST_FRAMES,
     Truths,
     bin_means,
@@ -32,8 +30,10 @@ from warpchain.pictures.wave_fields import (
     tensions,
     wave_speeds,
 )
+from warpchain import WalkResult
 
 Array = NDArray[np.float64]
+Colour = Literal["tension", "curvature", "velocity"]
 
 WINDOW: Final = (0.0, 0.3)
 """Times since the release that are shown [s], unless told otherwise: usually the first three impacts."""
@@ -106,11 +106,10 @@ class _Waves:
 
 
 def waves_figure(
-    walk: Walk,
+    walk: WalkResult,
     *,
     colour: Colour = "tension",
     window: tuple[float, float] | None = None,
-    figure: Figure | None = None,
 ) -> Figure:
     """Space–time picture of a walk: waves along the chain, above in its own frame, below in that of the room.
 
@@ -125,7 +124,6 @@ def waves_figure(
             chain bends as its loop; `velocity` of the joints across the chain, outwards, relative to the centre of
             mass [m/s].
         window: times since the release between which is shown [s]; None: `WINDOW`.
-        figure: an empty figure to draw into; by default a new one.
 
     Raises:
         ValueError: the plane of the walk tilts, the walk lacks frames or joint forces, its frames are too far apart,
@@ -134,7 +132,7 @@ def waves_figure(
     if colour not in _LOOKS:
         raise ValueError(f"colour: {colour!r} is unknown; give {', '.join(map(repr, get_args(Colour)))}")
     waves, look = _waves(walk, colour, WINDOW if window is None else window), _LOOKS[colour]
-    figure = InlineFigure(figsize=(9.0, 8.0), layout="constrained") if figure is None else figure
+    figure = Figure(figsize=(9.0, 8.0), layout="constrained")
     own, room = figure.subplots(2, 1, sharex=True)
     length, half = waves.links * waves.link_length, waves.links / 2
     times, shown = bin_means(waves.time, waves.values, MOST_COLUMNS)
@@ -169,7 +167,11 @@ def waves_figure(
         axes.set(xlim=span)
         tidy(axes)
     own.set(ylabel="number of the joint", ylim=(-0.5, waves.links - 0.5))
-    own.set_title(f"{setting(walk)}: in the frame of the chain", fontsize="medium", loc="left")
+    own.set_title(
+        f"{walk.setup.scene.links} links, {walk.setup.scene.frequency:g} Hz: in the frame of the chain",
+        fontsize="medium",
+        loc="left",
+    )
     arc = own.secondary_yaxis(
         "right", functions=(lambda joint: joint * waves.link_length, lambda s: s / waves.link_length)
     )
@@ -182,12 +184,11 @@ def waves_figure(
     return figure
 
 
-def _waves(walk: Walk, colour: Colour, window: tuple[float, float]) -> _Waves:
+def _waves(walk: WalkResult, colour: Colour, window: tuple[float, float]) -> _Waves:
     """What is drawn of a walk, or a `ValueError`."""
-    check_frames(walk)
-    if tilting(walk) is not None:
+    if walk.joints_in_room is not None:
         raise ValueError("walk: its plane tilts; waves are drawn of walks whose scene.plane is 'fixed'")
-    forces, parameters = joint_forces(walk), walk.setup.parameters
+    forces, parameters = walk.frame_forces if len(walk.frame_forces) else None, walk.setup.parameters
     if colour == "tension" and forces is None:
         raise ValueError(
             "walk: its joint forces were not recorded; run it again with record_loads, or give colour 'curvature' or "

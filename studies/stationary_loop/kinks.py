@@ -5,33 +5,27 @@ from typing import Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from warpchain.loop.stationary_loop import Kink, average_loop, find_kink
-from warpchain.pictures.labels import FREQUENCY
-from warpchain.pictures.style import LINE_COLORS, NothingToShow, Picture, tidy
-from warpchain.store.sweep_result import SweepResult
-from warpchain.sweeps.recording import Recording
+from studies.common import FREQUENCY, LINE_COLORS, tidy
+from warpchain import InputError, SweepResult
 
 MARKERS: Final = "os^vDPX"
 
 
-def sweep_kink(result: SweepResult) -> Picture:
+def draw_kinks(result: SweepResult) -> Figure:
     """Curvature and place of the kink against the frequency, a line for each number of links.
 
     Raises:
-        NothingToShow: the sweep has no walks whose last moments on the sprocket were kept.
+        InputError: no walk has frames of the time before its release.
     """
-    frames = Recording.of(result.sweep.get("record", {})).frames
-    if frames is None or frames.before == 0:
-        raise NothingToShow("the kink takes walks with frames before their release (record: {frames: {before: 0.5}})")
-    kinks: dict[int, dict[float, list[Kink]]] = {}
+    kinks: dict[int, dict[float, list[object]]] = {}
     for block in result.blocks.values():
         for place in np.argwhere(block.kept):
             walk = block.walk_motion(tuple(int(index) for index in place))
             if walk.before_release is not None:
-                scene, kink = walk.setup.scene, find_kink(average_loop(walk))
-                kinks.setdefault(scene.links, {}).setdefault(scene.frequency, []).append(kink)
+                scene = walk.setup.scene
+                kinks.setdefault(scene.links, {}).setdefault(scene.frequency, []).append(walk.mean_loop().kink())
     if not kinks:
-        raise NothingToShow("no walk that was released from a sprocket has frames of the time before")
+        raise InputError(f"{result.name}: no walk has frames before its release; give a folder of the sweep kink")
     figure = Figure(figsize=(9.6, 3.6), layout="constrained")
     panels = figure.subplots(1, 3)
     for axes, name, label, scale in (
@@ -47,8 +41,4 @@ def sweep_kink(result: SweepResult) -> Picture:
         axes.set(xlabel=FREQUENCY, ylabel=label)
         tidy(axes, grid="both")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper", frameon=False)
-    count = sum(len(found) for cells in kinks.values() for found in cells.values())
-    caption = f"The kink of the mean loop before the release, {count} walks: greatest curvature near the lowest point, "
-    caption += "least curvature beside it, negative where the loop bulges, and where that is along the arc, after the "
-    caption += "lowest point along the motion if positive."
-    return Picture("kink", caption, figure)
+    return figure

@@ -5,9 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import warpchain
-from warpchain import InputError, Status, preset
-from warpchain.loop import dispersion
-from warpchain.loop.dispersion import (
+from studies.waves.dispersion import (
     LOWER_BACKWARD,
     LOWER_FORWARD,
     UPPER_FORWARD,
@@ -17,10 +15,11 @@ from warpchain.loop.dispersion import (
     long_wave_speed,
     ring_spin,
     ring_waves,
-    single_band,
     straight_waves,
 )
-from warpchain.loop.mode_fit import find_packet, fit_rates, mode_amplitudes
+from studies.waves.mode_fit import find_packet, fit_rates, mode_amplitudes
+from studies.waves.tapped_ring import tapped_ring
+from warpchain import Status, preset
 from warpchain.oracle.circular_loop import circular_loop_force, tapped_loop
 from warpchain.oracle.motion_equations import acceleration, friction_torque
 from warpchain.oracle.ring_modes import ring_modes
@@ -28,7 +27,6 @@ from warpchain.oracle.ring_modes import ring_modes
 PAPER = preset("paper").with_values({"coulomb_friction": 0.0})
 SOFT = preset("soft").with_values({"coulomb_friction": 0.0})
 FREE = PAPER.with_values({"viscous_friction": 0.0})
-EQUAL = PAPER.with_values({"outer_mass": PAPER.inner_mass, "outer_inertia": PAPER.inner_inertia})
 TENSION, SPEED = 15.0, 7.5
 PHASES = np.array([0.05, 0.3, 0.7, 1.0, 1.3, 1.5, np.pi / 2])
 
@@ -61,9 +59,6 @@ def nearest(wanted, found):
     return np.take_along_axis(found, np.argmin(apart, axis=2), axis=1)
 
 
-# --- the straight chain ---
-
-
 @pytest.mark.parametrize("friction", [0.0, 9e-6, 9e-5, 9e-4])
 def test_straight_chain_agrees_with_the_equations_of_motion(friction):
     """All four rates are those of the linearised equations, but for 1e-4 by which k = 1e9 N/m gives way at most."""
@@ -72,43 +67,6 @@ def test_straight_chain_agrees_with_the_equations_of_motion(friction):
     found = np.array([straight_modes(parameters, TENSION, phase) for phase in PHASES])
     assert_allclose(nearest(waves.rate, found), waves.rate, rtol=1e-4)
     assert np.abs(waves.rate.imag).max() > 100
-
-
-def test_frequencies_without_friction_solve_the_equation_of_the_joints():
-    """Without friction (2τ − Pω²)² = cos²κ (2τ + (q₁ + q₂)ω²)² + (q₁ − q₂)² sin²κ ω⁴, from the joints' places."""
-    length = FREE.link_length
-    masses, inertias = (
-        np.array([FREE.inner_mass, FREE.outer_mass]),
-        np.array([FREE.inner_inertia, FREE.outer_inertia]),
-    )
-    p, q = masses / 4 + inertias / length**2, masses / 4 - inertias / length**2
-    square = straight_waves(FREE, TENSION, PHASES).frequency[:, [LOWER_FORWARD, UPPER_FORWARD]] ** 2
-    twice = 2 * TENSION / length
-    right = np.cos(PHASES)[:, None] ** 2 * (twice + q.sum() * square) ** 2
-    right += (q[0] - q[1]) ** 2 * np.sin(PHASES)[:, None] ** 2 * square**2
-    assert_allclose((twice - p.sum() * square) ** 2, right, rtol=1e-9, atol=1e-9 * twice**2)
-
-
-@pytest.mark.parametrize("parameters", [EQUAL, EQUAL.with_values({"viscous_friction": 0.0})])
-def test_equal_links_have_one_folded_band(parameters):
-    """Equal links: the lower band at κ and the upper one at π − κ are the single band, also where it does not swing."""
-    waves = straight_waves(parameters, TENSION, PHASES[:-1])
-    lower, upper = (single_band(parameters, TENSION, phase) for phase in (PHASES[:-1], np.pi - PHASES[:-1]))
-    wanted = np.concatenate([lower, upper], axis=1)
-    assert_allclose(nearest(wanted, waves.rate), wanted, rtol=1e-9)
-    assert_allclose(nearest(waves.rate, wanted), waves.rate, rtol=1e-9)
-
-
-def test_single_band_is_its_dispersion_relation():
-    """ω² [m̄ cos² + 4Ī/ℓ² sin²] + iωβ 16/ℓ² sin⁴ = 4T/ℓ sin² at κ/2, typed in from the text."""
-    m, inertia, length = EQUAL.inner_mass, EQUAL.inner_inertia, EQUAL.link_length
-    phases = np.linspace(0.1, np.pi, 30)[:, None]
-    omega = 1j * single_band(EQUAL, TENSION, phases[:, 0])
-    s, c = np.sin(phases / 2), np.cos(phases / 2)
-    left = omega**2 * (m * c**2 + 4 * inertia / length**2 * s**2)
-    left = left + 1j * omega * EQUAL.viscous_friction * 16 / length**2 * s**4
-    right = np.broadcast_to(4 * TENSION / length * s**2, left.shape)
-    assert_allclose(left, right, rtol=1e-10)
 
 
 def test_long_waves_run_at_the_speed_of_a_string():
@@ -126,13 +84,6 @@ def test_long_waves_run_at_the_speed_of_a_string():
     assert waves.loss_per_wavelength[0, LOWER_FORWARD] == pytest.approx(lost, rel=1e-3)
 
 
-def test_waves_without_friction_run_for_ever():
-    """Without friction the reach is infinite and nothing is lost over a wavelength."""
-    waves = straight_waves(FREE, TENSION, PHASES[:-1])
-    assert np.all(np.isinf(waves.reach))
-    assert_allclose(waves.loss_per_wavelength, 0)
-
-
 def test_bands_end_at_the_edges_of_the_gap():
     """At κ = π/2 both bands end at the gap's edges and stand still; the upper one begins at ω² = Tℓ/Ī."""
     waves = straight_waves(FREE, TENSION, [np.pi / 2])
@@ -145,13 +96,6 @@ def test_bands_end_at_the_edges_of_the_gap():
     assert top == pytest.approx(np.sqrt(TENSION * FREE.link_length / inertia), rel=1e-5)
 
 
-def test_unequal_links_may_have_no_gap():
-    """The gap vanishes if m − 4I/ℓ² is the same for both kinds of links, although the links differ."""
-    inertia = FREE.inner_inertia - (FREE.inner_mass - FREE.outer_mass) * FREE.link_length**2 / 4
-    low, high = band_gap(FREE.with_values({"outer_inertia": inertia}), TENSION)
-    assert high == pytest.approx(low, rel=1e-12)
-
-
 def test_group_speed_is_the_slope_of_the_frequency():
     """dω/dκ by central differences, with friction, for the straight chain; dω/dn for the ring's neighbours."""
     step, phases = 1e-3, np.array([0.2, 0.6, 0.9])
@@ -161,9 +105,6 @@ def test_group_speed_is_the_slope_of_the_frequency():
     ring = ring_waves(PAPER, 2000, SPEED, [99, 100, 101])
     slope = (ring.frequency[2] - ring.frequency[0]) / (ring.phase[2] - ring.phase[0])
     assert_allclose(ring.group_speed[1, LOWER_BACKWARD], slope[LOWER_BACKWARD], rtol=1e-4)
-
-
-# --- the ring ---
 
 
 @pytest.mark.parametrize("links", [8, 12, 60])
@@ -183,7 +124,7 @@ def test_a_large_ring_is_a_straight_chain():
     tension = circular_loop_force(links, PAPER, SPEED)[0]
     straight = straight_waves(PAPER, tension, 2 * np.pi * numbers / links)
     ring = ring_waves(PAPER, links, SPEED, numbers)
-    assert_allclose(ring.rate, straight.rate, rtol=2e-3)
+    assert_allclose(nearest(straight.rate, ring.rate), straight.rate, rtol=2e-3)
     assert_allclose(ring.slope[:, LOWER_FORWARD], straight.slope[:, LOWER_FORWARD], rtol=2e-3)
 
 
@@ -196,24 +137,9 @@ def test_long_waves_of_a_ring_are_those_of_the_continuous_ring():
     assert_allclose(continuous.real, ring.real, rtol=2e-2)
 
 
-def test_a_circulating_string_has_a_still_and_a_fast_family():
-    """Without rotary inertia and friction crests move in the room at 0 and 2v (n² − 1)/(n² + 1)."""
-    inertia = {"inner_inertia": FREE.inner_mass * FREE.link_length**2 / 6}
-    inertia["outer_inertia"] = FREE.outer_mass * FREE.link_length**2 / 6
-    numbers, links = np.array([2, 3, 6]), 600
-    radius = links * FREE.link_length / (2 * np.pi)
-    rates = continuous_ring(FREE.with_values(inertia), links, SPEED, numbers)
-    crests = (numbers[:, None] * SPEED / radius - rates.imag) * radius / numbers[:, None]
-    assert_allclose(crests[:, 0], 0, atol=1e-9 * SPEED)
-    assert_allclose(crests[:, 1], 2 * SPEED * (numbers**2 - 1) / (numbers**2 + 1), rtol=1e-9)
-
-
-# --- tapped rings ---
-
-
 def tapped(links, spins, times, parameters=SOFT):
     """Angles of a ring's links (t, n) [rad] after a tap, less those of the ring that turns on."""
-    position, velocity = tapped_loop(links, parameters, SPEED, spins)
+    position, velocity = tapped_ring(links, parameters, SPEED, spins)
     motion = warpchain.simulate(
         parameters,
         position,
@@ -251,19 +177,6 @@ def test_modes_of_a_tapped_ring():
     assert_allclose(measured.real, wanted.real, rtol=1e-2)
 
 
-def test_both_bands_ring_when_joints_hardly_rub():
-    """With a hundredth of Table 1's friction, one link that is turned excites both bands at the edge of the zone."""
-    parameters = SOFT.with_values({"viscous_friction": 9e-7})
-    links, interval = 60, 4e-4
-    spins = np.zeros(links)
-    spins[0] = 0.1
-    angles = tapped(links, spins, interval * np.arange(200), parameters)
-    wanted = ring_waves(parameters, links, SPEED, [12, 15]).rate
-    found = np.array([fit_rates(mode_amplitudes(angles, number), interval, 4) for number in (12, 15)])
-    assert_allclose(found.imag, wanted.imag, rtol=5e-4)
-    assert found[1, 2].imag / found[1, 3].imag < 0.98
-
-
 def test_two_packets_run_at_their_group_speeds():
     """Waves of 12 links run both ways: places as group speeds say to 0.1 %, amplitudes fall as damping says to 1 %.
 
@@ -290,9 +203,6 @@ def test_two_packets_run_at_their_group_speeds():
     assert_allclose(in_room, [0.0, 2.0], atol=0.04)
 
 
-# --- Coulomb friction ---
-
-
 @pytest.mark.parametrize("amplitude", [1e-3, 0.1, 1.0, 60.0])
 def test_equivalent_friction_takes_as_much_energy(amplitude):
     """β_eq W²/2 is the mean power of the NumPy model's friction in a joint that swings with amplitude W."""
@@ -302,55 +212,8 @@ def test_equivalent_friction_takes_as_much_energy(amplitude):
     assert equivalent_friction(chain, amplitude) * amplitude**2 / 2 == pytest.approx(power, rel=1e-4)
 
 
-def test_limits_of_equivalent_friction():
-    """β + τ_c/ω_c in small swings, β + 4τ_c/πW in large ones, with the paper's sharp ω_c too."""
-    chain = preset("paper")
-    assert equivalent_friction(chain, 1e-6) == pytest.approx(9e-5 + 1.1e-4 / 1e-3, rel=1e-4)
-    assert equivalent_friction(chain, 60.0) == pytest.approx(9e-5 + 4 * 1.1e-4 / (np.pi * 60), rel=1e-4)
-
-
-def test_coulomb_friction_damps_a_tapped_ring():
-    """Waves whose joints swing at 3 rad/s decay half as fast again, as equivalent friction has it to 12 %."""
-    chain, links, number, times = preset("soft"), 60, 5, 4e-4 * np.arange(100)
-    spins = 10 * np.cos(2 * np.pi * number * np.arange(links) / links)
-    angles = tapped(links, spins, times, chain)
-    rates = np.gradient(angles, times, axis=0)
-    amplitude = float(np.mean(np.sqrt(2 * np.mean(np.diff(rates, axis=1) ** 2, axis=1))))
-    equivalent = chain.with_values({"viscous_friction": equivalent_friction(chain, amplitude)})
-    wanted = ring_waves(equivalent, links, SPEED, [number]).rate[:, [LOWER_BACKWARD, LOWER_FORWARD]]
-    without = ring_waves(chain, links, SPEED, [number]).rate[:, [LOWER_BACKWARD, LOWER_FORWARD]]
-    found = nearest(wanted, fit_rates(mode_amplitudes(angles, number), 4e-4, 4)[None, :])
-    assert_allclose(found.real, wanted.real, rtol=0.12)
-    assert np.all(found.real < 1.3 * without.real)
-
-
-# --- inputs ---
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: straight_waves(PAPER, -1.0, [0.5]), "^tension: -1.0 N is not positive; give a greater one$"),
-        (lambda: equivalent_friction(PAPER, 0.0), "^amplitude: 0.0 rad/s is not positive"),
-        (lambda: straight_waves(PAPER, 1.0, [0.0]), r"^phase: outside of \(0, π/2\]"),
-        (lambda: straight_waves(PAPER, 1.0, [2.0]), "π minus itself$"),
-        (lambda: straight_waves(PAPER, 1.0, [np.nan]), "^phase: not a row of finite numbers"),
-        (lambda: ring_waves(PAPER, 7, 1.0, [2]), "^links: 7 make no ring"),
-        (lambda: ring_waves(PAPER, 60, 0.0, [2]), "^speed: 0.0 m/s is not positive"),
-        (lambda: ring_waves(PAPER, 60, 1.0, [1]), "^number: give whole numbers from 2 to 15"),
-        (lambda: ring_waves(PAPER, 60, 1.0, [2.5]), "^number: give whole numbers"),
-        (lambda: continuous_ring(PAPER, 60, 1.0, [16]), "^number: give whole numbers"),
-    ],
-)
-def test_bad_inputs_are_refused(call, message):
-    """Each in one line that names the input and says what to give."""
-    with pytest.raises(InputError, match=message):
-        call()
-
-
-def test_branches_are_followed_in_small_enough_steps(monkeypatch):
-    """Half as many steps of friction lead to the same branches."""
-    numbers = np.arange(2, 16)
-    fine = ring_waves(PAPER, 60, SPEED, numbers).rate
-    monkeypatch.setattr(dispersion, "FRICTION_STEPS", dispersion.FRICTION_STEPS // 2)
-    assert_allclose(ring_waves(PAPER, 60, SPEED, numbers).rate, fine, rtol=1e-9)
+def test_a_tapped_ring_is_that_of_the_model():
+    """Places and velocities are those of the NumPy model's loop; a spin that would move the ring is left out."""
+    spins = np.random.default_rng(1).normal(size=12)
+    for ours, theirs in zip(tapped_ring(12, SOFT, SPEED, spins), tapped_loop(12, SOFT, SPEED, spins), strict=True):
+        assert_allclose(ours, theirs, rtol=1e-12, atol=1e-12)

@@ -1,6 +1,6 @@
 """The theory of the free part of a stationary loop: its balances as a boundary value problem.
 
-With the signs and symbols of `warpchain.loop.stationary_loop`, p = κ' and M = f(ℓ v p), where f(w) = β w + τ_c
+With the signs of `walk.mean_loop()`, p = κ' and M = f(ℓ v p), where f(w) = β w + τ_c
 tanh(w/ω_c):
 
     x' = −cos φ    y' = sin φ    φ' = κ    κ' = p    T_e' = N κ + ρ g sin φ    N' = ρ g cos φ − T_e κ
@@ -17,21 +17,21 @@ T_e κ = ρ g cos φ: the catenary, for which only its ends and its length are g
 With a small ω_c the moment is almost a step wherever a joint changes its sense of rotation. The solver therefore starts
 with large ω_c and ends at `LEAST_SMOOTHING`. Joints turn at 60 rad/s where the loop bends; from there to 0.1 rad/s
 loops of 60 to 180 links at 10 to 30 Hz change by at most 0.1 mm and 0.05 1/m.
-
-SciPy is an optional dependency; functions that need it say so.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-
-from warpchain.loop.stationary_loop import LoopParameters, StationaryLoop
+from scipy.integrate import solve_bvp
 
 Array = NDArray[np.float64]
+MeanLoop = Any
+"""What `walk.mean_loop()` returns."""
+LoopParameters = Any
+"""Its `parameters`, a data class."""
 
 SMOOTHINGS: Final = (300.0, 100.0, 30.0, 10.0, 3.0, 1.0)
 """Smoothings ω_c [rad/s] for which the problem is solved before that of the chain."""
@@ -53,7 +53,7 @@ class NoSolutionError(ValueError):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TheoreticalLoop:
-    """The free part in theory, as functions of the arc length at g points; signs as of a `StationaryLoop`.
+    """The free part in theory, as functions of the arc length at g points; signs as of the mean loop.
 
     Attributes:
         s: arc length from the lowest point along the motion [m], shape (g,).
@@ -89,13 +89,13 @@ class End:
     curvature: float
 
     @classmethod
-    def of(cls, loop: StationaryLoop, s: float) -> "End":
+    def of(cls, loop: MeanLoop, s: float) -> "End":
         """The mean loop at the arc length s [m]."""
         columns = (*loop.position.T, loop.angle, loop.curvature)
         return cls(*(float(np.interp(s, loop.s, values)) for values in columns))
 
 
-def predict(loop: StationaryLoop, parameters: LoopParameters | None = None) -> TheoreticalLoop:
+def predict(loop: MeanLoop, parameters: LoopParameters | None = None) -> TheoreticalLoop:
     """The free part in theory, with the ends and the speed of a mean loop.
 
     Args:
@@ -104,7 +104,6 @@ def predict(loop: StationaryLoop, parameters: LoopParameters | None = None) -> T
 
     Raises:
         NoSolutionError: the solver has found no solution.
-        ModuleNotFoundError: SciPy is not installed.
     """
     inset = IN_LINKS * loop.parameters.link_length
     first, last = loop.free[0] + inset, loop.free[1] - inset
@@ -129,7 +128,6 @@ def solve(
 
     Raises:
         NoSolutionError: the solver has found no solution.
-        ModuleNotFoundError: SciPy is not installed.
     """
     weight, turning = parameters.density * parameters.gravity, parameters.inertia * speed**2
     points, nothing = np.linspace(0.0, 1.0, POINTS), np.zeros(POINTS)
@@ -162,49 +160,6 @@ def solve(
     found = _solve_bvp(hanging, _ends_meet(ends, 2, 2), share, guess[[0, 1, 2, 5]])
     x, y, angle, tension = found.sol(points)
     return _made(length, x, y, angle, weight * np.cos(angle) / tension, tension, nothing, nothing)
-
-
-def catenary(loop: StationaryLoop) -> TheoreticalLoop:
-    """The catenary between the ends of a mean loop's free part and of the same length; T_e is its tension.
-
-    Raises:
-        NoSolutionError: its length is not greater than the distance of its ends.
-    """
-    first, last = loop.free
-    return catenary_between((End.of(loop, first), End.of(loop, last)), last - first, loop.parameters)
-
-
-def catenary_between(ends: tuple[End, End], length: float, parameters: LoopParameters) -> TheoreticalLoop:
-    """The catenary of a given length [m] between two ends, of which the second is farther left.
-
-    With the width w and the height difference h, a curve y = c cosh((x − x₀)/c) has 2 c sinh(w/2c) = √(L² − h²).
-
-    Raises:
-        NoSolutionError: the length is less than the distance of the ends.
-    """
-    width, rise = ends[0].x - ends[1].x, ends[1].y - ends[0].y
-    square = length**2 - rise**2
-    if width <= 0 or square <= width**2:
-        raise NoSolutionError("a catenary of this length does not reach from one end to the other; check both")
-    ratio = math.sqrt(square) / width  # of sinh(z) to z, z = w/2c
-    z = math.sqrt(6 * (ratio - 1)) if ratio < 2 else math.log(2 * ratio) + math.log(math.log(2 * ratio))
-    for _ in range(100):
-        z -= (math.sinh(z) - ratio * z) / (math.cosh(z) - ratio)
-    c = width / (2 * z)
-    from_lowest = width / 2 - c * math.atanh(rise / length)  # x of the first end, from the lowest point
-    s = -c * math.sinh(from_lowest / c) + np.linspace(0.0, length, POINTS)
-    lowest_y = ends[0].y - c * (math.cosh(from_lowest / c) - 1)
-    position = np.stack([ends[0].x - from_lowest - c * np.arcsinh(s / c), lowest_y + np.hypot(s, c) - c], axis=1)
-    nothing = np.zeros(POINTS)
-    return TheoreticalLoop(
-        s=s,
-        position=position,
-        angle=np.arctan(s / c),
-        curvature=c / (s**2 + c**2),
-        effective_tension=parameters.density * parameters.gravity * np.hypot(s, c),
-        shear=nothing,
-        moment=nothing,
-    )
 
 
 def _rates(angle: Array, curvature: Array, tension: Array, shear: Array, weight: float) -> tuple[Array, ...]:
@@ -243,12 +198,7 @@ def _solve_bvp(slope: Callable[..., Array], conditions: Callable[..., Array], sh
 
     Raises:
         NoSolutionError: SciPy has found no solution.
-        ModuleNotFoundError: SciPy is not installed.
     """
-    try:
-        from scipy.integrate import solve_bvp
-    except ModuleNotFoundError:
-        raise ModuleNotFoundError("the theory of the loop needs SciPy: pip install 'warpchain[scipy]'") from None
     found = solve_bvp(slope, conditions, share, guess, tol=TOLERANCE, max_nodes=MOST_NODES)
     if not found.success:
         raise NoSolutionError(f"the boundary value problem was not solved ({found.message.lower().rstrip('.')})")
