@@ -147,7 +147,8 @@ def scene_page() -> str:
     """What happens in a walk."""
     return (
         "# Scene\n\nWhat happens in a walk, from hanging on the sprocket to rest: "
-        "[the model](../model.md#the-scene) explains the phases, [the stationary loop](../stationary-loop.md) the hold."
+        "[the model](../model.md#the-scene) explains the phases, "
+        "[the stationary loop](../../studies/stationary_loop/README.md) the hold."
         "\n\n" + model_table(Scene)
     )
 

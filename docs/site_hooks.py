@@ -1,9 +1,10 @@
-"""MkDocs hooks: files of the repository outside docs/ that pages link to become part of the site.
+"""MkDocs hooks: studies, and files of the repository that pages link to, become part of the site.
 
-A page links to them as GitHub needs it, such as `../sweeps/figure6.yaml`; in the site they lie in `repository/`.
-Docstrings lose the roles that only Sphinx knows.
+Pages link as GitHub needs it, such as `../sweeps/figure6.yaml`. In the site files of docs/ lie at the top, studies in
+`studies/`, all others in `repository/`. Docstrings lose the roles that only Sphinx knows.
 """
 
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -11,47 +12,54 @@ from typing import Any
 from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).parents[1]
-FOLDER = "repository"
 ROLE = re.compile(r":(?:attr|class|data|func|meth|mod):(?=<code>|`)")
-LINK = re.compile(r"\]\(((?:\.\./)+)([^)#]+)")
+LINK = re.compile(r"\]\(((?!\w+:)[^)#\s]+)")
 
 
-def outside(page: str, target: str) -> str | None:
-    """Path in the repository of a link's target, None if that lies in docs/.
+def in_site(path: str) -> str:
+    """Where a file of the repository is in the site."""
+    if path == "README.md":
+        return "index.md"
+    return path.removeprefix("docs/") if path.startswith(("docs/", "studies/")) else f"repository/{path}"
 
-    Args:
-        page: the page, relative to docs/.
-        target: what it links to, relative to the page's folder.
-    """
-    path = (ROOT / "docs" / page).parent / target
-    if path.resolve().is_relative_to(ROOT / "docs") or not path.resolve().is_relative_to(ROOT):
-        return None
-    return path.resolve().relative_to(ROOT).as_posix()
+
+def in_repository(uri: str) -> str:
+    """Where a file of the site is in the repository."""
+    return uri.removeprefix("repository/") if uri.startswith(("repository/", "studies/")) else f"docs/{uri}"
+
+
+def linked(page: str, target: str) -> str:
+    """What a link of a page leads to; both are paths in the repository."""
+    return os.path.normpath(os.path.join(os.path.dirname(page), target))
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the files that pages link to."""
-    wanted = set()
-    for page in files.documentation_pages():
-        for match in LINK.finditer(page.content_string):
-            path = outside(page.src_uri, match[1] + match[2])
-            if path is not None and (ROOT / path).is_file():
-                wanted.add(path)
-    for path in sorted(wanted):
-        files.append(File.generated(config, f"{FOLDER}/{path}", abs_src_path=str(ROOT / path)))
+    """Add the pages of the studies, and all that pages link to."""
+    waiting = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob("studies/**/README.md"))
+    waiting += [
+        linked(in_repository(page.src_uri), match[1])
+        for page in files.documentation_pages()
+        for match in LINK.finditer(page.content_string)
+    ]
+    while waiting:
+        path = waiting.pop()
+        if files.get_file_from_path(in_site(path)) is not None or not (ROOT / path).is_file():
+            continue
+        files.append(File.generated(config, in_site(path), abs_src_path=str(ROOT / path)))
+        if path.startswith("studies/") and path.endswith(".md"):
+            text = (ROOT / path).read_text(encoding="utf-8")
+            waiting += [linked(path, match[1]) for match in LINK.finditer(text)]
     return files
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Lead links that leave docs/ to `repository/`, and those of a page from there back to docs/."""
-    source = page.file.src_uri
-    if source.startswith(f"{FOLDER}/"):
-        return markdown.replace("](docs/", "](../").replace("](README.md", "](../index.md")
-    up = "../" * source.count("/")
+    """Lead links to where files are in the site."""
+    source = in_repository(page.file.src_uri)
+    folder = os.path.dirname(page.file.src_uri) or "."
 
     def moved(match: re.Match[str]) -> str:
-        path = outside(source, match[1] + match[2])
-        return match[0] if path is None else f"]({up}{FOLDER}/{path}"
+        path = linked(source, match[1])
+        return f"]({os.path.relpath(in_site(path), folder)}" if (ROOT / path).is_file() else match[0]
 
     return LINK.sub(moved, markdown)
 

@@ -15,6 +15,7 @@ import warpchain
 ROOT = Path(__file__).parents[1]
 HOST = sorted(path for path in (ROOT / "warpchain").rglob("*.py") if "kernels" not in path.parts)
 KERNELS = sorted((ROOT / "kernels").rglob("*.py"))
+STUDIES = sorted((ROOT / "studies").rglob("*.py"))
 LONGEST_FILE = 450
 
 STOREYS = (
@@ -64,6 +65,7 @@ TOP_LEVEL = {
     "docs",
     "kernels",
     "pyproject.toml",
+    "studies",
     "sweeps",
     "tests",
     "warpchain",
@@ -172,6 +174,14 @@ def foreign(source: str) -> list[str]:
     return sorted(top for top in tops if top != "warp" and top not in sys.stdlib_module_names)
 
 
+def private(source: str) -> list[str]:
+    """What a study takes of warpchain that is no public name, whether imported or got as an attribute."""
+    found = [name for name in imports(source) if name.startswith("warpchain") and name != "warpchain"]
+    nodes = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Attribute)]
+    found += [ast.unparse(node) for node in nodes if ast.unparse(node.value) == "warpchain"]
+    return sorted({name for name in found if name.removeprefix("warpchain.") not in warpchain.__all__})
+
+
 def tracked() -> list[str]:
     """Files of the repository, relative to its root."""
     if not (ROOT / ".git").exists():
@@ -217,8 +227,26 @@ def test_a_planted_import_is_found(module: str, target: str, rule: str) -> None:
     assert found.endswith(rule)
 
 
+@pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_a_study_takes_public_names_only(path: Path) -> None:
+    """What studies need of the package is what any user can reach; and their files are as short."""
+    text = path.read_text(encoding="utf-8")
+    assert private(text) == []
+    assert len(text.splitlines()) <= LONGEST_FILE
+
+
+def test_the_package_knows_no_study() -> None:
+    """Neither the host nor a kernel imports one."""
+    for path in MODULES.values():
+        assert not [name for name in imports(path.read_text(encoding="utf-8")) if name.startswith("studies")], path
+
+
 def test_planted_sins_are_found() -> None:
-    """A circle, a launch, a foreign import and a lazy one are seen."""
+    """A circle, a launch, a foreign import, a lazy one, and what a study must not take are seen."""
+    assert private("from warpchain.status import Status\nimport warpchain\nwarpchain.engine, warpchain.walk") == [
+        "warpchain.engine",
+        "warpchain.status.Status",
+    ]
     assert set(circle({"a": ["b"], "b": ["c"], "c": ["a"], "d": ["a"]})) == {"a", "b", "c"}
     assert launches("def f(): wp.launch(kernel, dim=1)") == {"wp.launch"}
     assert foreign("import warp as wp, numpy\nfrom warpchain.engine import batch") == ["numpy", "warpchain"]

@@ -14,7 +14,7 @@ from tests.support.command_line import Command
 from warpchain.cli import main as command_module
 from warpchain.cli import sweep_commands
 from warpchain.inputs.validation import InputError
-from warpchain.pictures.walk_shape import Colour, Kind
+from warpchain.pictures.walk_shape import Kind
 from warpchain.walks.walk_result import STORED, WalkResult
 
 command = command_line.command
@@ -93,43 +93,18 @@ def test_plot_of_a_walk_that_never_was_released_fails(command: Command) -> None:
     assert [path.name for path in Path().iterdir()] == ["walk.h5"]
 
 
-def test_recorded_loads_are_drawn_as_waves(command: Command) -> None:
-    """`--record-loads` takes frames 0.1 ms apart and writes waves.png; plot draws it alone, in other colours too."""
+def test_loads_are_recorded(command: Command) -> None:
+    """`--record-loads` takes frames 0.1 ms apart, with forces."""
     line = "--links 20 --frequency 8 --preset soft --start ellipse --set walk_limit=0.03 --set clearance=0.002"
-    answer = command("walk", *line.split(), "--record-loads", "-o", "fine")
-    assert "fine/waves.png" in answer.out.splitlines()
+    command("walk", *line.split(), "--record-loads", "-o", "fine")
     walk = warpchain.load_walk("fine/walk.h5")
     assert walk.setup.options.method == "os32"
     assert walk.frame_forces.shape == (len(walk.frame_time), 20, 2) and len(walk.frame_time) > 290
-    assert Path("fine/waves.png").read_bytes().startswith(b"\x89PNG")
-    assert "waves.png\n" in command("plot", "fine/walk.h5", "-o", "all").out
-    drawn = command("plot", "fine/walk.h5", *"-o one --kind waves --colour velocity --window 0 0.02".split())
-    assert (drawn.status, drawn.out, drawn.err) == (0, "one/waves.png\n", "")
-    command("walk", *line.split(), "-o", "fine")
-    assert not Path("fine/waves.png").exists()
-
-
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
-        ("--kind waves", "saved/waves.png: not drawn; walk: its joint forces were not recorded; run it again with "),
-        ("--kind waves --colour velocity", "saved/waves.png: not drawn; walk: its frames are 0.002 s apart, in which "),
-        ("--colour velocity", "error: --colour: only waves has one; add --kind waves, or leave it out\n"),
-        ("--kind loop --window 0 1", "error: --window: only waves has one; add --kind waves, or leave it out\n"),
-    ],
-)
-def test_waves_that_cannot_be_drawn(command: Command, fast: Path, line: str, message: str) -> None:
-    """One line says why."""
-    answer = command("plot", str(fast), *line.split())
-    assert answer.status > 0 and answer.out == "" and answer.err.count("\n") == 1
-    assert message in answer.err
 
 
 def test_figures_of_a_walk_are_those_of_the_library() -> None:
-    """The words of `--kind` and `--colour` are those of `walk.plot`."""
-    hints = get_type_hints(sweep_commands.plot)
-    for option, words in (("kind", Kind), ("colour", Colour)):
-        assert set(get_args(get_args(hints[option])[0])) == set(get_args(words))
+    """The words of `--kind` are those of `walk.plot`."""
+    assert set(get_args(get_args(get_type_hints(sweep_commands.plot)["kind"])[0])) == set(get_args(Kind))
 
 
 @pytest.mark.parametrize(("suffix", "beginning"), [("gif", b"GIF89a"), ("html", b"<!DOCTYPE html>")])

@@ -1,4 +1,4 @@
-"""Reads the code blocks of README and docs/, with the comments that say which are not run.
+"""Reads the code blocks of README, docs/ and studies/, with the comments that say which are not run.
 
 A block is not run if an HTML comment stands on the line before it: `<!-- not run: needs a GPU -->`. The reasons that
 count are those of `REASONS`.
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 ROOT: Final = Path(__file__).parents[2]
-PAGES: Final = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAGES: Final = [ROOT / "README.md", *sorted((*ROOT.glob("docs/**/*.md"), *ROOT.glob("studies/**/*.md")))]
 
 REASONS: Final = ("needs a GPU", "needs a cluster", "takes minutes", "sets up an environment")
 """Why a block may not be run."""

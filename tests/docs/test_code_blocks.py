@@ -1,4 +1,4 @@
-"""Every command and every example of README and docs/ does what a reader would have it do."""
+"""Every command and every example of README, docs/ and studies/ does what a reader would have it do."""
 
 import os
 import re
@@ -30,10 +30,10 @@ RUN = [page for page in PAGES if any(block.is_run for block in code_blocks(page)
 @pytest.mark.parametrize("page", RUN, ids=name_of)
 def test_blocks_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The blocks of a page run one after the other; sweeps have fewer samples and shorter axes than the page says."""
-    (tmp_path / "sweeps").mkdir()
-    for file in (ROOT / "sweeps").glob("*.yaml"):
-        small = yaml.safe_dump(reduced(read_yaml(file)), sort_keys=False)
-        (tmp_path / "sweeps" / file.name).write_text(small, encoding="utf-8")
+    for file in (*ROOT.glob("sweeps/*.yaml"), *ROOT.glob("studies/*/sweeps/*.yaml")):
+        target = tmp_path / file.relative_to(ROOT)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(yaml.safe_dump(reduced(read_yaml(file)), sort_keys=False), encoding="utf-8")
     command = tmp_path / "bin" / "warpchain"
     command.parent.mkdir()
     command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m warpchain "$@"\n', encoding="utf-8")
@@ -106,5 +106,5 @@ def test_files_that_are_named_exist(page: Path) -> None:
     """Each path of the repository that stands in a page's code is there."""
     code = [*inline_code(page), *(block.code for block in code_blocks(page) if block.is_run)]
     for text in code:
-        for path in re.findall(r"(?<![\w./-])(?:docs|kernels|sweeps|tests|warpchain)/[\w./-]*", text):
+        for path in re.findall(r"(?<![\w./-])(?:docs|kernels|studies|sweeps|tests|warpchain)/[\w./-]*", text):
             assert (ROOT / path).exists(), path

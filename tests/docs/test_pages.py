@@ -1,4 +1,4 @@
-"""What README, docs/ and CITATION.cff say of the project is so."""
+"""What README, docs/, studies/ and CITATION.cff say of the project is so."""
 
 import importlib.util
 import re

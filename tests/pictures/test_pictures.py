@@ -17,8 +17,8 @@ from matplotlib.collections import PolyCollection
 from PIL import Image, ImageSequence
 
 from tests.support.made_walks import make_unreleased, make_walk
-from warpchain.pictures import animation
 from warpchain.pictures.animation import animate
+from warpchain.pictures.film import Film
 from warpchain.pictures.room import link_outlines
 from warpchain.pictures.walk_figures import figure5, film_strip
 from warpchain.status import Status
@@ -181,15 +181,15 @@ def test_gif_draws_the_chain(tmp_path: Path) -> None:
     """The first picture shows outer links darker than inner ones, and paper inside their loop."""
     walk = make_walk()
     animate(walk, tmp_path / "walk.gif", fps=10, slow=5)
-    stage = animation._Stage(walk)
+    film = Film(walk)
     with Image.open(tmp_path / "walk.gif") as gif:
-        assert gif.size == stage.size
+        assert gif.size == film.size
         pixels = np.asarray(gif.convert("RGB")).astype(int)
     joints = walk.frame_joints[0]
 
     def brightness(place: np.ndarray) -> int:
-        x, y = stage._pixels(place) / 3
-        return int(pixels[int(y), int(x)].sum())
+        x, y = film._canvas.figure.axes[0].transData.transform(place)
+        return int(pixels[int(film.size[1] - y), int(x)].sum())
 
     middles = [brightness(middle) for middle in (joints + np.roll(joints, 1, axis=0)) / 2]
     assert np.median(middles[0::2]) > 450 > 400 > max(middles[1::2])

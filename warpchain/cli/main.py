@@ -240,8 +240,8 @@ def walk(
             "--output",
             metavar="DIR",
             parser=output_path,
-            help="Write walk.h5, figure5.png, film_strip.png, of a chain on a sprocket loop.png, if its plane tilts "
-            "tilt.png, and with --record-loads waves.png to this folder; files of these names are replaced.",
+            help="Write walk.h5, figure5.png, film_strip.png, of a chain on a sprocket loop.png, and if its plane "
+            "tilts tilt.png to this folder; files of these names are replaced.",
         ),
     ] = None,
     animation: Annotated[

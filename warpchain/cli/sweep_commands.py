@@ -162,38 +162,25 @@ def plot(
         ),
     ] = None,
     kind: Annotated[
-        Literal["figure5", "film_strip", "loop", "energy", "tilt", "waves"] | None,
+        Literal["figure5", "film_strip", "loop", "energy", "tilt"] | None,
         typer.Option(help="Only figure of a walk to draw. Default: all that it has something for."),
-    ] = None,
-    colour: Annotated[
-        Literal["tension", "curvature", "velocity"] | None,
-        typer.Option(
-            help="Colours of waves.png: tension of the joints, which needs a walk with --record-loads, curvature, or "
-            "their velocity across the chain. Default: tension."
-        ),
-    ] = None,
-    window: Annotated[
-        tuple[float, float] | None,
-        typer.Option(metavar="FROM TO", help="Times of waves.png, in s since the release. Default: 0 0.3."),
     ] = None,
 ) -> None:
     """Draw every figure that a sweep or a saved walk has something for.
 
     Of a sweep: Figures 6 and 5, grids, tolerance, sensitivity, statuses. Of a walk: figure5.png, film_strip.png,
-    loop.png, energy.png, if the plane tilts tilt.png, and with recorded loads waves.png; a line says what is left out
-    and why.
+    loop.png, energy.png and, if the plane tilts, tilt.png; a line says what is left out and why.
     """
     from warpchain.inputs.validation import InputError, printable
 
     if os.path.isfile(path) or (path.suffix == ".h5" and not os.path.isdir(path)):
         if quantity is not None:
             raise InputError("--quantity: a saved walk has no columns; leave it out, or give the folder of a sweep")
-        if not plot_walk(path, output, kind, colour, window):
+        if not plot_walk(path, output, kind):
             raise typer.Exit(FAILED)
         return
-    for option, value in (("--kind", kind), ("--colour", colour), ("--window", window)):
-        if value is not None:
-            raise InputError(f"{option}: a sweep has none; leave it out, or give the file of a saved walk")
+    if kind is not None:
+        raise InputError("--kind: a sweep has none; leave it out, or give the file of a saved walk")
     from warpchain.cli.terminal import try_folder
     from warpchain.files import make_folder
     from warpchain.reports.sweep_figures import figures

@@ -37,7 +37,7 @@ COMPILING: Final = "compiling kernels; later runs find them ready"
 
 
 RECORD: Final = "walk.h5"
-PICTURES: Final = ("figure5.png", "film_strip.png", "loop.png", "tilt.png", "waves.png")
+PICTURES: Final = ("figure5.png", "film_strip.png", "loop.png", "tilt.png")
 """Files of a walk, beside its animation."""
 
 
@@ -235,7 +235,7 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
     record = folder / RECORD
     result.save(record)
     yield record
-    figure5, film_strip, loop, tilt, waves = PICTURES
+    figure5, film_strip, loop, tilt = PICTURES
     pictures: dict[str, Callable[[WalkResult, Path], None]] = {
         figure5: partial(_draw, "figure5"),
         film_strip: partial(_draw, "film_strip"),
@@ -248,10 +248,6 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
         pictures[tilt] = partial(_draw, "tilt")
     else:
         remove_output(folder / tilt)
-    if len(result.frame_forces) and result.joints_in_room is None:
-        pictures[waves] = partial(_draw, "waves")
-    else:
-        remove_output(folder / waves)
     if animation is not None:
         from warpchain.pictures.animation import animate
 
@@ -261,7 +257,7 @@ def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iter
         try:
             draw(result, path)
         except ValueError as error:
-            if result.status.ok and name not in (loop, waves):
+            if result.status.ok and name != loop:
                 raise
             remove_output(path)
             print(one_line(f"{path}: not drawn; {error}"), file=sys.stderr)

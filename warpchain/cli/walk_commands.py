@@ -11,24 +11,16 @@ from warpchain.cli.output_paths import output_path
 
 if TYPE_CHECKING:
     from warpchain.inputs.setup import Setup
-    from warpchain.pictures.walk_shape import Colour, Kind
+    from warpchain.pictures.walk_shape import Kind
 
 
-def plot_walk(
-    path: Path,
-    output: Path | None,
-    kind: "Kind | None" = None,
-    colour: "Colour | None" = None,
-    window: tuple[float, float] | None = None,
-) -> bool:
+def plot_walk(path: Path, output: Path | None, kind: "Kind | None" = None) -> bool:
     """Draw every figure that a saved walk has something for, and say on stderr what is left out and why.
 
     Args:
         path: file of the walk.
         output: folder of the figures; None: that of the file.
         kind: the only figure to draw; None: all.
-        colour: what the colours of `waves` show; None: tension.
-        window: times of `waves` [s]; None: its default.
 
     Returns:
         Whether anything was drawn.
@@ -39,22 +31,18 @@ def plot_walk(
     """
     from warpchain.cli.terminal import try_folder
     from warpchain.files import make_folder
-    from warpchain.inputs.validation import InputError, one_line, printable
+    from warpchain.inputs.validation import one_line, printable
     from warpchain.pictures.style import save_figure
     from warpchain.pictures.walk_shape import kinds_of
     from warpchain.walks.walk_result import load_walk
 
-    if kind != "waves":
-        for name, value in (("--colour", colour), ("--window", window)):
-            if value is not None:
-                raise InputError(f"{name}: only waves has one; add --kind waves, or leave it out")
     walk, folder, drawn = load_walk(path), path.parent if output is None else output, False
     try_folder(folder)
     make_folder(folder)
     for each in kinds_of(walk) if kind is None else (kind,):
         target = folder / f"{each}.png"
         try:
-            figure = walk.plot(each, colour=colour, window=window)
+            figure = walk.plot(each)
         except ValueError as error:
             print(one_line(f"{target}: not drawn; {error}"), file=sys.stderr)
             continue

@@ -14,26 +14,17 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-FIELDS: Final[Mapping[str, tuple[str, str]]] = {
-    "time": ("s", "time since the release, negative, shape (t,)"),
-    "center": ("m", "centre of mass x, y, shape (t, 2)"),
-    "center_velocity": ("m/s", "velocity of the centre of mass x, y, shape (t, 2)"),
-    "frame_time": ("s", "time of a frame since the release, negative, shape (f,)"),
-    "frame_joints": ("m", "joints x, y, shape (f, n, 2); joint i ends link i, even links inner"),
-    "frame_forces": ("N", "force x, y in each joint on the link that it ends, shape (f, n, 2)"),
-    "frame_moments": ("N m", "friction moment in each joint on the link that it ends, shape (f, n)"),
+FIELDS: Final[Mapping[str, tuple[str, str, tuple[str | int, ...]]]] = {
+    "time": ("s", "time since the release, negative, shape (t,)", ("t",)),
+    "center": ("m", "centre of mass x, y, shape (t, 2)", ("t", 2)),
+    "center_velocity": ("m/s", "velocity of the centre of mass x, y, shape (t, 2)", ("t", 2)),
+    "frame_time": ("s", "time of a frame since the release, negative, shape (f,)", ("f",)),
+    "frame_joints": ("m", "joints x, y, shape (f, n, 2); joint i ends link i, even links inner", ("f", "n", 2)),
+    "frame_forces": ("N", "force x, y in each joint on the link that it ends, shape (f, n, 2)", ("f", "n", 2)),
+    "frame_moments": ("N m", "friction moment in each joint on the link that it ends, shape (f, n)", ("f", "n")),
 }
-"""Arrays of a `BeforeRelease`: name → unit and meaning."""
-_OF_JOINTS: Final = ("frame_joints", "frame_forces", "frame_moments")
-_DIMENSIONS: Final = {
-    "time": 1,
-    "center": 2,
-    "center_velocity": 2,
-    "frame_time": 1,
-    "frame_joints": 3,
-    "frame_forces": 3,
-    "frame_moments": 2,
-}
+"""Arrays of a `BeforeRelease`: name → unit, meaning and shape."""
+_OF_JOINTS: Final = tuple(name for name, (_, _, shape) in FIELDS.items() if "n" in shape)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -58,17 +49,9 @@ class BeforeRelease:
 
     def __post_init__(self) -> None:
         """Check that the arrays fit together."""
-        instants, frames = len(self.time), len(self.frame_time)
-        links = self.frame_joints.shape[1]
-        shapes = {
-            "center": (instants, 2),
-            "center_velocity": (instants, 2),
-            "frame_joints": (frames, links, 2),
-            "frame_forces": (frames, links, 2),
-            "frame_moments": (frames, links),
-        }
-        for name, shape in shapes.items():
-            given = np.shape(getattr(self, name))
+        sizes: dict[str | int, int] = {"t": len(self.time), "f": len(self.frame_time), "n": self.frame_joints.shape[1]}
+        for name, (_, _, symbols) in FIELDS.items():
+            shape, given = tuple(sizes.get(size, 2) for size in symbols), np.shape(getattr(self, name))
             if given != shape:
                 raise ValueError(f"before_release.{name}: its shape is {given}; give an array of shape {shape}")
         if np.any(self.time >= 0) or np.any(self.frame_time >= 0):
@@ -93,7 +76,7 @@ def is_ascending(times: Array) -> bool:
 
 def write_before_release(before: BeforeRelease, group: "h5py.Group") -> None:
     """Write the arrays and their units into a group."""
-    for name, (unit, meaning) in FIELDS.items():
+    for name, (unit, meaning, _) in FIELDS.items():
         dataset = group.create_dataset(name, data=getattr(before, name))
         dataset.attrs["unit"] = unit
         dataset.attrs["description"] = meaning
@@ -111,7 +94,7 @@ def read_before_release(group: Contents, joints: type[np.floating[Any]]) -> Befo
         ValueError: the arrays do not fit together.
     """
     values = {
-        name: group.array(name, joints if name in _OF_JOINTS else np.float64, (None,) * dimensions)
-        for name, dimensions in _DIMENSIONS.items()
+        name: group.array(name, joints if name in _OF_JOINTS else np.float64, (None,) * len(shape))
+        for name, (_, _, shape) in FIELDS.items()
     }
     return BeforeRelease(**values)

@@ -33,6 +33,7 @@ from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import joint_radius
 from warpchain.inputs.setup import Setup
 from warpchain.loop.before_release import BeforeRelease
+from warpchain.loop.catenary import Catenary, catenary_between
 
 Array = NDArray[np.float64]
 
@@ -48,8 +49,6 @@ NO_WAVES: Final = 2.0
 """… and waves up to this long not at all: joints are a link apart, and the mean loop has corners at the sprocket."""
 OFF_SPROCKET: Final = 5e-4
 """The loop is free where its joints are this much [m] farther from the centre than on the sprocket."""
-EDGE: Final = 4.0
-"""Links at either end of the free part that balances leave out: averages there include links on the sprocket."""
 KINK_REACH: Final = 0.35
 """Part of the free length, before and after the lowest point, in which the kink is searched for."""
 
@@ -96,6 +95,23 @@ class LoopParameters:
             coulomb_friction=parameters.coulomb_friction,
             friction_smoothing=friction_smoothing or parameters.friction_smoothing,
         )
+
+
+@dataclass(frozen=True)
+class Kink:
+    """The extreme curvatures near the lowest point.
+
+    Attributes:
+        peak: greatest curvature [1/m].
+        peak_at: its place s [m].
+        dip: least curvature [1/m], negative if the loop bulges.
+        dip_at: its place s [m], positive after the lowest point along the motion.
+    """
+
+    peak: float
+    peak_at: float
+    dip: float
+    dip_at: float
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -148,6 +164,27 @@ class StationaryLoop:
     def bottom_curvature(self) -> float:
         """κ at the lowest point [1/m]."""
         return float(np.interp(0.0, self.s, self.curvature))
+
+    def kink(self) -> Kink:
+        """The kink of the loop, beside its lowest point, where the curvature has its least value."""
+        reach = KINK_REACH * (self.free[1] - self.free[0])
+        before = np.flatnonzero((self.s > -reach) & (self.s < 0))
+        after = np.flatnonzero((self.s > 0) & (self.s < reach))
+        near = np.concatenate([before, after])
+        peak_at, peak = _vertex(self.s, self.curvature, int(near[np.argmax(self.curvature[near])]))
+        dips = [_vertex(self.s, self.curvature, int(side[np.argmin(self.curvature[side])])) for side in (before, after)]
+        dip_at, dip = min(dips, key=lambda place: place[1])
+        return Kink(peak=peak, peak_at=peak_at, dip=dip, dip_at=dip_at)
+
+    def catenary(self) -> Catenary:
+        """The catenary between the ends of the free part and as long as it.
+
+        Raises:
+            ValueError: its length is not greater than the distance of its ends.
+        """
+        first, last = (np.array([np.interp(s, self.s, column) for column in self.position.T]) for s in self.free)
+        weight = self.parameters.density * self.parameters.gravity
+        return catenary_between(first, last, self.free[1] - self.free[0], weight)
 
 
 @dataclass(frozen=True, kw_only=True)  # frozen: its attributes are only read
@@ -209,7 +246,7 @@ def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Ar
     tangent = first / per_q[:, None]
     normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
     curvature = np.sum(second * normal, axis=1) / per_q**2
-    bending = periodic_slope(curvature, links) / per_q
+    bending = _periodic_slope(curvature, links) / per_q
     mass = parameters.density * parameters.link_length
     effective = force - mass * rate**2 * (first + third / 12)
 
@@ -244,79 +281,7 @@ def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Ar
     )
 
 
-@dataclass(frozen=True)
-class Kink:
-    """The extreme curvatures near the lowest point.
-
-    Attributes:
-        peak: greatest curvature [1/m].
-        peak_at: its place s [m].
-        dip: least curvature [1/m], negative if the loop bulges.
-        dip_at: its place s [m], positive after the lowest point along the motion.
-    """
-
-    peak: float
-    peak_at: float
-    dip: float
-    dip_at: float
-
-
-def find_kink(loop: StationaryLoop) -> Kink:
-    """The kink of a loop, beside its lowest point, where the curvature has its least value."""
-    reach = KINK_REACH * (loop.free[1] - loop.free[0])
-    before = np.flatnonzero((loop.s > -reach) & (loop.s < 0))
-    after = np.flatnonzero((loop.s > 0) & (loop.s < reach))
-    near = np.concatenate([before, after])
-    peak_at, peak = _vertex(loop.s, loop.curvature, int(near[np.argmax(loop.curvature[near])]))
-    dips = [_vertex(loop.s, loop.curvature, int(side[np.argmin(loop.curvature[side])])) for side in (before, after)]
-    dip_at, dip = min(dips, key=lambda place: place[1])
-    return Kink(peak=peak, peak_at=peak_at, dip=dip, dip_at=dip_at)
-
-
-@dataclass(frozen=True)
-class Imbalance:
-    """The error of a balance relative to its greatest term: root mean square and greatest value."""
-
-    rms: float
-    greatest: float
-
-
-def imbalances(loop: StationaryLoop) -> dict[str, Imbalance]:
-    """The errors of the balances of the mean loop on its free part, `EDGE` links at its ends left out.
-
-    Returns:
-        `force`: (T_e t + N n)(s), less its value at the lowest point and the weight in between, ρ g ŷ s.
-        `normal`: N' + T_e κ − ρ g cos φ.
-        `moment`: M' + N − j v² κ'.
-        `friction`: M − f(ℓ v κ'), where f is the moment of joints that turn like the mean curve.
-    """
-    p, edge = loop.parameters, EDGE * loop.parameters.link_length
-    inside = (loop.s > loop.free[0] + edge) & (loop.s < loop.free[1] - edge)
-    step = loop.length / len(loop.s)
-    tangent = np.stack([-np.cos(loop.angle), np.sin(loop.angle)], axis=1)
-    normal = np.stack([np.sin(loop.angle), np.cos(loop.angle)], axis=1)
-    force = loop.effective_tension[:, None] * tangent + loop.shear[:, None] * normal
-    bottom = np.array([np.interp(0.0, loop.s, force[:, axis]) for axis in (0, 1)])
-    weight = np.stack([np.zeros_like(loop.s), p.density * p.gravity * loop.s], axis=1)
-    shear_slope, moment_slope = (periodic_slope(values, len(values)) / step for values in (loop.shear, loop.moment))
-    bend, across = loop.effective_tension * loop.curvature, p.density * p.gravity * np.cos(loop.angle)
-    turned = p.inertia * loop.speed**2 * loop.bending
-    expected = p.moment(p.link_length * loop.speed * loop.bending)
-    terms = {
-        "force": (np.hypot(*(force - bottom - weight).T), [np.hypot(*force.T)]),
-        "normal": (shear_slope + bend - across, [shear_slope, bend, across]),
-        "moment": (moment_slope + loop.shear - turned, [moment_slope, loop.shear, turned]),
-        "friction": (loop.moment - expected, [loop.moment]),
-    }
-    found = {}
-    for name, (rest, parts) in terms.items():
-        scale = max(float(np.max(np.abs(part[inside]))) for part in parts)
-        share = np.abs(rest[inside]) / scale
-        found[name] = Imbalance(rms=float(np.sqrt(np.mean(share**2))), greatest=float(share.max()))
-    return found
-
-
-def periodic_slope(values: Array, period: float) -> Array:
+def _periodic_slope(values: Array, period: float) -> Array:
     """Derivative of a periodic function from even samples of one period, shape (g,) or (g, c)."""
     waves = 2j * np.pi * np.fft.rfftfreq(len(values), period / len(values))
     if len(values) % 2 == 0:

@@ -1,32 +1,28 @@
 """Moving pictures of a walk: GIF, MP4, or a page with a player for the browser."""
 
+import html
 import importlib
 import itertools
+import json
 import math
 import os
 from contextlib import closing
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.files import checked_output, replacing, write_whole
-from warpchain.pictures.player_page import EDGE, ENLARGEMENT, FLAT, INNER, OUTER, TALLEST, WIDTH, page, whole
-from warpchain.pictures.room import link_outlines
-from warpchain.pictures.room_player import ROOM, room_data
-from warpchain.pictures.room_stage import RoomStage
+from warpchain.pictures.film import EDGE, INNER, OUTER, Film, side_view
+from warpchain.pictures.room import check_room
 from warpchain.pictures.strip_parts import center_at
-from warpchain.pictures.style import FAINT, GROUND, INK
-from warpchain.pictures.walk_figures import extent
 from warpchain.pictures.walk_shape import Walk, check_frames, setting, tilting
-
-if TYPE_CHECKING:
-    from PIL.Image import Image
 
 Array = NDArray[np.float64]
 
+_PLAYER: Final = Path(__file__).with_name("player.html")
+"""The page with a player, which says what its data are."""
 _HOLD: Final = 1.5
 """Time for which GIF and MP4 show their last picture [s]."""
 _GIF_PICTURES: Final = 1200
@@ -42,7 +38,7 @@ def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow
     """Write a moving picture of a walk; the suffix of `path` gives the format: .gif, .mp4 or .html.
 
     If there are more pictures than frames, each frame is shown until the next one. A chain whose plane tilts is seen
-    from the front right and slightly above; in a .html file it can be turned.
+    from the front right and slightly above; in a .html file from the side.
 
     Args:
         walk: a walk with frames.
@@ -93,11 +89,14 @@ def _write_gif(walk: Walk, path: Path, fps: float, slow: float) -> None:
     durations[-1] = int(_HOLD * 1000)
     if max(durations) >= 1000 / _SLOWEST_GIF:
         raise ValueError(f"slow: {slow} shows a picture for more than {1 / _SLOWEST_GIF:g} s; give a smaller number")
-    stage = _stage(walk)
+    film = Film(walk)
     # One palette for all, from the first, the middle and the last picture; otherwise each picture has its own.
-    samples = [np.asarray(stage.picture(pictures[round(part * (len(pictures) - 1))])) for part in (0, 0.5, 1)]
-    palette = Image.fromarray(np.concatenate(samples)).quantize(48, dither=Image.Dither.NONE)
-    reduced = (stage.picture(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in pictures)
+    samples = [film.picture(pictures[round(part * (len(pictures) - 1))]) for part in (0, 0.5, 1)]
+    palette = Image.fromarray(np.concatenate(samples)).quantize(64, dither=Image.Dither.NONE)
+    palette.putpalette([255 if part > 247 else part for part in palette.getpalette() or []])  # its white is a mean
+    reduced = (
+        Image.fromarray(film.picture(frame)).quantize(palette=palette, dither=Image.Dither.NONE) for frame in pictures
+    )
     with replacing(path) as part:
         first = next(reduced)
         first.save(part, format="GIF", save_all=True, append_images=reduced, duration=durations, loop=0)
@@ -108,17 +107,17 @@ def _write_mp4(walk: Walk, path: Path, fps: float, slow: float) -> None:
         ffmpeg = importlib.import_module("imageio_ffmpeg")
     except ImportError:
         raise ImportError(f"{path}: MP4 needs imageio-ffmpeg; pip install 'warpchain[video]'") from None
-    stage = _stage(walk)
+    film = Film(walk)
     chosen = _chosen_frames(walk, fps, slow)
     chosen += chosen[-1:] * round(_HOLD * fps)
     # imageio-ffmpeg lets the lines of ffmpeg through to the terminal, and hides how it ends.
     coding = {"fps": fps, "quality": 8, "macro_block_size": 2, "ffmpeg_log_level": "quiet"}
     with replacing(path) as part:
         try:
-            with closing(ffmpeg.write_frames(str(part), stage.size, **coding)) as writer:
+            with closing(ffmpeg.write_frames(str(part), film.size, **coding)) as writer:
                 writer.send(None)
                 for frame, group in itertools.groupby(chosen):
-                    content = stage.picture(frame).tobytes()
+                    content = film.picture(frame).tobytes()
                     for _ in group:
                         writer.send(content)
         except OSError as error:
@@ -141,108 +140,12 @@ def _is_whole_mp4(path: Path) -> bool:
     return place == end and b"moov" in kinds
 
 
-@dataclass(frozen=True)
-class _View:
-    """The part of the plane that is shown, and the marks on the floor [m]."""
-
-    left: float
-    right: float
-    bottom: float
-    top: float
-    marks: tuple[float, ...]
-
-
-def _view(walk: Walk) -> _View:
-    """The whole walk, with a strip of floor for the marks."""
-    left, right, top = extent(walk)
-    spacing = next((step for step in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0) if (right - left) / step <= 9), 10.0)
-    numbers = range(math.ceil(left / spacing), math.floor(right / spacing) + 1)
-    bottom = -0.045 * max(right - left, top)
-    return _View(left, right, bottom, top, tuple(round(number * spacing, 6) for number in numbers))
-
-
-def _stage(walk: Walk) -> "_Stage | RoomStage":
-    """What draws the frames of a walk."""
-    in_room = tilting(walk)
-    return _Stage(walk) if in_room is None else RoomStage(in_room)
-
-
-class _Stage:
-    """Draws the frames of one walk, all to the same scale.
-
-    Attributes:
-        size: width and height of a picture in pixels, even numbers for video.
-    """
-
-    def __init__(self, walk: Walk) -> None:
-        from PIL import ImageFont
-
-        view = _view(walk)
-        width, height = view.right - view.left, view.top - view.bottom
-        self._walk, self._view = walk, view
-        self._scale = min(WIDTH / width, TALLEST / height)
-        self.size = 2 * round(self._scale * width / 2), 2 * round(self._scale * height / 2)
-        self._font = ImageFont.load_default(16)
-        self._backdrop = self._draw_backdrop()
-        self._center = self._pixels(walk.center)
-
-    def _pixels(self, points: Array) -> Array:
-        """Pixels in the enlarged picture of points x, y [m], both of shape (…, 2)."""
-        scale = self._scale * ENLARGEMENT
-        return np.asarray((points - (self._view.left, self._view.top)) * (scale, -scale))
-
-    def _draw_backdrop(self) -> "Image":
-        """What never moves, enlarged."""
-        from PIL import Image, ImageDraw
-
-        width, height = (ENLARGEMENT * side for side in self.size)
-        backdrop = Image.new("RGB", (width, height), "white")
-        draw = ImageDraw.Draw(backdrop)
-        if self._walk.sprocket_center is not None:
-            center = tuple(self._pixels(self._walk.sprocket_center))
-            radius = self._walk.sprocket_radius * self._scale * ENLARGEMENT
-            draw.circle(center, radius, outline=FAINT, width=ENLARGEMENT)
-            draw.circle(center, 2 * ENLARGEMENT, fill=FAINT)
-        floor = self._pixels(np.zeros(2))[1]
-        draw.rectangle((0, floor, width, height), fill=GROUND)
-        draw.line((0, floor, width, floor), fill=INK, width=ENLARGEMENT)
-        for mark in self._view.marks:
-            x = self._pixels(np.array([mark, 0.0]))[0]
-            draw.line((x, floor, x, floor + 6 * ENLARGEMENT), fill=INK, width=ENLARGEMENT)
-        return backdrop
-
-    def picture(self, frame: int) -> "Image":
-        """One frame in colour: the chain, the path of its centre of mass so far, time and marks."""
-        from PIL import ImageDraw
-
-        image = self._backdrop.copy()
-        draw = ImageDraw.Draw(image)
-        joints, radius = self._walk.frame_joints[frame], self._walk.setup.parameters.circle_radius
-        rim = min(0.7 / self._scale, radius / 2)
-        for parity, fill in ((0, INNER), (1, OUTER)):
-            for size, color in ((radius, EDGE), (radius - rim, fill)):
-                for outline in self._pixels(link_outlines(joints, size)[parity::2]):
-                    draw.polygon(outline.ravel().tolist(), fill=color)
-        moment = self._walk.frame_time[frame]
-        path = self._center[: max(1, int(np.searchsorted(self._walk.time, moment, side="right")))]
-        draw.line(path.ravel().tolist(), fill=INK, width=ENLARGEMENT)
-        x, y = path[-1]
-        draw.circle((x, y), 3.5 * ENLARGEMENT, fill=INK)
-        image = image.reduce(ENLARGEMENT)
-        draw = ImageDraw.Draw(image)
-        draw.text((self.size[0] - 12, 10), f"{moment:.3f} s", fill=INK, font=self._font, anchor="rt")
-        for mark in self._view.marks:
-            x, y = self._pixels(np.array([mark, 0.0])) / ENLARGEMENT
-            draw.text((x, y + 9), f"{mark:g} m", fill=INK, font=self._font, anchor="mt")
-        return image
-
-
 def _write_html(walk: Walk, path: Path, fps: float, slow: float) -> None:
     write_whole(path, player(walk, slow))
 
 
 def player(walk: Walk, slow: float = 4.0) -> str:
-    """A page with the frames and a player: lengths in whole tenths of a millimetre, times in microseconds.
+    """A page with a player of the frames from the side: lengths in tenths of a millimetre, times in microseconds.
 
     Args:
         walk: a walk with frames.
@@ -254,23 +157,27 @@ def player(walk: Walk, slow: float = 4.0) -> str:
     check_frames(walk)
     count = min(len(walk.frame_time), _PLAYER_FRAMES)
     frames = np.rint(np.linspace(0, len(walk.frame_time) - 1, count)).astype(int)
+    in_room, times, sprocket = tilting(walk), walk.frame_time[frames], walk.sprocket_center
+    joints = walk.frame_joints if in_room is None else check_room(in_room)[..., :2]
     title = setting(walk) + (f": \u0394x = {walk.dx:.3f} m" if math.isfinite(walk.dx) else "")
-    in_room = tilting(walk)
-    data = _flat_data(walk, frames, slow) if in_room is None else {**room_data(in_room, frames), "slow": slow}
-    return page(title, data, FLAT if in_room is None else ROOM)
-
-
-def _flat_data(walk: Walk, frames: NDArray[np.int_], slow: float) -> dict[str, Any]:
-    """What the page of a chain in an upright plane draws."""
-    times, view, sprocket = walk.frame_time[frames], _view(walk), walk.sprocket_center
-    return {
-        "time": whole(times, 1e6),
-        "joints": whole(walk.frame_joints[frames].reshape(len(frames), -1)),
-        "center": whole(center_at(walk, times)),
+    *view, marks = side_view(walk)
+    data = {
+        "time": _whole(times, 1e6),
+        "joints": _whole(joints[frames].reshape(len(frames), -1)),
+        "center": _whole(center_at(walk, times)),
         "radius": walk.setup.parameters.circle_radius * 1e4,
-        "sprocket": None if sprocket is None else whole(np.array([*sprocket, walk.sprocket_radius])),
-        "view": whole(np.array([view.left, view.right, view.bottom, view.top])),
-        "marks": list(view.marks),
+        "sprocket": None if sprocket is None else _whole(np.array([*sprocket, walk.sprocket_radius])),
+        "view": _whole(np.array(view)),
+        "marks": marks,
         "slow": slow,
         "colors": {"inner": INNER, "outer": OUTER, "edge": EDGE},
     }
+    title = html.escape(title if in_room is None else f"{title}, from the side")
+    content = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    return _PLAYER.read_text(encoding="utf-8").replace("{{title}}", title).replace("{{data}}", content)
+
+
+def _whole(values: Array, parts: float = 1e4) -> list[int] | list[list[int]]:
+    """Numbers in whole parts, as lists: lengths [m] in tenths of a millimetre."""
+    whole: list[int] | list[list[int]] = np.rint(values * parts).astype(int).tolist()
+    return whole

@@ -1,6 +1,5 @@
-"""The figure of a stationary loop: its mean shape, curvature and tension, beside theory and the plain catenary."""
+"""The figure of a stationary loop: its mean shape, curvature and tension, beside a catenary."""
 
-from collections.abc import Callable
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -9,19 +8,17 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
-from warpchain.loop.stationary_loop import Kink, StationaryLoop, average_loop, find_kink
-from warpchain.loop.theory import NoSolutionError, TheoreticalLoop, catenary, predict
+from warpchain.loop.catenary import Catenary
+from warpchain.loop.stationary_loop import Kink, StationaryLoop, average_loop
 from warpchain.pictures.inline import InlineFigure
-from warpchain.pictures.style import BLUE, DASHES, FAINT, GREEN, GROUND, INK, RED, tidy
+from warpchain.pictures.style import BLUE, FAINT, GREEN, GROUND, INK, tidy
 from warpchain.pictures.walk_shape import Walk, setting
 
 SIMULATED: Final[dict[str, Any]] = {"color": BLUE, "linewidth": 2.2}
-PREDICTED: Final[dict[str, Any]] = {"color": RED, "linewidth": 1.3, "linestyle": DASHES}
 HANGING: Final[dict[str, Any]] = {"color": GREEN, "linewidth": 1.2}
-"""Lines of simulation, theory and catenary."""
+"""Lines of simulation and catenary."""
 BOTTOM: Final = 0.25
 """The curvature is shown this far [m] from the lowest point, or as far as the loop is free."""
-WITHOUT_SCIPY: Final = "without theory: SciPy is not installed"
 SLIM: Final = 4.0
 """A loop whose height is at least so many times its width has little room for numbers below it."""
 IN_LINKS: Final = 2.0
@@ -39,46 +36,25 @@ def loop_figure(walk: Walk, *, figure: Figure | None = None) -> Figure:
         ValueError: the time before the release was not kept, or is not enough for a mean loop.
     """
     loop = average_loop(walk)
-    theory, note = _solution(predict, loop)
-    hanging, _ = _solution(catenary, loop)
-    kink = find_kink(loop)
+    hanging, kink = loop.catenary(), loop.kink()
     figure = InlineFigure(figsize=(10.0, 6.4), layout="constrained") if figure is None else figure
     height, width = np.ptp(loop.position[:, 1]), np.ptp(loop.position[:, 0])
     share = float(np.clip(5.6 * (width + 0.08) / (height + 0.08), 2.3, 4.2)) / 10.0
     left, right = np.asarray(figure.subfigures(1, 2, width_ratios=[share, 1 - share]))
     shape = left.subplots()
     bend, pull = right.subplots(2, 1)
-    _draw_shape(shape, walk, loop, theory, hanging, kink)
+    _draw_shape(shape, walk, loop, hanging, kink)
     spread = 1e3 * float(loop.spread[loop.is_free].max())
     shape.set_title(f"{setting(walk)}\njoints within {spread:.2g} mm (s.d.)", fontsize="small", loc="left")
-    _draw_curvature(bend, loop, theory, hanging, kink, note)
-    _draw_tension(pull, loop, theory, hanging)
+    _draw_curvature(bend, loop, hanging, kink)
+    _draw_tension(pull, loop, hanging)
     tidy(shape)
     tidy(bend, grid="both")
     tidy(pull, grid="both")
     return figure
 
 
-def _solution(
-    solve: Callable[[StationaryLoop], TheoreticalLoop], loop: StationaryLoop
-) -> tuple[TheoreticalLoop | None, str]:
-    """A theoretical loop, or None and the reason that stands on the figure."""
-    try:
-        return solve(loop), ""
-    except ModuleNotFoundError:
-        return None, WITHOUT_SCIPY
-    except NoSolutionError:
-        return None, "without theory: no solution was found"
-
-
-def _draw_shape(
-    axes: Axes,
-    walk: Walk,
-    loop: StationaryLoop,
-    theory: TheoreticalLoop | None,
-    hanging: TheoreticalLoop | None,
-    kink: Kink,
-) -> None:
+def _draw_shape(axes: Axes, walk: Walk, loop: StationaryLoop, hanging: Catenary, kink: Kink) -> None:
     """The loop to scale, its joints' standard deviation on either side; the origin is the sprocket's centre."""
     place = loop.position - loop.center
     slim = np.ptp(place[:, 1]) > SLIM * np.ptp(place[:, 0])
@@ -88,11 +64,8 @@ def _draw_shape(
     outer, inner = (place - band)[closed], (place + band)[closed]
     axes.add_patch(Circle((0.0, 0.0), walk.sprocket_radius, facecolor=GROUND, edgecolor=FAINT, linewidth=0.8))
     axes.fill(*np.concatenate([outer, inner[::-1]]).T, color=BLUE, alpha=0.25, linewidth=0.0, zorder=2)
-    if hanging is not None:
-        axes.plot(*(hanging.position - loop.center).T, zorder=2.5, **HANGING | {"linewidth": 1.0})
+    axes.plot(*(hanging.position - loop.center).T, zorder=2.5, **HANGING | {"linewidth": 1.0})
     axes.plot(*place[closed].T, zorder=3, **SIMULATED)
-    if theory is not None:
-        axes.plot(*(theory.position - loop.center).T, zorder=4, **PREDICTED)
     x, y = (float(np.interp(kink.dip_at, loop.s, values)) for values in place.T)
     _mark(axes, x, y, "kink", -8 if slim else 8)
     radius = 0.6 * walk.sprocket_radius
@@ -108,38 +81,29 @@ def _draw_shape(
     axes.margins(0.4 if slim else 0.12, 0.03)
 
 
-def _draw_curvature(
-    axes: Axes,
-    loop: StationaryLoop,
-    theory: TheoreticalLoop | None,
-    hanging: TheoreticalLoop | None,
-    kink: Kink,
-    note: str,
-) -> None:
-    """Curvature near the lowest point. The axis fits simulation and theory; the catenary's peak may be a number."""
+def _draw_curvature(axes: Axes, loop: StationaryLoop, hanging: Catenary, kink: Kink) -> None:
+    """Curvature near the lowest point. The axis fits the simulation; the catenary's peak may be a number."""
     reach = 1.6 * max(BOTTOM, abs(kink.dip_at))
     low, high = max(-reach, loop.free[0] - 0.03), min(reach, loop.free[1] + 0.03)
     shown = (loop.s >= low) & (loop.s <= high)
-    _draw_lines(axes, "curvature", loop, theory, hanging)
+    _draw_lines(axes, "curvature", loop, hanging)
     _mark(axes, kink.dip_at, kink.dip, f"kink: ${kink.dip:.1f}$ m$^{{-1}}$ at ${100 * kink.dip_at:.1f}$ cm", 0)
     least, greatest = float(loop.curvature[shown].min()), float(loop.curvature[shown].max())
     room = greatest - least
     axes.set(xlim=(low, high), ylim=(least - 0.2 * room, greatest + 0.18 * room))
     axes.set_ylabel("curvature $\\kappa$ / m$^{-1}$")
-    top = 0.0 if hanging is None else float(hanging.curvature.max())
+    top = float(hanging.curvature.max())
     if top > greatest + 0.18 * room:
         side: dict[str, Any] = {"xy": (0.0, greatest + 0.16 * room), "xytext": (-8, 0), "textcoords": "offset points"}
         axes.annotate(f"{top:.0f} m$^{{-1}}$", ha="right", va="top", color=GREEN, fontsize="small", **side)
-    axes.legend(frameon=False, loc="upper left", title=note or None, title_fontsize="small", alignment="left")
+    axes.legend(frameon=False, loc="upper left")
 
 
-def _draw_tension(
-    axes: Axes, loop: StationaryLoop, theory: TheoreticalLoop | None, hanging: TheoreticalLoop | None
-) -> None:
+def _draw_tension(axes: Axes, loop: StationaryLoop, hanging: Catenary) -> None:
     """Tension along the free part, less ρ v², which bends the path of the moving chain."""
     inset = IN_LINKS * loop.parameters.link_length
     inside = (loop.s > loop.free[0] + inset) & (loop.s < loop.free[1] - inset)
-    _draw_lines(axes, "effective_tension", loop, theory, hanging, inside)
+    _draw_lines(axes, "effective_tension", loop, hanging, inside)
     carried = loop.parameters.density * loop.speed**2
     text = f"$\\rho v^2$ = {carried:.2f} N"
     axes.text(0.5, 0.95, text, transform=axes.transAxes, ha="center", va="top", color=INK)
@@ -155,18 +119,14 @@ def _draw_lines(
     axes: Axes,
     name: Literal["curvature", "effective_tension"],
     loop: StationaryLoop,
-    theory: TheoreticalLoop | None,
-    hanging: TheoreticalLoop | None,
+    hanging: Catenary,
     shown: Any = slice(None),
 ) -> None:
-    """A function of the arc length of all three loops, of the mean loop only where `shown`; the sprocket is shaded."""
+    """A function of the arc length of both loops, of the mean loop only where `shown`; the sprocket is shaded."""
     for first, last in ((-loop.length, loop.free[0]), (loop.free[1], loop.length)):
         axes.axvspan(first, last, color=GROUND, linewidth=0.0)
-    if hanging is not None:
-        axes.plot(hanging.s, getattr(hanging, name), label="catenary, as long", **HANGING)
+    axes.plot(hanging.s, getattr(hanging, name), label="catenary, as long", **HANGING)
     axes.plot(loop.s[shown], getattr(loop, name)[shown], label="simulation, mean", **SIMULATED)
-    if theory is not None:
-        axes.plot(theory.s, getattr(theory, name), label="theory", **PREDICTED)
 
 
 def _mark(axes: Axes, x: float, y: float, text: str, offset: float) -> None:

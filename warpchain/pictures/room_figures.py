@@ -1,5 +1,6 @@
 """Figures of a walk whose plane tilts: film strips from three sides, and tilt, yaw and drift against time."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -159,7 +160,7 @@ def _draw_chain(axes: Axes, walk: Walk, joints: Array, panel: _Panel, colors: tu
     """One chain: a white halo over the chains behind it, then its links from the rearmost to the foremost."""
     parameters = walk.setup.parameters
     solids = link_solids(joints, parameters.circle_radius, parameters.half_width, panel.view)
-    walls, faces = _paths(solids, panel.axes)
+    walls, faces = link_paths(solids, lambda points: points[..., list(panel.axes)])
     pale, color, dark = colors
     axes.add_collection(
         PathCollection([*walls, *faces], facecolors="white", edgecolors="white", linewidths=1.8, zorder=2)
@@ -173,15 +174,20 @@ def _draw_chain(axes: Axes, walk: Walk, joints: Array, panel: _Panel, colors: tu
     axes.add_collection(PathCollection(paths, facecolors=fills, edgecolors=edges, linewidths=0.25, zorder=2))
 
 
-def _paths(solids: Solids, axes: tuple[int, int]) -> tuple[list[Path], list[Path]]:
-    """Outlines of the visible walls and of the faces of all links, along two of the room's axes."""
+def link_paths(solids: Solids, project: Callable[[Array], Array]) -> tuple[list[Path], list[Path]]:
+    """Outlines of the visible walls and of the faces of all links.
+
+    Args:
+        solids: the links.
+        project: where points x, y, z [m], shape (…, 3), are in the picture, shape (…, 2).
+    """
     walls = []
-    for pieces, seen in zip(solids.walls[..., list(axes)], solids.seen, strict=True):
+    for pieces, seen in zip(project(solids.walls), solids.seen, strict=True):
         corners = pieces[seen]
         closed = np.concatenate([corners, corners[:, :1]], axis=1)
         codes = np.tile([Path.MOVETO, *3 * [Path.LINETO], Path.CLOSEPOLY], len(closed)).astype(Path.code_type)
         walls.append(Path(closed.reshape(-1, 2), codes))
-    faces = [Path(np.concatenate([face, face[:1]]), closed=True) for face in solids.faces[..., list(axes)]]
+    faces = [Path(np.concatenate([face, face[:1]]), closed=True) for face in project(solids.faces)]
     return walls, faces
 
 

@@ -30,8 +30,7 @@ from warpchain.pictures.strip_parts import (
     time_colors,
 )
 from warpchain.pictures.style import BLUE, DASHES, GREEN, INK, LINE_COLORS, RED, tidy
-from warpchain.pictures.walk_shape import Colour, EnergyWalk, Kind, Walk, check_frames, setting, tilting
-from warpchain.pictures.waves_figure import waves_figure
+from warpchain.pictures.walk_shape import EnergyWalk, Kind, Walk, check_frames, setting, tilting
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
@@ -49,8 +48,6 @@ def draw(
     *,
     figure: Figure | None = None,
     ax: Axes | None = None,
-    colour: Colour | None = None,
-    window: tuple[float, float] | None = None,
 ) -> Figure:
     """Draw a walk.
 
@@ -58,25 +55,18 @@ def draw(
         walk: what to draw.
         kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself, `loop` for its
             loop on the sprocket just before the release, `energy` for its energies, `tilt` for tilt, yaw and
-            lateral drift of a plane that tilts, `waves` for waves along the chain.
+            lateral drift of a plane that tilts.
         figure: an empty figure to draw into; by default a new one.
         ax: where to draw `energy`, the only figure with one pair of axes, instead of a figure of its own.
-        colour: what the colours of `waves` show, see `waves_figure`; None: tension.
-        window: times of `waves`, likewise; None: its own default.
 
     Raises:
-        ValueError: the kind is unknown, the walk does not have what it shows, or `ax`, `colour` or `window` do not suit
-            the kind.
+        ValueError: the kind is unknown, the walk does not have what it shows, or `ax` does not suit the kind.
     """
-    for name, value in (("colour", colour), ("window", window)):
-        if value is not None and kind != "waves":
-            raise ValueError(f"{name}: only waves has one; leave it out, or give kind 'waves'")
     if kind == "energy":
         return energy_figure(walk, figure=figure, ax=ax)
     draws = {"figure5": lambda: figure5([walk], figure=figure), "film_strip": lambda: film_strip(walk, figure=figure)}
     draws["loop"] = lambda: loop_figure(walk, figure=figure)
     draws["tilt"] = lambda: tilt_figure(walk, figure=figure)
-    draws["waves"] = lambda: waves_figure(walk, colour=colour or "tension", window=window, figure=figure)
     if kind not in draws:
         raise ValueError(f"kind: {kind!r} is unknown; give {', '.join(map(repr, get_args(Kind)))}")
     if ax is not None:

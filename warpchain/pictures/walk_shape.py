@@ -11,10 +11,8 @@ from warpchain.status import Status
 
 Array = NDArray[np.float64]
 
-Kind = Literal["figure5", "film_strip", "loop", "energy", "tilt", "waves"]
-"""Figures of a walk; `tilt` only of one whose plane tilts, `waves` only of fine frames."""
-Colour = Literal["tension", "curvature", "velocity"]
-"""What the colours of `waves` show."""
+Kind = Literal["figure5", "film_strip", "loop", "energy", "tilt"]
+"""Figures of a walk; `tilt` only of one whose plane tilts."""
 
 
 @dataclass(frozen=True, kw_only=True)  # frozen: its attributes are only read
@@ -83,17 +81,9 @@ def tilting(walk: Walk) -> TiltingWalk | None:
 
 
 def kinds_of(walk: Walk) -> tuple[Kind, ...]:
-    """The figures that a walk has, if it was recorded; `waves` if its forces were, too, and its plane is fixed."""
+    """The figures that a walk has, if it was recorded."""
     kinds: tuple[Kind, ...] = get_args(Kind)
-    left_out = {"tilt"} if tilting(walk) is None else set()
-    left_out |= {"waves"} if joint_forces(walk) is None or tilting(walk) is not None else set()
-    return tuple(kind for kind in kinds if kind not in left_out)
-
-
-def joint_forces(walk: Walk) -> Array | None:
-    """Force in each joint on the link that it ends [N], shape (f, n, 2); None if it was not recorded."""
-    forces: Array | None = getattr(walk, "frame_forces", None)
-    return None if forces is None or len(forces) == 0 else forces
+    return tuple(kind for kind in kinds if kind != "tilt" or tilting(walk) is not None)
 
 
 def check_frames(walk: Walk) -> None:

@@ -42,7 +42,6 @@ from warpchain.pictures.style import (
 )
 from warpchain.reports.figure5 import sweep_figure5
 from warpchain.reports.grids import grid_pictures, named
-from warpchain.reports.kink_figure import sweep_kink
 from warpchain.reports.panels import panels, third_quantities
 from warpchain.reports.statistics import CONFIDENCE, sensitivities, tolerance_agreement
 from warpchain.reports.sweep_series import Series, all_series
@@ -74,7 +73,7 @@ def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
     last: list[Callable[[SweepResult], Picture]] = []
     if quantity == "dx":
         against = [partial(panels, quantity=third) for third in third_quantities(result)]
-        draws = [figure6, sweep_figure5, sweep_kink, *draws, *against, tolerance, sensitivity]
+        draws = [figure6, sweep_figure5, *draws, *against, tolerance, sensitivity]
         last = [status_counts]
     for draw in (*draws, *grid_pictures(result, quantity), *last):
         with suppress(NothingToShow):

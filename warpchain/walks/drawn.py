@@ -4,11 +4,13 @@ import os
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from warpchain.pictures.walk_shape import Colour, Kind, Walk
+from warpchain.pictures.walk_shape import Kind, Walk
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from warpchain.loop.stationary_loop import HeldWalk, StationaryLoop
 
 
 class Drawn:
@@ -20,31 +22,36 @@ class Drawn:
         *,
         figure: "Figure | None" = None,
         ax: "Axes | None" = None,
-        colour: Colour | None = None,
-        window: tuple[float, float] | None = None,
     ) -> "Figure":
         """Draw the walk.
 
         Args:
             kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself, `loop` for
                 its loop on the sprocket just before the release, `energy` for its energies, `tilt` for tilt, yaw and
-                lateral drift of a plane that tilts, `waves` for waves along the chain against time.
+                lateral drift of a plane that tilts.
             figure: an empty matplotlib figure to draw into; by default a new one, which a notebook shows.
             ax: where to draw `energy`, the only figure with one pair of axes.
-            colour: what the colours of `waves` show: `tension` of the joints, by default, which needs `record_loads`;
-                `curvature`; or `velocity` across the chain.
-            window: first and last time of `waves` since the release [s]; by default 0 to 0.3.
 
         Returns:
             The figure, that of `ax` if it is given.
 
         Raises:
-            ValueError: the kind is unknown, the walk does not have what it shows (frames that are fine enough,
-                `before_release`, energies, loads), or `ax`, `colour` or `window` does not suit the kind.
+            ValueError: the kind is unknown, the walk does not have what it shows (frames, `before_release`,
+                energies), or `ax` does not suit the kind.
         """
         from warpchain.pictures.walk_figures import draw
 
-        return draw(self, kind, figure=figure, ax=ax, colour=colour, window=window)
+        return draw(self, kind, figure=figure, ax=ax)
+
+    def mean_loop(self: "HeldWalk") -> "StationaryLoop":
+        """The loop on its sprocket just before the release: its mean shape, the forces in it, its kink.
+
+        Raises:
+            ValueError: the walk has kept nothing of that time, or too little.
+        """
+        from warpchain.loop.stationary_loop import average_loop
+
+        return average_loop(self)
 
     def animate(self: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
         """Write a moving picture of the walk; the suffix of `path` gives the format: .gif, .mp4 or .html.

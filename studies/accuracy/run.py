@@ -1,0 +1,93 @@
+"""Compares the walks of two sweeps of the same samples, cell by cell, for studies/accuracy/README.md.
+
+    warpchain sweep studies/accuracy/sweeps/finer.yaml -o finer --device cuda
+    warpchain sweep studies/accuracy/sweeps/defaults.yaml -o defaults --device cuda
+    python -m studies.accuracy.run defaults finer
+
+It prints the relative difference of the mean Δx of each cell with the standard error of pairs of samples; over all
+cells their mean and χ², scatter and bounces; and how exact either is.
+"""
+
+import argparse
+import sys
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import warpchain
+
+Array = NDArray[np.float64]
+
+LENGTHS: Final = ("penetration_floor", "penetration_self", "penetration_sprocket", "greatest_opening")
+
+
+def cells(sweep: warpchain.SweepResult, column: str) -> dict[str, Array]:
+    """Values (samples,) of a column, by block and cell."""
+    found = {}
+    for name, block in sweep.blocks.items():
+        values = np.asarray(block.columns[column], dtype=np.float64)
+        for index in np.ndindex(values.shape[:-1]):
+            place = (f"{axis} {points[k]:g}" for (axis, points), k in zip(block.axes.items(), index, strict=True))
+            found[", ".join([name, *place])] = values[index]
+    return found
+
+
+def together(sweep: warpchain.SweepResult, column: str) -> Array:
+    """All values of a column."""
+    return np.concatenate(list(cells(sweep, column).values()))
+
+
+def describe(sweep: warpchain.SweepResult) -> None:
+    """Print depths, openings, errors of the energy and steps of all walks of a sweep."""
+    print(sweep.name)
+    for column in LENGTHS:
+        middle, high, greatest = 1e3 * np.nanpercentile(together(sweep, column), [50, 99, 100])
+        print(f"  {column}: median {middle:.2f}, 99th percentile {high:.2f}, greatest {greatest:.2f} mm")
+    high, higher = np.nanpercentile(np.abs(together(sweep, "energy_error")), [95, 99])
+    steps = together(sweep, "steps_accepted") + together(sweep, "steps_rejected")
+    print(f"  energy_error: 95th percentile {high:.1e}, 99th {higher:.1e}")
+    print(f"  attempted steps: {steps.sum() / 1e6:.1f} million, in the longest walk {steps.max():.0f}")
+
+
+def compare(new: warpchain.SweepResult, base: warpchain.SweepResult) -> None:
+    """Print how the walks of one sweep differ from those of another."""
+    distances, bounces = cells(new, "dx"), cells(new, "bounces")
+    base_distances, base_bounces = cells(base, "dx"), cells(base, "bounces")
+    if distances.keys() != base_distances.keys():
+        raise warpchain.InputError(f"{new.name} and {base.name}: other cells; give sweeps of the same blocks and grids")
+    rows = []
+    for name, b in base_distances.items():
+        a = distances[name][: len(b)]
+        b = b[: len(a)]
+        pairs = np.isfinite(a) & np.isfinite(b)
+        a, b = a[pairs], b[pairs]
+        error = np.std(a / a.mean() - b / b.mean(), ddof=1) / np.sqrt(len(a))
+        rows.append(
+            (a.mean() / b.mean() - 1, error, a.std() / b.std(), bounces[name].mean() / base_bounces[name].mean())
+        )
+        print(f"{name}: {100 * rows[-1][0]:+.2f} ± {100 * error:.2f} % ({len(a)} pairs)")
+    difference, error, scatter, bounced = np.array(rows).T
+    mean, its_error = 100 * difference.mean(), 100 * np.sqrt(np.sum(error**2)) / len(error)
+    chi_squared = np.sum((difference[error > 0] / error[error > 0]) ** 2)
+    print(f"mean of {len(rows)} cells {mean:+.3f} ± {its_error:.3f} %, χ² {chi_squared:.1f}")
+    print(f"standard deviations {100 * scatter.mean() - 100:+.1f} %, bounces {100 * bounced.mean() - 100:+.1f} %")
+
+
+def main(folder: str, base: str) -> None:
+    """Compare two folders."""
+    sweeps = warpchain.load(folder), warpchain.load(base)
+    compare(*sweeps)
+    for sweep in sweeps:
+        describe(sweep)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("folder", metavar="FOLDER", help="results of a sweep")
+    parser.add_argument("base", metavar="BASE", help="results of the sweep that it is compared with")
+    given = parser.parse_args()
+    try:
+        main(given.folder, given.base)
+    except (warpchain.InputError, OSError) as error:
+        sys.exit(str(error))

@@ -1,0 +1,62 @@
+"""What all studies share: how their figures look, and how their tables get into their pages."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+LINE_COLORS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+"""Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008)."""
+BLUE, RED, GREEN = LINE_COLORS[:3]
+INK: Final = "#222222"
+FAINT: Final = "#777777"
+GROUND: Final = "#E3E3E3"
+DASHES: Final[Any] = (0, (4, 3))
+
+DISTANCE: Final = "distance walked $Δx$ / m"
+FREQUENCY: Final = "frequency of the sprocket $ν$ / Hz"
+
+
+def save_figure(figure: Figure, path: Path, dpi: int = 200) -> None:
+    """Write a figure; its folder is made."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=dpi)
+
+
+def tidy(axes: Axes, *, grid: Literal["x", "y", "both"] | None = None) -> None:
+    """Leave out the upper and right border; draw a faint grid across one axis or both."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(color=FAINT)
+    if grid is not None:
+        axes.grid(axis=grid, color="#E6E6E6", linewidth=0.6)
+        axes.set_axisbelow(True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file; its folder is made."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+
+
+def with_tables(text: str, tables: Mapping[str, str]) -> str:
+    """A page with these tables between its markers ``<!-- NAME -->`` and ``<!-- end of NAME -->``.
+
+    Raises:
+        ValueError: the page lacks a marker.
+    """
+    for name, table in tables.items():
+        begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
+        if text.count(begin) != 1 or text.count(end) != 1:
+            raise ValueError(f"the page needs {begin} and {end} once each")
+        before, rest = text.split(begin)
+        text = f"{before}{begin}\n\n{table}\n\n{end}{rest.split(end)[1]}"
+    return text
+
+
+def write_tables(page: Path, tables: Mapping[str, str]) -> None:
+    """Put tables between the markers of a page, and print them."""
+    for name, table in tables.items():
+        print(f"\n{name}\n{table}")
+    write_text(page, with_tables(page.read_text(encoding="utf-8"), tables))

@@ -1,0 +1,95 @@
+"""Draws the figure of studies/floor_friction/README.md and prints its numbers, from the folder of the sweep.
+
+    warpchain sweep studies/floor_friction/sweeps/floor_friction.yaml -o floor_friction --device cuda
+    python -m studies.floor_friction.run floor_friction
+
+The numbers are printed, the figure is written beside the page.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+import warpchain
+from studies.common import DISTANCE, LINE_COLORS, save_figure, tidy
+
+Array = NDArray[np.float64]
+Block = Any
+"""A block of `warpchain.SweepResult.blocks` with the axes links, frequency and floor_friction."""
+
+FIGURE: Final = Path(__file__).parent / "figures" / "distances.png"
+
+
+def furthest(block: Block) -> Array:
+    """The friction with which mean Δx is greatest, (links, frequencies)."""
+    found: Array = block.axes["floor_friction"][np.argmax(block.statistics().mean, axis=-1)]
+    return found
+
+
+def ledger(block: Block, links: int, frequency: float) -> str:
+    """Mean Δx, speed, duration and energy lost in self-contacts by friction of a cell, in Markdown."""
+    cell = [list(block.axes[name]).index(value) for name, value in (("links", links), ("frequency", frequency))]
+    rest = block.columns["status"][tuple(cell)] == warpchain.Status.AT_REST
+    dx, time, lost = (
+        np.ma.masked_array(block.columns[name][tuple(cell)], ~rest).mean(axis=-1)
+        for name in ("dx", "walk_time", "loss_self_contact")
+    )
+    lines = ["| μ_fc | Δx / m | Δx / t / (m/s) | t / s | lost to self-contacts / J |", "|---|---|---|---|---|"]
+    values = zip(block.axes["floor_friction"], dx, dx / time, time, lost, strict=True)
+    lines += [f"| {friction:g} | {a:.3f} | {b:.2f} | {c:.2f} | {d:.2f} |" for friction, a, b, c, d in values]
+    return "\n".join(lines)
+
+
+def draw(blocks: dict[str, Block]) -> Figure:
+    """Mean Δx with standard errors against the friction: a panel for each frequency, solid and dashed lines."""
+    axes_of = next(iter(blocks.values())).axes
+    figure = Figure(figsize=(9.2, 3.2), layout="constrained")
+    panels = np.atleast_1d(figure.subplots(1, len(axes_of["frequency"])))
+    for column, panel in enumerate(panels):
+        for (name, block), style in zip(blocks.items(), ("-", "--"), strict=False):
+            cells = block.statistics()
+            for row, links in enumerate(axes_of["links"]):
+                panel.errorbar(
+                    axes_of["floor_friction"],
+                    cells.mean[row, column],
+                    cells.standard_error[row, column],
+                    color=LINE_COLORS[row % len(LINE_COLORS)],
+                    linestyle=style,
+                    linewidth=1.2,
+                    marker="o",
+                    markersize=3,
+                    label=f"$n$ = {links}" if style == "-" else None,
+                )
+            if column == len(panels) - 1:
+                panel.plot([], [], style, color="black", linewidth=1, label=name)
+        panel.set_title(f"$ν$ = {axes_of['frequency'][column]:g} Hz", loc="left", fontsize="medium")
+        panel.set_ylim(bottom=0)
+        tidy(panel, grid="both")
+    panels[0].set_ylabel(DISTANCE)
+    figure.supxlabel("friction of the floor $μ_\\mathrm{fc}$", fontsize="medium")
+    figure.legend(*panels[-1].get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize="small")
+    return figure
+
+
+def main(folder: str) -> None:
+    """Print the numbers of all blocks and draw them."""
+    blocks = warpchain.load(folder).blocks
+    for name, block in blocks.items():
+        print(f"\n{name}: friction with the greatest mean Δx, rows links {block.axes['links'].tolist()}")
+        print(furthest(block))
+        print(ledger(block, int(block.axes["links"].max() * 2 // 3), float(block.axes["frequency"].max())))
+    save_figure(draw(blocks), FIGURE)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("folder", metavar="FOLDER", help="results of the sweep")
+    try:
+        main(parser.parse_args().folder)
+    except (warpchain.InputError, OSError) as error:
+        sys.exit(str(error))

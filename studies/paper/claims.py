@@ -1,0 +1,293 @@
+"""The paper's claims in its order, each with what tests it and with reasons, by verdict.
+
+A reason is written by hand for the verdicts that were expected. For any other the page admits that none is known.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from studies.paper import findings
+from studies.paper.findings import Check, Finding, Numbers
+from studies.paper.verdicts import Verdict
+
+AGREES, PART, DIFFERS, OPEN = Verdict
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A sentence of the paper.
+
+    Attributes:
+        sentence: what it says, in short.
+        source: sweep or page whose numbers test it, in Markdown.
+        check: what came out.
+        reasons: verdict → why.
+    """
+
+    sentence: str
+    source: str
+    check: Check
+    reasons: Mapping[Verdict, str] = field(default_factory=dict)
+
+    def reason(self, verdict: Verdict) -> str:
+        """Why the verdict is what it is."""
+        if verdict is Verdict.OPEN and verdict not in self.reasons:
+            return "The numbers are missing."
+        if verdict in self.reasons:
+            return self.reasons[verdict]
+        return "" if verdict is Verdict.AGREES else "No reason is known."
+
+
+def _left_open(check: Check) -> Check:
+    """The same numbers without a verdict, because it is not clear what the paper says."""
+
+    def left(numbers: Numbers) -> Finding:
+        return Finding(check(numbers).text, Verdict.OPEN)
+
+    return left
+
+
+STARTS: Final = "`start`"
+SHAPES: Final = "`paper_shapes`"
+TOLERANCE: Final = "`paper_tolerance`"
+
+CREASES: Final = (
+    "What is counted is the first impulse between links without a common joint, mostly a crease of links 2 to 4 apart "
+    "near the floor ([when](#when-the-loop-touches-itself)). By hand, looking at 26 walks: the strands of the loop "
+    "meet 10 to 55 ms after the second impact in 17 of them, as the paper says, and after the first one in none."
+)
+
+SLOW: Final = "Slow loops, at 5 Hz and long ones at 10 Hz, collapse in their first impact and slide to rest."
+
+CLAIMS: Final = (
+    Claim(
+        "The chain bounces along the floor; number and size of the bounces vary",
+        STARTS,
+        findings.bounces,
+        {PART: SLOW},
+    ),
+    Claim(
+        "The shape of the chain does not change significantly in the collision",
+        SHAPES,
+        findings.shape,
+        {
+            verdict: f"{SLOW} Of those that rise again area and height stay; the width of slow ones grows, for they "
+            "[lose a greater share of their speed](#the-first-impact)."
+            for verdict in (PART, DIFFERS)
+        },
+    ),
+    Claim(
+        "The rotational speed is slightly reduced in the collision",
+        SHAPES,
+        findings.speed,
+        {
+            verdict: "The floor's impulse follows from the fall rather than from the speed along the loop, so "
+            "[slow loops lose a greater share](#the-first-impact)."
+            for verdict in (PART, DIFFERS)
+        },
+    ),
+    Claim(
+        "Collisions take most of the chain's energy",
+        STARTS,
+        findings.losses,
+        {
+            verdict: "Friction of the joints takes half: it acts all the time, and most after an impact, when the loop "
+            "swings. Damping of the joints follows impacts, too; with it collisions take about half."
+            for verdict in (PART, DIFFERS)
+        },
+    ),
+    Claim("Δx rises with ν (Figure 6)", STARTS, findings.faster),
+    Claim("Δx falls with n (Figure 6, from rest)", STARTS, findings.longer),
+    Claim("With n and ν constant Δx varies only moderately", STARTS, findings.moderate),
+    Claim(
+        "From rest, Δx of n = 150 and 180 is an underestimate; a wider ellipse walks further",
+        STARTS,
+        findings.underestimate,
+    ),
+    Claim(
+        "From rest, long chains collide with themselves right after their second collision with the floor",
+        STARTS,
+        findings.self_collision,
+        {OPEN: CREASES},
+    ),
+    Claim(
+        "… and that is why they walk less far",
+        STARTS,
+        _left_open(findings.cause),
+        {
+            OPEN: "Within a cell the first crease does not set the distance. Collisions of the strands are not "
+            "counted, and what all walks of a cell share, such as the narrow loop from which they start, this "
+            "comparison cannot show."
+        },
+    ),
+    Claim(
+        "The ellipse delays this collision (150 and 180 links)",
+        STARTS,
+        _left_open(findings.delay),
+        {OPEN: "It delays the first crease. Collisions of the strands are not counted."},
+    ),
+    Claim(
+        "Most simulated points lie within two standard deviations of the measured ones",
+        "Figure 6",
+        findings.stated("The measured points are published as a picture.", OPEN),
+        {OPEN: "There is no table of them."},
+    ),
+    Claim(
+        "A thousand times more precise, single walks differ by up to 10 %",
+        TOLERANCE,
+        findings.single_walks,
+        {
+            PART: "A walk amplifies any perturbation, so the greatest difference grows with the number of walks. "
+            "48 walks from rest, with Table 1's joints, differ by up to 13 % "
+            "([accuracy](../../docs/accuracy.md#tolerance)).",
+            DIFFERS: "A walk amplifies any perturbation; the greatest difference grows with the number of walks.",
+        },
+    ),
+    Claim(
+        "… and means of 12 walks by less than a few per cent",
+        TOLERANCE,
+        findings.means,
+        {
+            PART: "Means of 12 chaotic walks differ by their own standard error, 2 to 4 %, whatever the tolerance.",
+            DIFFERS: "Means of 12 chaotic walks differ by their own standard error, 2 to 4 %, whatever the tolerance.",
+        },
+    ),
+    Claim(
+        "High-order explicit methods are 40 times faster than implicit ones",
+        "[accuracy](../../docs/accuracy.md#error-against-cost), [methods](#further-remarks)",
+        findings.stated(
+            "a whole walk of 60 links: `rkf78` at 1e-6 takes 3.95 s, the implicit `rodas5p` 16.7 s at 1e-6 and 6.3 s "
+            "at 1e-4, so 4.2 and 1.6 times as long; 150 links in free flight: `rodas5p` takes 7.4 times less, both at "
+            "1e-6",
+            PART,
+        ),
+        {
+            PART: "Impulses end the long steps that an implicit method takes in flight. Its matrix is cyclic "
+            "block-tridiagonal and is solved in a time proportional to n, a general one in a time proportional to n³."
+        },
+    ),
+    Claim(
+        "… and 5 times faster than standard explicit methods, for the same error",
+        "[methods](#further-remarks)",
+        findings.stated(
+            "a whole walk of 60 links, both at 1e-6: `dp5` 3.7 s, `rkf78` 3.95 s, so `dp5` is 1.06 times faster; in "
+            "free flight 1.6 times, for errors of 4e-12 and 9e-12 m",
+            DIFFERS,
+        ),
+        {
+            DIFFERS: "The stiff joints bound the steps of both methods, so what counts is the number of stages: six "
+            "against thirteen."
+        },
+    ),
+    Claim(
+        "Longer links ℓ make the chain rigid, and it loses its shape more easily",
+        "`link_length`",
+        findings.collapse,
+        {
+            verdict: "The number of links stays, so longer links also make a longer chain: stiffness and size are not "
+            "told apart."
+            for verdict in (PART, DIFFERS)
+        },
+    ),
+    Claim(
+        "Masses and moments of inertia varied over two orders of magnitude",
+        "`inner_mass`, `outer_mass`",
+        _left_open(findings.MASSES),
+        {
+            OPEN: "The sentence is garbled in the copy of the paper that was at hand; if it says that nothing depends "
+            "on them, it differs. On the sprocket some such loops never become stationary, so all start as an ellipse."
+        },
+    ),
+    Claim(
+        "… moments of inertia",
+        "`inner_inertia`, `outer_inertia`",
+        _left_open(findings.INERTIAS),
+        {OPEN: "As above."},
+    ),
+    Claim(
+        "The floor's restitution e_fc, over two orders of magnitude: no dependence",
+        "`floor_restitution`",
+        findings.NO_RESTITUTION,
+    ),
+    Claim(
+        "Less friction of the floor, μ_fc, lets the chain walk further",
+        "`floor_friction`",
+        findings.floor_friction,
+        {
+            verdict: "Friction turns rotation into walking: Δx rises with it until links at the floor stick. Then it "
+            "is flat for short or slow loops and falls for long fast ones, which friction stops and "
+            "[folds](#friction-of-the-floor)."
+            for verdict in (PART, DIFFERS)
+        },
+    ),
+    Claim(
+        "… for then less energy is dissipated",
+        "`floor_friction`",
+        findings.lost_on_floor,
+        {
+            verdict: "Below Table 1's value collisions with the floor do take less, and friction of the joints more. "
+            "Above it they take less, too: there self-contacts and damping of the joints take more."
+            for verdict in (PART, DIFFERS)
+        },
+    ),
+    Claim("Greater gravity shortens Δx", "`gravity`", findings.falling("gravity")),
+    Claim(
+        "The adjusted parameters had little effect",
+        "`paper_joints`, `tangential_restitution`, `sprocket_restitution`, `sprocket_friction`",
+        findings.LITTLE_EFFECT,
+    ),
+    Claim("The motion depends unnoticeably on the damping b", "`joint_damping`", findings.UNNOTICED_DAMPING),
+    Claim(
+        "Besides Table 1's parameters, time and height of the release are drawn, which varies Δx further",
+        "`gravity`, `release_only`, `parameters_only`",
+        findings.spread,
+        {
+            verdict: "A walk amplifies any perturbation: either alone spreads Δx about as far as both."
+            for verdict in (PART, DIFFERS)
+        },
+    ),
+    Claim(
+        "A planar chain walks about as far as one that falls over",
+        "[tilting plane](../../docs/tilting-plane.md#does-the-distance-change)",
+        findings.stated(
+            "a tilt of 0.001 rad at the release lengthens Δx by 1.0 ± 0.2 %, 0.01 rad by 2.7 %, 0.1 rad by 8 %", AGREES
+        ),
+        {AGREES: "Chains fall over, but after their loop has collapsed, unless they start with 0.1 rad."},
+    ),
+    Claim(
+        "A plane that tilts needs only six more degrees of freedom",
+        "[tilting plane](../../docs/tilting-plane.md)",
+        findings.stated("three: across the plane, tilt and heading", AGREES),
+        {AGREES: "The other three, two of the centre of mass and the rotation in the plane, the links have already."},
+    ),
+    Claim(
+        "The kink of the loop on its sprocket",
+        "[stationary loop](../stationary_loop/README.md#the-shape-of-the-loop)",
+        findings.stated(
+            "a bending wave that stands still in the room: −11.2 1/m at 13.5 cm from the lowest point with 120 links "
+            "at 20 Hz, theory −10.9 at 13.5 cm",
+            AGREES,
+        ),
+    ),
+    Claim(
+        "A collision or a tap creates two disturbances, which spread in opposite directions",
+        "[waves](../waves/README.md#the-picture)",
+        findings.stated(
+            "seen after an impact; packets on tapped rings at 20 Hz run both ways along the chain at 6.9 to 7.6 m/s, "
+            "within 0.1 % of theory; "
+            "in the room one nearly stands still, the other runs at 15 m/s",
+            AGREES,
+        ),
+    ),
+    Claim(
+        "It is possible that these disturbances influence the distance",
+        "[waves](../waves/README.md#do-they-matter)",
+        findings.waves,
+        {
+            PART: "That was one drag. By hand: with 120 links at 30 Hz one of 250/s turns the sign, and without "
+            "drag during impacts less is left ([waves](../waves/README.md#do-they-matter)). Long waves cannot be told "
+            "apart from the loop's change of shape."
+        },
+    ),
+)

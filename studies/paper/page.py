@@ -1,0 +1,237 @@
+"""The page README.md, rendered from the numbers of `studies.paper.reduction`."""
+
+import re
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from studies.paper.claims import CLAIMS
+from studies.paper.findings import changes, percent
+from studies.paper.reduction import effect_of
+from studies.paper.statistics import Effect, summary
+from studies.paper.verdicts import Verdict
+from warpchain import Parameters
+
+Numbers = Mapping[str, Any]
+
+TEMPLATE: Final = Path(__file__).with_name("page.txt")
+"""The text of the page, with names of its automatic parts in braces: {{claims}}."""
+
+SYMBOLS: Final = {"phase": "phase of the release", "clearance": "height of the release / m"}
+"""Quantities that are none of Table 1."""
+
+
+def page(numbers: Numbers) -> str:
+    """The page.
+
+    Raises:
+        KeyError: the template names a part that there is not.
+        ValueError: the template leaves out a part.
+    """
+    parts = {
+        "claims": claims_table(numbers),
+        "verdicts": verdict_counts(numbers),
+        "reasons": reasons(numbers),
+        "distances": distances_table(numbers),
+        "ellipses": ellipses_text(numbers),
+        "contacts": contacts_table(numbers),
+        "impacts": impacts_table(numbers),
+        "effects": effects_table(numbers),
+        "friction": friction_table(numbers),
+        "walks": walks_text(numbers),
+    }
+    template = TEMPLATE.read_text(encoding="utf-8")
+    names = re.findall(r"\{\{(\w+)\}\}", template)
+    if unused := parts.keys() - set(names):
+        raise ValueError(f"{TEMPLATE.name} leaves out {', '.join(sorted(unused))}")
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)
+
+
+def table(head: list[str], rows: list[list[str]]) -> str:
+    """A table in Markdown."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def claims_table(numbers: Numbers) -> str:
+    """All claims with what came out."""
+    rows = []
+    for number, claim in enumerate(CLAIMS, 1):
+        finding = claim.check(numbers)
+        rows.append([str(number), claim.sentence, finding.text, claim.source, f"*{finding.verdict}*"])
+    return table(["", "the paper", "here", "from", "verdict"], rows)
+
+
+def verdict_counts(numbers: Numbers) -> str:
+    """How many claims have which verdict."""
+    counts = Counter(claim.check(numbers).verdict for claim in CLAIMS)
+    return ", ".join(f"{counts[verdict]} × *{verdict}*" for verdict in Verdict if counts[verdict])
+
+
+def reasons(numbers: Numbers) -> str:
+    """The reasons of all claims that have one, numbered as in the table."""
+    lines = []
+    for number, claim in enumerate(CLAIMS, 1):
+        verdict = claim.check(numbers).verdict
+        if reason := claim.reason(verdict):
+            lines.append(f"- {number} *{verdict}*: {reason}")
+    return "\n".join(lines)
+
+
+def distances_table(numbers: Numbers) -> str:
+    """Mean Δx ± standard deviation of a walk, by start, links and frequency."""
+    content = numbers["paper_claims"]
+    cells, starts = content["cells"], content["starts"]
+    head = ["links", "start", *(f"{frequency:g} Hz" for frequency in cells["frequency"])]
+    rows = []
+    for place, links in enumerate(cells["links"]):
+        for start in ("rest", "ellipse"):
+            pairs = zip(starts[start]["mean"][place], starts[start]["sd"][place], strict=True)
+            rows.append([str(links), start, *(f"{_number(mean, 3)} ± {_number(sd, 3)}" for mean, sd in pairs)])
+    return table(head, rows)
+
+
+def ellipses_text(numbers: Numbers) -> str:
+    """Greatest relative difference of ellipses of 90 links or more from their mean over the links, from 10 Hz on."""
+    content = numbers["paper_claims"]
+    links, frequencies = (np.array(content["cells"][name]) for name in ("links", "frequency"))
+    means = np.array(content["starts"]["ellipse"]["mean"], np.float64)[links >= 90][:, frequencies >= 10]
+    difference = np.abs(means / means.mean(axis=0) - 1)
+    return f"{percent(float(np.nanmax(difference)), sign=False)} from 10 Hz on"
+
+
+def contacts_table(numbers: Numbers) -> str:
+    """When loops first touch themselves and collapse, by start and links; a sentence where the sweep does not say."""
+    content = numbers["paper_claims"]
+    head = [
+        "start",
+        "links",
+        "the loop",
+        "before",
+        "after 1",
+        "after 2",
+        "after 3",
+        "later",
+        "never",
+        "early over late",
+    ]
+    rows = []
+    for start in ("rest", "ellipse"):
+        for links, each in zip(content["cells"]["links"], content["starts"][start].get("by_links", ()), strict=False):
+            ratio = "—"
+            if "early_over_late" in each:
+                effect = effect_of(each["early_over_late"])
+                ratio = percent(float(effect.relative), float(effect.half_width))
+            for event, text, last in (("contact", "touches itself", ratio), ("collapse", "collapses", "")):
+                total = max(1, sum(each[event]))
+                rows.append([start, str(links), text, *(f"{100 * count / total:.0f} %" for count in each[event]), last])
+    if not rows:
+        return "The sweep has no columns of self-contacts; run it again."
+    return f"![When loops first touch themselves](figures/self_contacts.png)\n\n{table(head, rows)}"
+
+
+def impacts_table(numbers: Numbers) -> str:
+    """Changes in the first impact: means over the numbers of links at each frequency, and their range."""
+    content = numbers["paper_shapes"]
+    found = content["impacts"]
+    names = ("area", "height", "width", "speed", "moved")
+    rows = []
+    for place, frequency in enumerate(content["cells"]["frequency"]):
+        row = [f"{frequency:g} Hz"]
+        for name in names:
+            values, signed = np.array(found[name], np.float64)[:, place], name != "moved"
+            values = values[np.isfinite(values)]
+            if not len(values):
+                row.append("—")
+                continue
+            ends = " to ".join(percent(float(each), sign=signed) for each in (values.min(), values.max()))
+            row.append(f"{percent(float(values.mean()), sign=signed)} ({ends})")
+        rows.append(row)
+    return table(["", "area", "height", "width", "speed along the loop", "outline moved"], rows)
+
+
+def effects_table(numbers: Numbers) -> str:
+    """What each value of each quantity does to Δx."""
+    names = [
+        name
+        for sweep in ("paper_claims", "paper_joints")
+        for name in numbers[sweep]["effects"]
+        if name not in ("start", "tolerance")
+    ]
+    rows = []
+    for name in names:
+        first = _symbol(name)
+        for value, effect in changes(numbers, name):
+            found = summary(effect)
+            rows.append(
+                [
+                    first,
+                    f"{value:g}",
+                    percent(found.mean, found.half_width),
+                    str(found.rises),
+                    str(found.falls),
+                    percent(found.typical, sign=False),
+                    _extremes(effect, numbers["paper_claims"]["cells"]),
+                    str(effect.lost) if effect.lost else "",
+                ]
+            )
+            first = ""
+    head = [
+        "quantity",
+        "value",
+        "Δx, mean of cells",
+        "rise",
+        "fall",
+        "typical",
+        "least and greatest cell",
+        "pairs lost",
+    ]
+    return table(head, rows)
+
+
+def _extremes(effect: Effect, cells: Mapping[str, list[float]]) -> str:
+    """The cells with the least and the greatest effect."""
+    if not effect.known.any():
+        return "—"
+    relative = np.where(effect.known, effect.relative, np.nan)
+    texts = []
+    for place in (np.nanargmin(relative), np.nanargmax(relative)):
+        row, column = np.unravel_index(int(place), relative.shape)
+        at = f"{cells['links'][row]}, {cells['frequency'][column]:g} Hz"
+        texts.append(f"{percent(float(relative[row, column]))} ({at})")
+    return ", ".join(texts)
+
+
+def friction_table(numbers: Numbers) -> str:
+    """The best friction of the floor in each cell."""
+    content = numbers["paper_claims"]
+    head = ["links", *(f"{frequency:g} Hz" for frequency in content["cells"]["frequency"])]
+    best = zip(content["cells"]["links"], content["friction"]["best"], strict=True)
+    return table(head, [[str(links), *(f"{value:g}" for value in row)] for links, row in best])
+
+
+def walks_text(numbers: Numbers) -> str:
+    """How many walks there are, and how they ended."""
+    total: Counter[str] = Counter()
+    for content in numbers.values():
+        total.update({name: count for name, count in content["walks"].items() if name != "missing"})
+    failed = ", ".join(f"{count} {name}" for name, count in total.items() if name != "at_rest" and count)
+    inaccurate = sum(content["inaccurate"] for content in numbers.values())
+    rest = f"{total.total():,} walks: {total['at_rest']:,} at rest" + (f", {failed}" if failed else "")
+    return f"{rest}; {inaccurate} with an energy error above 5 %"
+
+
+def _symbol(name: str) -> str:
+    """A quantity with its unit, as a table has it."""
+    if name in SYMBOLS:
+        return SYMBOLS[name]
+    quantity = Parameters.quantities()[name]
+    reference = f"{quantity.value:g}"
+    return f"{quantity.symbol} ({reference})"
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "—" if value is None else f"{value:.{digits}f}"

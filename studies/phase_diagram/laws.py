@@ -1,0 +1,274 @@
+"""Searches for a law Δx/(nℓ) = F(x) with one variable x that puts all cells of the phase diagram on one curve.
+
+Only the number of links n and the frequency ν vary in the sweep, so that x is a power law ν n^c but for constants; its
+own power is a part of F. F is a cubic spline, fitted to ln Δx/(nℓ) by least squares. What the spline leaves is the
+residual of the law, in per cent of Δx.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.optimize import minimize, minimize_scalar
+
+from warpchain import preset
+
+Array = NDArray[Any]
+
+PARAMETERS: Final = preset("soft")
+LINK_LENGTH: Final = PARAMETERS.link_length
+GRAVITY: Final = PARAMETERS.gravity
+RADIUS: Final = PARAMETERS.sprocket_radius + PARAMETERS.circle_radius
+"""At which joints ride on the sprocket [m]."""
+
+PIECES: Final = 6
+"""Of the spline."""
+NUMBERS: Final = PIECES + 3
+"""That a spline has."""
+FEWEST: Final = 3 * NUMBERS
+"""Cells that are enough for one."""
+MOST_FAILED: Final = 0.05
+"""Cells of which more walks failed are left out: those at rest may be another kind of walks than the rest."""
+FAST: Final = 12.0
+"""Frequency [Hz] from which most chains survive their second bounce."""
+PLACES: Final = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+"""Turns of the loop per second at which a curve is described."""
+ROUNDS: Final = 100
+"""Samples of the bootstrap over cells."""
+
+
+def in_papers_range(links: Array, frequency: Array) -> Array:
+    """Whether cells lie within 60 to 180 links and 5 to 30 Hz."""
+    return (links >= 60) & (links <= 180) & (frequency >= 5) & (frequency <= 30)
+
+
+@dataclass(frozen=True)
+class Points:
+    """Cells as the laws take them, shape (cells,) each: links, speed of the loop [m/s], mean Δx [m]."""
+
+    links: Array
+    frequency: Array
+    speed: Array
+    distance: Array
+
+    def __getitem__(self, chosen: Array) -> "Points":
+        """Some of the cells."""
+        return Points(self.links[chosen], self.frequency[chosen], self.speed[chosen], self.distance[chosen])
+
+    @property
+    def length(self) -> Array:
+        """Length of the chain nℓ [m]."""
+        return self.links * LINK_LENGTH
+
+    @property
+    def hanging(self) -> Array:
+        """Height of the loop that hangs on the sprocket [m]: straight sides and two half circles."""
+        return 2 * RADIUS + np.maximum(self.length / 2 - np.pi * RADIUS, 0.0)
+
+
+def points_of(cells: Mapping[str, Array]) -> Points:
+    """The cells that have a mean, and few enough failures."""
+    failed = cells["walks"] - cells["at_rest"]
+    used = (cells["at_rest"] > 0) & (failed <= MOST_FAILED * cells["walks"]) & (cells["dx_mean"] > 0)
+    frequency = cells["frequency"][used]
+    return Points(cells["links"][used], frequency, 2 * np.pi * RADIUS * frequency, cells["dx_mean"][used])
+
+
+@dataclass(frozen=True)
+class Law:
+    """A candidate: y of the cells over x of the cells is one curve.
+
+    Attributes:
+        name: in a table.
+        x: variable of the master curve.
+        y: what is divided by it.
+    """
+
+    name: str
+    x: Callable[[Points], Array]
+    y: Callable[[Points], Array]
+
+
+CANDIDATES: Final = (
+    Law("Δx/(nℓ) over ν²ℓ/g", lambda p: p.frequency**2 * LINK_LENGTH / GRAVITY, lambda p: p.distance / p.length),
+    Law("Δx/(nℓ) over v²/(g nℓ)", lambda p: p.speed**2 / (GRAVITY * p.length), lambda p: p.distance / p.length),
+    Law(
+        "Δx/(nℓ) over v/(nℓ), turns of the loop per second",
+        lambda p: p.speed / p.length,
+        lambda p: p.distance / p.length,
+    ),
+    Law(
+        "Δx/H over v²/(g H), H height of the loop",
+        lambda p: p.speed**2 / (GRAVITY * p.hanging),
+        lambda p: p.distance / p.hanging,
+    ),
+    Law("Δx/ℓ over v²/(g nℓ)", lambda p: p.speed**2 / (GRAVITY * p.length), lambda p: p.distance / LINK_LENGTH),
+    Law("Δx/ℓ over ν²ℓ/g", lambda p: p.frequency**2 * LINK_LENGTH / GRAVITY, lambda p: p.distance / LINK_LENGTH),
+)
+"""With a fixed drop, the Froude number of the drop v²/(g h) is ν²ℓ/g but for a constant, and so is v²/(g R)."""
+
+
+def master_curve(x: Array, y: Array) -> Callable[[Array], Array]:
+    """ln y as a cubic spline of ln x, by least squares; knots at equal shares of the points."""
+    abscissa = np.log(x)
+    inner = np.unique(np.quantile(abscissa, np.linspace(0, 1, PIECES + 1)[1:-1]))
+    low, high = abscissa.min(), abscissa.max()
+    inner = inner[(inner > low) & (inner < high)]
+    knots = np.r_[[low] * 4, inner, [high] * 4]
+
+    def design(values: Array) -> Array:
+        clipped = np.clip(np.log(values), low, high)
+        return BSpline.design_matrix(clipped, knots, 3).toarray()
+
+    weights, *_ = np.linalg.lstsq(design(x), np.log(y), rcond=None)
+    return lambda values: design(values) @ weights
+
+
+def residuals(x: Array, y: Array) -> Array:
+    """ln y less the master curve, shape (cells,)."""
+    return np.log(y) - master_curve(x, y)(x)
+
+
+def rms_residual(x: Array, y: Array) -> float:
+    """Residual of a law, root mean square in per cent."""
+    return root_mean_square(residuals(x, y), NUMBERS)
+
+
+def best_variable(points: Points, power: float = 1.0) -> float:
+    """Exponent c of x = ν n^c with the least residual of Δx/n^power."""
+    y = points.distance / points.links**power
+
+    def cost(c: float) -> float:
+        return rms_residual(points.frequency * points.links**c, y)
+
+    starts = np.linspace(-1.5, 1.0, 26)
+    first = starts[int(np.argmin([cost(c) for c in starts]))]
+    return float(minimize_scalar(cost, bounds=(first - 0.1, first + 0.1), method="bounded", options={"xatol": 1e-4}).x)
+
+
+def best_powers(points: Points, start: tuple[float, float] | None = None) -> tuple[float, float]:
+    """Exponents (c, d) of Δx/n^d over ν n^c with the least residual."""
+    if start is None:
+        powers = np.linspace(-1.0, 2.0, 13)
+        variables = [best_variable(points, power) for power in powers]
+        costs = [
+            rms_residual(points.frequency * points.links**c, points.distance / points.links**d)
+            for c, d in zip(variables, powers, strict=True)
+        ]
+        at = int(np.argmin(costs))
+        start = variables[at], float(powers[at])
+
+    def cost(exponents: Array) -> float:
+        c, d = exponents
+        return rms_residual(points.frequency * points.links**c, points.distance / points.links**d)
+
+    found = minimize(cost, start, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-5})
+    return float(found.x[0]), float(found.x[1])
+
+
+def bootstrap(points: Points, fit: Callable[[Points], Any], seed: int = 1) -> Array:
+    """Standard errors of what a fit returns, from samples of the cells with replacement."""
+    rng = np.random.default_rng(seed)
+    count = len(points.links)
+    found = [np.atleast_1d(fit(points[rng.integers(0, count, count)])) for _ in range(ROUNDS)]
+    return np.std(found, axis=0, ddof=1)
+
+
+def power_law(points: Points) -> tuple[float, float]:
+    """Exponents (p, q) of Δx ∝ ν^p n^q."""
+    _, p, q = np.linalg.lstsq(_logarithms(points), np.log(points.distance), rcond=None)[0]
+    return float(p), float(q)
+
+
+def power_law_residuals(points: Points) -> Array:
+    """ln Δx less the power law, shape (cells,)."""
+    design, values = _logarithms(points), np.log(points.distance)
+    left: Array = values - design @ np.linalg.lstsq(design, values, rcond=None)[0]
+    return left
+
+
+def _logarithms(points: Points) -> Array:
+    return np.stack([np.ones(len(points.links)), np.log(points.frequency), np.log(points.links)], axis=1)
+
+
+def root_mean_square(left: Array, numbers: int) -> float:
+    """Root mean square in per cent of residuals that a fit of so many numbers leaves."""
+    return float(100 * np.sqrt(np.sum(left**2) / max(len(left) - numbers, 1)))
+
+
+def worst(points: Points, left: Array, count: int = 3) -> str:
+    """The cells with the greatest residuals, in words."""
+    order = np.argsort(-np.abs(left))[:count]
+    return ", ".join(
+        f"{points.links[i]:g} × {points.frequency[i]:g} Hz {100 * np.expm1(left[i]):+.0f} %" for i in order
+    )
+
+
+def table(cells: Mapping[str, Array]) -> str:
+    """Markdown: for all cells, fast ones and the paper's range, the residual of each law and where it fails."""
+    points = points_of(cells)
+    papers = points[in_papers_range(points.links, points.frequency)]
+    fast = points[points.frequency >= FAST]
+    parts = (
+        (f"all {len(points.links)} cells", points),
+        (f"{len(fast.links)} cells from {FAST:g} Hz on", fast),
+        (f"{len(papers.links)} cells of the paper's range", papers),
+    )
+    lines = []
+    for title, chosen in parts:
+        if len(chosen.links) < FEWEST:
+            lines.append(f"{title}: too few for a curve of {NUMBERS} numbers.\n")
+            continue
+        lines += [f"| law, {title} | residual | farthest cells |", "|---|---|---|"]
+        lines += [
+            f"| {name} | {root_mean_square(left, numbers):.1f} % | {worst(chosen, left)} |"
+            for name, left, numbers in laws_of(chosen)
+        ]
+        lines += ["", f"{slopes(chosen)} {drift(chosen)}".rstrip(), ""]
+    return "\n".join(lines).rstrip()
+
+
+def slopes(points: Points) -> str:
+    """Steepness of the curve of Δx/(nℓ) over v/(nℓ) at some places, in words."""
+    x, y = points.speed / points.length, points.distance / points.length
+    curve, width = master_curve(x, y), 1.05
+    places = np.array([place for place in PLACES if x.min() * width < place < x.max() / width])
+    rise = (curve(places * width) - curve(places / width)) / (2 * np.log(width))
+    texts = [
+        f"{np.exp(value):.2g} at {place:g}/s (slope {slope:.1f})"
+        for place, value, slope in zip(places, curve(places), rise, strict=True)
+    ]
+    return f"Δx/(nℓ) over v/(nℓ) is {', '.join(texts)}."
+
+
+def drift(points: Points) -> str:
+    """Exponent c of Δx/(nℓ) over ν n^c for the slower and the faster half of the frequencies, in words."""
+    frequencies = np.unique(points.frequency)
+    half = len(frequencies) // 2
+    if not half:
+        return ""
+    slow, fast = points.frequency <= frequencies[half - 1], points.frequency >= frequencies[-half]
+    if min(slow.sum(), fast.sum()) < FEWEST:
+        return ""
+    (low, high), (until, since) = (best_variable(points[part]) for part in (slow, fast)), frequencies[[half - 1, -half]]
+    return f"With d = 1 given, c is {low:.2f} up to {until:g} Hz and {high:.2f} from {since:g} Hz on."
+
+
+def laws_of(points: Points) -> list[tuple[str, Array, int]]:
+    """Each law with its exponents and their standard errors, its residuals, and the numbers that it has fitted."""
+    laws = [(law.name, residuals(law.x(points), law.y(points)), NUMBERS) for law in CANDIDATES]
+    (p, q), (p_error, q_error) = power_law(points), bootstrap(points, power_law)
+    name = f"Δx ∝ ν^p n^q, p = {p:.2f} ± {p_error:.2f}, q = {q:.2f} ± {q_error:.2f}"
+    laws.append((name, power_law_residuals(points), 3))
+    c, (error,) = best_variable(points), bootstrap(points, best_variable)
+    left = residuals(points.frequency * points.links**c, points.distance / points.length)
+    laws.append((f"Δx/(nℓ) over ν n^c, d = 1 given, c = {c:.3f} ± {error:.3f}", left, NUMBERS + 1))
+    c, d = both = best_powers(points)
+    c_error, d_error = bootstrap(points, lambda sample: best_powers(sample, both))
+    left = residuals(points.frequency * points.links**c, points.distance / points.links**d)
+    name = f"Δx/n^d over ν n^c, c = {c:.2f} ± {c_error:.2f}, d = {d:.2f} ± {d_error:.2f}"
+    laws.append((name, left, NUMBERS + 2))
+    return laws

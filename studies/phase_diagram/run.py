@@ -1,0 +1,54 @@
+"""Makes the numbers, figures and tables of studies/phase_diagram/README.md.
+
+    python -m studies.phase_diagram.run                    # results/*.csv → figures and tables of the page
+    python -m studies.phase_diagram.run FOLDER…            # parts of the sweep phase_diagram → results/cells.csv, first
+    python -m studies.phase_diagram.run --scaling FOLDER   # the sweep scaling → results/scaling.csv, first
+
+Parts are folders of ``warpchain sweep``. They have other seeds; they may be unfinished, and their grids may differ.
+Without a folder it takes 10 to 25 s.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+import warpchain
+from studies.common import write_tables
+from studies.phase_diagram import cells, drawing, scales
+from studies.phase_diagram.tables import TABLES
+
+FOLDER: Final = Path(__file__).parent
+
+
+def make(parts: Sequence[str], scaling: str | None) -> None:
+    """Reduce the sweeps that are given into the committed files; then draw and write all that is in them.
+
+    Raises:
+        InputError: a sweep is another one, or parts do not belong together.
+        OSError: a folder cannot be read, or a file not be written.
+    """
+    if parts:
+        walks = cells.walks_by_cell(part for path in parts for part in cells.parts_of(warpchain.load(path), path))
+        cells.write_csv([cells.reduced(*cell, columns) for cell, columns in walks.items()], cells.CSV)
+    if scaling is not None:
+        cells.write_csv(scales.reduced(warpchain.load(scaling)), scales.CSV)
+    found = cells.read_csv()
+    varied, curve = scales.Cells(cells.read_rows(scales.CSV)), scales.Curve(found)
+    tables = {name: render(found) for name, render in TABLES.items()} | {"scales": scales.table(varied, curve)}
+    write_tables(FOLDER / "README.md", tables)
+    drawing.draw_maps(found, FOLDER / "figures" / "maps.png")
+    drawing.draw_laws(found, FOLDER / "figures" / "laws.png")
+    scales.draw(varied, curve, FOLDER / "figures" / "scales.png")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("parts", nargs="*", metavar="FOLDER", help="of the sweep; none: the committed file")
+    parser.add_argument("--scaling", metavar="FOLDER", help="of the sweep scaling; none: the committed file")
+    given = parser.parse_args()
+    try:
+        make(given.parts, given.scaling)
+    except (warpchain.InputError, OSError) as error:
+        sys.exit(str(error))

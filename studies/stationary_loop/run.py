@@ -1,0 +1,143 @@
+"""Prints the tables of studies/stationary_loop/README.md and draws its figures.
+
+    python -m studies.stationary_loop.run           # mean loops beside theory and the catenary, in a few minutes
+    python -m studies.stationary_loop.run FOLDER    # of the sweep kink: the figure of the kinks as well
+
+Numbers are printed.
+"""
+
+import argparse
+import dataclasses
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import warpchain
+from studies.common import DASHES, RED, save_figure
+from studies.stationary_loop.balances import imbalances
+from studies.stationary_loop.kinks import draw_kinks
+from studies.stationary_loop.theory import MeanLoop, NoSolutionError, TheoreticalLoop, predict
+
+FIGURES = Path(__file__).parent / "figures"
+SHOWN = (120, 20.0)
+CELLS = ((60, 20.0), (120, 20.0), (120, 10.0), (180, 30.0), (60, 30.0))
+OTHERS: tuple[tuple[str, int, float, Mapping[str, float]], ...] = (
+    ("half of the inertia", 120, 20.0, {"inner_inertia": 8.45e-8, "outer_inertia": 6.46e-8}),
+    ("a tenth of the inertia", 120, 20.0, {"inner_inertia": 1.69e-8, "outer_inertia": 1.292e-8}),
+    ("three times the inertia", 120, 20.0, {"inner_inertia": 5.07e-7, "outer_inertia": 3.876e-7}),
+    ("a third of the viscous friction", 120, 20.0, {"viscous_friction": 3e-5}),
+    ("hardly any Coulomb friction", 120, 20.0, {"coulomb_friction": 1e-6}),
+)
+
+
+UNDAMPED = {"load_factor": 1.0, "steady_time": 0.0, "steady_tolerance": 1.0, "further_hold": 40.0}
+
+
+def held(links: int, frequency: float, values: Mapping[str, float]) -> warpchain.WalkResult:
+    """A walk of Table 1's chain with softened joints, whose last half second on the sprocket is kept."""
+    settings = {"further_hold": 0.5, "hold_limit": 60.0, "walk_limit": 1e-3} | dict(values)
+    return warpchain.walk(links=links, frequency=frequency, preset="soft", start="spinning", **settings)
+
+
+def compare(name: str, ours: MeanLoop, theirs: MeanLoop) -> None:
+    """Prints how far two loops are apart."""
+    middle = np.abs(ours.s) < 0.45 * (ours.free[1] - ours.free[0])
+    s = ours.s[middle]
+    place = np.stack([np.interp(s, theirs.s, column) for column in theirs.position.T], axis=1)
+    apart = np.hypot(*(ours.position[middle] - place).T)
+    tension = ours.effective_tension[middle] - np.interp(s, theirs.s, theirs.effective_tension)
+    curvature = ours.curvature[middle] - np.interp(s, theirs.s, theirs.curvature)
+    height, width = (np.ptp(ours.position, axis=0) / np.ptp(theirs.position, axis=0) - 1)[[1, 0]]
+    print(
+        f"{name}: held under multiplied loads against 40 s under its own: height {100 * height:+.2f} %, "
+        f"width {100 * width:+.2f} %, places {1e3 * np.sqrt(np.mean(apart**2)):.2f} mm rms, curvature "
+        f"{np.sqrt(np.mean(curvature**2)):.2f} of {theirs.curvature.max():.1f} 1/m, tension "
+        f"{np.sqrt(np.mean(tension**2)):.4f} of {theirs.effective_tension.max():.2f} N"
+    )
+
+
+def row(name: str, loop: MeanLoop, theory: TheoreticalLoop | object) -> str:
+    """Bottom curvature, peak and dip of a predicted curve, and how far it is from the simulated one."""
+    near = np.abs(theory.s) < 0.35 * (loop.free[1] - loop.free[0])
+    peak = int(np.argmax(np.where(near, theory.curvature, -np.inf)))
+    dip = int(np.argmin(np.where(near, theory.curvature, np.inf)))
+    fine = np.linspace(loop.s[0], loop.s[-1], 20_000)
+    curve = np.stack([np.interp(fine, loop.s, column) for column in loop.position.T], axis=1)
+    apart = np.array([np.hypot(*(curve - point).T).min() for point in theory.position])
+    tension = theory.effective_tension - np.interp(theory.s, loop.s, loop.effective_tension)
+    return (
+        f"  {name:22} bottom {np.interp(0, theory.s, theory.curvature):6.2f} 1/m, "
+        f"greatest {theory.curvature[peak]:6.2f} at {100 * theory.s[peak]:5.1f} cm, "
+        f"least {theory.curvature[dip]:6.2f} at {100 * theory.s[dip]:5.1f} cm; "
+        f"shape {1e3 * np.sqrt(np.mean(apart**2)):.2f} mm rms, {1e3 * apart.max():.2f} at most; "
+        f"tension {np.sqrt(np.mean(tension**2)):.4f} N rms"
+    )
+
+
+def show(name: str, walk: warpchain.WalkResult) -> None:
+    """Prints what is known of one loop."""
+    if walk.before_release is None:
+        print(f"{name}: {walk.status.label}")
+        return
+    loop = walk.mean_loop()
+    kink = loop.kink()
+    print(f"{name}: v = {loop.speed:.3f} m/s, held for {walk.hold_time:.2f} s, drift {100 * walk.drift:.2f} %")
+    print(
+        f"  {'simulation':22} bottom {loop.bottom_curvature:6.2f} 1/m, "
+        f"greatest {kink.peak:6.2f} at {100 * kink.peak_at:5.1f} cm, "
+        f"least {kink.dip:6.2f} at {100 * kink.dip_at:5.1f} cm; "
+        f"joints within {1e3 * loop.spread.max():.3f} mm"
+    )
+    parameters = loop.parameters
+    for which, given in (
+        ("theory", parameters),
+        ("without Coulomb", dataclasses.replace(parameters, coulomb_friction=0.0)),
+        ("without friction", dataclasses.replace(parameters, coulomb_friction=0.0, viscous_friction=0.0)),
+    ):
+        try:
+            print(row(which, loop, predict(loop, given)))
+        except NoSolutionError as error:
+            print(f"  {which:22} {error}")
+    print(row("catenary", loop, loop.catenary()))
+    balances = (
+        f"{key} {100 * found.rms:.1f} % ({100 * found.greatest:.1f} %)" for key, found in imbalances(loop).items()
+    )
+    print("  balances, rms (greatest):", ", ".join(balances))
+
+
+def draw(walk: warpchain.WalkResult) -> Figure:
+    """The figure of a walk's loop with theory in it."""
+    figure, loop = walk.plot("loop"), walk.mean_loop()
+    theory, style = predict(loop), {"color": RED, "linewidth": 1.3, "linestyle": DASHES, "zorder": 4}
+    shape, bend, pull = figure.axes
+    shape.plot(*(theory.position - loop.center).T, **style)
+    bend.plot(theory.s, theory.curvature, label="theory", **style)
+    pull.plot(theory.s, theory.effective_tension, **style)
+    bend.legend(frameon=False, loc="upper left")
+    return figure
+
+
+def main(kinks: str | None) -> None:
+    """Print all tables and draw the figures."""
+    if kinks is not None:
+        save_figure(draw_kinks(warpchain.load(kinks)), FIGURES / "kink.png", dpi=100)
+    for links, frequency in CELLS:
+        title, walk = f"{links} links, {frequency:g} Hz", held(links, frequency, {})
+        show(title, walk)
+        compare(title, walk.mean_loop(), held(links, frequency, UNDAMPED).mean_loop())
+        if (links, frequency) == SHOWN:
+            save_figure(draw(walk), FIGURES / "loop.png", dpi=100)
+    for text, links, frequency, values in OTHERS:
+        show(f"{links} links, {frequency:g} Hz, {text}", held(links, frequency, values))
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("kinks", nargs="?", metavar="FOLDER", help="of the sweep kink")
+    try:
+        main(parser.parse_args().kinks)
+    except (warpchain.InputError, OSError) as error:
+        sys.exit(str(error))

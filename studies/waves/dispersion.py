@@ -1,0 +1,365 @@
+"""Waves along a chain: the straight one under tension and the ring that circulates without gravity.
+
+Joints are closed and friction is viscous. Small changes of the links' angles ϑ_j ∝ exp(iκj + λt) have the phase κ per
+link and the rate λ = −γ − iω: ω > 0 runs towards greater j. Inner links have m̄ + μ and Ī + δ, outer ones m̄ − μ and
+Ī − δ. They couple the wave of phase κ with that of phase κ + π: two bands in 0 < κ ≤ π/2.
+
+**The straight chain.** Let η_j be the transverse place of joint j. A link has its centre at (η_{j−1} + η_j)/2 and the
+angle ϑ_j = (η_j − η_{j−1})/ℓ. Its ends pull with T, which stores T ℓ ϑ²/2, and a joint loses β (ϑ̇_{j+1} − ϑ̇_j)².
+In terms of the angles, with c = cos(κ/2), s = sin(κ/2), this is A(λ) B(λ) = h² λ⁴ with
+
+    A = (Ī + ¼ m̄ℓ² c²/s²) λ² + 4β s² λ + Tℓ,    B = (Ī + ¼ m̄ℓ² s²/c²) λ² + 4β c² λ + Tℓ,    h = δ − ¼ μℓ².
+
+Links with h = 0, equal ones above all, have a single band, A = 0:
+
+    ω² [m̄ c² + (4Ī/ℓ²) s²] + iωβ (16/ℓ²) s⁴ = (4T/ℓ) s².
+
+Others have a gap at κ = π/2, where inner links turn and outer ones move across, or the other way round: its edges,
+without friction, are 4T/ℓ over m_outer + 4 I_inner/ℓ² and over m_inner + 4 I_outer/ℓ². The upper band ends, at κ → 0,
+at ω² = Tℓ/Ī. Long waves run at c = √(Tℓ/m̄).
+
+**The ring.** It turns at Ω and its links are seen from the centre under 2α = 2π/N. Let ζ_j be the place of joint j as a
+complex number in the frame that turns along. A change ϑ of the angles moves joints by ζ_j − ζ_{j−1} = −ℓ ϑ_j at the
+direction of link j, and forces change by what m (λ + iΩ)² needs; the conjugate does the same with −Ω and κ/2 − α in
+place of κ/2 + α. With x = κ/2 + α, y = κ/2 − α, κ = 2αn the torques on a link are in balance if A B = h² λ⁴ with
+
+    A = Ī λ² + 4β s² λ + ¼ m̄ℓ²Ω² cot²α + ⅛ m̄ℓ² [(λ + iΩ)² cot²x + (λ − iΩ)² cot²y]
+
+and B the same with c² for s² and tan² for cot². This is exact. The straight chain is its limit α → 0 with
+T = m̄ v² cos α/ℓ, Ω = 2v sin α/ℓ; v is the speed of the joints.
+
+**The continuous ring** of density ρ, with j = (Ī − m̄ℓ²/6)/ℓ and the moment βℓ κ̇ of its curvature, obeys
+
+    (1 + n² + (n² − 1)² j/ρR²) λ² + [(n² − 1)² n² βℓ/ρR⁴ − 4inΩ] λ + n² (n² − 3) Ω² = 0.
+
+With j = β = 0 it is a string, whose modes are λ = inΩ and λ = −in (n² − 3)/(n² + 1) Ω: in the room, where rates are
+λ − inΩ, the slow family stands still and the fast one runs at 2v (n² − 1)/(n² + 1).
+
+Coulomb friction is left out: it is not linear. `equivalent_friction` replaces it in joints that only swing. Joints that
+keep their sense of rotation, because the loop bends there, do not feel it in small waves.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import permutations
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpchain import InputError, Parameters
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Factors = Callable[[Array, float], tuple[Complex, Complex, Array]]
+
+UPPER_BACKWARD, LOWER_BACKWARD, LOWER_FORWARD, UPPER_FORWARD = range(4)
+"""Columns of `Waves.rate`: bands and directions. In the ring backward is the slow family, forward the fast one."""
+ZONE_EDGE: Final = np.pi / 2
+"""Greatest phase per link that tells waves of two alternating links apart."""
+FRICTION_STEPS: Final = 64
+"""Friction rises from nothing in so many steps, while the branches are followed."""
+PHASE_STEP: Final = 1e-5
+"""Step of a central difference with respect to the phase [rad]."""
+QUADRATURE_POINTS: Final = 2001
+"""Points of the integral of Coulomb friction over a period: good to 1e-5."""
+ROUNDING: Final = 1e-12
+"""Damping below this part of a rate is rounding."""
+FIRST_MODE: Final = 2
+"""The least mode number that bends a ring: 0 turns it, ±1 move it."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Waves:
+    """Free waves of k phases, four each.
+
+    Attributes:
+        phase: κ per link [rad], shape (k,).
+        rate: λ = −γ − iω [1/s] in the chain's frame, shape (k, 4); columns as `UPPER_BACKWARD` … `UPPER_FORWARD`,
+            which are sorted by frequency without friction and followed from there.
+        slope: dλ/dκ [1/s], shape (k, 4).
+    """
+
+    phase: Array
+    rate: Complex
+    slope: Complex
+
+    @property
+    def frequency(self) -> Array:
+        """ω [rad/s], shape (k, 4); 0 if friction lets a wave creep back without swinging."""
+        return -self.rate.imag
+
+    @property
+    def damping(self) -> Array:
+        """γ, at which an amplitude falls [1/s], shape (k, 4)."""
+        return -self.rate.real
+
+    @property
+    def group_speed(self) -> Array:
+        """dω/dκ, the speed of a packet of waves [links/s], shape (k, 4)."""
+        return -self.slope.imag
+
+    @property
+    def phase_speed(self) -> Array:
+        """ω/κ, the speed of crests [links/s], shape (k, 4)."""
+        return self.frequency / self.phase[:, None]
+
+    @property
+    def reach(self) -> Array:
+        """How far a packet runs along the chain until its amplitude is 1/e of what it was [links], shape (k, 4).
+
+        Infinite for waves whose damping is nothing but rounding.
+        """
+        damped = self.damping > ROUNDING * np.abs(self.rate)
+        return np.where(damped, np.abs(self.group_speed) / np.where(damped, self.damping, 1.0), np.inf)
+
+    @property
+    def loss_per_wavelength(self) -> Array:
+        """By how much the logarithm of the amplitude falls while a packet runs one wavelength, shape (k, 4).
+
+        Infinite for waves that decay where they are.
+        """
+        with np.errstate(divide="ignore"):
+            return 2 * np.pi / self.phase[:, None] / self.reach
+
+
+def straight_waves(parameters: Parameters, tension: float, phase: ArrayLike) -> Waves:
+    """Transverse waves of a straight chain under tension.
+
+    Args:
+        parameters: of the chain; its Coulomb friction is left out.
+        tension: T [N].
+        phase: κ per link [rad], in (0, π/2], shape (k,).
+
+    Raises:
+        InputError: the tension is not positive, or a phase is out of its range.
+    """
+    _check_positive("tension", tension, "N")
+    phases = _checked("phase", phase)
+    if not np.all((phases > 0) & (phases <= ZONE_EDGE * (1 + 1e-12))):
+        raise InputError("phase: outside of (0, π/2]; a longer phase is one of the upper band, π minus itself")
+
+    def factors(phases: Array, friction: float) -> tuple[Complex, Complex, Array]:
+        squares = np.sin(phases / 2) ** 2, np.cos(phases / 2) ** 2
+        first, second = (
+            np.stack([tension * parameters.link_length * s, 4 * friction * s**2, inertia * s + quarter * c], axis=-1)
+            for s, c in (squares, squares[::-1])
+        )
+        return first.astype(np.complex128), second.astype(np.complex128), np.asarray(squares[0] * squares[1])
+
+    inertia, quarter = _mean_inertia(parameters), _mean_mass(parameters) * parameters.link_length**2 / 4
+    return _waves(parameters, phases, factors)
+
+
+def ring_waves(parameters: Parameters, links: int, speed: float, number: ArrayLike) -> Waves:
+    """Bending modes of a circulating ring without gravity, exact for rigid links and closed joints.
+
+    Args:
+        parameters: of the chain; its Coulomb friction is left out.
+        links: N, even.
+        speed: v of the joints [m/s], towards the next links.
+        number: n, whole wavelengths around the ring, from 2 to N/4, shape (k,).
+
+    Returns:
+        Rates in the frame that turns with the ring, at the phases 2πn/N.
+
+    Raises:
+        InputError: the number of links is odd or less than 8, the speed is not positive, or a mode number is out of
+            its range.
+    """
+    numbers = _checked_ring(links, speed, number)
+    mass, inertia = _mean_mass(parameters), _mean_inertia(parameters)
+    alpha, length = np.pi / links, parameters.link_length
+    spin = ring_spin(parameters, links, speed)
+    eighth = mass * length**2 / 8
+
+    def factors(phases: Array, friction: float) -> tuple[Complex, Complex, Array]:
+        forward, backward = phases / 2 + alpha, phases / 2 - alpha
+        found, weights = [], []
+        for bend, shift in ((np.sin(phases / 2) ** 2, 0.0), (np.cos(phases / 2) ** 2, np.pi / 2)):
+            here, there = forward + shift, backward + shift
+            weight = (np.sin(here) * np.sin(there)) ** 2
+            ahead, behind = (np.cos(here) * np.sin(there)) ** 2, (np.sin(here) * np.cos(there)) ** 2
+            both = eighth * (ahead + behind)
+            stiffness = spin**2 * (2 * eighth / np.tan(alpha) ** 2 * weight - both)
+            turning = 4 * friction * bend * weight + 2j * spin * eighth * (ahead - behind)
+            found.append(np.stack([stiffness, turning, inertia * weight + both], axis=-1))
+            weights.append(weight)
+        return found[0], found[1], weights[0] * weights[1]
+
+    return _waves(parameters, 2 * alpha * numbers, factors)
+
+
+def single_band(parameters: Parameters, tension: float, phase: ArrayLike) -> Complex:
+    """Rates of a straight chain of equal links with the mean mass and inertia, backward and forward.
+
+    Args:
+        parameters: of the chain; its Coulomb friction is left out.
+        tension: T [N].
+        phase: κ per link [rad], shape (k,).
+
+    Returns:
+        λ [1/s], shape (k, 2). If friction keeps a wave from swinging both are real, the faster decay first.
+    """
+    length, half = parameters.link_length, np.asarray(phase, dtype=np.float64) / 2
+    inertia = _mean_mass(parameters) * np.cos(half) ** 2 + 4 * _mean_inertia(parameters) / length**2 * np.sin(half) ** 2
+    damping = 8 * parameters.viscous_friction / length**2 * np.sin(half) ** 4 / inertia
+    root = np.sqrt((4 * tension / length * np.sin(half) ** 2 / inertia - damping**2).astype(np.complex128))
+    return np.stack([-damping + 1j * root, -damping - 1j * root], axis=-1)
+
+
+def continuous_ring(parameters: Parameters, links: int, speed: float, number: ArrayLike) -> Complex:
+    """Rates of the continuous ring, slow and fast, in the frame that turns along: `ring_waves` for long waves.
+
+    The ring has the length Nℓ.
+
+    Args:
+        parameters: of the chain; its Coulomb friction is left out.
+        links: N.
+        speed: v [m/s].
+        number: n, from 2, shape (k,).
+
+    Returns:
+        λ [1/s], shape (k, 2).
+
+    Raises:
+        InputError: as `ring_waves`.
+    """
+    n = _checked_ring(links, speed, number)
+    length = parameters.link_length
+    density, radius = _mean_mass(parameters) / length, links * length / (2 * np.pi)
+    spin, bend = speed / radius, (n**2 - 1) ** 2
+    rotary = (_mean_inertia(parameters) / length - density * length**2 / 6) / (density * radius**2)
+    friction = parameters.viscous_friction * length / (density * radius**4)
+    leading = 1 + n**2 + bend * rotary
+    half = (bend * n**2 * friction - 4j * n * spin) / (2 * leading)
+    root = np.sqrt(half**2 - n**2 * (n**2 - 3) * spin**2 / leading)
+    rates: Complex = np.stack([-half + root, -half - root], axis=-1)
+    return np.take_along_axis(rates, np.argsort(-rates.imag, axis=-1), axis=-1)
+
+
+def band_gap(parameters: Parameters, tension: float) -> tuple[float, float]:
+    """Edges of the band gap of a straight chain at κ = π/2, without friction [rad/s]; equal if there is none."""
+    length = parameters.link_length
+    crosswise = (
+        parameters.outer_mass + 4 * parameters.inner_inertia / length**2,
+        parameters.inner_mass + 4 * parameters.outer_inertia / length**2,
+    )
+    return (
+        float(np.sqrt(4 * tension / (length * max(crosswise)))),
+        float(np.sqrt(4 * tension / (length * min(crosswise)))),
+    )
+
+
+def long_wave_speed(parameters: Parameters, tension: float) -> float:
+    """c = √(Tℓ/m̄), the speed of long waves along the chain under the tension T [N], in m/s."""
+    return float(np.sqrt(tension * parameters.link_length / _mean_mass(parameters)))
+
+
+def ring_spin(parameters: Parameters, links: int, speed: float) -> float:
+    """Ω = 2 v sin(π/N)/ℓ, at which a ring turns whose joints move at `speed` [m/s], in rad/s."""
+    return float(2 * speed * np.sin(np.pi / links) / parameters.link_length)
+
+
+def equivalent_friction(parameters: Parameters, amplitude: float) -> float:
+    """Viscous friction [N m s] that takes as much energy as joint friction does where joints swing about rest.
+
+    Harmonic balance: (2/W) times the mean of f(W cos φ) cos φ over a period, with f(w) = β w + τ_c tanh(w/ω_c). It is
+    β + 4τ_c/πW for W far above ω_c and β + τ_c/ω_c far below.
+
+    Args:
+        parameters: of the chain.
+        amplitude: W, of the relative angular velocity of two links [rad/s].
+
+    Raises:
+        InputError: the amplitude is not positive.
+    """
+    _check_positive("amplitude", amplitude, "rad/s")
+    ratio = amplitude / parameters.friction_smoothing
+    # By parts the mean of tanh(ratio · cos φ) cos φ is 2/π ∫ sin φ d tanh, over cos φ from 0, where it rises, to 1.
+    cosine = np.sinh(np.linspace(0.0, np.arcsinh(ratio), QUADRATURE_POINTS)) / ratio
+    cosine[-1] = 1.0
+    sine = np.sqrt(1 - cosine**2)
+    steps = np.diff(np.tanh(ratio * cosine))
+    mean = 2 / np.pi * float(np.sum((sine[1:] + sine[:-1]) / 2 * steps))
+    return parameters.viscous_friction + 2 * parameters.coulomb_friction * mean / amplitude
+
+
+def _mean_mass(parameters: Parameters) -> float:
+    return (parameters.inner_mass + parameters.outer_mass) / 2
+
+
+def _mean_inertia(parameters: Parameters) -> float:
+    return (parameters.inner_inertia + parameters.outer_inertia) / 2
+
+
+def _waves(parameters: Parameters, phases: Array, factors: Factors) -> Waves:
+    """Solve A B = h² λ⁴ at each phase, and follow its roots from zero friction to the chain's.
+
+    `factors` maps phases (k,) and friction to the coefficients of A and B, (k, 3) from λ⁰ on, each times any weight,
+    and to the product of the weights, (k,).
+    """
+    difference = (parameters.inner_mass - parameters.outer_mass) / 2
+    other = (parameters.inner_inertia - parameters.outer_inertia) / 2
+    coupling = other - difference * parameters.link_length**2 / 4
+
+    def quartic(phases: Array, friction: float) -> Complex:
+        first, second, weight = factors(phases, friction)
+        product = np.zeros((len(phases), 5), dtype=np.complex128)
+        for power in range(3):
+            product[:, power : power + 3] += first[:, power, None] * second
+        product[:, 4] -= coupling**2 * weight
+        return product
+
+    rates = _roots(quartic(phases, 0.0))
+    rates = np.take_along_axis(rates, np.argsort(-rates.imag, axis=1), axis=1)
+    for friction in parameters.viscous_friction * np.linspace(0.0, 1.0, FRICTION_STEPS + 1)[1:]:
+        rates = _matched(rates, _roots(quartic(phases, friction)))
+    friction = parameters.viscous_friction
+    ahead, behind = (quartic(phases + step, friction) for step in (PHASE_STEP, -PHASE_STEP))
+    powers = rates[:, :, None] ** np.arange(5)
+    by_phase = np.einsum("kp,krp->kr", (ahead - behind) / (2 * PHASE_STEP), powers)
+    by_rate = np.einsum("kp,krp->kr", quartic(phases, friction)[:, 1:] * np.arange(1, 5), powers[:, :, :4])
+    with np.errstate(divide="ignore", invalid="ignore"):  # where two roots meet there is no slope
+        return Waves(phase=phases, rate=rates, slope=-by_phase / by_rate)
+
+
+def _roots(coefficients: Complex) -> Complex:
+    """Roots of polynomials, (k, p) for coefficients (k, p + 1) from the constant on."""
+    degree = coefficients.shape[1] - 1
+    scale = np.abs(coefficients[:, :1] / coefficients[:, -1:]) ** (1 / degree)  # of the roots, for conditioning
+    scaled = coefficients * scale ** np.arange(degree + 1)
+    companion = np.zeros((len(scaled), degree, degree), dtype=np.complex128)
+    companion[:, np.arange(1, degree), np.arange(degree - 1)] = 1.0
+    companion[:, :, -1] = -scaled[:, :-1] / scaled[:, -1:]
+    roots: Complex = scale * np.linalg.eigvals(companion)
+    return roots
+
+
+def _matched(before: Complex, after: Complex) -> Complex:
+    """The roots `after`, each row in the order in which they are nearest to those `before`."""
+    orders = np.array(list(permutations(range(before.shape[1]))))
+    apart = np.abs(after[:, orders] - before[:, None, :]).sum(axis=2)
+    return np.take_along_axis(after, orders[np.argmin(apart, axis=1)], axis=1)
+
+
+def _checked(name: str, values: ArrayLike) -> Array:
+    array = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    if array.ndim != 1 or not np.all(np.isfinite(array)):
+        raise InputError(f"{name}: not a row of finite numbers; give one")
+    return array
+
+
+def _check_positive(name: str, value: float, unit: str) -> None:
+    if not 0 < value < np.inf:
+        raise InputError(f"{name}: {value!r} {unit} is not positive; give a greater one")
+
+
+def _checked_ring(links: int, speed: float, number: ArrayLike) -> Array:
+    if links < 4 * FIRST_MODE or links % 2:
+        raise InputError(f"links: {links!r} make no ring with bending modes; give an even number, at least 8")
+    _check_positive("speed", speed, "m/s")
+    numbers = _checked("number", number)
+    if not np.all((numbers >= FIRST_MODE) & (numbers <= links / 4) & (numbers % 1 == 0)):
+        raise InputError(f"number: give whole numbers from {FIRST_MODE} to {links // 4}, a quarter of the links")
+    return numbers

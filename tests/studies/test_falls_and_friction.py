@@ -1,0 +1,58 @@
+"""The studies of the tilting plane and of the floor's friction make their tables and figures of made sweeps."""
+
+from pathlib import Path
+
+import pytest
+
+import warpchain
+from studies.floor_friction import run as friction
+from studies.tilting_plane import run as falls
+from tests.support.made_sweeps import make_sweep
+from warpchain.inputs.yaml_files import read_yaml
+from warpchain.sweeps.plan import PlannedWalk
+
+
+def test_best_friction_is_that_of_the_furthest_walks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of made walks that go furthest with 0.2; both figures and numbers come of one folder."""
+    monkeypatch.setattr(friction, "FIGURE", tmp_path / "distances.png")
+
+    def outcome(walk: PlannedWalk) -> float:
+        return 1.0 - abs(walk.setup.parameters.floor_friction - 0.2) + 0.002 * walk.sample
+
+    content = read_yaml(Path(friction.__file__).with_name("sweeps") / "floor_friction.yaml") | {"samples": 2}
+    result = make_sweep(tmp_path / "sweep", content, outcome)
+    assert (friction.furthest(result.blocks["rest"]) == 0.2).all()
+    assert "| 0.2 | 1.001 |" in friction.ledger(result.blocks["rest"], 120, 30.0)
+    friction.main(str(tmp_path / "sweep"))
+    assert (tmp_path / "distances.png").stat().st_size > 10_000
+
+
+def test_distances_of_falling_chains_are_compared_with_those_of_fixed_planes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Made walks go a tenth further with each tilt; a folder of another sweep is refused."""
+    monkeypatch.setattr(falls, "FOLDER", tmp_path)
+    (tmp_path / "README.md").write_text("<!-- tilt -->\n<!-- end of tilt -->\n", encoding="utf-8")
+
+    def outcome(walk: PlannedWalk) -> float:
+        return (1.1 if walk.setup.scene.plane == "tilting" else 1.0) * (1 + 0.01 * walk.sample)
+
+    grid = {"links": [60, 120], "frequency": [10, 20]}
+    content = {
+        "version": 1,
+        "name": "tilt",
+        "seed": 1,
+        "preset": "soft",
+        "samples": 4,
+        "blocks": [
+            {"name": "fixed", "grid": grid},
+            {"name": "tilted", "scene": {"plane": "tilting"}, "grid": grid | {"tilt": [0.001, 0.1]}},
+        ],
+    }
+    make_sweep(tmp_path / "sweep", content, outcome)
+    falls.main(str(tmp_path / "sweep"))
+    assert "| 1.100 ± 0.005 | 1.10, 1.10 |" in (tmp_path / "README.md").read_text(encoding="utf-8")
+    assert (tmp_path / "figures" / "falls.png").stat().st_size > 10_000
+    make_sweep(tmp_path / "other", {name: content[name] for name in content if name != "blocks"} | {"grid": grid})
+    with pytest.raises(warpchain.InputError, match="no blocks fixed and tilted"):
+        falls.main(str(tmp_path / "other"))

@@ -1,0 +1,189 @@
+"""The study of the paper: its statistics, rules and reduction, and that its page is made of the committed numbers."""
+
+import json
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from studies.paper import impacts, reduction, run, statistics, verdicts
+from tests.support.made_sweeps import make_sweep
+from warpchain import InputError, Status
+from warpchain.sweeps.plan import PlannedWalk, load_sweep
+
+REFERENCE, HALVED = 9.809, 4.9
+
+
+def samples(seed: int, shape: tuple[int, ...], mean: float) -> Any:
+    """Gaussian distances with a scatter of a tenth."""
+    return np.random.default_rng(seed).normal(mean, 0.1, shape)
+
+
+def test_paired_signs_are_those_of_a_paired_t_test() -> None:
+    """A cell rises or falls just where SciPy's paired t test has p < 0.05; walks that failed take no part."""
+    before = samples(1, (40, 12), 1.0)
+    after = before + samples(2, (40, 12), 0.06)
+    after[3, 5] = before[7, 2] = np.nan
+    effect = statistics.paired(after, before)
+    tests = stats.ttest_rel(after, before, axis=-1, nan_policy="omit")
+    expected = np.where(tests.pvalue < 0.05, np.sign(tests.statistic), 0)
+    assert effect.sign.tolist() == expected.tolist() and 0 < np.count_nonzero(expected) < 40
+    assert effect.lost == 2 and effect.pairs.tolist() == [11 if cell in (3, 7) else 12 for cell in range(40)]
+
+
+def test_unpaired_signs_are_those_of_welchs_test() -> None:
+    """The same for independent samples of different size and scatter."""
+    before, after = samples(3, (40, 24), 1.0), 1.05 + 3 * (samples(4, (40, 12), 1.0) - 1.0)
+    effect = statistics.unpaired(after, before)
+    tests = stats.ttest_ind(after, before, axis=-1, equal_var=False)
+    expected = np.where(tests.pvalue < 0.05, np.sign(tests.statistic), 0)
+    assert effect.sign.tolist() == expected.tolist() and 0 < np.count_nonzero(expected) < 40
+
+
+@pytest.mark.parametrize("name", ["paired", "unpaired"])
+def test_intervals_cover_the_truth(name: str) -> None:
+    """Of 4000 intervals of a ratio of means 95 % hold it, to three standard errors; so do those of means of cells."""
+    cells, ratio = 4000, 1.3
+    before = samples(5, (cells, 16), 1.0)
+    after = ratio * (before if name == "paired" else samples(6, (cells, 16), 1.0)) + samples(7, (cells, 16), 0.0)
+    effect = getattr(statistics, name)(after, before)
+    covered = np.abs(effect.relative - (ratio - 1)) <= effect.half_width
+    assert abs(covered.mean() - 0.95) < 3 * (0.95 * 0.05 / cells) ** 0.5
+    means = [
+        statistics.summary(
+            statistics.Effect(
+                *(each[cut] for each in (effect.relative, effect.half_width, effect.sign)), effect.pairs[cut], 0
+            )
+        )
+        for cut in np.split(np.arange(cells), 200)
+    ]
+    covered = np.array([abs(found.mean - (ratio - 1)) <= found.half_width for found in means])
+    assert abs(covered.mean() - 0.95) < 3 * (0.95 * 0.05 / len(means)) ** 0.5
+
+
+def test_verdicts_follow_their_rules() -> None:
+    """Each rule gives each of its verdicts at its bounds."""
+    rules = verdicts
+    agrees, in_part, differs, left_open = rules.Verdict
+    directions = {
+        (15, 3): agrees,
+        (14, 3): in_part,
+        (15, 4): in_part,
+        (4, 20): differs,
+        (20, 10): in_part,
+        (3, 0): differs,
+        (0, 30): differs,
+    }
+    for (with_claim, against), verdict in directions.items():
+        assert rules.direction(with_claim, against, 30) is verdict
+    for exceeding, verdict in {0: agrees, 3: agrees, 4: in_part, 15: in_part, 16: differs}.items():
+        assert rules.smallness(exceeding, 30) is verdict
+    assert rules.direction(0, 0, 0) is rules.share(0, 0) is left_open
+    assert rules.together([agrees, agrees]) is agrees and rules.together([agrees, differs]) is in_part
+
+
+def made(folder: Path, name: str = "paper_claims", **changes: Any) -> Any:
+    """A sweep of four cells in which half of the gravity lets chains walk a fifth further, and one walk fails."""
+
+    def outcome(walk: PlannedWalk) -> float | Status:
+        if walk.index == 0:
+            return Status.TIME_LIMIT
+        scatter = 0.01 * walk.sample
+        factor = 1.2 if walk.setup.parameters.gravity == HALVED else 1.0
+        return factor * (walk.setup.scene.frequency / 10 + scatter)
+
+    content = {
+        "version": 1,
+        "name": name,
+        "seed": 1,
+        "preset": "soft",
+        "samples": 6,
+        "same_samples_along": ["gravity"],
+        "grid": {"links": [60, 180], "frequency": [10, 20], "gravity": [HALVED, REFERENCE]},
+    }
+    return make_sweep(folder, content | changes, outcome)
+
+
+def test_reduction_finds_what_was_put_in(tmp_path: Path) -> None:
+    """Effects of a made sweep are those that were put in, against the value of Table 1, without the failed walk."""
+    result = made(tmp_path / "made")
+    block = result.blocks["main"]
+    found = reduction.effects(
+        reduction.at_rest(block), block, "gravity", reduction._reference(result, block, "gravity")
+    )
+    assert found["reference"] == REFERENCE
+    (change,) = found["values"]
+    effect = reduction.effect_of(reduction.rounded(change))
+    assert change["value"] == HALVED and effect.lost == 1
+    assert effect.pairs.tolist() == [[5, 6], [6, 6]]
+    assert effect.relative == pytest.approx(0.2) and effect.half_width == pytest.approx(0.0, abs=1e-9)
+    assert effect.sign.tolist() == [[1, 1], [1, 1]]
+
+
+def turning_ellipse(time: float, width: float, height: float, speed: float) -> Any:
+    """Joints of a loop of 120 links that runs along an ellipse, clockwise, shape (120, 2)."""
+    fine = np.linspace(0, 2 * np.pi, 20_001)
+    curve = np.stack([-0.5 * width * np.sin(fine), 0.5 * height * np.cos(fine)], axis=1)[::-1]
+    along = np.append(0.0, np.cumsum(np.hypot(*np.diff(curve, axis=0).T)))
+    places = (np.arange(120) / 120 * along[-1] + speed * time) % along[-1]
+    return np.stack([np.interp(places, along, column) for column in curve.T], axis=1)
+
+
+def test_first_impact_finds_what_was_put_in() -> None:
+    """A made loop falls, touches the floor every 8 ms for 32 ms, and rises wider, lower and slower."""
+    radius, interval = 0.0042, 0.002
+    time = np.arange(200) * interval
+    falls, touches = time < 0.1, (time >= 0.1) & (time < 0.14)
+    frames = []
+    for now, before, touch in zip(time, falls, touches, strict=True):
+        loop = turning_ellipse(now, 0.2, 0.5, 8.0) if before else turning_ellipse(now, 0.22, 0.45, 7.2)
+        gap = 0.5 * (0.1 - now) if before else 0.0 if touch and round(now / interval) % 4 == 2 else 0.001
+        if not before and not touch:
+            gap = 0.5 * (now - 0.138)
+        loop += (now, radius + gap - loop[:, 1].min())
+        frames.append(loop)
+    parameters = SimpleNamespace(circle_radius=radius)
+    walk = SimpleNamespace(frame_joints=np.array(frames), frame_time=time, setup=SimpleNamespace(parameters=parameters))
+    impact = impacts.first_impact(walk)
+    assert impact.area == pytest.approx(0.22 * 0.45 / (0.2 * 0.5) - 1, abs=2e-3)
+    assert (impact.width, impact.height) == (pytest.approx(0.1, abs=2e-3), pytest.approx(-0.1, abs=2e-3))
+    assert impact.speed == pytest.approx(-0.1, abs=5e-3)
+    assert 0.034 <= impact.duration <= 0.05
+    walk.frame_joints = np.array(frames)[touches.argmax() :]
+    walk.frame_time = time[touches.argmax() :]
+    assert impacts.first_impact(walk) is None
+
+
+def test_sweeps_that_are_foreign_or_not_complete_are_refused(tmp_path: Path) -> None:
+    """They are refused by name."""
+    with pytest.raises(InputError, match=r"^other: no sweep of this page"):
+        reduction.reduced(made(tmp_path / "other", name="other"))
+    content = made(tmp_path / "known").sweep
+    unfinished = make_sweep(tmp_path / "unfinished", content, lambda walk: 1.0 if walk.index else None)
+    with pytest.raises(InputError, match=r"^paper_claims: 1 walks are missing"):
+        reduction.reduced(unfinished)
+
+
+def test_the_page_is_made_of_the_committed_numbers(tmp_path: Path) -> None:
+    """The command writes the committed page from the committed numbers, and draws every figure but that of loops."""
+    (tmp_path / "results").mkdir()
+    shutil.copy(run.FOLDER / run.RESULTS, tmp_path / run.RESULTS)
+    assert run.main(["-o", str(tmp_path)]) == 0
+    page = (run.FOLDER / run.PAGE).read_text(encoding="utf-8")
+    assert (tmp_path / run.PAGE).read_text(encoding="utf-8") == page, "run python -m studies.paper.run"
+    drawn = {path.stem for path in (tmp_path / "figures").iterdir()}
+    assert drawn == {"distances", "effects", "friction", "self_contacts"}
+    assert run.main([str(tmp_path), "-o", str(tmp_path)]) == 2
+
+
+def test_the_committed_numbers_are_those_of_the_sweeps() -> None:
+    """What the numbers' sweeps vary and draw is what today's sweep files do, with as many samples."""
+    numbers = json.loads((run.FOLDER / run.RESULTS).read_text(encoding="utf-8"))
+    for name in reduction.SWEEPS:
+        sweep = load_sweep(run.FOLDER / f"sweeps/{name}.yaml")
+        assert numbers[name]["sweep"] == reduction.content_digest(sweep.canonical()), name
+        assert numbers[name]["samples"] == {block.name: block.samples for block in sweep.blocks}

@@ -1,0 +1,250 @@
+"""The study of the phase diagram: endings, reduction of parts, scaling laws, and that its tables are of its files."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import warpchain
+from studies.common import with_tables
+from studies.phase_diagram import cells, laws, run, scales, tables
+from studies.phase_diagram.endings import IN_FLIGHT, Ending, endings
+from tests.support.made_sweeps import distance, make_sweep
+from warpchain import InputError, Status
+from warpchain.kernels.events.tallies import BOUNCE_PAUSE
+from warpchain.sweeps.plan import PlannedWalk
+
+NAN = math.nan
+SWEEP: dict[str, Any] = {
+    "version": 1,
+    "name": "part",
+    "seed": 1,
+    "preset": "soft",
+    "samples": 6,
+    "scene": {"start": "spinning"},
+    "grid": {"links": [30, 60, 90], "frequency": [3, 15]},
+}
+
+
+@pytest.mark.parametrize(
+    ("columns", "ending"),
+    [
+        ((-1, NAN, -1, NAN, -1), Ending.UNKNOWN),
+        ((Status.NOT_STEADY, NAN, -1, NAN, -1), Ending.UNKNOWN),
+        ((Status.TIME_LIMIT, 0.5, 3, 0.0, 2), Ending.UNKNOWN),
+        ((Status.AT_REST, NAN, -1, NAN, -1), Ending.KEPT),
+        ((Status.AT_REST, NAN, -1, NAN, 4), Ending.KEPT),
+        ((Status.AT_REST, 0.03, 0, NAN, -1), Ending.IN_FLIGHT),
+        ((Status.AT_REST, 0.5, 1, 0.011, 1), Ending.IN_FLIGHT),
+        ((Status.AT_REST, 0.5, 1, 0.009, 1), Ending.FIRST),
+        ((Status.AT_REST, 0.5, 1, 0.0, -1), Ending.FIRST),
+        ((Status.AT_REST, 0.5, 2, 0.0, 1), Ending.SECOND),
+        ((Status.AT_REST, 0.5, 7, 0.0, -1), Ending.LATER),
+        ((Status.AT_REST, 0.5, 7, 0.0, 7), Ending.LATER),
+        ((Status.AT_REST, 0.5, 7, 0.0, 8), Ending.LATER),
+        ((Status.AT_REST, 0.5, 7, 0.0, 0), Ending.FOLDED_AT_FIRST),
+        ((Status.AT_REST, 0.5, 3, 0.0, 1), Ending.FOLDED_AT_FIRST),
+        ((Status.AT_REST, 0.5, 3, 0.0, 2), Ending.FOLDED_AT_SECOND),
+        ((Status.AT_REST, 0.5, 7, 0.0, 6), Ending.FOLDED_LATER),
+    ],
+)
+def test_every_case_has_its_ending(columns: tuple[int, float, int, float, int], ending: Ending) -> None:
+    """Status first, then where the loop collapsed, then in which bounce it had touched itself before."""
+    names = (
+        "status",
+        "collapsed_at",
+        "bounces_before_collapse",
+        "flight_before_collapse",
+        "bounces_before_self_contact",
+    )
+    assert endings({name: np.array([value]) for name, value in zip(names, columns, strict=True)}).tolist() == [ending]
+
+
+def test_flight_is_what_ends_a_bounce() -> None:
+    """A chain is in flight as soon as an impulse on the floor would begin a new bounce."""
+    assert float(BOUNCE_PAUSE) == IN_FLIGHT
+
+
+def outcome(walk: PlannedWalk) -> "float | Status | None":
+    """Some walks fail, some are missing; the others go their distance."""
+    if walk.setup.scene.links == 90 and walk.setup.scene.frequency == 15:
+        return Status.NOT_STEADY
+    if walk.sample == 4:
+        return Status.TIME_LIMIT
+    return None if walk.sample == 5 else distance(walk)
+
+
+def test_parts_are_reduced_together(tmp_path: Path) -> None:
+    """Means, deviations and counts are those of the walks of all parts; failed and missing ones are counted."""
+    other = SWEEP | {"seed": 2, "name": "other", "grid": {"frequency": [15, 24], "links": [60, 90]}}
+    parts = [make_sweep(tmp_path / str(number), sweep, outcome) for number, sweep in enumerate((SWEEP, other))]
+    walks = cells.walks_by_cell(part for result in parts for part in cells.parts_of(result, result.name))
+    assert list(walks) == [(30, 3.0), (30, 15.0), (60, 3.0), (60, 15.0), (60, 24.0), (90, 3.0), (90, 15.0), (90, 24.0)]
+    both = cells.reduced(60, 15.0, walks[60, 15.0])
+    dx = np.concatenate([parts[0].dx[1, 1, :4], parts[1].dx[0, 0, :4]])
+    assert both["dx_mean"] == pytest.approx(dx.mean()) and both["dx_sd"] == pytest.approx(dx.std(ddof=1))
+    assert both["dx_se"] == pytest.approx(dx.std(ddof=1) / math.sqrt(8))
+    assert (both["walks"], both["at_rest"], both["time_limit"], both["missing"]) == (10, 8, 2, 2)
+    assert both["bounces_mean"] == 7 and both["in_flight"] == 8 and both["dx_in_flight"] == pytest.approx(dx.mean())
+    failed = cells.reduced(90, 15.0, walks[90, 15.0])
+    assert (failed["at_rest"], failed["not_steady"]) == (0, 12)
+    assert math.isnan(failed["dx_mean"]) and math.isnan(failed["dx_sd"]) and math.isnan(failed["dx_50"])
+
+
+def read(*paths: Path) -> dict[tuple[int, float], dict[str, np.ndarray]]:
+    """The walks of some parts by cell."""
+    return cells.walks_by_cell(part for path in paths for part in cells.parts_of(warpchain.load(path), path.name))
+
+
+def test_parts_that_do_not_belong_together_are_refused(tmp_path: Path) -> None:
+    """The same walks twice, or walks of another kind, would make wrong statistics; the device does not matter."""
+    first = tmp_path / "first"
+    make_sweep(first, SWEEP)
+    for name, change, message in (
+        ("again", {"name": "again"}, "walks of another part, the seed is the same"),
+        ("scene", {"seed": 2, "scene": {"start": "rest"}}, "other settings than the parts before"),
+        ("axes", {"seed": 2, "grid": {"links": [60]}}, "give a sweep of links and frequency"),
+    ):
+        make_sweep(tmp_path / name, SWEEP | change)
+        with pytest.raises(InputError, match=message):
+            read(first, tmp_path / name)
+    apart = {"grid": {"links": [120], "frequency": [3]}, "options": {"device": "cpu"}}
+    make_sweep(tmp_path / "apart", SWEEP | apart)
+    assert len(read(first, tmp_path / "apart")) == 7
+
+
+def test_an_ending_is_compared_with_the_others_of_its_cell() -> None:
+    """Its walks are none of the others; a cell with few walks on either side tells nothing."""
+    counted = {f"{dx}{way.label}": np.zeros(3) for way in cells.WAYS for dx in ("", "dx_")}
+    counted |= {f"dx_{way.label}": np.full(3, math.nan) for way in cells.WAYS}
+    for way, number, distance_ in (
+        (Ending.FIRST, [200, 99, 900], [1.0, 1.0, 3.0]),
+        (Ending.SECOND, [100, 500, 0], [2.0, 2.0, math.nan]),
+        (Ending.LATER, [300, 500, 99], [4.0, 2.0, 1.0]),
+    ):
+        counted[way.label], counted[f"dx_{way.label}"] = np.array(number, float), np.array(distance_)
+    np.testing.assert_allclose(tables.over_others(counted, [Ending.FIRST]), [1 / 3.5, math.nan, math.nan])
+    np.testing.assert_allclose(tables.over_others(counted, [Ending.SECOND], [Ending.LATER]), [0.5, 1.0, math.nan])
+    both = tables.over_others(counted, [Ending.FIRST, Ending.SECOND])
+    np.testing.assert_allclose(both, [4 / 3 / 4, (99 + 1000) / 599 / 2, math.nan])
+    assert tables.text_of_ratios(both) == "0.625 (0.33 to 0.92, 2 cells)"
+    assert tables.text_of_ratios(both[2:]) == "" and tables.text_of_ratios(both[1:]) == "0.917 (one cell)"
+
+
+def made_cells(exponent: float, power: float, noise: float = 0.0) -> dict[str, np.ndarray]:
+    """Cells of the law Δx = n^power F(ν n^exponent), with a curve F that is no power."""
+    links, frequency = (axis.ravel() for axis in np.meshgrid(np.arange(30.0, 241, 10), np.arange(3.0, 61, 3)))
+    x = frequency * links**exponent
+    scatter = np.exp(noise * np.random.default_rng(1).normal(size=len(links)))
+    top = x.max()
+    dx = links**power * (x / top) ** 2 / (1 + 30 * (x / top)) * scatter
+    whole = np.full(len(links), 100.0)
+    return {"links": links, "frequency": frequency, "dx_mean": dx, "at_rest": whole, "walks": whole}
+
+
+@pytest.mark.parametrize("exponent", [-1.2, -0.5, 0.0])
+def test_the_search_finds_the_exponent_of_a_made_law(exponent: float) -> None:
+    """One variable puts all cells on a curve, and the search finds it; the candidate of that exponent fits as well."""
+    points = laws.points_of(made_cells(exponent, 1.0))
+    assert laws.best_variable(points) == pytest.approx(exponent, abs=0.002)
+    assert laws.drift(points).count(f"{exponent:.2f}") == 2  # no drift: the slower and the faster half agree
+    fitting = {-0.5: "Δx/(nℓ) over v²/(g nℓ)", 0.0: "Δx/(nℓ) over ν²ℓ/g"}.get(exponent)
+    left = {law.name: laws.rms_residual(law.x(points), law.y(points)) for law in laws.CANDIDATES}
+    assert all((value < 0.5) == (name == fitting) for name, value in left.items()), left
+
+
+def test_both_exponents_are_found() -> None:
+    """The power of n beside the variable is found where the curve is no power law."""
+    c, d = laws.best_powers(laws.points_of(made_cells(-0.8, 0.4)))
+    assert (c, d) == (pytest.approx(-0.8, abs=0.01), pytest.approx(0.4, abs=0.02))
+
+
+def test_errors_are_those_of_the_noise() -> None:
+    """The residual is that of the noise in per cent, and the exponent is right within a few of its errors."""
+    points = laws.points_of(made_cells(-0.5, 1.0, noise=0.05))
+    x = points.frequency * points.links**-0.5
+    assert laws.rms_residual(x, points.distance / points.length) == pytest.approx(5.0, rel=0.1)
+    (error,) = laws.bootstrap(points, laws.best_variable)
+    assert 0 < error < 0.05 and abs(laws.best_variable(points) + 0.5) < 4 * error
+
+
+def test_a_power_law_is_found() -> None:
+    """Both exponents of a pure power law, without residual."""
+    made = made_cells(0.0, 1.0)
+    made["dx_mean"] = 3e-3 * made["frequency"] ** 1.7 * made["links"] ** -0.9
+    points = laws.points_of(made)
+    assert laws.power_law(points) == pytest.approx((1.7, -0.9))
+    assert np.abs(laws.power_law_residuals(points)).max() < 1e-12
+
+
+def test_cells_of_the_scaling_have_what_was_varied(tmp_path: Path) -> None:
+    """From an axis or from the block; an unfinished sweep and another one are refused."""
+    blocks = [
+        {"name": "gravity", "grid": {"gravity": [4.9, 19.6], "links": [60], "frequency": [6]}},
+        {"name": "links_of_18_mm", "parameters": {"link_length": 0.018}, "grid": {"links": [60], "frequency": [6]}},
+    ]
+    sweep = {name: value for name, value in SWEEP.items() if name != "grid"} | {"blocks": blocks}
+    rows = scales.reduced(make_sweep(tmp_path / "folder", sweep))
+    assert [(row["gravity"], row["link_length"]) for row in rows] == [(4.9, 0.01268), (19.6, 0.01268), (9.809, 0.018)]
+    unfinished = make_sweep(tmp_path / "part", sweep, lambda walk: None if walk.sample == 3 else distance(walk))
+    with pytest.raises(InputError, match="block gravity: walks are missing; run the sweep to its end"):
+        scales.reduced(unfinished)
+    other = make_sweep(tmp_path / "other", SWEEP | {"grid": {"links": [60, 90]}})
+    with pytest.raises(InputError, match="block main: no axes links and frequency"):
+        scales.reduced(other)
+
+
+@pytest.mark.parametrize("exponents", [(-0.5, 0.5, 0.0), (-0.5, 0.0, 0.5), (-0.3, 0.1, 0.2)])
+def test_the_exponents_of_a_made_time_are_found(exponents: tuple[float, float, float]) -> None:
+    """Cells whose Δx is the curve's with some time have no residual with it, and its exponents are found."""
+    curve = scales.Curve(cells.read_csv())
+    rows = []
+    for gravity, radius, link in [
+        (9.809, 0.06, 0.0127),
+        (4.0, 0.06, 0.0127),
+        (9.809, 0.1, 0.0127),
+        (9.809, 0.06, 0.02),
+    ]:
+        for links, frequency in [(60, 6), (60, 12), (120, 12), (120, 24), (180, 24)]:
+            ratios = np.array([gravity, radius, link]) / np.array(scales.NORMAL)
+            turns = 2 * np.pi * radius * frequency / (links * link) * np.prod(ratios ** np.array(exponents))
+            dx = links * link * curve(np.array([turns]))[0]
+            row = {"block": "gravity", "links": links, "frequency": frequency, "gravity": gravity, "radius": radius}
+            row |= {"link_length": link, "walks": 10, "at_rest": 10, "dx_mean": dx}
+            rows.append({name: str(value) for name, value in row.items()})
+    rows.append(rows[0] | {"at_rest": "9", "dx_mean": "1000"})  # too many failures
+    found = scales.Cells(rows)
+    assert len(found.names) == 20
+    assert np.abs(curve.left(found, exponents)).max() < 1e-12
+    assert np.abs(curve.left(found, (0.0, 0.0, 0.0))).max() > 0.1
+    assert curve.best_exponents(found, np.arange(20)) == pytest.approx(exponents, abs=1e-4)
+
+
+def test_the_page_has_the_tables_of_the_files() -> None:
+    """All tables but that of the laws, with its bootstrap, are rendered from the committed files."""
+    found = cells.read_csv()
+    page = (run.FOLDER / "README.md").read_text(encoding="utf-8")
+    made = {name: render(found) for name, render in tables.TABLES.items() if name != "scaling"}
+    made["scales"] = scales.table(scales.Cells(cells.read_rows(scales.CSV)), scales.Curve(found))
+    assert with_tables(page, made) == page, "out of date; run python -m studies.phase_diagram.run"
+    assert np.array_equal(found["told"], sum(found[way.label] for way in cells.WAYS))
+    assert np.array_equal(found["walks"], found["at_rest"] + sum(found[code.label] for code in cells.FAILURES))
+
+
+@pytest.mark.slow
+def test_the_command_draws_and_writes_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the committed files it draws all figures and writes the committed page."""
+    page = (run.FOLDER / "README.md").read_text(encoding="utf-8")
+    (tmp_path / "README.md").write_text(page, encoding="utf-8")
+    monkeypatch.setattr(run, "FOLDER", tmp_path)
+    run.make([], None)
+    assert (tmp_path / "README.md").read_text(encoding="utf-8") == page
+    assert {path.stem for path in (tmp_path / "figures").iterdir()} == {"maps", "laws", "scales"}
+
+
+def test_a_page_without_markers_is_refused() -> None:
+    """Tables are put between markers only."""
+    with pytest.raises(ValueError, match="needs <!-- cells --> and <!-- end of cells --> once each"):
+        with_tables("<!-- cells -->", {"cells": ""})

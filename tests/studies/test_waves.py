@@ -1,0 +1,219 @@
+"""Waves along a chain: limits, the equations of motion linearised about a straight chain and a ring, tapped rings."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import warpchain
+from studies.waves.dispersion import (
+    LOWER_BACKWARD,
+    LOWER_FORWARD,
+    UPPER_FORWARD,
+    band_gap,
+    continuous_ring,
+    equivalent_friction,
+    long_wave_speed,
+    ring_spin,
+    ring_waves,
+    straight_waves,
+)
+from studies.waves.mode_fit import find_packet, fit_rates, mode_amplitudes
+from studies.waves.tapped_ring import tapped_ring
+from warpchain import Status, preset
+from warpchain.oracle.circular_loop import circular_loop_force, tapped_loop
+from warpchain.oracle.motion_equations import acceleration, friction_torque
+from warpchain.oracle.ring_modes import ring_modes
+
+PAPER = preset("paper").with_values({"coulomb_friction": 0.0})
+SOFT = preset("soft").with_values({"coulomb_friction": 0.0})
+FREE = PAPER.with_values({"viscous_friction": 0.0})
+TENSION, SPEED = 15.0, 7.5
+PHASES = np.array([0.05, 0.3, 0.7, 1.0, 1.3, 1.5, np.pi / 2])
+
+
+def straight_modes(parameters, tension, phase):
+    """Transverse rates of a straight chain (8,): the equations of motion, differentiated by complex steps.
+
+    Six pairs, each joint opened by T/k; the third pair is moved. Neither it nor its neighbours touch the joint that
+    closes the chain over its whole length.
+    """
+    links, opening = 12, tension / parameters.joint_stiffness
+    position = np.zeros((links, 3))
+    position[:, 0] = (parameters.link_length + opening) * np.arange(links)
+    system = np.zeros((8, 8), dtype=complex)
+    system[:4, 4:] = np.eye(4)
+    for column in range(8):
+        state = [position.astype(complex), np.zeros((links, 3), dtype=complex)]
+        link, part = divmod(column % 4, 2)
+        state[column // 4][4 + link, 1 + part] += 1e-30j
+        changed = acceleration(*state, parameters, gravity=False).imag[:, 1:] / 1e-30
+        for pair in (1, 2, 3):
+            shift = np.exp(-2j * phase * (pair - 2))
+            system[4:, column] += shift * changed[2 * pair : 2 * pair + 2].ravel()
+    return np.linalg.eigvals(system)
+
+
+def nearest(wanted, found):
+    """The nearest of the rates `found` (k, …) to each of `wanted` (k, p)."""
+    apart = np.abs(wanted[:, :, None] - found[:, None, :])
+    return np.take_along_axis(found, np.argmin(apart, axis=2), axis=1)
+
+
+@pytest.mark.parametrize("friction", [0.0, 9e-6, 9e-5, 9e-4])
+def test_straight_chain_agrees_with_the_equations_of_motion(friction):
+    """All four rates are those of the linearised equations, but for 1e-4 by which k = 1e9 N/m gives way at most."""
+    parameters = PAPER.with_values({"viscous_friction": friction})
+    waves = straight_waves(parameters, TENSION, PHASES)
+    found = np.array([straight_modes(parameters, TENSION, phase) for phase in PHASES])
+    assert_allclose(nearest(waves.rate, found), waves.rate, rtol=1e-4)
+    assert np.abs(waves.rate.imag).max() > 100
+
+
+def test_long_waves_run_at_the_speed_of_a_string():
+    """κ → 0: phase and group speed tend to √(Tℓ/m̄), damping to βκ⁴/(2m̄ℓ²)."""
+    waves = straight_waves(PAPER, TENSION, [1e-2])
+    speed = long_wave_speed(PAPER, TENSION)
+    assert speed == pytest.approx(np.sqrt(TENSION * 0.01268 / 3.4235e-3), rel=1e-12)
+    for found in (waves.phase_speed, waves.group_speed):
+        assert found[0, LOWER_FORWARD] * PAPER.link_length == pytest.approx(speed, rel=1e-4)
+        assert found[0, LOWER_BACKWARD] * PAPER.link_length == pytest.approx(-speed, rel=1e-4)
+    expected = PAPER.viscous_friction * 1e-8 / (2 * 3.4235e-3 * PAPER.link_length**2)
+    assert waves.damping[0, LOWER_FORWARD] == pytest.approx(expected, rel=1e-4)
+    assert waves.reach[0, LOWER_FORWARD] == pytest.approx(speed / PAPER.link_length / expected, rel=1e-3)
+    lost = expected * 2 * np.pi / 1e-2 / (speed / PAPER.link_length)
+    assert waves.loss_per_wavelength[0, LOWER_FORWARD] == pytest.approx(lost, rel=1e-3)
+
+
+def test_bands_end_at_the_edges_of_the_gap():
+    """At κ = π/2 both bands end at the gap's edges and stand still; the upper one begins at ω² = Tℓ/Ī."""
+    waves = straight_waves(FREE, TENSION, [np.pi / 2])
+    edges = waves.frequency[0, [LOWER_FORWARD, UPPER_FORWARD]]
+    assert_allclose(edges, band_gap(FREE, TENSION), rtol=1e-9)
+    assert edges[1] / edges[0] == pytest.approx(1.031, abs=5e-4)
+    assert_allclose(waves.group_speed, 0, atol=1e-3)
+    top = straight_waves(FREE, TENSION, [1e-3]).frequency[0, UPPER_FORWARD]
+    inertia = (FREE.inner_inertia + FREE.outer_inertia) / 2
+    assert top == pytest.approx(np.sqrt(TENSION * FREE.link_length / inertia), rel=1e-5)
+
+
+def test_group_speed_is_the_slope_of_the_frequency():
+    """dω/dκ by central differences, with friction, for the straight chain; dω/dn for the ring's neighbours."""
+    step, phases = 1e-3, np.array([0.2, 0.6, 0.9])
+    ahead, behind = (straight_waves(PAPER, TENSION, phases + sign * step) for sign in (1, -1))
+    slope = (ahead.frequency - behind.frequency)[:, LOWER_FORWARD] / (2 * step)
+    assert_allclose(straight_waves(PAPER, TENSION, phases).group_speed[:, LOWER_FORWARD], slope, rtol=1e-4)
+    ring = ring_waves(PAPER, 2000, SPEED, [99, 100, 101])
+    slope = (ring.frequency[2] - ring.frequency[0]) / (ring.phase[2] - ring.phase[0])
+    assert_allclose(ring.group_speed[1, LOWER_BACKWARD], slope[LOWER_BACKWARD], rtol=1e-4)
+
+
+@pytest.mark.parametrize("links", [8, 12, 60])
+@pytest.mark.parametrize("friction", [0.0, 9e-5])
+def test_ring_agrees_with_the_equations_of_motion(links, friction):
+    """The exact ring has the bending modes of the linearised NumPy model, but for what k = 1e9 N/m stretches."""
+    parameters = PAPER.with_values({"viscous_friction": friction})
+    numbers = np.arange(2, links // 4 + 1)
+    waves, modes = ring_waves(parameters, links, SPEED, numbers), ring_modes(links, parameters, SPEED, numbers)
+    assert_allclose(nearest(waves.rate, modes.bending), waves.rate, rtol=2e-5)
+    assert_allclose(nearest(modes.bending, waves.rate), modes.bending, rtol=2e-5)
+
+
+def test_a_large_ring_is_a_straight_chain():
+    """Modes of a ring of 40 000 links are waves of the straight chain under the ring's tension."""
+    links, numbers = 40_000, np.array([2_000, 5_000, 8_000])
+    tension = circular_loop_force(links, PAPER, SPEED)[0]
+    straight = straight_waves(PAPER, tension, 2 * np.pi * numbers / links)
+    ring = ring_waves(PAPER, links, SPEED, numbers)
+    assert_allclose(nearest(straight.rate, ring.rate), straight.rate, rtol=2e-3)
+    assert_allclose(ring.slope[:, LOWER_FORWARD], straight.slope[:, LOWER_FORWARD], rtol=2e-3)
+
+
+def test_long_waves_of_a_ring_are_those_of_the_continuous_ring():
+    """At 60 links a wave and more, frequencies of the continuous ring are right to 0.1 %, damping to 2 %."""
+    numbers = np.array([2, 3, 5])
+    ring = ring_waves(PAPER, 300, SPEED, numbers).rate[:, [LOWER_BACKWARD, LOWER_FORWARD]]
+    continuous = continuous_ring(PAPER, 300, SPEED, numbers)
+    assert_allclose(continuous.imag, ring.imag, rtol=1e-3)
+    assert_allclose(continuous.real, ring.real, rtol=2e-2)
+
+
+def tapped(links, spins, times, parameters=SOFT):
+    """Angles of a ring's links (t, n) [rad] after a tap, less those of the ring that turns on."""
+    position, velocity = tapped_ring(links, parameters, SPEED, spins)
+    motion = warpchain.simulate(
+        parameters,
+        position,
+        velocity,
+        float(times[-1]),
+        times=times,
+        floor=False,
+        gravity=False,
+        self_contact=False,
+        tolerance=1e-8,
+    )
+    assert motion.status == Status.FINISHED
+    turned = ring_spin(parameters, links, SPEED) * times[:, None]
+    angles: np.ndarray = motion.position[:, :, 2] - position[:, 2] - turned
+    return angles
+
+
+def from_tap(links):
+    """Number of each link, counted from link 0 in both directions, (n,)."""
+    return (np.arange(links) + links / 2) % links - links / 2
+
+
+def test_modes_of_a_tapped_ring():
+    """Slow and fast modes of 60 links ring at the rates of theory: frequencies to 0.1 %, damping to 1 %."""
+    links, interval, numbers = 60, 8e-4, np.arange(2, 13)
+    place = from_tap(links)
+    angles = tapped(links, 0.1 * place * np.exp(-(place**2) / 4.5), interval * np.arange(100))
+    wanted = ring_waves(SOFT, links, SPEED, numbers).rate[:, [LOWER_BACKWARD, LOWER_FORWARD]]
+    found = []
+    for number, rates in zip(numbers, wanted, strict=True):
+        instants = min(100, int(-6 / rates[0].real / interval))  # before it has died
+        found.append(fit_rates(mode_amplitudes(angles, number)[:instants], interval, 4))
+    measured = nearest(wanted, np.array(found))
+    assert_allclose(measured.imag, wanted.imag, rtol=1e-3)
+    assert_allclose(measured.real, wanted.real, rtol=1e-2)
+
+
+def test_two_packets_run_at_their_group_speeds():
+    """Waves of 12 links run both ways: places as group speeds say to 0.1 %, amplitudes fall as damping says to 1 %.
+
+    A packet's short waves die first, so its mean speed changes; the packet's own spectrum gives it.
+    """
+    links, number = 180, 15
+    place, times = from_tap(links), np.linspace(0.05, 0.1, 41)
+    spins = 0.1 * np.cos(2 * np.pi * number / links * place) * np.exp(-(place**2) / 200)
+    angles = tapped(links, spins, times)
+    waves = ring_waves(SOFT, links, SPEED, np.arange(2, links // 4 + 1))
+    in_room = []
+    for column in (LOWER_BACKWARD, LOWER_FORWARD):
+        speeds, damping = waves.group_speed[:, column], waves.damping[:, column]
+        guess = speeds[number - 2] * times
+        width = np.minimum(np.abs(guess), links / 2 - np.abs(guess))
+        packets = [find_packet(*each) for each in zip(angles, guess, width, strict=True)]
+        expected = [packet.mean(speeds) * time for packet, time in zip(packets, times, strict=True)]
+        speed = np.polyfit(times, [packet.place for packet in packets], 1)[0]
+        assert speed == pytest.approx(np.polyfit(times, expected, 1)[0], rel=1e-3)
+        assert speed == pytest.approx(speeds[number - 2], rel=0.02)
+        falls = -np.polyfit(times, np.log([packet.amplitude for packet in packets]), 1)[0]
+        assert falls == pytest.approx(np.mean([packet.mean(damping) for packet in packets]), rel=1e-2)
+        in_room.append(1 + speed * SOFT.link_length / SPEED)
+    assert_allclose(in_room, [0.0, 2.0], atol=0.04)
+
+
+@pytest.mark.parametrize("amplitude", [1e-3, 0.1, 1.0, 60.0])
+def test_equivalent_friction_takes_as_much_energy(amplitude):
+    """β_eq W²/2 is the mean power of the NumPy model's friction in a joint that swings with amplitude W."""
+    chain = preset("soft")
+    spin = amplitude * np.cos(2 * np.pi * (np.arange(200_000) + 0.5) / 200_000)
+    power = np.mean(friction_torque(spin, chain) * spin)
+    assert equivalent_friction(chain, amplitude) * amplitude**2 / 2 == pytest.approx(power, rel=1e-4)
+
+
+def test_a_tapped_ring_is_that_of_the_model():
+    """Places and velocities are those of the NumPy model's loop; a spin that would move the ring is left out."""
+    spins = np.random.default_rng(1).normal(size=12)
+    for ours, theirs in zip(tapped_ring(12, SOFT, SPEED, spins), tapped_loop(12, SOFT, SPEED, spins), strict=True):
+        assert_allclose(ours, theirs, rtol=1e-12, atol=1e-12)

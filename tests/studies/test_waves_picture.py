@@ -1,0 +1,195 @@
+"""Waves along a chain: computations on made frames, and the space–time picture."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from studies.waves.fields import (
+    Impact,
+    characteristic,
+    curvatures,
+    floor_contacts,
+    impacts,
+    in_room,
+    joints_below,
+    loop_speeds,
+    normal_velocities,
+    self_contacts,
+    stacked_power,
+    tensions,
+    wave_speeds,
+)
+from studies.waves.picture import waves_figure
+from tests.support.made_walks import make_walk
+from warpchain.walks.walk_result import WalkResult
+
+LINKS = 40
+MASSES = np.tile([0.003, 0.002], LINKS // 2)
+RADIUS = 0.1  # m, of the ring
+LENGTH = 2 * RADIUS * np.sin(np.pi / LINKS)  # m, of a link
+SPEED = 3.0  # m/s, of the ring's joints
+MIDDLE = 0.13  # m, height of the ring's centre
+
+
+def ring(time: np.ndarray, *, speed: float = SPEED, bumps: Any = 0.0) -> np.ndarray:
+    """A ring that turns clockwise and moves on at 1 m/s: joints (f, n, 2); ``bumps`` [m] add to its radius."""
+    angle = -2 * np.pi * np.arange(LINKS) / LINKS - speed / RADIUS * time[:, None]
+    radius = RADIUS + bumps
+    return np.stack([radius * np.cos(angle) + time[:, None], radius * np.sin(angle) + MIDDLE], axis=2)
+
+
+def wave(time: np.ndarray, speed: float, height: float = 1e-3) -> np.ndarray:
+    """A bump [m] that is at joint 10 at time 0 and runs at this speed along the chain, (f, n)."""
+    place = 10 + speed * time[:, None] / LENGTH
+    apart = (np.arange(LINKS) - place + LINKS / 2) % LINKS - LINKS / 2
+    return height * np.exp(-((apart / 2) ** 2))
+
+
+def test_a_ring_has_constant_fields() -> None:
+    """Of a turning ring: curvature 1/R to (π/n)², no velocity across it, its speed along it, the tension put on it."""
+    time = np.linspace(0.0, 0.02, 201)
+    joints = ring(time)
+    center = np.array([0.0, MIDDLE]) + np.stack([time, 0 * time], axis=1)[:, None] * np.array([1.0, 0.0])
+    outward = (joints - center) / RADIUS
+    along = np.stack([outward[..., 1], -outward[..., 0]], axis=2)
+    np.testing.assert_allclose(tensions(joints, 7.0 * along + 2.0 * outward), 7.0, rtol=1e-9)
+    np.testing.assert_allclose(tensions(joints, -7.0 * along), -7.0, rtol=1e-9)
+    np.testing.assert_allclose(curvatures(joints, LENGTH), 1 / RADIUS, rtol=2e-3)
+    np.testing.assert_allclose(curvatures(joints[:, ::-1], LENGTH), 1 / RADIUS, rtol=2e-3)
+    inner = slice(1, -1)  # one-sided differences at both ends are less accurate
+    assert np.abs(normal_velocities(time, joints, MASSES)[inner]).max() < 1e-4 * SPEED
+    np.testing.assert_allclose(loop_speeds(time, joints, MASSES)[inner], SPEED, rtol=1e-4)
+
+
+@pytest.mark.parametrize("speed", [2.2, -2.2])
+def test_a_wave_follows_its_characteristic(speed: float) -> None:
+    """Of bumps that run at a known speed, the crest of the curvature stays on the line; the stack finds the speed."""
+    time = np.linspace(0.0, 0.08, 161)
+    joints = ring(time, bumps=wave(time, speed))
+    bend = curvatures(joints, LENGTH)
+    path = characteristic(time, np.full(161, speed), 0, 10, LENGTH)
+    assert path[-1] - path[0] == pytest.approx(speed * 0.08 / LENGTH)
+    crest = np.argmax(bend, axis=1)
+    apart = (crest - path + LINKS / 2) % LINKS - LINKS / 2
+    assert np.abs(apart).max() <= 0.75
+    ratios = np.arange(-1.5, 1.55, 0.05)
+    power = [stacked_power(bend, ratio * (path - path[0])) for ratio in ratios]
+    assert ratios[np.argmax(power)] == pytest.approx(1.0)
+    assert max(power) > 0.97 and min(power) < 0.2
+    assert stacked_power(bend, path - path[0], (3, 3)) > 0.97 > 0.2 > stacked_power(bend, path[0] - path, (3, 3))
+    assert stacked_power(np.ones((5, LINKS)), np.arange(5.0)) == 0.0
+
+
+def test_in_the_room_one_wave_stands_and_one_runs_twice_as_fast() -> None:
+    """On a ring at v with waves at ±v along the chain, one stays at its place in the room, the other moves at 2v."""
+    time = np.linspace(0.0, 0.05, 101)
+    joints = ring(time, bumps=wave(time, -SPEED))
+    below = joints_below(joints, MASSES)
+    # joints run past the lowest point: the joint below has ever lower numbers
+    np.testing.assert_allclose(np.diff(below).mean(), -SPEED * 0.05 / 100 / LENGTH, rtol=0.02)
+    still = in_room(curvatures(joints, LENGTH), below, 2 * LINKS)
+    crests = np.argmax(still, axis=1)
+    assert np.ptp(crests) <= 2
+    fast = in_room(curvatures(ring(time, bumps=wave(time, SPEED)), LENGTH), below, 2 * LINKS)
+    moved = np.unwrap(np.argmax(fast, axis=1).astype(float), period=2 * LINKS)
+    assert (moved[-1] - moved[0]) / 2 * LENGTH == pytest.approx(2 * SPEED * 0.05, rel=0.03)
+
+
+def test_speed_of_waves() -> None:
+    """c = √(Tℓ/m̄), which is v under the tension m̄v²/ℓ of a ring; no speed under pressure."""
+    tension = np.array([0.0025 * 3.0**2 / LENGTH, 0.0, -4.0])
+    np.testing.assert_allclose(wave_speeds(tension, LENGTH, 0.0025), [3.0, 0.0, 0.0], rtol=1e-12)
+
+
+def test_contacts_and_impacts() -> None:
+    """The floor touches within 2 % of the radius; neighbours do not touch each other; 10 ms without contact end one."""
+    time = np.arange(50) * 1e-3
+    joints = ring(0.0 * time)
+    joints[..., 1] += 1.0
+    assert not floor_contacts(joints, 0.004).any() and not self_contacts(joints, 0.004).any()
+    joints[5:9, 3, 1], joints[12, 7, 1], joints[30, 8, 1], joints[31, 8, 1] = 0.00407, 0.004, 0.003, 0.0041
+    touching = floor_contacts(joints, 0.004)
+    assert list(zip(*np.nonzero(touching), strict=True)) == [
+        *((frame, 3) for frame in (5, 6, 7, 8)),
+        (12, 7),
+        (30, 8),
+    ]
+    assert impacts(time, joints, touching) == [Impact(5, 3, 12, 7), Impact(30, 8, 30, 8)]
+    assert impacts(time, joints, np.zeros_like(touching)) == []
+    outwards = (joints[0] - joints[0].mean(axis=0)) / RADIUS
+    for frame, joint, other, distance in (
+        (20, 30, 10, 0.0081),
+        (21, 11, 10, 0.001),
+        (22, 0, 39, 0.001),
+        (23, 12, 10, 0),
+    ):
+        joints[frame, joint] = joints[frame, other] + distance * outwards[other]
+    assert list(zip(*np.nonzero(self_contacts(joints, 0.004)), strict=True)) == [(20, 10), (20, 30), (23, 10), (23, 12)]
+
+
+def bouncing_ring(interval: float = 2e-4, **changes: Any) -> WalkResult:
+    """A made walk of a ring that is twice at the floor, with a wave and with joint forces."""
+    time = np.arange(0.0, 0.3, interval)
+    joints = ring(time, bumps=wave(time, SPEED))
+    joints[..., 1] += 0.0042 - MIDDLE + RADIUS + 0.02 * np.abs(np.cos(20 * time))[:, None] - 1e-5
+    return make_walk(LINKS, frame_time=time, frame_joints=joints, **changes)
+
+
+def with_forces(walk: WalkResult) -> dict[str, Any]:
+    """Forces of 9 N along the chain, and moments, for all frames of a walk."""
+    joints = walk.frame_joints
+    ahead = np.roll(joints, -1, axis=1) - np.roll(joints, 1, axis=1)
+    forces = 9.0 * ahead / np.linalg.norm(ahead, axis=2, keepdims=True)
+    return {"frame_forces": forces, "frame_moments": np.zeros(joints.shape[:2])}
+
+
+@pytest.mark.parametrize("colour", ["tension", "curvature", "velocity"])
+def test_the_picture(colour: Any) -> None:
+    """Two panels with a colour bar; four characteristics from each impact; nothing lies outside the paper."""
+    walk = bouncing_ring(**with_forces(bouncing_ring()))
+    figure = waves_figure(walk, colour=colour, window=(0.02, 0.28))
+    figure.draw_without_rendering()
+    own, room, bar = figure.axes
+    assert len(own.lines) == len(room.lines) == 8
+    assert len(own.images) == len(room.images) == 1
+    assert own.get_xlim() == pytest.approx((0.02, 0.28), abs=3e-4)
+    assert own.get_ylim() == (-0.5, LINKS - 0.5)
+    length = LINKS * walk.setup.parameters.link_length
+    assert room.get_ylim() == pytest.approx((-length / 2, length / 2))
+    units = {"tension": "N", "curvature": "m$^{-1}$", "velocity": "(m/s)"}
+    assert bar.get_ylabel().endswith(f"/ {units[colour]}")
+    low, high = own.images[0].get_clim()
+    if colour == "tension":
+        assert low < 9.0 < high
+        np.testing.assert_allclose(own.images[0].get_array(), 9.0, rtol=1e-9)
+    if colour == "velocity":
+        assert low == -high
+    for axes, around in ((own, LINKS), (room, length)):  # no contact is drawn across its panel
+        drawn = [segment for lines in axes.collections for segment in lines.get_segments()]
+        assert drawn and max(np.abs(np.diff(segment[:, 1])).max(initial=0.0) for segment in drawn) < around / 2
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert any("sqrt" in text for text in texts) and len(texts) == 4
+    paper = figure.bbox
+    for axes in figure.axes:
+        box = axes.get_tightbbox()
+        assert box is not None
+        assert box.x0 >= 0 and box.y0 >= 0 and box.x1 <= paper.x1 and box.y1 <= paper.y1
+
+
+@pytest.mark.parametrize(
+    ("interval", "given", "message"),
+    [
+        (2e-4, {}, r"joint forces were not recorded; run it again with record_loads, or give colour 'curvature' or"),
+        (
+            2e-4,
+            {"colour": "velocity", "window": (0.5, 0.6)},
+            r"window: fewer than 3 frames .* frames to 0.3 s",
+        ),
+        (5e-3, {"colour": "curvature"}, r"frames are 0.005 s apart, in which a wave runs 1\.\d links; .* of 0.0004 s"),
+    ],
+)
+def test_what_the_picture_lacks_is_said(interval: float, given: dict[str, Any], message: str) -> None:
+    """One line says what is missing and what records it."""
+    with pytest.raises(ValueError, match=message):
+        waves_figure(bouncing_ring(interval), **given)
