@@ -82,7 +82,7 @@ class OtherScene(TypedDict, total=False):
     clearance_of: Literal["spinning", "hanging"]
     sprocket_radius_is: Literal["contact", "pitch"]
     ellipse_aspect: Number
-    settle_time: Number
+    settle_time: Number | None
     spin_up_time: Number
     load_factor: Number | None
     steady_time: Number | None

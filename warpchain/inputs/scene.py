@@ -1,7 +1,6 @@
 """What happens in a walk: how long the chain is, how fast it is spun, from which height it is released."""
 
 import math
-from collections.abc import Mapping
 from typing import Final, Literal, Self
 
 from pydantic import BaseModel, Field, field_validator, model_validator
@@ -26,8 +25,6 @@ LEAST_INERTIA: Final = 0.5
 """Part of its rotary inertia that a link must keep under multiplied loads."""
 FASTEST_TAP: Final = 1e3
 """Greatest speed [m/s] and rate [rad/s] of the plane at the release, far beyond that of any loop."""
-HANGING_SETTLE_TIME: Final = 2.0
-"""Default of `settle_time` [s] where the clearance is that of the hanging chain, which after 0.1 s still swings."""
 LONGEST: Final = 1e6
 """Greatest time, in which numbers still tell a nanosecond, a short step [s]."""
 
@@ -76,8 +73,13 @@ class Scene(BaseModel):
         description="what sprocket_radius measures: where circles touch (contact) or joints ride (pitch)",
     )
     ellipse_aspect: float = number_field(1.5, "1", "height over width of the starting ellipse", ge=0.05, le=20)
-    settle_time: float = number_field(
-        0.1, "s", "time for the chain to settle on the sprocket at rest; 2 with clearance_of: hanging", ge=0, le=LONGEST
+    settle_time: float | None = number_field(
+        None,
+        "s",
+        "time for the chain to settle on the sprocket at rest; null: 0.1, or 2 if the clearance is measured at the "
+        "chain that hangs there, which swings for longer",
+        ge=0,
+        le=LONGEST,
     )
     spin_up_time: float = number_field(0.3, "s", "time in which the sprocket reaches its frequency", gt=0, le=LONGEST)
     load_factor: float | None = number_field(
@@ -141,13 +143,6 @@ class Scene(BaseModel):
         le=FASTEST_TAP,
     )
 
-    @model_validator(mode="before")
-    @classmethod
-    def _hanging_chain_comes_to_rest(cls, values: object) -> object:
-        if isinstance(values, Mapping) and values.get("clearance_of") == "hanging" and "settle_time" not in values:
-            return {**values, "settle_time": HANGING_SETTLE_TIME}
-        return values
-
     @field_validator("links")
     @classmethod
     def _links_even(cls, links: int) -> int:
@@ -173,6 +168,15 @@ class Scene(BaseModel):
                 "give 'spinning' here, or start: rest",
             )
         return self
+
+
+def settling_time(scene: Scene) -> float:
+    """Time [s] for which the chain settles on the sprocket before that turns; 0 unless it starts at rest."""
+    if scene.start != "rest":
+        return 0.0
+    if scene.settle_time is not None:
+        return scene.settle_time
+    return 2.0 if scene.clearance_of == "hanging" else 0.1
 
 
 def joint_radius(scene: Scene, parameters: Parameters) -> float:

@@ -24,7 +24,7 @@ from warpchain.engine.control import (
 )
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import contact_radius, joint_radius, loop_speed
+from warpchain.inputs.scene import contact_radius, joint_radius, loop_speed, settling_time
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
 from warpchain.inputs.validation import InputError
@@ -118,7 +118,7 @@ class WalkRun:
             loaded_softness = hold_softness(parameters, tension + load_factor * weight, LOADED_STRAIN)
         period = scene.links * parameters.link_length / speed if speed > 0 else STILL_PERIOD
         batch.set_chain(world, parameters, scene.links, contact_radius(scene, parameters))
-        self._settled = scene.settle_time if from_rest else 0.0
+        self._settled = settling_time(scene)
         spin_up = scene.spin_up_time if from_rest and speed > 0 else 0.0
         self._at_full_speed = self._settled + spin_up
         start_speed = 0.0 if from_rest else speed
