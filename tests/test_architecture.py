@@ -213,7 +213,7 @@ def test_imports_go_downwards() -> None:
         ("walks.walk_phases", "run.single_walk", "not downwards"),
         ("pictures.style", "walks.walk_result", "not downwards"),
         ("engine.batch", "pictures.style", "not downwards"),
-        ("reports.panels", "bench.places", "not downwards"),
+        ("reports.grids", "bench.places", "not downwards"),
         ("run.single_walk", "oracle.motion_equations", "only bench may"),
         ("walks.scheduler", "kernels.cpu.loop", "only engine may"),
         ("kernels.cpu.loop", "kernels.gpu.stage", "not downwards"),

@@ -249,7 +249,7 @@ CLAIMS: Final = (
     ),
     Claim(
         "A planar chain walks about as far as one that falls over",
-        "[tilting plane](../../docs/tilting-plane.md#does-the-distance-change)",
+        "[tilting plane](../tilting_plane/README.md)",
         findings.stated(
             "a tilt of 0.001 rad at the release lengthens Δx by 1.0 ± 0.2 %, 0.01 rad by 2.7 %, 0.1 rad by 8 %", AGREES
         ),

@@ -417,7 +417,7 @@ def test_plot_draws_another_quantity(compared: Path, tmp_path: Path, capsys: pyt
     assert run_plot(compared, "-o", tmp_path, "--quantity", "walk_time") == 0
     written = capsys.readouterr().out.split()
     assert written == [str(path) for path in tmp_path.iterdir()]
-    assert [Path(path).name for path in written] == ["against_links_and_frequency_and_tolerance_walk_time.png"]
+    assert [Path(path).name for path in written] == ["against_tolerance_walk_time.png"]
     assert run_plot(compared, "-o", tmp_path) == 0
     assert [Path(path).name for path in capsys.readouterr().out.split()] == ["tolerance.png", "status_counts.png"]
 
@@ -439,3 +439,20 @@ def test_results_have_statistics_of_all_blocks(tmp_path: Path) -> None:
     assert list(result.cell_statistics()) == ["a", "b"]
     assert list(result.cell_statistics("floor_friction_drawn")) == ["b"]
     assert list(panels(result.plot(quantity="floor_friction_drawn"))) == [""]
+
+
+def test_a_third_quantity_runs_along_x(tmp_path: Path) -> None:
+    """Beside links and frequency: a panel for each frequency, a line for each number of links, each through its means.
+
+    Panels whose values are far apart have y axes of their own, which begin at zero.
+    """
+    grid = {"links": [60, 120], "frequency": [10, 20, 30], "floor_friction": FRICTION}
+    result = make_sweep(tmp_path, sweep(grid), lambda walk: walk.setup.scene.frequency**2 + walk.sample)
+    (picture,) = [each for each in figures(result) if each.name == "against_floor_friction"]
+    panels = [axes for axes in picture.figure.axes if axes.get_title(loc="left")]
+    assert [axes.get_title(loc="left") for axes in panels] == [f"$ν$ = {f} Hz" for f in (10, 20, 30)]
+    means = result.statistics().mean
+    for column, axes in enumerate(panels):
+        np.testing.assert_array_equal([line.get_ydata() for line in axes.lines], means[:, column])
+        low, high = axes.get_ylim()
+        assert low == 0 and means[:, column].max() < high < 1.2 * means[:, column].max()

@@ -42,6 +42,9 @@ _DECADES: Final = 30
 _DEEP, _LIGHT = 0.35, 0.13
 """Opacity of the bands of one standard error and one standard deviation."""
 
+_MOST_APART: Final = 3
+"""Panels have y axes of their own if the greatest value of one is at least so many times that of another."""
+
 _PANEL_SIZES: Final = {1: (5.2, 3.6), 2: (3.6, 2.9), 3: (3.0, 2.6), 4: (2.6, 2.4)}
 """Number of columns → width and height of a panel [inches]."""
 
@@ -89,10 +92,13 @@ def draw_grid(
     columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
     figure = InlineFigure(figsize=_size(panels, columns), layout="constrained") if figure is None else figure
     alike = _are_alike(panels)
-    sharey = alike or all(panel.kind == "lines" for panel in panels)
+    apart = _are_apart(panels)
+    sharey = (alike or all(panel.kind == "lines" for panel in panels)) and not apart
     areas, _ = panel_grid(figure, len(panels), columns, sharex=alike, sharey=sharey)
     _draw_panels(areas, panels, label)
-    _set_limits(areas, panels)
+    drawn = list(zip(areas, panels, strict=True))
+    for group in [[one] for one in drawn] if apart else [drawn]:
+        _set_limits(*zip(*group, strict=True), from_zero=apart)
     _label(figure, areas, panels, label)
     if left_out:
         figure.suptitle(
@@ -245,8 +251,8 @@ def _draw_maps(maps: Sequence[tuple[Axes, Panel]], label: str, *, with_numbers: 
     areas[0].figure.colorbar(image, ax=areas, label=label).outline.set_visible(False)
 
 
-def _set_limits(areas: Sequence[Axes], panels: Sequence[Panel]) -> None:
-    """Give all lines the same y axis, from zero if the values need more than half of that."""
+def _set_limits(areas: Sequence[Axes], panels: Sequence[Panel], *, from_zero: bool) -> None:
+    """Give all lines the same y axis, from zero if that is asked for or the values need more than half of that."""
     ends = [
         [panel.mean - half, panel.mean + half]
         for panel in panels
@@ -256,7 +262,7 @@ def _set_limits(areas: Sequence[Axes], panels: Sequence[Panel]) -> None:
     if not ends or not np.isfinite(known := np.concatenate(ends, axis=None)).any():
         return
     low, high = np.nanmin(known), np.nanmax(known)
-    if 0 <= low < 0.5 * high:
+    if 0 <= low < 0.5 * high or (0 <= low and from_zero):
         low = 0.0
     margin = 0.05 * (high - low)
     for axes, panel in zip(areas, panels, strict=True):
@@ -281,6 +287,12 @@ def _label(figure: Figure | SubFigure | None, areas: Sequence[Axes], panels: Seq
         figure.supxlabel(across, fontsize="medium")
     if figure is not None and (alike or all_lines):
         figure.supylabel(rows, fontsize="medium")
+
+
+def _are_apart(panels: Sequence[Panel]) -> bool:
+    """Whether lines of one panel would be flat on the y axis of another."""
+    tops = [np.nanmax(np.abs(panel.mean)) for panel in panels if np.isfinite(panel.mean).any()]
+    return all(panel.kind == "lines" for panel in panels) and max(tops) >= _MOST_APART * min(tops)
 
 
 def _are_alike(panels: Sequence[Panel]) -> bool:

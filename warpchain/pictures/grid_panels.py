@@ -1,7 +1,7 @@
 """How a grid of any number of axes becomes panels of lines or maps.
 
 The longest axis of numbers runs along x. The next one gives the lines, or the rows of a map if both have many values;
-all other axes give panels.
+all other axes give panels. What varies beside links and frequency runs along x, with a line for each number of links.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -182,6 +182,10 @@ def _panels(cells: Cells, kind: Kind | None, block: str) -> Iterator[Panel]:
 
 def _roles(axes: Sequence[Axis], kind: Kind | None) -> tuple[Kind, Axis, Axis | None, list[Axis]]:
     """What the axes of a grid become: kind, x axis, lines or rows, panels."""
+    named = {axis.name: axis for axis in axes}
+    third = [axis for axis in axes if axis.name not in ("links", "frequency")]
+    if kind != "map" and len(axes) == 3 and len(third) == 1 and third[0].is_numeric:
+        return "lines", third[0], named["links"], [named["frequency"]]
     across = max(reversed(axes), key=lambda axis: (axis.is_numeric, len(axis.values)))
     others = sorted((axis for axis in axes if axis is not across), key=lambda axis: len(axis.values))
     along = others.pop() if others else None

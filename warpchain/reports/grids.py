@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from warpchain.pictures.grid_figure import draw_grid
 from warpchain.pictures.labels import quantity_name
 from warpchain.pictures.style import NothingToShow, Picture
-from warpchain.reports.panels import third_axis
 from warpchain.reports.statistics import tolerance_agreement
 from warpchain.reports.sweep_series import has_series, several
 from warpchain.store.sweep_result import BlockResult, SweepResult
@@ -19,7 +18,7 @@ from warpchain.walks.rows import quantity_of
 def grid_pictures(result: SweepResult, quantity: str = "dx") -> Iterator[Callable[[SweepResult], Picture]]:
     """What draws the figures: one for all blocks that vary one quantity, one for each set of several axes.
 
-    Of the distance there are none of blocks that other figures show: Figure 6, third quantities, tolerances.
+    Of the distance there are none of blocks that other figures show: Figure 6, tolerances.
 
     Raises:
         InputError: there is no such column.
@@ -52,6 +51,9 @@ def grid_picture(result: SweepResult, quantity: str, blocks: list[str]) -> Pictu
     name, over = "against_" + "_and_".join(varied), f"{', '.join(words)} and {last}"
     if len(varied) == 1:
         name, over = "responses", "the one quantity that a block varies"
+    third = [each for each in varied if each not in ("links", "frequency")]
+    if len(varied) == 3 and len(third) == 1 and result.blocks[blocks[0]].axes[third[0]].dtype.kind in "if":
+        name, over = f"against_{third[0]}", f"{quantity_name(third[0])}, by links and frequency"
     text = quantity_name(quantity_of(quantity))
     those = "" if quantity == "dx" else " that have it"
     caption = f"{text[:1].upper()}{text[1:]} against {over}: means of the walks at rest{those}."
@@ -66,6 +68,4 @@ def named(name: str, quantity: str) -> str:
 def _has_own_figure(block: BlockResult, *, compared: bool) -> bool:
     """Whether a figure that only the distance has shows a block; `compared`: whether tolerances are."""
     varied = several(block)
-    in_figure6 = has_series(block) and "frequency" in varied
-    in_panels = third_axis(block) is not None and len(varied) > 1
-    return in_figure6 or in_panels or (compared and "tolerance" in varied)
+    return (has_series(block) and "frequency" in varied) or (compared and "tolerance" in varied)

@@ -42,7 +42,6 @@ from warpchain.pictures.style import (
 )
 from warpchain.reports.figure5 import sweep_figure5
 from warpchain.reports.grids import grid_pictures, named
-from warpchain.reports.panels import panels, third_quantities
 from warpchain.reports.statistics import CONFIDENCE, sensitivities, tolerance_agreement
 from warpchain.reports.sweep_series import Series, all_series
 from warpchain.status import Status
@@ -72,8 +71,7 @@ def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
     draws: list[Callable[[SweepResult], Picture]] = [partial(heat_map, quantity=quantity)]
     last: list[Callable[[SweepResult], Picture]] = []
     if quantity == "dx":
-        against = [partial(panels, quantity=third) for third in third_quantities(result)]
-        draws = [figure6, sweep_figure5, *draws, *against, tolerance, sensitivity]
+        draws = [figure6, sweep_figure5, *draws, tolerance, sensitivity]
         last = [status_counts]
     for draw in (*draws, *grid_pictures(result, quantity), *last):
         with suppress(NothingToShow):
