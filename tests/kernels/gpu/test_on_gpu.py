@@ -104,10 +104,10 @@ def test_a_walk_gives_the_same_bits_in_any_batch(device: str, method: str, monke
 
 
 @pytest.mark.usefixtures("gpu")
-@pytest.mark.parametrize("method", ["explicit", "os32", "rkf78", "dp5", "bs32"])
+@pytest.mark.parametrize("method", ["explicit", "rkf78", "dp5", "bs32"])
 def test_a_walk_gives_the_same_bits_in_any_block(method: str) -> None:
     """In the block of its own size, or in one that it shares with the longest chain, see `shared_threads`."""
-    setups = [brief_setup(links, links=links, device="cuda", method=method) for links in (30, 60, 90, 120, 150, 180)]
+    setups = [brief_setup(links, links=links, device="cuda", method=method) for links in (30, 90, 180)]
     assert outcomes(setups, threads=192) == outcomes(setups)
 
 
