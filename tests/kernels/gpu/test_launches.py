@@ -36,6 +36,7 @@ def piles(method: str) -> Batch:
     batch.control.skin = 2e-4
     batch.control.soften_area = 0.998
     batch.control.soft_stiffness, batch.control.soft_damping, batch.control.soft_smoothing = 1e6, 10.0, 1.0
+    batch.control.pile_push = 20.0  # circles of these heaps overlap by millimetres
     batch.set_chain(0, SOFT.with_values({"link_length": SOFT.link_length * (1 + 1e-4)}), LINKS)
     batch.state.step.numpy()[:] = FIXED_STEP
     return batch
