@@ -40,21 +40,24 @@ def quick_walk(tmp_path_factory: pytest.TempPathFactory) -> tuple[Answer, Path]:
 
 
 def test_help_is_quick_and_complete(tmp_path: Path) -> None:
-    """Help comes from the real entry point in half a second of computing, and names every option.
+    """Help comes from the real entry point and names every option, hardly later than the libraries that it is made with.
 
     Of three times the least counts: on a busy machine one can take twice as long.
     """
-    computed = []
+    computed, libraries = [], []
     for _ in range(3):
         before = os.times()
         answer = process("walk", "--help", folder=tmp_path)
+        between = os.times()
+        subprocess.run([sys.executable, "-c", "import pydantic, typer, rich.console, rich.table"], check=True)
         after = os.times()
-        computed.append(after.children_user + after.children_system - before.children_user - before.children_system)
+        for times, first, last in ((computed, before, between), (libraries, between, after)):
+            times.append(last.children_user + last.children_system - first.children_user - first.children_system)
     assert answer.status == 0 and answer.err == ""
     options = "links frequency preset method tol device start set seed json output animate config frame-interval"
     for option in options.split():
         assert f"--{option} " in answer.out
-    assert min(computed) < 0.5
+    assert min(computed) < 4.5 * min(libraries)
 
 
 def test_help_tells_the_defaults(command: Command) -> None:
@@ -75,8 +78,8 @@ def test_help_tells_the_defaults(command: Command) -> None:
         assert type(default)(match[1]) == default
     method = re.search(r"--method .*?Default: (\S+)\.(?: |$)", words)[1]
     assert options == Options(method=method)
-    assert f"{method}: {options.method} at 1e-3, joints softened on the sprocket and in the pile" in words
-    assert (options.tolerance, options.soften_drive, options.soften_pile) == (1e-3, True, True)
+    assert f"{method}: {options.method} at 3e-3, joints softened on the sprocket and in the pile" in words
+    assert (options.tolerance, options.soften_drive, options.soften_pile) == (3e-3, True, True)
     assert all(f"{name}: {title}" in words for name, title in METHODS.items())
     assert "Default: that of the word, 1e-6 for an integrator, 1e-4 for hybrid." in words
     assert Options(method="rkf78") == Options(method="reference")

@@ -180,8 +180,8 @@ def walk(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="standard: hybrid at 1e-3, joints softened on the sprocket and in the pile, on a GPU the next; "
-            "explicit: os32 at 1e-3, softened likewise; reference: rkf78 at 1e-6, as in the paper; or an integrator, "
+            help="standard: hybrid at 3e-3, joints softened on the sprocket and in the pile, on a GPU the next; "
+            "explicit: os32 at 3e-3, softened likewise; reference: rkf78 at 1e-6, as in the paper; or an integrator, "
             f"{'; '.join(f'{name}: {title}' for name, title in METHODS.items())}. Default: standard.",
             autocompletion=completions.methods,
         ),

@@ -69,8 +69,8 @@ def walk(
         frequency: Turns of the sprocket per second [Hz]; None: 15.
         preset: None or ``"paper"`` (Table 1), or ``"soft"`` (softer joints, with ``reference`` 10 to 15
             times fewer steps).
-        method: None or ``"standard"`` (``"hybrid"`` at 1e-3, with joints softened on the sprocket and in the pile; on a
-            GPU, and with ``record_loads``, the next), ``"explicit"`` (``"os32"`` at 1e-3, softened likewise),
+        method: None or ``"standard"`` (``"hybrid"`` at 3e-3, with joints softened on the sprocket and in the pile; on a
+            GPU, and with ``record_loads``, the next), ``"explicit"`` (``"os32"`` at 3e-3, softened likewise),
             ``"reference"`` (``"rkf78"`` at 1e-6, as in the paper), or an integrator: a key of
             ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
         tolerance: Error allowed in a step, absolute (SI units) and relative alike; None: the method's, 1e-6 for an
