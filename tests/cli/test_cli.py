@@ -40,7 +40,7 @@ def quick_walk(tmp_path_factory: pytest.TempPathFactory) -> tuple[Answer, Path]:
 
 
 def test_help_is_quick_and_complete(tmp_path: Path) -> None:
-    """Help comes from the real entry point and names every option, hardly later than the libraries that it is made with.
+    """Help comes from the real entry point and names every option, hardly later than the libraries that it needs.
 
     Of three times the least counts: on a busy machine one can take twice as long.
     """
