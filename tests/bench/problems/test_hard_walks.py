@@ -61,13 +61,15 @@ def test_longest_slow_walk_ends_in_a_pile_at_rest(method: str, links: int, toler
 def test_chain_dropped_without_spin_rests_below(name: str, links: int, method: str) -> None:
     """An upright ellipse at rest drops, collapses and rests within a few centimetres of where it hung.
 
-    With the settings of explicit, for at 1e-6 and on stiff joints a pile takes minutes; but tolerances of 1e-3 are made
-    for os32, which hybrid has as well. The implicit method, the slowest on stiff joints of a pile, has the longer chain
-    on soft ones only.
+    With the settings of explicit but tighter tolerances, which close the ledger to 1e-3; at 1e-6 and on stiff joints a
+    pile takes minutes. The implicit method, the slowest on stiff joints of a pile, has the longer chain on soft ones
+    only.
     """
     settings = {**METHODS_BY_NEED["explicit"], "flight_tolerance": 1e-4 if method == "hybrid" else 1e-3}
     del settings["method"]
-    if method not in ("os32", "hybrid"):
+    if method in ("os32", "hybrid"):
+        settings |= {"tolerance": 1e-3, "soft_tolerance": 3e-3}
+    else:
         settings |= {"tolerance": 1e-4, "soft_tolerance": 1e-4}
     done = walked(name, method, 1e-3, links=links, **settings)
     assert done.bounces >= 1
