@@ -234,16 +234,8 @@ def reason(error: OSError) -> str:
     return os.strerror(error.errno) if error.errno else " ".join(str(error).split())
 
 
-def version_refusal(found: int, known: int, remedy: str) -> str | None:
-    """Why a file of one format version is refused where another is known; None if they are equal.
-
-    Args:
-        found: version of the file.
-        known: version that this warpchain reads.
-        remedy: how to get an older file's content in this version.
-    """
-    if found == known:
-        return None
-    if found > known:
-        return f"format version {found}, but this warpchain reads {known}; update warpchain"
-    return f"format version {found}, but this warpchain reads {known}; {remedy}, or use the warpchain that wrote it"
+def unreadable(path: str | os.PathLike[str], error: OSError) -> OSError:
+    """One line for what the system refused to read, of the same class."""
+    problem = type(error)(f"{path}: cannot be read ({reason(error)}); give the path of a readable file")
+    problem.errno = error.errno
+    return problem

@@ -21,8 +21,9 @@ from warpchain.pictures.labels import axis_symbol, cell_text, cell_values, numbe
 from warpchain.pictures.walk_shape import Walk
 from warpchain.reports.html_page import page, pages_of, picture, table
 from warpchain.status import Status
+from warpchain.store.block_result import BlockResult
 from warpchain.store.manifest import Folder, check_not_own
-from warpchain.store.sweep_result import BlockResult, SweepResult, load
+from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import load_sweep
 from warpchain.sweeps.recording import Recording
 from warpchain.version import VERSION

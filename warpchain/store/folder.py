@@ -2,20 +2,21 @@
 
     DIR/sweep.json     what the folder belongs to, see `Manifest`; written first, replaced when the sweep grows
     DIR/sweep.yaml     the resolved sweep, for people and to run again
-    DIR/shards/        000000000-000000063.h5 holds walks 0 … 63, and their series and frames if they are kept
+    DIR/shards/        0-000003.h5 holds the rows of some walks, 0-000003-motion.h5 what is kept of their motion
     DIR/log.txt        what the runs of the sweep did, with times
     DIR/lock           locked by the process that runs the sweep; the system unlocks it when that ends
 
 None of these is a symbolic link when a sweep is run: nothing is written or deleted outside of the folder. A damaged
 shard is deleted, named in log.txt and by a warning, and computed again.
 
-A sweep grows when its file is given more samples: the walks that are there keep their shards, see
+A sweep grows when its file is given more samples: the shards that are there stay, 1-000000.h5 and so on join them, see
 `warpchain.store.manifest`. Whatever happens between two of these lines, the next `SweepFolder.open` goes on from there.
 """
 
 import datetime
 import errno
 import fcntl
+import math
 import os
 import re
 import secrets
@@ -35,19 +36,20 @@ import yaml
 from warpchain.files import failure, given_path
 from warpchain.hdf5_files import open_regular
 from warpchain.inputs.validation import DamagedFileError, InputError, InputWarning
-from warpchain.store.manifest import NUMERICS_VERSION, OWN, Folder, Manifest, read_manifest
-from warpchain.store.shards import present_shards, put_file, read_shard, writing
+from warpchain.store.manifest import OWN, Folder, Manifest, Shard, read_manifest
+from warpchain.store.shards import check_shard, present_shards, put_file, read_shard, stamp, writing
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
-from warpchain.walks.motion import SERIES
+from warpchain.version import NUMERICS_VERSION
 from warpchain.walks.rows import Rows
+from warpchain.walks.walk_result import MOTION
 
 SHARD_OVERHEAD: Final = 16 * 1024
 """Bytes that a shard takes at most beside its rows."""
 
 SHORT_WALK: Final = 0.5
 """Time [s] that few walks are shorter than."""
-SAMPLE_BYTES: Final = 8 * len(SERIES)
+SAMPLE_BYTES: Final = 8 * sum(math.prod(kept.sizes({"t": 1})) for kept in MOTION.values() if kept.sample is not None)
 """Bytes of a sample of a series."""
 
 LOCK_TRIES: Final = 5
@@ -55,7 +57,7 @@ LOCK_TRIES: Final = 5
 LOCK_PAUSE: Final = 0.02
 """Time [s] between two of them."""
 
-_PART: Final = re.compile(r"\.(?:sweep|\d{9,}-\d{9,})\.[0-9a-f]{8}\.part\.(?:json|yaml|h5)")
+_PART: Final = re.compile(r"\.(?:sweep|\d+-\d{6,}(?:-motion)?)\.[0-9a-f]{8}\.part\.(?:json|yaml|h5)")
 _DISCARDED: Final = re.compile(r"\.discarded-[0-9a-f]{8}")
 
 _HOLDER: Final = re.compile(r"process \d+ on \S*")
@@ -83,6 +85,11 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
     directory: Path
     manifest: Manifest
     lock: int
+
+    @property
+    def stamp(self) -> str:
+        """What `write_shard` wants of a worker."""
+        return stamp(self.directory)
 
     @classmethod
     def open(cls, directory: Folder, sweep: Sweep, *, fresh: bool = False, shard_size: int) -> Self:
@@ -130,10 +137,10 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             with open(descriptor, "a", encoding="utf-8") as file:
                 file.write(f"{now}  {text}\n")
 
-    def missing(self) -> list[range]:
-        """The places of each shard that is not there yet, in order; errors as of `present_shards`."""
-        present = present_shards(self.directory, self.manifest)
-        return [places for places in self.manifest.shards if places not in present]
+    def missing(self) -> list[Shard]:
+        """The shards that are not there yet, in order; errors as of `present_shards`."""
+        present = {shard.name for shard in present_shards(self.directory, self.manifest)}
+        return [shard for shard in self.manifest.shards if shard.name not in present]
 
     def close(self) -> None:
         """Let other processes have the folder."""
@@ -146,33 +153,35 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
     def _check(self) -> None:
         """Refuse what would fail later: foreign shards, a folder that cannot be written, a disk too full."""
         problems, bad = [], {}
-        for places, path in present_shards(self.directory, self.manifest).items():
+        for shard in present_shards(self.directory, self.manifest):
             try:
-                read_shard(self.directory, self.manifest, places)
+                check_shard(self.directory, shard)
             except DamagedFileError as error:
-                bad[path] = str(error).partition("; ")[0]
+                bad[shard] = str(error).partition("; ")[0]
             except InputError as error:
                 problems.append(str(error))
         if problems:
             raise InputError(problems[0] + (f" (and {len(problems) - 1} more)" if problems[1:] else ""))
-        for path, problem in bad.items():
-            with writing(path):
-                path.unlink()
+        for shard, problem in bad.items():
+            for name in reversed(shard.files):
+                path = self.directory / "shards" / name
+                with writing(path):
+                    path.unlink()
             self.log(f"{problem}; deleted, its walks are computed again")
             warnings.warn(f"{problem}; its walks are computed again", InputWarning, stacklevel=4)
         left = self.missing()
         if not left:
             return
         shards = self.directory / "shards"
-        probe = shards / f".{'0' * 9}-{'0' * 9}.{secrets.token_hex(4)}.part.h5"
+        probe = shards / f".0-000000.{secrets.token_hex(4)}.part.h5"
         with writing(shards):
             probe.touch()
             probe.unlink()
             free = shutil.disk_usage(shards).free
-        manifest, series = self.manifest, self.manifest.recording.series
-        need = sum(len(places) * manifest.row_type.itemsize + SHARD_OVERHEAD for places in left)
-        if series is not None:  # of short walks, and without frames
-            kept = sum(map(len, left)) / manifest.walk_count * manifest.kept_count
+        need = sum(len(shard) * shard.kind.itemsize + SHARD_OVERHEAD for shard in left)
+        if (series := self.manifest.recording.series) is not None:  # of short walks, and without frames
+            samples = np.concatenate([shard.keys["sample"] for shard in left])
+            kept = len(samples) if series.samples is None else int(np.isin(samples, series.samples).sum())
             need += round(kept * SHORT_WALK / series.interval * SAMPLE_BYTES)
         if need > free:
             raise failure(
@@ -184,12 +193,14 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
     def _describe(self) -> None:
         """Write what the folder says of its sweep, if that is new; sweep.yaml is never older than sweep.json."""
         description = self.directory / "sweep.yaml"
-        if read_manifest(self.directory).earlier != self.manifest.earlier:
+        if read_manifest(self.directory).growth != self.manifest.growth:
             with writing(description):
                 description.unlink(missing_ok=True)
             put_file(self.directory / "sweep.json", self.manifest.text().encode())
         if not description.exists():
-            dumper = _FAST_DUMPER if self.manifest.name.isascii() else yaml.SafeDumper  # they fold other text otherwise
+            dumper = (
+                _FAST_DUMPER if self.manifest.sweep["name"].isascii() else yaml.SafeDumper
+            )  # they fold other text otherwise
             text = yaml.dump(self.manifest.sweep, Dumper=dumper, sort_keys=False, allow_unicode=True)
             put_file(description, (_YAML_HEAD + text).encode())
 
@@ -201,12 +212,9 @@ def read_rows(directory: Folder, manifest: Manifest) -> Rows:
         OSError: the folder or a shard cannot be read.
         InputError: a shard is damaged or foreign.
     """
-    parts = [np.empty(0, manifest.row_type)]
-    for places in present_shards(directory, manifest):
-        parts.append(read_shard(directory, manifest, places))
-        parts[-1]["index"] = manifest.walks(places)
-    rows = np.concatenate(parts)
-    return rows[np.argsort(rows["index"])]
+    shards = present_shards(directory, manifest)
+    rows = np.concatenate([np.empty(0, manifest.row_type), *(read_shard(directory, shard) for shard in shards)])
+    return rows[np.argsort(manifest.numbers(rows))]
 
 
 def running_rate(directory: Folder) -> float | None:
@@ -224,7 +232,8 @@ def running_rate(directory: Folder) -> float | None:
             began = os.fstat(lock.fileno()).st_mtime
             fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
-        done = sum(len(places) for places, path in present.items() if path.stat().st_mtime >= began)
+        folder = Path(directory) / "shards"
+        done = sum(len(shard) for shard in present if (folder / shard.name).stat().st_mtime >= began)
         return done / max(time.time() - began, 1e-3)
     except FileNotFoundError:
         pass
@@ -269,10 +278,10 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
         )
     if found.digest == manifest.digest:
         return found
-    there = [block["samples"] for block in found.sweep["blocks"]]
+    there = list(found.growth[-1].samples)
     if len(there) != len(sweep.blocks) or sweep.digest(there) != found.digest:
         raise InputError(
-            f"{folder}: holds another sweep ({found.name}), or this one before it was changed; "
+            f"{folder}: holds another sweep ({found.sweep['name']}), or this one before it was changed; "
             "give another folder, or start anew with --fresh, which deletes what is there"
         )
     for count, block in zip(there, manifest.sweep["blocks"], strict=True):
