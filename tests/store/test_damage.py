@@ -187,14 +187,3 @@ def test_links_in_a_folder_are_not_followed(tmp_path: Path, name: str, fresh: bo
     shutil.move(kept, folder / name)
     run(folder, fresh=fresh)
     assert load(folder).missing_count == 0
-
-
-def test_a_discarded_link_does_not_stick(tmp_path: Path) -> None:
-    """A link of that name is removed, not what it leads to."""
-    run(tmp_path / "sweep")
-    (tmp_path / "mine").mkdir()
-    (tmp_path / "mine/notes.txt").write_text("mine")
-    (tmp_path / "sweep/.discarded-01234567").symlink_to(tmp_path / "mine")
-    run(tmp_path / "sweep")
-    assert not os.path.lexists(tmp_path / "sweep/.discarded-01234567")
-    assert (tmp_path / "mine/notes.txt").read_text() == "mine"

@@ -3,7 +3,6 @@
 import os
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,12 +14,11 @@ from tests.support.sweep_content import UNIFORM, blocks, content
 from tests.support.synthetic_sweep import content as files
 from warpchain.cli.main import main
 from warpchain.inputs.validation import InputError
-from warpchain.store.folder import SweepFolder
 from warpchain.store.manifest import read_manifest
 from warpchain.store.merged_file import merge
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.designs import EXTENSIBLE, SAMPLERS
-from warpchain.sweeps.plan import PlannedWalk, load_sweep
+from warpchain.sweeps.plan import PlannedWalk
 
 
 def two_blocks(first: int, second: int, **changes: Any) -> dict[str, Any]:
@@ -174,14 +172,3 @@ def test_samples_that_do_not_grow_are_refused(
     error = capsys.readouterr().err.strip()
     assert "but a latin_hypercube of 8 samples has other points; give samples: 4" in error and "\n" not in error
     assert files(tmp_path / "sweep") == before
-
-
-def test_a_folder_that_cannot_grow_stays_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Growth on a disk without room for it is refused, and the folder still takes the sweep that it has."""
-    make_sweep(tmp_path, content(samples=4), drawn_distance)
-    before = files(tmp_path)
-    with monkeypatch.context() as patched, pytest.raises(OSError, match="make room"):
-        patched.setattr("shutil.disk_usage", lambda folder: SimpleNamespace(free=10**6))
-        SweepFolder.open(tmp_path, load_sweep(content(samples=2**20)), shard_size=10**9)
-    assert files(tmp_path) == before
-    make_sweep(tmp_path, content(samples=4), drawn_distance)

@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import h5py
@@ -23,14 +22,12 @@ from tests.support.made_walks import assert_same
 from warpchain.engine.memory import CAPACITY_SAMPLES
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.pictures.style import NothingToShow
-from warpchain.reports.figure5 import MOST_CELLS, sweep_figure5
+from warpchain.reports.figure5 import sweep_figure5
 from warpchain.reports.sweep_page import write_report
 from warpchain.run.sweep_run import sweep
-from warpchain.store.folder import SweepFolder
 from warpchain.store.merged_file import merge
 from warpchain.store.shards import write_shard
 from warpchain.store.sweep_result import SweepResult, load
-from warpchain.sweeps.plan import load_sweep
 from warpchain.walks.motion import Keep
 from warpchain.walks.scheduler import run_setups
 
@@ -239,16 +236,6 @@ def test_damage_to_a_motion_is_seen(kept: Path, tmp_path: Path) -> None:
     assert data_of(tmp_path) == data_of(kept)
 
 
-def test_a_disk_too_small_for_series_is_said_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Series are in the estimate of the room that a sweep takes."""
-    monkeypatch.setattr("shutil.disk_usage", lambda folder: SimpleNamespace(free=4 * 10**9))
-    huge = TINY | {"samples": 2**20}
-    SweepFolder.open(tmp_path / "rows", load_sweep(huge), shard_size=256).close()
-    huge |= {"record": {"series": True}}
-    with pytest.raises(OSError, match=r"the rest of the sweep takes .* MB, but .* MB are free"):
-        SweepFolder.open(tmp_path, load_sweep(huge), shard_size=256)
-
-
 def test_a_merged_file_has_the_motions(kept: Path, tmp_path: Path) -> None:
     """Walks of a merged file are those of the folder, and every array has its unit; merging again gives equal bytes."""
     for name in ("one.h5", "two.h5"):
@@ -303,16 +290,6 @@ def test_figure5_of_a_sweep_shows_the_kept_series(kept: Path) -> None:
     assert "8 walks in 4 of 4 cells" in picture.caption
     names = [entry.get_text() for entry in height.get_legend().get_texts()]
     assert names[0] == "n = 30, ν = 5 Hz" and len(names) == 4
-
-
-def test_figure5_of_many_cells_shows_some_from_first_to_last(tmp_path: Path) -> None:
-    """Of many cells as many are shown as there are colours, the first and the last among them."""
-    grid = {"frequency": {"from": 1, "to": 20, "step": 1}}
-    content = KEPT | {"samples": 1, "grid": grid, "scene": BRIEF | {"links": 30}, "record": {"series": True}}
-    picture = sweep_figure5(sweep(content, tmp_path))
-    names = [entry.get_text() for entry in picture.figure.axes[0].get_legend().get_texts()]
-    assert len(names) == MOST_CELLS and (names[0], names[-1]) == ("ν = 1 Hz", "ν = 20 Hz")
-    assert f"{MOST_CELLS} of 20 cells" in picture.caption
 
 
 def test_report_and_pictures_use_kept_frames(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,7 +16,6 @@ import xarray
 from tests.support.synthetic_sweep import SHARD_SIZE, SWEEP, run, synthetic_rows, synthetic_sweep, write
 from warpchain.cli.main import main
 from warpchain.inputs.validation import InputError
-from warpchain.reports.sweep_page import write_report
 from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
 from warpchain.store.folder import SweepFolder
@@ -371,22 +370,3 @@ def test_a_merged_file_replaces_another_only(folder: Path, single: Path, tmp_pat
         with pytest.raises(OSError, match=rf"{name}: is there and is no merged sweep; give another name$"):
             merge(folder, tmp_path / name)
     assert {name: (tmp_path / name).read_bytes() for name in others} == others
-
-
-@pytest.mark.parametrize("name", ["sweep.json", "sweep.yaml", "log.txt", "lock", "shards", "shards/all.h5"])
-def test_nothing_is_written_over_the_sweep(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The names of what a sweep has are refused to merged file, page and figures, there or not yet, by any path."""
-    folder = tmp_path / "sweep"
-    run(folder)
-    (folder / "log.txt").unlink(missing_ok=True)
-    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    monkeypatch.chdir(folder)
-    for target in (Path(name), folder / "shards/.." / name):
-        for make in (merge, write_report):
-            with pytest.raises(InputError, match=rf"{name}: belongs to the sweep itself; give another path$"):
-                make(folder, target)
-    with pytest.raises(SystemExit, match="2"):
-        main(["plot", ".", "-o", name])
-    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
-    merge(folder, "all.h5")
-    merge(folder, "all.h5")

@@ -171,15 +171,5 @@ def play_full_disk(directory: Path) -> None:
     print(json.dumps({"messages": messages, "missing": load(directory).missing_count}))
 
 
-def play_read_only(directory: Path) -> None:
-    """In a mount namespace: a folder that cannot be written, for root either."""
-    subprocess.run(["mount", "--bind", directory, directory], check=True)
-    subprocess.run(["mount", "-o", "remount,ro,bind", directory], check=True)
-    try:
-        SweepFolder.open(directory, SWEEP, shard_size=SHARD_SIZE)
-    except OSError as error:
-        print(json.dumps({"message": str(error), "missing": load(directory).missing_count}))
-
-
 if __name__ == "__main__":
     globals()[f"play_{sys.argv[1]}"](Path(sys.argv[2]))

@@ -184,12 +184,10 @@ def plot(
     from warpchain.cli.terminal import try_folder
     from warpchain.files import make_folder
     from warpchain.reports.sweep_figures import figures
-    from warpchain.store.manifest import check_not_own
     from warpchain.store.sweep_result import load
 
     result = load(path)
     folder = output or (path.parent if is_file else path)
-    check_not_own(path, folder.resolve())
     try_folder(folder)
     make_folder(folder)
     drawn = False

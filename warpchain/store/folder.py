@@ -14,18 +14,15 @@ A sweep grows when its file is given more samples: the shards that are there sta
 """
 
 import datetime
-import errno
 import fcntl
-import math
 import os
 import re
-import secrets
 import shutil
 import socket
 import stat
 import time
 import warnings
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Self
@@ -33,24 +30,15 @@ from typing import Final, Self
 import numpy as np
 import yaml
 
-from warpchain.files import failure, given_path
+from warpchain.files import given_path, make_folder, naming, remove_output, write_whole
 from warpchain.hdf5_files import open_regular
 from warpchain.inputs.validation import DamagedFileError, InputError, InputWarning
 from warpchain.store.manifest import OWN, Folder, Manifest, Shard, read_manifest
-from warpchain.store.shards import check_shard, present_shards, put_file, read_shard, stamp, writing
+from warpchain.store.shards import check_shard, present_shards, read_shard, stamp
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
 from warpchain.version import NUMERICS_VERSION
 from warpchain.walks.rows import Rows
-from warpchain.walks.walk_result import MOTION
-
-SHARD_OVERHEAD: Final = 16 * 1024
-"""Bytes that a shard takes at most beside its rows."""
-
-SHORT_WALK: Final = 0.5
-"""Time [s] that few walks are shorter than."""
-SAMPLE_BYTES: Final = 8 * sum(math.prod(kept.sizes({"t": 1})) for kept in MOTION.values() if kept.sample is not None)
-"""Bytes of a sample of a series."""
 
 LOCK_TRIES: Final = 5
 """Tries to lock a folder: `running_rate` of another process holds the lock for a moment."""
@@ -58,8 +46,6 @@ LOCK_PAUSE: Final = 0.02
 """Time [s] between two of them."""
 
 _PART: Final = re.compile(r"\.(?:sweep|\d+-\d{6,}(?:-motion)?)\.[0-9a-f]{8}\.part\.(?:json|yaml|h5)")
-_DISCARDED: Final = re.compile(r"\.discarded-[0-9a-f]{8}")
-
 _HOLDER: Final = re.compile(r"process \d+ on \S*")
 
 _FAST_DUMPER: Final = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
@@ -103,22 +89,17 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
                 shards that a folder has keep their size.
 
         Raises:
-            OSError: the folder cannot be made, locked, read or written, or the disk is too full for the rest of
-                the sweep.
+            OSError: the folder cannot be made, locked, read or written.
             InputError: another process holds the folder, it belongs to another sweep or to something else, or a
                 shard is foreign. Nothing has been deleted.
-            ValueError: the shard size is not positive.
 
         Warns:
             InputWarning: a shard was damaged; its walks are missing now.
         """
-        if shard_size < 1:
-            raise ValueError(f"shard_size: {shard_size} is not positive; give 1 or more")
         path = given_path(directory)
-        with writing(path):
-            path.mkdir(parents=True, exist_ok=True)
-            _refuse_links(path)
-            lock = _locked(path)
+        make_folder(path)
+        _refuse_links(path)
+        lock = _locked(path)
         try:
             folder = cls(path, _prepared(path, sweep, Manifest.of(sweep, shard_size), fresh), lock)
             folder._check()
@@ -132,10 +113,8 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         """Add a line with the time to log.txt; an `OSError` if it cannot be written."""
         path = self.directory / "log.txt"
         now = datetime.datetime.now().astimezone().isoformat(timespec="seconds")
-        with writing(path):
-            descriptor = _opened_own(path, os.O_WRONLY | os.O_APPEND)
-            with open(descriptor, "a", encoding="utf-8") as file:
-                file.write(f"{now}  {text}\n")
+        with naming(path), open(_opened_own(path, os.O_WRONLY | os.O_APPEND), "a", encoding="utf-8") as file:
+            file.write(f"{now}  {text}\n")
 
     def missing(self) -> list[Shard]:
         """The shards that are not there yet, in order; errors as of `present_shards`."""
@@ -151,7 +130,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         self.close()
 
     def _check(self) -> None:
-        """Refuse what would fail later: foreign shards, a folder that cannot be written, a disk too full."""
+        """Refuse a folder with foreign shards, and delete damaged ones."""
         problems, bad = [], {}
         for shard in present_shards(self.directory, self.manifest):
             try:
@@ -164,45 +143,22 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             raise InputError(problems[0] + (f" (and {len(problems) - 1} more)" if problems[1:] else ""))
         for shard, problem in bad.items():
             for name in reversed(shard.files):
-                path = self.directory / "shards" / name
-                with writing(path):
-                    path.unlink()
+                remove_output(self.directory / "shards" / name)
             self.log(f"{problem}; deleted, its walks are computed again")
             warnings.warn(f"{problem}; its walks are computed again", InputWarning, stacklevel=4)
-        left = self.missing()
-        if not left:
-            return
-        shards = self.directory / "shards"
-        probe = shards / f".0-000000.{secrets.token_hex(4)}.part.h5"
-        with writing(shards):
-            probe.touch()
-            probe.unlink()
-            free = shutil.disk_usage(shards).free
-        need = sum(len(shard) * shard.kind.itemsize + SHARD_OVERHEAD for shard in left)
-        if (series := self.manifest.recording.series) is not None:  # of short walks, and without frames
-            samples = np.concatenate([shard.keys["sample"] for shard in left])
-            kept = len(samples) if series.samples is None else int(np.isin(samples, series.samples).sum())
-            need += round(kept * SHORT_WALK / series.interval * SAMPLE_BYTES)
-        if need > free:
-            raise failure(
-                errno.ENOSPC,
-                f"{self.directory}: the rest of the sweep takes {need / 1e6:.3g} MB, but {free / 1e6:.3g} MB are "
-                "free; make room and start again, shards written are kept",
-            )
 
     def _describe(self) -> None:
         """Write what the folder says of its sweep, if that is new; sweep.yaml is never older than sweep.json."""
         description = self.directory / "sweep.yaml"
         if read_manifest(self.directory).growth != self.manifest.growth:
-            with writing(description):
-                description.unlink(missing_ok=True)
-            put_file(self.directory / "sweep.json", self.manifest.text().encode())
+            remove_output(description)
+            write_whole(self.directory / "sweep.json", self.manifest.text())
         if not description.exists():
             dumper = (
                 _FAST_DUMPER if self.manifest.sweep["name"].isascii() else yaml.SafeDumper
             )  # they fold other text otherwise
             text = yaml.dump(self.manifest.sweep, Dumper=dumper, sort_keys=False, allow_unicode=True)
-            put_file(description, (_YAML_HEAD + text).encode())
+            write_whole(description, _YAML_HEAD + text)
 
 
 def read_rows(directory: Folder, manifest: Manifest) -> Rows:
@@ -252,15 +208,13 @@ def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Ma
         for name in OWN:
             if (folder / name).exists():
                 raise InputError(f"{folder / name}: in the way of a sweep; give another folder")
-        put_file(named, manifest.text().encode())
+        write_whole(named, manifest.text())
     elif fresh:
         _discard(folder, read_manifest(folder))
-        put_file(named, manifest.text().encode())
-        _clear_leftovers(folder)
+        write_whole(named, manifest.text())
     else:
         manifest = _continued(folder, sweep, manifest)
-    with writing(folder / "shards"):
-        (folder / "shards").mkdir(exist_ok=True)
+    make_folder(folder / "shards")
     return manifest
 
 
@@ -300,25 +254,21 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
 
 
 def _discard(folder: Path, manifest: Manifest) -> None:
-    """Delete what a sweep left, the shards in one step; nothing if there is a foreign file among them."""
+    """Delete what a sweep left, its shards first; nothing if there is a foreign file among them."""
     present_shards(folder, manifest)
-    with writing(folder):
-        with suppress(FileNotFoundError):
-            os.rename(folder / "shards", folder / f".discarded-{secrets.token_hex(4)}")
+    with naming(folder):
+        shutil.rmtree(folder / "shards", ignore_errors=not (folder / "shards").exists())
         for name in ("sweep.yaml", "log.txt"):
             (folder / name).unlink(missing_ok=True)
 
 
 def _clear_leftovers(folder: Path) -> None:
-    """Delete what a killed process left unfinished: parts of files, and shards that it was deleting."""
-    with writing(folder):
+    """Delete the parts of files that a killed process left."""
+    with naming(folder):
         for place in (folder, folder / "shards"):
             for path in place.iterdir() if place.is_dir() else ():
-                is_folder = path.is_dir() and not path.is_symlink()
-                if _PART.fullmatch(path.name) and not is_folder:
+                if _PART.fullmatch(path.name) and (path.is_symlink() or not path.is_dir()):
                     path.unlink(missing_ok=True)
-                elif _DISCARDED.fullmatch(path.name) and place == folder:
-                    shutil.rmtree(path) if is_folder else path.unlink()
 
 
 def _refuse_links(folder: Path) -> None:
@@ -333,7 +283,8 @@ def _refuse_links(folder: Path) -> None:
 
 def _opened_own(path: Path, flags: int) -> int:
     """A descriptor of a file that a sweep writes to, made if need be; an `InputError` if it is no regular file."""
-    descriptor = os.open(path, flags | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
+    with naming(path):
+        descriptor = os.open(path, flags | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
         raise InputError(f"{path}: a pipe or a device in the way of a sweep; give another folder")

@@ -254,14 +254,3 @@ def read_manifest(directory: Folder) -> Manifest:
     content = json.loads(text)
     growth = tuple(Growth(**{**each, "samples": tuple(each["samples"])}) for each in content["growth"])
     return Manifest(content["sweep"], content["numerics_version"], growth, content["versions"])
-
-
-def check_not_own(directory: Folder, path: Path) -> None:
-    """Refuse to write a file or folder over one that a sweep has in its folder.
-
-    Raises:
-        InputError: it is one of them, or lies among the shards.
-    """
-    folder, place = Path(directory).resolve(), path.parent.resolve() / path.name
-    if place.is_relative_to(folder) and place.relative_to(folder).parts[:1] in {(name,) for name in (*OWN, "lock")}:
-        raise InputError(f"{path}: belongs to the sweep itself; give another path")

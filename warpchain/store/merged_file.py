@@ -25,8 +25,7 @@ from warpchain.files import Kind, checked_output, given_path, write_whole
 from warpchain.hdf5_files import hdf5_image, kind_of_hdf5
 from warpchain.inputs.validation import InputError
 from warpchain.store.block_result import Origin
-from warpchain.store.manifest import Folder, check_not_own
-from warpchain.store.shards import writing
+from warpchain.store.manifest import Folder
 from warpchain.store.sweep_result import KIND, WANTED, SweepResult, load
 
 if TYPE_CHECKING:
@@ -45,21 +44,16 @@ def merge(sources: Folder | Sequence[Folder], path: str | os.PathLike[str]) -> N
 
     Raises:
         OSError: a folder cannot be read, or the file cannot be written, or is there already and no merged file.
-        InputError: there is no sweep in a folder, a shard is damaged or foreign, sweeps do not fit together, or the
-            file is one of a sweep's own.
+        InputError: there is no sweep in a folder, a shard is damaged or foreign, or sweeps do not fit together.
     """
     folders = [sources] if isinstance(sources, str | os.PathLike) else list(sources)
     target = given_path(path)
-    for folder in folders:
-        check_not_own(folder, target)
-    with writing(target):
-        checked_output(target, _MERGED)
+    checked_output(target, _MERGED)
     results = [load(folder) for folder in folders]
     if len(results) > 1:
         _check_fit(folders, results)
     image = hdf5_image(KIND, partial(_fill, results=results))
-    with writing(target):
-        write_whole(target, image, _MERGED)
+    write_whole(target, image, _MERGED)
 
 
 def _check_fit(folders: Sequence[Folder], results: Sequence[SweepResult]) -> None:

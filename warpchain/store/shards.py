@@ -8,7 +8,6 @@ A file appears whole or not at all. Its content depends only on the sweep and on
 was computed: a sweep leaves the same bytes however often it was killed.
 """
 
-import errno
 import hashlib
 import os
 from collections.abc import Iterator, Mapping
@@ -18,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from warpchain.files import NotReplaceable, failure, remedy, replacing, unreadable
+from warpchain.files import unreadable, write_whole
 from warpchain.hdf5_files import hdf5_image, open_regular, reading_hdf5
 from warpchain.inputs.validation import InputError
 from warpchain.store.manifest import Folder, Manifest, Shard
@@ -83,8 +82,8 @@ def write_shard(
 
     folder = Path(directory) / "shards"
     if shard.keeps_motion:
-        put_file(folder / shard.motion_name, hdf5_image(MOTION_KIND, fill_motions))
-    put_file(folder / shard.name, hdf5_image(KIND, fill))
+        write_whole(folder / shard.motion_name, hdf5_image(MOTION_KIND, fill_motions), clear=False)
+    write_whole(folder / shard.name, hdf5_image(KIND, fill), clear=False)  # parts go when the folder is opened
 
 
 def read_shard(directory: Folder, shard: Shard) -> Rows:
@@ -141,33 +140,3 @@ def present_shards(directory: Folder, manifest: Manifest) -> list[Shard]:
         more = f" (and {len(strange) - 1} more)" if strange[1:] else ""
         raise InputError(f"{folder / strange[0]}: not a shard of this sweep; move it out of this folder{more}")
     return [shard for shard in manifest.shards if names.issuperset(shard.files)]
-
-
-@contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Turn an `OSError` of the `with` block into one of one line: the path cannot be written, why, and the remedy."""
-    try:
-        yield
-    except NotReplaceable:
-        raise
-    except OSError as error:
-        number = error.errno or errno.EIO
-        problem = f"cannot be written ({os.strerror(number)})"
-        remedy_too = f"{remedy(number)} and start again, shards written are kept"
-        raise failure(number, f"{path}: {problem}; {remedy_too}") from error
-
-
-def put_file(path: Path, content: bytes) -> None:
-    """Write a file, whole or not at all, and down to the disk before this returns.
-
-    Raises:
-        OSError: the file cannot be written; one line that names it and the remedy.
-    """
-    with writing(path):
-        with replacing(path, clear=False) as part:  # parts go when the folder is opened; it may have many names
-            part.write_bytes(content)
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)  # the new name, too
-        finally:
-            os.close(folder)
