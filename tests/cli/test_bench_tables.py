@@ -12,7 +12,7 @@ from warpchain.cli.bench_tables import TABLES, print_bench
 
 MACHINE = {"gpu": "some GPU", "system": "some system"}
 STEP = StepCost("flight", "hybrid", 60, 3.5, 12.25, 4e-4, 0.0, 0.0123)
-LIST = BroadPhaseCost(180, 152, 5.5, 11.0)
+LIST = BroadPhaseCost(180, 152, 5.5)
 GPU = GpuCost("flight", "dp5", 60, 1000, 6.5, 5.5e10, 210.0, 0.25, 168, 160, 6, 0.1875, 0.4)
 PLACE = PlaceCost(
     "2xcpu", "dp5 1e-06", 1200, {"at_rest": 1190, "time_limit": 10}, [4.0], 4.0, 7.9, 30.0, 300.0, 600.0, 1.9
@@ -24,7 +24,7 @@ PLACE = PlaceCost(
     [
         ("steps", STEP, "flight 60 hybrid 3.50 12.25 400 0.0% 0.0123"),
         ("steps", replace(STEP, per_link_stage=math.nan, rejected=math.nan), "flight 60 hybrid 3.50 400 0.0123"),
-        ("broad_phase", LIST, "180 152 5.5 11.0"),
+        ("broad_phase", LIST, "180 152 5.5"),
         ("attempts", GPU, "flight 60 dp5 1000 6.50 5.50e+10 210 25.0% 168 160 6 (19%) 40%"),
         ("attempts", replace(GPU, peak=math.nan), "flight 60 dp5 1000 6.50 5.50e+10 210 25.0% 168 160 6 (19%)"),
         ("costs", PLACE, "2xcpu dp5 1e-06 1,200 10 4.0 300 600 7.9 1.90 30.0"),

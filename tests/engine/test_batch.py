@@ -170,7 +170,6 @@ def test_few_walks_of_several_lengths_share_a_kernel() -> None:
     assert shared_threads("os32", [60, 64], 504) is None
     assert shared_threads("os32", [60, 90, 180], 20_000) is None
     assert shared_threads("os32", [60, 240], 504) is None
-    assert shared_threads("rodas5p", [60, 90, 180], 504) is None
     assert shared_threads("hybrid", [60, 90, 180], 504) is None
 
 

@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 DEVICE = start_device("cpu").warp
 POISONED_JOINT = 2**30
 
-_compiled = functools.partial(
+compiled = functools.partial(
     wp.kernel, module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS}
 )
 
@@ -49,7 +49,7 @@ def _poisoned(*shape: int) -> wp.array:
 # --- the impulse law ---
 
 
-@_compiled
+@compiled
 def _law(cases: wp.array2d(dtype=wp.float64), impulses: wp.array2d(dtype=wp.float64)):
     i = wp.tid()
     inverse_nn, inverse_determinant = inverse_masses(cases[i, 2], cases[i, 3], cases[i, 4])
@@ -74,7 +74,7 @@ def impulses_of_law(cases: Array) -> Array:
     return _map_rows(_law, cases, 2)
 
 
-@_compiled
+@compiled
 def _fixed(cases: wp.array2d(dtype=wp.float64), results: wp.array2d(dtype=wp.float64)):
     i = wp.tid()
     chain = Chain()
@@ -108,7 +108,7 @@ def fixed_contacts(cases: Array) -> Array:
     return _map_rows(_fixed, cases, 5)
 
 
-@_compiled
+@compiled
 def _link_pair(
     scratch: wp.array3d(dtype=wp.float64),
     cases: wp.array2d(dtype=wp.float64),
@@ -183,8 +183,8 @@ def _map_rows(kernel: wp.Kernel, cases: Array, width: int) -> Array:
 
 # --- the contact pass ---
 
-GRID, ALL_PAIRS, FLOOR, SPROCKET, SELF = 1, 2, 4, 8, 16
-"""Parts of a pass, to be added up: make the neighbour list by the grid or by all pairs; resolve contacts."""
+LIST, FLOOR, SPROCKET, SELF = 1, 2, 4, 8
+"""Parts of a pass, to be added up: make the neighbour list; resolve contacts."""
 
 RESULTS = (
     *("opening", "floor_gap", "sprocket_gap", "fits", "displacement", "slack"),
@@ -194,11 +194,11 @@ RESULTS = (
 
 @functools.cache
 def _contact_pass(columns: int) -> wp.Kernel:
-    build_by_grid, build_by_all_pairs = neighbour_list(columns)
+    build_list = neighbour_list(columns)
     resolve_self_contacts = self_contacts(columns)
     size = list_layout(columns).size
 
-    @_compiled
+    @compiled
     def contact_pass(
         model: Model,
         state: State,
@@ -223,20 +223,15 @@ def _contact_pass(columns: int) -> wp.Kernel:
         results[world, 1] = floor_gap(block, chain)
         results[world, 2] = sprocket_gap(block, chain)
         if (parts & 1) != 0:
-            results[world, 3] = wp.where(
-                build_by_grid(block, pairs, chain, skin, opening), wp.float64(1.0), wp.float64(0.0)
-            )
-        if (parts & 2) != 0:
-            results[world, 3] = wp.where(
-                build_by_all_pairs(block, pairs, chain, skin, opening), wp.float64(1.0), wp.float64(0.0)
-            )
+            fits = build_list(block, pairs, chain, skin, opening)
+            results[world, 3] = wp.where(fits, wp.float64(1.0), wp.float64(0.0))
         results[world, 4] = greatest_displacement(block, chain)
         results[world, 5] = list_slack(block, chain, skin, opening)
-        if (parts & 4) != 0:
+        if (parts & 2) != 0:
             results[world, 6] = wp.float64(resolve_floor(block, chain, sprocket_speed, push_rate))
-        if (parts & 8) != 0:
+        if (parts & 4) != 0:
             results[world, 7] = wp.float64(resolve_sprocket(block, chain, sprocket_speed, push_rate))
-        if (parts & 16) != 0:
+        if (parts & 8) != 0:
             hits, lost, depth = resolve_self_contacts(block, pairs, chain, opening)
             results[world, 8] = wp.float64(hits)
             results[world, 9] = lost

@@ -66,7 +66,6 @@ class ChainTimer:
         chains: int = 1,
         *,
         watch: str = "none",
-        broad_phase: str = "grid",
         launches: int = 1,
         settling_runs: int = 1,
         tilts: bool = False,
@@ -79,7 +78,6 @@ class ChainTimer:
             start: State that all chains begin in.
             chains: Number of chains.
             watch: ``"none"``, or ``"rest"`` as in a walk; a chain at rest is carried on all the same.
-            broad_phase: ``"grid"`` or ``"all_pairs"``.
             launches: Launches of each batch that are queued together.
             settling_runs: Runs of :data:`SETTLING_ATTEMPTS` after each start.
             tilts: Whether the plane of the chains may move; it is upright and at rest.
@@ -93,7 +91,7 @@ class ChainTimer:
             batch.control.launch_time = math.inf  # only the number of attempts ends a launch: it is divided by
             for world in range(len(batch.links)):
                 batch.set_chain(world, parameters, self.links)
-        self.features = self.batches[0].features(fixed_body="floor", watch=watch, broad_phase=broad_phase, tilts=tilts)
+        self.features = self.batches[0].features(fixed_body="floor", watch=watch, tilts=tilts)
         self.batches[0].compile(self.features, [self.links])
         self.settled = self._begin()
 

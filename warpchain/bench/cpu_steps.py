@@ -66,13 +66,11 @@ class BroadPhaseCost:
         links: n.
         pairs: Pairs in the list.
         grid_microseconds: By the uniform grid [µs].
-        all_pairs_microseconds: By testing every pair [µs].
     """
 
     links: int
     pairs: int
     grid_microseconds: float
-    all_pairs_microseconds: float
 
 
 def step_costs(
@@ -142,7 +140,7 @@ def _stages(method: str) -> float:
 def broad_phase_costs(
     links: Sequence[int] = (60, 180, 1000), rounds: int = 7, *, report: Callable[[str], None]
 ) -> list[BroadPhaseCost]:
-    """Cost of one neighbour list by grid and by all pairs: of steps that rebuild it, less that of steps that never do.
+    """Cost of one neighbour list by grid: of steps that rebuild it, less that of steps that never do.
 
     Chains of more than 200 links are flattened loops on the floor, two layers thick; shorter ones have been dropped.
     """
@@ -162,7 +160,6 @@ def broad_phase_costs(
         timers = {
             "kept": ChainTimer(parameters, kept, (position, velocity)),
             "grid": ChainTimer(parameters, void, (position, velocity)),
-            "pairs": ChainTimer(parameters, void, (position, velocity), broad_phase="all_pairs"),
         }
         seconds: dict[str, list[float]] = {name: [] for name in timers}
         for timer in timers.values():
@@ -176,7 +173,6 @@ def broad_phase_costs(
                 links=n,
                 pairs=timers["kept"].batches[0].listed_pairs(0),
                 grid_microseconds=statistics.median(seconds["grid"]) - base,
-                all_pairs_microseconds=statistics.median(seconds["pairs"]) - base,
             )
         )
     return costs

@@ -27,7 +27,6 @@ TABLES: Final = {
         "neighbour list: links": "{.links:d}",
         "pairs": "{.pairs:d}",
         "grid µs": "{.grid_microseconds:.1f}",
-        "all pairs µs": "{.all_pairs_microseconds:.1f}",
     },
     "attempts": {
         "scene": "{.scene}",

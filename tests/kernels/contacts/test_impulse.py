@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tests.support.impulse_cases import BALL, HAND_CASES, PAIR, PAIR_TURNED, Collision, collisions, law_violations
+from tests.support.impulse_cases import BALL, HAND_CASES, Collision, collisions, law_violations
 from tests.support.kernels_under_test import fixed_contacts, impulses_of_law, link_pairs
 from warpchain.oracle import contact_equations
 
@@ -91,8 +91,8 @@ class Pairs:
     Attributes hold one row per collision; axis 1 of position and velocity is the body, A or B.
     """
 
-    def __init__(self, cases, seed=0, distance=DISTANCE, swapped=False, push_rate=0.0):
-        """Set up and resolve; `swapped` calls A what the collision calls B; `push_rate` is that of `Chain`."""
+    def __init__(self, cases, seed=0, distance=DISTANCE, push_rate=0.0):
+        """Set up and resolve; `push_rate` is that of `Chain`."""
         generator = np.random.default_rng(seed)
         count = len(cases)
         self.normal = np.array([collision.normal for collision in cases])
@@ -113,15 +113,14 @@ class Pairs:
         self.e, self.mu, self.e_t = np.array([[c.restitution, c.friction, c.tangential_restitution] for c in cases]).T
         ends = self.point[:, None] + np.array([-0.5, 0.5])[:, None] * distance * self.normal[:, None]
         law = np.column_stack([np.full(count, RADIUS), self.e, self.mu, self.e_t])
-        order = [1, 0] if swapped else [0, 1]
         after, results = link_pairs(
-            self.position[:, order],
-            self.velocity[:, order],
-            inverses[:, order],
-            np.hstack([law, ends[:, order].reshape(count, 4)]),
+            self.position,
+            self.velocity,
+            inverses,
+            np.hstack([law, ends.reshape(count, 4)]),
             push_rate,
         )
-        self.after = after[:, order]
+        self.after = after
         self.depth, self.lost, self.hits = results.T
 
     def relative(self, velocity):
@@ -334,14 +333,6 @@ def test_link_above_surface_keeps_its_velocity(gap):
 # --- laws that hold for all collisions ---
 
 
-def test_law_agrees_with_reference():
-    """Impulses of ten thousand random collisions are those of the reference, to 1e-12."""
-    expected = np.array([contact_equations.collision_impulse(*collision.arguments()) for collision in MANY])
-    size = np.linalg.norm(expected, axis=1)
-    assert np.all(size > 0)
-    assert_allclose(np.linalg.norm(law_impulses(MANY) - expected, axis=1) / size, 0, atol=1e-12)
-
-
 def test_links_agree_with_reference(pairs, fixed):
     """Two links, and a link on a surface, get the reference's impulse, to 1e-12 of all that enters."""
     assert_reference_impulses(pairs, MANY)
@@ -366,16 +357,6 @@ def test_friction_cone():
     assert np.all(tangential <= friction * normal * (1 + 1e-12))
     slides = tangential > friction * normal * (1 - 1e-12)
     assert 1000 < np.count_nonzero(slides) < 9000
-
-
-def test_sticking_ends_the_slip():
-    """With e = e_t = 0 and sticking friction the bodies have no relative velocity afterwards."""
-    cases = [replace(c, restitution=0.0, tangential_restitution=0.0, friction=1.0) for c in MANY]
-    parts = impulses_of_law(np.array([law_arguments(collision) for collision in cases]))
-    sticks = np.abs(parts[:, 1]) < parts[:, 0] * (1 - 1e-9)
-    pair = Pairs(cases)
-    assert np.count_nonzero(sticks) > 1000
-    assert_allclose((pair.relative(pair.after) / pair.speed()[:, None])[sticks], 0, atol=1e-12)
 
 
 def test_momenta_are_kept(pairs):
@@ -403,35 +384,6 @@ def test_loss_is_change_of_kinetic_energy(pairs, fixed):
     assert np.any(fixed.lost < -1e-3 * fixed.energy(fixed.velocity))
     at_rest = Fixed(MANY_FIXED, surface_speed=0.0)
     assert np.all(at_rest.lost >= -1e-12 * at_rest.energy(at_rest.velocity))
-
-
-def test_energy_is_kept_without_friction_and_loss():
-    """With e = 1 and μ = 0, or e = e_t = 1 and no sliding, kinetic energy stays as it was."""
-    smooth = Pairs([replace(collision, restitution=1.0, friction=0.0) for collision in MANY])
-    assert_allclose(smooth.lost / smooth.energy(smooth.velocity), 0, atol=1e-12)
-    elastic = [replace(c, restitution=1.0, tangential_restitution=1.0, friction=1.0) for c in MANY]
-    parts = impulses_of_law(np.array([law_arguments(collision) for collision in elastic]))
-    sticks = np.abs(parts[:, 1]) < parts[:, 0] * (1 - 1e-9)
-    pair = Pairs(elastic)
-    assert np.count_nonzero(sticks) > 1000
-    assert_allclose((pair.lost / pair.energy(pair.velocity))[sticks], 0, atol=1e-12)
-
-
-def test_either_link_may_be_called_a(pairs):
-    """Which of two links is A makes no difference."""
-    swapped = Pairs(MANY, swapped=True)
-    error = np.abs(swapped.after - pairs.after)
-    error[:, :, 2] *= np.linalg.norm(pairs.lever, axis=2)
-    heavy = pairs.inverses[:, :, 0].max(axis=1) / pairs.inverses[:, :, 0].min(axis=1)
-    assert_allclose(error / (heavy * pairs.speed())[:, None, None], 0, atol=1e-12)
-    assert_allclose(swapped.lost, pairs.lost, rtol=1e-9, atol=1e-12 * pairs.energy(pairs.velocity).max())
-
-
-def test_turned_axes_turn_the_impulse():
-    """A collision turned by 0.6, 0.8 gets the impulse turned alike."""
-    impulses = law_impulses([PAIR, PAIR_TURNED])
-    x, y = impulses[0]
-    assert_allclose(impulses[1], [0.6 * x - 0.8 * y, 0.8 * x + 0.6 * y], atol=1e-14)
 
 
 @given(st.lists(collisions(), min_size=1, max_size=8))

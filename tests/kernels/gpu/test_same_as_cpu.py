@@ -206,13 +206,10 @@ def test_frames_between_samples_equal_a_cpu_kernel() -> None:
     assert len(few) < 6 and len(our_times) > 12 and np.all(np.diff(marks) >= 1)
 
 
-@pytest.mark.parametrize("broad_phase", ["grid", "all_pairs"])
-def test_neighbour_list_holds_the_same_pairs(broad_phase: str) -> None:
+def test_neighbour_list_holds_the_same_pairs() -> None:
     """The list built in parallel holds the pairs of the list built by one thread."""
     ours, theirs = (batch_of([heap(LINKS, 8)], method="dp5", fixed_step=False) for _ in range(2))
-    launch_blocks(
-        ours, features_of(ours, fixed_body="floor", watch="rest", broad_phase=broad_phase), 1, block_dim=LINKS
-    )
+    launch_blocks(ours, features_of(ours, fixed_body="floor", watch="rest"), 1, block_dim=LINKS)
     launch_chains(theirs, features_of(theirs, fixed_body="floor", watch="rest"), 1)
     assert len(listed_pairs(theirs)) > 10
     assert listed_pairs(ours) == listed_pairs(theirs)
@@ -273,7 +270,7 @@ def compiles_for_gpus(
 
 def test_a_kernel_compiles_for_gpus(tmp_path: Path) -> None:
     """The walk's kernel compiles for sm_80 and sm_90."""
-    features = Features("dp5", layout.padded_width(60), "floor", True, "grid", "rest")
+    features = Features("dp5", layout.padded_width(60), "floor", True, "rest")
     compiles_for_gpus(tmp_path, features, 64)
 
 
@@ -302,7 +299,7 @@ def test_every_kernel_compiles_for_gpus(
 ) -> None:
     """Methods with all pairs of the other features compile for sm_80 or sm_90, in larger blocks."""
     fixed_body, watch = body_and_watch
-    features = Features(method, layout.padded_width(60), fixed_body, self_contact, "grid", watch)
+    features = Features(method, layout.padded_width(60), fixed_body, self_contact, watch)
     compiles_for_gpus(tmp_path, features, 192, [generation])
 
 
@@ -311,5 +308,5 @@ def test_every_kernel_compiles_for_gpus(
 @pytest.mark.parametrize(("fixed_body", "watch"), [("floor", "rest"), ("sprocket", "steady")])
 def test_kernels_that_soften_compile_for_gpus(tmp_path: Path, fixed_body: str, watch: str, method: str) -> None:
     """So do those that change the softness of joints, each method for one of them."""
-    features = Features(method, layout.padded_width(60), fixed_body, True, "grid", watch, softens=True)
+    features = Features(method, layout.padded_width(60), fixed_body, True, watch, softens=True)
     compiles_for_gpus(tmp_path, features, 192, [80 if method == "rkf78" else 90])

@@ -10,8 +10,8 @@ error. A jump at a given time is of this kind. What `rkf78` sees of it is what c
 later stages: less, the shorter the step. So it accepts steps whose error is thousands of tolerances. The estimates of
 the other methods have weights at stages within the step.
 
-Flights of 1 ms without floor are compared with `dp5` at 1e-13. How far `rodas5p` at 1e-12, which has another kind of
-stages and of steps, is from that says how far the reference can be trusted.
+Flights of 1 ms without floor are compared with `dp5` at 1e-13. How far `os32` at 1e-12, which has other stages and
+steps, is from that says how far the reference can be trusted.
 """
 
 import itertools
@@ -53,7 +53,7 @@ SMOOTHINGS: Final = (PAPER.friction_smoothing, 0.1, 1.0)
 """Values of ω_c [rad/s]: Table 1's, that of `soft`, and one that joints pass in many steps."""
 TOLERANCES: Final = (1e-6, 1e-9, 1e-11)
 REFERENCE: Final = ("dp5", 1e-13)
-CHECK: Final = ("rodas5p", 1e-12)
+CHECK: Final = ("os32", 1e-12)
 WATCHED_TIME: Final = 1e-4
 """Time [s] in which the errors of single steps are looked at, of the second start."""
 WATCHED_AT_ONCE: Final = 500
