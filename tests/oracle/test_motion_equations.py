@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.oracle_model import motion_equations
+from tests.oracle_model.circular_loop import circular_loop
 from tests.support.impulse_cases import UNIT
 from tests.support.mild_parameters import MILD, SILENT
 from warpchain.inputs.parameters import Parameters, preset
-from warpchain.oracle import motion_equations
-from warpchain.oracle.circular_loop import circular_loop
 
 PAPER = preset("paper")
 
@@ -244,7 +244,7 @@ def test_flight_refuses_and_reports():
 
 def test_scipy_is_needed_by_flight_only(monkeypatch):
     """Importing the reference leaves SciPy alone, and without SciPy a flight names the extra to install."""
-    code = "import sys, warpchain.oracle.motion_equations; sys.exit('scipy' in sys.modules)"
+    code = "import sys, tests.oracle_model.motion_equations; sys.exit('scipy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
     monkeypatch.setitem(sys.modules, "scipy.integrate", None)
     position, velocity = disturbed_loop(4, MILD)

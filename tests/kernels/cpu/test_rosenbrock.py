@@ -8,11 +8,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 import warpchain
+from tests.oracle_model import motion_equations
 from tests.support.rosenbrock_under_test import one_step, solve_loop
 from warpchain import Status, preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels.methods.rosenbrock_tableaus import ROSENBROCK_TABLES
-from warpchain.oracle import motion_equations
 
 PAPER, SOFT = preset("paper"), preset("soft")
 
