@@ -4,11 +4,10 @@ Run ``python docs/generate_reference.py`` after a change of any of these; a test
 """
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 
-import typer
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from typer.models import ArgumentInfo, OptionInfo
@@ -51,10 +50,10 @@ KEYS: Final = {
 
 SAMPLER_MEANINGS: Final = {
     "random": "independent samples",
-    "sobol": "scrambled Sobol' sequence; a power of two of samples; needs `warpchain[scipy]`",
-    "latin_hypercube": "latin hypercube; needs `warpchain[scipy]`",
+    "sobol": "scrambled Sobol' sequence; a power of two of samples",
+    "latin_hypercube": "latin hypercube",
     "saltelli": "points for Sobol indices: each sample of d drawn quantities takes d + 2 walks; a power of two of "
-    "samples; needs `warpchain[scipy]`",
+    "samples",
 }
 
 
