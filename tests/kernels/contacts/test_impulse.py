@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.oracle_model import contact_equations
 from tests.support.impulse_cases import BALL, HAND_CASES, Collision, collisions, law_violations
 from tests.support.kernels_under_test import fixed_contacts, impulses_of_law, link_pairs
-from warpchain.oracle import contact_equations
 
 RADIUS = 0.1
 DISTANCE = 0.15

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import warpchain
+from tests.oracle_model import motion_equations
 from tests.support.bouncing_chains import PAPER, falling, loop
 from tests.support.rigid_joints import exact_rigid_flight, projected, rigid_motion
 from tests.support.rigid_under_test import visit
@@ -13,7 +14,6 @@ from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels.methods.w_tableaus import ROS34PW2
-from warpchain.oracle import motion_equations
 
 SOFT = preset("soft")
 LENGTHS = (4, 6, 8, 10, 12, 14, 16, 22, 60)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
+from tests.oracle_model.motion_equations import acceleration
 from tests.support.driven_loops import Loop, hold, released_loop
 from warpchain import preset
 from warpchain.engine.devices import start_device
@@ -19,7 +20,6 @@ from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
 from warpchain.kernels.physics.scaled_loads import crossing_time, drag_shape, under_load, write_inertias
 from warpchain.kernels.types import Chain
-from warpchain.oracle.motion_equations import acceleration
 
 Array = NDArray[np.float64]
 

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 import warpchain
-from warpchain.bench.starts import flying
+from tests.oracle_model.motion_equations import acceleration
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
+from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
 from warpchain.kernels.cpu.loop import make_advance
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.loop import make_advance_block
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS, Tableau, register
-from warpchain.oracle.motion_equations import acceleration
 
 EACH = pytest.mark.parametrize("tableau", TABLEAUS.values(), ids=list(TABLEAUS))
 
@@ -40,7 +40,7 @@ def eigenvalues(n: int) -> np.ndarray:
     ω_c is so large that sticking friction plays no part.
     """
     parameters = preset("paper").with_values({"friction_smoothing": 10.0})
-    start = np.stack(flying(n, parameters))
+    start = np.stack(lay_chain(ellipse(1.5), n, parameters.link_length, speed=5.0))
 
     def rates(state: np.ndarray) -> np.ndarray:
         return np.stack([state[1], acceleration(state[0], state[1], parameters)])
