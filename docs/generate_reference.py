@@ -29,6 +29,9 @@ from warpchain.walks.walk_result import STORED
 FOLDER: Final = Path(__file__).parent / "reference"
 NOTE: Final = "<!-- Written by docs/generate_reference.py; change the code, then run that script. -->\n"
 
+JSON: Final = "--json"
+"""An option of most commands, which is explained once."""
+
 KEYS: Final = {
     "version": ("file", "version of the format: 1"),
     "name": ("file, block", "name of the sweep, in figures and pages; of a block, unique in its sweep"),
@@ -298,12 +301,14 @@ def commands_page() -> str:
     """Every command with its options; those that are fields of the scene or of the options by their names only."""
     parts = [
         "# Commands\n\nWhat `--help` of each command says. Options that set a field have the meaning, values and "
-        "default of that field.\n"
+        f"default of that field. `{JSON}`, where a command has it, prints one JSON object instead of tables.\n"
     ]
     for path, function in sorted(commands(app, "warpchain"), key=lambda item: item[0] != "warpchain walk"):
         hints = get_type_hints(function, include_extras=True)
         given = inspect.signature(function).parameters.items()
-        rows = {name: row for name, one in given if (row := option_row(name, hints[name], one.default)) is not None}
+        found = {name: option_row(name, hints[name], one.default) for name, one in given}
+        rows = {name: row for name, row in found.items() if row is not None and row[0] != f"`{JSON}`"}
+        rows.pop("as_json", None)
         text = "\n\n".join(" ".join(part.split()) for part in (function.__doc__ or "").split("\n\n"))
         lines: list[tuple[str, str]] = []
         for page, model in (("scene", Scene), ("options", Options)):
