@@ -263,19 +263,6 @@ def bracketed(unit: str) -> str:
     return "" if unit == "1" else f" [{unit}]"
 
 
-def commands(application: typer.Typer, path: str) -> Iterable[tuple[str, Callable[..., None]]]:
-    """The words that call each command, and its function."""
-    for group in application.registered_groups:
-        assert group.typer_instance is not None
-        name = f"{path} {group.name}"
-        if group.typer_instance.registered_callback and group.typer_instance.registered_callback.callback:
-            yield name, group.typer_instance.registered_callback.callback
-        yield from commands(group.typer_instance, name)
-    for command in application.registered_commands:
-        assert command.callback is not None
-        yield f"{path} {command.name or command.callback.__name__}", command.callback
-
-
 def option_row(name: str, annotation: Any, default: Any) -> tuple[str, str] | None:
     """How an option is written, and its help; None for what is no option."""
     kind, *notes = get_args(annotation) or (annotation,)
@@ -302,7 +289,8 @@ def commands_page() -> str:
         "# Commands\n\nWhat `--help` of each command says. Options that set a field have the meaning, values and "
         f"default of that field. `{JSON}`, where a command has it, prints one JSON object instead of tables.\n"
     ]
-    for path, function in sorted(commands(app, "warpchain"), key=lambda item: item[0] != "warpchain walk"):
+    named = [(one.name or one.callback.__name__, one.callback) for one in app.registered_commands]
+    for command, function in sorted(named, key=lambda item: item[0] != "walk"):
         hints = get_type_hints(function, include_extras=True)
         given = inspect.signature(function).parameters.items()
         found = {name: option_row(name, hints[name], one.default) for name, one in given}
@@ -311,12 +299,10 @@ def commands_page() -> str:
         text = "\n\n".join(" ".join(part.split()) for part in (function.__doc__ or "").split("\n\n"))
         lines: list[tuple[str, str]] = []
         for page, model in (("scene", Scene), ("options", Options)):
-            fields = [
-                rows.pop(name)[0] for name in list(rows) if path == "warpchain walk" and name in model.model_fields
-            ]
+            fields = [rows.pop(name)[0] for name in list(rows) if command == "walk" and name in model.model_fields]
             if fields:
                 lines.append((", ".join(fields), f"fields of the [{page}]({page}.md)"))
-        parts.append(f"\n## {path}\n\n{text}\n\n" + listing([*lines, *rows.values()]))
+        parts.append(f"\n## warpchain {command}\n\n{text}\n\n" + listing([*lines, *rows.values()]))
     return "".join(parts)
 
 
