@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from warpchain.engine.devices import start_device
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
-from warpchain.kernels.contacts.impulse import collision_impulse, fixed_contact, inverse_masses
+from warpchain.kernels.contacts.impulse import fixed_contact
 from warpchain.kernels.contacts.link_pair import circles_of_links, collide
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu.contacts.neighbour_list import greatest_displacement, list_slack, neighbour_list
@@ -47,31 +47,6 @@ def _poisoned(*shape: int) -> wp.array:
 
 
 # --- the impulse law ---
-
-
-@compiled
-def _law(cases: wp.array2d(dtype=wp.float64), impulses: wp.array2d(dtype=wp.float64)):
-    i = wp.tid()
-    inverse_nn, inverse_determinant = inverse_masses(cases[i, 2], cases[i, 3], cases[i, 4])
-    impulse_n, impulse_t = collision_impulse(
-        cases[i, 0],
-        cases[i, 1],
-        cases[i, 2],
-        cases[i, 3],
-        cases[i, 4],
-        inverse_nn,
-        inverse_determinant,
-        cases[i, 5],
-        cases[i, 6],
-        cases[i, 7],
-    )
-    impulses[i, 0] = impulse_n
-    impulses[i, 1] = impulse_t
-
-
-def impulses_of_law(cases: Array) -> Array:
-    """`collision_impulse` of many collisions: speeds, W, coefficients (N, 8) in its order → J_n, J_t (N, 2)."""
-    return _map_rows(_law, cases, 2)
 
 
 @compiled

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.support.kernels_under_test import FLOOR, ContactPass, Placed
-from tests.support.tilted_chains import mirrored, tilted_heap
+from tests.support.tilted_chains import tilted_heap
 from tests.support.tilting_under_test import floor_pass
 from warpchain.inputs.parameters import preset
 from warpchain.oracle import motion_equations, tilting_contacts, tilting_plane
@@ -137,15 +137,6 @@ def test_pushing_floor_does_the_work_that_is_booked():
         assert before - after == pytest.approx(outcome.loss, abs=1e-12 * (before + after))
         gains += after > before
     assert gains > 20
-
-
-def test_mirror_image_meets_the_floor_as_the_mirror_image(passes):
-    """The mirrored plane gets the opposite changes, and links and losses are the same, all to the bit."""
-    for (position, velocity, plane, parameters), outcome in passes:
-        image = floor_pass(position, velocity, mirrored(plane), parameters)
-        assert_array_equal(image.velocity, outcome.velocity)
-        assert_array_equal(image.rates, -outcome.rates)
-        assert (image.loss, image.impulses, image.gap) == (outcome.loss, outcome.impulses, outcome.gap)
 
 
 @pytest.mark.parametrize(("half_width", "push_rate"), [(0.0, 0.0), (4e-3, 0.0), (4e-3, 500.0)])
