@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import warpchain
-from tests.support.folded_chains import accordion, chain_of_angles, folded_chain
+from tests.support.folded_chains import chain_of_angles, folded_chain
 from tests.support.kernels_under_test import LIST, SELF, ContactPass, Placed
 from warpchain import Status
 from warpchain.engine.batch import Batch
@@ -212,14 +212,6 @@ def test_torn_chain_never_trusts_its_list():
 # --- a full list ---
 
 
-def longest_accordion():
-    """Length of the longest accordion whose pairs, (n/2)(n/2 − 1), the list can hold; two more links overflow it."""
-    lists = list_layout(layout.padded_width(80))
-    n = max(n for n in range(4, 199, 2) if (n // 2) * (n // 2 - 1) <= lists.capacity)
-    assert n < 196
-    return n
-
-
 def test_overflow_is_noticed_at_the_last_pair():
     """A list that is just full holds all pairs; one pair too many is reported, not dropped in silence."""
     position = folded_chain(190, 1, LENGTH)[0]
@@ -239,21 +231,6 @@ def test_overflow_is_noticed_at_the_last_pair():
         if fits:
             assert len(contact_pass.listed_pairs(0)) == capacity
             assert contact_pass.listed_pairs(0) == pairs_within_reach(position, skin)
-
-
-def test_overflow_at_the_start_ends_the_simulation():
-    """A chain folded onto two spots is simulated if the list can hold its pairs, else ends in list_overflow."""
-    n = longest_accordion()
-    run = {"floor": False, "gravity": False, "method": "bs32", "skin": 1e-4}
-    assert warpchain.simulate("soft", *accordion(n, LENGTH, 1e-6), 1e-6, **run).status == Status.FINISHED
-    start = accordion(n + 2, LENGTH, 1e-6)
-    trajectory = warpchain.simulate("soft", *start, 1e-6, **run)
-    assert trajectory.status == Status.LIST_OVERFLOW
-    assert not trajectory.status.ok
-    assert trajectory.steps_accepted == 0
-    assert_array_equal(trajectory.time, [0.0])
-    assert_array_equal(trajectory.position, start[0][None])
-    assert "skin" in trajectory.status.sentence
 
 
 def zigzag(n, slope, rate):

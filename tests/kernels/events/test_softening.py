@@ -13,12 +13,9 @@ from warpchain.engine.devices import start_device
 from warpchain.inputs.options import Options
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
-from warpchain.kernels.cpu.explicit import place_ends
-from warpchain.kernels.cpu.loop import load_state
 from warpchain.kernels.events.softening import contact_step, spring_tolerance
-from warpchain.kernels.events.summary import summarise
 from warpchain.kernels.physics.softness import softened
-from warpchain.kernels.types import Chain, Control, Drive, Model, State, read_chain
+from warpchain.kernels.types import Chain, Control, Drive, State
 from warpchain.run.single_walk import setup_walk
 
 PAPER = preset("paper")
@@ -26,38 +23,6 @@ SERIES = ("time", "center", "center_velocity", "kinetic_energy", "spring_energy"
 
 
 # --- area and joints ---
-
-
-@wp.kernel(module="unique", enable_backward=False)
-def _area(model: Model, state: State, scratch: wp.array3d(dtype=wp.float64), areas: wp.array(dtype=wp.float64)):
-    world = wp.tid()
-    chain = read_chain(model, world)
-    load_state(scratch[world], state, chain, world)
-    place_ends(scratch[world], chain)
-    areas[world] = summarise(scratch[world], chain).area
-
-
-def area_of(position: np.ndarray) -> float:
-    """Area of a chain (n, 3)."""
-    batch = Batch(1, len(position), setup_walk("paper", {}, None).options)
-    batch.set_chain(0, PAPER, len(position))
-    batch.load(0, position, np.zeros_like(position), stop_time=1.0, stop_status=Status.FINISHED)
-    areas = wp.full(1, np.nan, dtype=wp.float64, device=start_device("cpu").warp)
-    wp.launch(_area, dim=1, inputs=[batch.model, batch.state, batch.scratch, areas], device="cpu")
-    return float(areas.numpy()[0])
-
-
-@pytest.mark.parametrize("links", [4, 30, 180])
-def test_area_of_a_ring(links: int) -> None:
-    """A ring is a regular polygon of area n ℓ² / (4 tan(π/n)), wherever it lies; run the other way it is negative."""
-    position, _ = lay_chain(ellipse(1.0), links, PAPER.link_length, 0.0)
-    expected = links * PAPER.link_length**2 / (4 * np.tan(np.pi / links))
-    sign = np.sign(area_of(position))
-    assert area_of(position) == pytest.approx(sign * expected, rel=1e-9)
-    moved = position + np.array([3.0, -1.0, 0.0])
-    assert area_of(moved) == pytest.approx(sign * expected, rel=1e-9)
-    mirrored = position * np.array([-1.0, 1.0, -1.0]) + np.array([0.0, 0.0, np.pi])
-    assert area_of(mirrored) == pytest.approx(-sign * expected, rel=1e-9)
 
 
 @wp.kernel(module="unique", enable_backward=False)
@@ -124,16 +89,6 @@ def bounds_of(batch: Batch, *, is_driven: bool) -> np.ndarray:
     inputs = [batch.drive, batch.state, batch.control, is_driven, bounds]
     wp.launch(_bounds, dim=len(batch.links), inputs=inputs, device="cpu")
     return bounds.numpy()
-
-
-@pytest.mark.parametrize(("own", "longest"), [(2e-5, 5e-5), (7e-5, 7e-5)])
-@pytest.mark.parametrize("is_driven", [False, True])
-def test_steps_near_contacts_are_longer_on_soft_joints(own: float, longest: float, is_driven: bool) -> None:
-    """Below softness 1, and at 1 unless it is driven, the contact step bounds them; beyond, the greater of the two."""
-    batch = Batch(5, 4, Options(contact_step=own, soft_contact_step=5e-5))
-    batch.state.softness.numpy()[:] = [0.0, 0.99, 1.0, 1.01, 2.0]
-    steps = bounds_of(batch, is_driven=is_driven)[:, 0].tolist()
-    assert steps == [own, own, longest if is_driven else own, longest, longest]
 
 
 @pytest.mark.parametrize("softness", [0.0, 1.0])
