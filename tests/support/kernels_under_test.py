@@ -42,8 +42,19 @@ compiled = functools.partial(
 )
 
 
-def _poisoned(*shape: int) -> wp.array:
+def poisoned(*shape: int) -> wp.array:
+    """Memory that nothing has been written to."""
     return wp.full(shape, np.nan, dtype=wp.float64, device=DEVICE)
+
+
+def chain_on_cpu(position: Array, velocity: Array, parameters: Parameters) -> tuple[Model, State]:
+    """Structs of one chain; of its state only the links are set."""
+    model, state = Model(), State()
+    model.link_count = wp.array([len(position)], dtype=wp.int32, device=DEVICE)
+    for name, value in parameters:
+        setattr(model, name, wp.array([value], dtype=wp.float64, device=DEVICE))
+    state.links = wp.array(np.hstack([position, velocity]).T[None], dtype=wp.float64, device=DEVICE)
+    return model, state
 
 
 # --- the impulse law ---
@@ -142,7 +153,7 @@ def link_pairs(
     block[:, rates] = velocity.transpose(0, 2, 1)
     block[:, [layout.INVERSE_MASS, layout.INVERSE_INERTIA]] = inverses.transpose(0, 2, 1)
     scratch = wp.array(block, dtype=wp.float64, device=DEVICE)
-    results = _poisoned(len(cases), 3)
+    results = poisoned(len(cases), 3)
     cases = np.column_stack([cases, np.full(len(cases), push_rate)])
     inputs = [scratch, wp.array(cases, dtype=wp.float64, device=DEVICE), results]
     wp.launch(_link_pair, dim=len(cases), inputs=inputs, device=DEVICE)
@@ -150,7 +161,7 @@ def link_pairs(
 
 
 def _map_rows(kernel: wp.Kernel, cases: Array, width: int) -> Array:
-    results = _poisoned(len(cases), width)
+    results = poisoned(len(cases), width)
     inputs = [wp.array(cases, dtype=wp.float64, device=DEVICE), results]
     wp.launch(kernel, dim=len(cases), inputs=inputs, device=DEVICE)
     return results.numpy()
@@ -224,16 +235,6 @@ class Placed:
     parameters: Parameters
 
 
-def chain_on_cpu(position: Array, velocity: Array, parameters: Parameters) -> tuple[Model, State]:
-    """Structs of one chain; of its state only the links are set."""
-    model, state = Model(), State()
-    model.link_count = wp.array([len(position)], dtype=wp.int32, device=DEVICE)
-    for name, value in parameters:
-        setattr(model, name, wp.array([value], dtype=wp.float64, device=DEVICE))
-    state.links = wp.array(np.hstack([position, velocity]).T[None], dtype=wp.float64, device=DEVICE)
-    return model, state
-
-
 class ContactPass:
     """Many chains, one after the other, on which parts of the contact pass are run."""
 
@@ -251,8 +252,8 @@ class ContactPass:
             setattr(self.model, name, wp.array(values, dtype=wp.float64, device=DEVICE))
         worlds, rows, size = len(chains), layout.scratch_rows(0), list_layout(self.columns).size
         self.state = State()
-        self.state.links = _poisoned(worlds, 6, max(self.links))
-        self.scratch = _poisoned(worlds, rows, self.columns)
+        self.state.links = poisoned(worlds, 6, max(self.links))
+        self.scratch = poisoned(worlds, rows, self.columns)
         self.lists = wp.full((worlds, size), POISONED_JOINT, dtype=wp.int32, device=DEVICE)
         self.place(chains)
 
@@ -263,7 +264,7 @@ class ContactPass:
 
     def run(self, parts: int) -> list[dict[str, float]]:
         """Run parts of a pass from the states placed last: `RESULTS` of each chain, NaN if not computed."""
-        results = _poisoned(len(self.links), len(RESULTS))
+        results = poisoned(len(self.links), len(RESULTS))
         speeds = [self.sprocket_speed, self.push_rate]
         inputs = [self.model, self.state, self.scratch, self.lists, self.skin, *speeds, parts]
         kernel = _contact_pass(self.columns)

@@ -5,9 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import warpchain
-from tests.support.bouncing_chains import PAPER, falling, loop
-from tests.support.rigid_joints import exact_rigid_flight, projected, rigid_motion
-from tests.support.rigid_under_test import visit
+from tests.support.rigid_chains import PAPER, exact_rigid_flight, falling, loop, projected, rigid_motion, visit
 from warpchain import Status, preset
 from warpchain.kernels.methods.w_tableaus import ROS34PW2
 from warpchain.oracle import motion_equations
