@@ -1,7 +1,6 @@
 """Loops that are held and released: which loop it is, how long that takes, hard cases and refusals."""
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,7 +8,7 @@ import pytest
 
 import warpchain
 from tests.support.driven_loops import Loop, released_loop
-from warpchain import InputError, Status, load_walk, preset
+from warpchain import InputError, Status, preset
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL
 from warpchain.inputs.scene import Scene, fewest_links, greatest_load
 from warpchain.run.single_walk import setup_walk
@@ -68,27 +67,13 @@ def test_further_hold_prolongs_the_hold() -> None:
     assert longer.drift == usual.drift
 
 
-def test_hold_time_and_drift_are_in_the_result_its_file_and_its_row(tmp_path: Path) -> None:
-    """They are those of the drive, and come back from the file; without a sprocket there are none."""
+def test_hold_time_and_drift_are_those_of_the_drive() -> None:
+    """A walk tells them; without a sprocket there are none."""
     settings = {"start": "spinning", "method": "explicit", "walk_limit": 1e-3, **CELL}
     walk = warpchain.walk(preset="soft", **settings)
     drive = released_loop(start="spinning", **CELL)
     assert (walk.hold_time, walk.drift) == (drive.hold_time, drive.drift)
     assert walk.simulated_time == pytest.approx(walk.hold_time + walk.walk_time, abs=1e-12)
-    walk.save(tmp_path / "walk.h5")
-    again = load_walk(tmp_path / "walk.h5")
-    assert (again.hold_time, again.drift) == (walk.hold_time, walk.drift)
-    scene = {name: settings[name] for name in ("start", "walk_limit", *CELL)}
-    content = {
-        "version": 1,
-        "name": "one",
-        "seed": 1,
-        "preset": "soft",
-        "samples": 1,
-        "distributions": {"all": "fixed"},
-    }
-    rows = warpchain.sweep(content | {"scene": scene, "options": {"method": "explicit"}}, tmp_path / "sweep")
-    assert (rows.hold_time.item(), rows.drift.item()) == (walk.hold_time, walk.drift)
     ellipse = warpchain.walk(preset="soft", **settings | {"start": "ellipse"})
     assert math.isnan(ellipse.hold_time) and math.isnan(ellipse.drift)
 

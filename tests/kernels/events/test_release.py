@@ -160,15 +160,6 @@ def test_a_loop_that_keeps_its_shape_is_released_in_time() -> None:
     assert watched.drift == pytest.approx(0, abs=1e-12)
 
 
-def test_steady_time_sets_how_long_a_free_loop_is_watched() -> None:
-    """With a steady_time of 1 s instead of a period's 0.25 s the release is 0.75 s later; 0 takes one window."""
-    by_itself, second, none = (
-        Watched(drive={"steady_time": steady_time}).sample().release for steady_time in (-1.0, 1.0, 0.0)
-    )
-    assert second - by_itself == 0.75
-    assert by_itself - none == 0.125
-
-
 def test_own_loads_are_watched_for_as_long_as_slow_waves_need() -> None:
     """With a factor of 1 there is one watch, of 6 s in this loop; a steady_time that is given overrides that."""
     watched = Watched(duration=8.0, drive={"load_factor": 1.0}).sample()
@@ -257,21 +248,6 @@ def test_a_loop_that_slips_much_is_not_released(sign: int) -> None:
     """Slower or faster than its sprocket by more than MOST_SLIP it is never stationary."""
     for slip, is_released in ((float(MOST_SLIP) - 0.01, True), (float(MOST_SLIP) + 0.01, False)):
         watched = Watched(duration=10.0).sample(speed=SPEED * (1 - sign * slip))
-        assert math.isfinite(watched.release) == is_released
-
-
-def test_a_loop_that_changes_its_speed_as_it_becomes_free_may() -> None:
-    """Loaded loops slip more: what is watched of the speed of a free loop is its own."""
-    watched = Watched()
-    watched.sample(speed=SPEED * (1 - 0.015 * (watched.time < fall_of(16.0) + 0.1)))
-    assert watched.release == Watched().sample().release
-
-
-def test_a_loop_whose_speed_varies_is_not_released() -> None:
-    """A speed that grows by 3 % in a crossing is not that of an even loop, though none of it is far off; 0.1 % is."""
-    for part, is_released in ((0.03, False), (0.001, True)):
-        watched = Watched(duration=3.0)
-        watched.sample(speed=SPEED * (1 + part * (watched.time - 1.5) / crossing(16.0)))
         assert math.isfinite(watched.release) == is_released
 
 

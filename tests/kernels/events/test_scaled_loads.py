@@ -6,8 +6,6 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 import warp as wp
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
@@ -141,28 +139,6 @@ def test_drag_multiplies_the_velocity_across_the_path(left: float) -> None:
     along, across = np.array([np.cos(0.7), np.sin(0.7)]), np.array([-np.sin(0.7), np.cos(0.7)])
     after = dragged(angle, np.tile(3.0 * along - 2.0 * across, (20, 1)), left)
     assert_allclose(after, np.tile(3.0 * along - left * 2.0 * across, (20, 1)), rtol=1e-14)
-
-
-shapes_of_chains = st.integers(2, 30).flatmap(
-    lambda half: st.tuples(
-        st.lists(st.floats(-10, 10), min_size=2 * half, max_size=2 * half),
-        st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50)), min_size=2 * half, max_size=2 * half),
-        st.floats(0, 1),
-    )
-)
-
-
-@given(shapes_of_chains)
-@settings(max_examples=60, deadline=None)
-def test_drag_takes_energy_and_no_momentum_along_the_path(case: tuple[Sequence[float], Sequence[tuple], float]) -> None:
-    """However a chain lies and moves, no link gains speed, and its velocity along the path is what it was."""
-    angle, velocity, left = np.array(case[0]), np.array(case[1]), case[2]
-    after = dragged(angle, velocity, left)
-    assert np.all(np.linalg.norm(after, axis=1) <= np.linalg.norm(velocity, axis=1) * (1 + 1e-14) + 1e-300)
-    turn = (np.sin(np.roll(angle, 1) - angle) + np.sin(np.roll(angle, -1) - angle)) / 12
-    path = np.stack([np.cos(angle) - turn * np.sin(angle), np.sin(angle) + turn * np.cos(angle)], axis=1)
-    scale = 1e-13 * (1 + np.abs(velocity).max())
-    assert_allclose(np.sum(after * path, axis=1), np.sum(velocity * path, axis=1), atol=scale)
 
 
 # --- how long slow waves take ---

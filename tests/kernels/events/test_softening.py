@@ -7,15 +7,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import warpchain
 from warpchain import InputError, Status, preset
-from warpchain.engine.batch import Batch
-from warpchain.engine.control import HOLD_STRAIN, LOADED_STRAIN, SOFTEST, hold_softness
-from warpchain.engine.devices import start_device
-from warpchain.inputs.options import Options
+from warpchain.engine.control import SOFTEST
 from warpchain.inputs.start_shapes import ellipse, lay_chain
-from warpchain.kernels import layout
-from warpchain.kernels.events.softening import contact_step, spring_tolerance
 from warpchain.kernels.physics.softness import softened
-from warpchain.kernels.types import Chain, Control, Drive, State
+from warpchain.kernels.types import Chain, Control
 from warpchain.run.single_walk import setup_walk
 
 PAPER = preset("paper")
@@ -56,58 +51,12 @@ def test_softness_goes_geometrically_from_own_over_soft_to_softest() -> None:
     assert_allclose(joints_of(1e9, 1e3, 1e-3, 1.5), [np.sqrt(1e13), 50.0, 10.0], rtol=1e-14)
 
 
-@pytest.mark.parametrize("own", [1e9, 1e7, 3e6])
-@pytest.mark.parametrize("strain", [HOLD_STRAIN, LOADED_STRAIN])
-def test_the_loop_is_held_on_joints_that_it_stretches_by_no_more_than_it_may(own: float, strain: float) -> None:
-    """k = T/(strain ℓ), whatever the joints' own, between the softest and the lesser of that and the soft ones'."""
-    parameters = PAPER.with_values({"joint_stiffness": own})
-    for tension in (0.0, 5.0, 25.0, 400.0):
-        wanted = tension / (strain * PAPER.link_length)
-        held, _, _ = joints_of(own, 1e3, 1e-3, hold_softness(parameters, tension, strain))
-        assert held == pytest.approx(min(max(wanted, 1e6), 1e7, own))
-    assert hold_softness(PAPER.with_values({"joint_stiffness": 1e5}), 25.0, strain) == 2.0
-
-
 def test_no_joint_becomes_stiffer() -> None:
     """What is softer than soft or softest joints stays, undamped joints included; the rest softens."""
     for softness in (0.0, 0.3, 1.0, 1.7, 2.0):
         assert joints_of(1e6, 0.0, 2.0, softness) == (1e6, 0.0, 0.5)
     assert joints_of(1e6, 1e3, 2.0, 1.0) == (1e6, 100.0, 0.5)
     assert joints_of(3e6, 1e3, 2.0, 2.0) == (1e6, 25.0, 0.5)
-
-
-@wp.kernel(module="unique", enable_backward=False)
-def _bounds(drive: Drive, state: State, control: Control, is_driven: bool, bounds: wp.array2d(dtype=wp.float64)):
-    i = wp.tid()
-    bounds[i, 0] = contact_step(state, control, i, is_driven)
-    bounds[i, 1] = spring_tolerance(drive, state, control, i, is_driven)
-
-
-def bounds_of(batch: Batch, *, is_driven: bool) -> np.ndarray:
-    """`contact_step` and `spring_tolerance` (W, 2) of the worlds of a batch."""
-    bounds = wp.full((len(batch.links), 2), np.nan, dtype=wp.float64, device=start_device("cpu").warp)
-    inputs = [batch.drive, batch.state, batch.control, is_driven, bounds]
-    wp.launch(_bounds, dim=len(batch.links), inputs=inputs, device="cpu")
-    return bounds.numpy()
-
-
-@pytest.mark.parametrize("softness", [0.0, 1.0])
-@pytest.mark.parametrize("is_driven", [False, True])
-def test_tolerance_of_a_drive_is_tenfold_until_the_loop_is_watched_free(softness: float, is_driven: bool) -> None:
-    """Tenfold up to the watch under its own loads, where it is the options' own; but no looser than 0.05 or that."""
-    own = 1e-5 if softness < 1 else 2e-4
-    batch = Batch(5, 4, Options(tolerance=1e-5, soft_tolerance=2e-4))
-    batch.state.softness.numpy()[:] = softness
-    for world in range(5):
-        batch.set_drive(world, hold_start=2.5)
-    batch.state.last_sample.numpy()[:, layout.TIME] = [-1.0, 2.4, 2.5, 2.6, 2.6]
-    batch.state.load_factor.numpy()[:] = [1.0, 1.0, 50.0, 1.001, 1.0]
-    tenfold = 10 * own if is_driven else own
-    assert_allclose(bounds_of(batch, is_driven=is_driven)[:, 1], [tenfold] * 4 + [own], rtol=1e-15)
-    for own, driven in ((0.02, 0.05), (0.08, 0.08)):
-        batch.control.tolerance = batch.control.soft_tolerance = own
-        expected = [driven if is_driven else own] * 4 + [own]
-        assert_allclose(bounds_of(batch, is_driven=is_driven)[:, 1], expected, rtol=1e-15)
 
 
 # --- the pile ---

@@ -6,7 +6,6 @@ contacts resolved in parallel rounds.
 """
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -16,13 +15,11 @@ import warp as wp
 from tests.support.blocks_under_test import (
     FIXED_STEP,
     SOFT,
+    assert_same,
     batch_of,
-    exact_kernels,
-    features_of,
     heap,
     launch_blocks,
     launch_chains,
-    listed_pairs,
 )
 from warpchain.engine.batch import Batch
 from warpchain.engine.kernel_choice import most_registers
@@ -34,24 +31,9 @@ from warpchain.kernels.gpu.loop import make_advance_block
 from warpchain.status import Status
 
 LINKS = 12
-SINGLE = 1e-6
-"""Relative error of what GPU kernels compare in single precision."""
 
 
-@pytest.fixture(scope="module", autouse=True)
-def without_fused_operations() -> Iterator[None]:
-    """All kernels here are exact."""
-    with exact_kernels():
-        yield
-
-
-def assert_same(ours: Batch, theirs: Batch) -> None:
-    """State, clock, counters and statuses agree to the bit, sums of losses to rounding, extremes as compared."""
-    for name in ("links", "time", "counts", "status"):
-        assert np.array_equal(getattr(ours.state, name).numpy(), getattr(theirs.state, name).numpy()), name
-    losses = theirs.state.losses.numpy()
-    assert np.allclose(ours.state.losses.numpy(), losses, rtol=1e-12, atol=0)
-    assert np.allclose(ours.state.extremes.numpy(), theirs.state.extremes.numpy(), rtol=SINGLE, atol=0)
+pytestmark = pytest.mark.usefixtures("without_fused_operations")
 
 
 @pytest.mark.parametrize(
@@ -66,7 +48,7 @@ def test_fixed_steps_equal_a_cpu_kernel(method: str, fixed_body: str, self_conta
     raised = 0.9 * SOFT.sprocket_radius if fixed_body == "sprocket" else 0.0
     chains = [heap(LINKS, 3, raised=raised), heap(LINKS, 18, tilt=np.pi, raised=raised)]
     ours, theirs = (batch_of(chains, method=method, self_contact=self_contact) for _ in range(2))
-    features = features_of(ours, fixed_body=fixed_body)
+    features = ours.features(fixed_body=fixed_body, watch="none")
     launch_blocks(ours, features, 40, block_dim=block_dim)
     launch_chains(theirs, features, 40)
     for counts in map(theirs.counts, range(2)):
@@ -82,7 +64,7 @@ def test_chains_too_long_for_shared_memory_equal_a_cpu_kernel(block_dim: int, mo
     monkeypatch.setattr(functions, "LARGEST_SHARED_BLOCK", LINKS - 1)
     make_advance_block.cache_clear()
     ours, theirs = (batch_of([heap(LINKS)], method="bs32") for _ in range(2))
-    features = features_of(ours, fixed_body="floor")
+    features = ours.features(fixed_body="floor", watch="none")
     launch_blocks(ours, features, 20, block_dim=block_dim)
     make_advance_block.cache_clear()
     launch_chains(theirs, features, 20)
@@ -98,7 +80,7 @@ def test_free_flight_equals_a_cpu_kernel() -> None:
     ours, theirs = (
         batch_of([(position, velocity)], method="rkf78", self_contact=False, fixed_step=False) for _ in range(2)
     )
-    features = features_of(ours, fixed_body="none")
+    features = ours.features(fixed_body="none", watch="none")
     launch_blocks(ours, features, 60, block_dim=LINKS)
     launch_chains(theirs, features, 60)
     assert ours.counts(0) == theirs.counts(0)
@@ -122,7 +104,7 @@ def test_samples_frames_and_rest_equal_a_cpu_kernel() -> None:
     ours, theirs = bounded_heaps(2), bounded_heaps(2)
     for batch in (ours, theirs):
         batch.control.rest_speed, batch.control.rest_time = 100.0, 20 * FIXED_STEP
-    features = features_of(ours, fixed_body="floor", watch="rest")
+    features = ours.features(fixed_body="floor", watch="rest")
     launch_blocks(ours, features, 100, block_dim=LINKS)
     launch_chains(theirs, features, 100)
     assert theirs.status(0) == Status.AT_REST
@@ -150,7 +132,7 @@ def test_frames_between_samples_equal_a_cpu_kernel() -> None:
         batch = bounded_heaps(2)
         batch.control.frame_interval = 2.5 * FIXED_STEP
         batch.state.next_frame.numpy()[1] = 0 if len(runs) < 2 else -1
-        features = features_of(batch, fixed_body="floor", watch="rest")
+        features = batch.features(fixed_body="floor", watch="rest")
         while batch.status(1) == Status.RUNNING:
             if launch is launch_blocks:
                 launch_blocks(batch, features, attempts, block_dim=LINKS)
@@ -169,15 +151,6 @@ def test_frames_between_samples_equal_a_cpu_kernel() -> None:
     assert len(few) < 6 and len(our_times) > 12 and np.all(np.diff(marks) >= 1)
 
 
-def test_neighbour_list_holds_the_same_pairs() -> None:
-    """The list built in parallel holds the pairs of the list built by one thread."""
-    ours, theirs = (batch_of([heap(LINKS, 8)], method="dp5", fixed_step=False) for _ in range(2))
-    launch_blocks(ours, features_of(ours, fixed_body="floor", watch="rest"), 1, block_dim=LINKS)
-    launch_chains(theirs, features_of(theirs, fixed_body="floor", watch="rest"), 1)
-    assert len(listed_pairs(theirs)) > 10
-    assert listed_pairs(ours) == listed_pairs(theirs)
-
-
 def test_failures_stop_one_chain_and_leave_the_others() -> None:
     """A chain with a NaN ends as not finite, one that may not shrink its step as too small; the others go on."""
     good = heap(LINKS, 5)
@@ -187,7 +160,7 @@ def test_failures_stop_one_chain_and_leave_the_others() -> None:
     batch.control.contact_step = FIXED_STEP
     alone = batch_of([good], method="dp5", fixed_step=False)
     alone.control.contact_step = FIXED_STEP
-    features = features_of(batch, fixed_body="floor", watch="rest")
+    features = batch.features(fixed_body="floor", watch="rest")
     for each in (batch, alone):
         launch_blocks(each, features, 10, block_dim=LINKS)
     assert [batch.status(world) for world in range(3)] == [Status.RUNNING, Status.NOT_FINITE, Status.RUNNING]

@@ -1,13 +1,12 @@
 """A chain whose plane tilts: GPU kernels against CPU kernels, and in any cut."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.kernels.gpu.test_same_as_cpu import compiles_for_gpus
-from tests.support.blocks_under_test import SOFT, exact_kernels, launch_blocks, launch_chains
+from tests.support.blocks_under_test import SOFT, launch_blocks, launch_chains
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.start_shapes import ellipse, lay_chain
@@ -18,11 +17,7 @@ from warpchain.status import Status
 LINKS = (20, 38)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def without_fused_operations() -> Iterator[None]:
-    """All kernels here are exact."""
-    with exact_kernels():
-        yield
+pytestmark = pytest.mark.usefixtures("without_fused_operations")
 
 
 def falling_batch(fixed_step: float | None = None) -> Batch:
