@@ -13,7 +13,7 @@ import pytest
 import warpchain
 
 ROOT = Path(__file__).parents[1]
-HOST = sorted(path for path in (ROOT / "warpchain").rglob("*.py") if "kernels" not in path.parts)
+HOST = sorted(path for path in (ROOT / "warpchain").rglob("*.py") if "kernels" not in path.relative_to(ROOT).parts)
 KERNELS = sorted((ROOT / "kernels").rglob("*.py"))
 STUDIES = sorted((ROOT / "studies").rglob("*.py"))
 LONGEST_FILE = 450

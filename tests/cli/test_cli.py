@@ -104,7 +104,7 @@ REFUSED = {
     "--frequency 15Hz": "scene.frequency: '15Hz' has its unit written with it",
     "--start up": "scene.start: 'up' is unknown",
     "--method rk4": "options.method: 'rk4' is unknown",
-    "--method rodas4p": "options.method: 'rodas4p' was removed; give rodas5p",
+    "--method rodas5p": "options.method: 'rodas5p' was removed; give dp5",
     "--method hybrid --device cuda": "options.method: 'hybrid' runs on a CPU only; give explicit",
     "--tol 0": "options.tolerance: 0 is less than 1e-13",
     "--preset hard": "preset: 'hard' is unknown",

@@ -149,10 +149,10 @@ def test_from_a_file(tmp_path: Path) -> None:
             content(options={"method": "rk4"}),
             "sweep.options.method: 'rk4' is unknown; give one of standard, explicit, reference,",
         ),
-        (content(options={"method": "rodas4p"}), "sweep.options.method: 'rodas4p' was removed; give rodas5p"),
+        (content(options={"method": "rodas5p"}), "sweep.options.method: 'rodas5p' was removed; give dp5"),
         (
-            content(options={"device": "cuda", "method": "rodas5p"}),
-            "sweep.options.method: 'rodas5p' runs on a CPU only; give explicit, or device: cpu",
+            content(options={"device": "cuda", "method": "hybrid"}),
+            "sweep.options.method: 'hybrid' runs on a CPU only; give explicit, or device: cpu",
         ),
         (
             content(options={"device": "cuda"}, grid={"method": ["os32", "hybrid"]}),

@@ -135,7 +135,6 @@ def test_a_tableau_is_all_that_a_new_method_takes(cash_karp: str) -> None:
     ("changes", "message"),
     [
         ({"name": "dp5"}, "dp5: there is a method of this name"),
-        ({"name": "rodas5p"}, "rodas5p: there is a method of this name"),
         ({"name": "hybrid"}, "hybrid: there is a method of this name"),
         (
             {"matrix": (*CASH_KARP.matrix[:3], CASH_KARP.matrix[2], *CASH_KARP.matrix[4:])},
@@ -157,6 +156,6 @@ def test_a_tableau_that_does_not_fit_is_refused(changes: dict, message: str) -> 
 
 def test_every_tableau_has_kernels_of_its_own() -> None:
     """Coefficients in an unrolled loop are not in the name that Warp gives a kernel's module: others must differ."""
-    features = [Features(name, layout.padded_width(60), "floor", True, "grid", "rest") for name in TABLEAUS]
+    features = [Features(name, layout.padded_width(60), "floor", True, "rest") for name in TABLEAUS]
     assert len({make_advance(each).module.name for each in features}) == len(TABLEAUS)
     assert len({make_advance_block(each, 64, 168).module.name for each in features}) == len(TABLEAUS)
