@@ -4,11 +4,10 @@ Run ``python docs/generate_reference.py`` after a change of any of these; a test
 """
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 
-import typer
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from typer.models import ArgumentInfo, OptionInfo
@@ -51,10 +50,10 @@ KEYS: Final = {
 
 SAMPLER_MEANINGS: Final = {
     "random": "independent samples",
-    "sobol": "scrambled Sobol' sequence; a power of two of samples; needs `warpchain[scipy]`",
-    "latin_hypercube": "latin hypercube; needs `warpchain[scipy]`",
+    "sobol": "scrambled Sobol' sequence; a power of two of samples",
+    "latin_hypercube": "latin hypercube",
     "saltelli": "points for Sobol indices: each sample of d drawn quantities takes d + 2 walks; a power of two of "
-    "samples; needs `warpchain[scipy]`",
+    "samples",
 }
 
 
@@ -243,19 +242,6 @@ def results_page() -> str:
     )
 
 
-def commands(application: typer.Typer, path: str) -> Iterable[tuple[str, Callable[..., None]]]:
-    """The words that call each command, and its function."""
-    for group in application.registered_groups:
-        assert group.typer_instance is not None
-        name = f"{path} {group.name}"
-        if group.typer_instance.registered_callback and group.typer_instance.registered_callback.callback:
-            yield name, group.typer_instance.registered_callback.callback
-        yield from commands(group.typer_instance, name)
-    for command in application.registered_commands:
-        assert command.callback is not None
-        yield f"{path} {command.name or command.callback.__name__}", command.callback
-
-
 def option_row(name: str, annotation: Any, default: Any) -> tuple[str, str] | None:
     """How an option is written, and its help; None for what is no option."""
     kind, *notes = get_args(annotation) or (annotation,)
@@ -279,12 +265,13 @@ def option_row(name: str, annotation: Any, default: Any) -> tuple[str, str] | No
 def commands_page() -> str:
     """Every command with its options."""
     parts = ["# Commands\n\nThe same text as `--help` of each command.\n"]
-    for path, function in sorted(commands(app, "warpchain"), key=lambda item: item[0] != "warpchain walk"):
+    named = [(command.name or command.callback.__name__, command.callback) for command in app.registered_commands]
+    for name, function in sorted(named, key=lambda item: item[0] != "walk"):
         hints = get_type_hints(function, include_extras=True)
         given = inspect.signature(function).parameters.items()
-        rows = [row for name, one in given if (row := option_row(name, hints[name], one.default)) is not None]
+        rows = [row for key, one in given if (row := option_row(key, hints[key], one.default)) is not None]
         text = "\n\n".join(" ".join(part.split()) for part in (function.__doc__ or "").split("\n\n"))
-        parts.append(f"\n## {path}\n\n{text}\n\n" + table(("option", "meaning"), rows))
+        parts.append(f"\n## warpchain {name}\n\n{text}\n\n" + table(("option", "meaning"), rows))
     return "".join(parts)
 
 

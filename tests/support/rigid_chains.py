@@ -8,6 +8,7 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from tests.oracle_model import motion_equations
 from tests.support.kernels_under_test import DEVICE, chain_on_cpu, compiled, poisoned
 from warpchain import preset
 from warpchain.inputs.parameters import Parameters
@@ -17,7 +18,6 @@ from warpchain.kernels.cpu.functions import rigid_flight
 from warpchain.kernels.cpu.loop import load_state
 from warpchain.kernels.cpu.rows import scratch_rows
 from warpchain.kernels.types import Model, State, read_chain
-from warpchain.oracle import motion_equations
 
 Array = NDArray[np.float64]
 

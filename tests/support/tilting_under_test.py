@@ -8,6 +8,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from tests.oracle_model.tilting_plane import Plane
 from tests.support.kernels_under_test import DEVICE, chain_on_cpu, compiled, poisoned
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
@@ -18,7 +19,6 @@ from warpchain.kernels.cpu.loop import load_state
 from warpchain.kernels.cpu.tilting import resolve_tilting_floor, tilting_gap, write_plane_sums
 from warpchain.kernels.physics.plane import on_plane
 from warpchain.kernels.types import Model, State, read_chain
-from warpchain.oracle.tilting_plane import Plane
 from warpchain.status import Status
 
 Array = NDArray[np.float64]

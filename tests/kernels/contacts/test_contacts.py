@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.oracle_model import contact_equations, motion_equations
+from tests.oracle_model.circular_loop import circular_loop
 from tests.support.folded_chains import chain_of_angles, folded_chain
 from tests.support.kernels_under_test import FLOOR, LIST, SELF, SPROCKET, ContactPass, Placed
 from warpchain.inputs.parameters import preset
-from warpchain.oracle import contact_equations, motion_equations
-from warpchain.oracle.circular_loop import circular_loop
 
 PAPER = preset("paper")
 TURNING = -90.0

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 import warpchain
+from tests.oracle_model import contact_equations, motion_equations
+from tests.oracle_model.circular_loop import circular_loop
 from tests.support.folded_chains import chain_of_angles, folded_chain
 from tests.support.kernels_under_test import LIST, SELF, ContactPass, Placed
 from warpchain import Status
@@ -17,8 +19,6 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.list_layout import list_layout
-from warpchain.oracle import contact_equations, motion_equations
-from warpchain.oracle.circular_loop import circular_loop
 
 PAPER = preset("paper")
 SOFT = preset("soft")

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.oracle_model import tilting_contacts, tilting_plane
+from tests.oracle_model.tilting_plane import Plane
 from tests.support.kernels_under_test import FLOOR, ContactPass, Placed
 from tests.support.tilted_chains import tilted_heap
 from tests.support.tilting_under_test import floor_pass
 from warpchain.inputs.parameters import preset
-from warpchain.oracle import tilting_contacts, tilting_plane
-from warpchain.oracle.tilting_plane import Plane
 
 PAPER = preset("paper")
 HEAPS = range(300)

@@ -5,10 +5,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import warpchain
+from tests.oracle_model import motion_equations
 from tests.support.rigid_chains import PAPER, exact_rigid_flight, falling, loop, projected, rigid_motion, visit
 from warpchain import Status, preset
 from warpchain.kernels.methods.w_tableaus import ROS34PW2
-from warpchain.oracle import motion_equations
 
 SOFT = preset("soft")
 LENGTHS = (4, 6, 8, 10, 12, 14, 16, 22, 60)

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.oracle_model import tilting_plane
+from tests.oracle_model.tilting_plane import tilt_of, tilted_plane
 from tests.support.tilted_chains import mirrored
 from tests.support.tilting_under_test import end_of, row_of, tilting_batch
 from warpchain.engine.batch import Batch
@@ -14,8 +16,6 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
-from warpchain.oracle import tilting_plane
-from warpchain.oracle.tilting_plane import tilt_of, tilted_plane
 from warpchain.status import Status
 
 SOFT = preset("soft")

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import warpchain
-from warpchain.bench.starts import flying
+from tests.oracle_model.motion_equations import acceleration
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
+from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS, Tableau, register
-from warpchain.oracle.motion_equations import acceleration
 
 EACH = pytest.mark.parametrize("tableau", TABLEAUS.values(), ids=list(TABLEAUS))
 
@@ -36,7 +36,7 @@ def eigenvalues(n: int) -> np.ndarray:
     ω_c is so large that sticking friction plays no part.
     """
     parameters = preset("paper").with_values({"friction_smoothing": 10.0})
-    start = np.stack(flying(n, parameters))
+    start = np.stack(lay_chain(ellipse(1.5), n, parameters.link_length, speed=5.0))
 
     def rates(state: np.ndarray) -> np.ndarray:
         return np.stack([state[1], acceleration(state[0], state[1], parameters)])

@@ -7,13 +7,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import warpchain
+from tests.oracle_model import motion_equations
+from tests.oracle_model.circular_loop import circular_loop, circular_loop_force
 from warpchain import Status, preset
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels.methods.method import find_method, method_names
-from warpchain.oracle import motion_equations
-from warpchain.oracle.circular_loop import circular_loop, circular_loop_force
 
 METHODS = [name for name in method_names() if not find_method(name).has_rigid_flight]
 PAPER, SOFT = preset("paper"), preset("soft")

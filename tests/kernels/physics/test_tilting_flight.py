@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.oracle_model import motion_equations, tilting_plane
+from tests.oracle_model.circular_loop import circular_loop
+from tests.oracle_model.tilting_plane import axes, tilted_plane
 from tests.support.mild_parameters import MILD, SILENT
 from tests.support.tilted_chains import tumbling_loop
 from tests.support.tilting_under_test import end_of, fly, row_of
 from warpchain.kernels import layout
-from warpchain.oracle import motion_equations, tilting_plane
-from warpchain.oracle.circular_loop import circular_loop
-from warpchain.oracle.tilting_plane import axes, tilted_plane
 
 WIDE = {"half_width": 0.02}
 """A half width [m] with which S is as large as the links' moments of inertia."""

@@ -2,7 +2,7 @@
 
 The chain stays planar, but its plane moves: the extension that the paper's discussion proposes.
 
-Conventions of all functions, beside those of :mod:`warpchain.oracle.motion_equations`:
+Conventions of all functions, beside those of :mod:`tests.oracle_model.motion_equations`:
 
 - Room axes: X̂ forward, Ŷ up, Ẑ = X̂ × Ŷ; the floor is at height 0. Plane axes: e1 and e2 in the plane, e3 = e1 × e2 its
   normal. A link's `position` and `velocity` (n, 3) are x, y (m), θ (rad) and their rates within the plane; the point
@@ -24,8 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.inputs.parameters import Parameters
-from warpchain.oracle.motion_equations import (
+from tests.oracle_model.motion_equations import (
     acceleration,
     direction,
     integrated,
@@ -35,6 +34,7 @@ from warpchain.oracle.motion_equations import (
     spring_energy,
     turned,
 )
+from warpchain.inputs.parameters import Parameters
 
 Array = NDArray[np.float64]
 

@@ -1,10 +1,10 @@
-"""A loop that turns like a rigid body, in closed form, with the conventions of `warpchain.oracle.motion_equations`."""
+"""A loop that turns like a rigid body, in closed form, with the conventions of `motion_equations`."""
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.oracle_model.motion_equations import direction, link_masses, turned
 from warpchain.inputs.parameters import Parameters
-from warpchain.oracle.motion_equations import direction, link_masses, turned
 
 Array = NDArray[np.float64]
 

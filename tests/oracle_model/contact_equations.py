@@ -1,4 +1,4 @@
-"""Contacts of the model in plain NumPy, with the conventions of :mod:`warpchain.oracle.motion_equations`.
+"""Contacts of the model in plain NumPy, with the conventions of :mod:`tests.oracle_model.motion_equations`.
 
 Sources: "A walking roller chain", section 2.2; A. Chatterjee and A. Ruina, "A new algebraic rigid-body collision law
 based on impulse space considerations", Journal of Applied Mechanics 65 (1998) 939-951.
@@ -10,8 +10,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.oracle_model.motion_equations import cross, link_ends, link_inertias, link_masses, turned
 from warpchain.inputs.parameters import Parameters
-from warpchain.oracle.motion_equations import cross, link_ends, link_inertias, link_masses, turned
 
 Array = NDArray[np.float64]
 Sprocket = tuple[Array, float, float]

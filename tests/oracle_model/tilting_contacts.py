@@ -1,4 +1,4 @@
-"""Floor contacts of a chain whose plane tilts, with the conventions of :mod:`warpchain.oracle.tilting_plane`.
+"""Floor contacts of a chain whose plane tilts, with the conventions of :mod:`tests.oracle_model.tilting_plane`.
 
 A roller is a cylinder of radius r and half width h about the e3 through a link's end. Vectors are in plane axes unless
 they are said to be in room axes; the floor's normal is n̂ = `Plane.y`. Contacts between links stay within the plane:
@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.oracle_model.motion_equations import cross, link_ends, link_inertias, link_masses, turned
+from tests.oracle_model.tilting_plane import Plane, plane_mass_matrix
 from warpchain.inputs.parameters import Parameters
-from warpchain.oracle.motion_equations import cross, link_ends, link_inertias, link_masses, turned
-from warpchain.oracle.tilting_plane import Plane, plane_mass_matrix
 
 Array = NDArray[np.float64]
 

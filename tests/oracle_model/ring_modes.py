@@ -17,9 +17,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.oracle_model.circular_loop import circular_loop
+from tests.oracle_model.motion_equations import acceleration
 from warpchain.inputs.parameters import Parameters
-from warpchain.oracle.circular_loop import circular_loop
-from warpchain.oracle.motion_equations import acceleration
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -1,20 +1,26 @@
-"""Chains in awkward states, and what their energy ledger leaves open; the tests and the hard cases start from them."""
+"""Chains in awkward states, what their energy ledger leaves open, and the methods that must cope with them."""
 
 from collections.abc import Mapping
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
-from warpchain.bench.starts import State
+from tests.oracle_model import contact_equations, motion_equations
+from tests.oracle_model.circular_loop import circular_loop
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain, links_between
-from warpchain.oracle import contact_equations, motion_equations
-from warpchain.oracle.circular_loop import circular_loop
+from warpchain.kernels.methods.method import method_names
 from warpchain.walks.trajectory import Trajectory
 from warpchain.walks.walk_result import WalkResult
 
 Array = NDArray[np.float64]
+State = tuple[Array, Array]
+"""Position (n, 3) and velocity (n, 3) of a chain."""
+
+METHODS = method_names()
+every_method = pytest.mark.parametrize("method", METHODS)
 
 PAPER: Final = preset("paper")
 SOFT: Final = preset("soft")
@@ -27,6 +33,12 @@ UNDISSIPATIVE: Final[Mapping[str, float]] = {
 """Nothing dissipates, neither joints nor collisions; springs soft enough to show the order of convergence."""
 
 ELASTIC: Final = SOFT.with_values(UNDISSIPATIVE)
+
+
+def quick_with(*quick: str) -> Any:
+    """Parametrises a test with every method, marked as slow unless it is one of these."""
+    slow = pytest.mark.slow
+    return pytest.mark.parametrize("method", [pytest.param(m, marks=() if m in quick else slow) for m in METHODS])
 
 
 def set_down(position: Array, gap: float = 2e-4, parameters: Parameters = SOFT) -> Array:

@@ -16,6 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 
 from warpchain.inputs.parameters import Parameters
 
@@ -167,7 +168,6 @@ def solve_flight(
         positions (t, n, 3), velocities (t, n, 3) and the number of evaluations of the equations.
 
     Raises:
-        ImportError: SciPy is not installed.
         ValueError: `times` is not a strictly increasing sequence, or the start is not finite.
         RuntimeError: the solver failed.
     """
@@ -200,15 +200,9 @@ def integrated(
         states (t, d) and the number of evaluations of `derivative`.
 
     Raises:
-        ImportError: SciPy is not installed.
         ValueError: `times` is not a strictly increasing sequence, or the start is not finite.
         RuntimeError: the solver failed.
     """
-    try:
-        from scipy.integrate import solve_ivp
-    except ImportError as error:
-        raise ImportError("a flight needs SciPy: pip install 'warpchain[scipy]'") from error
-
     times = np.asarray(times, dtype=np.float64)
     if times.ndim != 1 or len(times) == 0 or not np.all(np.diff(times) > 0):
         raise ValueError("times must be a strictly increasing sequence of at least one time")
