@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 
 import warpchain
 from tests.oracle_model import contact_equations, motion_equations
 from tests.oracle_model.circular_loop import circular_loop
-from tests.support.folded_chains import accordion, chain_of_angles, folded_chain
+from tests.support.folded_chains import chain_of_angles, folded_chain
 from tests.support.kernels_under_test import LIST, SELF, ContactPass, Placed
 from warpchain import Status
 from warpchain.engine.batch import Batch
@@ -154,24 +154,6 @@ def greatest_move(before, after):
     ).max()
 
 
-def test_list_lasts_until_a_joint_has_moved_half_the_skin():
-    """A list's slack is skin/2 − |C| less the greatest displacement since it was made, when it is full again."""
-    skin = 6e-3
-    for fraction in (0.0, 0.5, 0.99, 1.01, 3.0):
-        moves = [moved_heap(n, n, skin, fraction) for n in (8, 60, 150)]
-        contact_pass = ContactPass([at_rest(before) for before, _ in moves], skin=skin)
-        for result in contact_pass.run(LIST):
-            assert result["slack"] == pytest.approx(skin / 2 - result["opening"], rel=1e-12)
-        contact_pass.place([at_rest(after) for _, after in moves])
-        for (before, after), result in zip(moves, contact_pass.run(0), strict=True):
-            move, limit = greatest_move(before, after), skin / 2 - result["opening"]
-            assert_allclose(result["displacement"], move, rtol=1e-9, atol=1e-16)
-            assert_allclose(result["slack"], limit - move, atol=1e-15)
-            assert (result["slack"] > 0) == (fraction < 1)
-        for result in contact_pass.run(LIST):
-            assert result["slack"] == pytest.approx(skin / 2 - result["opening"], rel=1e-12)
-
-
 def test_list_stays_complete_while_it_lasts():
     """A list that is not stale holds every touching pair, and gives the velocities of a fresh one to the bit."""
     skin = 6e-3
@@ -212,14 +194,6 @@ def test_torn_chain_never_trusts_its_list():
 # --- a full list ---
 
 
-def longest_accordion():
-    """Length of the longest accordion whose pairs, (n/2)(n/2 − 1), the list can hold; two more links overflow it."""
-    lists = list_layout(layout.padded_width(80))
-    n = max(n for n in range(4, 199, 2) if (n // 2) * (n // 2 - 1) <= lists.capacity)
-    assert n < 196
-    return n
-
-
 def test_overflow_is_noticed_at_the_last_pair():
     """A list that is just full holds all pairs; one pair too many is reported, not dropped in silence."""
     position = folded_chain(190, 1, LENGTH)[0]
@@ -239,50 +213,6 @@ def test_overflow_is_noticed_at_the_last_pair():
         if fits:
             assert len(contact_pass.listed_pairs(0)) == capacity
             assert contact_pass.listed_pairs(0) == pairs_within_reach(position, skin)
-
-
-def test_overflow_at_the_start_ends_the_simulation():
-    """A chain folded onto two spots is simulated if the list can hold its pairs, else ends in list_overflow."""
-    n = longest_accordion()
-    run = {"floor": False, "gravity": False, "method": "bs32", "skin": 1e-4}
-    assert warpchain.simulate("soft", *accordion(n, LENGTH, 1e-6), 1e-6, **run).status == Status.FINISHED
-    start = accordion(n + 2, LENGTH, 1e-6)
-    trajectory = warpchain.simulate("soft", *start, 1e-6, **run)
-    assert trajectory.status == Status.LIST_OVERFLOW
-    assert not trajectory.status.ok
-    assert trajectory.steps_accepted == 0
-    assert_array_equal(trajectory.time, [0.0])
-    assert_array_equal(trajectory.position, start[0][None])
-    assert "skin" in trajectory.status.sentence
-
-
-def zigzag(n, slope, rate):
-    """A chain folded to three columns of zigzags, which flatten: links lean by ±slope and turn by `rate`.
-
-    The velocities keep the joints closed.
-    """
-    upwards, downwards = [slope, np.pi - slope], [-slope, np.pi + slope]
-    angle = np.concatenate([np.tile(upwards, n // 4), np.tile(downwards, n // 4)])
-    turn = rate * np.concatenate([np.tile([1.0, -1.0], n // 4), np.tile([-1.0, 1.0], n // 4)])
-    position = chain_of_angles(angle, LENGTH)
-    step = LENGTH * turn[:, None] * np.column_stack([-np.sin(angle), np.cos(angle)])
-    right = np.cumsum(step, axis=0)
-    return position, np.column_stack([right - step / 2, turn])
-
-
-def test_overflow_during_the_simulation_ends_it():
-    """A chain that crowds together while it runs ends in list_overflow, at a finite state before its duration."""
-    skin, capacity = 0.04, list_layout(layout.padded_width(150)).capacity
-    count = {n: [len(pairs_within_reach(zigzag(n, s, 0.0)[0], skin)) for s in (0.5, 0.4)] for n in range(80, 196, 4)}
-    n = next(n for n in count if count[n][0] + 20 < capacity < count[n][1] - 20)
-    position, velocity = zigzag(n, 0.5, -100.0)
-    assert_allclose(motion_equations.joint_opening_rate(position, velocity, SOFT), 0, atol=1e-12)
-    run = {"floor": False, "gravity": False, "method": "bs32", "skin": skin}
-    trajectory = warpchain.simulate("soft", position, velocity, 5e-3, **run)
-    assert trajectory.status == Status.LIST_OVERFLOW
-    assert 2e-4 < trajectory.time[-1] < 2e-3
-    assert np.all(np.isfinite(trajectory.position))
-    assert trajectory.steps_accepted > 10
 
 
 # --- whole runs ---

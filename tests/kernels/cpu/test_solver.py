@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 from numpy.testing import assert_allclose
 
-from tests.support.kernels_under_test import DEVICE, compiled
+from tests.support.kernels_under_test import DEVICE, compiled, poisoned
 from warpchain.kernels.cpu.implicit.solver import SegmentLayout, cyclic_solver, segment_columns, segment_places
 
 
@@ -51,7 +51,7 @@ def solve_loop(kernel, segments, matrices, right):
     placed[repeats] = 0.0
     block[segments.right : segments.right + size, used] = placed.T
     memory = wp.array(block, dtype=wp.float64, device=DEVICE)
-    separators = wp.full((segments.separator_rows, 8), np.nan, dtype=wp.float64, device=DEVICE)
+    separators = poisoned(segments.separator_rows, 8)
     wp.launch(kernel, dim=1, inputs=[memory, separators, rows], device=DEVICE)
     solution = memory.numpy()[segments.right : segments.right + size, used].T
     result = np.full((rows, size), np.nan)

@@ -27,7 +27,7 @@ RIGID = COMMON | {
 TILTING = (EXPLICIT - {"greatest_speed"}) | {
     *("shift_first_stage", "tilting_gap", "greatest_tilting_speed", "resolve_tilting_floor", "write_plane_sums"),
 }
-HOT_FUNCTIONS = {"rkf78": EXPLICIT, "dp5": EXPLICIT, "hybrid": RIGID}
+HOT_FUNCTIONS = {"dp5": EXPLICIT, "hybrid": RIGID}
 
 
 def remarks_by_function(folder: Path, method: str, fixed_body: str, tilts: bool = False) -> list[tuple[str, str]]:
@@ -56,7 +56,6 @@ def remarks_by_function(folder: Path, method: str, fixed_body: str, tilts: bool 
 @pytest.mark.parametrize(
     ("method", "fixed_body", "tilts"),
     [
-        ("rkf78", "floor", False),
         ("dp5", "sprocket", False),
         ("hybrid", "floor", False),
         ("dp5", "floor", True),

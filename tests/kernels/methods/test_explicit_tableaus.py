@@ -13,10 +13,6 @@ from tests.oracle_model.motion_equations import acceleration
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain
-from warpchain.kernels import layout
-from warpchain.kernels.cpu.loop import make_advance
-from warpchain.kernels.features import Features
-from warpchain.kernels.gpu.loop import make_advance_block
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS, Tableau, register
 
 EACH = pytest.mark.parametrize("tableau", TABLEAUS.values(), ids=list(TABLEAUS))
@@ -152,10 +148,3 @@ def test_a_tableau_that_does_not_fit_is_refused(changes: dict, message: str) -> 
     with pytest.raises(ValueError, match=f"^{message}$"):
         register(replace(CASH_KARP, **changes))
     assert before == TABLEAUS
-
-
-def test_every_tableau_has_kernels_of_its_own() -> None:
-    """Coefficients in an unrolled loop are not in the name that Warp gives a kernel's module: others must differ."""
-    features = [Features(name, layout.padded_width(60), "floor", True, "rest") for name in TABLEAUS]
-    assert len({make_advance(each).module.name for each in features}) == len(TABLEAUS)
-    assert len({make_advance_block(each, 64, 168).module.name for each in features}) == len(TABLEAUS)

@@ -85,15 +85,6 @@ def test_both_controllers_reach_the_same_flight():
     assert flights[0].steps_accepted != flights[1].steps_accepted
 
 
-def test_features_left_out_do_not_change_a_flight():
-    """Without floor and self-contacts in the kernel a flight that meets neither is the same to rounding."""
-    start = spinning_ellipse(SOFT)
-    full = warpchain.simulate(SOFT, *start, 2e-3, method="bs32", tolerance=1e-9)
-    bare = warpchain.simulate(SOFT, *start, 2e-3, floor=False, self_contact=False, method="bs32", tolerance=1e-9)
-    assert greatest(bare.position, full.position) < 1e-12
-    assert greatest(bare.velocity, full.velocity) < 1e-10
-
-
 SMOOTH = PAPER.with_values({"joint_stiffness": 1e5, "joint_damping": 0.05, "friction_smoothing": 10.0})
 """Springs and friction so soft that steps of 10 µs are short against everything."""
 
