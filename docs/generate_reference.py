@@ -4,11 +4,10 @@ Run ``python docs/generate_reference.py`` after a change of any of these; a test
 """
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 
-import typer
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from typer.models import ArgumentInfo, OptionInfo
@@ -52,10 +51,10 @@ KEYS: Final = {
 
 SAMPLER_MEANINGS: Final = {
     "random": "independent samples",
-    "sobol": "scrambled Sobol' sequence; a power of two of samples; needs `warpchain[scipy]`",
-    "latin_hypercube": "latin hypercube; needs `warpchain[scipy]`",
+    "sobol": "scrambled Sobol' sequence; a power of two of samples",
+    "latin_hypercube": "latin hypercube",
     "saltelli": "points for Sobol indices: each sample of d drawn quantities takes d + 2 walks; a power of two of "
-    "samples; needs `warpchain[scipy]`",
+    "samples",
 }
 
 
@@ -263,19 +262,6 @@ def bracketed(unit: str) -> str:
     return "" if unit == "1" else f" [{unit}]"
 
 
-def commands(application: typer.Typer, path: str) -> Iterable[tuple[str, Callable[..., None]]]:
-    """The words that call each command, and its function."""
-    for group in application.registered_groups:
-        assert group.typer_instance is not None
-        name = f"{path} {group.name}"
-        if group.typer_instance.registered_callback and group.typer_instance.registered_callback.callback:
-            yield name, group.typer_instance.registered_callback.callback
-        yield from commands(group.typer_instance, name)
-    for command in application.registered_commands:
-        assert command.callback is not None
-        yield f"{path} {command.name or command.callback.__name__}", command.callback
-
-
 def option_row(name: str, annotation: Any, default: Any) -> tuple[str, str] | None:
     """How an option is written, and its help; None for what is no option."""
     kind, *notes = get_args(annotation) or (annotation,)
@@ -302,21 +288,23 @@ def commands_page() -> str:
         "# Commands\n\nWhat `--help` of each command says. Options that set a field have the meaning, values and "
         f"default of that field. `{JSON}`, where a command has it, prints one JSON object instead of tables.\n"
     ]
-    for path, function in sorted(commands(app, "warpchain"), key=lambda item: item[0] != "warpchain walk"):
+    named = [
+        (command.name or function.__name__, function)
+        for command in app.registered_commands
+        if (function := command.callback) is not None
+    ]
+    for command, function in sorted(named, key=lambda item: item[0] != "walk"):
         hints = get_type_hints(function, include_extras=True)
         given = inspect.signature(function).parameters.items()
         found = {name: option_row(name, hints[name], one.default) for name, one in given}
         rows = {name: row for name, row in found.items() if row is not None and row[0] != f"`{JSON}`"}
-        rows.pop("as_json", None)
-        text = "\n\n".join(" ".join(part.split()) for part in (function.__doc__ or "").split("\n\n"))
         lines: list[tuple[str, str]] = []
         for page, model in (("scene", Scene), ("options", Options)):
-            fields = [
-                rows.pop(name)[0] for name in list(rows) if path == "warpchain walk" and name in model.model_fields
-            ]
+            fields = [rows.pop(name)[0] for name in list(rows) if command == "walk" and name in model.model_fields]
             if fields:
                 lines.append((", ".join(fields), f"fields of the [{page}]({page}.md)"))
-        parts.append(f"\n## {path}\n\n{text}\n\n" + listing([*lines, *rows.values()]))
+        text = "\n\n".join(" ".join(part.split()) for part in (function.__doc__ or "").split("\n\n"))
+        parts.append(f"\n## warpchain {command}\n\n{text}\n\n" + listing([*lines, *rows.values()]))
     return "".join(parts)
 
 

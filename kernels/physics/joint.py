@@ -45,12 +45,6 @@ def friction_torque(chain: Chain, spin: wp.float64):
 
 
 @wp.func
-def friction_slope(chain: Chain, spin: wp.float64):
-    """The slope f'(w) of that torque [N m s], with the chain's own ω_c."""
-    return smoothed_slope(chain, spin, chain.inverse_smoothing)
-
-
-@wp.func
 def link_acceleration(
     chain: Chain,
     inverse_mass: wp.float64,

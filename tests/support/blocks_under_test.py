@@ -103,9 +103,9 @@ def batch_of(
     return batch
 
 
-def features_of(batch: Batch, *, fixed_body: str, watch: str = "none", broad_phase: str = "grid") -> Features:
+def features_of(batch: Batch, *, fixed_body: str, watch: str = "none") -> Features:
     """Kernel features for a batch."""
-    return batch.features(fixed_body=fixed_body, watch=watch, broad_phase=broad_phase)
+    return batch.features(fixed_body=fixed_body, watch=watch)
 
 
 def launch_kernel(batch: Batch, kernel: wp.Kernel, worlds: Sequence[int], attempts: int, *, block_dim: int) -> None:

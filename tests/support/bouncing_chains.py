@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.oracle_model import motion_equations
 from tests.support.rigid_joints import projected
 from warpchain import preset
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.start_shapes import ellipse, lay_chain
-from warpchain.oracle import motion_equations
 
 Array = NDArray[np.float64]
 

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from tests.oracle_model import motion_equations
 from warpchain.inputs.parameters import Parameters
-from warpchain.oracle import motion_equations
 
 Array = NDArray[np.float64]
 

@@ -8,6 +8,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from tests.oracle_model.tilting_plane import Plane
 from tests.support.kernels_under_test import chain_on_cpu
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import start_device
@@ -20,7 +21,6 @@ from warpchain.kernels.cpu.tilting import resolve_tilting_floor, tilting_gap, wr
 from warpchain.kernels.features import COMPILER_FLAGS
 from warpchain.kernels.physics.plane import on_plane
 from warpchain.kernels.types import Model, State, read_chain
-from warpchain.oracle.tilting_plane import Plane
 from warpchain.status import Status
 
 Array = NDArray[np.float64]

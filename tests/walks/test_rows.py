@@ -7,8 +7,7 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
 from warpchain.store.sweep_result import BlockResult, SweepResult
-from warpchain.walks.rows import COLUMNS, MISSING, ROW, field_column, missing_rows, row_type
-from warpchain.walks.walk_result import STORED
+from warpchain.walks.rows import COLUMNS, MISSING, field_column, missing_rows, row_type
 
 
 def test_names_of_columns_mean_one_thing() -> None:
@@ -17,27 +16,6 @@ def test_names_of_columns_mean_one_thing() -> None:
     assert not fields & COLUMNS.keys()
     taken = {*dir(BlockResult), *dir(SweepResult), *BlockResult.__annotations__, *SweepResult.__annotations__}
     assert not taken & (fields | COLUMNS.keys())
-
-
-def test_columns_of_a_row() -> None:
-    """A row has the agreed columns, without padding, and the drawn quantities in the order of the table."""
-    assert ROW.names == (
-        *("index", "status", "dx", "walk_time", "simulated_time", "hold_time", "drift", "softened_at"),
-        *("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at"),
-        *("fell_over", "fell_before_collapse"),
-        *("self_contact_at", "flight_before_self_contact", "collapsed_at", "flight_before_collapse"),
-        *("bounces", "bounces_before_self_contact", "bounces_before_collapse"),
-        *("steps_accepted", "steps_rejected"),
-        *("impulses_floor", "impulses_sprocket", "impulses_self", "greatest_opening"),
-        *("penetration_floor", "penetration_sprocket", "penetration_self", "energy_at_release"),
-        *("loss_joint_friction", "loss_joint_damping", "loss_floor", "loss_self_contact", "loss_softening"),
-        "loss_joint_switch",
-        *("energy_residual", "energy_error"),
-    )
-    assert ROW.itemsize == sum(ROW[name].itemsize for name in ROW.names)
-    one, other = row_type(["clearance", "phase", "link_length"]), row_type(["link_length", "clearance", "phase"])
-    assert one == other and one.names == (*ROW.names, "link_length_drawn", "phase_drawn", "clearance_drawn")
-    assert COLUMNS["dx"].meaning == STORED["dx"].meaning and COLUMNS["loss_floor"].unit == "J"
 
 
 def test_fields_have_units() -> None:

@@ -49,10 +49,9 @@ from warpchain.kernels.cpu.implicit.rigid_layout import (
     STAGE_V,
     TORQUE,
     force_layout,
+    pad_behind,
     pad_joints,
 )
-from warpchain.kernels.cpu.implicit.rosenbrock import GREATEST_TURN
-from warpchain.kernels.cpu.implicit.rosenbrock_layout import pad_behind
 from warpchain.kernels.cpu.implicit.solver import (
     LANES,
     cyclic_solver,
@@ -69,6 +68,9 @@ from warpchain.kernels.physics.rigid_joint import steepness, switch_smoothing
 from warpchain.kernels.types import Chain
 
 wp.set_module_options({"enable_backward": False})
+
+GREATEST_TURN = wp.constant(wp.float64(1.0))
+"""Greatest turn of a link [rad] in one step: beyond it the error estimate, made from four places, is no estimate."""
 
 
 @functools.cache

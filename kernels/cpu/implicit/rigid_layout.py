@@ -35,6 +35,23 @@ def force_layout(columns: int) -> SegmentLayout:
 
 
 @functools.cache
+def pad_behind(rows: tuple[int, ...]):
+    """Warp function that copies, in these rows, the next segment's first link behind each segment's last."""
+
+    @wp.func
+    def pad(S: wp.array2d(dtype=wp.float64), places: int, full: int):
+        s = int(0)
+        while s < 8:
+            after = (s + 1) % 8
+            source = 8 + after + wp.where(after >= full, 8, 0)
+            for k in range(wp.static(len(rows))):
+                S[wp.static(rows[k]), 8 * places + 8 + s] = S[wp.static(rows[k]), source]
+            s += 1
+
+    return pad
+
+
+@functools.cache
 def pad_joints(rows: tuple[int, ...]):
     """Warp function that copies, in these rows, the previous joint before each segment's first place."""
 

@@ -157,26 +157,6 @@ def test_a_gpu_kernel_drives_under_load_as_a_cpu_kernel_does(cut: int, quick_unl
     assert_same_bits(ours, theirs)
 
 
-@pytest.mark.parametrize("device", ["gpu", "cpu"])
-def test_loads_are_on_then_fall_then_are_off(device: str, quick_unloading: None) -> None:
-    """From sample to sample they are 1, 15, powers of it that fall with time, and 1 for good; softness follows."""
-    batch = driven()
-    features = softening_features(batch, "sprocket", "steady")
-    seen = []
-    for _ in range(80):
-        advance(batch, device, features, 1)
-        time = batch.last_sample(0)[layout.TIME]
-        seen.append((time / FIXED_STEP, batch.state.load_factor.numpy()[0], batch.state.softness.numpy()[0]))
-    fell = False
-    for steps, load, softness in seen:
-        expected = 15.0 ** np.clip(1 - (steps - 90) / 20, 0, 1) if steps >= 70 - 1e-6 else 1.0
-        assert load == pytest.approx(expected, rel=1e-6)
-        fell = fell or 1 < load < 15
-        if steps >= 70:
-            assert softness == pytest.approx(1.25 - 0.15 * np.log(load) / np.log(15), abs=1e-6)
-    assert fell and {1.0, 15.0} <= {load for _, load, _ in seen}
-
-
 def advance(batch: Batch, device: str, features: Features, attempts: int) -> None:
     """Carry a batch on in a GPU or a CPU kernel."""
     if device == "gpu":
