@@ -73,8 +73,8 @@ def listing(rows: Iterable[tuple[str, object]]) -> str:
 def shown(value: object) -> str:
     """A value as YAML has it."""
     if value is None or isinstance(value, bool):
-        return "`" + {None: "null", True: "true", False: "false"}[value] + "`"
-    return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"
+        return {None: "null", True: "true", False: "false"}[value]
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def in_unit(text: str, unit: str) -> str:
@@ -83,15 +83,13 @@ def in_unit(text: str, unit: str) -> str:
 
 
 def values_of(field: FieldInfo) -> str:
-    """What a field may be: its names, or the limits of its number with their unit."""
+    """What a field may be: its other names, or the limits of its number with their unit; nothing for any text."""
     kinds = [field.annotation, *get_args(field.annotation)]
-    for kind in kinds:
-        if get_origin(kind) is Literal:
-            return ", ".join(f"`{name}`" for name in get_args(kind))
-    if bool in kinds:
-        return "`true`, `false`"
+    names = next((get_args(kind) for kind in kinds if get_origin(kind) is Literal), (True, False) * (bool in kinds))
+    if names:
+        return ", or " + ", ".join(f"`{shown(name)}`" for name in names if name != field.default)
     if str in kinds:
-        return "name"
+        return ""
     limits = {
         name: format(limit, "g")
         for item in field.metadata
@@ -102,17 +100,16 @@ def values_of(field: FieldInfo) -> str:
     upper = limits["le"] + "]" if "le" in limits else limits.get("lt", "∞") + ")"
     extra = field.json_schema_extra
     unit = str(extra.get("unit", "1")) if isinstance(extra, dict) else "1"
-    return ("whole, " if int in kinds else "") + in_unit(f"{lower}, {upper}", unit)
+    return (", whole, " if int in kinds else ", ") + in_unit(f"{lower}, {upper}", unit)
 
 
-def model_table(model: type[BaseModel], other_meanings: Mapping[str, str] | None = None) -> str:
+def fields_of(model: type[BaseModel], other_meanings: Mapping[str, str] | None = None) -> str:
     """All fields of a model; `other_meanings` replaces descriptions."""
     meanings = {name: field.description for name, field in model.model_fields.items()} | dict(other_meanings or {})
-    rows = (
-        (f"`{name}`", shown(field.default), values_of(field), meanings[name])
+    return listing(
+        (f"`{name}: {shown(field.default)}`{values_of(field)}", meanings[name])
         for name, field in model.model_fields.items()
     )
-    return table(("name", "default", "values", "meaning"), rows)
 
 
 def parameters_page() -> str:
@@ -155,8 +152,8 @@ def scene_page() -> str:
     return (
         "# Scene\n\nWhat happens in a walk, from hanging on the sprocket to rest: "
         "[the model](../model.md#the-scene) explains the phases, "
-        "[the stationary loop](../../studies/stationary_loop/README.md) the hold."
-        "\n\n" + model_table(Scene)
+        "[the stationary loop](../../studies/stationary_loop/README.md) the hold. "
+        "Each line has a field with its default, what it may be, and its meaning.\n\n" + fields_of(Scene)
     )
 
 
@@ -167,13 +164,14 @@ def options_page() -> str:
         alike = next((one for one in words if METHODS_BY_NEED[one].keys() == settings.keys()), None)
         known = METHODS_BY_NEED[alike] if alike else {}
         own = {name: value for name, value in settings.items() if name not in known or known[name] != value}
-        text = ", ".join(f"`{name}: {shown(value).strip('`')}`" for name, value in own.items())
+        text = ", ".join(f"`{name}: {shown(value)}`" for name, value in own.items())
         words[word] = text + (f"; all else as `{alike}`" if alike else "")
     integrators = ", ".join(f"`{name}`" for name in METHODS)
     return (
         "# Options\n\nHow a walk is computed; see [methods](../methods.md). A method in one word, such as the default, "
-        "has defaults of its own, see below.\n\n"
-        + model_table(
+        "has defaults of its own, see below. Each line has a field with its default, what it may be, and its meaning."
+        "\n\n"
+        + fields_of(
             Options, {"method": f"a word, see below, or an [integrator](../methods.md#integrators): {integrators}"}
         )
         + "\n## Methods in one word\n\nSuch a word of `method` sets the defaults of these options. On a GPU `standard` "
@@ -235,7 +233,7 @@ def results_page() -> str:
     for name, column in COLUMNS.items():
         fields = numbers.setdefault((column.meaning, column.unit), [])
         if fields != [f"`{name}`"]:
-            fields.append(f"`{name}` of a sweep")
+            fields.append(f"`{name}`" if fields else f"`{name}` of a sweep")
     rows = ((f"{', '.join(names)}{bracketed(unit)}", meaning) for (meaning, unit), names in numbers.items())
     arrays = (
         (f"`{name}`{bracketed(stored.unit)}", stored.meaning)
@@ -248,7 +246,8 @@ def results_page() -> str:
         "Δx is NaN.\n\n"
         + listing(statuses)
         + "\n## Numbers\n\nFields of `warpchain.WalkResult`, datasets of the file that `save` writes, and columns of "
-        "`warpchain.SweepResult`, where each drawn quantity has a column, too. Losses of energy are positive. "
+        "`warpchain.SweepResult`, where each drawn quantity has a column, too; a second name is that of the column. "
+        "Losses of energy are positive. "
         "What a walk of a sweep does not have is NaN, or −1 in columns of whole numbers. `cell_statistics` and figures "
         "leave such walks out, column by column: `count` is the number of walks that were averaged, `absent` that of "
         "walks at rest without the quantity. Averages of your own must do so, too.\n\n"
@@ -289,19 +288,22 @@ def commands_page() -> str:
         "# Commands\n\nWhat `--help` of each command says. Options that set a field have the meaning, values and "
         f"default of that field. `{JSON}`, where a command has it, prints one JSON object instead of tables.\n"
     ]
-    named = [(one.name or one.callback.__name__, one.callback) for one in app.registered_commands]
+    named = [
+        (command.name or function.__name__, function)
+        for command in app.registered_commands
+        if (function := command.callback) is not None
+    ]
     for command, function in sorted(named, key=lambda item: item[0] != "walk"):
         hints = get_type_hints(function, include_extras=True)
         given = inspect.signature(function).parameters.items()
         found = {name: option_row(name, hints[name], one.default) for name, one in given}
         rows = {name: row for name, row in found.items() if row is not None and row[0] != f"`{JSON}`"}
-        rows.pop("as_json", None)
-        text = "\n\n".join(" ".join(part.split()) for part in (function.__doc__ or "").split("\n\n"))
         lines: list[tuple[str, str]] = []
         for page, model in (("scene", Scene), ("options", Options)):
             fields = [rows.pop(name)[0] for name in list(rows) if command == "walk" and name in model.model_fields]
             if fields:
                 lines.append((", ".join(fields), f"fields of the [{page}]({page}.md)"))
+        text = "\n\n".join(" ".join(part.split()) for part in (function.__doc__ or "").split("\n\n"))
         parts.append(f"\n## warpchain {command}\n\n{text}\n\n" + listing([*lines, *rows.values()]))
     return "".join(parts)
 
