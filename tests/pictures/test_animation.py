@@ -75,7 +75,10 @@ def test_broken_walks_and_long_films_are_refused(tmp_path: Path) -> None:
         animate(make_unreleased(), path)
     with pytest.raises(ValueError, match="not all finite numbers"):
         animate(make_walk(status=Status.NOT_FINITE, frame_joints=np.full((41, 30, 2), math.nan)), path)
-    long = {"frame_time": np.linspace(0.0, 20.0, 2001), "frame_joints": np.resize(walk.frame_joints, (2001, 30, 2))}
+    long: dict[str, Any] = {
+        "frame_time": np.linspace(0.0, 20.0, 2001),
+        "frame_joints": np.resize(walk.frame_joints, (2001, 30, 2)),
+    }
     with pytest.raises(ValueError, match="pictures are too many for a GIF; lower fps or slow"):
         animate(make_walk(**long), path, fps=50, slow=8)
     assert not list(tmp_path.iterdir())

@@ -104,9 +104,9 @@ def test_the_energies_lost_end_at_the_sum_of_the_ledger() -> None:
     lines = {str(line.get_label()): line for line in walk.plot("energy").axes[0].lines}
     released = walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"]
     whole = walk.kinetic_energy + walk.gravitational_energy + walk.spring_energy
-    np.testing.assert_allclose(lines["lost since the release"].get_ydata(), released - whole)
+    np.testing.assert_allclose(np.asarray(lines["lost since the release"].get_ydata(), float), released - whole)
     left = walk.energy["kinetic_at_end"] + walk.energy["potential_at_end"] + walk.energy["residual"]
-    np.testing.assert_allclose(lines["sum of all losses"].get_ydata(), [released - left])
+    np.testing.assert_allclose(np.asarray(lines["sum of all losses"].get_ydata(), float), [released - left])
 
 
 def test_tilt_figure_draws_the_series_in_degrees() -> None:
@@ -114,8 +114,8 @@ def test_tilt_figure_draws_the_series_in_degrees() -> None:
     walk = make_tilting_walk(collapsed_at=0.9)
     angles, drift = walk.plot("tilt").axes
     lines = {str(line.get_label()): line for line in angles.lines}
-    np.testing.assert_allclose(lines["tilt, to the left"].get_ydata(), np.degrees(walk.tilt))
-    np.testing.assert_allclose(lines["yaw, to the left"].get_ydata(), np.degrees(walk.yaw))
+    np.testing.assert_allclose(np.asarray(lines["tilt, to the left"].get_ydata(), float), np.degrees(walk.tilt))
+    np.testing.assert_allclose(np.asarray(lines["yaw, to the left"].get_ydata(), float), np.degrees(walk.yaw))
     assert any(np.array_equal(line.get_ydata(), walk.center_z) for line in drift.lines)
     assert lines[f"fell over (45°), {walk.fell_at:.3f} s"].get_xdata()[0] == walk.fell_at  # type: ignore[index]
     assert lines["loop collapsed, 0.900 s"].get_xdata()[0] == 0.9  # type: ignore[index]

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from warpchain.cli.output_paths import output_path
 from warpchain.cli.sweep_commands import SweepFile
+from warpchain.cli.words import output_path
 
 bench_app = typer.Typer()
 
@@ -186,7 +186,8 @@ def accuracy(
     from warpchain.bench.accuracy.page import write_pictures_and_page
     from warpchain.bench.accuracy.plan import FILE, Plan, run_accuracy
     from warpchain.cli.bench_tables import print_table
-    from warpchain.cli.terminal import status_line, try_folder
+    from warpchain.cli.terminal import status_line
+    from warpchain.cli.walk_files import try_folder
 
     texts = {"parts": parts, "problems": problems, "presets": presets, "methods": chosen, "cases": cases}
     given: dict[str, Any] = {name: _words(f"--{name}", text) for name, text in texts.items() if text is not None}
@@ -307,7 +308,8 @@ def sweep(
     from warpchain.bench.places import places_of
     from warpchain.bench.scaling import FILE, measure
     from warpchain.cli.bench_tables import print_bench
-    from warpchain.cli.terminal import status_line, try_folder
+    from warpchain.cli.terminal import status_line
+    from warpchain.cli.walk_files import try_folder
 
     places = places_of(_words("--devices", devices), samples)
     try_folder(output)

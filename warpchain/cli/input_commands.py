@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from warpchain.cli import completions
-from warpchain.cli.output_paths import output_path
+from warpchain.cli.words import argument, option, output
 
 if TYPE_CHECKING:
     from warpchain.inputs.value_list import ValueEntry
@@ -17,6 +16,7 @@ WIDE: Final = 160
 """Columns of the tables where there is no terminal to ask."""
 ROOM_FOR_MEANINGS: Final = 120
 """Columns from which a table of many values also says what they mean."""
+_NAMES: Final = "Names or symbols, such as floor_friction, mu_fc or scene.phase, or a section. Default: all."
 _TITLES: Final = {
     "parameters": "parameters, preset {} (measured, looked up, adjusted: Table 1)",
     "scene": "scene",
@@ -25,23 +25,8 @@ _TITLES: Final = {
 
 
 def parameters(
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="[NAME]...",
-            help="Names or symbols, such as floor_friction, mu_fc or scene.phase, or a section. Default: all.",
-            autocompletion=completions.names,
-            show_default=False,
-        ),
-    ] = None,
-    preset: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME",
-            help="Whose values: paper, Table 1 of the paper, or soft.",
-            autocompletion=completions.presets,
-        ),
-    ] = "paper",
+    names: Annotated[list[str] | None, argument("[NAME]...", _NAMES)] = None,
+    preset: Annotated[str, option("NAME", "Whose values: paper, Table 1 of the paper, or soft.")] = "paper",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")] = False,
 ) -> None:
     """List what can be set: parameters, scene and options, with symbols, units, values, bounds and sources."""
@@ -62,16 +47,7 @@ def parameters(
 
 
 def schema(
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE",
-            parser=output_path,
-            help="Write it to this file instead of standard output.",
-        ),
-    ] = None,
+    path: Annotated[Path | None, output("FILE", "Write it to this file instead of standard output.")] = None,
 ) -> None:
     """Print a JSON schema of sweep files, with which editors check and complete them.
 
@@ -83,11 +59,11 @@ def schema(
     from warpchain.sweeps.schema import sweep_schema
 
     text = json.dumps(sweep_schema(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-    if output is None:
+    if path is None:
         print(text, end="")
         return
-    write_whole(output, text)
-    print(printable(str(output)))
+    write_whole(path, text)
+    print(printable(str(path)))
 
 
 def _content(entry: "ValueEntry") -> dict[str, Any]:

@@ -8,7 +8,7 @@ import math
 import os
 import subprocess
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,7 +114,9 @@ def _write_mp4(walk: Walk, path: Path, fps: float, slow: float) -> None:
     chosen += chosen[-1:] * round(_HOLD * fps)
     film = Film(walk)
     # What ffmpeg says would be lines on the terminal.
-    writer = FFMpegWriter(fps, codec="h264", extra_args=["-crf", "20", "-loglevel", "quiet", "-f", "mp4"])
+    writer = FFMpegWriter(
+        fps=cast(Any, fps), codec="h264", extra_args=["-crf", "20", "-loglevel", "quiet", "-f", "mp4"]
+    )
     with replacing(path) as part, mpl.rc_context({"animation.ffmpeg_path": ffmpeg}):
         try:
             with writer.saving(film.figure, str(part), DPI):

@@ -67,11 +67,11 @@ class Film:
         scale = float((space / np.diff(box)[:, 0]).min())
         size = 2 * np.rint((np.diff(box)[:, 0] * scale + _PADDING.sum(axis=0)) / 2)
         self.figure = Figure(figsize=tuple(size / DPI), dpi=DPI)
-        self._canvas = FigureCanvasAgg(self.figure)
+        self._canvas: Any = FigureCanvasAgg(self.figure)
         share = _PADDING / size
         self._axes = self.figure.add_axes((*share[0], *(1 - share.sum(axis=0))), xlim=box[0], ylim=box[1])
         if self._view is SIDE:
-            draw_ground(self._axes, *box[0], box[1, 0])
+            draw_ground(self._axes, box[0, 0], box[0, 1], box[1, 0])
             self._axes.set(xlabel="$x$ / m", yticks=[], xticks=floor_marks(*box[0]))
             tidy(self._axes)
             self._axes.spines[["left", "bottom"]].set_visible(False)

@@ -92,7 +92,7 @@ def film_strip(walk: Walk, *, count: int | None = None, figure: Figure | None = 
         front.set(xlim=z, ylim=(-depth, high[1]), xlabel="$z$ / m", ylabel="$y$ / m")
         above = panel(left, _FOOT + 0.5, width, scale * broad)
         above.set(xlim=(low[0], high[0]), ylim=z, xlabel="$x$ / m", ylabel="$z$ / m", facecolor=GROUND)
-        draw_ground(front, *z, -depth)
+        draw_ground(front, z[0], z[1], -depth)
         views += [("from the front", front, FRONT), ("from above", above, ABOVE)]
     color_of = _time_colors(walk)
     center = center_in_room(walk)

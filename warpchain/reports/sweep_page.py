@@ -164,7 +164,8 @@ def _inaccurate(result: SweepResult) -> str:
 
 def _walk(result: SweepResult, index: int, device: str | None) -> str:
     """One walk, as kept or else run again: its numbers, a player, and its pictures."""
-    from warpchain.pictures.walk_figures import figure5, film_strip
+    from warpchain.pictures.film_strip import film_strip
+    from warpchain.pictures.walk_figures import figure5
     from warpchain.run.single_walk import run_walk
     from warpchain.run.sweep_run import on_device
 
