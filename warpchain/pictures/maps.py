@@ -1,7 +1,7 @@
 """Maps: a table of numbers as coloured cells, with the walks that are not part of them."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -10,6 +10,7 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
+from warpchain.pictures.labels import COUNTS
 from warpchain.pictures.style import FAINT, GROUND, INK, RED, label_room
 
 Array = NDArray[Any]
@@ -41,20 +42,18 @@ def draw_map(axes: Axes, table: Array, columns: Sequence[str], rows: Sequence[st
     return image
 
 
-def write_values(axes: Axes, image: AxesImage, table: Array, count: Array, failed: Array, missing: Array) -> None:
+def write_values(axes: Axes, image: AxesImage, table: Array, cells: Mapping[str, Array]) -> None:
     """Write into each cell of a map its value, and how many of its walks failed or have not been run.
 
     Args:
         axes: where the map is.
         image: the map.
         table: its values; a dash stands for NaN, unless the cell has no walks at all.
-        count: number of walks at rest.
-        failed: number of walks that ended otherwise.
-        missing: number of walks not computed yet.
+        cells: numbers of walks: name of `COUNTS` → table.
     """
     for (row, column), value in np.ndenumerate(table):
-        lost, waiting = failed[row, column], missing[row, column]
-        if not (count[row, column] or lost or waiting):
+        rested, absent, lost, waiting = (cells[name][row, column] for name in COUNTS)
+        if not (rested or absent or lost or waiting):
             continue
         text = f"{value:.3g}" if np.isfinite(value) else "–"
         parts = [f"{lost:.0f} failed"] * bool(lost) + [f"{waiting:.0f} to run"] * bool(waiting)
@@ -65,19 +64,11 @@ def write_values(axes: Axes, image: AxesImage, table: Array, count: Array, faile
             axes.text(column, row, "\n".join(parts), ha="center", va="top", color=color, fontsize="xx-small")
 
 
-def draw_failed(axes: Axes, share: Array, color: str = RED, rim: str = "white") -> None:
+def draw_failed(axes: Axes, share: Array) -> None:
     """Mark cells of a map in which walks failed by a dot, whose area is proportional to the share that failed."""
     rows, columns = np.nonzero(share > 0)
     sizes = _LARGEST_DOT * np.sqrt(share[rows, columns])
-    dots = EllipseCollection(
-        sizes,
-        sizes,
-        np.zeros(len(sizes)),
-        units="xy",
-        offsets=np.stack([columns, rows], axis=1),
-        offset_transform=axes.transData,
-        facecolor=color,
-        edgecolor=rim,
-        linewidth=0.5,
-    )
+    places: dict[str, Any] = {"offsets": np.stack([columns, rows], axis=1), "offset_transform": axes.transData}
+    style: dict[str, Any] = {"facecolor": RED, "edgecolor": "white", "linewidth": 0.5}
+    dots = EllipseCollection(sizes, sizes, np.zeros(len(sizes)), units="xy", **places, **style)
     axes.add_collection(dots, autolim=False)
