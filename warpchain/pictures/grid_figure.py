@@ -7,8 +7,10 @@ from typing import Any, Final
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullLocator, PercentFormatter
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 from warpchain.pictures.grid_panels import MOST_LINES, Axis, Cells, Kind, Panel, grid_panels, line_values
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.labels import (
+    COUNTS,
     lost_note,
     math_symbol,
     quantity_label,
@@ -25,8 +28,7 @@ from warpchain.pictures.labels import (
     unit_text,
     with_unit,
 )
-from warpchain.pictures.maps import draw_failed, draw_map, write_values
-from warpchain.pictures.style import BLUE, FAINT, LINE_COLORS, RED, label_room, panel_grid, tidy
+from warpchain.pictures.style import BLUE, FAINT, GROUND, INK, LINE_COLORS, RED, label_room, panel_grid, tidy
 
 Array = NDArray[Any]
 
@@ -35,6 +37,12 @@ _MOST_NUMBERS: Final = 60
 
 _MOST_TICKS: Final = 8
 """Up to so many values have a tick each, as far as there is room."""
+
+_MOST_ROWS: Final = 16
+"""Greatest number of labelled rows or columns of a map."""
+
+_LARGEST_DOT: Final = 0.75
+"""Diameter of the dot of a cell whose walks all failed, relative to the cell."""
 
 _DECADES: Final = 30
 """From such a ratio of the greatest value to the least on, an axis is logarithmic if its values are more even so."""
@@ -56,6 +64,7 @@ def draw_grid(
     *,
     ax: Axes | None = None,
     figure: Figure | SubFigure | None = None,
+    label: str = "",
 ) -> Figure | SubFigure:
     """Draw a quantity over the grids of one block or several.
 
@@ -68,6 +77,7 @@ def draw_grid(
         kind: `lines` or `map`; None for what shows a grid best.
         ax: where to draw a figure of one panel.
         figure: an empty figure to draw into; by default a new one.
+        label: what is shown, without its unit; by default name and symbol of the quantity.
 
     Returns:
         The figure.
@@ -81,7 +91,7 @@ def draw_grid(
     if ax is not None and figure is not None:
         raise ValueError("ax: given together with figure; leave one out")
     panels, left_out = grid_panels(blocks, kind)
-    label = with_unit(quantity_text(quantity), next(iter(blocks.values())).unit)
+    label = with_unit(label or quantity_text(quantity), next(iter(blocks.values())).unit)
     if ax is not None and len(panels) > 1:
         raise ValueError(f"ax: this figure has {len(panels)} panels; leave ax out, or give figure")
     alike = len({panel.signature for panel in panels}) == 1
@@ -123,8 +133,10 @@ def draw_grid(
 
 
 def _has_numbers(panels: Sequence[Panel]) -> bool:
-    """Whether there is just one map, with room for numbers."""
-    return len(panels) == 1 and panels[0].cells.mean.size <= _MOST_NUMBERS
+    """Whether there are only maps, with room for numbers."""
+    return (
+        all(panel.kind == "map" for panel in panels) and sum(panel.cells.mean.size for panel in panels) <= _MOST_NUMBERS
+    )
 
 
 def _size(panels: Sequence[Panel], columns: int) -> tuple[float, float]:
@@ -237,13 +249,65 @@ def _draw_maps(maps: Sequence[tuple[Axes, Panel]], label: str, *, with_numbers: 
     colors = {"vmin": known.min(), "vmax": known.max(), "cmap": "viridis"} if len(known) else {}
     for axes, panel in maps:
         assert panel.along is not None
-        image = draw_map(axes, panel.cells.mean, panel.across.texts, panel.along.texts, **colors)
+        image = _draw_map(axes, panel.cells.mean, panel.across.texts, panel.along.texts, **colors)
         if with_numbers:
-            write_values(axes, image, panel.cells.mean, panel.counts)
+            _write_values(axes, image, panel.cells.mean, panel.counts)
         else:
-            draw_failed(axes, panel.failed_share)
+            _draw_failed(axes, panel.failed_share)
     areas = [axes for axes, _ in maps]
     areas[0].figure.colorbar(image, ax=areas, label=label).outline.set_visible(False)
+
+
+def _draw_map(axes: Axes, table: Array, columns: Sequence[str], rows: Sequence[str], **colors: Any) -> AxesImage:
+    """Draw a table from the bottom row up; cells that are NaN stay empty.
+
+    Args:
+        axes: where to draw.
+        table: values, shape (rows, columns).
+        columns: label of each column.
+        rows: label of each row.
+        colors: `cmap`, `vmin` and `vmax`, as of matplotlib's `imshow`.
+    """
+    image = axes.imshow(table, origin="lower", aspect="auto", **colors)
+    for axis, texts, room in zip((axes.xaxis, axes.yaxis), (columns, rows), label_room(axes, columns), strict=True):
+        every = slice(None, None, math.ceil(len(texts) / max(1, min(_MOST_ROWS, int(room)))))
+        axis.set_ticks(range(len(texts))[every], list(texts[every]))
+    axes.set_facecolor(GROUND)
+    axes.spines[:].set_visible(False)
+    axes.tick_params(color=FAINT)
+    return image
+
+
+def _write_values(axes: Axes, image: AxesImage, table: Array, cells: Mapping[str, Array]) -> None:
+    """Write into each cell of a map its value, and how many of its walks failed or have not been run.
+
+    Args:
+        axes: where the map is.
+        image: the map.
+        table: its values; a dash stands for NaN, unless the cell has no walks at all.
+        cells: numbers of walks: name of `COUNTS` → table.
+    """
+    for (row, column), value in np.ndenumerate(table):
+        rested, absent, lost, waiting = (cells[name][row, column] for name in COUNTS)
+        if not (rested or absent or lost or waiting):
+            continue
+        text = f"{value:.3g}" if np.isfinite(value) else "–"
+        parts = [f"{lost:.0f} failed"] * bool(lost) + [f"{waiting:.0f} to run"] * bool(waiting)
+        red, green, blue, _ = image.to_rgba(value) if np.isfinite(value) else (1.0, 1.0, 1.0, 1.0)
+        color = INK if 0.3 * red + 0.59 * green + 0.11 * blue > 0.5 else "white"
+        axes.text(column, row, text, ha="center", va="bottom" if parts else "center", color=color, fontsize="small")
+        if parts:
+            axes.text(column, row, "\n".join(parts), ha="center", va="top", color=color, fontsize="xx-small")
+
+
+def _draw_failed(axes: Axes, share: Array) -> None:
+    """Mark cells of a map in which walks failed by a dot, whose area is proportional to the share that failed."""
+    rows, columns = np.nonzero(share > 0)
+    sizes = _LARGEST_DOT * np.sqrt(share[rows, columns])
+    places: dict[str, Any] = {"offsets": np.stack([columns, rows], axis=1), "offset_transform": axes.transData}
+    style: dict[str, Any] = {"facecolor": RED, "edgecolor": "white", "linewidth": 0.5}
+    dots = EllipseCollection(sizes, sizes, np.zeros(len(sizes)), units="xy", **places, **style)
+    axes.add_collection(dots, autolim=False)
 
 
 def _set_limits(drawn: Sequence[tuple[Axes, Panel]], *, from_zero: bool) -> None:

@@ -100,7 +100,6 @@ def quantity_label(name: str) -> str:
 
 DISTANCE: Final = with_unit(quantity_text("dx"), "m")
 FREQUENCY: Final = quantity_label("frequency")
-LINKS: Final = quantity_label("links")
 
 
 def cell_values(axes: Mapping[str, NDArray[Any]], place: Iterable[int]) -> dict[str, Any]:

@@ -6,6 +6,7 @@ been run yet, is on the figure.
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from typing import Any, Final
 
@@ -17,18 +18,16 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from warpchain.pictures.grid_figure import draw_grid
 from warpchain.pictures.labels import (
     COUNTS,
     DISTANCE,
     FREQUENCY,
-    LINKS,
     lost_note,
     number_text,
     quantity_name,
     quantity_text,
-    with_unit,
 )
-from warpchain.pictures.maps import draw_map, write_values
 from warpchain.pictures.style import (
     BLUE,
     FAINT,
@@ -53,9 +52,6 @@ Array = NDArray[np.float64]
 
 _MOST_BLOCKS: Final = 6
 """Greatest number of blocks whose walks are counted separately."""
-
-_MOST_NUMBERS: Final = 120
-"""Greatest number of cells of a map with numbers in them."""
 
 
 def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
@@ -132,38 +128,19 @@ def heat_map(result: SweepResult, quantity: str = "dx") -> Picture:
         NothingToShow: no walk at rest has the quantity in a block that has several links and frequencies, and no other
             axes.
     """
-    series = [
-        item for item in all_series(result, quantity) if item.has.any(axis=0).sum() > 1 < item.has.any(axis=1).sum()
-    ]
-    if not any(item.cells.count.any() for item in series):
+    shown = {item.label: item.cells for item in all_series(result, quantity) if item.is_map}
+    if not any(cells.count.any() for cells in shown.values()):
         raise NothingToShow(
             "a map takes walks at rest in a block with several links and frequencies, and no other axes"
         )
-    kept = np.ix_(*(np.any([item.has for item in series], axis=(0, axis)) for axis in (2, 1)))
-    links, frequencies = (
-        values[part.ravel()] for values, part in zip(series[0].cells.axes.values(), kept, strict=True)
-    )
     name, symbol = ("distance walked", "$Δx$") if quantity == "dx" else (quantity_name(quantity_of(quantity)),) * 2
-    texts = [f"{frequency:g}" for frequency in frequencies]
-    has_numbers = len(links) * len(frequencies) <= _MOST_NUMBERS
-    width, height = (0.6, 0.42) if has_numbers else (0.24, 0.24)
-    width, height = max(3.8, 1.5 + width * len(frequencies)), max(1.6, 0.4 + height * len(links))
-    figure = Figure(figsize=(2 * width, 0.6 + (0.3 + height) * len(series)), layout="constrained")
-    grid = figure.subplots(len(series), 2, sharex=True, sharey=True, squeeze=False)
-    for column, (title, colors) in enumerate((("mean", "viridis"), ("standard deviation of", "cividis"))):
-        tables = [(item.cells.sd if column else item.cells.mean)[kept] for item in series]
-        known = np.concatenate([table[np.isfinite(table)] for table in tables])
-        low, high = (known.min(), known.max()) if len(known) else (0.0, 1.0)
-        for axes, item, table in zip(grid[:, column], series, tables, strict=True):
-            image = draw_map(axes, table, texts, [f"{number}" for number in links], cmap=colors, vmin=low, vmax=high)
-            if len(series) > 1 and not column:
-                axes.set_title(item.label, fontsize="medium", loc="left")
-            if has_numbers:
-                write_values(axes, image, table, {name: getattr(item.cells, name)[kept] for name in COUNTS})
-        label = with_unit(f"{title} {symbol}", series[0].cells.unit)
-        figure.colorbar(image, ax=list(grid[:, column]), label=label).outline.set_visible(False)
-    figure.supxlabel(FREQUENCY, fontsize="medium")
-    figure.supylabel(LINKS, fontsize="medium")
+    rows, columns = (len(values) for values in next(iter(shown.values())).axes.values())
+    width, height = max(3.6, 0.8 + 0.6 * min(20, columns)), max(2.8, 1.0 + 0.4 * min(20, rows))
+    figure = Figure(figsize=(1.2 + width * min(3, len(shown)), 2 * height), layout="constrained")
+    upper, lower = np.asarray(figure.subfigures(2, 1))
+    draw_grid(shown, kind="map", figure=upper, label=f"mean {symbol}")
+    spread = {label: replace(cells, mean=cells.sd) for label, cells in shown.items()}
+    draw_grid(spread, kind="map", figure=lower, label=f"standard deviation of {symbol}")
     over = "the walks at rest" if quantity == "dx" else "the walks at rest that have it"
     caption = f"Mean and standard deviation of the {name}, over {over} in each cell."
     return Picture(named("heat_map", quantity), caption, figure)
@@ -204,7 +181,7 @@ def tolerance(result: SweepResult) -> Picture:
         right.errorbar(100 * cell.difference, row + 0.16, xerr=error, label=labels[1], **style)
     right.set_yticks(range(len(cells)), [cell.cell for cell in cells])
     right.set_ylim(len(cells) - 0.5, -0.5)
-    widest = 110 * max(0.1, agreement.greatest)
+    widest = 110 * max(0.1, float(np.abs(agreement.differences).max()))
     right.set_xlim(-widest, widest)
     lost = f"\n{agreement.lost} pairs are not complete" if agreement.lost else ""
     right.set_xlabel(f"difference of $Δx$ ({loose} less {tight}) / %{lost}")

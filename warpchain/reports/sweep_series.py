@@ -45,6 +45,11 @@ class Series:
         """Whether the block has a cell, shape (links, frequencies)."""
         return sum(getattr(self.cells, name) for name in COUNTS) > 0
 
+    @property
+    def is_map(self) -> bool:
+        """Whether it has several numbers of links and several frequencies."""
+        return bool(min(self.has.any(axis=axis).sum() for axis in (0, 1)) > 1)
+
 
 def several(block: BlockResult) -> set[str]:
     """The axes of a block that have several values."""
