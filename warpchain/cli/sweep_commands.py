@@ -49,10 +49,14 @@ def sweep(
     as_json: AsJson = False,
 ) -> None:
     """Run a sweep, or what is left of it: many walks over a grid, with random samples in each cell."""
-    from warpchain.inputs.validation import InputError
+    from warpchain.inputs.validation import InputError, printable
+    from warpchain.sweeps.shipped import write_new_sweep
 
     if new is not None:
-        _write_new(new, alone=not any(value for name, value in context.params.items() if name != "new"))
+        if any(value for name, value in context.params.items() if name != "new"):
+            raise InputError("--new: given together with other arguments; leave them out")
+        write_new_sweep(new)
+        print(printable(str(new)))
         return
     if source is None:
         raise InputError("FILE.yaml: missing; give a sweep file, or --new FILE.yaml to have one written")
@@ -68,34 +72,18 @@ def sweep(
         if device not in (None, "cuda"):
             raise InputError(f"--device: {device} is given together with --gpus; give cuda, or leave one out")
         device = "cuda"
-    with status_line(LOG_EVERY) as show, _executor(gpus, scheduler) as (executor, count):
+    with status_line(LOG_EVERY) as show, _executor(gpus, scheduler) as executor:
         result = run(
             source,
             folder,
             device=device,
             executor=executor,
-            workers=workers or count,
+            workers=workers or gpus,
             fresh=fresh,
             on_progress=lambda progress: show(sweep_progress_text(progress)),
         )
     print_sweep(result, as_json)
     _note_failures(result)
-
-
-def _write_new(path: Path, *, alone: bool) -> None:
-    """Write a sweep file to start from.
-
-    Raises:
-        InputError: other arguments are given, or there is such a file already.
-        OSError: it cannot be written.
-    """
-    from warpchain.inputs.validation import InputError, printable
-    from warpchain.sweeps.shipped import write_new_sweep
-
-    if not alone:
-        raise InputError("--new: given together with other arguments; leave them out")
-    write_new_sweep(path)
-    print(printable(str(path)))
 
 
 def info(
@@ -199,8 +187,8 @@ def merge(
 
 
 @contextlib.contextmanager
-def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[tuple[Executor | DaskClient | None, int | None]]":
-    """Workers on GPUs, and their number, or the client of a Dask cluster; (None, None) if neither is asked for.
+def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[Executor | DaskClient | None]":
+    """Workers on GPUs, or the client of a Dask cluster; None if neither is asked for.
 
     Raises:
         InputError: there are not so many GPUs, Dask is not installed, or the scheduler does not answer.
@@ -214,22 +202,16 @@ def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[tuple[Execut
         if gpus > (there := gpu_count()):
             raise InputError(f"--gpus: {gpus} wanted, but this machine has {there}; give at most {there}")
         with gpu_workers(gpus) as executor:
-            yield executor, gpus
+            yield executor
     elif scheduler is not None:
-        with _without_logs(), _dask_client(scheduler) as client:
-            yield client, None
+        logging.disable(logging.ERROR)  # Dask logs tracebacks of what is said in one line
+        try:
+            with _dask_client(scheduler) as client:
+                yield client
+        finally:
+            logging.disable(logging.NOTSET)
     else:
-        yield None, None
-
-
-@contextlib.contextmanager
-def _without_logs() -> Iterator[None]:
-    """Keep tracebacks that Dask logs off the terminal: what is wrong is said in one line."""
-    logging.disable(logging.ERROR)
-    try:
-        yield
-    finally:
-        logging.disable(logging.NOTSET)
+        yield None
 
 
 def _dask_client(address: str) -> Any:

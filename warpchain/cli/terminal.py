@@ -81,20 +81,17 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
         rate: walks per second of the process that runs the sweep; None if none does.
     """
     time_left = result.missing_count / rate if rate else None
-    summary = result.summary()
-    statistics = {name: block.statistics() for name, block in result.blocks.items()}
+    summary, statistics = result.summary(), result.cell_statistics()
     if as_json:
-        numbers = ("mean", "sd", "count", "failed", "missing")
         blocks = {
             name: {
-                "axes": {axis: _plain(values) for axis, values in of_block.axes.items()},
-                "dx": {key: _plain(getattr(of_block, key)) for key in numbers},
+                "axes": {axis: _plain(values) for axis, values in cells.axes.items()},
+                "dx": {key: _plain(getattr(cells, key)) for key in ("mean", "sd", "count", "failed", "missing")},
             }
-            for name, of_block in statistics.items()
+            for name, cells in statistics.items()
         }
         whole = {"name": result.name, "walks": result.walk_count, "statuses": summary}
-        whole["inaccurate"] = result.inaccurate_count
-        whole |= {"rate": rate, "time_left": time_left, "blocks": blocks}
+        whole |= {"inaccurate": result.inaccurate_count, "rate": rate, "time_left": time_left, "blocks": blocks}
         print(json.dumps(whole, indent=2, allow_nan=False))
         return
     console = Console(highlight=False, markup=False)
@@ -103,27 +100,25 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
     for remedy_of_fault, number in fault_remedies(block.faults for block in result.blocks.values()).items():
         console.print(f"{number:,} inaccurate: {remedy_of_fault}")
     if rate is not None:
-        console.print(
-            f"running: {rate:.2f} walks a second" + ("" if time_left is None else f", {_duration(time_left)} left")
-        )
-    left = _MOST_CELLS
-    for name, of_block in statistics.items():
-        if left == 0:
-            break
-        table = Table(
-            box=None, pad_edge=False, title=printable(name) if len(statistics) > 1 else None, title_justify="left"
-        )
-        for heading in (*map(printable, of_block.axes), "mean Δx / m", "s.d. / m", "at rest", "failed", "missing"):
+        left = "" if time_left is None else f", {_duration(time_left)} left"
+        console.print(f"running: {rate:.2f} walks a second{left}")
+    room = _MOST_CELLS
+    for name, cells in statistics.items():
+        title = printable(name) if len(statistics) > 1 else None
+        table = Table(box=None, pad_edge=False, title=title, title_justify="left")
+        for heading in (*map(printable, cells.axes), "mean Δx / m", "s.d. / m", "at rest", "failed", "missing"):
             table.add_column(heading, justify="right")
-        for cell in itertools.islice(np.ndindex(*of_block.mean.shape), left):
-            at = (values[index] for values, index in zip(of_block.axes.values(), cell, strict=True))
-            place = ["null" if value is None else printable(str(value)) for value in at]
-            lengths = [f"{array[cell]:.4f}" for array in (of_block.mean, of_block.sd)]
-            walks = [str(array[cell]) for array in (of_block.count, of_block.failed, of_block.missing)]
-            table.add_row(*place, *lengths, *walks)
-        console.print(table)
-        left -= len(table.rows)
-    if more := sum(of_block.mean.size for of_block in statistics.values()) - _MOST_CELLS + left:
+        for place in itertools.islice(np.ndindex(*cells.mean.shape), room):
+            at = (values[index] for values, index in zip(cells.axes.values(), place, strict=True))
+            texts = ["null" if value is None else printable(str(value)) for value in at]
+            lengths = [f"{array[place]:.4f}" for array in (cells.mean, cells.sd)]
+            table.add_row(
+                *texts, *lengths, *(str(array[place]) for array in (cells.count, cells.failed, cells.missing))
+            )
+        if table.rows:
+            console.print(table)
+        room -= len(table.rows)
+    if more := sum(cells.mean.size for cells in statistics.values()) - _MOST_CELLS + room:
         console.print(f"… and {more:,} more cells, which --json lists")
 
 

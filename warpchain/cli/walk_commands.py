@@ -18,50 +18,38 @@ if TYPE_CHECKING:
 FAILED: Final = 1
 """Exit status of a command whose walks failed."""
 
+_STARTS: Final = "rest: spin up on the sprocket; spinning: circulate on it; ellipse: without a sprocket. Default: rest."
+_PRESETS: Final = "Parameters to start from. paper: Table 1 of the paper; soft: softer joints. Default: paper."
 _METHODS: Final = (
     "standard: hybrid at 3e-3, joints softened on the sprocket and in the pile, on a GPU the next; explicit: os32 at "
     "3e-3, softened likewise; reference: rkf78 at 1e-6, as in the paper; or an integrator, "
     f"{'; '.join(f'{name}: {title}' for name, title in METHODS.items())}. Default: standard."
 )
-_STARTS: Final = (
-    "rest: hang on the sprocket and spin up; spinning: circulate on it already; ellipse: circulate without a sprocket. "
-    "Default: rest."
-)
-_PRESETS: Final = (
-    "Parameters to start from. paper: Table 1 of the paper; soft: softer joints, 10 to 15 times fewer steps with "
-    "reference, about as many with standard. Default: paper."
-)
 _TOLERANCE: Final = (
-    "Error allowed in a step: absolute, in SI units (m, rad, m/s, rad/s), and relative alike. Default: that of the "
-    "word, 1e-6 for an integrator, 1e-4 for hybrid."
+    "Error allowed in a step, in SI units and relative alike. Default: that of the word, 1e-6 for an integrator, 1e-4 "
+    "for hybrid."
 )
 _SET: Final = (
-    "Any other value by its name or symbol, in SI units, such as clearance=0.005 (in m), mu_fc=0.3 or "
-    "parameters.floor_friction=0.3; may be repeated. `warpchain parameters` lists them."
+    "Any other value by its name or symbol, in SI units, as clearance=0.005 or mu_fc=0.3; may be repeated. "
+    "`warpchain parameters` lists them."
 )
-_SEED: Final = (
-    "Draw the parameters, phase and clearance that are not given at random: one Monte Carlo sample for each whole "
-    "number. Without it: the means of Table 1, phase 0."
-)
-_CONFIG: Final = (
-    "Read preset, scene, options and parameters (in SI units) from a file; what the command line gives counts more."
-)
+_SEED: Final = "Draw what is not given at random, one sample for each whole number. Without it: means, phase 0."
+_CONFIG: Final = "Read preset, scene, options and parameters from a file; what the command line gives counts more."
 _LIKE: Final = (
-    "Take setup and seed of a saved walk, which repeats it to the bit; other options change single values, and nothing "
-    "is drawn anew. Not with --config, --preset or --seed."
+    "Take setup and seed of a saved walk, which repeats it to the bit; other options change single values. Not with "
+    "--config, --preset or --seed."
 )
 _OUTPUT: Final = (
     "Write walk.h5, figure5.png, film_strip.png, of a chain on a sprocket loop.png, and if its plane tilts tilt.png to "
     "this folder; files of these names are replaced."
 )
-_FRAMES: Final = (
-    "Simulated time between two recorded pictures of the chain, in s; needs a folder; with --record-loads by default "
-    "0.0001. Default: 0.002."
-)
+_FRAMES: Final = "Simulated time between two pictures of the chain, in s; needs a folder. Default: 0.002."
 _LOADS: Final = (
-    "Record forces and moments of the joints with each picture after the release; needs a folder. standard then is "
-    "explicit: rigid joints have no forces. 60 links take 24 MB a second."
+    "Record forces and moments of the joints with each picture, by default every 0.0001 s; needs a folder. standard "
+    "then is explicit: rigid joints have no forces. 60 links take 24 MB a second."
 )
+
+Sections = Mapping[str, Mapping[str, object]]
 
 _Text = str | None
 
@@ -96,17 +84,8 @@ def walk(
     from warpchain.inputs.validation import InputError, checked_whole, printable
     from warpchain.run.single_walk import run_walk
 
-    given = _given_values(
-        {
-            "links": links,
-            "frequency": frequency,
-            "start": start,
-            "method": method,
-            "tolerance": tolerance,
-            "device": device,
-        },
-        assignments or [],
-    )
+    named = {"links": links, "frequency": frequency, "start": start}
+    given = _given_values(named | {"method": method, "tolerance": tolerance, "device": device}, assignments or [])
     if like is not None:
         for name, value in (("--config", config), ("--preset", preset), ("--seed", seed)):
             if value is not None:
@@ -226,18 +205,8 @@ def _parsed(path: str, text: str) -> Any:
         raise InputError(f"{path}: {shown(text)} cannot be read; give a number, true, false or a name") from None
 
 
-def _setup(
-    config: Path | None,
-    preset: str | None,
-    given: Mapping[str, Mapping[str, object]],
-    seed: int | None,
-    records_loads: bool,
-) -> "Setup":
-    """The setup of a walk: the file's values, the command line's over them, and the sample of the seed.
-
-    Raises:
-        InputError: something is refused; one line with the field's path and the remedy.
-    """
+def _setup(config: Path | None, preset: str | None, given: Sections, seed: int | None, records_loads: bool) -> "Setup":
+    """The setup of a walk: the file's values, the command line's over them, and the sample of the seed."""
     from warpchain.inputs.distributions import random_generator, sampled
     from warpchain.inputs.setup import read_setup
     from warpchain.inputs.validation import InputError
@@ -254,16 +223,10 @@ def _setup(
     return setup if seed is None else sampled(setup, random_generator(seed), kept=kept)
 
 
-def _setup_like(
-    path: Path, given: Mapping[str, Mapping[str, object]], records_loads: bool
-) -> "tuple[Setup, int | None]":
+def _setup_like(path: Path, given: Sections, records_loads: bool) -> "tuple[Setup, int | None]":
     """Setup of a saved walk with other values in place of some of its own, and its seed.
 
     A method that is given brings its own settings, and a tolerance also holds where joints are soft, as in a new walk.
-
-    Raises:
-        InputError: the file is no walk, or a value is refused.
-        OSError: the file cannot be read.
     """
     from warpchain.inputs.methods import METHODS_BY_NEED
     from warpchain.walks.walk_result import load_walk
@@ -272,22 +235,18 @@ def _setup_like(
     replaced = {"soft_tolerance"} if "tolerance" in given["options"] else set()
     if "method" in given["options"]:
         replaced |= {"tolerance", "soft_tolerance"}.union(*METHODS_BY_NEED.values())
-    sections = {
-        section: {**getattr(saved.setup, section).model_dump(exclude=replaced), **values}
-        for section, values in given.items()
-    }
+    own = {section: getattr(saved.setup, section).model_dump(exclude=replaced) for section in given}
+    sections = {section: {**own[section], **values} for section, values in given.items()}
     return _resolved(saved.setup.preset, sections, given["parameters"], records_loads), saved.seed
 
 
-def _resolved(preset: str, sections: Any, parameters: Mapping[str, object], records_loads: bool) -> "Setup":
-    """The checked setup of some sections; a warning for each of the `parameters` that looks like another unit's."""
+def _resolved(preset: str, sections: Mapping[str, Any], given: Mapping[str, object], records_loads: bool) -> "Setup":
+    """The checked setup of some sections; a warning for each given parameter that looks like one in another unit."""
     from warpchain.inputs.parameters import warn_of_units
     from warpchain.inputs.setup import resolve
 
-    setup = resolve(
-        preset, **{name: sections[name] for name in ("scene", "options", "parameters")}, records_loads=records_loads
-    )
-    warn_of_units((f"parameters.{name}", name, value) for name, value in parameters.items())
+    setup = resolve(preset, **sections, records_loads=records_loads)
+    warn_of_units((f"parameters.{name}", name, value) for name, value in given.items())
     return setup
 
 
