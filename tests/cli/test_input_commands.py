@@ -169,40 +169,6 @@ def test_a_new_sweep_runs_as_it_is(command: Command) -> None:
     assert run.status == 0 and json.loads(run.out)["statuses"] == {"at_rest": 8, "missing": 0}
 
 
-def completed(line: str, folder: Path) -> list[str]:
-    """What bash offers for the last word of a command line."""
-    words = line.split(" ")
-    environment = os.environ | {
-        "_WARPCHAIN_COMPLETE": "complete_bash",
-        "COMP_WORDS": line,
-        "COMP_CWORD": str(len(words) - 1),
-    }
-    done = subprocess.run(
-        [sys.executable, "-m", "warpchain"], cwd=folder, env=environment, capture_output=True, encoding="utf-8"
-    )
-    assert done.stderr == ""
-    return done.stdout.splitlines()
-
-
-def test_words_complete(tmp_path: Path) -> None:
-    """Methods, presets, starts, names and sweeps complete, and so do commands."""
-    (tmp_path / "foo.yaml").touch()
-    (tmp_path / "folder").mkdir()
-    (tmp_path / "foo.txt").touch()
-    expected = {
-        "walk --method ": [*METHODS_BY_NEED, *METHODS],
-        "walk --preset s": ["soft"],
-        "walk --start ": ["rest", "spinning", "ellipse"],
-        "walk --set mu": ["mu_fc=", "mu_cc=", "mu_sc="],
-        "parameters floor_": ["floor_restitution", "floor_friction"],
-        "parameters --preset ": ["paper", "soft"],
-        "sweep f": ["figure6", "folder/", "foo.yaml"],
-        "sche": ["schema"],
-    }
-    for line, words in expected.items():
-        assert sorted(completed(f"warpchain {line}", tmp_path)) == sorted(words), line
-
-
 def test_completion_installs_itself(tmp_path: Path) -> None:
     """--install-completion writes what bash needs below the home folder."""
     environment = os.environ | {"HOME": str(tmp_path), "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}

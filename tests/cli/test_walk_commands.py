@@ -11,8 +11,7 @@ import pytest
 import warpchain
 from tests.support import command_line
 from tests.support.command_line import Command
-from warpchain.cli import main as command_module
-from warpchain.cli import sweep_commands
+from warpchain.cli import sweep_commands, walk_commands
 from warpchain.inputs.validation import InputError
 from warpchain.pictures.walk_shape import Kind
 from warpchain.walks.walk_result import STORED, WalkResult
@@ -220,7 +219,7 @@ def test_a_refusal_of_several_lines_is_printed_as_several(command: Command, monk
     def refuse(*_: object) -> None:
         raise InputError("links: 3 is odd;  give an even number", "samples: 0 is less than 1; give 1 or more")
 
-    monkeypatch.setattr(command_module, "_setup", refuse)
+    monkeypatch.setattr(walk_commands, "_setup", refuse)
     answer = command("walk")
     lines = ["error: links: 3 is odd; give an even number", "error: samples: 0 is less than 1; give 1 or more"]
     assert answer.status == 2 and answer.err.splitlines() == lines

@@ -166,7 +166,7 @@ def test_counts_at_the_top(page: str) -> None:
 @pytest.mark.usefixtures("no_figures")
 def test_many_failures_are_cut_short(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A long list of failures ends with how many more there are; a sweep without failures says so."""
-    monkeypatch.setattr(sweep_page, "_MOST_FAILED", 2)
+    monkeypatch.setattr(sweep_page, "_MOST_LISTED", 2)
     content = CONTENT | {"blocks": None, "grid": {"frequency": [10]}, "samples": 5}
     make_sweep(tmp_path / "sweep", content, lambda walk: Status.STEP_LIMIT)
     write_report(tmp_path / "sweep", tmp_path / "report.html")
