@@ -131,6 +131,5 @@ def _warpchain(
         print(context.get_help())
 
 
-for _command in (walk, sweep, info, plot, report, merge, animate, parameters, schema):
+for _command in (walk, sweep, info, plot, report, merge, animate, parameters, schema, bench):
     app.command()(_command)
-app.command()(bench)
