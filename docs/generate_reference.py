@@ -208,7 +208,7 @@ def sweep_file_page() -> str:
         + "\n## Samplers\n\n"
         + listing((f"`{name}`", SAMPLER_MEANINGS[name]) for name in SAMPLERS)
         + "\n## Record\n\n"
-        f"`series` keeps time series of the centre of mass, every {SERIES_INTERVAL:g} s. `frames` keeps positions of "
+        f"`series` keeps the time series of a walk, every {SERIES_INTERVAL:g} s. `frames` keeps positions of "
         f"all joints, every {FRAME_INTERVAL:g} s, of samples whose series are kept. Each is `false`, `true` (all "
         "samples) or a mapping:\n\n"
         + listing(
@@ -225,7 +225,7 @@ def results_page() -> str:
     """Fields of a walk, columns of a sweep, statuses."""
     numbers: dict[tuple[str, str], list[str]] = {}
     for name, stored in STORED.items():
-        if stored.group == "summary":
+        if not stored.shape:
             for key, meaning in stored.keys.items():
                 numbers[meaning, stored.unit] = [f'`{name}["{key}"]`']
             if not stored.keys:
@@ -236,9 +236,7 @@ def results_page() -> str:
             fields.append(f"`{name}`" if fields else f"`{name}` of a sweep")
     rows = ((f"{', '.join(names)}{bracketed(unit)}", meaning) for (meaning, unit), names in numbers.items())
     arrays = (
-        (f"`{name}`{bracketed(stored.unit)}", stored.meaning)
-        for name, stored in STORED.items()
-        if stored.group != "summary"
+        (f"`{name}`{bracketed(stored.unit)}", stored.described) for name, stored in STORED.items() if stored.shape
     )
     statuses = ((f"`{status.label}`, {int(status)}", status.sentence) for status in Status)
     return (
