@@ -22,12 +22,12 @@ _PLAYER: Final = Path(__file__).with_name("player.html")
 _HOLD: Final = 1.5
 """Time for which GIF and MP4 show their last picture [s]."""
 _GIF_PICTURES: Final = 1200
-"""Most pictures of a GIF: all are in memory at once, 0.5 MB each."""
+"""Most pictures of a GIF: all are in memory at once, up to 0.5 MB each."""
 _PLAYER_FRAMES: Final = 2000
 """Most frames of a page, which then has about 1 MB with 60 links."""
 
-_SLOWEST_GIF, _FASTEST_GIF = 0.002, 50
-"""Pictures per second of a GIF, whose delays are 16-bit numbers of hundredths of a second."""
+_SLOWEST_GIF, _FASTEST_GIF = 1, 50
+"""Pictures per second of a GIF."""
 
 
 def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
@@ -77,28 +77,27 @@ def _chosen_frames(walk: Walk, fps: float, slow: float) -> list[int]:
 
 
 def _write_gif(walk: Walk, path: Path, fps: float, slow: float) -> None:
-    """Write each frame once; durations are hundredths of a second, rounded so that errors do not add up.
+    """Write pictures with equal delays in whole hundredths of a second; Pillow writes equal ones once.
 
-    matplotlib's writer of GIFs has the same delay for all pictures, which at 30 a second is 10 % too short.
+    matplotlib's writer of GIFs cuts its delays off: at 30 pictures a second they would be 10 % too short.
     """
     from PIL import Image
 
-    shown = [(frame, len(list(group))) for frame, group in itertools.groupby(_chosen_frames(walk, fps, slow))]
-    if len(shown) > _GIF_PICTURES:
-        raise ValueError(f"{path}: {len(shown)} pictures are too many for a GIF; lower fps or slow, or give .mp4")
-    ends = np.rint(np.cumsum([0, *(count for _, count in shown)]) * 100 / fps)
-    durations = [int(hundredths) * 10 for hundredths in np.diff(ends)]
-    durations[-1] = int(_HOLD * 1000)
-    if max(durations) >= 1000 / _SLOWEST_GIF:
-        raise ValueError(f"slow: {slow} shows a picture for more than {1 / _SLOWEST_GIF:g} s; give a smaller number")
+    delay = round(100 / fps)
+    chosen = _chosen_frames(walk, 100 / delay, slow)
+    if len(chosen) > _GIF_PICTURES:
+        raise ValueError(f"{path}: {len(chosen)} pictures are too many for a GIF; lower fps or slow, or give .mp4")
     film = Film(walk)
     palette = Image.fromarray(film.picture(len(walk.frame_time) // 2)).quantize(64)
     palette.putpalette([255 if part > 247 else part for part in palette.getpalette() or []])  # its white is a mean
-    pictures = (
-        Image.fromarray(film.picture(frame)).quantize(palette=palette, dither=Image.Dither.NONE) for frame, _ in shown
-    )
+
+    def reduced(frame: int) -> Image.Image:
+        return Image.fromarray(film.picture(frame)).quantize(palette=palette, dither=Image.Dither.NONE)
+
+    chosen += chosen[-1:] * (round(_HOLD * 100 / delay) - 1)
+    pictures = (each for frame, group in itertools.groupby(chosen) for each in [reduced(frame)] * len(list(group)))
     with replacing(path) as part:
-        next(pictures).save(part, format="GIF", save_all=True, append_images=pictures, duration=durations, loop=0)
+        next(pictures).save(part, format="GIF", save_all=True, append_images=pictures, duration=10 * delay, loop=0)
 
 
 def _write_mp4(walk: Walk, path: Path, fps: float, slow: float) -> None:
