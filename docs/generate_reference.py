@@ -200,7 +200,7 @@ def sweep_file_page() -> str:
         + "\n## Samplers\n\n"
         + table(("sampler", "what it draws"), ((f"`{name}`", SAMPLER_MEANINGS[name]) for name in SAMPLERS))
         + "\n## Record\n\n"
-        f"`series` keeps time series of the centre of mass, every {SERIES_INTERVAL:g} s. `frames` keeps positions of "
+        f"`series` keeps the time series of a walk, every {SERIES_INTERVAL:g} s. `frames` keeps positions of "
         f"all joints, every {FRAME_INTERVAL:g} s, of samples whose series are kept. Each is `false`, `true` (all "
         "samples) or a mapping:\n\n"
         + table(
@@ -222,7 +222,7 @@ def results_page() -> str:
     fields = []
     for name, stored in STORED.items():
         unit = "" if stored.unit == "1" else stored.unit
-        fields.append((f"`{name}`", unit, stored.meaning))
+        fields.append((f"`{name}`", unit, stored.described))
         fields += [(f'`{name}["{key}"]`', unit, meaning) for key, meaning in stored.keys.items()]
     columns = (
         (f"`{name}`", "" if column.unit == "1" else column.unit, column.meaning) for name, column in COLUMNS.items()
@@ -232,7 +232,7 @@ def results_page() -> str:
         "# Results\n\n## Status\n\nHow a walk ended. The first error of a walk stays; its Δx is NaN.\n\n"
         + table(("status", "code", "sentence"), statuses)
         + "\n## A walk\n\nFields of `warpchain.WalkResult`, and datasets of the file that `save` writes. "
-        "Losses of energy are positive.\n\n"
+        "Losses of energy are positive. `sprocket_center` and `sprocket_radius`, in m, follow from them.\n\n"
         + table(("field", "unit", "meaning"), fields)
         + "\n## A sweep\n\nColumns of `warpchain.SweepResult`; each drawn quantity has a column, too. "
         "What a walk does not have is NaN, or −1 in columns of whole numbers, such as `bounces_before_collapse` of a "

@@ -1,6 +1,5 @@
 """What a notebook shows of results and figures, without pyplot and without IPython's help."""
 
-import dataclasses
 import subprocess
 import sys
 from pathlib import Path
@@ -14,16 +13,8 @@ from tests.support.made_sweeps import FIGURE_6, make_sweep
 from tests.support.made_walks import make_walk
 from warpchain.status import Status
 from warpchain.store.sweep_result import SweepResult
-from warpchain.store.walk_motion import WalkMotion
 
 PNG = b"\x89PNG\r\n\x1a\n"
-
-
-def make_motion() -> WalkMotion:
-    """A made walk as a sweep keeps it: without energies."""
-    walk = make_walk()
-    names = {field.name for field in dataclasses.fields(WalkMotion)} - {"index"}
-    return WalkMotion(index=7, **{name: getattr(walk, name) for name in names})
 
 
 def test_a_walk_is_shown_with_numbers_and_picture() -> None:
@@ -45,13 +36,6 @@ def test_what_cannot_be_drawn_is_left_out(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(type(walk), "plot", fail)
     assert walk._repr_png_() is None
     assert "0.64 m" in walk._repr_html_() and "<img" not in walk._repr_html_()
-
-
-def test_a_walk_of_a_sweep_is_shown() -> None:
-    """So is a walk that a sweep kept, with its number."""
-    motion = make_motion()
-    assert "number in the sweep" in motion._repr_html_() and "<img" in motion._repr_html_()
-    assert motion._repr_png_().startswith(PNG)
 
 
 def test_a_sweep_is_shown_with_its_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -93,8 +77,6 @@ def test_energies_go_into_axes_of_the_caller() -> None:
         walk.plot("film_strip", ax=axes)
     with pytest.raises(ValueError, match="ax: given together with figure"):
         walk.plot("energy", ax=axes, figure=own)
-    with pytest.raises(ValueError, match="a sweep does not keep its energies"):
-        make_motion().plot("energy")
     empty = {name: np.empty(0) for name in ("time", "kinetic_energy", "gravitational_energy", "spring_energy")}
     empty |= {name: np.empty(0) for name in ("lowest", "rms_speed")}
     pairs = {name: np.empty((0, 2)) for name in ("center", "center_velocity")}
