@@ -1,7 +1,7 @@
 """Rows of a chain's scratch, of which the host makes the memory."""
 
 from warpchain.kernels import layout
-from warpchain.kernels.cpu.implicit.flight_layout import flight_rows
+from warpchain.kernels.cpu.implicit.rigid_layout import flight_rows
 from warpchain.kernels.methods.method import find_method
 
 

@@ -5,7 +5,7 @@ Scalar functions, one joint or one link a call.
 
 import warp as wp
 
-from warpchain.kernels.physics.elementary import ONE, tanh
+from warpchain.kernels.physics.elementary import tanh
 from warpchain.kernels.types import Chain
 
 wp.set_module_options({"enable_backward": False})
@@ -29,13 +29,6 @@ def smoothed_torque(chain: Chain, spin: wp.float64, inverse_smoothing: wp.float6
     The spin w of a joint is ω of the link left of it less ω of the link right of it.
     """
     return chain.viscous_friction * spin + chain.coulomb_friction * tanh(spin * inverse_smoothing)
-
-
-@wp.func
-def smoothed_slope(chain: Chain, spin: wp.float64, inverse_smoothing: wp.float64):
-    """f'(w) = β + τ_c / ω_c (1 − tanh²(w / ω_c)) [N m s]."""
-    switch = tanh(spin * inverse_smoothing)
-    return chain.viscous_friction + chain.coulomb_friction * inverse_smoothing * (ONE - switch * switch)
 
 
 @wp.func

@@ -22,33 +22,31 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.cpu.implicit.flight_layout import (
-    COUPLED,
-    DRAG,
-    FIRST_STAGE_ROW,
-    FLIGHT_SYSTEM,
-    NEW,
-    POWER,
-    SLOPE,
-    TARGET,
-    friction_layout,
-)
 from warpchain.kernels.cpu.implicit.rigid import rigid_joints
 from warpchain.kernels.cpu.implicit.rigid_layout import (
     BASE,
     BASE_RATE,
     COSINE,
     COUNTED,
+    COUPLED,
+    DRAG,
+    FIRST_STAGE_ROW,
+    FLIGHT_SYSTEM,
     INERTIA,
     INVERSE_MASS,
     INVERSE_SMOOTHING,
+    NEW,
+    POWER,
     RATE,
     SINE,
+    SLOPE,
     SPIN,
     STAGE_U,
     STAGE_V,
+    TARGET,
     TORQUE,
     force_layout,
+    friction_layout,
     pad_behind,
     pad_joints,
 )

@@ -27,18 +27,6 @@ def block_list(columns: int, block_dim: int):
     lists = list_layout(columns)
 
     @wp.func
-    def append_if_near(
-        K: wp.array2d(dtype=wp.float64), L: wp.array(dtype=wp.int32), p: int, q: int, square: wp.float64
-    ):
-        dx = K[RIGHT_X, q] - K[RIGHT_X, p]
-        dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
-        if dx * dx + dy * dy < square:
-            slot = wp.atomic_add(L, wp.static(lists.count), 1)
-            if slot < wp.static(lists.capacity):
-                L[wp.static(lists.first) + slot] = p
-                L[wp.static(lists.second) + slot] = q
-
-    @wp.func
     def search_cells(K: wp.array2d(dtype=wp.float64), L: wp.array(dtype=wp.int32), p: int, square: wp.float64):
         near = int(0)
         while near < 9:
@@ -48,7 +36,13 @@ def block_list(columns: int, block_dim: int):
             while q >= 0:
                 # a bucket may serve several cells
                 if q > p and L[wp.static(lists.cell_x) + q] == cell_x and L[wp.static(lists.cell_y) + q] == cell_y:
-                    append_if_near(K, L, p, q, square)
+                    dx = K[RIGHT_X, q] - K[RIGHT_X, p]
+                    dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
+                    if dx * dx + dy * dy < square:
+                        slot = wp.atomic_add(L, wp.static(lists.count), 1)
+                        if slot < wp.static(lists.capacity):
+                            L[wp.static(lists.first) + slot] = p
+                            L[wp.static(lists.second) + slot] = q
                 q = L[wp.static(lists.next_joint) + q]
             near += 1
 
