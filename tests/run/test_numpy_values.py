@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import warpchain
+from tests.oracle_model.circular_loop import circular_loop
 from warpchain.inputs.sections import SECTION_OF
-from warpchain.inputs.validation import plain
-from warpchain.oracle.circular_loop import circular_loop
+from warpchain.inputs.validation import InputError, plain
 from warpchain.run.single_walk import setup_walk
 from warpchain.sweeps.plan import load_sweep
 
@@ -104,3 +104,16 @@ def test_a_walk_and_a_trajectory_of_numpy_numbers():
         for real, truth, times in ((float, bool, [0.0, 0.01]), (np.float64, np.bool_, (np.float64(0.0), 0.01)))
     ]
     assert np.array_equal(runs[0].position, runs[1].position)
+
+
+def test_what_is_no_number_is_still_refused():
+    """An array is no number, whole numbers have no fractions, and messages show Python's numbers."""
+    for settings, message in (
+        ({"links": np.array([30])}, r"scene\.links: \[30\] is of type list; give a whole number"),
+        ({"links": np.float64(30.0)}, r"scene\.links: 30.0 is of type float; .*"),
+        ({"frequency": np.float64("nan")}, r"scene\.frequency: nan is not finite; .*"),
+        ({"seed": np.float64(1.0)}, r"seed: 1.0 is no whole number .*"),
+        ({"frame_interval": np.bool_(True)}, r"frame_interval: True is not a positive time .*"),
+    ):
+        with pytest.raises(InputError, match=message):
+            warpchain.walk(**settings)
