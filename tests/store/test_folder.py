@@ -1,6 +1,5 @@
 """Folders of sweeps: killed at any moment, gone on with, locked, refused, and full disks."""
 
-import errno
 import json
 import os
 import shutil
@@ -26,7 +25,6 @@ from warpchain.store.folder import SweepFolder, read_rows
 from warpchain.store.manifest import Manifest, read_manifest
 from warpchain.store.shards import write_shard
 from warpchain.version import NUMERICS_VERSION
-from warpchain.walks.rows import missing_rows
 
 FIRST, SECOND = "0-000000.h5", "0-000001.h5"
 SHARDS = Manifest.of(SWEEP, SHARD_SIZE).shards
@@ -308,48 +306,7 @@ def test_workers_need_the_folder(tmp_path: Path) -> None:
         write_shard(tmp_path, stamp, first, rows, {})
 
 
-def test_wrong_rows_are_refused(tmp_path: Path) -> None:
-    """Rows of other walks, or without an end, are not written."""
-    first, second = SHARDS[:2]
-    with open_folder(tmp_path) as opened:
-        for rows in (synthetic_rows(SWEEP, second), synthetic_rows(SWEEP, first)[::-1]):
-            with refused(ValueError, tmp_path, "not those of its walks"):
-                write(opened, first, rows)
-        with refused(ValueError, tmp_path, "all ended"):
-            write(opened, first, missing_rows(first.kind, first.keys))
-
-
 # What the system refuses
-
-
-def fail_with(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """From now on no content of a file gets to the disk."""
-
-    def write_bytes(path: Path, content: bytes) -> int:
-        with path.open("wb") as file:
-            file.write(content[: len(content) // 2])
-        raise OSError(number, os.strerror(number), str(path))
-
-    monkeypatch.setattr(Path, "write_bytes", write_bytes)
-
-
-@pytest.mark.parametrize(
-    ("number", "remedy"),
-    [(errno.ENOSPC, "make room"), (errno.EDQUOT, "make room"), (errno.EROFS, "writable"), (errno.EIO, "disk")],
-)
-def test_a_failed_write_leaves_no_trace(
-    tmp_path: Path, number: int, remedy: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A shard that cannot be written is named with reason and remedy; the folder is as before and can go on."""
-    with open_folder(tmp_path) as opened:
-        first, second = opened.missing()[:2]
-        write(opened, first, synthetic_rows(SWEEP, first))
-        name = f"{SECOND}: cannot be written ({os.strerror(number)})"
-        with monkeypatch.context() as patched, refused(OSError, tmp_path, name, remedy):
-            fail_with(number, patched)
-            write(opened, second, synthetic_rows(SWEEP, second))
-        write(opened, second, synthetic_rows(SWEEP, second))
-        assert len(read_rows(opened.directory, opened.manifest)) == 40
 
 
 @needs_namespace

@@ -66,15 +66,6 @@ def test_a_grown_sweep_is_the_larger_one(tmp_path: Path, sampler: str) -> None:
     assert (tmp_path / "grown.h5").read_bytes() == (tmp_path / "fresh.h5").read_bytes()
 
 
-def test_every_walk_is_in_one_shard(tmp_path: Path) -> None:
-    """Whenever it was added."""
-    for counts in ((1, 2), (3, 2), (4, 7)):
-        make_sweep(tmp_path, two_blocks(*counts), drawn_distance)
-    manifest = read_manifest(tmp_path)
-    walks = np.concatenate([shard.walks for shard in manifest.shards])
-    assert sorted(walks.tolist()) == [*range(manifest.walk_count)] and len(manifest.growth) == 3
-
-
 def test_a_sweep_grows_before_it_is_complete(tmp_path: Path) -> None:
     """Walks that were missing are then run in their old shards; what is there is read meanwhile."""
     make_sweep(tmp_path / "grown", content(samples=2), lambda walk: drawn_distance(walk) if walk.sample else None)

@@ -20,7 +20,6 @@ from warpchain.store.manifest import Manifest
 from warpchain.store.merged_file import merge
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import load_sweep
-from warpchain.version import NUMERICS_VERSION
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, drawn_column, missing_rows
 
 SINGLE = synthetic_sweep(
@@ -295,26 +294,6 @@ def test_merged_file_of_several_blocks(folder: Path, tmp_path: Path) -> None:
             xarray.testing.assert_equal(data, block.to_xarray())
     with xarray.open_datatree(path, engine="h5netcdf") as tree:
         assert set(tree.children) == {"rest", "ellipse"} and tree.attrs["walks"] == 160
-
-
-def test_merged_file_is_plain_hdf5(folder: Path, tmp_path: Path) -> None:
-    """Without xarray, too, every dataset says its axes, unit and meaning; one says what its codes mean."""
-    path = tmp_path / "merged.h5"
-    merge(folder, path)
-    with h5py.File(path) as file:
-        group = file["rest"]
-        assert [dim.label or dim.keys()[0] for dim in group["dx"].dims] == ["links", "frequency", "sample"]
-        assert group["dx"].dims[1][0][()].tolist() == [5.0, 12.5] and group["frequency"].is_scale
-        for dataset in group.values():
-            assert dataset.attrs["units"] and dataset.attrs["description"], dataset.name
-        meanings = group["status"].attrs["flag_meanings"].split()
-        assert dict(zip(group["status"].attrs["flag_values"].tolist(), meanings, strict=True)) == {
-            -1: "missing",
-            **{int(status): status.label for status in Status},
-        }
-        assert json.loads(file.attrs["sweep"]) == SWEEP.canonical()
-        assert json.loads(file.attrs["versions"]).keys() == {"warpchain", "warp-lang", "numpy"}
-        assert file.attrs["numerics_version"] == NUMERICS_VERSION and file.attrs["digest"] == SWEEP.digest()
 
 
 def test_a_merge_that_fails_leaves_the_older_file(folder: Path, single: Path, tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, Unpack
+from typing import Literal, Unpack
 
 from warpchain.engine.devices import gpu_turn, versions
 from warpchain.inputs.distributions import LARGEST_SEED, random_generator, sampled
@@ -16,7 +16,7 @@ from warpchain.inputs.setup import DEFAULT_PRESET, Setup, check_has_joint_forces
 from warpchain.inputs.symbols import full_name
 from warpchain.inputs.validation import InputError, checked_whole, plain, shown
 from warpchain.walks.motion import LONGEST_INTERVAL, Keep
-from warpchain.walks.scheduler import Watch, run_setups
+from warpchain.walks.scheduler import run_setups
 from warpchain.walks.walk_phases import WalkRun
 from warpchain.walks.walk_result import WalkResult
 
@@ -179,20 +179,15 @@ def run_walk(
 
     keep = Keep(series_every=1, frame_every=frame_every, frame_interval=between, loads=record_loads, before=before)
     with gpu_turn([setup.options.device]):
-        values, compile_time = _values_of_walk(setup, keep, watch)
-    return WalkResult(
-        **values,
-        setup=setup,
-        seed=plain(seed),
-        versions=versions(),
-        wall_time=time.perf_counter() - started - compile_time,
-    )
-
-
-def _values_of_walk(setup: Setup, keep: Keep, watch: Watch) -> tuple[dict[str, Any], float]:
-    """Run a walk; returns what a `WalkResult` has of it, and the time [s] that its kernels took to compile."""
-    ((_, run),) = run_setups([setup], keeps=[keep], watch=watch)
-    return {**run.outcome(), **run.recorder.motion()}, run.compile_time
+        ((_, run),) = run_setups([setup], keeps=[keep], watch=watch)
+        return WalkResult(
+            **run.outcome(),
+            **run.recorder.motion(),
+            setup=setup,
+            seed=plain(seed),
+            versions=versions(),
+            wall_time=time.perf_counter() - started - run.compile_time,
+        )
 
 
 def _frame_marks(frame_interval: float | None, options: Options) -> tuple[int | None, float]:
