@@ -138,6 +138,7 @@ def replacing(path: str | os.PathLike[str], only: Kind | None = None, *, clear: 
         checked_output(target, only)  # again: the block may have taken hours
         with naming(target):
             os.replace(part, target)
+        with suppress(OSError):  # a folder that can be written but not read
             folder = os.open(target.parent, os.O_RDONLY)
             try:
                 os.fsync(folder)  # the new name, too

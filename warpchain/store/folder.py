@@ -154,10 +154,9 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             remove_output(description)
             write_whole(self.directory / "sweep.json", self.manifest.text())
         if not description.exists():
-            dumper = (
-                _FAST_DUMPER if self.manifest.sweep["name"].isascii() else yaml.SafeDumper
-            )  # they fold other text otherwise
-            text = yaml.dump(self.manifest.sweep, Dumper=dumper, sort_keys=False, allow_unicode=True)
+            sweep = self.manifest.sweep
+            dumper = _FAST_DUMPER if sweep["name"].isascii() else yaml.SafeDumper  # they fold other text otherwise
+            text = yaml.dump(sweep, Dumper=dumper, sort_keys=False, allow_unicode=True)
             write_whole(description, _YAML_HEAD + text)
 
 
@@ -257,7 +256,8 @@ def _discard(folder: Path, manifest: Manifest) -> None:
     """Delete what a sweep left, its shards first; nothing if there is a foreign file among them."""
     present_shards(folder, manifest)
     with naming(folder):
-        shutil.rmtree(folder / "shards", ignore_errors=not (folder / "shards").exists())
+        if (folder / "shards").exists():
+            shutil.rmtree(folder / "shards")
         for name in ("sweep.yaml", "log.txt"):
             (folder / name).unlink(missing_ok=True)
 
