@@ -109,15 +109,6 @@ class Waves:
         damped = self.damping > ROUNDING * np.abs(self.rate)
         return np.where(damped, np.abs(self.group_speed) / np.where(damped, self.damping, 1.0), np.inf)
 
-    @property
-    def loss_per_wavelength(self) -> Array:
-        """By how much the logarithm of the amplitude falls while a packet runs one wavelength, shape (k, 4).
-
-        Infinite for waves that decay where they are.
-        """
-        with np.errstate(divide="ignore"):
-            return 2 * np.pi / self.phase[:, None] / self.reach
-
 
 def straight_waves(parameters: Parameters, tension: float, phase: ArrayLike) -> Waves:
     """Transverse waves of a straight chain under tension.
@@ -172,24 +163,6 @@ def ring_waves(parameters: Parameters, links: int, speed: float, number: ArrayLi
         return found[0], found[1], weights[0] * weights[1]
 
     return _waves(parameters, 2 * alpha * np.asarray(number), factors)
-
-
-def single_band(parameters: Parameters, tension: float, phase: ArrayLike) -> Complex:
-    """Rates of a straight chain of equal links with the mean mass and inertia, backward and forward.
-
-    Args:
-        parameters: of the chain; its Coulomb friction is left out.
-        tension: T [N].
-        phase: κ per link [rad], shape (k,).
-
-    Returns:
-        λ [1/s], shape (k, 2). If friction keeps a wave from swinging both are real, the faster decay first.
-    """
-    length, half = parameters.link_length, np.asarray(phase, dtype=np.float64) / 2
-    inertia = _mean_mass(parameters) * np.cos(half) ** 2 + 4 * _mean_inertia(parameters) / length**2 * np.sin(half) ** 2
-    damping = 8 * parameters.viscous_friction / length**2 * np.sin(half) ** 4 / inertia
-    root = np.sqrt((4 * tension / length * np.sin(half) ** 2 / inertia - damping**2).astype(np.complex128))
-    return np.stack([-damping + 1j * root, -damping - 1j * root], axis=-1)
 
 
 def continuous_ring(parameters: Parameters, links: int, speed: float, number: ArrayLike) -> Complex:

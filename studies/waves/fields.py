@@ -91,16 +91,6 @@ def centers(joints: Array, masses: Array) -> Array:
     return weighted
 
 
-def loop_speeds(time: Array, joints: Array, masses: Array) -> Array:
-    """Mean speed of the joints along the chain relative to the centre of mass [m/s], in the order of their numbers.
-
-    Shape (f,); arguments as of `normal_velocities`.
-    """
-    velocity = np.gradient(joints, time, axis=0) - np.gradient(centers(joints, masses), time, axis=0)[:, None]
-    speed: Array = np.sum(velocity * _tangents(joints), axis=2).mean(axis=1)
-    return speed
-
-
 def wave_speeds(tension: Array, link_length: float, mean_mass: float) -> Array:
     """Speed c = √(Tℓ/m̄) of long transverse waves in the chain's frame [m/s] for each T; 0 where T is negative."""
     speed: Array = np.sqrt(np.maximum(tension, 0.0) * link_length / mean_mass)
