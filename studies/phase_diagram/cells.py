@@ -72,13 +72,7 @@ def settings_of(result: SweepResult) -> str:
 
 
 def reduced(links: int, frequency: float, walks: Mapping[str, Array]) -> dict[str, float]:
-    """Statistics of one cell: a row of the file. NaN where there are too few walks.
-
-    Args:
-        links: of the chain.
-        frequency: of the sprocket [Hz].
-        walks: `COLUMNS`, shape (walks,).
-    """
+    """Statistics of one cell: a row of the file. NaN where there are too few walks."""
     status = walks["status"]
     rest = status == Status.AT_REST
     dx, codes = walks["dx"][rest].astype(float), endings(walks)[rest]
