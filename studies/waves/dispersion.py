@@ -172,7 +172,7 @@ def ring_spin(parameters: Parameters, links: int, speed: float) -> float:
 
 
 def equivalent_friction(parameters: Parameters, amplitude: float) -> float:
-    """Viscous friction [N m s] that takes as much energy as joint friction does where joints swing about rest.
+    """Viscous friction [N m s] that takes as much energy as joint friction where joints swing at `amplitude` W [rad/s].
 
     Harmonic balance: (2/W) times the mean of f(W cos φ) cos φ over a period, with f(w) = β w + τ_c tanh(w/ω_c). It is
     β + 4τ_c/πW for W far above ω_c and β + τ_c/ω_c far below.
