@@ -218,11 +218,7 @@ class BlockResult:
 
     def to_pandas(self) -> "pandas.DataFrame":
         """The block as a table with one row for each walk: values of the axes, sample, columns."""
-        import pandas
-
-        grid = np.meshgrid(*self._places().values(), indexing="ij")
-        places = dict(zip(self.dims, grid, strict=True))
-        return pandas.DataFrame({name: values.ravel() for name, values in (places | self.columns).items()})
+        return self.to_xarray().to_dataframe().reset_index()
 
     def variables(self) -> tuple[_Variables, _Variables]:
         """Coordinates and variables."""
