@@ -22,15 +22,7 @@ from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.folder import read_rows
 from warpchain.store.manifest import Folder, Layout, Manifest, layouts, read_manifest
 from warpchain.store.shards import opened_motions
-from warpchain.walks.rows import (
-    COLUMNS,
-    KEYS,
-    STORED_COLUMNS,
-    derived_columns,
-    drawn_column,
-    missing_rows,
-    quantity_of,
-)
+from warpchain.walks.rows import COLUMNS, MISSING, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
 
 if TYPE_CHECKING:
     import h5py
@@ -224,14 +216,17 @@ def load(path: Folder) -> SweepResult:
 def _load_folder(directory: Folder) -> SweepResult:
     manifest, folder = read_manifest(directory), Path(directory).absolute()
     present = read_rows(directory, manifest)
-    rows = missing_rows(manifest.row_type, np.zeros(manifest.walk_count, KEYS))
-    rows[manifest.numbers(present)] = present
+    numbers = manifest.numbers(present)
 
     def columns(block: Layout) -> dict[str, Array]:
-        numbers = np.arange(block.first, block.first + math.prod(block.shape))
-        names = ("status", *STORED_COLUMNS, *map(drawn_column, block.drawn))
-        stored = {"index": numbers} | {name: np.ascontiguousarray(rows[name][numbers]) for name in names}
-        return {name: values.reshape(block.shape) for name, values in stored.items()}
+        stop = block.first + math.prod(block.shape)
+        here = slice(*np.searchsorted(numbers, [block.first, stop]))
+        found = {"index": np.arange(block.first, stop)}
+        for name in ("status", *STORED_COLUMNS, *map(drawn_column, block.drawn)):
+            kind = present.dtype[name]
+            found[name] = np.full(stop - block.first, np.nan if kind.kind == "f" else MISSING, kind)
+            found[name][numbers[here] - block.first] = present[name][here]
+        return {name: values.reshape(block.shape) for name, values in found.items()}
 
     provenance = {name: getattr(manifest, name) for name in ("digest", "numerics_version", "versions")}
     origin = Origin((manifest.sweep,), provenance)
