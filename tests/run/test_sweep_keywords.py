@@ -10,7 +10,6 @@ import pytest
 
 import warpchain
 from warpchain.inputs.validation import InputError
-from warpchain.run import sweep_run
 from warpchain.run.sweep_keywords import sweep_of_keywords
 from warpchain.sweeps.plan import load_sweep
 
@@ -79,24 +78,6 @@ def test_a_sweep_runs_from_keywords(tmp_path, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_sweep_on_a_gpu_is_that_of_the_file(tmp_path, monkeypatch):
-    """The device changes both alike."""
-    planned = []
-
-    def stop(sweep, *arguments):
-        planned.append(sweep)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(sweep_run, "_run_in_folder", stop)
-    path = tmp_path / "speeds.yaml"
-    path.write_text(FILE, encoding="utf-8")
-    for keywords in ({"source": path}, KEYWORDS):
-        with pytest.raises(KeyboardInterrupt):
-            warpchain.sweep(**keywords, out=tmp_path / "speeds", device="cuda")
-    assert planned[0].canonical() == planned[1].canonical()
-    assert planned[0].blocks[0].sections["options"]["method"] == "os32"
-
-
 def test_all_errors_are_told_at_once(tmp_path):
     """One line for each value, with its place in a list, in the order of the keywords."""
     lines = refused(
@@ -149,14 +130,6 @@ def test_what_only_the_whole_shows_is_told(keywords, begin, tmp_path):
     """Values that contradict one another, and what is missing, are refused as in a file."""
     lines = refused(**keywords, out=tmp_path)
     assert [line for line in lines if line.startswith(begin) or ("device" in begin and "device" in line)]
-
-
-def test_values_that_suit_one_another_only_together():
-    """A value that the default of another field would refuse is not told beside a real error."""
-    with pytest.raises(InputError) as caught:
-        sweep_of_keywords({"grid": {"links": [10]}, "parameters": {"sprocket_radius": 0.01}, "samples": -1}, "x")
-    (line,) = str(caught.value).splitlines()
-    assert line.startswith("sweep.samples: -1")
 
 
 def test_a_terminal_shows_a_bar(tmp_path, monkeypatch):
