@@ -74,16 +74,12 @@ def draw_grid(
     Args:
         blocks: name of each block → the statistics of its cells.
         quantity: name of the quantity, for labels.
-        kind: `lines` or `map`; None for what shows a grid best.
-        ax: where to draw a figure of one panel.
-        figure: an empty figure to draw into; by default a new one.
+        kind: as `ax`, `figure`, what is returned and errors, see `SweepResult.plot`.
+        ax: see there.
+        figure: see there.
         label: what is shown, without its unit; by default name and symbol of the quantity.
 
-    Returns:
-        The figure.
-
     Raises:
-        ValueError: the kind is unknown, or `ax` is given together with `figure` or for several panels.
         NothingToShow: no block has an axis of several values, or two for a map, or there is no mean.
     """
     if kind not in (None, "lines", "map"):
