@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 
 EXAMPLES = 60
 """Inputs of each kind."""
-FEWER = {"bytes of sweep.yaml": 5, "bytes of log.txt": 5, "objects of shard, signed": 30, "shards run again": 30}
+FEWER = {"bytes of sweep.yaml": 5, "bytes of log.txt": 5, "shards run again": 30}
 """Inputs of kinds that take longer: most of them end in reading a whole sweep."""
 BATCH = 200
 """Inputs between two looks at the clock, when a time is given."""

@@ -28,8 +28,8 @@ def test_a_new_tableau_is_a_method() -> None:
 
 
 def test_methods_that_a_gpu_has_no_kernel_for_are_refused_there() -> None:
-    """There are some, `standard` is not among the methods that are refused, and the word that is named is taken."""
-    assert {"hybrid", "rodas5p"} == {name for name in method_names() if not find_method(name).runs_on_gpus}
+    """`hybrid` is one, `standard` is not among the methods that are refused, and the word that is named is taken."""
+    assert {"hybrid"} == {name for name in method_names() if not find_method(name).runs_on_gpus}
     for word in METHODS_BY_NEED:
         assert find_method(Options(method=word, device="cuda").method).runs_on_gpus
     assert Options(device="cuda") == Options(method="explicit", device="cuda")

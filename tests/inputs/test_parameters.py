@@ -231,7 +231,7 @@ def test_scene_upper_bounds(name: str, greatest: float, message: str) -> None:
             {"method": "rk45"},
             f"options.method: 'rk45' is unknown; give one of {', '.join((*METHODS_BY_NEED, *method_names()))}",
         ),
-        ("options", {"method": "rodas4p"}, "options.method: 'rodas4p' was removed; give rodas5p"),
+        ("options", {"method": "rodas5p"}, "options.method: 'rodas5p' was removed; give dp5"),
         *[
             (
                 "options",

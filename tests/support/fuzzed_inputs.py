@@ -288,16 +288,6 @@ BYTE_STEPS: st.SearchStrategy[Steps] = st.lists(
     min_size=1,
     max_size=3,
 )
-HEAD_STEPS: st.SearchStrategy[Steps] = st.lists(
-    st.one_of(
-        st.tuples(st.just("flip"), st.integers(0, 6000), st.integers(0, 7)),
-        st.tuples(st.just("overwrite"), st.integers(0, 6000), CHUNKS),
-        st.tuples(st.just("splice"), st.integers(0, 6000), st.integers(0, 6000), st.integers(1, 64)),
-    ),
-    min_size=1,
-    max_size=3,
-)
-"""Damage where HDF5 keeps what it has about the objects."""
 
 
 def mangled(texts: Inputs) -> Inputs:
@@ -344,52 +334,6 @@ def options(hostile: Inputs) -> Inputs:
 def steps_of(file: str, steps: Inputs) -> Inputs:
     """Damage to a file."""
     return st.fixed_dictionaries({"file": st.just(file), "steps": steps})
-
-
-JSON_VALUES = st.recursive(
-    st.one_of(NUMBERS, st.booleans(), st.none(), ANY_TEXT, st.sampled_from(["links", "0" * 64, "\ud800", "\x1b[2J"])),
-    lambda inner: st.one_of(
-        st.lists(inner, max_size=3), st.dictionaries(st.one_of(NAMES, ANY_TEXT), inner, max_size=2)
-    ),
-    max_leaves=5,
-)
-JSON_STEPS = st.lists(
-    st.one_of(
-        st.tuples(st.just("replace"), PLACES, JSON_VALUES),
-        st.tuples(st.just("replace"), PLACES, COUNTS),
-        st.tuples(st.just("drop"), PLACES),
-        st.tuples(st.just("double"), PLACES),
-        st.tuples(st.just("add"), PLACES, NAMES, JSON_VALUES),
-    ),
-    min_size=1,
-    max_size=2,
-)
-ODD_NUMBERS = st.one_of(NUMBERS, st.sampled_from([float("nan"), float("inf"), -1, 0, 127, -128, 2**62]))
-TYPES = st.sampled_from(["f8", "f4", "i8", "i1", "u8", ">f8", "S5", "c16", "i4,f8", "?", "V7"])
-SHAPES = st.lists(st.sampled_from([0, 1, 2, 12, 24, 1000]), max_size=2)
-TARGETS = st.sampled_from(["/etc/passwd", "/rows", "/nowhere", "all.h5", "walk.h5", "/dev/zero", ".", "/"])
-HDF5_STEPS = st.lists(
-    st.one_of(
-        st.tuples(st.just("number"), PLACES, PLACES, ODD_NUMBERS),
-        st.tuples(st.just("number"), PLACES, PLACES, ODD_NUMBERS),
-        st.tuples(st.just("delete"), PLACES),
-        st.tuples(st.just("soft link"), PLACES, TARGETS),
-        st.tuples(st.just("external link"), PLACES, TARGETS),
-        st.tuples(st.just("hard link"), PLACES, PLACES),
-        st.tuples(
-            st.just("other"), PLACES, TYPES, SHAPES, st.sampled_from(["plain", "compressed", "unwritten", "chunks"])
-        ),
-        st.tuples(st.just("text"), PLACES),
-        st.tuples(st.just("group"), PLACES),
-        st.tuples(st.just("set text"), PLACES, PLACES, st.one_of(ANY_TEXT, JSON_VALUES.map(json.dumps))),
-        st.tuples(st.just("set value"), PLACES, PLACES, st.one_of(ODD_NUMBERS, ANY_TEXT)),
-        st.tuples(st.just("set value"), PLACES, PLACES, st.lists(ODD_NUMBERS, max_size=3)),
-        st.tuples(st.just("damage text"), PLACES, PLACES, BYTE_STEPS),
-        st.tuples(st.just("remove"), PLACES, PLACES),
-    ),
-    min_size=1,
-    max_size=2,
-)  # fmt: skip
 
 
 def python_calls() -> Inputs:
@@ -444,11 +388,5 @@ INPUTS: dict[str, tuple[str, Inputs]] = {
         for file in ("shard", "walk.h5", "merged", "sweep.json", "sweep.yaml", "log.txt")
     },
     "shards run again": ("run again", steps_of("shard", BYTE_STEPS)),
-    **{f"objects of {file}, signed": ("lie", steps_of(file, HDF5_STEPS)) for file in ("shard", "walk.h5", "merged")},
-    "values of sweep.json, signed": ("lie", steps_of("sweep.json", JSON_STEPS)),
-    **{
-        f"bytes of {file}, signed": ("sign", steps_of(file, st.one_of(HEAD_STEPS, BYTE_STEPS)))
-        for file in ("shard", "walk.h5", "merged")
-    },
 }
 """Each kind of input: what plays it, and the strategy."""

@@ -11,7 +11,6 @@ import yaml
 
 from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content
 from warpchain.inputs.validation import InputError
-from warpchain.sweeps import designs
 from warpchain.sweeps.plan import load_sweep
 from warpchain.sweeps.sizes import CELL_LIMIT
 
@@ -150,10 +149,10 @@ def test_from_a_file(tmp_path: Path) -> None:
             content(options={"method": "rk4"}),
             "sweep.options.method: 'rk4' is unknown; give one of standard, explicit, reference,",
         ),
-        (content(options={"method": "rodas4p"}), "sweep.options.method: 'rodas4p' was removed; give rodas5p"),
+        (content(options={"method": "rodas5p"}), "sweep.options.method: 'rodas5p' was removed; give dp5"),
         (
-            content(options={"device": "cuda", "method": "rodas5p"}),
-            "sweep.options.method: 'rodas5p' runs on a CPU only; give explicit, or device: cpu",
+            content(options={"device": "cuda", "method": "hybrid"}),
+            "sweep.options.method: 'hybrid' runs on a CPU only; give explicit, or device: cpu",
         ),
         (
             content(options={"device": "cuda"}, grid={"method": ["os32", "hybrid"]}),
@@ -463,11 +462,3 @@ def test_values_are_judged_in_their_cells() -> None:
     setup = sweep.planned(0).setup
     assert (setup.options.smallest_step, setup.parameters.circle_radius) == (1e-4, 0.008)
     assert load_sweep(sweep.canonical()).digest() == sweep.digest()
-
-
-def test_scipy_is_asked_for_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without SciPy a designed sampler is refused with the remedy; random samples do not need it."""
-    monkeypatch.setattr(designs, "find_spec", lambda name: None)
-    load_sweep(content())
-    with pytest.raises(InputError, match=r"^sweep\.sampler: sobol needs SciPy, .* pip install 'warpchain\[scipy\]'"):
-        load_sweep(content(sampler="sobol", samples=4))

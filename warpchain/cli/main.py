@@ -16,7 +16,7 @@ from typing import Annotated, Any, Final, NoReturn
 
 import typer
 
-from warpchain.cli.bench_commands import bench_app
+from warpchain.cli.bench_commands import bench
 from warpchain.cli.input_commands import parameters, schema
 from warpchain.cli.interrupts import INTERRUPTED, interrupts_heard
 from warpchain.cli.sweep_commands import info, merge, plot, report, sweep
@@ -131,6 +131,5 @@ def _warpchain(
         print(context.get_help())
 
 
-for _command in (walk, sweep, info, plot, report, merge, animate, parameters, schema):
+for _command in (walk, sweep, info, plot, report, merge, animate, parameters, schema, bench):
     app.command()(_command)
-app.add_typer(bench_app, name="bench")

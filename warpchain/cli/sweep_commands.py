@@ -1,7 +1,6 @@
 """The commands of the command line that are about sweeps: sweep, info, plot, report, merge."""
 
 import contextlib
-import json
 import logging
 import os
 import sys
@@ -89,21 +88,16 @@ def sweep(
 def info(
     directory: Annotated[Path, argument("DIR", "Folder of a sweep, or a merged file.")], as_json: AsJson = False
 ) -> None:
-    """Show how far a sweep is and what it has found so far; of a merged file, check every byte and show its counts."""
+    """Show how far a sweep is and what it has found so far; of a merged file, after its checksum is compared."""
     from warpchain.cli.terminal import print_sweep
     from warpchain.store.folder import running_rate
-    from warpchain.store.merged_file import check_merged
     from warpchain.store.sweep_result import load
 
-    if os.path.isfile(directory):
-        found = check_merged(directory)
-        print(json.dumps(found) if as_json else "\n".join(f"{name:20} {value}" for name, value in found.items()))
-        return
-    print_sweep(load(directory), as_json, running_rate(directory))
+    print_sweep(load(directory), as_json, None if os.path.isfile(directory) else running_rate(directory))
 
 
 def plot(
-    path: Annotated[Path, argument("PATH", "Folder of a sweep, or file of a saved walk.")],
+    path: Annotated[Path, argument("PATH", "Folder of a sweep, a merged file, or the file of a saved walk.")],
     folder: Annotated[Path | None, output("DIR", "Folder of the figures. Default: that of PATH.")] = None,
     quantity: Annotated[
         str | None,
@@ -119,9 +113,14 @@ def plot(
     Of a sweep: Figures 6 and 5, grids, tolerance, sensitivity, statuses. Of a walk: figure5.png, film_strip.png,
     loop.png, energy.png and, if the plane tilts, tilt.png; a line says what is left out and why.
     """
+    from warpchain.hdf5_files import kind_of_hdf5
     from warpchain.inputs.validation import InputError, printable
+    from warpchain.store.sweep_result import KIND
 
-    if os.path.isfile(path) or (path.suffix == ".h5" and not os.path.isdir(path)):
+    is_file = os.path.isfile(path)
+    if (
+        is_file and kind_of_hdf5(path, "give the folder of a sweep, a merged file, or the file of a saved walk") != KIND
+    ) or (path.suffix == ".h5" and not os.path.exists(path)):
         if quantity is not None:
             raise InputError("--quantity: a saved walk has no columns; leave it out, or give the folder of a sweep")
         plot_walk(path, folder, kind)
@@ -131,12 +130,10 @@ def plot(
     from warpchain.cli.walk_files import try_folder
     from warpchain.files import make_folder
     from warpchain.reports.sweep_figures import figures
-    from warpchain.store.manifest import check_not_own
     from warpchain.store.sweep_result import load
 
     result = load(path)
-    folder = folder or path
-    check_not_own(path, folder.resolve())
+    folder = folder or (path.parent if is_file else path)
     try_folder(folder)
     make_folder(folder)
     plotted = False
@@ -166,13 +163,13 @@ def report(
 
     if device is not None and walk is None:
         raise InputError("--device: no walk is run for this page; add --walk INDEX, or leave it out")
-    path = path or directory / "report.html"
+    path = path or (directory.parent if os.path.isfile(directory) else directory) / "report.html"
     write_report(directory, path, animation_of=walk, device=device)
     print(printable(str(path)))
 
 
 def merge(
-    directories: Annotated[list[Path], argument("DIR...", "Folder of a sweep, or several.")],
+    directories: Annotated[list[Path], argument("DIR...", "Folder of a sweep, or several; merged files, too.")],
     path: Annotated[Path, argument("FILE.h5", "The file to write.", parser=output_path)],
 ) -> None:
     """Put all results into one HDF5 file with named axes and units, which xarray opens.

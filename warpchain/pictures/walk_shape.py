@@ -37,7 +37,6 @@ class Walk(HeldWalk, Protocol):
         frame_time: times of the frames [s], shape (f,).
         frame_joints: joints x, y in the plane [m], shape (f, n, 2); joint i ends link i.
         joints_in_room: joints x, y, z [m], shape (f, n, 3); None if the plane is fixed.
-        sprocket_radius: radius of the sprocket that links touch [m]; NaN without one.
     """
 
     status: Status
@@ -50,7 +49,11 @@ class Walk(HeldWalk, Protocol):
     yaw: Array
     frame_time: Array
     frame_joints: Array
-    sprocket_radius: float
+
+    @property
+    def sprocket_radius(self) -> float:
+        """Radius of the sprocket that links touch [m]; NaN without one."""
+        ...
 
     @property
     def joints_in_room(self) -> Array | None:

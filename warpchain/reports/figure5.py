@@ -9,7 +9,7 @@ from warpchain.pictures.labels import cell_text, cell_values
 from warpchain.pictures.style import LINE_COLORS, NothingToShow, Picture
 from warpchain.pictures.walk_figures import figure5
 from warpchain.store.sweep_result import SweepResult
-from warpchain.store.walk_motion import WalkMotion
+from warpchain.walks.walk_result import WalkResult
 
 MOST_CELLS: Final = len(LINE_COLORS) - 1
 """Greatest number of cells that are shown, each in its own colour."""
@@ -32,7 +32,7 @@ def sweep_figure5(result: SweepResult) -> Picture:
         for place in np.ndindex(*block.shape[:-1])
         if block.kept[place].any()
     ]
-    walks: list[WalkMotion] = []
+    walks: list[WalkResult] = []
     labels: list[str] = []
     for number in dict.fromkeys(np.linspace(0, len(cells) - 1, MOST_CELLS).round().astype(int)) if cells else ():
         block, place = cells[number]

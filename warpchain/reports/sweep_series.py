@@ -7,8 +7,9 @@ import numpy as np
 
 from warpchain.pictures.labels import COUNTS
 from warpchain.pictures.style import BLUE, GREEN, INK, LINE_COLORS, RED
+from warpchain.store.block_result import BlockResult
 from warpchain.store.cell_statistics import CellStatistics
-from warpchain.store.sweep_result import BlockResult, SweepResult
+from warpchain.store.sweep_result import SweepResult
 
 _AXES: Final = ("start", "links", "frequency")
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from tests.oracle_model import motion_equations, tilting_plane
+from tests.oracle_model.circular_loop import circular_loop
+from tests.oracle_model.tilting_plane import tilted_plane
 from tests.support.tilting_under_test import end_of, tilting_batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.kernels import layout
-from warpchain.oracle import motion_equations, tilting_plane
-from warpchain.oracle.circular_loop import circular_loop
-from warpchain.oracle.tilting_plane import tilted_plane
 from warpchain.status import Status
 
 LINKS = 8
@@ -55,7 +55,7 @@ def let_go(start, parameters, duration, longest_step=None):
     options = Options(method="dp5", tolerance=1e-6, rest_time=100.0)
     batch = tilting_batch([start], [parameters], options, duration, longest_step=longest_step, keeps_samples=True)
     rows = []
-    features = batch.features(fixed_body="floor", watch="rest", tilts=True)
+    features = batch.features(fixed_body="floor", tilts=True)
     batch.run([0], features, lambda: rows.append(batch.drain_samples(0)))
     assert batch.status(0) == Status.FINISHED
     position, _, plane = end_of(batch)
