@@ -19,7 +19,7 @@ from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.symbols import spelled
+from warpchain.inputs.sections import spelled
 from warpchain.status import Status
 from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL

@@ -19,8 +19,8 @@ from warpchain.inputs.scene import Scene
 from warpchain.inputs.sections import NAME_OF_SYMBOL, SECTION_OF, SECTIONS
 from warpchain.store.folder import SweepFolder
 from warpchain.sweeps.plan import Sweep, load_sweep
-from warpchain.sweeps.schema import sweep_schema
 from warpchain.sweeps.shipped import shipped_sweeps
+from warpchain.sweeps.sweep_file import sweep_schema
 
 command = command_line.command
 

@@ -120,7 +120,7 @@ def test_redraw_takes_the_next_number_of_the_stream() -> None:
 def test_hopeless_draw_is_an_error() -> None:
     """A mean far outside the bounds ends in a clear error after a limited number of draws."""
     base = Parameters.model_construct(**{**preset("paper").model_dump(), "inner_mass": -1.0})
-    with pytest.raises(InputError, match=rf"^parameters\.inner_mass: {DRAW_LIMIT} draws about -1\.0 kg"):
+    with pytest.raises(InputError, match=rf"^parameters\.inner_mass: {DRAW_LIMIT} draws about -1\.0 "):
         sample_parameters(base, random_generator(0))
 
 

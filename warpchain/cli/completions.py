@@ -25,7 +25,7 @@ def starts() -> list[str]:
     from warpchain.inputs.scene import Scene
     from warpchain.inputs.value_list import field_choices
 
-    return list(field_choices("start", Scene.model_fields["start"]))
+    return list(field_choices(Scene.model_fields["start"]))
 
 
 def names() -> list[str]:

@@ -354,15 +354,9 @@ def _parsed(path: str, text: str) -> Any:
     Raises:
         InputError: the text is not YAML.
     """
-    import yaml
-
-    from warpchain.inputs.validation import InputError, shown
     from warpchain.inputs.yaml_files import parse_yaml
 
-    try:
-        return parse_yaml(text)
-    except yaml.YAMLError:
-        raise InputError(f"{path}: {shown(text)} cannot be read; give a number, true, false or a name") from None
+    return parse_yaml(text, path)
 
 
 def _setup(config: Path | None, preset: str | None, given: Sections, seed: int | None, records_loads: bool) -> "Setup":

@@ -1,7 +1,9 @@
-"""Sections of a user's values, and the names and symbols of their fields."""
+"""Sections of a user's values, and the names of their fields; the paper's symbols stand for names.
 
-import difflib
-from collections.abc import Collection, Mapping
+`mu_fc`, or μ_fc itself, stands for `floor_friction`.
+"""
+
+from collections.abc import Mapping
 from typing import Any, Final, TypeVar
 
 from pydantic import BaseModel
@@ -9,39 +11,66 @@ from pydantic import BaseModel
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.symbols import by_full_name, full_name, names_by_symbol, spelled
-from warpchain.inputs.validation import InputError, as_word, choice
+from warpchain.inputs.validation import InputError, field_unit, path_of, shown, suggestion
 
 T = TypeVar("T")
+
+_SPELLINGS: Final = str.maketrans(
+    {"ℓ": "ell", "β": "beta", "μ": "mu", "\N{MICRO SIGN}": "mu", "ν": "nu", "τ": "tau", "ω": "omega"}
+)
+
+
+def spelled(symbol: str) -> str:
+    """A symbol in ASCII, Greek letters by their names."""
+    return symbol.translate(_SPELLINGS)
+
 
 SECTIONS: Final[Mapping[str, type[BaseModel]]] = {"scene": Scene, "options": Options, "parameters": Parameters}
 """Sections of a user's values, and the models that hold their fields."""
 SECTION_OF: Final = {name: section for section, model in SECTIONS.items() for name in model.model_fields}
 """Section of each field; no name is in two."""
-NAME_OF_SYMBOL: Final = {symbol: name for model in SECTIONS.values() for symbol, name in names_by_symbol(model).items()}
-"""Symbol, in ASCII → name; no symbol is the name of a field."""
-SYMBOL_OF: Final = {name: symbol for symbol, name in NAME_OF_SYMBOL.items()}
+SYMBOL_OF: Final = {
+    name: spelled(str(field.json_schema_extra["symbol"]))
+    for model in SECTIONS.values()
+    for name, field in model.model_fields.items()
+    if isinstance(field.json_schema_extra, dict) and "symbol" in field.json_schema_extra
+}
+"""Name → symbol, in ASCII; no symbol is the name of a field."""
+NAME_OF_SYMBOL: Final = {symbol: name for name, symbol in SYMBOL_OF.items()}
+DOTTED_NAMES: Final = {
+    written: f"{SECTION_OF[name]}.{written}"
+    for written, name in ({name: name for name in SECTION_OF} | NAME_OF_SYMBOL).items()
+}
+"""Name or symbol → the same with its section before it."""
 
 
-def by_name(
-    values: Mapping[Any, T], path: str | None, known: Collection[str], *, elsewhere: bool = True
-) -> dict[str, tuple[str, T]]:
-    """Values by the full names of their fields, each with the path where it was given; the values are not checked.
+def unit_of(name: str) -> str:
+    """SI unit of a field; `DIMENSIONLESS` for pure numbers and for what is no number."""
+    return field_unit(SECTIONS[SECTION_OF[name]].model_fields[name])
+
+
+def full_name(written: Any) -> Any:
+    """Name of the field that is written as its name or symbol; anything else stays as it is."""
+    return NAME_OF_SYMBOL.get(spelled(written), written) if isinstance(written, str) else written
+
+
+def by_name(values: Mapping[Any, T], path: str = "") -> dict[Any, T]:
+    """Values by the full names of their fields; neither names nor values are checked.
 
     Args:
         values: name or symbol → value.
-        path: where the values were given; None for keyword arguments.
-        known: names that may be given there.
-        elsewhere: whether an unknown name may belong to another section.
+        path: where the values were given.
 
     Raises:
-        InputError: a name is unknown, or given twice.
+        InputError: a value is given twice, by name and by symbol.
     """
-    found = by_full_name(values, NAME_OF_SYMBOL, path)
-    for name, (where, _) in found.items():
-        if name not in known:
-            raise InputError(f"{where}: unknown name; {suggested_name(name, known, elsewhere=elsewhere)}")
-    return found
+    named: dict[Any, T] = {}
+    for written, value in values.items():
+        name = full_name(written)
+        if name in named:
+            raise InputError(f"{path_of(path, name)}: given twice, also as {shown(SYMBOL_OF[name])}; leave one out")
+        named[name] = value
+    return named
 
 
 def by_section(settings: Mapping[str, object]) -> dict[str, dict[str, object]]:
@@ -51,8 +80,8 @@ def by_section(settings: Mapping[str, object]) -> dict[str, dict[str, object]]:
         InputError: there is no such field, or a value is given twice.
     """
     sections: dict[str, dict[str, object]] = {section: {} for section in SECTIONS}
-    for name, (_, value) in by_name(settings, None, SECTION_OF).items():
-        sections[SECTION_OF[name]][name] = value
+    for name, value in by_name(settings).items():
+        sections[SECTION_OF[dotted_name(name, shown(name))]][name] = value
     return sections
 
 
@@ -63,38 +92,7 @@ def dotted_name(written: str, path: str) -> str:
         InputError: there is none; the message begins with `path`.
     """
     section, _, last = written.rpartition(".")
-    name: str = full_name(last, NAME_OF_SYMBOL)
+    name: str = full_name(last)
     if name not in SECTION_OF or section not in ("", SECTION_OF[name]):
-        raise InputError(f"{path}: unknown name; {suggested_name(last, () if section else SECTION_OF)}")
+        raise InputError(f"{path}: unknown name; {suggestion(last, DOTTED_NAMES)}")
     return name
-
-
-def suggested_name(written: object, known: Collection[str], *, elsewhere: bool = True) -> str:
-    """The remedy for an unknown name.
-
-    Names like it are looked for among the known ones first: those of which it is the first or the last part, as `mu`
-    is of `mu_fc`, then the closest one.
-
-    Args:
-        written: the name.
-        known: names that may be given.
-        elsewhere: whether names of other sections are suggested as well, with the section before them.
-    """
-    names = {name: name for name in (*known, *(SECTION_OF if elsewhere else ()))}
-    names |= {symbol: name for symbol, name in NAME_OF_SYMBOL.items() if name in names}
-    shown = {each: each if name in known else f"{SECTION_OF[name]}.{each}" for each, name in names.items()}
-    text = spelled(as_word(written))
-    alike = [text] if text in names else [name for name in names if _is_part(text, name)]
-    here = [name for name in alike if names[name] in known]
-    found = [shown[name] for name in here or alike or difflib.get_close_matches(text, names, n=1)]
-    if found:
-        return f"did you mean {' or '.join(filter(None, (', '.join(found[:-1]), found[-1])))}?"
-    words = choice(known)
-    if not known or (elsewhere and words.endswith("...")):
-        return "give one of those that `warpchain parameters` lists"
-    return f"give one of {words}"
-
-
-def _is_part(text: str, name: str) -> bool:
-    """Whether a text is the first or the last part of a name whose parts are joined by underscores."""
-    return name.startswith(f"{text}_") or name.endswith(f"_{text}")

@@ -2,19 +2,15 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, get_args
+from typing import Any, get_args
 
 from pydantic.fields import FieldInfo
 
-from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.sections import SECTIONS, SYMBOL_OF
 from warpchain.inputs.validation import field_limits, field_unit
-
-METHOD_WORDS: Final = (*METHODS_BY_NEED, *METHODS)
-"""What `method` can be."""
 
 
 @dataclass(frozen=True)
@@ -60,12 +56,12 @@ def list_values(preset_name: str) -> dict[str, list[ValueEntry]]:
     return {section: list(_entries(section, values[section], preset_name)) for section in values}
 
 
-def field_choices(name: str, field: FieldInfo) -> tuple[Any, ...]:
+def field_choices(field: FieldInfo) -> tuple[Any, ...]:
     """The possible values of a field, if these are words or truth values, else empty."""
     if field.annotation is bool:
         return (True, False)
-    if name == "method":
-        return METHOD_WORDS
+    if isinstance(field.json_schema_extra, dict) and "enum" in field.json_schema_extra:
+        return tuple(field.json_schema_extra["enum"])  # type: ignore[arg-type]
     return tuple(word for word in get_args(field.annotation) if isinstance(word, str))
 
 
@@ -86,7 +82,7 @@ def _entries(section: str, values: Mapping[str, Any], preset_name: str) -> Itera
             value=values[name],
             sigma=sigma,
             limits=field_limits(field),
-            choices=field_choices(name, field),
+            choices=field_choices(field),
             source=source,
             meaning=str(field.description),
         )

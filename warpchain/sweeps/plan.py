@@ -191,7 +191,7 @@ class Sweep:
                     if distribution != checked.get(name) and distribution.share() < LEAST_SHARE:
                         raise InputError(
                             f"{block.path}.distributions.{name}: less than {LEAST_SHARE:.0%} of the draws "
-                            f"{distribution.described('')} are physical; give a uniform distribution"
+                            f"{distribution} are physical; give a uniform distribution"
                         )
                 checked = distributions
                 self._first_possible(block, cell, fixed, distributions, 0, designed=False)
