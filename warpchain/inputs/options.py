@@ -4,10 +4,10 @@ import re
 from collections.abc import Mapping
 from typing import Annotated, Final, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from warpchain.inputs.methods import BURST_TOLERANCE, FORMER_METHODS, METHODS, METHODS_BY_NEED
-from warpchain.inputs.validation import STRICT, InputError, number_field, shown, suggestion
+from warpchain.inputs.validation import InputError, Section, number_field, shown, suggestion
 from warpchain.kernels.methods.explicit_tableaus import HYBRID
 from warpchain.kernels.methods.method import find_method, method_names
 
@@ -42,7 +42,7 @@ def _supported_device(device: str) -> str:
     return device
 
 
-class Options(BaseModel):
+class Options(Section):
     """How a walk is computed.
 
     `method` is an integrator or a word of `METHODS_BY_NEED`. A word supplies its own defaults; an explicit `tolerance`
@@ -53,8 +53,6 @@ class Options(BaseModel):
         pydantic.ValidationError: a value is unknown or out of bounds, the smallest step is not below the contact step,
             the device is not supported, or the method does not run on it.
     """
-
-    model_config = STRICT
 
     method: Annotated[str, AfterValidator(_known_method)] = Field(
         default="standard",

@@ -14,14 +14,15 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any, Final, Literal, Self
 
-from pydantic import BaseModel, model_validator
+from pydantic import model_validator
 
 from warpchain.inputs.validation import (
     DIMENSIONLESS,
-    STRICT,
     Bounds,
     InputError,
     InputWarning,
+    Section,
+    by_name,
     field_bounds,
     field_unit,
     number_field,
@@ -82,7 +83,7 @@ def _row(symbol: str, unit: str, value: float, sigma: float, limits: Limits, sou
     return number_field(..., unit, meaning, symbol=symbol, value=value, sigma=sigma, source=source, **limits)
 
 
-class Parameters(BaseModel):
+class Parameters(Section):
     """Physical parameters of one chain, its sprocket and the floor, in SI units.
 
     No field has a default: a set of parameters comes from a named preset (`preset`), with changes made by
@@ -92,8 +93,6 @@ class Parameters(BaseModel):
         pydantic.ValidationError: a value is missing, unknown, not a finite number or out of bounds, or
             `circle_radius` is not smaller than half of `link_length`.
     """
-
-    model_config = STRICT
 
     link_length: float = _row("ℓ", "m", 1.268e-2, 1e-5, LENGTH, "measured", "distance between the two joints of a link")
     sprocket_radius: float = _row(
@@ -167,8 +166,6 @@ class Parameters(BaseModel):
         Raises:
             InputError: a name is unknown, a value is given twice, or the new set is not physical.
         """
-        from warpchain.inputs.sections import by_name  # which names the fields of this class
-
         return validated(type(self), {**vars(self), **by_name(values, "parameters")}, "parameters")
 
 

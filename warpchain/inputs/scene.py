@@ -3,11 +3,11 @@
 import math
 from typing import Annotated, Final, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from warpchain.inputs.options import on_gpu
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.validation import STRICT, InputError, number_field
+from warpchain.inputs.validation import InputError, Section, number_field
 
 MOST_LINKS: Final = 100_000
 """A chain of so many links takes 0.4 GB, and kernels of its own."""
@@ -41,15 +41,13 @@ def _even(links: int) -> int:
     return links
 
 
-class Scene(BaseModel):
+class Scene(Section):
     """What happens in one walk, from hanging on the sprocket to the end.
 
     Raises:
         pydantic.ValidationError: a value is unknown or out of bounds, `links` is odd, the clearance is that of a
             hanging chain although the chain never hangs, or the release disturbs a plane that is fixed.
     """
-
-    model_config = STRICT
 
     links: Annotated[int, AfterValidator(_even)] = number_field(
         60,

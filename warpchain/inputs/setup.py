@@ -13,8 +13,8 @@ from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import Scene, check_links_on_gpu, check_scene
-from warpchain.inputs.sections import SECTION_OF, SECTIONS, by_name
-from warpchain.inputs.validation import InputError, path_of, shown, suggestion, validated
+from warpchain.inputs.sections import SECTION_OF, SECTIONS
+from warpchain.inputs.validation import InputError, by_name, path_of, shown, suggestion, validated
 from warpchain.inputs.yaml_files import read_yaml
 from warpchain.kernels.methods.method import find_method
 

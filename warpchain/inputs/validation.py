@@ -122,6 +122,73 @@ def field_bounds(field: FieldInfo) -> Bounds:
     return Bounds(limits.get("ge", limits.get("gt", -math.inf)), upper, "gt" not in limits)
 
 
+FIELDS: Final[dict[str, FieldInfo]] = {}
+"""Name of each field of parameters, scene and options → the field; no name is in two sections."""
+SECTION_OF: Final[dict[str, str]] = {}
+"""Name of each field → its section."""
+SYMBOL_OF: Final[dict[str, str]] = {}
+"""Name → the paper's symbol, in ASCII; no symbol is the name of a field."""
+NAME_OF_SYMBOL: Final[dict[str, str]] = {}
+
+_SPELLINGS: Final = str.maketrans(
+    {"ℓ": "ell", "β": "beta", "μ": "mu", "\N{MICRO SIGN}": "mu", "ν": "nu", "τ": "tau", "ω": "omega"}
+)
+
+
+def spelled(symbol: str) -> str:
+    """A symbol in ASCII, Greek letters by their names."""
+    return symbol.translate(_SPELLINGS)
+
+
+class Section(BaseModel):
+    """A section of a user's values: parameters, scene or options; its fields have their names from then on."""
+
+    model_config = STRICT
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        """Tell the names of the fields."""
+        for name, field in cls.model_fields.items():
+            FIELDS[name], SECTION_OF[name] = field, cls.__name__.lower()
+            if isinstance(field.json_schema_extra, dict) and "symbol" in field.json_schema_extra:
+                SYMBOL_OF[name] = spelled(str(field.json_schema_extra["symbol"]))
+                NAME_OF_SYMBOL[SYMBOL_OF[name]] = name
+
+
+def full_name(written: Any) -> Any:
+    """Name of the field that is written as its name or symbol, `mu_fc` or μ_fc; anything else stays as it is."""
+    return NAME_OF_SYMBOL.get(spelled(written), written) if isinstance(written, str) else written
+
+
+T = TypeVar("T")
+
+
+def by_name(values: Mapping[Any, T], path: str = "") -> dict[Any, T]:
+    """Values by the full names of their fields; neither names nor values are checked.
+
+    Args:
+        values: name or symbol → value.
+        path: where the values were given.
+
+    Raises:
+        InputError: a value is given twice, by name and by symbol.
+    """
+    named: dict[Any, T] = {}
+    for written, value in values.items():
+        name = full_name(written)
+        if name in named:
+            raise InputError(f"{path_of(path, name)}: given twice, also as {shown(SYMBOL_OF[name])}; leave one out")
+        named[name] = value
+    return named
+
+
+def suggested_name(written: object, keys: Iterable[str] = ()) -> str:
+    """The remedy for an unknown name of a field, or for one of these keys."""
+    fields = {name: f"{section}.{name}" for name, section in SECTION_OF.items()}
+    symbols = {symbol: f"{SECTION_OF[name]}.{symbol}" for symbol, name in NAME_OF_SYMBOL.items()}
+    return suggestion(written, {key: key for key in keys} | fields | symbols)
+
+
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
 
@@ -155,8 +222,6 @@ def refusals(error: ValidationError, path: str, keys: Iterable[str] = ()) -> lis
         path: of the value that was validated.
         keys: that may be meant by an unknown one, beside names of fields.
     """
-    from warpchain.inputs.sections import DOTTED_NAMES, SECTION_OF, unit_of  # whose models are made of the fields above
-
     lines = []
     for problem in error.errors(include_url=False)[:MOST_PROBLEMS]:
         where, cause = path, problem.get("ctx", {}).get("error")
@@ -166,14 +231,13 @@ def refusals(error: ValidationError, path: str, keys: Iterable[str] = ()) -> lis
         if isinstance(cause, InputError):
             lines.append(f"{where}.{cause}".removeprefix("."))
         elif problem["type"] == "extra_forbidden":
-            known = {key: key for key in keys} | DOTTED_NAMES
-            lines.append(f"{where}: unknown name; {suggestion(problem['loc'][-1], known)}")
+            lines.append(f"{where}: unknown name; {suggested_name(problem['loc'][-1], keys)}")
         elif problem["type"] == "model_type":
             lines.append(f"{where}: {shown(problem['input'])} is no mapping; give names with values")
         elif cause is not None or problem["type"] == "missing":
             lines.append(f"{where}: {cause or problem['msg']}")
         else:
-            unit = next((unit_of(name) for name in problem["loc"][::-1] if name in SECTION_OF), DIMENSIONLESS)
+            unit = next((field_unit(FIELDS[name]) for name in problem["loc"] if name in FIELDS), DIMENSIONLESS)
             in_unit = "" if unit == DIMENSIONLESS else f", in {unit}"
             lines.append(f"{where}: {problem['msg']}{in_unit}; given {shown(problem['input'])}")
     if error.error_count() > len(lines):

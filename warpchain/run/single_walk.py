@@ -11,9 +11,9 @@ from warpchain.inputs.distributions import LARGEST_SEED, random_generator, sampl
 from warpchain.inputs.keywords import Method, Number, Preset, Truth, WalkSettings, Whole
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import warn_of_units
-from warpchain.inputs.sections import by_section, full_name
+from warpchain.inputs.sections import by_section
 from warpchain.inputs.setup import DEFAULT_PRESET, Setup, check_has_joint_forces, resolve
-from warpchain.inputs.validation import InputError, checked_whole, plain, shown
+from warpchain.inputs.validation import InputError, checked_whole, full_name, plain, shown
 from warpchain.walks.motion import LONGEST_INTERVAL, Keep
 from warpchain.walks.scheduler import Watch, run_setups
 from warpchain.walks.walk_phases import WalkRun

@@ -28,13 +28,18 @@ from pydantic import (
 
 from warpchain.inputs.distributions import DRAWABLE, LARGEST_SEED, TABLE, Distribution, Gaussian, Uniform
 from warpchain.inputs.keywords import Preset, Sampler
-from warpchain.inputs.sections import SECTION_OF, SECTIONS, SYMBOL_OF, by_name, full_name
+from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.validation import (
+    FIELDS,
     LONGEST_NAME,
     MOST_VALUES,
+    SECTION_OF,
     STRICT,
+    SYMBOL_OF,
     InputError,
+    by_name,
     field_bounds,
+    full_name,
     plain,
     refusals,
     shown,
@@ -85,14 +90,13 @@ class _Given(BaseModel):
         return {name: getattr(checked, name) for name in named}
 
 
-_FIELDS: Final = {name: field for model in SECTIONS.values() for name, field in model.model_fields.items()}
 _TYPES: Final[Mapping[str, Any]] = {
     name: Annotated[
         field.annotation,
         Field(description=field.description, json_schema_extra=field.json_schema_extra),
         *field.metadata,
     ]
-    for name, field in _FIELDS.items()
+    for name, field in FIELDS.items()
 }
 
 
@@ -193,7 +197,7 @@ def _distribution(given: Any, info: ValidationInfo) -> Distribution | None:
         raise ValueError(f"there is no uncertainty of {name} in Table 1; give uniform or gaussian")
     if isinstance(given, str):
         return TABLE[name] if given == "table" else None
-    bounds = field_bounds(_FIELDS[name])
+    bounds = field_bounds(FIELDS[name])
     if given.gaussian is not None:
         if given.gaussian.mean is not None and not bounds.admit(given.gaussian.mean):
             raise InputError(f"gaussian.mean: {given.gaussian.mean} is not physical; see `warpchain parameters {name}`")
@@ -267,7 +271,9 @@ class BlockOfFile(BlockKeys):
     """An item of `blocks`."""
 
     name: str = Field(
-        pattern="^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=LONGEST_NAME, description="of the block, unique in its sweep"
+        pattern="^[A-Za-z0-9][A-Za-z0-9_-]*$",
+        max_length=LONGEST_NAME,
+        description="name of the block, unique in its sweep",
     )
 
 
@@ -276,7 +282,7 @@ class SweepFile(BlockKeys):
 
     version: Literal[1] = Field(description="version of the format: 1")
     name: Annotated[str, AfterValidator(_printable)] = Field(
-        max_length=LONGEST_NAME, description="name of the sweep, in figures and pages"
+        max_length=LONGEST_NAME, description="name of the sweep, in figures and pages; of a block, unique in its sweep"
     )
     seed: int = Field(ge=0, le=LARGEST_SEED, description="whole number from which all random numbers follow")
     blocks: list[BlockOfFile] | None = Field(
