@@ -267,7 +267,7 @@ def plain(value: object, path: str = "value") -> Any:
             value = value[()]
         if isinstance(value, np.generic):
             return float(value) if isinstance(value, np.floating) else _OF_KIND.get(value.dtype.kind, str)(value)
-        if not isinstance(value, Mapping | np.ndarray | list | tuple | range):
+        if not isinstance(value, Mapping | np.ndarray | list | tuple | range) or value is np.ma.masked:
             return value
         if depth == DEEPEST:
             raise InputError(f"{path}: more than {DEEPEST} lists or mappings inside of one another; give fewer")
