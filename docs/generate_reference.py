@@ -4,11 +4,10 @@ Run ``python docs/generate_reference.py`` after a change of any of these; a test
 """
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 
-import typer
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from typer.models import ArgumentInfo, OptionInfo
@@ -34,10 +33,10 @@ SIGNS: Final = {"ge": "≥ ", "gt": "> ", "le": "≤ ", "lt": "< "}
 
 SAMPLER_MEANINGS: Final = {
     "random": "independent samples",
-    "sobol": "scrambled Sobol' sequence; a power of two of samples; needs `warpchain[scipy]`",
-    "latin_hypercube": "latin hypercube; needs `warpchain[scipy]`",
+    "sobol": "scrambled Sobol' sequence; a power of two of samples",
+    "latin_hypercube": "latin hypercube",
     "saltelli": "points for Sobol indices: each sample of d drawn quantities takes d + 2 walks; a power of two of "
-    "samples; needs `warpchain[scipy]`",
+    "samples",
 }
 
 
@@ -192,7 +191,7 @@ def sweep_file_page() -> str:
         + "\n## Samplers\n\n"
         + table(("sampler", "what it draws"), ((f"`{name}`", SAMPLER_MEANINGS[name]) for name in SAMPLERS))
         + "\n## Record\n\n"
-        f"`series` keeps time series of the centre of mass, every {SERIES_INTERVAL:g} s. `frames` keeps positions of "
+        f"`series` keeps the time series of a walk, every {SERIES_INTERVAL:g} s. `frames` keeps positions of "
         f"all joints, every {FRAME_INTERVAL:g} s, of samples whose series are kept. Each is `false`, `true` (all "
         "samples) or a mapping:\n\n" + table(("key", "meaning"), kept)
     )
@@ -203,7 +202,7 @@ def results_page() -> str:
     fields = []
     for name, stored in STORED.items():
         unit = "" if stored.unit == "1" else stored.unit
-        fields.append((f"`{name}`", unit, stored.meaning))
+        fields.append((f"`{name}`", unit, stored.described))
         fields += [(f'`{name}["{key}"]`', unit, meaning) for key, meaning in stored.keys.items()]
     columns = (
         (f"`{name}`", "" if column.unit == "1" else column.unit, column.meaning) for name, column in COLUMNS.items()
@@ -213,7 +212,7 @@ def results_page() -> str:
         "# Results\n\n## Status\n\nHow a walk ended. The first error of a walk stays; its Δx is NaN.\n\n"
         + table(("status", "code", "sentence"), statuses)
         + "\n## A walk\n\nFields of `warpchain.WalkResult`, and datasets of the file that `save` writes. "
-        "Losses of energy are positive.\n\n"
+        "Losses of energy are positive. `sprocket_center` and `sprocket_radius`, in m, follow from them.\n\n"
         + table(("field", "unit", "meaning"), fields)
         + "\n## A sweep\n\nColumns of `warpchain.SweepResult`; each drawn quantity has a column, too. "
         "What a walk does not have is NaN, or −1 in columns of whole numbers, such as `bounces_before_collapse` of a "
@@ -221,19 +220,6 @@ def results_page() -> str:
         "the number of walks that were averaged, `absent` that of walks at rest without the quantity. Averages of your "
         "own must do so, too.\n\n" + table(("column", "unit", "meaning"), columns)
     )
-
-
-def commands(application: typer.Typer, path: str) -> Iterable[tuple[str, Callable[..., None]]]:
-    """The words that call each command, and its function."""
-    for group in application.registered_groups:
-        assert group.typer_instance is not None
-        name = f"{path} {group.name}"
-        if group.typer_instance.registered_callback and group.typer_instance.registered_callback.callback:
-            yield name, group.typer_instance.registered_callback.callback
-        yield from commands(group.typer_instance, name)
-    for command in application.registered_commands:
-        assert command.callback is not None
-        yield f"{path} {command.name or command.callback.__name__}", command.callback
 
 
 def option_row(name: str, annotation: Any, default: Any) -> tuple[str, str] | None:
@@ -259,12 +245,13 @@ def option_row(name: str, annotation: Any, default: Any) -> tuple[str, str] | No
 def commands_page() -> str:
     """Every command with its options."""
     parts = ["# Commands\n\nThe same text as `--help` of each command.\n"]
-    for path, function in sorted(commands(app, "warpchain"), key=lambda item: item[0] != "warpchain walk"):
+    named = [(command.name or command.callback.__name__, command.callback) for command in app.registered_commands]
+    for name, function in sorted(named, key=lambda item: item[0] != "walk"):
         hints = get_type_hints(function, include_extras=True)
         given = inspect.signature(function).parameters.items()
-        rows = [row for name, one in given if (row := option_row(name, hints[name], one.default)) is not None]
+        rows = [row for key, one in given if (row := option_row(key, hints[key], one.default)) is not None]
         text = "\n\n".join(" ".join(part.split()) for part in (function.__doc__ or "").split("\n\n"))
-        parts.append(f"\n## {path}\n\n{text}\n\n" + table(("option", "meaning"), rows))
+        parts.append(f"\n## warpchain {name}\n\n{text}\n\n" + table(("option", "meaning"), rows))
     return "".join(parts)
 
 

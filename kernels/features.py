@@ -17,7 +17,6 @@ class Features:
         columns: Width of a chain's scratch, see :func:`layout.padded_width`.
         fixed_body: ``"floor"``, ``"sprocket"`` or ``"none"``.
         self_contact: Contacts between a chain's own links.
-        broad_phase: ``"grid"`` or ``"all_pairs"``, which exists for comparison only.
         watch: What ends the run before its stop time: ``"rest"``, ``"steady"`` or ``"none"``.
         softens: Whether samples may change the softness of the joints, see :mod:`events.softening`.
         tilts: Whether the plane of the chain may move, see :mod:`physics.plane`; with an explicit method only.
@@ -27,7 +26,6 @@ class Features:
     columns: int
     fixed_body: str
     self_contact: bool
-    broad_phase: str
     watch: str
     softens: bool = False
     tilts: bool = False

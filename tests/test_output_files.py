@@ -112,7 +112,7 @@ def test_the_part_of_a_killed_merge_goes(tmp_path: Path) -> None:
     """As that of a walk, with what had been written of it."""
     run(tmp_path / "sweep")
     path = tmp_path / "merged.h5"
-    program = "from warpchain.store import merged_file\nmerged_file._write_rows = die\nmerged_file.merge(*sys.argv[1:])"
+    program = "from warpchain.store.merged_file import merge\nos.fsync = die\nmerge(*sys.argv[1:])"
     killed(program, tmp_path / "sweep", path)
     assert len(parts(tmp_path)) == 1 and not path.exists()
     merge(tmp_path / "sweep", path)

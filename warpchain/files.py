@@ -95,7 +95,7 @@ def checked_output(path: str | os.PathLike[str], only: Kind | None = None) -> Pa
         OSError: it is no path, or the folder is not there.
     """
     target = given_path(path)
-    with _naming(target):
+    with naming(target):
         target.parent.stat()
         try:
             mode = target.lstat().st_mode
@@ -129,32 +129,39 @@ def replacing(path: str | os.PathLike[str], only: Kind | None = None, *, clear: 
     target = checked_output(path, only)
     if clear:
         _clear_parts(target)
-    with _naming(target):
+    with naming(target):
         part, descriptor = _new_part(target)
     try:
-        with _naming(target):
+        with naming(target):
             yield part
             os.fsync(descriptor)
         checked_output(target, only)  # again: the block may have taken hours
-        with _naming(target):
+        with naming(target):
             os.replace(part, target)
+            folder = os.open(target.parent, os.O_RDONLY)
+            try:
+                os.fsync(folder)  # the new name, too
+            finally:
+                os.close(folder)
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
         os.close(descriptor)
 
 
-def write_whole(path: str | os.PathLike[str], content: bytes | str, only: Kind | None = None) -> None:
+def write_whole(
+    path: str | os.PathLike[str], content: bytes | str, only: Kind | None = None, *, clear: bool = True
+) -> None:
     """Write a file, see `replacing`; text in UTF-8."""
     data = content.encode() if isinstance(content, str) else content
-    with replacing(path, only) as part:
+    with replacing(path, only, clear=clear) as part:
         part.write_bytes(data)
 
 
 def remove_output(path: str | os.PathLike[str]) -> None:
     """Delete a file that a new one would replace; nothing if there is none. Errors as of `checked_output`."""
     target = checked_output(path)
-    with _naming(target):
+    with naming(target):
         target.unlink(missing_ok=True)
 
 
@@ -164,12 +171,12 @@ def make_folder(folder: Path) -> None:
     Raises:
         OSError: it cannot be made; one line that names it.
     """
-    with _naming(folder):
+    with naming(folder):
         folder.mkdir(parents=True, exist_ok=True)
 
 
 @contextmanager
-def _naming(target: Path) -> Iterator[None]:
+def naming(target: Path) -> Iterator[None]:
     """Turn an `OSError` of the `with` block into one of one line that names a file and what to do."""
     try:
         yield
@@ -234,16 +241,8 @@ def reason(error: OSError) -> str:
     return os.strerror(error.errno) if error.errno else " ".join(str(error).split())
 
 
-def version_refusal(found: int, known: int, remedy: str) -> str | None:
-    """Why a file of one format version is refused where another is known; None if they are equal.
-
-    Args:
-        found: version of the file.
-        known: version that this warpchain reads.
-        remedy: how to get an older file's content in this version.
-    """
-    if found == known:
-        return None
-    if found > known:
-        return f"format version {found}, but this warpchain reads {known}; update warpchain"
-    return f"format version {found}, but this warpchain reads {known}; {remedy}, or use the warpchain that wrote it"
+def unreadable(path: str | os.PathLike[str], error: OSError) -> OSError:
+    """One line for what the system refused to read, of the same class."""
+    problem = type(error)(f"{path}: cannot be read ({reason(error)}); give the path of a readable file")
+    problem.errno = error.errno
+    return problem

@@ -1,65 +1,155 @@
-"""HDF5 files with checksums: written from memory or into reserved room, and read with distrust.
+"""HDF5 files of results: equal content gives equal bytes, and a checksum tells of damage.
 
-Behind the HDF5 content, where other readers do not look, stand the SHA-256 of each `PIECE` bytes of it, and a line:
+Behind the HDF5 content, where the HDF5 library does not look, stands a line with its SHA-256:
 
-    warpchain checksums: SHA-256 of 0000000000123456 bytes in pieces, HEX
+    warpchain SHA-256: HEX
 
-with the length of the content and the SHA-256 of length and checksums. A piece is checked before the HDF5 library gets
-a byte of it, because that library may hang, or crash, on damaged files. So a look into a large file costs little.
-A user block before the content was tried instead: xarray then does not know the file by itself.
+It is compared before that library gets a byte, because damage may make it hang or crash. A user block before the
+content was tried instead: xarray then does not know the file by itself.
 
-Checksums tell of damage, not of intent. `Contents` therefore opens only what is asked for, and takes only datasets
-that lie in the file itself as they are, of the type and the shape that are asked for: nothing leads to another file,
-and nothing is larger in memory than in the file.
+Fields of a dataclass that a file keeps are annotated with `Stored`; `write_fields` and `read_fields` go by that.
 """
 
 import hashlib
 import io
-import json
 import os
 import re
 import stat
-import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import lru_cache
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Final
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, get_args
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
 
-from warpchain.files import reason
+from warpchain.files import unreadable
 from warpchain.inputs.validation import DamagedFileError, InputError
+from warpchain.version import FORMAT_VERSION, version_refusal
 
 if TYPE_CHECKING:
     import h5py
 
-PIECE: Final = 2**18
-"""Bytes of content that have a checksum of their own."""
-SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
-"""First bytes of an HDF5 file."""
-
-
-class ContentError(ValueError):
-    """The content of a file is not what warpchain writes; the text says in which way."""
-
-
-class ForeignContentError(ContentError):
-    """The content of a file was never HDF5."""
-
-
-_LINE: Final = "\nwarpchain checksums: SHA-256 of {:016d} bytes in pieces, {}\n"
-_LINE_LENGTH: Final = len(_LINE.format(0, "0" * 64))
-_FOUND: Final = re.compile(rb"\nwarpchain checksums: SHA-256 of (\d{16}) bytes in pieces, ([0-9a-f]{64})\n")
-_PIECES_KEPT: Final = 64
+_SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
+_LINE: Final = "\nwarpchain SHA-256: {}\n"
+_LINE_LENGTH: Final = len(_LINE.format("0" * 64))
+_OLDER_LINE: Final = re.compile(rb"\nwarpchain checksums: SHA-256 of \d{16} bytes in pieces, ")
+_OLDER_LENGTH: Final = 150
+"""Among so many bytes at the end of a file of warpchain 0.1 is the line above."""
+_PIECE: Final = 2**20
 _FIXED: Final[dict[str, Any]] = {"libver": ("v108", "v108"), "track_order": True}
 """Version bounds without which equal content would not give equal bytes; they also leave out times."""
 
 
-def hdf5_image(fill: "Callable[[h5py.File], None]") -> bytes:
-    """The bytes of an HDF5 file that `fill` fills, with checksums; equal content gives equal bytes.
+@dataclass(frozen=True)
+class Stored:
+    """Annotation of a field that files keep: a number, an array, or a dictionary of numbers.
+
+    Attributes:
+        unit: SI unit, "1" for pure numbers.
+        meaning: one line saying what the numbers are.
+        shape: of an array, such as "t 2" for an array of shape (t, 2); t instants, f frames, n links.
+        empty: when an array has no instants or frames, although there are some; "" if that is never so.
+        keys: of a dictionary its keys and their meanings.
+        sample: columns of a sample of the kernels that an array is made of; None if it is made otherwise.
+    """
+
+    unit: str
+    meaning: str
+    shape: str = ""
+    empty: str = ""
+    keys: Mapping[str, str] = field(default_factory=dict)
+    sample: int | list[int] | None = None
+
+    @property
+    def described(self) -> str:
+        """Meaning and shape."""
+        if not self.shape:
+            return self.meaning
+        sizes = self.shape.split()
+        shape = f"{self.meaning}, shape ({', '.join(sizes)}{',' * (len(sizes) == 1)})"
+        return f"{shape}; none {self.empty}" if self.empty else shape
+
+    def sizes(self, named: Mapping[str, int]) -> tuple[int, ...]:
+        """The shape as numbers, given what its letters stand for."""
+        return tuple(named[size] if size in named else int(size) for size in self.shape.split())
+
+    def path(self, name: str) -> str:
+        """Where a file keeps the field of this name."""
+        group = {"": "summary", "t": "series", "f": "frames"}[self.shape[:1]]
+        return f"{group}/{name.removeprefix('frame_')}"
+
+
+def stored_fields(kind: type) -> dict[str, Stored]:
+    """The fields of a dataclass that files keep: name → annotation."""
+    notes = ((item.name, note) for item in fields(kind) for note in get_args(item.type))
+    return {name: note for name, note in notes if isinstance(note, Stored)}
+
+
+def check_fields(values: Any, links: int) -> None:
+    """Check the arrays and dictionaries of a dataclass with annotated fields, among them `time` and `frame_time`.
+
+    Raises:
+        ValueError: an array has another shape, a dictionary other keys than its annotation says, or times do not
+            ascend.
+    """
+    named = {"t": len(values.time), "f": len(values.frame_time), "n": links}
+    for name, stored in stored_fields(type(values)).items():
+        value, shape = getattr(values, name), stored.sizes(named)
+        if stored.keys and set(value) != set(stored.keys):
+            raise ValueError(f"{name}: wrong keys; give exactly {', '.join(stored.keys)}")
+        if shape and np.shape(value) != shape and not (stored.empty and np.shape(value) == (0, *shape[1:])):
+            raise ValueError(f"{name}: its shape is {np.shape(value)}; give an array of shape {shape}")
+    for name in ("time", "frame_time"):
+        times = getattr(values, name)
+        if not (np.isfinite(times).all() and (np.diff(times) >= 0).all()):
+            raise ValueError(f"{name}: does not ascend; give finite times in order")
+
+
+def write_fields(
+    group: "h5py.Group", values: Mapping[str, Any], kept: Mapping[str, Stored], joints: type = np.float64
+) -> None:
+    """Write annotated fields with units and meanings; arrays without numbers are left out.
+
+    Args:
+        group: where to.
+        values: name → value of each field.
+        kept: the fields, see `stored_fields`.
+        joints: precision of what each joint has in each frame.
+    """
+    for name, stored in kept.items():
+        for key, meaning in (stored.keys or {"": stored.described}).items():
+            value = values[name][key] if key else values[name]
+            if stored.shape:  # a NaN has many bit patterns, and the pattern may depend on the batch
+                value = np.where(np.isnan(value), np.nan, value).astype(joints if "n" in stored.shape else np.float64)
+            if np.size(value):
+                put(group, f"{stored.path(name)}/{key}".removesuffix("/"), value, stored.unit, meaning)
+
+
+def put(group: "h5py.Group", path: str, value: Any, unit: str, meaning: str) -> "h5py.Dataset":
+    """Write one dataset with its unit and meaning."""
+    dataset = group.create_dataset(path, data=value)
+    dataset.attrs["unit"], dataset.attrs["description"] = unit, meaning
+    return dataset
+
+
+def read_fields(group: "h5py.Group", kept: Mapping[str, Stored], links: int) -> dict[str, Any]:
+    """What `write_fields` wrote; arrays of floats come back in double precision."""
+    values: dict[str, Any] = {}
+    for name, stored in kept.items():
+        path = stored.path(name)
+        if stored.keys:
+            values[name] = {key: group[path][key][()].item() for key in stored.keys}
+        elif not stored.shape:
+            values[name] = group[path][()].item()
+        elif path in group:
+            values[name] = group[path][()].astype(np.float64)
+        else:
+            values[name] = np.empty(stored.sizes({"t": 0, "f": 0, "n": links}))
+    return values
+
+
+def hdf5_image(kind: str, fill: "Callable[[h5py.File], None]") -> bytes:
+    """The bytes of an HDF5 file of some kind that `fill` fills; equal content gives equal bytes.
 
     The file is made in memory, because HDF5 fails badly on a full disk: it neither says what is wrong nor closes the
     file.
@@ -68,67 +158,74 @@ def hdf5_image(fill: "Callable[[h5py.File], None]") -> bytes:
 
     image = io.BytesIO()
     with h5py.File(image, "w", **_FIXED) as file:
+        file.attrs["format"], file.attrs["format_version"] = kind, FORMAT_VERSION
         fill(file)
-    _add_checksums(image)
+    image.seek(0, os.SEEK_END)
+    image.write(_LINE.format(hashlib.sha256(image.getvalue()).hexdigest()).encode())
     return image.getvalue()
 
 
-def put_text(group: "h5py.Group", name: str, text: str) -> None:
-    """Give a group an attribute that `Contents.text` reads: of fixed length, in UTF-8.
-
-    HDF5 keeps texts of any length in a heap without checksums, and loops for ever on one that is all zeros.
-    """
-    import h5py
-
-    content = text.encode()
-    group.attrs.create(name, content, dtype=h5py.string_dtype("utf-8", max(1, len(content))))
-
-
 @contextmanager
-def open_new_hdf5(path: Path, most: int) -> "Iterator[h5py.File]":
-    """A new HDF5 file that may be too large for `hdf5_image`, with the same bytes.
-
-    Its space on the disk is reserved first, because HDF5 fails badly on a full disk. What is left over is given back.
+def reading_hdf5(
+    path: str | os.PathLike[str], kind: str, remedy: str, wanted: str | None = None
+) -> "Iterator[h5py.File]":
+    """An HDF5 file that `hdf5_image` made, undamaged and of the right kind.
 
     Args:
-        path: the file, which may be there.
-        most: bytes that it takes at most, without its checksums.
+        path: the file.
+        kind: its kind.
+        remedy: what to do about a damaged or an older file.
+        wanted: which file to give instead of one of another kind; None if a sweep has it in its folder.
 
     Raises:
-        OSError: there is not enough room, or the file cannot be written.
+        OSError: it cannot be read.
+        InputError: it is no regular file, of another kind or of another version.
+        DamagedFileError: it is damaged or cut short.
     """
     import h5py
 
-    with path.open("w+b") as content:
-        with h5py.File(content, "w", **_FIXED) as file:
-            _take_room(content.fileno(), most)
-            yield file
-        _add_checksums(content)
+    _compare(path, remedy, wanted)
+    with h5py.File(path, "r", locking=False) as file:
+        if file.attrs["format"] != kind:
+            raise InputError(
+                f"{path}: a {file.attrs['format']}, not a {kind}; {wanted or 'move it out of this folder'}"
+            )
+        if refusal := version_refusal(int(file.attrs["format_version"]), remedy):
+            raise InputError(f"{path}: {refusal}")
+        yield file
 
 
-def _add_checksums(file: BinaryIO) -> None:
-    """Put the checksums behind the content of a file."""
-    file.seek(0)
-    table, length = b"", 0
-    while piece := file.read(PIECE):
-        table += hashlib.sha256(piece).digest()
-        length += len(piece)
-    file.write(table + _LINE.format(length, _of_table(length, table)).encode())
+def kind_of_hdf5(path: str | os.PathLike[str], wanted: str) -> str:
+    """The kind of an HDF5 file that `hdf5_image` made; errors as of `reading_hdf5`."""
+    import h5py
+
+    _compare(path, "fetch another copy of it", wanted)
+    with h5py.File(path, "r", locking=False) as file:
+        return str(file.attrs["format"])
 
 
-def _of_table(length: int, table: bytes) -> str:
-    """Hexadecimal SHA-256 of a content's length and its checksums."""
-    return hashlib.sha256(f"{length} ".encode() + table).hexdigest()
-
-
-def _take_room(descriptor: int, size: int) -> None:
-    """Reserve space for a file, whose content stays; an `OSError` if the disk has too little."""
-    if hasattr(os, "posix_fallocate"):
-        os.posix_fallocate(descriptor, 0, size)
+def _compare(path: str | os.PathLike[str], remedy: str, wanted: str | None) -> None:
+    """Compare the checksum of a file; errors as of `reading_hdf5`."""
+    with open_regular(path) as file:
+        try:
+            head = file.read(len(_SIGNATURE))
+            left = file.seek(0, os.SEEK_END) - _LINE_LENGTH
+            file.seek(max(0, left + _LINE_LENGTH - _OLDER_LENGTH))
+            end = file.read()
+            file.seek(0)
+            digest = hashlib.sha256()
+            while left > 0 and (piece := file.read(min(left, _PIECE))):
+                digest.update(piece)
+                left -= len(piece)
+        except OSError as error:
+            raise unreadable(path, error) from error
+    if end.endswith(_LINE.format(digest.hexdigest()).encode()):
         return
-    zeros, end = bytes(2**20), os.fstat(descriptor).st_size  # macOS
-    while end < size:
-        end += os.pwrite(descriptor, zeros[: size - end], end)
+    if _OLDER_LINE.search(end):
+        raise InputError(f"{path}: of warpchain 0.1, which reads it; {remedy}")
+    if wanted and head != _SIGNATURE and b"warpchain SHA-256: " not in end:
+        raise InputError(f"{path}: not an HDF5 file; {wanted}")
+    raise DamagedFileError(f"{path}: damaged or cut short; {remedy}")
 
 
 def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
@@ -143,261 +240,8 @@ def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
     except IsADirectoryError:
         raise InputError(f"{path}: is a folder, not a file; give another path") from None
     except OSError as error:
-        problem = type(error)(f"{path}: cannot be read ({reason(error)}); give the path of a readable file")
-        problem.errno = error.errno
-        raise problem from error
+        raise unreadable(path, error) from error
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
         file.close()
         raise InputError(f"{path}: a pipe or a device, not a file; give another path")
     return file
-
-
-class CheckedFile(io.RawIOBase):
-    """The HDF5 content of a file, of which each piece is checked before it is handed out.
-
-    Attributes:
-        size: bytes of content.
-        problem: the error that ended the last call, which HDF5 would hide.
-    """
-
-    def __init__(self, file: BinaryIO) -> None:
-        """Check that the file has its checksums.
-
-        Raises:
-            OSError: it cannot be read.
-            ContentError: it is not an HDF5 file, has no checksums, or wrong ones.
-        """
-        whole = os.fstat(file.fileno()).st_size
-        is_hdf5 = file.read(len(SIGNATURE)) == SIGNATURE
-        file.seek(max(0, whole - _LINE_LENGTH))
-        found = _FOUND.fullmatch(file.read())
-        if found is None and not is_hdf5:
-            raise ForeignContentError("not an HDF5 file")
-        if found is None:
-            raise ContentError("no checksums at its end; older versions wrote none")
-        self.size = int(found[1])
-        table_size = 32 * -(-self.size // PIECE)
-        if self.size + table_size + _LINE_LENGTH != whole:
-            raise ContentError(f"it has {whole} bytes, but checksums for {self.size}")
-        file.seek(self.size)
-        self._table = file.read(table_size)
-        if _of_table(self.size, self._table) != found[2].decode():
-            raise ContentError("its checksums are wrong")
-        self.problem: Exception | None = None
-        self._file, self._at = file, 0
-        self._kept = lru_cache(_PIECES_KEPT)(self._piece)
-
-    def readable(self) -> bool:
-        """It is."""
-        return True
-
-    def seekable(self) -> bool:
-        """It is."""
-        return True
-
-    def tell(self) -> int:
-        """Place of the next byte."""
-        return self._at
-
-    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """Go to a place."""
-        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self.size}[whence]
-        return self._at
-
-    def readinto(self, buffer: Any) -> int:
-        """Fill a buffer; a `ContentError` if that goes beyond the end or a piece is damaged."""
-        view = memoryview(buffer).cast("B")
-        try:
-            if not 0 <= self._at <= self.size - len(view):
-                raise ContentError(f"it points to byte {self._at + len(view)} of {self.size}")
-            done = 0
-            while done < len(view):
-                number, start = divmod(self._at + done, PIECE)
-                part = self._kept(number)[start : start + len(view) - done]
-                view[done : done + len(part)] = part
-                done += len(part)
-        except (OSError, ContentError) as error:
-            self.problem = type(error)(*error.args)  # without what led there, which `reading_hdf5` clears
-            raise
-        self._at += done
-        return done
-
-    def check(self) -> None:
-        """Check all pieces; errors as of `readinto`."""
-        for number in range(-(-self.size // PIECE)):
-            self._piece(number)
-
-    def _piece(self, number: int) -> bytes:
-        """The bytes of a piece, checked."""
-        self._file.seek(number * PIECE)
-        piece = self._file.read(min(PIECE, self.size - number * PIECE))
-        if hashlib.sha256(piece).digest() != self._table[32 * number : 32 * number + 32]:
-            raise ContentError(f"somewhere in its bytes {number * PIECE} to {number * PIECE + len(piece)}")
-        return piece
-
-
-@dataclass(frozen=True)
-class Contents:
-    """A group of an HDF5 file, of which only what is asked for is opened.
-
-    Attributes:
-        group: the group.
-        room: bytes of the file's content; nothing in it can be larger.
-    """
-
-    group: "h5py.Group"
-    room: int
-
-    def has(self, path: str) -> bool:
-        """Whether there is something; a `ContentError` if the way there leads out of the file."""
-        try:
-            self._opened(path)
-        except KeyError:
-            return False
-        return True
-
-    def part(self, path: str) -> "Contents":
-        """A group in it; errors as of `array`."""
-        import h5py
-
-        found = self._opened(path)
-        if not isinstance(found, h5py.h5g.GroupID):
-            raise ContentError(f"{path} is no group")
-        return Contents(h5py.Group(found), self.room)
-
-    def array(
-        self, path: str, kind: DTypeLike, shape: tuple[int | None, ...], rows: slice | None = None
-    ) -> NDArray[Any]:
-        """An array in it, or some of its rows.
-
-        Args:
-            path: names from this group on, with slashes.
-            kind: its type.
-            shape: its shape; None for an axis of any length.
-            rows: which of it along the first axis; None: all.
-
-        Raises:
-            KeyError: there is none.
-            ContentError: it is of another type or shape, or does not lie in the file itself as it is.
-        """
-        import h5py
-
-        found = self._opened(path)
-        if not isinstance(found, h5py.h5d.DatasetID):
-            raise ContentError(f"{path} is no dataset")
-        stored = found.get_create_plist()
-        layouts = (h5py.h5d.CONTIGUOUS, h5py.h5d.COMPACT)
-        if stored.get_layout() not in layouts or stored.get_external_count() or stored.get_nfilters():
-            raise ContentError(f"{path} does not lie in the file as it is (filtered, in chunks, virtual or external)")
-        dataset = h5py.Dataset(found)
-        if dataset.dtype != np.dtype(kind):
-            raise ContentError(f"{path} is of another type")
-        if len(dataset.shape or ()) != len(shape) or any(
-            size not in (None, given) for size, given in zip(shape, dataset.shape, strict=True)
-        ):
-            raise ContentError(f"{path} has the shape {dataset.shape}")
-        if dataset.nbytes > self.room:
-            raise ContentError(f"{path} declares {dataset.nbytes} bytes, but the file has {self.room}")
-        if found.get_storage_size() != dataset.nbytes:
-            raise ContentError(f"{path} declares {dataset.nbytes} bytes, but stores {found.get_storage_size()}")
-        values: NDArray[Any] = dataset[() if rows is None else rows]
-        return values
-
-    def text(self, name: str) -> str:
-        """A text among its attributes, as `put_text` writes it; errors as of `array`."""
-        return bytes(self._attribute(name, bytes)).decode()
-
-    def whole(self, name: str) -> int:
-        """A whole number among its attributes; errors as of `array`."""
-        return int(self._attribute(name, np.integer))
-
-    def json(self, name: str) -> Any:
-        """What a text in JSON among its attributes says; errors as of `array`."""
-        return json.loads(self.text(name))
-
-    def attributes(self) -> list[str]:
-        """Names of its attributes, in order."""
-        return list(self.group.attrs)
-
-    def _attribute(self, name: str, kind: type) -> Any:
-        import h5py
-
-        if not h5py.h5a.exists(self.group.id, name.encode()):
-            raise KeyError(name)
-        found = h5py.h5a.open(self.group.id, name.encode())
-        stored = found.get_type()
-        is_text = isinstance(stored, h5py.h5t.TypeStringID) and not stored.is_variable_str()
-        is_known = is_text or isinstance(stored, h5py.h5t.TypeIntegerID)
-        if not is_known or found.shape != () or found.get_storage_size() > self.room:
-            raise ContentError(f"attribute {name} is no text or number")
-        value = self.group.attrs[name]
-        if not isinstance(value, kind):
-            raise ContentError(f"attribute {name} is of another type")
-        return value
-
-    def _opened(self, path: str) -> Any:
-        """The object behind a path of which every step is an object of its own, not a pointer to somewhere."""
-        import h5py
-
-        at = self.group.id
-        for step in path.split("/"):
-            name = step.encode()
-            if not isinstance(at, h5py.h5g.GroupID) or not at.links.exists(name):
-                raise KeyError(path)
-            if at.links.get_info(name).type != h5py.h5l.TYPE_HARD:
-                raise ContentError(f"{path} is a link to another place")
-            at = h5py.h5o.open(at, name)
-        return at
-
-
-@contextmanager
-def reading_hdf5(path: str | os.PathLike[str], remedy: str, wanted: str | None = None) -> Iterator[Contents]:
-    """The content of a file that `hdf5_image` or `open_new_hdf5` wrote; an error while it is read means damage.
-
-    Args:
-        path: the file.
-        remedy: what to do about a damaged file.
-        wanted: which file to give instead of one that is not HDF5 at all; None: such a file is damaged.
-
-    Raises:
-        OSError: it cannot be read.
-        InputError: it is no regular file, or not HDF5 and `wanted` is given.
-        DamagedFileError: it is damaged, or has other content than is asked for.
-    """
-    import h5py
-
-    with open_regular(path) as file:
-        checked = None
-        try:
-            checked = CheckedFile(file)
-            with h5py.File(checked, "r") as opened:
-                yield Contents(opened["/"], checked.size)
-        except InputError:
-            raise
-        except (OSError, RuntimeError, LookupError, TypeError, ValueError, AttributeError) as error:
-            # Whoever keeps the error would keep h5py's frames, and with them the settings of the file. When HDF5 frees
-            # those after the end of Python, the process crashes.
-            traceback.clear_frames(error.__traceback__)
-            problem = checked.problem if checked is not None and checked.problem else error
-            if isinstance(problem, OSError) and problem.errno:
-                raise OSError(f"{path}: cannot be read ({reason(problem)}); see to the disk") from error
-            if wanted and isinstance(problem, ForeignContentError):
-                raise InputError(f"{path}: {problem}; {wanted}") from None
-            raise _damaged(path, problem, remedy) from None
-
-
-def check_hdf5(path: str | os.PathLike[str], remedy: str, wanted: str) -> None:
-    """Check every byte of a file that `hdf5_image` or `open_new_hdf5` wrote; errors as of `reading_hdf5`."""
-    with open_regular(path) as file:
-        try:
-            CheckedFile(file).check()
-        except ForeignContentError as error:
-            raise InputError(f"{path}: {error}; {wanted}") from None
-        except ContentError as error:
-            raise _damaged(path, error, remedy) from None
-
-
-def _damaged(path: str | os.PathLike[str], problem: Exception, remedy: str) -> DamagedFileError:
-    """One line for a file whose content is not right; what HDF5 and others say of it helps nobody."""
-    why = f" ({problem})" if isinstance(problem, ContentError) else ""
-    return DamagedFileError(f"{path}: damaged or cut short{why}; {remedy}")

@@ -1,8 +1,13 @@
-"""The version of warpchain, which stands here only, and those of the software that its numbers depend on."""
+"""The versions of warpchain, of its numbers and of its files, and those of the software that its numbers depend on."""
 
 from typing import Final
 
-VERSION: Final = "0.1.0"
+VERSION: Final = "0.2.0.dev0"
+
+NUMERICS_VERSION: Final = 12
+"""Raised by every change that changes a number of any walk; shards of two versions never mix."""
+FORMAT_VERSION: Final = 7
+"""Of all files of results: sweep.json, shards, merged files and walks."""
 
 
 def package_versions() -> dict[str, str]:
@@ -10,3 +15,17 @@ def package_versions() -> dict[str, str]:
     from importlib.metadata import version  # takes longer to import than the package does
 
     return {"warpchain": VERSION, **{name: version(name) for name in ("warp-lang", "numpy")}}
+
+
+def version_refusal(found: int, remedy: str) -> str | None:
+    """Why a file of a format version is refused; None if it is that of this warpchain.
+
+    Args:
+        found: version of the file.
+        remedy: how to get an older file's content in this version.
+    """
+    if found == FORMAT_VERSION:
+        return None
+    if found > FORMAT_VERSION:
+        return f"format version {found}, but this warpchain reads {FORMAT_VERSION}; update warpchain"
+    return f"format version {found} of warpchain 0.1, which reads it; {remedy}"

@@ -7,15 +7,14 @@ from warpchain.kernels import layout
 from warpchain.kernels.cpu.explicit import explicit_method
 from warpchain.kernels.cpu.implicit.joint_switch import joint_switch
 from warpchain.kernels.cpu.implicit.rigid_flight import flight_method
-from warpchain.kernels.cpu.implicit.rosenbrock import rosenbrock_method
-from warpchain.kernels.methods.controller import classical_controller, implicit_controller, step_controller
+from warpchain.kernels.methods.controller import classical_controller, step_controller
 from warpchain.kernels.methods.method import find_method
 from warpchain.kernels.methods.w_tableaus import ROS34PW2
 
 
 @dataclass(frozen=True)
 class CpuMethod:
-    """Warp functions of a method for scratch of one width.
+    """Warp functions of a method's steps on springs.
 
     Attributes:
         first_stage: ``(K, chain)`` evaluates the first stage of the next step.
@@ -55,16 +54,11 @@ class RigidFlight:
     shrinkage: Any
 
 
-def cpu_method(name: str, columns: int, tilts: bool = False) -> CpuMethod:
-    """A method's steps on springs; an explicit one can carry chains whose plane tilts."""
+def cpu_method(name: str, tilts: bool) -> CpuMethod:
+    """A method's steps on springs, for chains whose plane tilts or does not."""
     method = find_method(name)
-    if method.kind == "rosenbrock":
-        functions = rosenbrock_method(method.tableau, columns)
-        controller = implicit_controller(method.error_order)
-    else:
-        functions = explicit_method(method.tableau, tilts)
-        controller = step_controller(method.order, method.error_order)
-    return CpuMethod(*functions, *controller, method.reuses_last)
+    controller = step_controller(method.order, method.error_order)
+    return CpuMethod(*explicit_method(method.tableau, tilts), *controller, method.reuses_last)
 
 
 def rigid_flight(name: str, columns: int) -> RigidFlight | None:

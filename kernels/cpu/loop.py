@@ -134,7 +134,7 @@ def make_advance(features: Features):
     columns = features.columns
     rows = scratch_rows(features.method, columns)
     tilts = features.tilts
-    method = cpu_method(features.method, columns, tilts)
+    method = cpu_method(features.method, tilts)
     list_size = list_layout(columns).size
     list_count = list_layout(columns).count
     has_floor = features.fixed_body == "floor"
@@ -157,8 +157,7 @@ def make_advance(features: Features):
         attempt_flight, commit_flight = flight.attempt, flight.commit
         close_joints, open_joints = flight.close_joints, flight.open_joints
         flight_growth, flight_shrinkage = flight.growth, flight.shrinkage
-    build_by_grid, build_by_all_pairs = neighbour_list(columns)
-    build_list = build_by_grid if features.broad_phase == "grid" else build_by_all_pairs
+    build_list = neighbour_list(columns)
     resolve_self_contacts = self_contacts(columns)
     bound_of_step = step_bound(features, has_flight)
 

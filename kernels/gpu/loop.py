@@ -100,7 +100,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     attempt = explicit_attempt(method.tableau, block_dim, write_proximity, read_proximity, tilts)
     begin_step, sum_up, meet_tilting_floor = block_tilting(block_dim)
     growth, shrinkage = step_controller(method.order, method.error_order, wp.float32)
-    build_list = block_list(columns, block_dim, features.broad_phase)
+    build_list = block_list(columns, block_dim)
     clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, block_dim, touch)
     chain_values = layout.BOARD_VALUES
     softens = features.softens

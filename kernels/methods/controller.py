@@ -109,35 +109,6 @@ def step_controller(order: int, error_order: int, real: type = wp.float64):
 
 
 @functools.cache
-def implicit_controller(error_order: int):
-    """(growth, shrinkage) of implicit methods: proportional-integral, see :func:`step_controller`.
-
-    Accuracy sets the steps of an implicit method, and the error jumps where a joint's friction changes its sign. There
-    odeint's rule shrinks steps too far and lets them grow too soon: in flights of 60 and 150 links it took up to a
-    tenth more attempts for an error of 1e-7 m/s, and twice as many at a tolerance of 1e-4. Under this rule a constant
-    error settles at safety^(k/0.3) = 0.1 of the tolerance, a margin for jumps. Safeties from 0.8 to 0.95 cost the same
-    for the same error; with smaller ones rounding errors shrink steps at 1e-12.
-    """
-    safety = 0.85
-    proportional = -0.7 / (error_order + 1)
-    integral = 0.4 / (error_order + 1)
-    alone = -1.0 / (error_order + 1)
-
-    @wp.func
-    def growth(error: wp.float64, last_error: wp.float64, _proportional: wp.int32):
-        bounded = wp.max(error, wp.static(wp.float64(1e-6)))
-        factor = wp.static(wp.float64(safety)) * wp.pow(bounded, wp.static(wp.float64(proportional)))
-        factor = factor * wp.pow(last_error, wp.static(wp.float64(integral)))
-        return wp.clamp(factor, LEAST_SHRINKAGE, wp.static(wp.float64(GREATEST_GROWTH)))
-
-    @wp.func
-    def shrinkage(error: wp.float64):
-        return wp.max(wp.static(wp.float64(safety)) * wp.pow(error, wp.static(wp.float64(alone))), LEAST_SHRINKAGE)
-
-    return growth, shrinkage
-
-
-@functools.cache
 def classical_controller(error_order: int):
     """(growth, shrinkage) of flights: the next step is SAFETY times that whose error would be the tolerance.
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from fractions import Fraction as F
 from functools import cached_property
 
-from warpchain.kernels.methods.rosenbrock_tableaus import ROSENBROCK_TABLES
-
 HYBRID = "hybrid"
 """The method that takes rigid joints between impulses …"""
 HYBRID_SPRINGS = "os32"
@@ -112,7 +110,7 @@ def register(tableau: Tableau) -> None:
             the embedded solution is of an order below 2, for which the step controller has no exponent.
     """
     name = tableau.name
-    if name in {*TABLEAUS, *ROSENBROCK_TABLES, HYBRID}:
+    if name in {*TABLEAUS, HYBRID}:
         raise ValueError(f"{name}: there is a method of this name")
     rows = [(f"matrix[{stage}]", row, stage) for stage, row in enumerate(tableau.matrix)]
     solutions = [("weights", tableau.weights), ("embedded", tableau.embedded)]

@@ -1,14 +1,12 @@
 """Every method by the name that a user writes, with the facts that step loops and host need.
 
-Every entry of :data:`TABLEAUS` and :data:`ROSENBROCK_TABLES` is a method, and nothing else names it. ``hybrid`` takes
-an explicit method near contacts and rigid joints between them.
+Every entry of :data:`TABLEAUS` is a method, and nothing else names it. ``hybrid`` takes one of them near contacts and
+rigid joints between them.
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 from warpchain.kernels.methods.explicit_tableaus import HYBRID, HYBRID_SPRINGS, TABLEAUS
-from warpchain.kernels.methods.rosenbrock_tableaus import ROSENBROCK_TABLES
 
 
 @dataclass(frozen=True)
@@ -18,8 +16,7 @@ class Method:
     Attributes:
         name: What a user writes for ``method``.
         title: One line for help texts.
-        kind: Kind of its steps on springs.
-        tableau: Key of its coefficients in the table of that kind.
+        tableau: Key in :data:`TABLEAUS` of its steps on springs.
         order: Order of the solution that is propagated.
         error_order: Order of the embedded solution; both set the controller's exponents.
         stages: Number of stages.
@@ -29,18 +26,17 @@ class Method:
 
     name: str
     title: str
-    kind: Literal["explicit", "rosenbrock"]
     tableau: str
     order: int
     error_order: int
     stages: int
     reuses_last: bool
-    has_rigid_flight: bool = False
+    has_rigid_flight: bool
 
     @property
     def runs_on_gpus(self) -> bool:
-        """Whether it has a GPU kernel. Those of implicit steps and rigid flights were written, and saved no time."""
-        return self.kind == "explicit" and not self.has_rigid_flight
+        """Whether it has a GPU kernel. That of rigid flights was written, and saved no time."""
+        return not self.has_rigid_flight
 
     @property
     def has_joint_forces(self) -> bool:
@@ -49,13 +45,13 @@ class Method:
 
     @property
     def can_tilt(self) -> bool:
-        """Whether it carries chains whose plane tilts: implicit steps and rigid flights know nothing of the plane."""
-        return self.kind == "explicit" and not self.has_rigid_flight
+        """Whether it carries chains whose plane tilts: rigid flights know nothing of the plane."""
+        return not self.has_rigid_flight
 
 
 def method_names() -> tuple[str, ...]:
     """Names of all methods."""
-    return (*TABLEAUS, *ROSENBROCK_TABLES, HYBRID)
+    return (*TABLEAUS, HYBRID)
 
 
 def find_method(name: str) -> Method:
@@ -65,27 +61,14 @@ def find_method(name: str) -> Method:
         KeyError: There is none.
     """
     key = HYBRID_SPRINGS if name == HYBRID else name
-    if key in TABLEAUS:
-        tableau = TABLEAUS[key]
-        return Method(
-            name=name,
-            title=f"rigid joints between impulses, {key} around them" if name == HYBRID else tableau.title,
-            kind="explicit",
-            tableau=key,
-            order=tableau.order,
-            error_order=tableau.error_order,
-            stages=tableau.stages,
-            reuses_last=tableau.first_same_as_last,
-            has_rigid_flight=name == HYBRID,
-        )
-    table = ROSENBROCK_TABLES[key]
+    tableau = TABLEAUS[key]
     return Method(
         name=name,
-        title=table.title,
-        kind="rosenbrock",
+        title=f"rigid joints between impulses, {key} around them" if name == HYBRID else tableau.title,
         tableau=key,
-        order=table.order,
-        error_order=table.error_order,
-        stages=table.stages,
-        reuses_last=False,
+        order=tableau.order,
+        error_order=tableau.error_order,
+        stages=tableau.stages,
+        reuses_last=tableau.first_same_as_last,
+        has_rigid_flight=name == HYBRID,
     )

@@ -91,29 +91,15 @@ def quotient(a: wp.float64, b: wp.float64) -> wp.float64:
 
 
 @wp.func
-def versine_sine(angle: wp.float64):
-    """1 − cos and sin of an angle [rad], each to its own rounding within ±π/4, to 4e-14 within ±1."""
-    z = angle * angle
-    sine = angle + angle * z * (S1 + z * (S2 + z * (S3 + z * (S4 + z * (S5 + z * S6)))))
-    versine = HALF * z - z * z * (C1 + z * (C2 + z * (C3 + z * (C4 + z * (C5 + z * C6)))))
-    return versine, sine
-
-
-@wp.func
-def turn(angle: wp.float64):
-    """Cosine and sine of an angle [rad], to rounding within ±π/4, to 4e-14 within ±1."""
-    versine, sine = versine_sine(angle)
-    return ONE - versine, sine
-
-
-@wp.func
 def cos_sin(angle: wp.float64):
     """Cosine and sine of an angle [rad], to about one unit in the last place for |angle| < 1e5."""
     shifted = angle * TWO_OVER_PI + ROUNDER
     quarter = shifted - ROUNDER
     turns = wp.cast(shifted, wp.int64)
     r = ((angle - quarter * HALF_PI_1) - quarter * HALF_PI_2) - quarter * HALF_PI_3
-    c, s = turn(r)
+    z = r * r
+    s = r + r * z * (S1 + z * (S2 + z * (S3 + z * (S4 + z * (S5 + z * S6)))))
+    c = ONE - (HALF * z - z * z * (C1 + z * (C2 + z * (C3 + z * (C4 + z * (C5 + z * C6))))))
     odd = (turns & wp.int64(1)) != wp.int64(0)
     cosine = wp.where(odd, s, c)
     sine = wp.where(odd, c, s)

@@ -5,7 +5,7 @@ Scalar functions, one joint or one link a call.
 
 import warp as wp
 
-from warpchain.kernels.physics.elementary import ONE, tanh
+from warpchain.kernels.physics.elementary import tanh
 from warpchain.kernels.types import Chain
 
 wp.set_module_options({"enable_backward": False})
@@ -32,22 +32,9 @@ def smoothed_torque(chain: Chain, spin: wp.float64, inverse_smoothing: wp.float6
 
 
 @wp.func
-def smoothed_slope(chain: Chain, spin: wp.float64, inverse_smoothing: wp.float64):
-    """f'(w) = β + τ_c / ω_c (1 − tanh²(w / ω_c)) [N m s]."""
-    switch = tanh(spin * inverse_smoothing)
-    return chain.viscous_friction + chain.coulomb_friction * inverse_smoothing * (ONE - switch * switch)
-
-
-@wp.func
 def friction_torque(chain: Chain, spin: wp.float64):
     """The torque f(w) of a joint [N m], with the chain's own ω_c."""
     return smoothed_torque(chain, spin, chain.inverse_smoothing)
-
-
-@wp.func
-def friction_slope(chain: Chain, spin: wp.float64):
-    """The slope f'(w) of that torque [N m s], with the chain's own ω_c."""
-    return smoothed_slope(chain, spin, chain.inverse_smoothing)
 
 
 @wp.func

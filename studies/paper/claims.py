@@ -157,9 +157,9 @@ CLAIMS: Final = (
         "High-order explicit methods are 40 times faster than implicit ones",
         "[accuracy](../../docs/accuracy.md#error-against-cost), [methods](#further-remarks)",
         findings.stated(
-            "a whole walk of 60 links: `rkf78` at 1e-6 takes 3.95 s, the implicit `rodas5p` 16.7 s at 1e-6 and 6.3 s "
-            "at 1e-4, so 4.2 and 1.6 times as long; 150 links in free flight: `rodas5p` takes 7.4 times less, both at "
-            "1e-6",
+            "a whole walk of 60 links: `rkf78` at 1e-6 takes 3.95 s, the implicit `rodas5p`, since removed, 16.7 s at "
+            "1e-6 and 6.3 s at 1e-4, so 4.2 and 1.6 times as long; 150 links in free flight: `rodas5p` takes 7.4 times "
+            "less, both at 1e-6",
             PART,
         ),
         {

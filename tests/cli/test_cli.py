@@ -104,7 +104,7 @@ REFUSED = {
     "--frequency 15Hz": "scene.frequency: '15Hz' has its unit written with it",
     "--start up": "scene.start: 'up' is unknown",
     "--method rk4": "options.method: 'rk4' is unknown",
-    "--method rodas4p": "options.method: 'rodas4p' was removed; give rodas5p",
+    "--method rodas5p": "options.method: 'rodas5p' was removed; give dp5",
     "--method hybrid --device cuda": "options.method: 'hybrid' runs on a CPU only; give explicit",
     "--tol 0": "options.tolerance: 0 is less than 1e-13",
     "--preset hard": "preset: 'hard' is unknown",
@@ -151,9 +151,7 @@ def test_bad_input_is_refused_in_one_line(command: Command, tmp_path: Path, argu
     ("arguments", "line"),
     [
         ("foo", "No such command 'foo'; see warpchain --help"),
-        ("bench foo", "No such command 'foo'; see warpchain bench --help"),
         ("info", "Missing argument 'DIR'; see warpchain info --help"),
-        ("bench accuracy", "Missing option '-o' / '--output'; see warpchain bench accuracy --help"),
         ("walk --json=1", "Option '--json' does not take a value; see warpchain --help"),
     ],
 )
@@ -346,39 +344,6 @@ def test_a_defect_is_not_disguised_as_bad_input(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(WALK_MODULE, "run_walk", broken)
     with pytest.raises(ValueError, match="broadcast"):
         main(["walk"])
-
-
-@pytest.mark.parametrize(
-    ("arguments", "problem"),
-    [
-        ("--links 61", "bench.links: 61 is odd"),
-        ("--links 60 --links 2", "bench.links: 2 is less than 4"),
-        ("--chains 4", "--chains: only measurements on a GPU can be restricted so; add --device cuda"),
-        ("--device gpu", "bench.device: 'gpu' is no device"),
-        ("--device cuda:99", "options.device: there is no cuda:99 on this machine"),
-        ("--device cuda:99 --method euler", "bench.method: 'euler' is not measured on a GPU"),
-    ],
-)
-def test_bad_input_of_bench_is_refused_in_one_line(command: Command, arguments: str, problem: str) -> None:
-    """Lengths of chains go through the door of the scene, devices through that of the options."""
-    answer = command("bench", *arguments.split())
-    assert (answer.status, answer.out) == (2, "")
-    assert answer.err.startswith(f"error: {problem}") and answer.err.count("\n") == 1
-
-
-@pytest.mark.slow
-def test_bench_measures_every_method(tmp_path: Path) -> None:
-    """The JSON of a bench has finite positive costs for each method and scene, SciPy's, and neighbour lists."""
-    answer = process("bench", "--links", "32", "--rounds", "1", "--json", folder=tmp_path)
-    assert answer.status == 0 and answer.err == ""
-    costs = json.loads(answer.out)
-    methods = {(cost["scene"], cost["method"]) for cost in costs["steps"]}
-    ours = {(scene, method) for scene in ("flight", "pile") for method in METHODS}
-    assert methods == ours | {("flight", "DOP853 (SciPy)")}
-    for cost in costs["steps"]:
-        assert cost["links"] == 32 and 0 < cost["microseconds"] < 1e5 and cost["wall_per_simulated"] > 0
-    assert [cost["links"] for cost in costs["broad_phase"]] == [60, 180, 1000]
-    assert costs["machine"]["warp-lang"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudoterminals")

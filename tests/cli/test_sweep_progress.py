@@ -10,13 +10,12 @@ import yaml
 
 from tests.run.test_sweep_run import TINY
 from tests.support import synthetic_sweep
-from tests.support.synthetic_sweep import SWEEP, SyntheticSweep, synthetic_rows, write
+from tests.support.synthetic_sweep import SWEEP, synthetic_rows, write
 from warpchain.cli import sweep_commands
 from warpchain.cli.main import main
 from warpchain.engine.batch import Batch
 from warpchain.run.single_walk import walk
 from warpchain.store.folder import SweepFolder
-from warpchain.store.manifest import BlockLayout
 
 
 def run(*arguments: str) -> None:
@@ -44,11 +43,11 @@ def test_info_tells_rate_and_time_left_of_a_running_sweep(tmp_path: Path, capsys
     """Counted are the shards written since the run began; a sweep that nobody runs has no rate."""
     with SweepFolder.open(tmp_path, SWEEP, shard_size=20) as opened:
         first, second, third, *_ = opened.missing()
-        for walks in (first, second, third):
-            write(opened, walks, synthetic_rows(SWEEP, walks))
+        for shard in (first, second, third):
+            write(opened, shard, synthetic_rows(SWEEP, shard))
         now = time.time()
         os.utime(tmp_path / "lock", (now - 10, now - 10))
-        os.utime(opened.directory / "shards/000000000-000000019.h5", (now - 60, now - 60))  # of an earlier run
+        os.utime(opened.directory / "shards/0-000000.h5", (now - 60, now - 60))  # of an earlier run
         run("info", str(tmp_path))
         assert "running: 4.0" in (text := capsys.readouterr().out) or "running: 3.9" in text
         assert "walks a second, 25 s left" in text or "26 s left" in text
@@ -80,8 +79,8 @@ def test_the_time_of_a_walk_is_without_compilation(monkeypatch: pytest.MonkeyPat
 
 def test_info_lists_a_thousand_cells_at_most(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The table of more cells ends with a line that counts the others; JSON has them all."""
-    wide = SyntheticSweep(
-        blocks=(BlockLayout("main", {"gravity": tuple(map(float, range(1, 1201)))}, 1, 0, ("phase",)),)
+    wide = synthetic_sweep.synthetic_sweep(
+        {"name": "main", "grid": {"gravity": list(map(float, range(1, 1201)))}, "samples": 1}
     )
     synthetic_sweep.run(tmp_path, wide, shard_size=1200)
     run("info", str(tmp_path))

@@ -76,8 +76,9 @@ def cut(file: Path) -> None:
     os.truncate(file, file.stat().st_size // 2)
 
 
-@pytest.mark.parametrize("damage", [partial(flip, part=0.5), cut, Path.unlink])
-@pytest.mark.parametrize("suffix", [".o", ".meta"])
+@pytest.mark.parametrize(
+    ("suffix", "damage"), [(".o", partial(flip, part=0.5)), (".o", cut), (".meta", cut), (".meta", Path.unlink)]
+)
 def test_what_is_damaged_is_compiled_anew(cache: tuple[Path, str], suffix: str, damage: Callable[[Path], None]) -> None:
     """A flipped bit, a cut and a missing file change no bit of what is computed: the kernel is written anew."""
     folder, expected = cache

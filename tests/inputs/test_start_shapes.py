@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from tests.oracle_model import motion_equations
+from tests.oracle_model.circular_loop import circular_loop
 from warpchain import preset
 from warpchain.inputs.start_shapes import CurvePoints, ellipse, lay_chain, links_between, stadium
-from warpchain.oracle import motion_equations
-from warpchain.oracle.circular_loop import circular_loop
 
 PAPER = preset("paper")
 LENGTH = PAPER.link_length

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from tests.oracle_model import motion_equations
+from tests.oracle_model.circular_loop import circular_loop, circular_loop_force
 from warpchain.inputs.parameters import preset
-from warpchain.oracle import motion_equations
-from warpchain.oracle.circular_loop import circular_loop, circular_loop_force
 
 PAPER = preset("paper")
 

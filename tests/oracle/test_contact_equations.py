@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.oracle_model import contact_equations, motion_equations
 from tests.support.impulse_cases import (
     BALL,
     HAND_CASES,
@@ -18,7 +19,6 @@ from tests.support.impulse_cases import (
     law_violations,
 )
 from warpchain.inputs.parameters import preset
-from warpchain.oracle import contact_equations, motion_equations
 
 PAPER = preset("paper")
 

@@ -1,17 +1,14 @@
 """The NumPy reference against hand-worked numbers, derivatives, invariants and closed forms."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.oracle_model import motion_equations
+from tests.oracle_model.circular_loop import circular_loop
 from tests.support.impulse_cases import UNIT
 from tests.support.mild_parameters import MILD, SILENT
 from warpchain.inputs.parameters import Parameters, preset
-from warpchain.oracle import motion_equations
-from warpchain.oracle.circular_loop import circular_loop
 
 PAPER = preset("paper")
 
@@ -240,13 +237,3 @@ def test_flight_refuses_and_reports():
         velocity[0, 0] = speed
         with pytest.raises(error, match=r"finite|failed between 0\.0 s and 0\.001 s"), np.errstate(all="ignore"):
             motion_equations.solve_flight(position, velocity, np.array([0.0, 1e-3]), MILD)
-
-
-def test_scipy_is_needed_by_flight_only(monkeypatch):
-    """Importing the reference leaves SciPy alone, and without SciPy a flight names the extra to install."""
-    code = "import sys, warpchain.oracle.motion_equations; sys.exit('scipy' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-    monkeypatch.setitem(sys.modules, "scipy.integrate", None)
-    position, velocity = disturbed_loop(4, MILD)
-    with pytest.raises(ImportError, match=r"warpchain\[scipy\]"):
-        motion_equations.solve_flight(position, velocity, np.array([0.0, 1e-3]), MILD)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from tests.oracle_model import motion_equations
+from tests.oracle_model.circular_loop import circular_loop, tapped_loop
+from tests.oracle_model.ring_modes import ring_modes
 from tests.support.mild_parameters import SILENT
 from warpchain.inputs.parameters import preset
-from warpchain.oracle import motion_equations
-from warpchain.oracle.circular_loop import circular_loop, tapped_loop
-from warpchain.oracle.ring_modes import ring_modes
 
 PAPER = preset("paper").with_values({"coulomb_friction": 0.0})
 SPEED = 5.0

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.oracle_model import contact_equations, tilting_contacts, tilting_plane
+from tests.oracle_model.tilting_plane import Plane, axes, tilted_plane
 from tests.support.impulse_cases import HAND_CASES, UNIT
 from tests.support.tilted_chains import mirrored, tilted_heap
 from warpchain.inputs.parameters import preset
-from warpchain.oracle import contact_equations, tilting_contacts, tilting_plane
-from warpchain.oracle.tilting_plane import Plane, axes, tilted_plane
 
 PAPER = preset("paper")
 HEAPS = range(300)

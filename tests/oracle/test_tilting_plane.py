@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.oracle_model import motion_equations, tilting_plane
+from tests.oracle_model.circular_loop import circular_loop
+from tests.oracle_model.tilting_plane import Plane, axes, tilted_plane
 from tests.support.impulse_cases import UNIT
 from tests.support.mild_parameters import MILD, SILENT
 from tests.support.tilted_chains import mirrored, tumbling_loop
 from warpchain.inputs.parameters import preset
-from warpchain.oracle import motion_equations, tilting_plane
-from warpchain.oracle.circular_loop import circular_loop
-from warpchain.oracle.tilting_plane import Plane, axes, tilted_plane
 
 PAPER = preset("paper")
 WIDE = 0.02

@@ -108,7 +108,7 @@ def test_film_strip_labels_fit(tmp_path: Path) -> None:
 
 def test_film_strip_of_a_failed_walk() -> None:
     """A walk that did not rest gets no distance, and its last close-up is the end, not rest."""
-    figure = film_strip(make_walk(status=Status.TIME_LIMIT, dx=math.nan, sprocket_center=None))
+    figure = film_strip(make_walk(status=Status.TIME_LIMIT, dx=math.nan, sprocket_height=math.nan))
     assert not any("Delta" in text.get_text() for text in figure.axes[0].texts)
     assert "end" in figure.axes[-1].get_title("left")
 

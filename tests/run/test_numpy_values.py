@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import warpchain
+from tests.oracle_model.circular_loop import circular_loop
 from warpchain.inputs.sections import SECTION_OF
 from warpchain.inputs.validation import InputError, plain
-from warpchain.oracle.circular_loop import circular_loop
 from warpchain.run.single_walk import setup_walk
 from warpchain.sweeps.plan import load_sweep
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import warpchain
+from tests.oracle_model.circular_loop import circular_loop
 from warpchain import InputError, Status
 from warpchain.engine.batch import Batch
 from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.parameters import preset
-from warpchain.oracle.circular_loop import circular_loop
 from warpchain.run.single_walk import setup_walk
 
 SOFT = preset("soft")

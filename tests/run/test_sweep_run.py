@@ -23,7 +23,7 @@ from warpchain.inputs.setup import Setup
 from warpchain.run.single_walk import setup_walk
 from warpchain.run.sweep_run import run_shards, shard_size, sweep
 from warpchain.status import Status
-from warpchain.store.manifest import Manifest, read_manifest
+from warpchain.store.manifest import Manifest
 from warpchain.sweeps.block import Block
 from warpchain.sweeps.plan import load_sweep
 from warpchain.walks.scheduler import run_setups
@@ -145,7 +145,7 @@ def test_progress_tells_when_the_walks_begin(tmp_path):
 def test_progress_shows_the_shards_of_a_task_under_way(tmp_path, monkeypatch, uninterrupted):
     """With all shards in one task, each is counted once, and most of them before the task is over."""
     monkeypatch.setattr(runner, "POLL", 0.01)
-    monkeypatch.setattr(runner, "_tasks", lambda planned, manifest, missing, workers: iter([list(missing)]))
+    monkeypatch.setattr(runner, "_tasks", lambda planned, missing, workers: iter([list(missing)]))
     seen = []
     sweep(TINY, tmp_path / "sweep", workers=1, on_progress=lambda p: seen.append((p.done, sum(p.statuses.values()))))
     assert all(done == counted for done, counted in seen)
@@ -159,7 +159,7 @@ def test_walks_are_drawn_when_they_begin(tmp_path, monkeypatch):
     draw, write = type(planned).drawn, runner.write_shard
     monkeypatch.setattr(type(planned), "drawn", lambda self, walk: events.append(walk.index) or draw(self, walk))
     monkeypatch.setattr(runner, "write_shard", lambda *given: events.append("written") or write(*given))
-    monkeypatch.setattr(runner, "_tasks", lambda planned, manifest, missing, workers: iter([list(missing)]))
+    monkeypatch.setattr(runner, "_tasks", lambda planned, missing, workers: iter([list(missing)]))
     monkeypatch.setattr(runner, "prepare", lambda planned: None)
     sweep(TINY, tmp_path / "sweep", workers=1)
     drawn = [event for event in events if event != "written"]
@@ -386,14 +386,14 @@ def test_tasks_of_gpus_are_alike(monkeypatch: pytest.MonkeyPatch) -> None:
     grid = {"links": [60, 90, 120, 150, 180], "frequency": [5.0, 10.0]}
     given = {"version": 1, "name": "alike", "seed": 1, "preset": "soft", "samples": 24, "grid": grid}
     planned = load_sweep(given | {"options": {"device": "cuda"}})
-    missing = [range(first, first + 8) for first in range(0, planned.walk_count, 8)]
+    missing = Manifest.of(planned, 8).shards
     for most, workers, count in ((1000, 3, 3), (60, 2, 4), (1000, 40, 30)):
         monkeypatch.setattr(runner, "GPU_TASK_WALKS", most)
-        tasks = list(runner._tasks(planned, Manifest.of(planned, 8), missing, workers))
+        tasks = list(runner._tasks(planned, missing, workers))
         assert len(tasks) == count
-        assert sorted((shard for task in tasks for shard in task), key=lambda shard: shard.start) == missing
+        assert sorted((shard for task in tasks for shard in task), key=lambda shard: shard.name) == [*missing]
         assert max(sum(map(len, task)) for task in tasks) <= most + 8
-        means = [np.mean([planned.planned(shard.start).setup.scene.links for shard in task]) for task in tasks]
+        means = [np.mean([planned.planned(int(shard.walks[0])).setup.scene.links for shard in task]) for task in tasks]
         assert workers > 4 or np.ptp(means) <= 12
 
 
@@ -436,9 +436,9 @@ MANY = {
 
 
 def test_a_task_checks_only_the_cells_of_its_walks(tmp_path, monkeypatch):
-    """Each of 150 tasks makes the setup of its own cell, is sent only its block and does not read sweep.json again."""
-    planned, made, sent, read = load_sweep(MANY), [], [], []
-    usual, usual_run, usual_read = Block.fixed_in, run_shards, read_manifest
+    """Each of 150 tasks makes the setup of its own cell and is sent only its block."""
+    planned, made, sent = load_sweep(MANY), [], []
+    usual, usual_run = Block.fixed_in, run_shards
 
     def counted(block, cells):
         for setup in usual(block, cells):
@@ -448,15 +448,13 @@ def test_a_task_checks_only_the_cells_of_its_walks(tmp_path, monkeypatch):
     def noted(part, *arguments):
         sent.append(len(part.blocks))
         before = len(made)
-        keys = usual_run(part, *arguments)
+        usual_run(part, *arguments)
         assert len(made) - before <= 2
-        return keys
 
     monkeypatch.setattr(Block, "fixed_in", counted)
     monkeypatch.setattr(runner, "run_shards", noted)
-    monkeypatch.setattr("warpchain.store.manifest.read_manifest", lambda folder: read.append(1) or usual_read(folder))
     sweep(planned, tmp_path / "sweep", workers=1)
-    assert sent == [1] * 150 and len(read) <= 3
+    assert sent == [1] * 150
     assert len(made) <= 10 * 150  # canonical forms, kinds of kernels, tasks
 
 

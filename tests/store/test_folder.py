@@ -2,7 +2,6 @@
 
 import errno
 import json
-import math
 import os
 import shutil
 import signal
@@ -15,22 +14,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
 from tests.support import synthetic_sweep
-from tests.support.forged_files import with_byte
 from tests.support.synthetic_sweep import LONG_SWEEP, SHARD_SIZE, SWEEP, content, run, synthetic_rows, write
 from warpchain.inputs.validation import DamagedFileError, InputError, InputWarning
-from warpchain.status import Status
-from warpchain.store import folder, manifest, shards
+from warpchain.store import folder
 from warpchain.store.folder import SweepFolder, read_rows
-from warpchain.store.manifest import NUMERICS_VERSION, read_manifest
-from warpchain.store.manifest_content import FORMAT_VERSION
-from warpchain.store.shards import empty_rows, read_shard, shard_name, write_shard
-from warpchain.walks.rows import ROW
+from warpchain.store.manifest import Manifest, read_manifest
+from warpchain.store.shards import write_shard
+from warpchain.version import NUMERICS_VERSION
+from warpchain.walks.rows import missing_rows
 
-FIRST, SECOND = range(20), range(20, 40)
+FIRST, SECOND = "0-000000.h5", "0-000001.h5"
+SHARDS = Manifest.of(SWEEP, SHARD_SIZE).shards
 CHANGED = replace(SWEEP, seed=7, name="changed")
 
 
@@ -77,40 +76,28 @@ def test_a_sweep_is_written_and_read(tmp_path: Path) -> None:
     """All rows come back to the bit; nothing is missing, and nothing else is in the folder."""
     with open_folder(tmp_path / "new" / "folder") as opened:
         folder = opened.directory
-        assert opened.missing() == [range(i, i + 20) for i in range(0, 160, 20)]
+        assert [shard.walks.tolist() for shard in opened.missing()] == [[*range(i, i + 20)] for i in range(0, 160, 20)]
         assert len(read_rows(folder, opened.manifest)) == 0
-        for walks in reversed(opened.missing()):
-            key = write(opened, walks, synthetic_rows(SWEEP, walks))
-            assert len(key) == 64 and walks not in opened.missing()
+        for shard in reversed(opened.missing()):
+            write(opened, shard, synthetic_rows(SWEEP, shard))
+        assert opened.missing() == []
         opened.log("ended")
-        expected = synthetic_rows(SWEEP, range(160))
-        rows = read_rows(folder, opened.manifest)
-        assert rows.dtype == expected.dtype and rows.tobytes() == expected.tobytes()
+        expected = np.concatenate([synthetic_rows(SWEEP, shard) for shard in SHARDS])
+        assert read_rows(folder, opened.manifest).tobytes() == expected.tobytes()
     assert sorted(os.listdir(folder)) == ["lock", "log.txt", "shards", "sweep.json", "sweep.yaml"]
     assert len(os.listdir(folder / "shards")) == 8
     assert yaml.safe_load((folder / "sweep.yaml").read_text()) == SWEEP.canonical()
     assert (folder / "log.txt").read_text().endswith("  ended\n")
 
 
-def test_the_last_shard_has_what_is_left(tmp_path: Path) -> None:
-    """A number of walks that is no multiple of the shard size leaves a shorter shard; a folder keeps its size."""
-    with open_folder(tmp_path, shard_size=150) as opened:
-        assert opened.missing() == [range(150), range(150, 160)]
-        write(opened, range(150, 160), synthetic_rows(SWEEP, range(150, 160)))
-    with open_folder(tmp_path, shard_size=10) as opened:
-        assert opened.manifest.shard_size == 150 and opened.missing() == [range(150)]
-    with pytest.raises(ValueError, match="shard_size: 0 is not positive"):
-        open_folder(tmp_path, shard_size=0)
-
-
 def test_equal_sweeps_leave_equal_files(tmp_path: Path) -> None:
     """The files have no time, place or chance in them, whatever NaNs and order the rows came with."""
     run(tmp_path / "one")
     with open_folder(tmp_path / "two") as opened:
-        for walks in sorted(opened.missing(), key=lambda walks: walks.start % 7):
-            rows = synthetic_rows(SWEEP, walks)
+        for shard in sorted(opened.missing(), key=lambda shard: shard.walks[0] % 7):
+            rows = synthetic_rows(SWEEP, shard)
             rows["greatest_opening"] = -rows["greatest_opening"]  # the same NaN to a reader, but other bits
-            write(opened, walks, rows)
+            write(opened, shard, rows)
     assert content(tmp_path / "one") == content(tmp_path / "two")
 
 
@@ -166,7 +153,7 @@ def test_every_step_of_opening_may_be_the_last(tmp_path: Path, fresh: bool, monk
 def test_unfinished_files_go(tmp_path: Path) -> None:
     """What a killed process had half written is cleared away; hidden files of others are not."""
     run(tmp_path)
-    parts = [".sweep.0123abcd.part.json", f"shards/.{shard_name(FIRST)[:-3]}.0123abcd.part.h5"]
+    parts = [".sweep.0123abcd.part.json", "shards/.0-000000.0123abcd.part.h5"]
     for name in (*parts, ".nfs0123", "shards/.keep"):
         (tmp_path / name).write_bytes(b"half")
     open_folder(tmp_path).close()
@@ -212,10 +199,9 @@ def test_workers_may_write_the_same_shard(tmp_path: Path) -> None:
     assert play("race", tmp_path / "race") == [0, 0, 0, 0]
     with open_folder(tmp_path / "threads") as opened, ThreadPoolExecutor(4) as threads:
         shards = opened.missing()[:2] * 20
-        keys = list(threads.map(lambda walks: write(opened, walks, synthetic_rows(SWEEP, walks)), shards))
-    assert len(set(keys)) == 2
+        list(threads.map(lambda shard: write(opened, shard, synthetic_rows(SWEEP, shard)), shards))
     assert content(tmp_path / "race") == content(tmp_path / "threads")
-    assert read_rows(tmp_path / "race", read_manifest(tmp_path / "race"))["index"].tolist() == list(range(40))
+    assert len(read_rows(tmp_path / "race", read_manifest(tmp_path / "race"))) == 40
 
 
 # Refusals
@@ -238,12 +224,9 @@ def test_a_changed_sweep_is_refused(tmp_path: Path) -> None:
 def test_other_numerics_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Walks of another version of the numerics are not gone on with, but still read."""
     run(tmp_path)
-    for module in (manifest, shards, folder):
-        monkeypatch.setattr(module, "NUMERICS_VERSION", 99)
+    monkeypatch.setattr(folder, "NUMERICS_VERSION", 99)
     with refused(InputError, tmp_path, f"numerics {NUMERICS_VERSION}, but this warpchain has 99", "start anew"):
         open_folder(tmp_path)
-    with refused(InputError, tmp_path, "belongs to another sweep now"):
-        write_shard(tmp_path, SWEEP.digest(), FIRST, synthetic_rows(SWEEP, FIRST))
     assert len(read_rows(tmp_path, read_manifest(tmp_path))) == 160
 
 
@@ -261,139 +244,79 @@ def test_files_of_others_are_not_touched(tmp_path: Path, name: str, fresh: bool)
 def test_a_foreign_file_among_the_shards_is_refused(tmp_path: Path, fresh: bool) -> None:
     """A file that is no shard of the sweep is named, however many there are, and starting anew spares it."""
     run(tmp_path)
-    for name in ("notes.txt", "000000001-000000020.h5", "000000160-000000179.h5"):
+    for name in ("notes.txt", "0-000008.h5", "0-000000-motion.h5"):
         (tmp_path / "shards" / name).write_text("mine")
-    with refused(InputError, tmp_path, "shards/000000001-000000020.h5: not a shard", "move it", "(and 2 more)"):
+    with refused(InputError, tmp_path, "shards/0-000000-motion.h5: not a shard", "move it", "(and 2 more)"):
         open_folder(tmp_path, fresh=fresh)
 
 
 def test_a_shard_of_another_sweep_is_refused(tmp_path: Path) -> None:
-    """A shard with the right name but another sweep's digest, or other walks, is named."""
+    """A shard with the right name but of another sweep, or of other walks, is named; nothing is deleted meanwhile."""
     run(tmp_path / "one")
     run(tmp_path / "two", CHANGED)
-    first, second = (tmp_path / "one/shards" / shard_name(walks) for walks in (FIRST, SECOND))
+    first, second = (tmp_path / "one/shards" / name for name in (FIRST, SECOND))
     kept = first.read_bytes()
-    for stranger in (tmp_path / "two/shards" / first.name, second):
+    for stranger in (tmp_path / "two/shards" / FIRST, second):
         shutil.copy(stranger, first)
         with refused(InputError, tmp_path, f"{first}: a shard of another sweep", "move it"):
             open_folder(tmp_path / "one")
+    second.write_bytes(b"damaged")
+    with refused(InputError, tmp_path, f"{first}: a shard of another sweep", "move it"):
+        open_folder(tmp_path / "one")
     first.write_bytes(kept)
-    open_folder(tmp_path / "one").close()
+    with pytest.warns(InputWarning):
+        open_folder(tmp_path / "one").close()
 
 
-@pytest.mark.parametrize("part", [0.0, 0.1, 0.5, 0.999])
+@pytest.mark.parametrize("part", [0.0, 0.1, 0.999])
 def test_a_truncated_shard_is_computed_again(tmp_path: Path, part: float) -> None:
     """A shard cut short is refused to a reader; a run names it, and computes its walks and no others again."""
     run(tmp_path)
-    before, path = content(tmp_path), tmp_path / "shards" / shard_name(FIRST)
+    before, path = content(tmp_path), tmp_path / "shards" / FIRST
     os.truncate(path, int(part * path.stat().st_size))
     with refused(DamagedFileError, tmp_path, f"{path}: damaged or cut short", "delete it"):
         read_rows(tmp_path, read_manifest(tmp_path))
-    with pytest.warns(InputWarning, match=rf"^{path}: damaged or cut short .*; its walks are computed again$"):
+    with pytest.warns(InputWarning, match=rf"^{path}: damaged or cut short; its walks are computed again$"):
         opened = open_folder(tmp_path)
     with opened:
-        assert opened.missing() == [FIRST]
-        write(opened, FIRST, synthetic_rows(SWEEP, FIRST))
+        (shard,) = opened.missing()
+        write(opened, shard, synthetic_rows(SWEEP, shard))
     assert content(tmp_path) == before
     assert f"{path}: damaged or cut short" in (tmp_path / "log.txt").read_text()
 
 
-def test_no_damage_goes_unnoticed(tmp_path: Path) -> None:
-    """No flipped byte of a shard is read past; all bad shards are named."""
-    run(tmp_path)
-    path = tmp_path / "shards" / shard_name(FIRST)
-    whole = path.read_bytes()
-    manifest = read_manifest(tmp_path)
-    for place in (*range(0, len(whole), 97), len(whole) - 1):
-        path.write_bytes(with_byte(whole, place, lambda byte: byte ^ 0x10))
-        with pytest.raises(DamagedFileError, match=f"^{path}: damaged or cut short"):
-            read_shard(tmp_path, manifest, FIRST)
-    path.write_bytes(b"")
-    (tmp_path / "shards" / shard_name(SECOND)).write_bytes(b"no HDF5")
-    with pytest.warns(InputWarning) as warned, open_folder(tmp_path) as opened:
-        assert opened.missing() == [FIRST, SECOND]
-    assert [str(warning.message).partition(":")[0] for warning in warned] == [
-        str(tmp_path / "shards" / shard_name(walks)) for walks in (FIRST, SECOND)
-    ]
-
-
-def test_foreign_files_save_damaged_ones(tmp_path: Path) -> None:
-    """As long as a folder is refused, nothing is deleted in it."""
-    run(tmp_path / "one")
-    run(tmp_path / "two", CHANGED)
-    first, second = (tmp_path / "one/shards" / shard_name(walks) for walks in (FIRST, SECOND))
-    first.write_bytes(b"damaged")
-    shutil.copy(tmp_path / "two/shards" / second.name, second)
-    with refused(InputError, tmp_path / "one", f"{second}: a shard of another sweep"):
-        open_folder(tmp_path / "one")
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        *("", "[]", "3", "\xff", "{" * 2000, '{"format": "other"}'),
-        *(f'{{"format": "warpchain sweep", "format_version": {version}}}' for version in ('"3"', FORMAT_VERSION)),
-    ],
-)
-def test_a_damaged_manifest_is_refused(tmp_path: Path, text: str) -> None:
-    """A manifest that is none is named, and nothing is begun over it."""
-    run(tmp_path)
-    (tmp_path / "sweep.json").write_text(text, encoding="latin-1")
-    with refused(InputError, tmp_path, f"{tmp_path / 'sweep.json'}: damaged, or not of warpchain"):
-        open_folder(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("version", "remedy"), [(4, "run it again in another folder, or use the warpchain that wrote it"), (6, "update")]
-)
-def test_other_formats_are_refused(tmp_path: Path, version: int, remedy: str) -> None:
-    """A folder of an older or later version of the format says so, and what to do; starting anew spares it, too."""
+def test_a_folder_of_an_older_version_names_it(tmp_path: Path) -> None:
+    """Refused in one line, with the version that reads it."""
     run(tmp_path)
     path = tmp_path / "sweep.json"
-    path.write_text(path.read_text().replace('"format_version": 5', f'"format_version": {version}'))
-    message = f"{path}: format version {version}, but this warpchain reads 5; {remedy}"
-    for attempt in (read_manifest, open_folder, lambda place: open_folder(place, fresh=True)):
-        with refused(InputError, tmp_path, message):
-            attempt(tmp_path)
-
-
-def test_a_shard_of_another_format_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A shard that an older warpchain wrote for the same sweep is not read as one of this."""
-    with monkeypatch.context() as patched:
-        patched.setattr(shards, "FORMAT_VERSION", 2)
-        run(tmp_path)
-    with refused(InputError, tmp_path, "a shard of another sweep; move it"):
+    path.write_text(path.read_text().replace('"format_version": 7', '"format_version": 5'))
+    with refused(
+        InputError, tmp_path, f"{path}: format version 5 of warpchain 0.1, which reads it; run the sweep again"
+    ):
         open_folder(tmp_path)
 
 
 def test_workers_need_the_folder(tmp_path: Path) -> None:
     """A worker that does not see the folder, or finds another sweep in it, writes nothing."""
-    rows = synthetic_rows(SWEEP, FIRST)
+    rows, first = synthetic_rows(SWEEP, SHARDS[0]), SHARDS[0]
+    with open_folder(tmp_path) as opened:
+        stamp = opened.stamp
     with refused(InputError, tmp_path, f"{tmp_path / 'elsewhere'}: no sweep", "every worker"):
-        write_shard(tmp_path / "elsewhere", SWEEP.digest(), FIRST, rows)
-    open_folder(tmp_path, CHANGED).close()
+        write_shard(tmp_path / "elsewhere", stamp, first, rows, {})
+    open_folder(tmp_path, CHANGED, fresh=True).close()
     with refused(InputError, tmp_path, "belongs to another sweep now"):
-        write_shard(tmp_path, SWEEP.digest(), FIRST, rows)
+        write_shard(tmp_path, stamp, first, rows, {})
 
 
 def test_wrong_rows_are_refused(tmp_path: Path) -> None:
-    """Rows of other walks, of another type or without an end are not written."""
-    good = synthetic_rows(SWEEP, FIRST)
+    """Rows of other walks, or without an end, are not written."""
+    first, second = SHARDS[:2]
     with open_folder(tmp_path) as opened:
-        for walks, rows, word in (
-            (FIRST, synthetic_rows(SWEEP, SECOND), "not those of walks 0 to 19"),
-            (FIRST, good[::-1], "not those"),
-            (FIRST, good[:3], "not those"),
-            (FIRST, good[[*ROW.names]].copy(), "not those"),
-            (range(1, 21), synthetic_rows(SWEEP, range(1, 21)), "no shard"),
-            (FIRST, empty_rows(SWEEP, FIRST), "no status that ends"),
-        ):
-            with refused(ValueError, tmp_path, word):
-                write(opened, walks, rows)
-        running = good.copy()
-        running["status"][2] = Status.RUNNING
-        with refused(ValueError, tmp_path, "no status that ends"):
-            write(opened, FIRST, running)
+        for rows in (synthetic_rows(SWEEP, second), synthetic_rows(SWEEP, first)[::-1]):
+            with refused(ValueError, tmp_path, "not those of its walks"):
+                write(opened, first, rows)
+        with refused(ValueError, tmp_path, "all ended"):
+            write(opened, first, missing_rows(first.kind, first.keys))
 
 
 # What the system refuses
@@ -419,35 +342,14 @@ def test_a_failed_write_leaves_no_trace(
 ) -> None:
     """A shard that cannot be written is named with reason and remedy; the folder is as before and can go on."""
     with open_folder(tmp_path) as opened:
-        write(opened, FIRST, synthetic_rows(SWEEP, FIRST))
-        name = f"{shard_name(SECOND)}: cannot be written ({os.strerror(number)})"
-        with monkeypatch.context() as patched, refused(OSError, tmp_path, name, remedy, "kept"):
+        first, second = opened.missing()[:2]
+        write(opened, first, synthetic_rows(SWEEP, first))
+        name = f"{SECOND}: cannot be written ({os.strerror(number)})"
+        with monkeypatch.context() as patched, refused(OSError, tmp_path, name, remedy):
             fail_with(number, patched)
-            write(opened, SECOND, synthetic_rows(SWEEP, SECOND))
-        write(opened, SECOND, synthetic_rows(SWEEP, SECOND))
+            write(opened, second, synthetic_rows(SWEEP, second))
+        write(opened, second, synthetic_rows(SWEEP, second))
         assert len(read_rows(opened.directory, opened.manifest)) == 40
-
-
-def test_a_disk_too_small_is_said_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A sweep that the disk has no room for does not begin; a complete one needs none."""
-    usage = shutil.disk_usage(tmp_path)._replace(free=50_000)
-    with monkeypatch.context() as patched:
-        patched.setattr(shutil, "disk_usage", lambda path: usage)
-        with pytest.raises(OSError, match=r"takes 0\.\d+ MB, but 0\.05 MB are free; make room"):
-            open_folder(tmp_path)
-    run(tmp_path)
-    monkeypatch.setattr(shutil, "disk_usage", lambda path: usage)
-    open_folder(tmp_path).close()
-
-
-def test_shards_take_no_more_room_than_said(tmp_path: Path) -> None:
-    """The room that is asked for is enough."""
-    with open_folder(tmp_path, shard_size=40) as opened:
-        walks = opened.missing()[0]
-        write(opened, walks, synthetic_rows(SWEEP, walks))
-        size = (tmp_path / "shards" / shard_name(walks)).stat().st_size
-        most = 40 * opened.manifest.row_type.itemsize + folder.SHARD_OVERHEAD
-    assert size + 4096 <= most <= 4 * size and math.isfinite(size)
 
 
 @needs_namespace
@@ -455,17 +357,8 @@ def test_a_full_disk(tmp_path: Path) -> None:
     """A disk that fills up in the middle: a clear line, nothing lost, and the sweep goes on once there is room."""
     done = play("full_disk", tmp_path / "full", namespace=True)
     writing, opening = done["messages"]
-    assert "000000040-000000079.h5: cannot be written (No space left on device); make room" in writing
+    assert "0-000001.h5: cannot be written (No space left on device); make room" in writing
     assert "make room" in opening and done["missing"] == 0
-
-
-@needs_namespace
-def test_a_read_only_folder(tmp_path: Path) -> None:
-    """A folder that cannot be written is refused for a run, with a clear line, and can be read."""
-    run(tmp_path)
-    done = play("read_only", tmp_path, namespace=True)
-    assert f"{tmp_path}: cannot be written (Read-only file system); make the folder writable" in done["message"]
-    assert done["missing"] == 0
 
 
 def test_a_folder_that_is_a_file(tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 import os
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,12 +14,11 @@ from tests.support.sweep_content import UNIFORM, blocks, content
 from tests.support.synthetic_sweep import content as files
 from warpchain.cli.main import main
 from warpchain.inputs.validation import InputError
-from warpchain.store.folder import SweepFolder
 from warpchain.store.manifest import read_manifest
 from warpchain.store.merged_file import merge
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.designs import EXTENSIBLE, SAMPLERS
-from warpchain.sweeps.plan import PlannedWalk, load_sweep
+from warpchain.sweeps.plan import PlannedWalk
 
 
 def two_blocks(first: int, second: int, **changes: Any) -> dict[str, Any]:
@@ -68,17 +66,13 @@ def test_a_grown_sweep_is_the_larger_one(tmp_path: Path, sampler: str) -> None:
     assert (tmp_path / "grown.h5").read_bytes() == (tmp_path / "fresh.h5").read_bytes()
 
 
-def test_places_and_numbers_are_inverse(tmp_path: Path) -> None:
-    """Every place holds one walk, every walk has one place, and the shards have each place once."""
+def test_every_walk_is_in_one_shard(tmp_path: Path) -> None:
+    """Whenever it was added."""
     for counts in ((1, 2), (3, 2), (4, 7)):
         make_sweep(tmp_path, two_blocks(*counts), drawn_distance)
     manifest = read_manifest(tmp_path)
-    everywhere = range(manifest.walk_count)
-    walks = manifest.walks(everywhere).tolist()
-    assert sorted(walks) == list(everywhere) and [manifest.place(walk) for walk in walks] == list(everywhere)
-    assert [place for shard in manifest.shards for place in shard] == list(everywhere)
-    assert all(manifest.shard_of(place) == shard for shard in manifest.shards for place in shard)
-    np.testing.assert_array_equal(manifest.walks(range(3, 20)), walks[3:20])
+    walks = np.concatenate([shard.walks for shard in manifest.shards])
+    assert sorted(walks.tolist()) == [*range(manifest.walk_count)] and len(manifest.growth) == 3
 
 
 def test_a_sweep_grows_before_it_is_complete(tmp_path: Path) -> None:
@@ -178,26 +172,3 @@ def test_samples_that_do_not_grow_are_refused(
     error = capsys.readouterr().err.strip()
     assert "but a latin_hypercube of 8 samples has other points; give samples: 4" in error and "\n" not in error
     assert files(tmp_path / "sweep") == before
-
-
-def test_a_folder_that_cannot_grow_stays_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Growth on a disk without room for it is refused, and the folder still takes the sweep that it has."""
-    make_sweep(tmp_path, content(samples=4), drawn_distance)
-    before = files(tmp_path)
-    with monkeypatch.context() as patched, pytest.raises(OSError, match="make room"):
-        patched.setattr("shutil.disk_usage", lambda folder: SimpleNamespace(free=10**6))
-        SweepFolder.open(tmp_path, load_sweep(content(samples=2**20)), shard_size=10**9)
-    assert files(tmp_path) == before
-    make_sweep(tmp_path, content(samples=4), drawn_distance)
-
-
-def test_shards_of_a_fresh_and_of_a_grown_folder_do_not_mix(tmp_path: Path) -> None:
-    """A shard of the same places in a folder that was not grown holds other walks, and is refused."""
-    for given in (content(samples=2), content(samples=4)):
-        grown = make_sweep(tmp_path / "grown", given, lambda walk: drawn_distance(walk) if walk.index != 15 else None)
-    fresh = make_sweep(tmp_path / "fresh", given, lambda walk: drawn_distance(walk) if walk.index != 15 else None)
-    assert grown.missing_count == fresh.missing_count == 1
-    shared = [name for name in shards(tmp_path / "fresh") if name in shards(tmp_path / "grown")]
-    (tmp_path / "grown" / shared[-1]).write_bytes((tmp_path / "fresh" / shared[-1]).read_bytes())
-    with pytest.raises(InputError, match="a shard of another sweep"):
-        load(tmp_path / "grown")

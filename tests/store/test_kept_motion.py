@@ -2,14 +2,12 @@
 
 import concurrent.futures
 import multiprocessing
-import os
 import pickle
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import h5py
@@ -20,20 +18,17 @@ import yaml
 
 import warpchain
 from tests.run.test_sweep_run import BRIEF, TINY, brief_setup, data_of
+from tests.support.made_walks import assert_same
 from warpchain.engine.memory import CAPACITY_SAMPLES
 from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.pictures.style import NothingToShow
-from warpchain.reports.figure5 import MOST_CELLS, sweep_figure5
+from warpchain.reports.figure5 import sweep_figure5
 from warpchain.reports.sweep_page import write_report
 from warpchain.run.sweep_run import sweep
-from warpchain.store.folder import SweepFolder
-from warpchain.store.manifest import read_manifest
 from warpchain.store.merged_file import merge
-from warpchain.store.shards import read_shard, write_shard
+from warpchain.store.shards import write_shard
 from warpchain.store.sweep_result import SweepResult, load
-from warpchain.store.walk_motion import WalkMotion
-from warpchain.sweeps.plan import load_sweep
-from warpchain.walks.motion import SERIES, Keep
+from warpchain.walks.motion import Keep
 from warpchain.walks.scheduler import run_setups
 
 OFTEN = {"method": "dp5", "record_interval": 1e-4}
@@ -52,9 +47,9 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def same(one: WalkMotion, walk: warpchain.WalkResult) -> bool:
+def same(one: warpchain.WalkResult, walk: warpchain.WalkResult) -> bool:
     """Whether a kept walk has the series and frames of a walk, to the bit."""
-    names = ("time", "center", "center_velocity", "frame_time", "sprocket_center")
+    names = ("time", "center", "center_velocity", "kinetic_energy", "lowest", "frame_time", "sprocket_center")
     joints = walk.frame_joints.astype(np.float32)
     return np.array_equal(one.frame_joints, joints) and all(
         np.array_equal(getattr(one, name), getattr(walk, name)) for name in names
@@ -69,7 +64,7 @@ def test_kept_is_what_the_walk_itself_gives(tmp_path: Path) -> None:
     walk = warpchain.walk(preset="soft", seed=7, links=60, method="dp5", **scene)
     assert len(kept.time) > 15 and kept.frame_joints.shape[1:] == (60, 2) and len(kept.frame_time) > 8
     assert kept.time[0] == 0 and kept.sprocket_radius == walk.sprocket_radius and kept.status == walk.status
-    assert same(kept, walk)
+    assert same(kept, walk) and kept.setup == walk.setup and kept.energy == walk.energy
     assert (kept.unit("center_velocity"), kept.unit("time")) == ("m/s", "s") and "mass" in kept.meaning("center")
 
 
@@ -78,12 +73,17 @@ def test_a_coarser_interval_keeps_the_first_of_each_and_the_last() -> None:
     setup = brief_setup(3, record_interval=1e-4)
     ((_, fine),) = run_setups([setup], keeps=[Keep(series_every=1)])
     ((_, coarse),) = run_setups([setup], keeps=[Keep(series_every=7)])
-    time, thinned = fine.motion.series[:, 0], coarse.motion.series[:, 0]
+    time, thinned = fine.recorder.motion()["time"], coarse.recorder.motion()["time"]
     marks = np.arange(0.0, 0.01, 7e-4)
     expected = [time[time >= mark].min() for mark in marks]
     assert thinned[: len(marks)] == pytest.approx(expected, abs=0) and len(thinned) == len(marks) + 1
     assert thinned[-1] == time[-1] == pytest.approx(0.01)
-    assert {row.tobytes() for row in coarse.motion.series} <= {row.tobytes() for row in fine.motion.series}
+    assert set(thinned) <= set(time)
+
+
+def motion_bytes(motion: dict[str, Any]) -> bytes:
+    """All arrays of a motion."""
+    return b"".join(values.tobytes() for values in motion.values() if values is not None)
 
 
 def test_motions_do_not_depend_on_their_batch() -> None:
@@ -96,7 +96,7 @@ def test_motions_do_not_depend_on_their_batch() -> None:
         found = {}
         runs = run_setups([setups[i] for i in order], keeps=[keeps[i] for i in order], slots=slots)
         for place, run in runs:
-            found[order[place]] = (run.motion.checksum(), run.energy()["joint_friction"])
+            found[order[place]] = (motion_bytes(run.recorder.motion()), run.energy()["joint_friction"])
         return [found[i] for i in range(len(setups))]
 
     alone = [run([*range(6)], 1), run([*range(6)], 4), run([5, 3, 1, 0, 2, 4], 3)]
@@ -110,12 +110,12 @@ def test_long_motions_are_drained_between_launches() -> None:
     """A series longer than the device's record has every sample, in order and without a gap."""
     setup = brief_setup(1, record_interval=1e-6, walk_limit=0.04)  # a sample after each step
     ((_, run),) = run_setups([setup], keeps=[Keep(series_every=1, frame_every=10)])
-    time = run.motion.series[:, 0]
+    time = run.recorder.motion()["time"]
     skipped = 1 + run.counts["accepted"] - len(time)
     assert (
         skipped in range(4) and len(time) > 3 * CAPACITY_SAMPLES and np.all(np.diff(time) > 0)
     )  # first steps are short
-    frames = run.motion.frame_time
+    frames = run.recorder.motion()["frame_time"]
     assert len(frames) > 100 and set(frames) <= set(time)
 
 
@@ -127,7 +127,7 @@ def test_only_chosen_samples_are_kept(kept: Path) -> None:
     first, last = result.series(links=44, frequency=5), result.series(links=44, frequency=5, sample=3)
     assert (len(first.frame_time), last.frame_joints.shape) == (0, (len(last.frame_time), 44, 2))
     assert len(last.frame_time) == pytest.approx(20, abs=1) and first.sprocket_center is None
-    assert last.index == result.index[1, 0, 3] and last.setup.scene.links == 44
+    assert last.setup.scene.links == 44
     for message, at in (
         (r"walk 11 is not there; give one of the samples 0, 3", {"links": 44, "frequency": 5, "sample": 1}),
         (r"frequency: 6 is not on the axis; give one of 5\.0, 15\.0", {"links": 44, "frequency": 6}),
@@ -146,8 +146,7 @@ def test_a_sweep_without_series_is_as_ever(kept: Path, tmp_path: Path) -> None:
     said = sweep(KEPT | {"record": {"series": False, "frames": False}}, tmp_path / "said")
     assert bare.sweep["record"] == said.sweep["record"] == {"series": False}
     assert data_of(tmp_path / "bare") == data_of(tmp_path / "said")
-    with h5py.File(next((tmp_path / "bare/shards").glob("[0-9]*.h5"))) as file:
-        assert list(file) == ["rows"]
+    assert not list((tmp_path / "bare/shards").glob("*motion*"))
     result = load(kept)
     assert result.provenance["digest"] != bare.provenance["digest"]
     for name, column in bare.columns.items():
@@ -168,10 +167,10 @@ def test_workers_and_interruptions_leave_the_same_bytes(
         sweep(KEPT, tmp_path / "processes", executor=processes, workers=2)
     assert data_of(tmp_path / "processes") == uninterrupted
 
-    def full(*arguments: object) -> str:
-        if len(data_of(tmp_path / "stopped")) == 7:
+    def full(*arguments: object) -> None:
+        if load(tmp_path / "stopped").missing_count == 13:
             raise OSError(28, "No space left on device")
-        return write_shard(*arguments)  # type: ignore[arg-type]
+        write_shard(*arguments)  # type: ignore[arg-type]
 
     with monkeypatch.context() as patched:
         patched.setattr("warpchain.run.sweep_run.write_shard", full)
@@ -213,74 +212,43 @@ def test_a_walk_that_was_never_released_has_no_motion(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="no time series"):
         walk.plot()
     merge(tmp_path, tmp_path / "merged.h5")
-    with xarray.open_dataset(tmp_path / "merged.h5", engine="h5netcdf") as data:
-        assert "instant" not in data.dims and data.dx.shape == (1, 2)
+    assert load(tmp_path / "merged.h5").series(sample=1).time.shape == (0,)
 
 
 def test_damage_to_a_motion_is_seen(kept: Path, tmp_path: Path) -> None:
     """A flipped bit in a series is refused with the remedy when the walk is asked for; a run computes it again."""
     sweep(KEPT, tmp_path, workers=1)
-    path = tmp_path / "shards" / sorted(data_of(tmp_path))[3]
+    path = tmp_path / "shards/0-000003-motion.h5"
     assert path.read_bytes() == (kept / "shards" / path.name).read_bytes()
     result = load(tmp_path)
-    series = result.series(links=30, frequency=5, sample=3)
-    content, wanted = bytearray(path.read_bytes()), series.center[:, 1].tobytes()
+    content, wanted = bytearray(path.read_bytes()), result.series(links=30, frequency=5, sample=3).center.tobytes()
     assert content.count(wanted) == 1
     content[content.index(wanted) + 11] ^= 4
     path.write_bytes(content)
-    with pytest.raises(InputError, match=f"{path}: damaged or cut short .*; delete it and run the sweep again"):
+    with pytest.raises(InputError, match=f"{path}: damaged or cut short; delete it and run the sweep again"):
         result.series(links=30, frequency=5, sample=3)
     with pytest.warns(InputWarning, match=f"{path}: .*; its walks are computed again"):
         sweep(KEPT, tmp_path)
     assert data_of(tmp_path) == data_of(kept)
+    path.unlink()  # as the refusal says
+    assert load(tmp_path).missing_count == 1
+    sweep(KEPT, tmp_path)
+    assert data_of(tmp_path) == data_of(kept)
 
 
-def test_a_shard_without_its_motions_is_not_written(kept: Path, tmp_path: Path) -> None:
-    """Rows whose motions should be kept are refused without them, and motions that should not be kept as well."""
-    manifest = read_manifest(kept)
-    assert [manifest.kept(walks) for walks in manifest.shards[:5]] == [[0], [], [], [3], []]
-    with SweepFolder.open(tmp_path, load_sweep(KEPT), shard_size=manifest.shard_size) as store:
-        rows = read_shard(kept, manifest, manifest.shards[0])
-        with pytest.raises(ValueError, match="motions are not those that are kept of walks 0 to 0"):
-            write_shard(tmp_path, manifest.digest, manifest.shards[0], rows)
-        assert store.missing() == manifest.shards
-
-
-def test_a_disk_too_small_for_series_is_said_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Series are in the estimate of the room that a sweep takes."""
-    monkeypatch.setattr("shutil.disk_usage", lambda folder: SimpleNamespace(free=2 * 10**9))
-    huge = TINY | {"samples": 2**20}
-    SweepFolder.open(tmp_path / "rows", load_sweep(huge), shard_size=256).close()
-    huge |= {"record": {"series": True}}
-    with pytest.raises(OSError, match=r"the rest of the sweep takes .* MB, but .* MB are free"):
-        SweepFolder.open(tmp_path, load_sweep(huge), shard_size=256)
-
-
-def test_the_merged_file_has_series_by_name(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """xarray finds each walk's series and frames, with units, at the place that the file says; so on any system."""
-    merge(kept, tmp_path / "one.h5")
-    monkeypatch.delattr(os, "posix_fallocate")
-    merge(kept, tmp_path / "two.h5")
+def test_a_merged_file_has_the_motions(kept: Path, tmp_path: Path) -> None:
+    """Walks of a merged file are those of the folder, and every array has its unit; merging again gives equal bytes."""
+    for name in ("one.h5", "two.h5"):
+        merge(kept, tmp_path / name)
     assert (tmp_path / "one.h5").read_bytes() == (tmp_path / "two.h5").read_bytes()
-    assert len(list(tmp_path.iterdir())) == 2
-    result = load(kept)
+    folder, merged = load(kept), load(tmp_path / "one.h5")
+    for links, frequency, sample in ((30, 5, 0), (44, 15, 3)):
+        one, other = (result.series(links=links, frequency=frequency, sample=sample) for result in (folder, merged))
+        assert_same(one, other)
+    with h5py.File(tmp_path / "one.h5") as file:
+        assert file["motion/0/series/center_velocity"].attrs["unit"] == "m/s"
     with xarray.open_dataset(tmp_path / "one.h5", engine="h5netcdf") as data:
-        assert data.series_center_y.dims == ("instant",) and data.joint_x.dims == ("joint",)
-        assert data.series_center_velocity_x.attrs["units"] == "m/s" and data.joint_y.attrs["units"] == "m"
-        assert {f"series_{name}" for name in SERIES} < set(data.variables)
-        np.testing.assert_array_equal(data.series_count.values > 0, result.kept)
-        assert data.series_count.attrs["sample_dimension"] == "instant"
-        for links, frequency, sample in ((30, 5, 0), (44, 15, 3)):
-            walk = result.series(links=links, frequency=frequency, sample=sample)
-            at = data.sel(links=links, frequency=frequency, sample=sample)
-            instants = slice(int(at.series_start), int(at.series_start + at.series_count))
-            np.testing.assert_array_equal(data.series_time[instants], walk.time)
-            np.testing.assert_array_equal(data.series_center_y[instants], walk.center[:, 1])
-            np.testing.assert_array_equal(data.series_center_velocity_x[instants], walk.center_velocity[:, 0])
-            frames = slice(int(at.frame_start), int(at.frame_start + at.frame_count))
-            np.testing.assert_array_equal(data.frame_time[frames], walk.frame_time)
-            joints = slice(int(at.joint_start), int(at.joint_start + at.joint_count))
-            np.testing.assert_array_equal(data.joint_y[joints], walk.frame_joints[..., 1].ravel())
+        assert data.dx.shape == (2, 2, 5)
 
 
 def test_the_merged_file_of_blocks_and_of_a_part(tmp_path: Path) -> None:
@@ -289,39 +257,14 @@ def test_the_merged_file_of_blocks_and_of_a_part(tmp_path: Path) -> None:
     content = KEPT | {"blocks": blocks, "scene": BRIEF | {"links": 44}, "record": {"series": {"interval": 1e-3}}}
     del content["grid"]
     sweep(content, tmp_path / "sweep", workers=1)
-    (tmp_path / "sweep/shards/000000007-000000007.h5").unlink()
-    result = load(tmp_path / "sweep")
+    (tmp_path / "sweep/shards/0-000007.h5").unlink()
     merge(tmp_path / "sweep", tmp_path / "merged.h5")
-    with xarray.open_dataset(tmp_path / "merged.h5", engine="h5netcdf", group="b") as data:
-        assert (data.series_count.values > 0).tolist() == [[True, True, False], [True, True, True]]
-        walk = result.blocks["b"].series(frequency=15, sample=1)
-        at = data.sel(frequency=15, sample=1)
-        np.testing.assert_array_equal(data.series_time[int(at.series_start) :][: int(at.series_count)], walk.time)
-        assert "joint" not in data.dims
-    with pytest.raises(InputError, match="the motion of walk 7 is not there"):
-        result.blocks["b"].series(frequency=5, sample=2)
-
-
-@pytest.mark.parametrize("line", ["", "del os.posix_fallocate\n"], ids=["fallocate", "as on macOS"])
-def test_a_merge_with_motions_that_fails_leaves_the_older_file(kept: Path, tmp_path: Path, line: str) -> None:
-    """In a process that may write small files only, the merged file is refused in one line; what was there stays."""
-    path = tmp_path / "merged.h5"
-    merge(kept, path)
-    older = path.read_bytes()
-    program = (
-        f"import os, resource, signal, sys\n{line}"
-        "from warpchain.store.merged_file import merge\n"
-        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (30000, 30000))\n"
-        "try:\n"
-        "    merge(*sys.argv[1:])\n"
-        "except OSError as error:\n"
-        "    print(error)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program, kept, path], capture_output=True, encoding="utf-8")
-    assert done.stdout.startswith(f"{path}: cannot be written (File too large); make room"), done.stderr
-    assert done.stdout.count("\n") == 1
-    assert path.read_bytes() == older and list(tmp_path.iterdir()) == [path]
+    for result in (load(tmp_path / "sweep"), load(tmp_path / "merged.h5")):
+        block = result.blocks["b"]
+        assert block.kept.tolist() == [[True, True, False], [True, True, True]]
+        assert len(block.series(frequency=15, sample=1).time) > 9
+        with pytest.raises(InputError, match="the motion of walk 7 is not there"):
+            block.series(frequency=5, sample=2)
 
 
 def test_figure5_of_a_sweep_shows_the_kept_series(kept: Path) -> None:
@@ -347,16 +290,6 @@ def test_figure5_of_a_sweep_shows_the_kept_series(kept: Path) -> None:
     assert "8 walks in 4 of 4 cells" in picture.caption
     names = [entry.get_text() for entry in height.get_legend().get_texts()]
     assert names[0] == "n = 30, ν = 5 Hz" and len(names) == 4
-
-
-def test_figure5_of_many_cells_shows_some_from_first_to_last(tmp_path: Path) -> None:
-    """Of many cells as many are shown as there are colours, the first and the last among them."""
-    grid = {"frequency": {"from": 1, "to": 20, "step": 1}}
-    content = KEPT | {"samples": 1, "grid": grid, "scene": BRIEF | {"links": 30}, "record": {"series": True}}
-    picture = sweep_figure5(sweep(content, tmp_path))
-    names = [entry.get_text() for entry in picture.figure.axes[0].get_legend().get_texts()]
-    assert len(names) == MOST_CELLS and (names[0], names[-1]) == ("ν = 1 Hz", "ν = 20 Hz")
-    assert f"{MOST_CELLS} of 20 cells" in picture.caption
 
 
 def test_report_and_pictures_use_kept_frames(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

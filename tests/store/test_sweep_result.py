@@ -3,41 +3,40 @@
 import copy
 import json
 import math
-import os
 import pickle
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 import xarray
 
-from tests.support.synthetic_sweep import SWEEP, SyntheticSweep, run, synthetic_rows, write
+from tests.support.synthetic_sweep import SHARD_SIZE, SWEEP, run, synthetic_rows, synthetic_sweep, write
 from warpchain.cli.main import main
 from warpchain.inputs.validation import InputError
-from warpchain.reports.sweep_page import write_report
 from warpchain.status import Status
+from warpchain.store.block_result import BlockResult
 from warpchain.store.folder import SweepFolder
-from warpchain.store.manifest import NUMERICS_VERSION, BlockLayout
+from warpchain.store.manifest import Manifest
 from warpchain.store.merged_file import merge
-from warpchain.store.shards import empty_rows, shard_name
-from warpchain.store.sweep_result import BlockResult, SweepResult, load
+from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import load_sweep
-from warpchain.walks.rows import COLUMNS, drawn_column
+from warpchain.version import NUMERICS_VERSION
+from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, drawn_column, missing_rows
 
-SINGLE: Any = SyntheticSweep(
-    blocks=(
-        BlockLayout(
-            "main",
-            {"links": (60, 90), "start": ("rest", "ellipse"), "self_contact": (False, True), "frequency": (5.0, 7.5)},
-            6,
-            0,
-            ("phase",),
-        ),
-    )
+SINGLE = synthetic_sweep(
+    {
+        "name": "main",
+        "grid": {
+            "links": [60, 90],
+            "start": ["rest", "ellipse"],
+            "self_contact": [False, True],
+            "frequency": [5.0, 7.5],
+        },
+        "samples": 6,
+    }
 )
 
 
@@ -54,7 +53,7 @@ def single(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A sweep of one block with axes of all types, walks 20 … 39 missing."""
     directory = tmp_path_factory.mktemp("one")
     run(directory, SINGLE)
-    (directory / "shards" / shard_name(range(20, 40))).unlink()
+    (directory / "shards/0-000001.h5").unlink()
     return directory
 
 
@@ -62,14 +61,14 @@ def test_arrays_have_named_axes(folder: Path) -> None:
     """Every walk is where block, cell and sample say, every column under its name and to the bit."""
     result = load(folder)
     assert result.name == "synthetic" and result.seed == SWEEP.seed and list(result.blocks) == ["rest", "ellipse"]
-    rows = synthetic_rows(SWEEP, range(160))
+    rows = np.concatenate([synthetic_rows(SWEEP, shard) for shard in Manifest.of(SWEEP, SHARD_SIZE).shards])
     rest, ellipse = result.blocks["rest"], result.blocks["ellipse"]
     assert rest.dims == ("links", "frequency", "sample") and rest.shape == rest.dx.shape == (3, 2, 20)
     assert ellipse.dims == ("gravity", "sample") and ellipse.shape == (5, 8)
     assert rest.axes["links"].tolist() == [60, 90, 120] and rest.axes["links"].dtype == np.int64
     assert rest.axes["frequency"].tolist() == [5.0, 12.5]
     assert rest.index[2, 1, 3] == (2 * 2 + 1) * 20 + 3 and ellipse.index[4, 7] == 159
-    for name in (*COLUMNS, *map(drawn_column, rest.drawn)):
+    for name in ("status", *STORED_COLUMNS, *map(drawn_column, rest.drawn)):
         assert getattr(rest, name).tobytes() == np.ascontiguousarray(rows[name][:120]).tobytes(), name
         assert getattr(rest, name).dtype == rows.dtype[name]
     assert set(rest.columns) == {*COLUMNS, "phase_drawn", "floor_friction_drawn", "clearance_drawn"}
@@ -93,13 +92,13 @@ def test_the_layout_is_that_of_the_sweep(tmp_path: Path) -> None:
         }
     )
     with SweepFolder.open(tmp_path, sweep, shard_size=5) as store:
-        for walks in store.missing():
-            rows = empty_rows(sweep, walks)
+        for shard in store.missing():
+            rows = missing_rows(shard.kind, shard.keys)
             rows["status"] = Status.TIME_LIMIT
-            for row, index in zip(rows, walks, strict=True):
+            for row, index in zip(rows, shard.walks.tolist(), strict=True):
                 for name, value in sweep.planned(index).drawn.items():
                     row[drawn_column(name)] = value
-            write(store, walks, rows)
+            write(store, shard, rows)
     result = load(tmp_path)
     for index in range(sweep.walk_count):
         walk = sweep.planned(index)
@@ -173,16 +172,16 @@ def test_a_sweep_just_begun_is_all_missing(tmp_path: Path) -> None:
 
 def test_statistics_are_over_walks_at_rest(tmp_path: Path) -> None:
     """Mean and deviation of known numbers; failed and missing walks are in neither, but counted."""
-    sweep: Any = SyntheticSweep(blocks=(BlockLayout("main", {"links": (10, 20, 30, 40, 50)}, 4, 0, ()),))
+    sweep = synthetic_sweep({"name": "main", "grid": {"frequency": [10, 20, 30, 40, 50]}, "samples": 4})
     status = [[1, 1, 1, 1], [1, 3, 6, 1], [1, 3, 3, 3], [3, 3, 3, 3]]
     with SweepFolder.open(tmp_path, sweep, shard_size=4) as store:
-        for cell, walks in enumerate(store.missing()[:4]):
-            rows = synthetic_rows(sweep, walks)
+        for cell, shard in enumerate(store.missing()[:4]):
+            rows = synthetic_rows(sweep, shard)
             rows["status"] = status[cell]
             rows["dx"] = np.where(rows["status"] == 1, [1.0, 2.0, 4.0, 5.0], np.nan)
-            write(store, walks, rows)
+            write(store, shard, rows)
     found = load(tmp_path).statistics()
-    assert found.unit == "m" and found.axes["links"].tolist() == [10, 20, 30, 40, 50]
+    assert found.unit == "m" and found.axes["frequency"].tolist() == [10, 20, 30, 40, 50]
     assert found.count.tolist() == [4, 2, 1, 0, 0]
     assert found.failed.tolist() == [0, 2, 3, 4, 0] and found.missing.tolist() == [0, 0, 0, 0, 4]
     np.testing.assert_allclose(found.mean, [3.0, 3.0, 1.0, math.nan, math.nan])
@@ -203,13 +202,15 @@ def test_results_can_be_copied(single: Path) -> None:
 
 def test_no_sweep_no_result(tmp_path: Path, single: Path) -> None:
     """A folder without a sweep, or none at all, is named; a bad shard is no missing one."""
-    for nothing in (tmp_path, tmp_path / "none", single / "sweep.json"):
+    for nothing in (tmp_path, tmp_path / "none"):
         with pytest.raises(InputError, match=f"{nothing}: no sweep in this folder"):
             load(nothing)
+    with pytest.raises(InputError, match=r"sweep\.json: not an HDF5 file; give a folder of a sweep"):
+        load(single / "sweep.json")
     run(tmp_path)
-    path = tmp_path / "shards" / shard_name(range(20, 40))
+    path = tmp_path / "shards/0-000001.h5"
     path.write_bytes(path.read_bytes()[:-1])
-    with pytest.raises(InputError, match=f"{path}: damaged or cut short .*; delete it"):
+    with pytest.raises(InputError, match=f"{path}: damaged or cut short; delete it"):
         load(tmp_path)
 
 
@@ -256,12 +257,27 @@ def test_walks_as_a_table(folder: Path) -> None:
     assert table[table.block == "ellipse"].gravity.tolist() == np.repeat([1.6, 3.7, 9.8, 12.0, 24.8], 8).tolist()
 
 
-@pytest.mark.parametrize(("package", "method"), [("xarray", "to_xarray"), ("pandas", "to_pandas")])
-def test_missing_packages_are_named(single: Path, package: str, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without the optional package, one line says how to get it."""
-    monkeypatch.setitem(sys.modules, package, None)
-    with pytest.raises(ImportError, match=rf"^{package} is not installed; pip install 'warpchain\[xarray\]'$"):
-        getattr(load(single), method)()
+def same_result(one: SweepResult, other: SweepResult) -> bool:
+    """Whether two results have the same blocks, columns, axes and origin, to the bit."""
+    return (one.sweep, one.provenance, list(one.blocks)) == (other.sweep, other.provenance, list(other.blocks)) and all(
+        [(name, values.tobytes(), values.dtype) for name, values in {**ours.axes, **ours.columns}.items()]
+        == [(name, values.tobytes(), values.dtype) for name, values in {**theirs.axes, **theirs.columns}.items()]
+        for ours, theirs in zip(one.blocks.values(), other.blocks.values(), strict=True)
+        if not any(values.dtype.kind == "O" for values in ours.axes.values())
+    )
+
+
+def test_a_merged_file_is_read_like_a_folder(folder: Path, single: Path, tmp_path: Path) -> None:
+    """The same result, which the commands show likewise."""
+    for number, given in enumerate((folder, single)):
+        path = tmp_path / f"{number}.h5"
+        merge(given, path)
+        assert same_result(load(path), load(given))
+        for command in ("info", "plot", "report"):
+            with pytest.raises(SystemExit) as done:
+                main([command, str(path)])
+            assert done.value.code in (None, 0)
+    assert (tmp_path / "report.html").exists() and list(tmp_path.glob("*.png"))
 
 
 def test_merged_file_of_one_block(single: Path, tmp_path: Path) -> None:
@@ -273,7 +289,7 @@ def test_merged_file_of_one_block(single: Path, tmp_path: Path) -> None:
         assert set(data.coords) == {"links", "start", "self_contact", "frequency", "sample"}
         xarray.testing.assert_equal(data, expected)
         assert data.self_contact.dtype == bool and data.start.values.tolist() == ["rest", "ellipse"]
-        assert set(data.attrs) == set(expected.attrs)
+        assert set(data.attrs) == {*expected.attrs, "format", "format_version"}
         for name in expected.variables:
             notes = {key: np.array(value).tolist() for key, value in data[name].attrs.items()}
             assert notes == {key: np.array(value).tolist() for key, value in expected[name].attrs.items()}, name
@@ -320,22 +336,21 @@ def test_merged_files_are_equal(folder: Path, tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["one.h5", "two.h5"]
 
 
-def test_a_merge_that_fails_leaves_the_older_file(
-    folder: Path, single: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A file that cannot be written is named; what was there stays."""
+def test_a_merge_that_fails_leaves_the_older_file(folder: Path, single: Path, tmp_path: Path) -> None:
+    """In a process that may write small files only, one line names the file; what was there stays."""
     path = tmp_path / "merged.h5"
     merge(single, path)
     older = path.read_bytes()
-
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    with monkeypatch.context() as patched:
-        patched.setattr(os, "posix_fallocate", full)
-        with pytest.raises(OSError, match=r"merged\.h5: cannot be written \(No space left on device\); make room"):
-            merge(folder, path)
-    assert path.read_bytes() == older and len(list(tmp_path.iterdir())) == 1
+    program = (
+        "import resource, sys\n"
+        "from warpchain.cli.main import main\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (30000, 30000))\n"
+        "main(['merge', *sys.argv[1:]])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program, folder, path], capture_output=True, encoding="utf-8")
+    assert done.returncode == 1 and done.stderr.count("\n") == 1
+    assert done.stderr.startswith(f"error: {path}: cannot be written (File too large); make room")
+    assert path.read_bytes() == older and list(tmp_path.iterdir()) == [path]
     with pytest.raises(OSError, match=r"cannot be written \(No such file or directory\); give a folder that is there"):
         merge(folder, tmp_path / "none" / "merged.h5")
 
@@ -355,22 +370,3 @@ def test_a_merged_file_replaces_another_only(folder: Path, single: Path, tmp_pat
         with pytest.raises(OSError, match=rf"{name}: is there and is no merged sweep; give another name$"):
             merge(folder, tmp_path / name)
     assert {name: (tmp_path / name).read_bytes() for name in others} == others
-
-
-@pytest.mark.parametrize("name", ["sweep.json", "sweep.yaml", "log.txt", "lock", "shards", "shards/all.h5"])
-def test_nothing_is_written_over_the_sweep(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The names of what a sweep has are refused to merged file, page and figures, there or not yet, by any path."""
-    folder = tmp_path / "sweep"
-    run(folder)
-    (folder / "log.txt").unlink(missing_ok=True)
-    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    monkeypatch.chdir(folder)
-    for target in (Path(name), folder / "shards/.." / name):
-        for make in (merge, write_report):
-            with pytest.raises(InputError, match=rf"{name}: belongs to the sweep itself; give another path$"):
-                make(folder, target)
-    with pytest.raises(SystemExit, match="2"):
-        main(["plot", ".", "-o", name])
-    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
-    merge(folder, "all.h5")
-    merge(folder, "all.h5")

@@ -19,10 +19,10 @@ from studies.waves.dispersion import (
 )
 from studies.waves.mode_fit import find_packet, fit_rates, mode_amplitudes
 from studies.waves.tapped_ring import tapped_ring
+from tests.oracle_model.circular_loop import circular_loop_force, tapped_loop
+from tests.oracle_model.motion_equations import acceleration, friction_torque
+from tests.oracle_model.ring_modes import ring_modes
 from warpchain import Status, preset
-from warpchain.oracle.circular_loop import circular_loop_force, tapped_loop
-from warpchain.oracle.motion_equations import acceleration, friction_torque
-from warpchain.oracle.ring_modes import ring_modes
 
 PAPER = preset("paper").with_values({"coulomb_friction": 0.0})
 SOFT = preset("soft").with_values({"coulomb_friction": 0.0})

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
-import pytest
 import warp as wp
+from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
 from tests.support.folded_chains import folded_chain
@@ -33,20 +33,6 @@ def fibers() -> Iterator[None]:
         yield
     finally:
         wp.config.enable_cpu_blocks = before
-
-
-@contextmanager
-def exact_kernels() -> Iterator[None]:
-    """Step kernels without fused operations: then those of GPUs and of CPUs do the same operations."""
-    factories = (cpu_loop.make_advance, gpu_loop.make_advance_block)
-    with pytest.MonkeyPatch.context() as patch:
-        for module in (cpu_loop, gpu_loop):
-            patch.setattr(module, "COMPILER_FLAGS", "-ffp-contract=off")
-        for factory in factories:
-            factory.cache_clear()
-        yield
-    for factory in factories:
-        factory.cache_clear()
 
 
 def heap(links: int, seed: int = 3, *, tilt: float = 0.3, raised: float = 0.0) -> tuple[Array, Array]:
@@ -103,11 +89,6 @@ def batch_of(
     return batch
 
 
-def features_of(batch: Batch, *, fixed_body: str, watch: str = "none", broad_phase: str = "grid") -> Features:
-    """Kernel features for a batch."""
-    return batch.features(fixed_body=fixed_body, watch=watch, broad_phase=broad_phase)
-
-
 def launch_kernel(batch: Batch, kernel: wp.Kernel, worlds: Sequence[int], attempts: int, *, block_dim: int) -> None:
     """Carry worlds on by at most this many attempts each in a GPU kernel."""
     batch.control.attempts = attempts
@@ -138,3 +119,12 @@ def listed_pairs(batch: Batch, world: int = 0) -> set[tuple[int, int]]:
     count = int(row[lists.count])
     first, second = row[lists.first : lists.first + count], row[lists.second : lists.second + count]
     return set(zip(first.tolist(), second.tolist(), strict=True))
+
+
+def assert_same(ours: Batch, theirs: Batch) -> None:
+    """State, clock, counters and watches agree to the bit, sums of losses to rounding, extremes to single precision."""
+    exact = ("links", "time", "counts", "status", "softness", "load_factor", "first_area", "watch", "stop_time")
+    for name in exact:
+        assert_array_equal(getattr(ours.state, name).numpy(), getattr(theirs.state, name).numpy(), err_msg=name)
+    assert_allclose(ours.state.losses.numpy(), theirs.state.losses.numpy(), rtol=1e-12)
+    assert_allclose(ours.state.extremes.numpy(), theirs.state.extremes.numpy(), rtol=1e-6)

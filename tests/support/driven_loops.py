@@ -35,7 +35,6 @@ class Loop:
         attempts: Attempted steps.
         depth: Greatest by which circles sank into the sprocket [m].
         is_released: Whether the hold ended in a release.
-        status: Of the batch's world when the drive was over.
     """
 
     setup: Setup
@@ -47,7 +46,6 @@ class Loop:
     attempts: int
     depth: float
     is_released: bool
-    status: Status
 
 
 def period_of(setup: Setup) -> float:
@@ -71,7 +69,6 @@ def released_loop(preset: str = "soft", drive: dict[str, float] | None = None, *
     samples: list[Array] = []
     while True:
         batch.run([0], run.features, lambda: samples.append(batch.drain_samples(0)))
-        status = batch.status(0)
         position, velocity = batch.position(0), batch.velocity(0)
         goes_on = run.next_phase()
         if not goes_on or run.phase == Phase.WALK:
@@ -88,7 +85,6 @@ def released_loop(preset: str = "soft", drive: dict[str, float] | None = None, *
         attempts=run.attempts,
         depth=run.extremes["sprocket"],
         is_released=goes_on,
-        status=status,
     )
 
 

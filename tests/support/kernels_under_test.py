@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from warpchain.engine.devices import start_device
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
-from warpchain.kernels.contacts.impulse import collision_impulse, fixed_contact, inverse_masses
+from warpchain.kernels.contacts.impulse import fixed_contact
 from warpchain.kernels.contacts.link_pair import circles_of_links, collide
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu.contacts.neighbour_list import greatest_displacement, list_slack, neighbour_list
@@ -37,44 +37,30 @@ Array = NDArray[np.float64]
 DEVICE = start_device("cpu").warp
 POISONED_JOINT = 2**30
 
-_compiled = functools.partial(
+compiled = functools.partial(
     wp.kernel, module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS}
 )
 
 
-def _poisoned(*shape: int) -> wp.array:
+def poisoned(*shape: int) -> wp.array:
+    """Memory that nothing has been written to."""
     return wp.full(shape, np.nan, dtype=wp.float64, device=DEVICE)
+
+
+def chain_on_cpu(position: Array, velocity: Array, parameters: Parameters) -> tuple[Model, State]:
+    """Structs of one chain; of its state only the links are set."""
+    model, state = Model(), State()
+    model.link_count = wp.array([len(position)], dtype=wp.int32, device=DEVICE)
+    for name, value in parameters:
+        setattr(model, name, wp.array([value], dtype=wp.float64, device=DEVICE))
+    state.links = wp.array(np.hstack([position, velocity]).T[None], dtype=wp.float64, device=DEVICE)
+    return model, state
 
 
 # --- the impulse law ---
 
 
-@_compiled
-def _law(cases: wp.array2d(dtype=wp.float64), impulses: wp.array2d(dtype=wp.float64)):
-    i = wp.tid()
-    inverse_nn, inverse_determinant = inverse_masses(cases[i, 2], cases[i, 3], cases[i, 4])
-    impulse_n, impulse_t = collision_impulse(
-        cases[i, 0],
-        cases[i, 1],
-        cases[i, 2],
-        cases[i, 3],
-        cases[i, 4],
-        inverse_nn,
-        inverse_determinant,
-        cases[i, 5],
-        cases[i, 6],
-        cases[i, 7],
-    )
-    impulses[i, 0] = impulse_n
-    impulses[i, 1] = impulse_t
-
-
-def impulses_of_law(cases: Array) -> Array:
-    """`collision_impulse` of many collisions: speeds, W, coefficients (N, 8) in its order → J_n, J_t (N, 2)."""
-    return _map_rows(_law, cases, 2)
-
-
-@_compiled
+@compiled
 def _fixed(cases: wp.array2d(dtype=wp.float64), results: wp.array2d(dtype=wp.float64)):
     i = wp.tid()
     chain = Chain()
@@ -108,7 +94,7 @@ def fixed_contacts(cases: Array) -> Array:
     return _map_rows(_fixed, cases, 5)
 
 
-@_compiled
+@compiled
 def _link_pair(
     scratch: wp.array3d(dtype=wp.float64),
     cases: wp.array2d(dtype=wp.float64),
@@ -167,7 +153,7 @@ def link_pairs(
     block[:, rates] = velocity.transpose(0, 2, 1)
     block[:, [layout.INVERSE_MASS, layout.INVERSE_INERTIA]] = inverses.transpose(0, 2, 1)
     scratch = wp.array(block, dtype=wp.float64, device=DEVICE)
-    results = _poisoned(len(cases), 3)
+    results = poisoned(len(cases), 3)
     cases = np.column_stack([cases, np.full(len(cases), push_rate)])
     inputs = [scratch, wp.array(cases, dtype=wp.float64, device=DEVICE), results]
     wp.launch(_link_pair, dim=len(cases), inputs=inputs, device=DEVICE)
@@ -175,7 +161,7 @@ def link_pairs(
 
 
 def _map_rows(kernel: wp.Kernel, cases: Array, width: int) -> Array:
-    results = _poisoned(len(cases), width)
+    results = poisoned(len(cases), width)
     inputs = [wp.array(cases, dtype=wp.float64, device=DEVICE), results]
     wp.launch(kernel, dim=len(cases), inputs=inputs, device=DEVICE)
     return results.numpy()
@@ -183,8 +169,8 @@ def _map_rows(kernel: wp.Kernel, cases: Array, width: int) -> Array:
 
 # --- the contact pass ---
 
-GRID, ALL_PAIRS, FLOOR, SPROCKET, SELF = 1, 2, 4, 8, 16
-"""Parts of a pass, to be added up: make the neighbour list by the grid or by all pairs; resolve contacts."""
+LIST, FLOOR, SPROCKET, SELF = 1, 2, 4, 8
+"""Parts of a pass, to be added up: make the neighbour list; resolve contacts."""
 
 RESULTS = (
     *("opening", "floor_gap", "sprocket_gap", "fits", "displacement", "slack"),
@@ -194,11 +180,11 @@ RESULTS = (
 
 @functools.cache
 def _contact_pass(columns: int) -> wp.Kernel:
-    build_by_grid, build_by_all_pairs = neighbour_list(columns)
+    build_list = neighbour_list(columns)
     resolve_self_contacts = self_contacts(columns)
     size = list_layout(columns).size
 
-    @_compiled
+    @compiled
     def contact_pass(
         model: Model,
         state: State,
@@ -223,20 +209,15 @@ def _contact_pass(columns: int) -> wp.Kernel:
         results[world, 1] = floor_gap(block, chain)
         results[world, 2] = sprocket_gap(block, chain)
         if (parts & 1) != 0:
-            results[world, 3] = wp.where(
-                build_by_grid(block, pairs, chain, skin, opening), wp.float64(1.0), wp.float64(0.0)
-            )
-        if (parts & 2) != 0:
-            results[world, 3] = wp.where(
-                build_by_all_pairs(block, pairs, chain, skin, opening), wp.float64(1.0), wp.float64(0.0)
-            )
+            fits = build_list(block, pairs, chain, skin, opening)
+            results[world, 3] = wp.where(fits, wp.float64(1.0), wp.float64(0.0))
         results[world, 4] = greatest_displacement(block, chain)
         results[world, 5] = list_slack(block, chain, skin, opening)
-        if (parts & 4) != 0:
+        if (parts & 2) != 0:
             results[world, 6] = wp.float64(resolve_floor(block, chain, sprocket_speed, push_rate))
-        if (parts & 8) != 0:
+        if (parts & 4) != 0:
             results[world, 7] = wp.float64(resolve_sprocket(block, chain, sprocket_speed, push_rate))
-        if (parts & 16) != 0:
+        if (parts & 8) != 0:
             hits, lost, depth = resolve_self_contacts(block, pairs, chain, opening)
             results[world, 8] = wp.float64(hits)
             results[world, 9] = lost
@@ -252,16 +233,6 @@ class Placed:
     position: Array
     velocity: Array
     parameters: Parameters
-
-
-def chain_on_cpu(position: Array, velocity: Array, parameters: Parameters) -> tuple[Model, State]:
-    """Structs of one chain; of its state only the links are set."""
-    model, state = Model(), State()
-    model.link_count = wp.array([len(position)], dtype=wp.int32, device=DEVICE)
-    for name, value in parameters:
-        setattr(model, name, wp.array([value], dtype=wp.float64, device=DEVICE))
-    state.links = wp.array(np.hstack([position, velocity]).T[None], dtype=wp.float64, device=DEVICE)
-    return model, state
 
 
 class ContactPass:
@@ -281,8 +252,8 @@ class ContactPass:
             setattr(self.model, name, wp.array(values, dtype=wp.float64, device=DEVICE))
         worlds, rows, size = len(chains), layout.scratch_rows(0), list_layout(self.columns).size
         self.state = State()
-        self.state.links = _poisoned(worlds, 6, max(self.links))
-        self.scratch = _poisoned(worlds, rows, self.columns)
+        self.state.links = poisoned(worlds, 6, max(self.links))
+        self.scratch = poisoned(worlds, rows, self.columns)
         self.lists = wp.full((worlds, size), POISONED_JOINT, dtype=wp.int32, device=DEVICE)
         self.place(chains)
 
@@ -293,7 +264,7 @@ class ContactPass:
 
     def run(self, parts: int) -> list[dict[str, float]]:
         """Run parts of a pass from the states placed last: `RESULTS` of each chain, NaN if not computed."""
-        results = _poisoned(len(self.links), len(RESULTS))
+        results = poisoned(len(self.links), len(RESULTS))
         speeds = [self.sprocket_speed, self.push_rate]
         inputs = [self.model, self.state, self.scratch, self.lists, self.skin, *speeds, parts]
         kernel = _contact_pass(self.columns)

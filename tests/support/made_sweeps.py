@@ -9,10 +9,10 @@ import numpy as np
 
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
-from warpchain.store.shards import empty_rows, write_shard
+from warpchain.store.shards import write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, load_sweep
-from warpchain.walks.rows import Rows, quantity_of
+from warpchain.walks.rows import KEYS, Rows, missing_rows, quantity_of
 
 Outcome = Callable[[PlannedWalk], "float | Status | None"]
 """What a walk gives: its distance [m], how it failed, or None if it has not been run yet."""
@@ -80,10 +80,10 @@ def fill_row(walk: PlannedWalk, outcome: "float | Status", rows: Rows, **own: fl
             rows[name] = walk.drawn[quantity]
         elif name.startswith("penetration_") or name == "greatest_opening":
             rows[name] = 7e-6
-        elif name not in ("index", "status", "dx"):
+        elif name not in (*(KEYS.names or ()), "status", "dx"):
             rows[name] = 7
     rows["dx"] = math.nan if failed else outcome
-    rows["energy_error"] = 1e-4
+    rows["energy_residual"] = 14e-4  # of 14 J
     for name, value in own.items():
         rows[name] = value
 
@@ -100,11 +100,10 @@ def make_sweep(
     outcomes = [outcome(walk) for walk in walks]
     with SweepFolder.open(folder, sweep, shard_size=1 if None in outcomes else len(walks)) as store:
         for shard in store.missing():
-            rows = empty_rows(sweep, shard)
-            indices = store.manifest.walks(shard).tolist()
-            for row, index in enumerate(indices):
+            rows = missing_rows(shard.kind, shard.keys)
+            for row, index in enumerate(shard.walks.tolist()):
                 if (given := outcomes[index]) is not None:
                     fill_row(walks[index], given, rows[row : row + 1], **columns(walks[index]))
-            if outcomes[indices[0]] is not None:
-                write_shard(store.directory, store.manifest.digest, shard, rows)
+            if outcomes[shard.walks[0]] is not None:
+                write_shard(store.directory, store.stamp, shard, rows, {})
     return load(folder)

@@ -10,7 +10,7 @@ from warpchain.engine.tallies import CONTACTS
 from warpchain.inputs.setup import resolve
 from warpchain.loop.before_release import BeforeRelease
 from warpchain.status import Status
-from warpchain.walks.walk_result import ENERGIES, STORED, WalkResult
+from warpchain.walks.walk_result import ENERGIES, MOTION, WalkResult
 
 
 def make_walk(links: int = 30, **changes: Any) -> WalkResult:
@@ -55,8 +55,7 @@ def make_walk(links: int = 30, **changes: Any) -> WalkResult:
         "greatest_opening": 1.1e-5,
         "greatest_penetration": dict(zip(CONTACTS, (1e-5, 0.0, 2e-5), strict=True)),
         "energy": {key: 0.1 * number for number, key in enumerate(ENERGIES)} | {"residual": 1e-6},
-        "sprocket_center": np.array([0.0, 0.1]),
-        "sprocket_radius": 0.0556,
+        "sprocket_height": 0.1,
         "setup": resolve("soft", scene={"links": links}, options={"method": "dp5"}, parameters={"floor_friction": 0.3}),
         "seed": 2**100 + 1,
         "versions": {"warpchain": "0.1.0", "warp-lang": "1.19.0"},
@@ -83,17 +82,14 @@ def make_walk(links: int = 30, **changes: Any) -> WalkResult:
 
 def make_unreleased() -> WalkResult:
     """A walk that ended on the sprocket: no series, no frames, no distance."""
-    names = [name for name, stored in STORED.items() if stored.group == "series"]
-    empty: dict[str, Any] = {name: np.empty(0) for name in names}
-    empty |= {"center": np.empty((0, 2)), "center_velocity": np.empty((0, 2)), "frame_time": np.empty(0)}
+    empty: dict[str, Any] = {name: np.empty(stored.sizes({"t": 0, "f": 0, "n": 30})) for name, stored in MOTION.items()}
     energy = dict.fromkeys(ENERGIES, math.nan)
     return make_walk(
         status=Status.NOT_STEADY,
         dx=math.nan,
         energy=energy,
-        sprocket_center=None,
+        sprocket_height=math.nan,
         seed=None,
-        frame_joints=np.empty((0, 30, 2)),
         **empty,
     )
 

@@ -11,8 +11,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,91 +20,71 @@ import numpy as np
 
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
-from warpchain.store.manifest import BlockLayout
-from warpchain.store.shards import empty_rows, write_shard
+from warpchain.store.manifest import Shard
+from warpchain.store.shards import write_shard
 from warpchain.store.sweep_result import load
-from warpchain.sweeps.plan import digest_of
-from warpchain.walks.rows import Rows, quantity_of
+from warpchain.sweeps.plan import Sweep, load_sweep
+from warpchain.walks.rows import STORED_COLUMNS, Rows, missing_rows, quantity_of
 
 SHARD_SIZE = 20
+UNIT = {"uniform": [0.0, 1.0]}
 
 
-@dataclass(frozen=True)
-class SyntheticSweep:
-    """What a store reads of a sweep; two blocks of 3 × 2 × 20 and 5 × 8 walks."""
-
-    name: str = "synthetic"
-    seed: int = 2**100 + 1
-    blocks: tuple[BlockLayout, ...] = field(
-        default=(
-            BlockLayout(
-                "rest",
-                {"links": (60, 90, 120), "frequency": (5.0, 12.5)},
-                20,
-                0,
-                ("phase", "floor_friction", "clearance"),
-            ),
-            BlockLayout("ellipse", {"gravity": (1.6, 3.7, 9.8, 12.0, 24.8)}, 8, 120, ("phase", "link_length")),
-        )
+def synthetic_sweep(*blocks: Mapping[str, Any], **changes: Any) -> Sweep:
+    """A sweep of these blocks, which draw the phase unless they say otherwise."""
+    drawn = {"all": "fixed", "phase": UNIT}
+    given = [{"distributions": drawn, **block} for block in blocks]
+    return load_sweep(
+        {"version": 1, "name": "synthetic", "seed": 2**100 + 1, "preset": "paper", "blocks": given, **changes}
     )
 
-    @property
-    def walk_count(self) -> int:
-        """Walks of all blocks."""
-        return sum(int(np.prod(block.shape)) for block in self.blocks)
 
-    def canonical(self) -> dict[str, Any]:
-        """All that there is, in the form of a real sweep."""
-        blocks = [
-            {
-                "name": block.name,
-                "preset": "paper",
-                "samples": block.samples,
-                "sampler": "random",
-                "distributions": {"all": "fixed"} | {name: {"uniform": [0, 1]} for name in block.drawn},
-                "grid": {name: list(values) for name, values in block.axes.items()},
-            }
-            for block in self.blocks
-        ]
-        return {"name": self.name, "seed": self.seed, "blocks": blocks}
-
-    def digest(self, samples: Sequence[int] | None = None) -> str:
-        """As of a real sweep, with these samples of each block if they are given."""
-        return digest_of(self.canonical(), samples)
+SWEEP = synthetic_sweep(
+    {
+        "name": "rest",
+        "grid": {"links": [60, 90, 120], "frequency": [5.0, 12.5]},
+        "samples": 20,
+        "distributions": {"all": "fixed", "phase": UNIT, "floor_friction": UNIT, "clearance": UNIT},
+    },
+    {
+        "name": "ellipse",
+        "scene": {"start": "ellipse"},
+        "grid": {"gravity": [1.6, 3.7, 9.8, 12.0, 24.8]},
+        "samples": 8,
+        "distributions": {"all": "fixed", "phase": UNIT, "link_length": {"uniform": [0.0125, 0.0129]}},
+    },
+)
+"""Two blocks of 3 × 2 × 20 and 5 × 8 walks."""
+LONG_SWEEP = synthetic_sweep({"name": "main", "grid": {"links": [60, 90]}, "samples": 350})
 
 
-SWEEP: Any = SyntheticSweep()
-LONG_SWEEP: Any = SyntheticSweep(blocks=(BlockLayout("main", {"links": (60, 90)}, 350, 0, ("phase",)),))
-
-
-def synthetic_rows(sweep: Any, walks: range) -> Rows:
-    """Rows that each depend on the index of their walk only; about one walk in ten fails."""
-    rows = empty_rows(sweep, walks)
-    for row, index in zip(rows, walks, strict=True):
-        block = next(block for block in reversed(sweep.blocks) if block.first <= index)
+def synthetic_rows(sweep: Sweep, shard: Shard) -> Rows:
+    """Rows that each depend on the number of their walk only; about one walk in ten fails."""
+    rows = missing_rows(shard.kind, shard.keys)
+    for row, index in zip(rows, shard.walks.tolist(), strict=True):
+        drawn = sweep.blocks[int(row["block"])].drawn
         rng = np.random.default_rng([sweep.seed, index])
         failed = rng.random() < 0.1
         row["status"] = Status.TIME_LIMIT if failed else Status.AT_REST
-        names = [name for name in rows.dtype.names or () if name not in ("index", "status")]
-        for name in names:
-            if rows.dtype[name].kind == "i":
+        for name in rows.dtype.names or ():
+            if name in STORED_COLUMNS and rows.dtype[name].kind == "i":
                 row[name] = rng.integers(0, 100)
-            elif quantity_of(name) in block.drawn or name in ("walk_time", "energy_at_release"):
+            elif quantity_of(name) in drawn or name in ("walk_time", "energy_kinetic_at_release"):
                 row[name] = rng.random()
         row["dx"] = np.nan if failed else rng.normal(1.0, 0.1)
     return rows
 
 
-def write(store: SweepFolder, walks: range, rows: Rows) -> str:
-    """Write a shard as a worker does; its key."""
-    return write_shard(store.directory, store.manifest.digest, walks, rows)
+def write(store: SweepFolder, shard: Shard, rows: Rows) -> None:
+    """Write a shard as a worker does."""
+    write_shard(store.directory, store.stamp, shard, rows, {})
 
 
-def run(directory: Path | str, sweep: Any = SWEEP, *, shard_size: int = SHARD_SIZE, **settings: Any) -> None:
+def run(directory: Path | str, sweep: Sweep = SWEEP, *, shard_size: int = SHARD_SIZE, **settings: Any) -> None:
     """Begin or go on with a sweep, to its end."""
     with SweepFolder.open(directory, sweep, shard_size=shard_size, **settings) as store:
-        for walks in store.missing():
-            write(store, walks, synthetic_rows(sweep, walks))
+        for shard in store.missing():
+            write(store, shard, synthetic_rows(sweep, shard))
 
 
 def content(directory: Path) -> dict[str, bytes]:
@@ -158,8 +137,8 @@ def play_race(directory: Path) -> None:
         for _ in range(4):
             children.append(os.fork())
             if not children[-1]:
-                for _, walks in itertools.product(range(10), store.manifest.shards[:2]):
-                    write(store, walks, synthetic_rows(SWEEP, walks))
+                for _, shard in itertools.product(range(10), store.manifest.shards[:2]):
+                    write(store, shard, synthetic_rows(SWEEP, shard))
                 os._exit(0)
         print(json.dumps([os.waitpid(child, 0)[1] for child in children]))
 
@@ -190,16 +169,6 @@ def play_full_disk(directory: Path) -> None:
     filler.unlink()
     run(directory, shard_size=40)
     print(json.dumps({"messages": messages, "missing": load(directory).missing_count}))
-
-
-def play_read_only(directory: Path) -> None:
-    """In a mount namespace: a folder that cannot be written, for root either."""
-    subprocess.run(["mount", "--bind", directory, directory], check=True)
-    subprocess.run(["mount", "-o", "remount,ro,bind", directory], check=True)
-    try:
-        SweepFolder.open(directory, SWEEP, shard_size=SHARD_SIZE)
-    except OSError as error:
-        print(json.dumps({"message": str(error), "missing": load(directory).missing_count}))
 
 
 if __name__ == "__main__":

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.oracle_model.circular_loop import circular_loop
+from tests.oracle_model.tilting_plane import Plane, tilted_plane
 from tests.support.impulse_cases import crumpled_chain
 from warpchain.inputs.parameters import Parameters
-from warpchain.oracle.circular_loop import circular_loop
-from warpchain.oracle.tilting_plane import Plane, tilted_plane
 
 Array = NDArray[np.float64]
 

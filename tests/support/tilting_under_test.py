@@ -8,26 +8,22 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from tests.support.kernels_under_test import chain_on_cpu
+from tests.oracle_model.tilting_plane import Plane
+from tests.support.kernels_under_test import DEVICE, chain_on_cpu, compiled, poisoned
 from warpchain.engine.batch import Batch
-from warpchain.engine.devices import start_device
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
 from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.loop import load_state
 from warpchain.kernels.cpu.tilting import resolve_tilting_floor, tilting_gap, write_plane_sums
-from warpchain.kernels.features import COMPILER_FLAGS
 from warpchain.kernels.physics.plane import on_plane
 from warpchain.kernels.types import Model, State, read_chain
-from warpchain.oracle.tilting_plane import Plane
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
 Start = tuple[Array, Array, Plane]
 """Position (n, 3), velocity (n, 3) and plane."""
-
-DEVICE = start_device("cpu").warp
 
 
 def row_of(plane: Plane) -> Array:
@@ -126,7 +122,7 @@ class FloorOutcome:
 
 @functools.cache
 def _floor_pass(columns: int) -> wp.Kernel:
-    @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS})
+    @compiled
     def floor_pass(
         model: Model,
         state: State,
@@ -155,11 +151,11 @@ def floor_pass(
     links = len(position)
     columns = layout.padded_width(links)
     model, state = chain_on_cpu(position, velocity, parameters)
-    scratch = wp.full((1, layout.scratch_rows(0), columns), np.nan, dtype=wp.float64, device=DEVICE)
+    scratch = poisoned(1, layout.scratch_rows(0), columns)
     values = np.full((1, layout.PLANE_ROWS), np.nan)
     values[0, : layout.PLANE_VALUES] = row_of(plane)
     planes = wp.array(values, dtype=wp.float64, device=DEVICE)
-    results = wp.full(2, np.nan, dtype=wp.float64, device=DEVICE)
+    results = poisoned(2)
     wp.launch(_floor_pass(columns), dim=1, inputs=[model, state, scratch, planes, push_rate, results], device=DEVICE)
     rows = scratch.numpy()[0, :, :links]
     return FloorOutcome(

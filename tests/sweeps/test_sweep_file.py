@@ -12,7 +12,6 @@ import yaml
 from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError
-from warpchain.sweeps import designs
 from warpchain.sweeps.plan import load_sweep
 from warpchain.sweeps.sweep_file import CELL_LIMIT, WALK_LIMIT
 
@@ -258,11 +257,3 @@ def test_values_are_judged_in_their_cells() -> None:
     setup = sweep.planned(0).setup
     assert (setup.options.smallest_step, setup.parameters.circle_radius) == (1e-4, 0.008)
     assert load_sweep(sweep.canonical()).digest() == sweep.digest()
-
-
-def test_scipy_is_asked_for_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without SciPy a designed sampler is refused with the remedy; random samples do not need it."""
-    monkeypatch.setattr(designs, "find_spec", lambda name: None)
-    load_sweep(content())
-    with pytest.raises(InputError, match=r"^sweep\.sampler: sobol needs SciPy, .* pip install 'warpchain\[scipy\]'"):
-        load_sweep(content(sampler="sobol", samples=4))

@@ -11,8 +11,6 @@ import pytest
 import warpchain
 from tests.support.made_walks import assert_same, make_walk
 from warpchain.inputs.validation import InputError
-from warpchain.walks.motion import Keep
-from warpchain.walks.scheduler import run_setups
 from warpchain.walks.walk_result import WalkResult
 
 FLIGHT: dict[str, Any] = {"preset": "soft", "start": "ellipse", "links": 24, "clearance": 0.03, "walk_limit": 0.04}
@@ -82,18 +80,6 @@ def test_moments_are_those_of_turning_joints() -> None:
     late = walk.frame_time > 0.01
     apart = np.abs(walk.frame_moments - expected)[late]
     assert np.median(apart) < 1e-3 * np.median(np.abs(expected))
-
-
-def test_fine_frames_stand_at_the_first_step_after_their_marks() -> None:
-    """Frames 50 µs apart come as often as asked, each soon after its mark, although samples are 1 ms apart."""
-    walk = flight(ellipse_aspect=1.5, method="dp5")
-    marks = np.round(walk.frame_time / FINE - 0.45)
-    late = walk.frame_time - marks * FINE
-    assert np.array_equal(marks, np.arange(len(marks)))
-    assert len(marks) == pytest.approx(walk.walk_time / FINE, abs=2)
-    assert 0 <= late.min() and late.max() < FINE
-    assert np.diff(walk.time).min() > 0.9e-3
-    assert walk.frame_forces.shape == (len(marks), 24, 2) and walk.frame_moments.shape == (len(marks), 24)
 
 
 @pytest.mark.parametrize("start", ["ellipse", "spinning"])
@@ -166,11 +152,3 @@ def test_loads_fit_the_frames() -> None:
     for name, shape in (("frame_forces", (40, 30, 2)), ("frame_forces", (41, 29, 2)), ("frame_moments", (41, 30))):
         with pytest.raises(ValueError, match=r"frame_(forces|moments): its shape is .*; give an array of shape"):
             make_walk(**{name: np.zeros(shape)})
-
-
-def test_walks_that_run_together_have_one_frame_interval() -> None:
-    """Another one would be taken for all without a word."""
-    setup = make_walk().setup
-    keeps = [Keep(frame_every=1, frame_interval=interval) for interval in (1e-4, 2e-4)]
-    with pytest.raises(ValueError, match=r"keeps: frame intervals \[0\.0001, 0\.0002\] s; walks that run together"):
-        next(run_setups([setup, setup], keeps=keeps))

@@ -1,7 +1,5 @@
 """What a notebook shows of results and figures, without pyplot and without IPython's help."""
 
-import dataclasses
-import math
 import subprocess
 import sys
 from pathlib import Path
@@ -15,16 +13,8 @@ from tests.support.made_sweeps import FIGURE_6, make_sweep
 from tests.support.made_walks import make_walk
 from warpchain.status import Status
 from warpchain.store.sweep_result import SweepResult
-from warpchain.store.walk_motion import WalkMotion
 
 PNG = b"\x89PNG\r\n\x1a\n"
-
-
-def make_motion() -> WalkMotion:
-    """A made walk as a sweep keeps it: without energies."""
-    walk = make_walk()
-    names = {field.name for field in dataclasses.fields(WalkMotion)} - {"index"}
-    return WalkMotion(index=7, **{name: getattr(walk, name) for name in names})
 
 
 def test_a_walk_is_shown_with_numbers_and_picture() -> None:
@@ -34,21 +24,6 @@ def test_a_walk_is_shown_with_numbers_and_picture() -> None:
     for text in ("at_rest", "0.64 m", "30 links at 15 Hz", str(walk.seed), "data:image/png;base64,"):
         assert text in shown
     assert walk._repr_png_().startswith(PNG)
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"frame_time": np.empty(0), "frame_joints": np.empty((0, 30, 2))},
-        {"frame_joints": np.full((41, 30, 2), math.nan), "status": Status.NOT_FINITE, "dx": math.nan},
-    ],
-    ids=["no frames", "not finite"],
-)
-def test_a_walk_without_film_strip_shows_figure_5(changes: dict[str, Any]) -> None:
-    """Without frames that can be drawn, the picture is that of the centre of mass."""
-    walk = make_walk(**changes)
-    assert walk._repr_png_().startswith(PNG)
-    assert walk.status.label in walk._repr_html_()
 
 
 def test_what_cannot_be_drawn_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -61,13 +36,6 @@ def test_what_cannot_be_drawn_is_left_out(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(type(walk), "plot", fail)
     assert walk._repr_png_() is None
     assert "0.64 m" in walk._repr_html_() and "<img" not in walk._repr_html_()
-
-
-def test_a_walk_of_a_sweep_is_shown() -> None:
-    """So is a walk that a sweep kept, with its number."""
-    motion = make_motion()
-    assert "number in the sweep" in motion._repr_html_() and "<img" in motion._repr_html_()
-    assert motion._repr_png_().startswith(PNG)
 
 
 def test_a_sweep_is_shown_with_its_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -99,21 +67,6 @@ def test_figures_show_themselves_without_pyplot(kind: str) -> None:
     assert done.stdout == "PNG False\n", done.stderr
 
 
-def test_energies_and_their_losses_are_drawn() -> None:
-    """Four lines: three energies, and what the walk lost of them; the ledger's losses are a dot at the end."""
-    walk = make_walk()
-    (axes,) = walk.plot("energy").axes
-    kinetic, gravitational, springs, lost, losses = axes.lines
-    assert np.array_equal(kinetic.get_ydata(), walk.kinetic_energy)
-    assert np.array_equal(gravitational.get_ydata(), walk.gravitational_energy)
-    assert np.array_equal(springs.get_ydata(), walk.spring_energy)
-    released = walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"]
-    whole = walk.kinetic_energy + walk.gravitational_energy + walk.spring_energy
-    np.testing.assert_allclose(np.asarray(lost.get_ydata()), released - whole)
-    names = ("kinetic_at_end", "potential_at_end", "residual")
-    np.testing.assert_allclose(losses.get_ydata(), [released - sum(walk.energy[name] for name in names)])
-
-
 def test_energies_go_into_axes_of_the_caller() -> None:
     """`ax` of a figure or of a part of one; other kinds, and `figure` beside it, are refused."""
     walk, own = make_walk(), Figure()
@@ -124,21 +77,8 @@ def test_energies_go_into_axes_of_the_caller() -> None:
         walk.plot("film_strip", ax=axes)
     with pytest.raises(ValueError, match="ax: given together with figure"):
         walk.plot("energy", ax=axes, figure=own)
-    with pytest.raises(ValueError, match="a sweep does not keep its energies"):
-        make_motion().plot("energy")
     empty = {name: np.empty(0) for name in ("time", "kinetic_energy", "gravitational_energy", "spring_energy")}
     empty |= {name: np.empty(0) for name in ("lowest", "rms_speed")}
     pairs = {name: np.empty((0, 2)) for name in ("center", "center_velocity")}
     with pytest.raises(ValueError, match="it has no time series"):
         make_walk(**empty, **pairs, status=Status.NOT_STEADY).plot("energy")
-
-
-def test_a_walk_animates_itself(tmp_path: Path) -> None:
-    """`animate` writes the format that the suffix names."""
-    for walk in (make_walk(), make_motion()):
-        walk.animate(tmp_path / "walk.gif", fps=5.0, slow=1.0)
-        walk.animate(tmp_path / "walk.html")
-        assert (tmp_path / "walk.gif").read_bytes().startswith(b"GIF")
-        assert "<!DOCTYPE html>" in (tmp_path / "walk.html").read_text(encoding="utf-8")
-    with pytest.raises(ValueError, match="unknown kind of picture"):
-        make_walk().animate(tmp_path / "walk.png")

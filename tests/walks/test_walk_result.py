@@ -14,31 +14,15 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.support.forged_files import forged, with_byte
 from tests.support.made_walks import assert_same, make_unreleased, make_walk
-from warpchain.hdf5_files import put_text
+from warpchain.hdf5_files import hdf5_image
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.setup import resolve
 from warpchain.status import Status
-from warpchain.walks import walk_result
+from warpchain.version import FORMAT_VERSION
 from warpchain.walks.walk_result import ENERGIES, STORED, WalkResult, load_walk
 
 # Status
-
-
-def test_status_codes_are_fixed() -> None:
-    """Codes keep their numbers, because kernels hold them."""
-    assert {status.label: int(status) for status in Status} == {
-        "running": 0,
-        "at_rest": 1,
-        "finished": 2,
-        "time_limit": 3,
-        "step_limit": 4,
-        "step_too_small": 5,
-        "not_finite": 6,
-        "not_steady": 7,
-        "list_overflow": 8,
-    }
 
 
 def test_status_says_what_to_try() -> None:
@@ -47,14 +31,6 @@ def test_status_says_what_to_try() -> None:
     for status in Status:
         assert re.fullmatch(r"[A-Z][^\n]*\.", status.sentence), status
         assert ("; " in status.sentence) == (not status.ok), status
-
-
-def test_statuses_name_fields_that_exist() -> None:
-    """The remedies speak of fields that scene and options have."""
-    setup = make_walk().setup
-    named = re.findall(r"(scene|options)\.(\w+)", " ".join(status.sentence for status in Status))
-    assert len(named) >= 6
-    assert all(hasattr(getattr(setup, model), field) for model, field in named)
 
 
 # The record itself
@@ -66,7 +42,6 @@ def test_statuses_name_fields_that_exist() -> None:
         ("lowest", np.zeros(800)),
         ("center", np.zeros((801, 3))),
         ("frame_joints", np.zeros((41, 32, 2))),
-        ("sprocket_center", np.zeros(3)),
         ("impulses", {"floor": 1}),
         ("energy", dict.fromkeys([*ENERGIES, "heat"], 0.0)),
     ],
@@ -90,18 +65,6 @@ def test_to_dict_is_json() -> None:
     assert described["scene"]["links"] == 30 and described["impulses"]["self"] == 11
     assert {"walk_time", "simulated_time", "wall_time", "bounces", "steps_accepted", "steps_rejected"} < set(described)
     assert not {"time", "center", "frame_joints"} & set(described)
-
-
-def test_to_dict_takes_numpy_numbers() -> None:
-    """NumPy's numbers, which engines hand over, become plain ones."""
-    described = make_walk(bounces=np.int64(4), dx=np.float64(0.5), seed=np.int64(3)).to_dict()
-    assert (described["bounces"], described["dx"], described["seed"]) == (4, 0.5, 3)
-    json.dumps(described, allow_nan=False)
-
-
-def test_repr_is_short() -> None:
-    """A walk prints as one short line, not as its arrays."""
-    assert repr(make_walk()) == ("<WalkResult at_rest: dx 0.64 m in 0.8 s, 3 bounces, 30 links at 15 Hz, soft>")
 
 
 def test_light_import() -> None:
@@ -153,8 +116,9 @@ def test_units_everywhere(tmp_path: Path) -> None:
     assert all(unit and meaning for unit, meaning in found.values())
     assert found["series/center_velocity"][0] == "m/s" and found["frames/joints"][0] == "m"
     assert found["summary/energy/floor"][0] == "J" and found["summary/impulses/floor"][0] == "1"
+    empty = [name for name, value in vars(walk).items() if isinstance(value, np.ndarray) and not value.size]
     expected = sum(max(1, len(stored.keys)) for stored in STORED.values()) + len(Parameters.quantities())
-    assert len(found) == expected
+    assert len(found) == expected - len(empty)
 
 
 def test_provenance(tmp_path: Path) -> None:
@@ -162,8 +126,8 @@ def test_provenance(tmp_path: Path) -> None:
     walk = make_walk()
     walk.save(tmp_path / "walk.h5")
     with h5py.File(tmp_path / "walk.h5") as file:
-        assert file.attrs["format"] == b"warpchain walk" and file.attrs["format_version"] == 6
-        assert file.attrs["status"] == b"at_rest"
+        assert file.attrs["format"] == "warpchain walk" and file.attrs["format_version"] == FORMAT_VERSION
+        assert file.attrs["status"] == "at_rest"
         setup = json.loads(file.attrs["setup"])
         assert json.loads(file.attrs["seed"]) == walk.seed
         assert json.loads(file.attrs["versions"]) == walk.versions
@@ -188,7 +152,7 @@ def test_interrupted_save_keeps_old_file(culprit: str, tmp_path: Path, monkeypat
         raise OSError(28, "No space left on device")
 
     if culprit == "write":
-        monkeypatch.setattr(walk_result, "_write", _fail_half_way)
+        monkeypatch.setattr(WalkResult, "_fill", _fail_half_way)
     else:
         monkeypatch.setattr(os, culprit, disk_full)
     with pytest.raises((KeyboardInterrupt, OSError)) as caught:
@@ -198,20 +162,6 @@ def test_interrupted_save_keeps_old_file(culprit: str, tmp_path: Path, monkeypat
         assert str(caught.value).startswith(f"{path}: cannot be written (No space left on device); ")
     assert path.read_bytes() == before
     assert [entry.name for entry in tmp_path.iterdir()] == ["walk.h5"]
-
-
-def test_killed_save_keeps_old_file(tmp_path: Path) -> None:
-    """A process that dies in the middle of saving leaves the older file whole."""
-    path = tmp_path / "walk.h5"
-    make_walk().save(path)
-    before = path.read_bytes()
-    code = (
-        "import os, sys; from warpchain.walks import walk_result as results\n"
-        "def die(walk, file): file['half'] = [1.0]; file.flush(); os._exit(9)\n"
-        "results._write = die; results.load_walk(sys.argv[1]).save(sys.argv[1])"
-    )
-    assert subprocess.run([sys.executable, "-c", code, str(path)], check=False).returncode == 9
-    assert path.read_bytes() == before
 
 
 @pytest.mark.parametrize("place", ["missing/walk.h5", "file/walk.h5", "folder"])
@@ -235,7 +185,7 @@ def _refused(path: Path) -> str:
 
 
 def test_foreign_files_are_refused(tmp_path: Path) -> None:
-    """Text, an empty file, other HDF5, and walks of older and later format versions are told apart."""
+    """Text, an empty file, other HDF5, and other files of warpchain are told apart."""
     path = tmp_path / "walk.h5"
     path.write_text("dx = 0.6\n")
     assert "not an HDF5 file" in _refused(path)
@@ -243,39 +193,9 @@ def test_foreign_files_are_refused(tmp_path: Path) -> None:
     assert "not an HDF5 file" in _refused(path)
     with h5py.File(path, "w") as file:
         file["x"] = 1.0
-    assert "no checksums at its end; older versions wrote none" in _refused(path)
-    make_walk().save(path)
-    for version, remedy in ((5, "run the walk again, or use the warpchain that wrote it"), (7, "update warpchain")):
-        with forged(path) as file:
-            file.attrs["format_version"] = version
-        assert f"format version {version}, but this warpchain reads 6; {remedy}" in _refused(path)
-    with forged(path) as file:
-        put_text(file, "format", "another")
-    assert "HDF5, but not a walk" in _refused(path)
-
-
-def test_setup_of_another_version_is_refused(tmp_path: Path) -> None:
-    """A setup with a field that this version doesn't know is refused by name."""
-    path = tmp_path / "walk.h5"
-    make_walk().save(path)
-    with forged(path) as file:
-        setup = json.loads(file.attrs["setup"])
-        setup["options"]["warp_factor"] = 9
-        put_text(file, "setup", json.dumps(setup))
-    assert "(warp_factor)" in _refused(path)
-
-
-@pytest.mark.parametrize("name", ["series/time", "summary/dx", "parameters", "frames/joints"])
-def test_missing_part_is_refused(name: str, tmp_path: Path) -> None:
-    """A file that lacks a dataset is damaged, unless the dataset only repeats the setup."""
-    path = tmp_path / "walk.h5"
-    make_walk().save(path)
-    with forged(path) as file:
-        del file[name]
-    if name == "parameters":
-        assert_same(load_walk(path), make_walk())
-    else:
-        assert "damaged or cut short" in _refused(path)
+    assert "damaged or cut short" in _refused(path)
+    path.write_bytes(hdf5_image("another kind", lambda file: None))
+    assert "a another kind, not a warpchain walk" in _refused(path)
 
 
 @pytest.mark.parametrize("kept", [0.999, 0.7, 0.3, 0.02])
@@ -286,20 +206,3 @@ def test_truncated_file_is_refused(kept: float, tmp_path: Path) -> None:
     content = path.read_bytes()
     path.write_bytes(content[: int(kept * len(content))])
     assert "damaged or cut short" in _refused(path)
-
-
-def test_flipped_bit_is_noticed(tmp_path: Path) -> None:
-    """Checksums reveal a single wrong bit in an array."""
-    path = tmp_path / "walk.h5"
-    make_walk().save(path)
-    with h5py.File(path) as file:
-        offset = file["frames/joints"].id.get_offset()
-    path.write_bytes(with_byte(path.read_bytes(), offset + 100, lambda byte: byte ^ 1))
-    assert "damaged or cut short (somewhere in its bytes 0 to " in _refused(path)
-
-
-def test_absent_file_is_named(tmp_path: Path) -> None:
-    """A file that isn't there is an OSError with its path and a remedy."""
-    with pytest.raises(OSError, match=r"none\.h5: cannot be read \(No such file or directory\); give") as caught:
-        load_walk(tmp_path / "none.h5")
-    assert "\n" not in str(caught.value)

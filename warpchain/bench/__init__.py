@@ -1,1 +1,1 @@
-"""Speed and accuracy, measured. Only the command line imports this."""
+"""The measurements of ``warpchain bench``: steps and errors of the methods, and walks a second."""

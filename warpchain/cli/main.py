@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NoReturn, Text
 import typer
 
 from warpchain.cli import completions
-from warpchain.cli.bench_commands import bench_app
+from warpchain.cli.bench_commands import bench
 from warpchain.cli.input_commands import parameters, schema
 from warpchain.cli.interrupts import INTERRUPTED, interrupts_heard
 from warpchain.cli.output_paths import output_path
@@ -320,7 +320,7 @@ add_commands(app)
 app.command()(animate)
 app.command()(parameters)
 app.command()(schema)
-app.add_typer(bench_app, name="bench")
+app.command()(bench)
 
 
 def _given_values(named: Mapping[str, str], assignments: Sequence[str]) -> Sections:

@@ -1,7 +1,6 @@
 """The commands of the command line that are about sweeps: sweep, info, plot, report, merge."""
 
 import contextlib
-import json
 import logging
 import os
 import sys
@@ -32,7 +31,7 @@ SWEEP_FILE: Final = typer.Argument(
     show_default=False,
 )
 SweepFile = Annotated[Path, SWEEP_FILE]
-Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a sweep.", show_default=False)]
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a sweep, or a merged file.", show_default=False)]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, in SI units, instead of a table.")]
 
 
@@ -127,27 +126,23 @@ def _write_new(path: Path, *, alone: bool) -> None:
 
 
 def info(
-    directory: Annotated[
-        Path, typer.Argument(metavar="DIR", help="Folder of a sweep, or a merged file.", show_default=False)
-    ],
+    directory: Folder,
     as_json: AsJson = False,
 ) -> None:
-    """Show how far a sweep is and what it has found so far; of a merged file, check every byte and show its counts."""
+    """Show how far a sweep is and what it has found so far; of a merged file, after its checksum is compared."""
     from warpchain.cli.terminal import print_sweep
     from warpchain.store.folder import running_rate
-    from warpchain.store.merged_file import check_merged
     from warpchain.store.sweep_result import load
 
-    if os.path.isfile(directory):
-        found = check_merged(directory)
-        print(json.dumps(found) if as_json else "\n".join(f"{name:20} {value}" for name, value in found.items()))
-        return
-    print_sweep(load(directory), as_json, running_rate(directory))
+    print_sweep(load(directory), as_json, None if os.path.isfile(directory) else running_rate(directory))
 
 
 def plot(
     path: Annotated[
-        Path, typer.Argument(metavar="PATH", help="Folder of a sweep, or file of a saved walk.", show_default=False)
+        Path,
+        typer.Argument(
+            metavar="PATH", help="Folder of a sweep, a merged file, or the file of a saved walk.", show_default=False
+        ),
     ],
     output: Annotated[
         Path | None,
@@ -171,9 +166,14 @@ def plot(
     Of a sweep: Figures 6 and 5, grids, tolerance, sensitivity, statuses. Of a walk: figure5.png, film_strip.png,
     loop.png, energy.png and, if the plane tilts, tilt.png; a line says what is left out and why.
     """
+    from warpchain.hdf5_files import kind_of_hdf5
     from warpchain.inputs.validation import InputError, printable
+    from warpchain.store.sweep_result import KIND
 
-    if os.path.isfile(path) or (path.suffix == ".h5" and not os.path.isdir(path)):
+    is_file = os.path.isfile(path)
+    if (
+        is_file and kind_of_hdf5(path, "give the folder of a sweep, a merged file, or the file of a saved walk") != KIND
+    ) or (path.suffix == ".h5" and not os.path.exists(path)):
         if quantity is not None:
             raise InputError("--quantity: a saved walk has no columns; leave it out, or give the folder of a sweep")
         if not plot_walk(path, output, kind):
@@ -184,12 +184,10 @@ def plot(
     from warpchain.cli.terminal import try_folder
     from warpchain.files import make_folder
     from warpchain.reports.sweep_figures import figures
-    from warpchain.store.manifest import check_not_own
     from warpchain.store.sweep_result import load
 
     result = load(path)
-    folder = output or path
-    check_not_own(path, folder.resolve())
+    folder = output or (path.parent if is_file else path)
     try_folder(folder)
     make_folder(folder)
     drawn = False
@@ -236,14 +234,15 @@ def report(
 
     if device is not None and walk is None:
         raise InputError("--device: no walk is run for this page; add --walk INDEX, or leave it out")
-    path = output or directory / "report.html"
+    path = output or (directory.parent if os.path.isfile(directory) else directory) / "report.html"
     write_report(directory, path, animation_of=walk, device=device)
     print(printable(str(path)))
 
 
 def merge(
     directories: Annotated[
-        list[Path], typer.Argument(metavar="DIR...", help="Folder of a sweep, or several.", show_default=False)
+        list[Path],
+        typer.Argument(metavar="DIR...", help="Folder of a sweep, or several; merged files, too.", show_default=False),
     ],
     output: Annotated[
         Path, typer.Argument(metavar="FILE.h5", parser=output_path, help="The file to write.", show_default=False)

@@ -16,7 +16,7 @@ Truth = bool | np.bool_
 
 Preset = Literal["paper", "soft"]
 """A key of `warpchain.inputs.parameters.PRESETS`."""
-Method = Literal["standard", "explicit", "reference", "rkf78", "dp5", "bs32", "os32", "rodas5p", "hybrid"]
+Method = Literal["standard", "explicit", "reference", "rkf78", "dp5", "bs32", "os32", "hybrid"]
 """What a user may write for `method`; see `warpchain.inputs.methods`."""
 Sampler = Literal["random", "sobol", "latin_hypercube", "saltelli"]
 """One of `warpchain.sweeps.designs.SAMPLERS`."""

@@ -76,7 +76,7 @@ class Options(Section):
     controller: Literal["standard", "pi"] = Field(
         default="standard",
         description="rule for the next step: standard takes the error of the last step, pi those of the last two; "
-        "rodas5p always takes two, hybrid one while joints are rigid",
+        "hybrid takes one while joints are rigid",
     )
     contact_step: float = number_field(
         2e-5, "s", "longest step near a contact; bounds how deep circles sink in before the contact is found", gt=0

@@ -193,13 +193,16 @@ class HeldWalk(Protocol):
 
     Attributes:
         setup: parameters, scene and options.
-        sprocket_center: centre of the sprocket x, y at the release [m], shape (2,); None without one.
         before_release: the motion on the sprocket just before the release; None if it was not kept.
     """
 
     setup: Setup
-    sprocket_center: Array | None
     before_release: BeforeRelease | None
+
+    @property
+    def sprocket_center(self) -> Array | None:
+        """Centre of the sprocket x, y at the release [m], shape (2,); None without one."""
+        ...
 
 
 def average_loop(walk: HeldWalk) -> StationaryLoop:

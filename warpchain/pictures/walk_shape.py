@@ -27,7 +27,6 @@ class Walk(HeldWalk, Protocol):
         center_velocity: its velocity [m/s], shape (t, 2).
         frame_time: times of the frames [s], shape (f,).
         frame_joints: joints x, y [m], shape (f, n, 2); joint i ends link i.
-        sprocket_radius: radius of the sprocket that links touch [m]; NaN without one.
     """
 
     status: Status
@@ -37,7 +36,11 @@ class Walk(HeldWalk, Protocol):
     center_velocity: Array
     frame_time: Array
     frame_joints: Array
-    sprocket_radius: float
+
+    @property
+    def sprocket_radius(self) -> float:
+        """Radius of the sprocket that links touch [m]; NaN without one."""
+        ...
 
 
 class EnergyWalk(Walk, Protocol):

@@ -9,7 +9,7 @@ from warpchain.pictures.labels import cell_text, cell_values
 from warpchain.pictures.style import LINE_COLORS, NothingToShow, Picture
 from warpchain.pictures.walk_figures import figure5
 from warpchain.store.sweep_result import SweepResult
-from warpchain.store.walk_motion import WalkMotion
+from warpchain.walks.walk_result import WalkResult
 
 MOST_CELLS: Final = len(LINE_COLORS) - 1
 """Greatest number of cells that are shown, each in its own colour."""
@@ -33,7 +33,7 @@ def sweep_figure5(result: SweepResult) -> Picture:
         if block.kept[place].any()
     ]
     chosen = np.unique(np.linspace(0, len(cells) - 1, MOST_CELLS).round().astype(int)) if cells else ()
-    walks: list[WalkMotion] = []
+    walks: list[WalkResult] = []
     labels: list[str] = []
     for block, place, samples in (cells[number] for number in chosen):
         released = (walk for sample in samples if len((walk := block.walk_motion((*place, int(sample)))).time))

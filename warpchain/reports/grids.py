@@ -11,7 +11,8 @@ from warpchain.pictures.labels import quantity_name
 from warpchain.pictures.style import NothingToShow, Picture
 from warpchain.reports.statistics import tolerance_agreement
 from warpchain.reports.sweep_series import has_series, several
-from warpchain.store.sweep_result import BlockResult, SweepResult
+from warpchain.store.block_result import BlockResult
+from warpchain.store.sweep_result import SweepResult
 from warpchain.walks.rows import quantity_of
 
 

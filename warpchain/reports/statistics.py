@@ -14,7 +14,8 @@ from warpchain.inputs.distributions import random_generator
 from warpchain.pictures.labels import cell_text, cell_values, number_text
 from warpchain.pictures.style import NothingToShow
 from warpchain.status import Status
-from warpchain.store.sweep_result import BlockResult, SweepResult
+from warpchain.store.block_result import BlockResult
+from warpchain.store.sweep_result import SweepResult
 from warpchain.sweeps.designs import saltelli_outputs, sobol_indices, walks_per_sample
 from warpchain.walks.rows import drawn_column
 

@@ -14,15 +14,16 @@ from typing import Any, Final
 import numpy as np
 import yaml
 
-from warpchain.files import checked_output, given_path, write_whole
+from warpchain.files import checked_output, write_whole
 from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.validation import InputError
 from warpchain.pictures.labels import axis_symbol, cell_text, cell_values, number_text, unit_text, with_unit
 from warpchain.pictures.walk_shape import Walk
 from warpchain.reports.html_page import page, pages_of, picture, table
 from warpchain.status import Status
-from warpchain.store.manifest import Folder, check_not_own
-from warpchain.store.sweep_result import BlockResult, SweepResult, load
+from warpchain.store.block_result import BlockResult
+from warpchain.store.manifest import Folder
+from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import load_sweep
 from warpchain.sweeps.recording import Recording
 from warpchain.version import VERSION
@@ -56,7 +57,6 @@ def write_report(
         InputError: there is no sweep in the folder, a shard is damaged or foreign, there is no such walk, or the file
             is one of the sweep's own.
     """
-    check_not_own(directory, given_path(path))
     result = load(directory)
     checked_output(path, _REPORTS)
     if animation_of is not None and not 0 <= animation_of < result.walk_count:

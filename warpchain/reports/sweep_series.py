@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from warpchain.pictures.labels import cell_values
 from warpchain.pictures.style import BLUE, GREEN, INK, LINE_COLORS, RED
-from warpchain.store.sweep_result import BlockResult, SweepResult
+from warpchain.store.block_result import BlockResult
+from warpchain.store.sweep_result import SweepResult
 
 Array = NDArray[np.float64]
 

@@ -191,19 +191,7 @@ def run_walk(
 def _values_of_walk(setup: Setup, keep: Keep, watch: Watch) -> tuple[dict[str, Any], float]:
     """Run a walk; returns what a `WalkResult` has of it, and the time [s] that its kernels took to compile."""
     ((_, run),) = run_setups([setup], keeps=[keep], watch=watch)
-    frame_time, frame_joints = run.recorder.frames()
-    frame_forces, frame_moments = run.recorder.frame_loads()
-    values = {
-        **run.outcome(),
-        **run.recorder.series(),
-        "frame_time": frame_time,
-        "frame_joints": frame_joints,
-        "frame_forces": frame_forces,
-        "frame_moments": frame_moments,
-        **run.recorder.frame_planes(),
-        "before_release": run.recorder.before,
-    }
-    return values, run.compile_time
+    return {**run.outcome(), **run.recorder.motion()}, run.compile_time
 
 
 def _frame_marks(frame_interval: float | None, options: Options) -> tuple[int | None, float]:

@@ -1,6 +1,6 @@
 """Runs a sweep: hands its shards to workers and follows their progress; a sweep that was killed can go on.
 
-A worker runs the walks of shards, writes each shard to an immutable file and returns only the keys of the shards. So
+A worker runs the walks of shards, writes each shard to an immutable file and returns nothing. So
 any executor in the style of ``concurrent.futures`` will do, on this machine or another that sees the same folder.
 """
 
@@ -28,13 +28,12 @@ from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text, p
 from warpchain.run.sweep_keywords import sweep_of_keywords
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
-from warpchain.store.manifest import Manifest, known_manifest
-from warpchain.store.shards import read_shard, shard_name, write_shard
+from warpchain.store.manifest import Shard
+from warpchain.store.shards import read_shard, write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
-from warpchain.walks.faulty_rows import faults_of_rows, lengths_of_blocks
-from warpchain.walks.motion import Motion
-from warpchain.walks.rows import Rows, fill_row, missing_rows
+from warpchain.walks.faulty_rows import LENGTHS, faults_of_columns, lengths_of_block
+from warpchain.walks.rows import derived_columns, fill_row, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
 
 SHARD_WALKS = 256
@@ -271,65 +270,58 @@ def shard_size(walks: int) -> int:
 
 def run_shards(
     planned: Sweep,
-    digest: str,
     directory: str,
-    shards: Sequence[range],
+    stamp: str,
+    shards: Sequence[Shard],
     threads: int | None = None,
     stop: threading.Event | None = None,
-) -> list[str]:
+) -> None:
     """Run the walks of some shards and write each shard as soon as its walks are over; what a worker does.
 
     Args:
         planned: The sweep, or a part of it that has these walks.
-        digest: Of the whole sweep.
         directory: The sweep's folder.
-        shards: The places of each shard.
+        stamp: What the folder has to be, see `SweepFolder.stamp`.
+        shards: The shards.
         threads: Of every block on a GPU; None: as many as its chain needs.
         stop: When set, the work is abandoned: unfinished shards are not written.
-
-    Returns:
-        Keys of the shards written.
     """
-    manifest = known_manifest(directory)
-    walks = list(planned.undrawn(index for shard in shards for index in manifest.walks(shard).tolist()))
-    rows = {shard: missing_rows(manifest.row_type, shard) for shard in shards}
+    walks = list(planned.undrawn(index for shard in shards for index in shard.walks.tolist()))
     with gpu_turn((walk.setup.options.device for walk in walks), stop):
         # all at once, and in this process: a walk that needs one would wait for it alone
         compile_kernels(one_of_each_kind(planned) if _is_on_gpu(planned) else [walk.setup for walk in walks], threads)
-        return _run_shards(planned, walks, rows, digest, directory, threads, stop)
+        _run_shards(planned, walks, directory, stamp, shards, threads, stop)
 
 
 def _run_shards(
     planned: Sweep,
     walks: Sequence[PlannedWalk],
-    rows: dict[range, Rows],
-    digest: str,
     directory: str,
+    stamp: str,
+    shards: Sequence[Shard],
     threads: int | None,
     stop: threading.Event | None,
-) -> list[str]:
-    """Run the walks of some shards, in which their rows are missing, see `run_shards`."""
+) -> None:
+    """Run the walks of some shards whose kernels are compiled, see `run_shards`."""
     under_way: dict[int, PlannedWalk] = {}
-    shards = list(rows)
-    stored = [(shard, place) for shard in shards for place in shard]
+    rows = {shard: missing_rows(shard.kind, shard.keys) for shard in shards}
+    motions: dict[Shard, dict[int, dict[str, Any]]] = {shard: {} for shard in shards}
     left = {shard: len(shard) for shard in shards}
-    motions: dict[range, dict[int, Motion]] = {shard: {} for shard in shards}
+    stored = [(shard, row) for shard in shards for row in range(len(shard))]
     setups, keeps = [walk.setup for walk in walks], [planned.keep(walk) for walk in walks]
-    keys = []
 
     def draw(number: int) -> Setup:
         under_way[number] = planned.drawn(walks[number])
         return under_way[number].setup
 
     for number, run in run_setups(setups, draw=draw, keeps=keeps, threads=threads, stop=stop):
-        shard, place = stored[number]
-        fill_row(rows[shard][place - shard.start], run.outcome(), under_way.pop(number).drawn)
+        shard, row = stored[number]
+        fill_row(rows[shard][row], run.outcome(), under_way.pop(number).drawn)
         if keeps[number].series_every is not None:
-            motions[shard][place] = run.motion
+            motions[shard][row] = run.recorder.motion()
         left[shard] -= 1
         if left[shard] == 0:
-            keys.append(write_shard(directory, digest, shard, rows.pop(shard), motions.pop(shard)))
-    return keys
+            write_shard(directory, stamp, shard, rows.pop(shard), motions.pop(shard))
 
 
 @contextlib.contextmanager
@@ -374,7 +366,7 @@ def _run(
     stop: threading.Event | None,
     planned: Sweep,
     store: SweepFolder,
-    missing: Sequence[range],
+    missing: Sequence[Shard],
     workers: int,
     progress: SweepProgress,
     report: OnProgress,
@@ -383,42 +375,47 @@ def _run(
     report(progress)
     began = time.perf_counter()
     threads = _shared_threads(planned)
-    waiting = _tasks(planned, store.manifest, missing, workers if stop is None else 1)  # threads take turns on a GPU
-    folder, digest, manifest = store.directory / "shards", planned.digest(), store.manifest
-    pending: dict[concurrent.futures.Future[list[str]], list[range]] = {}  # with the shards still to be counted
+    waiting = _tasks(planned, missing, workers if stop is None else 1)  # threads take turns on a GPU
+    folder, stamp = store.directory / "shards", store.stamp
+    pending: dict[concurrent.futures.Future[None], list[Shard]] = {}  # with the shards still to be counted
 
     def submit() -> bool:
         task = next(waiting, None)
         if task is None:
             return False
-        part = planned.part(np.concatenate([manifest.walks(shard) for shard in task]))
-        given = (part, digest, str(store.directory), tuple(task), threads, stop)
+        part = planned.part(np.concatenate([shard.walks for shard in task]))
+        given = (part, str(store.directory), stamp, tuple(task), threads, stop)
         with losses_named():
             pending[executor.submit(run_shards, *given)] = task
         return True
 
-    lengths = lengths_of_blocks(
-        (content, block.shape) for content, block in zip(planned.canonical()["blocks"], planned.blocks, strict=True)
-    )
+    blocks = [
+        lengths_of_block(content, layout.shape)
+        for content, layout in zip(store.manifest.sweep["blocks"], store.manifest.blocks, strict=True)
+    ]
+    lengths = {name: np.concatenate([block[name].ravel() for block in blocks]) for name in LENGTHS}
     while len(pending) < 2 * workers and submit():
         pass
     try:
         while pending:
             finished, _ = concurrent.futures.wait(pending, POLL, concurrent.futures.FIRST_COMPLETED)
-            written: list[range] = []
+            written: list[Shard] = []
             for future in finished:
                 written += pending.pop(future)
                 with losses_named():
                     future.result()
                 submit()
             for task in pending.values():
-                there = [shard for shard in task if (folder / shard_name(shard)).exists()]
+                there = [shard for shard in task if (folder / shard.name).exists()]
                 task[:] = [shard for shard in task if shard not in there]
                 written += there
             for shard in written:
-                rows = read_shard(store.directory, store.manifest, shard)
+                rows = read_shard(store.directory, shard)
+                columns = {name: rows[name] for name in rows.dtype.names or ()}
+                own = {name: values[shard.walks] for name, values in lengths.items()}
+                found = faults_of_columns(columns | derived_columns(columns), own)
                 progress.statuses.update(Status(int(code)).label for code in rows["status"])
-                progress.inaccurate += int(np.any([*faults_of_rows(rows, lengths).values()], axis=0).sum())
+                progress.inaccurate += int(np.any([*found.values()], axis=0).sum())
                 progress.done += len(shard)
             progress.seconds = time.perf_counter() - began
             if written:
@@ -428,14 +425,14 @@ def _run(
             future.cancel()
 
 
-def _tasks(planned: Sweep, manifest: Manifest, missing: Sequence[range], gpus: int) -> Iterator[list[range]]:
+def _tasks(planned: Sweep, missing: Sequence[Shard], gpus: int) -> Iterator[list[Shard]]:
     """The shards of each task: one on a CPU; on a GPU enough to fill it, if there are enough.
 
     Neighbouring shards are alike, and a GPU has few tasks. So each task takes every n-th shard, and all take equally
     long.
     """
-    for_gpus: list[range] = []
-    firsts = planned.undrawn(int(manifest.walks(shard)[0]) for shard in missing)
+    for_gpus: list[Shard] = []
+    firsts = planned.undrawn(int(shard.walks[0]) for shard in missing)
     for shard, first in zip(missing, firsts, strict=True):
         if on_gpu(first.setup.options.device):
             for_gpus.append(shard)

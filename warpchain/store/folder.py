@@ -2,29 +2,27 @@
 
     DIR/sweep.json     what the folder belongs to, see `Manifest`; written first, replaced when the sweep grows
     DIR/sweep.yaml     the resolved sweep, for people and to run again
-    DIR/shards/        000000000-000000063.h5 holds walks 0 … 63, and their series and frames if they are kept
+    DIR/shards/        0-000003.h5 holds the rows of some walks, 0-000003-motion.h5 what is kept of their motion
     DIR/log.txt        what the runs of the sweep did, with times
     DIR/lock           locked by the process that runs the sweep; the system unlocks it when that ends
 
 None of these is a symbolic link when a sweep is run: nothing is written or deleted outside of the folder. A damaged
 shard is deleted, named in log.txt and by a warning, and computed again.
 
-A sweep grows when its file is given more samples: the walks that are there keep their shards, see
+A sweep grows when its file is given more samples: the shards that are there stay, 1-000000.h5 and so on join them, see
 `warpchain.store.manifest`. Whatever happens between two of these lines, the next `SweepFolder.open` goes on from there.
 """
 
 import datetime
-import errno
 import fcntl
 import os
 import re
-import secrets
 import shutil
 import socket
 import stat
 import time
 import warnings
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Self
@@ -32,32 +30,22 @@ from typing import Final, Self
 import numpy as np
 import yaml
 
-from warpchain.files import failure, given_path
+from warpchain.files import given_path, make_folder, naming, remove_output, write_whole
 from warpchain.hdf5_files import open_regular
 from warpchain.inputs.validation import DamagedFileError, InputError, InputWarning
-from warpchain.store.manifest import NUMERICS_VERSION, OWN, Folder, Manifest, read_manifest
-from warpchain.store.shards import present_shards, put_file, read_shard, writing
+from warpchain.store.manifest import OWN, Folder, Manifest, Shard, read_manifest
+from warpchain.store.shards import check_shard, present_shards, read_shard, stamp
 from warpchain.sweeps.designs import EXTENSIBLE
 from warpchain.sweeps.plan import Sweep
-from warpchain.walks.motion import SERIES
+from warpchain.version import NUMERICS_VERSION
 from warpchain.walks.rows import Rows
-
-SHARD_OVERHEAD: Final = 16 * 1024
-"""Bytes that a shard takes at most beside its rows."""
-
-SHORT_WALK: Final = 0.5
-"""Time [s] that few walks are shorter than."""
-SAMPLE_BYTES: Final = 8 * len(SERIES)
-"""Bytes of a sample of a series."""
 
 LOCK_TRIES: Final = 5
 """Tries to lock a folder: `running_rate` of another process holds the lock for a moment."""
 LOCK_PAUSE: Final = 0.02
 """Time [s] between two of them."""
 
-_PART: Final = re.compile(r"\.(?:sweep|\d{9,}-\d{9,})\.[0-9a-f]{8}\.part\.(?:json|yaml|h5)")
-_DISCARDED: Final = re.compile(r"\.discarded-[0-9a-f]{8}")
-
+_PART: Final = re.compile(r"\.(?:sweep|\d+-\d{6,}(?:-motion)?)\.[0-9a-f]{8}\.part\.(?:json|yaml|h5)")
 _HOLDER: Final = re.compile(r"process \d+ on \S*")
 
 _FAST_DUMPER: Final = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
@@ -84,6 +72,11 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
     manifest: Manifest
     lock: int
 
+    @property
+    def stamp(self) -> str:
+        """What `write_shard` wants of a worker."""
+        return stamp(self.directory)
+
     @classmethod
     def open(cls, directory: Folder, sweep: Sweep, *, fresh: bool = False, shard_size: int) -> Self:
         """Begin a sweep in a folder, or go on with it, with more samples if the sweep has more than the folder.
@@ -96,22 +89,17 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
                 shards that a folder has keep their size.
 
         Raises:
-            OSError: the folder cannot be made, locked, read or written, or the disk is too full for the rest of
-                the sweep.
+            OSError: the folder cannot be made, locked, read or written.
             InputError: another process holds the folder, it belongs to another sweep or to something else, or a
                 shard is foreign. Nothing has been deleted.
-            ValueError: the shard size is not positive.
 
         Warns:
             InputWarning: a shard was damaged; its walks are missing now.
         """
-        if shard_size < 1:
-            raise ValueError(f"shard_size: {shard_size} is not positive; give 1 or more")
         path = given_path(directory)
-        with writing(path):
-            path.mkdir(parents=True, exist_ok=True)
-            _refuse_links(path)
-            lock = _locked(path)
+        make_folder(path)
+        _refuse_links(path)
+        lock = _locked(path)
         try:
             folder = cls(path, _prepared(path, sweep, Manifest.of(sweep, shard_size), fresh), lock)
             folder._check()
@@ -125,15 +113,13 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         """Add a line with the time to log.txt; an `OSError` if it cannot be written."""
         path = self.directory / "log.txt"
         now = datetime.datetime.now().astimezone().isoformat(timespec="seconds")
-        with writing(path):
-            descriptor = _opened_own(path, os.O_WRONLY | os.O_APPEND)
-            with open(descriptor, "a", encoding="utf-8") as file:
-                file.write(f"{now}  {text}\n")
+        with naming(path), open(_opened_own(path, os.O_WRONLY | os.O_APPEND), "a", encoding="utf-8") as file:
+            file.write(f"{now}  {text}\n")
 
-    def missing(self) -> list[range]:
-        """The places of each shard that is not there yet, in order; errors as of `present_shards`."""
-        present = present_shards(self.directory, self.manifest)
-        return [places for places in self.manifest.shards if places not in present]
+    def missing(self) -> list[Shard]:
+        """The shards that are not there yet, in order; errors as of `present_shards`."""
+        present = {shard.name for shard in present_shards(self.directory, self.manifest)}
+        return [shard for shard in self.manifest.shards if shard.name not in present]
 
     def close(self) -> None:
         """Let other processes have the folder."""
@@ -144,54 +130,35 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         self.close()
 
     def _check(self) -> None:
-        """Refuse what would fail later: foreign shards, a folder that cannot be written, a disk too full."""
+        """Refuse a folder with foreign shards, and delete damaged ones."""
         problems, bad = [], {}
-        for places, path in present_shards(self.directory, self.manifest).items():
+        for shard in present_shards(self.directory, self.manifest):
             try:
-                read_shard(self.directory, self.manifest, places)
+                check_shard(self.directory, shard)
             except DamagedFileError as error:
-                bad[path] = str(error).partition("; ")[0]
+                bad[shard] = str(error).partition("; ")[0]
             except InputError as error:
                 problems.append(str(error))
         if problems:
             raise InputError(problems[0] + (f" (and {len(problems) - 1} more)" if problems[1:] else ""))
-        for path, problem in bad.items():
-            with writing(path):
-                path.unlink()
+        for shard, problem in bad.items():
+            for name in reversed(shard.files):
+                remove_output(self.directory / "shards" / name)
             self.log(f"{problem}; deleted, its walks are computed again")
             warnings.warn(f"{problem}; its walks are computed again", InputWarning, stacklevel=4)
-        left = self.missing()
-        if not left:
-            return
-        shards = self.directory / "shards"
-        probe = shards / f".{'0' * 9}-{'0' * 9}.{secrets.token_hex(4)}.part.h5"
-        with writing(shards):
-            probe.touch()
-            probe.unlink()
-            free = shutil.disk_usage(shards).free
-        manifest, series = self.manifest, self.manifest.recording.series
-        need = sum(len(places) * manifest.row_type.itemsize + SHARD_OVERHEAD for places in left)
-        if series is not None:  # of short walks, and without frames
-            kept = sum(map(len, left)) / manifest.walk_count * manifest.kept_count
-            need += round(kept * SHORT_WALK / series.interval * SAMPLE_BYTES)
-        if need > free:
-            raise failure(
-                errno.ENOSPC,
-                f"{self.directory}: the rest of the sweep takes {need / 1e6:.3g} MB, but {free / 1e6:.3g} MB are "
-                "free; make room and start again, shards written are kept",
-            )
 
     def _describe(self) -> None:
         """Write what the folder says of its sweep, if that is new; sweep.yaml is never older than sweep.json."""
         description = self.directory / "sweep.yaml"
-        if read_manifest(self.directory).earlier != self.manifest.earlier:
-            with writing(description):
-                description.unlink(missing_ok=True)
-            put_file(self.directory / "sweep.json", self.manifest.text().encode())
+        if read_manifest(self.directory).growth != self.manifest.growth:
+            remove_output(description)
+            write_whole(self.directory / "sweep.json", self.manifest.text())
         if not description.exists():
-            dumper = _FAST_DUMPER if self.manifest.name.isascii() else yaml.SafeDumper  # they fold other text otherwise
+            dumper = (
+                _FAST_DUMPER if self.manifest.sweep["name"].isascii() else yaml.SafeDumper
+            )  # they fold other text otherwise
             text = yaml.dump(self.manifest.sweep, Dumper=dumper, sort_keys=False, allow_unicode=True)
-            put_file(description, (_YAML_HEAD + text).encode())
+            write_whole(description, _YAML_HEAD + text)
 
 
 def read_rows(directory: Folder, manifest: Manifest) -> Rows:
@@ -201,12 +168,9 @@ def read_rows(directory: Folder, manifest: Manifest) -> Rows:
         OSError: the folder or a shard cannot be read.
         InputError: a shard is damaged or foreign.
     """
-    parts = [np.empty(0, manifest.row_type)]
-    for places in present_shards(directory, manifest):
-        parts.append(read_shard(directory, manifest, places))
-        parts[-1]["index"] = manifest.walks(places)
-    rows = np.concatenate(parts)
-    return rows[np.argsort(rows["index"])]
+    shards = present_shards(directory, manifest)
+    rows = np.concatenate([np.empty(0, manifest.row_type), *(read_shard(directory, shard) for shard in shards)])
+    return rows[np.argsort(manifest.numbers(rows))]
 
 
 def running_rate(directory: Folder) -> float | None:
@@ -224,7 +188,8 @@ def running_rate(directory: Folder) -> float | None:
             began = os.fstat(lock.fileno()).st_mtime
             fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
-        done = sum(len(places) for places, path in present.items() if path.stat().st_mtime >= began)
+        folder = Path(directory) / "shards"
+        done = sum(len(shard) for shard in present if (folder / shard.name).stat().st_mtime >= began)
         return done / max(time.time() - began, 1e-3)
     except FileNotFoundError:
         pass
@@ -243,15 +208,13 @@ def _prepared(folder: Path, sweep: Sweep, manifest: Manifest, fresh: bool) -> Ma
         for name in OWN:
             if (folder / name).exists():
                 raise InputError(f"{folder / name}: in the way of a sweep; give another folder")
-        put_file(named, manifest.text().encode())
+        write_whole(named, manifest.text())
     elif fresh:
         _discard(folder, read_manifest(folder))
-        put_file(named, manifest.text().encode())
-        _clear_leftovers(folder)
+        write_whole(named, manifest.text())
     else:
         manifest = _continued(folder, sweep, manifest)
-    with writing(folder / "shards"):
-        (folder / "shards").mkdir(exist_ok=True)
+    make_folder(folder / "shards")
     return manifest
 
 
@@ -269,10 +232,10 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
         )
     if found.digest == manifest.digest:
         return found
-    there = [block["samples"] for block in found.sweep["blocks"]]
+    there = list(found.growth[-1].samples)
     if len(there) != len(sweep.blocks) or sweep.digest(there) != found.digest:
         raise InputError(
-            f"{folder}: holds another sweep ({found.name}), or this one before it was changed; "
+            f"{folder}: holds another sweep ({found.sweep['name']}), or this one before it was changed; "
             "give another folder, or start anew with --fresh, which deletes what is there"
         )
     for count, block in zip(there, manifest.sweep["blocks"], strict=True):
@@ -291,25 +254,21 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
 
 
 def _discard(folder: Path, manifest: Manifest) -> None:
-    """Delete what a sweep left, the shards in one step; nothing if there is a foreign file among them."""
+    """Delete what a sweep left, its shards first; nothing if there is a foreign file among them."""
     present_shards(folder, manifest)
-    with writing(folder):
-        with suppress(FileNotFoundError):
-            os.rename(folder / "shards", folder / f".discarded-{secrets.token_hex(4)}")
+    with naming(folder):
+        shutil.rmtree(folder / "shards", ignore_errors=not (folder / "shards").exists())
         for name in ("sweep.yaml", "log.txt"):
             (folder / name).unlink(missing_ok=True)
 
 
 def _clear_leftovers(folder: Path) -> None:
-    """Delete what a killed process left unfinished: parts of files, and shards that it was deleting."""
-    with writing(folder):
+    """Delete the parts of files that a killed process left."""
+    with naming(folder):
         for place in (folder, folder / "shards"):
             for path in place.iterdir() if place.is_dir() else ():
-                is_folder = path.is_dir() and not path.is_symlink()
-                if _PART.fullmatch(path.name) and not is_folder:
+                if _PART.fullmatch(path.name) and (path.is_symlink() or not path.is_dir()):
                     path.unlink(missing_ok=True)
-                elif _DISCARDED.fullmatch(path.name) and place == folder:
-                    shutil.rmtree(path) if is_folder else path.unlink()
 
 
 def _refuse_links(folder: Path) -> None:
@@ -324,7 +283,8 @@ def _refuse_links(folder: Path) -> None:
 
 def _opened_own(path: Path, flags: int) -> int:
     """A descriptor of a file that a sweep writes to, made if need be; an `InputError` if it is no regular file."""
-    descriptor = os.open(path, flags | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
+    with naming(path):
+        descriptor = os.open(path, flags | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
         raise InputError(f"{path}: a pipe or a device in the way of a sweep; give another folder")

@@ -2,8 +2,14 @@
 
 from typing import Any, Final
 
-from warpchain.walks.energy_error import ENERGY_REMEDY, MOST_ENERGY_ERROR
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
+MOST_ENERGY_ERROR: Final = 0.05
+"""Greatest energy error of a walk that nothing warns of."""
+ENERGY_REMEDY: Final = (
+    f"more than {100 * MOST_ENERGY_ERROR:g} % of the energy at release is unaccounted for; lower options.tolerance"
+)
 FAULTS: Final = {
     "energy": ENERGY_REMEDY,
     "opening": "joints opened by more than a link length, so that the chain came apart; lower the masses or "
@@ -11,6 +17,12 @@ FAULTS: Final = {
     "penetration": "circles sank in by more than their radius, through what they touched; lower options.contact_step",
 }
 """Faults of a walk, each with what it means and what to try."""
+
+
+def energy_error(at_release: ArrayLike, residual: ArrayLike) -> NDArray[np.float64]:
+    """Size of the energy unaccounted for [J], relative to kinetic and potential energy at release; NaN before it."""
+    energy = np.asarray(at_release, np.float64)
+    return np.abs(residual) / np.where(energy > 0, energy, np.nan)
 
 
 def faults(energy_error: Any, opening: Any, penetration: Any, link_length: Any, circle_radius: Any) -> dict[str, Any]:

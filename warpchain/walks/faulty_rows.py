@@ -1,4 +1,4 @@
-"""Which walks of a sweep are inaccurate, by their rows."""
+"""Which walks of a sweep are inaccurate, by their columns."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from warpchain.engine.tallies import CONTACTS
 from warpchain.inputs.parameters import preset
 from warpchain.walks.faults import FAULTS, faults
-from warpchain.walks.rows import Rows, drawn_column
+from warpchain.walks.rows import drawn_column
 
 LENGTHS: Final = ("link_length", "circle_radius")
 """Against which openings and penetrations are held."""
@@ -34,12 +34,6 @@ def lengths_of_block(block: Mapping[str, Any], shape: Sequence[int]) -> dict[str
     return found
 
 
-def lengths_of_blocks(blocks: Iterable[tuple[Mapping[str, Any], Sequence[int]]]) -> dict[str, NDArray[Any]]:
-    """The same of each walk of a sweep, in the order of their numbers; ``blocks``: arguments of `lengths_of_block`."""
-    found = [lengths_of_block(*block) for block in blocks]
-    return {name: np.concatenate([lengths[name].ravel() for lengths in found]) for name in LENGTHS}
-
-
 def faults_of_columns(
     columns: Mapping[str, NDArray[Any]], lengths: Mapping[str, NDArray[Any]]
 ) -> dict[str, NDArray[np.bool_]]:
@@ -55,12 +49,6 @@ def faults_of_columns(
             own[name] = np.where(np.isnan(columns[column]), own[name], columns[column])
     deepest = np.max([columns[f"penetration_{kind}"] for kind in CONTACTS], axis=0)
     return faults(columns["energy_error"], columns["greatest_opening"], deepest, **own)
-
-
-def faults_of_rows(rows: Rows, lengths: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[np.bool_]]:
-    """The same of rows, of which some may be missing; `lengths` of all walks of the sweep."""
-    columns = {name: rows[name] for name in rows.dtype.names or ()}
-    return faults_of_columns(columns, {name: values[rows["index"]] for name, values in lengths.items()})
 
 
 def fault_remedies(blocks: Iterable[Mapping[str, NDArray[np.bool_]]]) -> dict[str, int]:

@@ -1,7 +1,7 @@
 """Takes the time series and frames of a walk out of its world, between launches."""
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,24 +9,11 @@ from numpy.typing import NDArray
 from warpchain.engine.batch import Batch
 from warpchain.kernels import layout
 from warpchain.loop.before_release import BeforeRelease
-from warpchain.walks.motion import Keep, Motion
+from warpchain.walks.motion import Keep
 from warpchain.walks.moving_plane import angles, frame_axes
+from warpchain.walks.walk_result import BEFORE, MOTION
 
 Array = NDArray[np.float64]
-
-MOTION_COLUMNS: Final = [layout.TIME, layout.CENTER_X, layout.CENTER_Y, layout.CENTER_U, layout.CENTER_V]
-"""Columns of a sample that are those of `warpchain.walks.motion.SERIES`."""
-RESULT_COLUMNS: Final[dict[str, int | list[int]]] = {
-    "time": layout.TIME,
-    "center": [layout.CENTER_X, layout.CENTER_Y],
-    "center_velocity": [layout.CENTER_U, layout.CENTER_V],
-    "kinetic_energy": layout.KINETIC,
-    "gravitational_energy": layout.GRAVITATIONAL,
-    "spring_energy": layout.SPRING,
-    "lowest": layout.LOWEST,
-    "rms_speed": layout.RMS_SPEED,
-}
-"""Time series of a `WalkResult` → columns of a sample."""
 
 
 @dataclass(frozen=True)
@@ -118,13 +105,13 @@ class Recorder:
         )
         oldest = max(moment - self.keep.before, earliest)
         is_wanted = (samples[:, layout.TIME] >= oldest) & (samples[:, layout.TIME] < moment)
-        samples = samples[is_wanted][:, MOTION_COLUMNS]
+        samples = samples[is_wanted]
         wanted = (times >= oldest) & (times < moment)
         raise_by = np.array([0.0, raised])
         self.before = BeforeRelease(
-            time=samples[:, 0] - moment,
-            center=samples[:, 1:3] + raise_by,
-            center_velocity=samples[:, 3:5],
+            time=samples[:, layout.TIME] - moment,
+            center=samples[:, [layout.CENTER_X, layout.CENTER_Y]] + raise_by,
+            center_velocity=samples[:, [layout.CENTER_U, layout.CENTER_V]],
             frame_time=times[wanted] - moment,
             frame_joints=frames[wanted] + raise_by,
             frame_forces=loads[wanted, :, :2],
@@ -146,59 +133,26 @@ class Recorder:
         is_there = len(kept) == 0 or kept[-1, layout.TIME] == self._last[0, layout.TIME]
         return kept if is_there else np.concatenate([kept, self._last])
 
-    def series(self) -> dict[str, Any]:
-        """Time series by the names of the fields of `WalkResult`."""
-        samples = self.samples()
-        return {name: samples[:, columns] for name, columns in RESULT_COLUMNS.items()} | self._plane_series(samples)
-
-    def _plane_series(self, samples: Array) -> dict[str, Array]:
-        """Place across the way and angles of the plane, (t,) each; (0,) if the plane is fixed."""
-        if not self._tilts:
-            samples = np.empty((0, layout.ALL_COLUMNS))
-        tilt, yaw = angles(samples[:, layout.PLANE_COLUMN :])
-        return {"center_z": samples[:, layout.CENTER_Z], "tilt": tilt, "yaw": np.unwrap(yaw)}
-
-    def frame_planes(self) -> dict[str, Any]:
-        """Origin (f, 3) [m] and axes (f, 2, 3) of the plane in the room in each frame; f = 0 if the plane is fixed."""
+    def motion(self) -> dict[str, Any]:
+        """The arrays of a `WalkResult` by name, and its `before_release`."""
+        samples, links = self.samples(), self._batch.links[self._world]
+        tilting = samples if self._tilts else np.empty((0, layout.ALL_COLUMNS))
+        tilt, yaw = angles(tilting[:, layout.PLANE_COLUMN :])
+        loads = np.concatenate([np.empty((0, links, 3)), *self._loads])
         planes = np.concatenate([np.empty((0, layout.PLANE_VALUES)), *(self._planes if self._tilts else [])])
-        return {"frame_origin": planes[:, layout.ORIGIN : layout.ORIGIN + 3], "frame_axes": frame_axes(planes)}
-
-    def frames(self) -> tuple[Array, Array]:
-        """Times of the frames (f,) [s], joint positions (f, n, 2) [m]."""
-        return (
-            np.concatenate([np.empty(0), *self._frame_times]),
-            np.concatenate([np.empty((0, self._batch.links[self._world], 2)), *self._frames]),
-        )
-
-    def frame_loads(self) -> tuple[Array, Array]:
-        """Joint forces (f, n, 2) [N] and moments (f, n) [N m] of each frame; f = 0 if they are not kept."""
-        loads = np.concatenate([np.empty((0, self._batch.links[self._world], 3)), *self._loads])
-        return loads[:, :, :2], loads[:, :, 2]
-
-    def motion(self, sprocket_height: float) -> Motion:
-        """What a sweep keeps of the walk."""
-        times, frames = self.frames()
-        samples = self.samples()
-        series, joints = samples[:, MOTION_COLUMNS], frames.astype(np.float32)
-        planes = self.frame_planes()
-        plane_series = np.stack(list(self._plane_series(samples).values()), axis=-1)
-        frame_planes = np.concatenate([planes["frame_origin"], planes["frame_axes"].reshape(-1, 6)], axis=1)
-        for array in (
-            series,
-            joints,
-            plane_series,
-            frame_planes,
-        ):  # which NaN a failed walk has may depend on the batch
-            array[np.isnan(array)] = np.nan
-        return Motion(
-            series=series,
-            frame_time=times,
-            frame_joints=joints,
-            plane_series=plane_series,
-            frame_planes=frame_planes,
-            sprocket_height=sprocket_height,
-            before_release=None if self.before is None else self.before.as_type(np.float32),
-        )
+        return {
+            **{name: samples[:, stored.sample] for name, stored in MOTION.items() if stored.sample is not None},
+            "center_z": tilting[:, layout.CENTER_Z],
+            "tilt": tilt,
+            "yaw": np.unwrap(yaw),
+            "frame_time": np.concatenate([np.empty(0), *self._frame_times]),
+            "frame_joints": np.concatenate([np.empty((0, links, 2)), *self._frames]),
+            "frame_forces": loads[:, :, :2],
+            "frame_moments": loads[:, :, 2],
+            "frame_origin": planes[:, layout.ORIGIN : layout.ORIGIN + 3],
+            "frame_axes": frame_axes(planes),
+            BEFORE: self.before,
+        }
 
 
 def _ends_before(piece: _Piece, moment: float) -> bool:

@@ -1,102 +1,137 @@
-"""Rows of a sweep: what one walk leaves, as a NumPy structure."""
+"""Rows of a sweep: the numbers of each walk, keyed by its block, its cell and its sample."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any, Final
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Final, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.engine.tallies import CONTACTS, LOST
+from warpchain.engine.tallies import LOST
 from warpchain.inputs.distributions import DRAWABLE
 from warpchain.inputs.sections import SECTION_OF, SECTIONS
 from warpchain.inputs.validation import field_unit
-from warpchain.walks.energy_error import ENERGY_ERROR, MOST_ENERGY_ERROR, energy_error
-from warpchain.walks.walk_result import STORED
+from warpchain.walks.faults import MOST_ENERGY_ERROR, energy_error
+from warpchain.walks.walk_result import NUMBERS, WalkResult
 
 Rows = NDArray[np.void]
 
-_DRAWN: Final = "_drawn"
+KEYS: Final = np.dtype([("block", "<i4"), ("cell", "<i4"), ("sample", "<i4")])
+"""What a row is found by: number of its block, of its cell in C order over the axes, of its sample in the cell."""
 
 MISSING: Final = -1
 """Status of a walk that has not been computed yet; no code of `Status` is negative."""
 
+_DRAWN: Final = "_drawn"
+_PREFIXES: Final = {"impulses": "impulses", "greatest_penetration": "penetration", "energy": "energy"}
+"""Field that is a dictionary → how the names of its columns begin."""
+_ONLY_OF_A_WALK: Final = ("wall_time",)
+"""Fields that are no columns: a number of a sweep is the same however its walk was computed."""
+
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the rows.
+    """A column of a sweep.
 
     Attributes:
         kind: its type in NumPy's notation.
         unit: SI unit, "1" for pure numbers.
         meaning: one line saying what the numbers are.
+        field: field of `WalkResult` that it is of; "" for none.
+        key: key in that field, if it is a dictionary, else "".
     """
 
     kind: str
     unit: str
     meaning: str
+    field: str = ""
+    key: str = ""
 
 
-def _flat(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Something for each field of `WalkResult`, by names of columns: a column for each key of a dictionary."""
-    flat = dict(fields)
-    for prefix, name in (("impulses", "impulses"), ("penetration", "greatest_penetration")):
-        flat |= {f"{prefix}_{kind}": value for kind, value in fields[name].items()}
-    return flat | {f"{'loss' if key in LOST else 'energy'}_{key}": value for key, value in fields["energy"].items()}
+def _stored_columns() -> Iterator[tuple[str, Column]]:
+    """The columns of the fields of `WalkResult`."""
+    types = {item.name: get_args(item.type) for item in fields(WalkResult)}
+    for name, stored in NUMBERS.items():
+        if name in _ONLY_OF_A_WALK:
+            continue
+        kind = "<i8" if types[name][0] in (int, dict[str, int]) else "<f8"
+        for key, meaning in (stored.keys or {"": stored.meaning}).items():
+            prefix = "loss" if name == "energy" and key in LOST else _PREFIXES.get(name, name)
+            yield f"{prefix}_{key}" if key else name, Column(kind, stored.unit, meaning, name, key)
 
 
-_NOTES: Final = {
-    "index": ("1", "number of the walk in its sweep"),
-    "status": ("1", f"code of what ended the walk; {MISSING} while it is missing"),
-    "energy_at_release": ("J", "energy at release, kinetic and potential"),
-    "energy_error": ("1", f"{ENERGY_ERROR}; above {MOST_ENERGY_ERROR} the walk is inaccurate"),
-    **_flat(
-        {
-            name: {key: (stored.unit, meaning) for key, meaning in stored.keys.items()} or (stored.unit, stored.meaning)
-            for name, stored in STORED.items()
-        }
+STORED_COLUMNS: Final = dict(_stored_columns())
+"""Columns that shards keep, beside keys, status and what is drawn."""
+COLUMNS: Final = {
+    "index": Column("<i8", "1", "number of the walk in its sweep"),
+    "status": Column("<i1", "1", f"code of what ended the walk; {MISSING} while it is missing"),
+    **STORED_COLUMNS,
+    "energy_at_release": Column("<f8", "J", "energy at release, kinetic and potential"),
+    "energy_error": Column(
+        "<f8",
+        "1",
+        "size of the energy unaccounted for, |residual|, relative to kinetic and potential at release; above "
+        f"{MOST_ENERGY_ERROR} the walk is inaccurate",
     ),
 }
-_KINDS: Final = {
-    "index": "<i8",
-    "status": "<i1",
-    **dict.fromkeys(("dx", "walk_time", "simulated_time", "hold_time", "drift", "softened_at"), "<f8"),
-    **dict.fromkeys(("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at"), "<f8"),
-    **dict.fromkeys(("fell_over", "fell_before_collapse"), "<i1"),
-    **dict.fromkeys(("self_contact_at", "flight_before_self_contact", "collapsed_at", "flight_before_collapse"), "<f8"),
-    **dict.fromkeys(("bounces", "bounces_before_self_contact", "bounces_before_collapse"), "<i4"),
-    **dict.fromkeys(("steps_accepted", "steps_rejected", *(f"impulses_{kind}" for kind in CONTACTS)), "<i8"),
-    **dict.fromkeys(("greatest_opening", *(f"penetration_{kind}" for kind in CONTACTS)), "<f8"),
-    **dict.fromkeys(
-        ("energy_at_release", *(f"loss_{name}" for name in LOST), "energy_residual", "energy_error"), "<f8"
-    ),
-}
-COLUMNS: Final = {name: Column(kind, *_NOTES[name]) for name, kind in _KINDS.items()}
 """Columns of every sweep; behind them comes one for each quantity that the sweep draws, see `drawn_column`.
 
-A number is the same however its walk was computed, so there is no wall time. What is missing, or does not
-exist (the distance of a walk that failed), is NaN in a column of floats and −1 in one of integers.
+What is missing, or does not exist (the distance of a walk that failed), is NaN in a column of floats and −1 in one of
+integers.
 """
 
-ROW: Final = np.dtype([(name, column.kind) for name, column in COLUMNS.items()])
-"""Type of a row of a sweep that draws nothing."""
+
+def row_type(drawn: Iterable[str]) -> np.dtype[np.void]:
+    """Type of a row.
+
+    Args:
+        drawn: quantities that some block of the sweep draws, in any order.
+    """
+    names = set(drawn)
+    stored = [("status", "<i1"), *((name, column.kind) for name, column in STORED_COLUMNS.items())]
+    return np.dtype([*KEYS.descr, *stored, *((drawn_column(name), "<f8") for name in DRAWABLE if name in names)])
+
+
+def missing_rows(kind: np.dtype[np.void], keys: Rows) -> Rows:
+    """Rows of walks of which nothing is known but their keys, shape (len(keys),)."""
+    rows = np.empty(len(keys), kind)
+    for name in kind.names or ():
+        rows[name] = keys[name] if name in (KEYS.names or ()) else np.nan if kind[name].kind == "f" else MISSING
+    return rows
 
 
 def fill_row(row: Any, outcome: Mapping[str, Any], drawn: Mapping[str, float]) -> None:
-    """Write a walk into its row, which has its index already.
+    """Write a walk into its row, which has its keys already.
 
     Args:
         row: one of `missing_rows`.
         outcome: of the walk, see `WalkRun.outcome`.
         drawn: name → value of what was drawn for it.
     """
-    energy = outcome["energy"]
-    values = _flat(outcome) | {"energy_at_release": energy["kinetic_at_release"] + energy["potential_at_release"]}
-    values["energy_error"] = energy_error(energy)
-    for name in COLUMNS.keys() - {"index"}:
-        row[name] = values[name]
+    row["status"] = outcome["status"]
+    for name, column in STORED_COLUMNS.items():
+        value = outcome[column.field]
+        row[name] = value[column.key] if column.key else value
     for name, value in drawn.items():
         row[drawn_column(name)] = value
+
+
+def numbers_of(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields of a `WalkResult` in the columns of one walk, those apart that are no columns."""
+    found: dict[str, Any] = {name: {} for name in _PREFIXES}
+    for name, column in STORED_COLUMNS.items():
+        value = values[name].item()
+        if column.key:
+            found[column.field][column.key] = value
+        else:
+            found[column.field] = value
+    return found
+
+
+def derived_columns(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[np.float64]]:
+    """The columns that are computed from others."""
+    at_release = columns["energy_kinetic_at_release"] + columns["energy_potential_at_release"]
+    return {"energy_at_release": at_release, "energy_error": energy_error(at_release, columns["energy_residual"])}
 
 
 def drawn_column(name: str) -> str:
@@ -117,27 +152,6 @@ def field_column(name: str) -> Column:
     """
     if name == "preset":
         return Column("<f8", "1", "named set of parameters that others are changed from")
-    if name.endswith(_DRAWN):
-        own = field_column(quantity_of(name))
-        return Column(own.kind, own.unit, f"{own.meaning}; as drawn for the walk")
-    field = SECTIONS[SECTION_OF[name]].model_fields[name]
-    return Column("<f8", field_unit(field), field.description or name)
-
-
-def row_type(drawn: Iterable[str]) -> np.dtype[np.void]:
-    """Type of a row.
-
-    Args:
-        drawn: quantities that some block of the sweep draws, in any order.
-    """
-    names = set(drawn)
-    return np.dtype([*ROW.descr, *((drawn_column(name), "<f8") for name in DRAWABLE if name in names)])
-
-
-def missing_rows(kind: np.dtype[np.void], walks: range) -> Rows:
-    """Rows of walks of which nothing is known but their indices, shape (len(walks),)."""
-    rows = np.empty(len(walks), kind)
-    for name in kind.names or ():
-        rows[name] = np.nan if rows[name].dtype.kind == "f" else MISSING
-    rows["index"] = walks
-    return rows
+    field = SECTIONS[SECTION_OF[quantity_of(name)]].model_fields[quantity_of(name)]
+    meaning = field.description or name
+    return Column("<f8", field_unit(field), f"{meaning}; as drawn for the walk" if name.endswith(_DRAWN) else meaning)

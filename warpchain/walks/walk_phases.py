@@ -31,7 +31,7 @@ from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
-from warpchain.walks.motion import NOTHING, Keep, Motion
+from warpchain.walks.motion import NOTHING, Keep
 from warpchain.walks.moving_plane import angles, released_plane
 from warpchain.walks.recorder import Recorder
 
@@ -260,7 +260,7 @@ class WalkRun:
 
     def outcome(self) -> dict[str, Any]:
         """Results of the walk apart from its motion, by the names of the fields of `WalkResult`."""
-        setup, counts, extremes = self.setup, self.counts, self.extremes
+        counts, extremes = self.counts, self.extremes
         is_at_rest = self.status == Status.AT_REST
         # Δx is x of the centre of mass, because the sprocket's centre is at x = 0
         return {
@@ -281,14 +281,8 @@ class WalkRun:
             **self._fall(is_at_rest),
             **self._ending("self_contact_at", "self_contact", layout.SELF_CONTACT_AT),
             **self._ending("collapsed_at", "collapse", layout.COLLAPSED_AT),
-            "sprocket_center": np.array([0.0, self.raised]) if self._has_sprocket else None,
-            "sprocket_radius": contact_radius(setup.scene, setup.parameters) if self._has_sprocket else math.nan,
+            "sprocket_height": self.raised if self._has_sprocket else math.nan,
         }
-
-    @property
-    def motion(self) -> Motion:
-        """What is kept of the motion since the release."""
-        return self.recorder.motion(self.raised if self._has_sprocket else math.nan)
 
     def drain(self) -> None:
         """Take what a launch has recorded; to be called after each launch, before the next phase."""

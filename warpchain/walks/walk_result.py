@@ -2,18 +2,18 @@
 
 A saved walk has the groups `series` (time series), `frames` (joint positions), `summary` (numbers), `parameters` (the
 chain's quantities with their symbols) and, if that was kept, `before_release`; every dataset has its unit and meaning.
-The attributes `setup`, `seed` and `versions`, in JSON, say how to make the walk again. Checksums stand at its end, see
-`warpchain.hdf5_files`.
+The attributes `setup`, `seed` and `versions`, in JSON, say how to make the walk again. Shards and merged files of
+sweeps keep the motion of a walk in the same groups.
+
+The annotations of `WalkResult` are the one table of a walk's quantities: files, columns of a sweep, units and the
+reference derive from them.
 """
 
-import dataclasses
 import json
-import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, Final, get_args
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,18 +21,27 @@ from pydantic import ValidationError
 from pydantic_core import to_jsonable_python
 
 from warpchain.engine.tallies import COUNTS, DEPTHS, EXTREMES, IMPULSES, LOST
-from warpchain.files import version_refusal, write_whole
-from warpchain.hdf5_files import ContentError, Contents, hdf5_image, put_text, reading_hdf5
+from warpchain.files import write_whole
+from warpchain.hdf5_files import (
+    Stored,
+    check_fields,
+    hdf5_image,
+    put,
+    read_fields,
+    reading_hdf5,
+    stored_fields,
+    write_fields,
+)
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import Scene
+from warpchain.inputs.scene import Scene, contact_radius
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError
-from warpchain.loop.before_release import BeforeRelease, is_ascending, read_before_release, write_before_release
+from warpchain.kernels import layout
+from warpchain.loop.before_release import FIELDS, BeforeRelease
 from warpchain.status import Status
 from warpchain.walks.drawn import Drawn
-from warpchain.walks.energy_error import MOST_ENERGY_ERROR, energy_error
-from warpchain.walks.faults import FAULTS, faults
+from warpchain.walks.faults import FAULTS, MOST_ENERGY_ERROR, energy_error, faults
 from warpchain.walks.moving_plane import in_room
 
 if TYPE_CHECKING:
@@ -40,13 +49,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-FORMAT: Final = "warpchain walk"
-FORMAT_VERSION: Final = 6
-
+KIND: Final = "warpchain walk"
 BEFORE: Final = "before_release"
 
-SINCE_FLOOR: Final = "time since the last impulse on the floor; NaN if there was none before, or never such a sample"
-"""Meaning of two fields of `WalkResult`."""
+_SINCE_FLOOR: Final = "time since the last impulse on the floor; NaN if there was none before, or never such a sample"
+_FIXED: Final = "if the plane is fixed"
 
 ENERGIES: Final = {
     "kinetic_at_release": "kinetic energy at release",
@@ -57,23 +64,6 @@ ENERGIES: Final = {
     "residual": "energy at release, less that at the end and all losses: the error of the integration",
 }
 """Keys of `WalkResult.energy`. Losses count as positive."""
-
-
-@dataclass(frozen=True)
-class Stored:
-    """Annotation of a field that a file keeps.
-
-    Attributes:
-        group: of the file.
-        unit: SI unit, "1" for pure numbers.
-        meaning: one line saying what the numbers are.
-        keys: for a dictionary, which is a group of its own, its keys and their meanings.
-    """
-
-    group: str
-    unit: str
-    meaning: str
-    keys: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -91,127 +81,114 @@ class WalkResult(Drawn):
     """
 
     status: Status
-    dx: Annotated[float, Stored("summary", "m", "x of the centre of mass less x of the sprocket; NaN unless at rest")]
-    walk_time: Annotated[float, Stored("summary", "s", "from the release to the end")]
-    simulated_time: Annotated[float, Stored("summary", "s", "simulated, the phases before the release included")]
-    hold_time: Annotated[
-        float, Stored("summary", "s", "for which the loop was held at full frequency; NaN without a sprocket")
-    ]
+    dx: Annotated[float, Stored("m", "x of the centre of mass less x of the sprocket; NaN unless at rest")]
+    walk_time: Annotated[float, Stored("s", "from the release to the end")]
+    simulated_time: Annotated[float, Stored("s", "simulated, the phases before the release included")]
+    hold_time: Annotated[float, Stored("s", "for which the loop was held at full frequency; NaN without a sprocket")]
     drift: Annotated[
         float,
         Stored(
-            "summary",
             "1",
             "greatest change of the held loop's mean height, width or place, relative to height or width, while it was "
             "last watched; NaN if it never was",
         ),
     ]
     lateral_drift: Annotated[
-        float, Stored("summary", "m", "z of the centre of mass at rest, to the right; NaN unless the plane tilts")
+        float, Stored("m", "z of the centre of mass at rest, to the right; NaN unless the plane tilts")
     ]
     final_tilt: Annotated[
-        float, Stored("summary", "rad", "tilt of the plane at the end, positive to the left; NaN if the plane is fixed")
+        float, Stored("rad", "tilt of the plane at the end, positive to the left; NaN if the plane is fixed")
     ]
     final_yaw: Annotated[
-        float, Stored("summary", "rad", "heading of the plane at the end, anticlockwise; NaN if the plane is fixed")
+        float, Stored("rad", "heading of the plane at the end, anticlockwise; NaN if the plane is fixed")
     ]
-    greatest_tilt: Annotated[
-        float, Stored("summary", "rad", "greatest size of the tilt in the walk; NaN if the plane is fixed")
-    ]
+    greatest_tilt: Annotated[float, Stored("rad", "greatest size of the tilt in the walk; NaN if the plane is fixed")]
     fell_at: Annotated[
-        float, Stored("summary", "s", "from the release until the plane was first tilted by 45°; NaN if it never was")
+        float, Stored("s", "from the release until the plane was first tilted by 45°; NaN if it never was")
     ]
-    fell_over: Annotated[
-        int, Stored("summary", "1", "1 if the plane was ever tilted by 45°, 0 if not; −1 if the plane is fixed")
-    ]
+    fell_over: Annotated[int, Stored("1", "1 if the plane was ever tilted by 45°, 0 if not; −1 if the plane is fixed")]
     fell_before_collapse: Annotated[
-        int, Stored("summary", "1", "1 if it fell over before its loop collapsed, 0 if not; −1 if the plane is fixed")
+        int, Stored("1", "1 if it fell over before its loop collapsed, 0 if not; −1 if the plane is fixed")
     ]
     self_contact_at: Annotated[
         float,
-        Stored("summary", "s", "from the release to the sample after the first impulse between links; or NaN"),
+        Stored("s", "from the release to the sample after the first impulse between links; or NaN"),
     ]
     bounces_before_self_contact: Annotated[
-        int, Stored("summary", "1", "bounces begun when links first touched one another; −1 if they never did")
+        int, Stored("1", "bounces begun when links first touched one another; −1 if they never did")
     ]
     flight_before_self_contact: Annotated[
         float,
-        Stored("summary", "s", f"at self_contact_at, {SINCE_FLOOR}"),
+        Stored("s", f"at self_contact_at, {_SINCE_FLOOR}"),
     ]
     collapsed_at: Annotated[
         float,
-        Stored(
-            "summary", "s", "from the release until the loop enclosed less than half of its area; NaN if it never did"
-        ),
+        Stored("s", "from the release until the loop enclosed less than half of its area; NaN if it never did"),
     ]
     bounces_before_collapse: Annotated[
-        int, Stored("summary", "1", "bounces begun when the loop collapsed, see collapsed_at; −1 if it never did")
+        int, Stored("1", "bounces begun when the loop collapsed, see collapsed_at; −1 if it never did")
     ]
-    flight_before_collapse: Annotated[float, Stored("summary", "s", f"at collapsed_at, {SINCE_FLOOR}")]
-    softened_at: Annotated[
-        float, Stored("summary", "s", "from the release to the softening of the joints; NaN if they were not")
+    flight_before_collapse: Annotated[float, Stored("s", f"at collapsed_at, {_SINCE_FLOOR}")]
+    softened_at: Annotated[float, Stored("s", "from the release to the softening of the joints; NaN if they were not")]
+    wall_time: Annotated[float, Stored("s", "that the computer took, without the compilation of kernels")]
+    bounces: Annotated[int, Stored("1", COUNTS["bounces"])]
+    steps_accepted: Annotated[int, Stored("1", COUNTS["accepted"])]
+    steps_rejected: Annotated[int, Stored("1", COUNTS["rejected"])]
+    impulses: Annotated[dict[str, int], Stored("1", "by kind of contact", keys=IMPULSES)]
+    greatest_opening: Annotated[float, Stored("m", EXTREMES["opening"])]
+    greatest_penetration: Annotated[dict[str, float], Stored("m", "by kind of contact", keys=DEPTHS)]
+    energy: Annotated[dict[str, float], Stored("J", "ledger of the walk", keys=ENERGIES)]
+    sprocket_height: Annotated[
+        float, Stored("m", "height of the sprocket's centre at the release; NaN without a sprocket or a release")
     ]
-    wall_time: Annotated[float, Stored("summary", "s", "that the computer took, without the compilation of kernels")]
-    bounces: Annotated[int, Stored("summary", "1", COUNTS["bounces"])]
-    steps_accepted: Annotated[int, Stored("summary", "1", COUNTS["accepted"])]
-    steps_rejected: Annotated[int, Stored("summary", "1", COUNTS["rejected"])]
-    impulses: Annotated[dict[str, int], Stored("summary", "1", "by kind of contact", IMPULSES)]
-    greatest_opening: Annotated[float, Stored("summary", "m", EXTREMES["opening"])]
-    greatest_penetration: Annotated[dict[str, float], Stored("summary", "m", "by kind of contact", DEPTHS)]
-    energy: Annotated[dict[str, float], Stored("summary", "J", "ledger of the walk", ENERGIES)]
-    sprocket_center: Annotated[
-        Array | None, Stored("summary", "m", "centre of the sprocket, shape (2,); absent without one")
-    ]
-    sprocket_radius: Annotated[float, Stored("summary", "m", "radius of the sprocket that links touch")]
     setup: Setup
     seed: int | None
     versions: dict[str, str]
-    time: Annotated[Array, Stored("series", "s", "time since the release, shape (t,)")]
-    center: Annotated[Array, Stored("series", "m", "centre of mass x, y, shape (t, 2)")]
-    center_velocity: Annotated[Array, Stored("series", "m/s", "velocity of the centre of mass x, y, shape (t, 2)")]
-    kinetic_energy: Annotated[Array, Stored("series", "J", "kinetic energy, shape (t,)")]
-    gravitational_energy: Annotated[Array, Stored("series", "J", "energy in the field of gravity, shape (t,)")]
-    spring_energy: Annotated[Array, Stored("series", "J", "energy of the joint springs, shape (t,)")]
-    lowest: Annotated[Array, Stored("series", "m", "height of the lowest point of all circles, shape (t,)")]
-    rms_speed: Annotated[Array, Stored("series", "m/s", "root mean square speed of the links, shape (t,)")]
-    frame_time: Annotated[Array, Stored("frames", "s", "time since the release, shape (f,)")]
-    frame_joints: Annotated[
-        Array, Stored("frames", "m", "joints x, y, shape (f, n, 2); joint i ends link i, even links inner")
+    time: Annotated[Array, Stored("s", "time since the release", "t", sample=layout.TIME)]
+    center: Annotated[Array, Stored("m", "centre of mass x, y", "t 2", sample=[layout.CENTER_X, layout.CENTER_Y])]
+    center_velocity: Annotated[
+        Array, Stored("m/s", "velocity of the centre of mass x, y", "t 2", sample=[layout.CENTER_U, layout.CENTER_V])
     ]
+    kinetic_energy: Annotated[Array, Stored("J", "kinetic energy", "t", sample=layout.KINETIC)]
+    gravitational_energy: Annotated[
+        Array, Stored("J", "energy in the field of gravity", "t", sample=layout.GRAVITATIONAL)
+    ]
+    spring_energy: Annotated[Array, Stored("J", "energy of the joint springs", "t", sample=layout.SPRING)]
+    lowest: Annotated[Array, Stored("m", "height of the lowest point of all circles", "t", sample=layout.LOWEST)]
+    rms_speed: Annotated[Array, Stored("m/s", "root mean square speed of the links", "t", sample=layout.RMS_SPEED)]
+    frame_time: Annotated[Array, Stored("s", "time since the release", "f")]
+    frame_joints: Annotated[Array, Stored("m", "joints x, y; joint i ends link i, even links inner", "f n 2")]
     frame_forces: Annotated[
         Array,
         Stored(
-            "frames",
             "N",
             "force x, y in each joint on the link that it ends, with the stiffness and damping of the moment, softened "
-            "after a collapse, shape (f, n, 2); (0, n, 2) if not recorded",
+            "after a collapse",
+            "f n 2",
+            empty="if not recorded",
         ),
     ]
     frame_moments: Annotated[
         Array,
-        Stored(
-            "frames", "N m", "friction moment in each joint on the link that it ends, (f, n); (0, n) if not recorded"
-        ),
+        Stored("N m", "friction moment in each joint on the link that it ends", "f n", empty="if not recorded"),
     ]
-    center_z: Annotated[
-        Array, Stored("series", "m", "centre of mass z, to the right, shape (t,); (0,) if the plane is fixed")
-    ]
-    tilt: Annotated[Array, Stored("series", "rad", "tilt of the plane, shape (t,); (0,) if the plane is fixed")]
-    yaw: Annotated[
-        Array,
-        Stored("series", "rad", "heading of the plane, all turns counted, shape (t,); (0,) if the plane is fixed"),
-    ]
-    frame_origin: Annotated[
-        Array,
-        Stored(
-            "frames", "m", "origin of the plane's coordinates in the room, shape (f, 3); (0, 3) if the plane is fixed"
-        ),
-    ]
-    frame_axes: Annotated[
-        Array,
-        Stored("frames", "1", "axes of x and y of the plane in the room, shape (f, 2, 3); (0, 2, 3) if it is fixed"),
-    ]
+    center_z: Annotated[Array, Stored("m", "centre of mass z, to the right", "t", _FIXED)]
+    tilt: Annotated[Array, Stored("rad", "tilt of the plane", "t", _FIXED)]
+    yaw: Annotated[Array, Stored("rad", "heading of the plane, all turns counted", "t", _FIXED)]
+    frame_origin: Annotated[Array, Stored("m", "origin of the plane's coordinates in the room", "f 3", _FIXED)]
+    frame_axes: Annotated[Array, Stored("1", "axes of x and y of the plane in the room", "f 2 3", _FIXED)]
     before_release: BeforeRelease | None = None
+
+    @property
+    def sprocket_center(self) -> Array | None:
+        """Centre of the sprocket x, y at the release [m], shape (2,); None without one."""
+        return None if np.isnan(self.sprocket_height) else np.array([0.0, self.sprocket_height])
+
+    @property
+    def sprocket_radius(self) -> float:
+        """Radius of the sprocket that links touch [m]; NaN without one."""
+        scene = self.setup.scene
+        return np.nan if scene.start == "ellipse" else contact_radius(scene, self.setup.parameters)
 
     @property
     def joints_in_room(self) -> Array | None:
@@ -222,34 +199,13 @@ class WalkResult(Drawn):
 
     def __post_init__(self) -> None:
         """Check that arrays and dictionaries fit together."""
-        instants, frames = len(self.time), len(self.frame_time)
-        shapes: dict[str, tuple[int, ...]] = {
-            name: (instants,) for name, stored in STORED.items() if stored.group == "series"
-        }
-        shapes["center"] = shapes["center_velocity"] = (instants, 2)
-        moving = self.setup.scene.plane == "tilting"
-        shapes["center_z"] = shapes["tilt"] = shapes["yaw"] = (instants if moving else 0,)
-        shapes["frame_origin"] = (frames if moving else 0, 3)
-        shapes["frame_axes"] = (frames if moving else 0, 2, 3)
-        shapes["frame_time"] = (frames,)
-        shapes["frame_joints"] = (frames, self.setup.scene.links, 2)
         links, before = self.setup.scene.links, self.before_release
-        loaded = frames if len(self.frame_forces) else 0
-        shapes["frame_forces"], shapes["frame_moments"] = (loaded, links, 2), (loaded, links)
+        check_fields(self, links)
+        moving = self.setup.scene.plane == "tilting"
+        if moving != bool(len(self.tilt)) and len(self.time):
+            raise ValueError(f"tilt: it has {len(self.tilt)} instants; give those of a plane that tilts, and no others")
         if before is not None and before.frame_joints.shape[1] != links:
             raise ValueError(f"before_release: its frames are not of {links} links; give those of this walk")
-        if self.sprocket_center is not None:
-            shapes["sprocket_center"] = (2,)
-        for name, shape in shapes.items():
-            given = np.shape(getattr(self, name))
-            if given != shape:
-                raise ValueError(f"{name}: its shape is {given}; give an array of shape {shape}")
-        for name, stored in STORED.items():
-            if stored.keys and set(getattr(self, name)) != set(stored.keys):
-                raise ValueError(f"{name}: wrong keys; give exactly {', '.join(stored.keys)}")
-        for name in ("time", "frame_time"):
-            if not is_ascending(getattr(self, name)):
-                raise ValueError(f"{name}: does not ascend; give finite times in order")
 
     def __repr__(self) -> str:
         """One line with the most important numbers."""
@@ -263,7 +219,8 @@ class WalkResult(Drawn):
     @property
     def energy_error(self) -> float:
         """Size of the energy unaccounted for, relative to the energy at release; above 0.05 the walk is inaccurate."""
-        return energy_error(self.energy)
+        at_release = self.energy["kinetic_at_release"] + self.energy["potential_at_release"]
+        return float(energy_error(at_release, self.energy["residual"]))
 
     def warnings(self) -> list[str]:
         """Why the walk is inaccurate, each with what to try: energy, joints or contacts; empty if it is not."""
@@ -284,16 +241,23 @@ class WalkResult(Drawn):
             ("computed in", f"{self.wall_time:.1f} s"),
         ]
 
+    def unit(self, name: str) -> str:
+        """SI unit of a field; a `KeyError` if there is none of that name."""
+        return STORED[name].unit
+
+    def meaning(self, name: str) -> str:
+        """One line saying what a field is; a `KeyError` if there is none of that name."""
+        return STORED[name].described
+
     def to_dict(self) -> dict[str, Any]:
         """Everything but time series and frames, for JSON; a number that is not finite is None."""
-        summary = {name: getattr(self, name) for name, stored in STORED.items() if stored.group == "summary"}
         plain: dict[str, Any] = _plain(
             {
-                "dx": summary.pop("dx"),
+                "dx": self.dx,
                 "status": self.status.label,
                 "status_sentence": self.status.sentence,
-                **summary,
-                "energy_error": self.energy_error,
+                **{name: getattr(self, name) for name in NUMBERS},
+                **{name: getattr(self, name) for name in ("sprocket_center", "sprocket_radius", "energy_error")},
                 **_setup_as_dict(self.setup),
                 "seed": self.seed,
                 "versions": self.versions,
@@ -307,36 +271,45 @@ class WalkResult(Drawn):
         Raises:
             OSError: the file cannot be written, or something else than a regular file is there; one line that names it.
         """
-        write_whole(path, hdf5_image(partial(_write, self)))
+        write_whole(path, hdf5_image(KIND, self._fill))
+
+    def _fill(self, file: "h5py.File") -> None:
+        """Fill an empty file."""
+        file.attrs["status"], file.attrs["status_sentence"] = self.status.label, self.status.sentence
+        file.attrs["setup"] = json.dumps(_setup_as_dict(self.setup), allow_nan=False)
+        file.attrs["seed"], file.attrs["versions"] = json.dumps(self.seed), json.dumps(self.versions)
+        write_fields(file, vars(self), NUMBERS)
+        write_motion(file, vars(self))
+        for name, quantity in Parameters.quantities().items():
+            value = getattr(self.setup.parameters, name)
+            put(file, f"parameters/{name}", value, quantity.unit, quantity.meaning).attrs["symbol"] = quantity.symbol
 
 
-STORED: Final[dict[str, Stored]] = {
-    item.name: note
-    for item in dataclasses.fields(WalkResult)
-    for note in get_args(item.type)
-    if isinstance(note, Stored)
-}
-"""Fields of `WalkResult` that a file keeps as datasets: name → where, in which unit, what."""
-_DIMENSIONS: Final = {
-    **{name: 1 for name, stored in STORED.items() if stored.group in ("series", "frames")},
-    **dict.fromkeys(("center", "center_velocity"), 2),
-    "frame_joints": 3,
-    "frame_forces": 3,
-    "frame_moments": 2,
-    "frame_origin": 2,
-    "frame_axes": 3,
-    "sprocket_center": 1,
-}
-"""Fields that are arrays: name → number of axes."""
-_KINDS: Final = {
-    item.name: np.dtype(
-        np.int64 if item.type is not None and get_args(item.type)[0] in (int, dict[str, int]) else float
-    )
-    for item in dataclasses.fields(WalkResult)
-    if item.name in STORED
-}
-"""Types of their numbers."""
-_PATHS: Final = {name: f"{stored.group}/{name.removeprefix('frame_')}" for name, stored in STORED.items()}
+STORED: Final = stored_fields(WalkResult)
+"""Fields of `WalkResult` that a file keeps: name → unit, meaning, shape."""
+NUMBERS: Final = {name: stored for name, stored in STORED.items() if not stored.shape}
+"""Those that are numbers, or dictionaries of them."""
+MOTION: Final = {name: stored for name, stored in STORED.items() if stored.shape}
+"""Those that are arrays."""
+
+
+def write_motion(group: "h5py.Group", values: Mapping[str, Any], joints: type = np.float64) -> None:
+    """Write the arrays of a walk, and `before_release`, into a group.
+
+    Args:
+        group: where to.
+        values: name → value, as in a `WalkResult`.
+        joints: precision of what each joint has in each frame.
+    """
+    write_fields(group, values, MOTION, joints)
+    if (before := values[BEFORE]) is not None:
+        write_fields(group.create_group(BEFORE, track_order=True), vars(before), FIELDS, joints)
+
+
+def read_motion(group: "h5py.Group", links: int) -> dict[str, Any]:
+    """What `write_motion` wrote of a chain of so many links."""
+    before = BeforeRelease(**read_fields(group[BEFORE], FIELDS, links)) if BEFORE in group else None
+    return {**read_fields(group, MOTION, links), BEFORE: before}
 
 
 def load_walk(path: str | os.PathLike[str]) -> WalkResult:
@@ -347,19 +320,29 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
         InputError: the file is no walk, or belongs to another version of warpchain. It is a `ValueError`.
         DamagedFileError: the file is damaged or cut short. It is an `InputError`.
     """
-    refusal, wanted = None, "give a file written by WalkResult.save"
-    with reading_hdf5(path, "fetch another copy of the file or run the walk again", wanted) as contents:
-        if contents.text("format") != FORMAT:
-            refusal = f"HDF5, but not a walk; {wanted}"
-        else:
-            refusal = version_refusal(contents.whole("format_version"), FORMAT_VERSION, "run the walk again")
-        if refusal is None:
-            try:
-                return _read(contents)
-            except ValidationError as error:
-                first = ".".join(str(part) for part in error.errors()[0]["loc"])
-                refusal = f"this warpchain refuses its setup ({first}); read it with the version that wrote it"
-    raise InputError(f"{path}: {refusal}")
+    remedy = "run the walk again, or fetch another copy of the file"
+    with reading_hdf5(path, KIND, remedy, "give a file written by WalkResult.save") as file:
+        given = json.loads(file.attrs["setup"])
+        try:
+            setup = Setup(
+                preset=given["preset"],
+                parameters=Parameters.model_validate(given["parameters"]),
+                scene=Scene.model_validate(given["scene"]),
+                options=Options.model_validate(given["options"]),
+            )
+        except ValidationError as error:
+            first = ".".join(str(part) for part in error.errors()[0]["loc"])
+            raise InputError(
+                f"{path}: this warpchain refuses its setup ({first}); read it with the version that wrote it"
+            ) from None
+        return WalkResult(
+            status=Status[file.attrs["status"].upper()],
+            setup=setup,
+            seed=json.loads(file.attrs["seed"]),
+            versions=json.loads(file.attrs["versions"]),
+            **read_fields(file, NUMBERS, setup.scene.links),
+            **read_motion(file, setup.scene.links),
+        )
 
 
 def _setup_as_dict(setup: Setup) -> dict[str, Any]:
@@ -370,75 +353,3 @@ def _setup_as_dict(setup: Setup) -> dict[str, Any]:
 def _plain(value: Any) -> Any:
     """A value as JSON has it."""
     return to_jsonable_python(value, inf_nan_mode="null", fallback=lambda array: array.tolist())
-
-
-def _write(walk: WalkResult, file: "h5py.File") -> None:
-    """Fill an empty file."""
-    file.attrs["format_version"] = FORMAT_VERSION
-    texts = {
-        "format": FORMAT,
-        "status": walk.status.label,
-        "status_sentence": walk.status.sentence,
-        "setup": json.dumps(_setup_as_dict(walk.setup), allow_nan=False),
-        "seed": json.dumps(_plain(walk.seed)),
-        "versions": json.dumps(walk.versions),
-    }
-    for name, text in texts.items():
-        put_text(file, name, text)
-    for name, stored in STORED.items():
-        value = getattr(walk, name)
-        if stored.keys:
-            for key, meaning in stored.keys.items():
-                _put(file, f"{_PATHS[name]}/{key}", value[key], stored.unit, meaning)
-        elif value is not None:
-            _put(file, _PATHS[name], value, stored.unit, stored.meaning)
-    for name, quantity in Parameters.quantities().items():
-        value = getattr(walk.setup.parameters, name)
-        dataset = _put(file, f"parameters/{name}", value, quantity.unit, quantity.meaning)
-        dataset.attrs["symbol"] = quantity.symbol
-    if walk.before_release is not None:
-        write_before_release(walk.before_release, file.create_group(BEFORE, track_order=True))
-
-
-def _put(file: "h5py.File", path: str, value: float | Array, unit: str, meaning: str) -> "h5py.Dataset":
-    """Write one dataset."""
-    dataset = file.create_dataset(path, data=value)
-    dataset.attrs["unit"] = unit
-    dataset.attrs["description"] = meaning
-    return dataset
-
-
-def _read(contents: Contents) -> WalkResult:
-    """The walk in a file of our format."""
-    setup, status = contents.json("setup"), Status[contents.text("status").upper()]
-    values: dict[str, Any] = {
-        "status": status,
-        "setup": Setup(
-            preset=setup["preset"],
-            parameters=Parameters.model_validate(setup["parameters"]),
-            scene=Scene.model_validate(setup["scene"]),
-            options=Options.model_validate(setup["options"]),
-        ),
-        "seed": contents.json("seed"),
-        "versions": contents.json("versions"),
-    }
-    for name, path in _PATHS.items():
-        group, _, item = path.partition("/")
-        part = contents.part(group)
-        if keys := STORED[name].keys:
-            values[name] = {key: part.array(f"{item}/{key}", _KINDS[name], ()).item() for key in keys}
-        elif name == "sprocket_center" and not part.has(item):
-            values[name] = None
-        else:
-            shape = (None,) * _DIMENSIONS.get(name, 0)
-            number = part.array(item, _KINDS[name], shape)
-            values[name] = number if shape else number.item()
-    if contents.has(BEFORE):
-        values["before_release"] = read_before_release(contents.part(BEFORE), np.float64)
-    preset, seed, versions = setup["preset"], values["seed"], values["versions"]
-    texts = (preset, *versions, *versions.values())
-    if not all(isinstance(text, str) for text in texts) or not (seed is None or type(seed) is int):
-        raise ContentError("preset, seed or versions of another type")
-    if status is Status.RUNNING or math.isfinite(values["dx"]) != (status is Status.AT_REST):
-        raise ContentError(f"a walk with status {status.label} and distance {values['dx']}")
-    return WalkResult(**values)

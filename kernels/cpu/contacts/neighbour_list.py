@@ -35,10 +35,7 @@ def greatest_displacement(K: wp.array2d(dtype=wp.float64), chain: Chain):
 
 @functools.cache
 def neighbour_list(columns: int):
-    """Warp functions (build by grid, build by testing all pairs) for scratch of this width.
-
-    Both list the same pairs in the same order, and return False if there are more than the list can hold.
-    """
+    """Warp function that builds the list, for scratch of this width; False: more pairs are near than fit."""
     lists = list_layout(columns)
 
     @wp.func
@@ -68,7 +65,7 @@ def neighbour_list(columns: int):
         L[wp.static(lists.count)] = total
 
     @wp.func
-    def build_by_grid(
+    def build(
         K: wp.array2d(dtype=wp.float64),
         L: wp.array(dtype=wp.int32),
         chain: Chain,
@@ -126,39 +123,7 @@ def neighbour_list(columns: int):
         arrange(L, total)
         return fits
 
-    @wp.func
-    def build_by_all_pairs(
-        K: wp.array2d(dtype=wp.float64),
-        L: wp.array(dtype=wp.int32),
-        chain: Chain,
-        skin: wp.float64,
-        opening: wp.float64,
-    ):
-        n = chain.link_count
-        reach = listing_reach(chain, skin, opening)
-        square = reach * reach
-        remember_positions(K, chain)
-        total = int(0)
-        fits = bool(True)
-        p = int(0)
-        while p < n:
-            q = p + 1
-            while q < n:
-                dx = K[RIGHT_X, q] - K[RIGHT_X, p]
-                dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
-                if dx * dx + dy * dy < square:
-                    if total < wp.static(lists.capacity):
-                        L[wp.static(lists.found_first) + total] = p
-                        L[wp.static(lists.found_second) + total] = q
-                        total += 1
-                    else:
-                        fits = bool(False)
-                q += 1
-            p += 1
-        arrange(L, total)
-        return fits
-
-    return build_by_grid, build_by_all_pairs
+    return build
 
 
 @wp.func

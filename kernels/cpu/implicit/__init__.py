@@ -1,1 +1,1 @@
-"""Rigid joints and Rosenbrock methods, vectorised over eight segments of the loop."""
+"""Rigid joints, vectorised over eight segments of the loop."""

@@ -38,10 +38,9 @@ from warpchain.kernels.cpu.implicit.rigid_layout import (
     SPIN,
     TORQUE,
     force_layout,
+    pad_behind,
     pad_joints,
 )
-from warpchain.kernels.cpu.implicit.rosenbrock_layout import pad_behind
-from warpchain.kernels.cpu.implicit.rosenbrock_system import opening
 from warpchain.kernels.cpu.implicit.solver import LANES, cyclic_solver, link_at, place_column, row_at, segment_places
 from warpchain.kernels.layout import STAGES, X
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, cos_sin, order_bits
@@ -268,6 +267,7 @@ def rigid_joints(columns: int) -> RigidJoints:
 
     @wp.func
     def openings(S: wp.array2d(dtype=wp.float64), chain: Chain, places: int, full: int):
+        a = chain.half_length
         end = place_column(places + 1)
         c = int(8)
         while c < end:
@@ -282,7 +282,8 @@ def rigid_joints(columns: int) -> RigidJoints:
         c = int(8)
         while c < end:
             repeats = c < 16 and c >= 8 + full
-            cx, cy = opening(S, chain, c, BASE, COSINE)
+            cx = (S[BASE, c + 8] - S[BASE, c]) - a * (S[COSINE, c + 8] + S[COSINE, c])
+            cy = (S[wp.static(BASE + 1), c + 8] - S[wp.static(BASE + 1), c]) - a * (S[SINE, c + 8] + S[SINE, c])
             S[wp.static(right), c] = wp.where(repeats, ZERO, cx)
             S[wp.static(right + 1), c] = wp.where(repeats, ZERO, cy)
             greatest = wp.max(greatest, order_bits(cx * cx + cy * cy))

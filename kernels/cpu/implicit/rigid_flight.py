@@ -22,37 +22,34 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.cpu.implicit.flight_layout import (
-    COUPLED,
-    DRAG,
-    FIRST_STAGE_ROW,
-    FLIGHT_SYSTEM,
-    NEW,
-    POWER,
-    SLOPE,
-    TARGET,
-    friction_layout,
-)
 from warpchain.kernels.cpu.implicit.rigid import rigid_joints
 from warpchain.kernels.cpu.implicit.rigid_layout import (
     BASE,
     BASE_RATE,
     COSINE,
     COUNTED,
+    COUPLED,
+    DRAG,
+    FIRST_STAGE_ROW,
+    FLIGHT_SYSTEM,
     INERTIA,
     INVERSE_MASS,
     INVERSE_SMOOTHING,
+    NEW,
+    POWER,
     RATE,
     SINE,
+    SLOPE,
     SPIN,
     STAGE_U,
     STAGE_V,
+    TARGET,
     TORQUE,
     force_layout,
+    friction_layout,
+    pad_behind,
     pad_joints,
 )
-from warpchain.kernels.cpu.implicit.rosenbrock import GREATEST_TURN
-from warpchain.kernels.cpu.implicit.rosenbrock_layout import pad_behind
 from warpchain.kernels.cpu.implicit.solver import (
     LANES,
     cyclic_solver,
@@ -69,6 +66,9 @@ from warpchain.kernels.physics.rigid_joint import steepness, switch_smoothing
 from warpchain.kernels.types import Chain
 
 wp.set_module_options({"enable_backward": False})
+
+GREATEST_TURN = wp.constant(wp.float64(1.0))
+"""Greatest turn of a link [rad] in one step: beyond it the error estimate, made from four places, is no estimate."""
 
 
 @functools.cache

@@ -1,4 +1,4 @@
-"""Memory of rigid joints: rows in the order of :mod:`cpu.implicit.solver`.
+"""Memory of rigid joints and of flights on them: rows in the order of :mod:`cpu.implicit.solver`.
 
 The next link lies at the next place, eight columns further. A segment is padded with copies of neighbouring values
 where they are needed. A joint lies at the column of the link on its left.
@@ -8,7 +8,8 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.cpu.implicit.solver import SegmentLayout, segment_columns
+from warpchain.kernels.cpu.implicit.solver import LANES, SegmentLayout, segment_columns
+from warpchain.kernels.methods.w_tableaus import ROS34PW2
 
 wp.set_module_options({"enable_backward": False})
 
@@ -26,12 +27,49 @@ BASE_RATE = 24
 # The system S F = r.
 SYSTEM = 27
 ROWS_OF_RIGID = SYSTEM + 22
+# A flight: slopes; the θ of r, Σ γ_ij k_j of the rates; power; the new state.
+SLOPE, TARGET, COUPLED = ROWS_OF_RIGID, ROWS_OF_RIGID + 1, ROWS_OF_RIGID + 2
+POWER, DRAG = ROWS_OF_RIGID + 5, ROWS_OF_RIGID + 6
+NEW = ROWS_OF_RIGID + 7
+FIRST_STAGE_ROW = ROWS_OF_RIGID + 13
+FLIGHT_SYSTEM = FIRST_STAGE_ROW + 6 * ROS34PW2.stages
 
 
 @functools.cache
 def force_layout(columns: int) -> SegmentLayout:
     """Layout of the system S F = r, for scratch of this width."""
     return SegmentLayout(size=2, columns=segment_columns(columns), matrix=SYSTEM, right=SYSTEM + 20)
+
+
+@functools.cache
+def friction_layout(columns: int) -> SegmentLayout:
+    """Layout of the stages' system, for scratch of this width."""
+    width = force_layout(columns).columns
+    return SegmentLayout(size=3, columns=width, matrix=FLIGHT_SYSTEM, right=FLIGHT_SYSTEM + 45)
+
+
+def flight_rows(columns: int) -> int:
+    """Rows of a chain's scratch of this width that a flight takes."""
+    forces, friction = force_layout(columns), friction_layout(columns)
+    doubles = (FLIGHT_SYSTEM + 48) * forces.columns + LANES * (forces.separator_rows + friction.separator_rows)
+    return -(-doubles // columns)
+
+
+@functools.cache
+def pad_behind(rows: tuple[int, ...]):
+    """Warp function that copies, in these rows, the next segment's first link behind each segment's last."""
+
+    @wp.func
+    def pad(S: wp.array2d(dtype=wp.float64), places: int, full: int):
+        s = int(0)
+        while s < 8:
+            after = (s + 1) % 8
+            source = 8 + after + wp.where(after >= full, 8, 0)
+            for k in range(wp.static(len(rows))):
+                S[wp.static(rows[k]), 8 * places + 8 + s] = S[wp.static(rows[k]), source]
+            s += 1
+
+    return pad
 
 
 @functools.cache

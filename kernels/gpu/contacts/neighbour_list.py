@@ -17,28 +17,14 @@ wp.set_module_options({"enable_backward": False})
 
 
 @functools.cache
-def block_list(columns: int, block_dim: int, broad_phase: str):
+def block_list(columns: int, block_dim: int):
     """Warp function that builds the list of a chain and returns the number of pairs; above capacity it overflows.
 
     Args:
         columns: Width of the scratch, which sets the layout of the list.
         block_dim: Threads in a block.
-        broad_phase: ``"grid"`` or ``"all_pairs"``.
     """
     lists = list_layout(columns)
-    by_grid = broad_phase == "grid"
-
-    @wp.func
-    def append_if_near(
-        K: wp.array2d(dtype=wp.float64), L: wp.array(dtype=wp.int32), p: int, q: int, square: wp.float64
-    ):
-        dx = K[RIGHT_X, q] - K[RIGHT_X, p]
-        dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
-        if dx * dx + dy * dy < square:
-            slot = wp.atomic_add(L, wp.static(lists.count), 1)
-            if slot < wp.static(lists.capacity):
-                L[wp.static(lists.first) + slot] = p
-                L[wp.static(lists.second) + slot] = q
 
     @wp.func
     def search_cells(K: wp.array2d(dtype=wp.float64), L: wp.array(dtype=wp.int32), p: int, square: wp.float64):
@@ -50,7 +36,13 @@ def block_list(columns: int, block_dim: int, broad_phase: str):
             while q >= 0:
                 # a bucket may serve several cells
                 if q > p and L[wp.static(lists.cell_x) + q] == cell_x and L[wp.static(lists.cell_y) + q] == cell_y:
-                    append_if_near(K, L, p, q, square)
+                    dx = K[RIGHT_X, q] - K[RIGHT_X, p]
+                    dy = K[RIGHT_Y, q] - K[RIGHT_Y, p]
+                    if dx * dx + dy * dy < square:
+                        slot = wp.atomic_add(L, wp.static(lists.count), 1)
+                        if slot < wp.static(lists.capacity):
+                            L[wp.static(lists.first) + slot] = p
+                            L[wp.static(lists.second) + slot] = q
                 q = L[wp.static(lists.next_joint) + q]
             near += 1
 
@@ -69,31 +61,23 @@ def block_list(columns: int, block_dim: int, broad_phase: str):
         square = reach * reach
         if lane == 0:
             L[wp.static(lists.count)] = 0
-        if wp.static(by_grid):
-            i = lane
-            while i < wp.static(lists.table):
-                L[wp.static(lists.bucket) + i] = -1
-                i += wp.static(block_dim)
+        i = lane
+        while i < wp.static(lists.table):
+            L[wp.static(lists.bucket) + i] = -1
+            i += wp.static(block_dim)
         barrier()
         if lane < n:
             K[BOARD_LISTED_X, lane] = K[RIGHT_X, lane]
             K[BOARD_LISTED_Y, lane] = K[RIGHT_Y, lane]
-            if wp.static(by_grid):
-                cell_x = int(wp.floor(K[RIGHT_X, lane] / reach))
-                cell_y = int(wp.floor(K[RIGHT_Y, lane] / reach))
-                bucket = bucket_of(cell_x, cell_y, wp.static(lists.table))
-                L[wp.static(lists.cell_x) + lane] = cell_x
-                L[wp.static(lists.cell_y) + lane] = cell_y
-                L[wp.static(lists.next_joint) + lane] = wp.atomic_exch(L, wp.static(lists.bucket) + bucket, lane)
+            cell_x = int(wp.floor(K[RIGHT_X, lane] / reach))
+            cell_y = int(wp.floor(K[RIGHT_Y, lane] / reach))
+            bucket = bucket_of(cell_x, cell_y, wp.static(lists.table))
+            L[wp.static(lists.cell_x) + lane] = cell_x
+            L[wp.static(lists.cell_y) + lane] = cell_y
+            L[wp.static(lists.next_joint) + lane] = wp.atomic_exch(L, wp.static(lists.bucket) + bucket, lane)
         barrier()
         if lane < n:
-            if wp.static(by_grid):
-                search_cells(K, L, lane, square)
-            else:
-                q = lane + 1
-                while q < n:
-                    append_if_near(K, L, lane, q, square)
-                    q += 1
+            search_cells(K, L, lane, square)
         barrier()
         return L[wp.static(lists.count)]
 

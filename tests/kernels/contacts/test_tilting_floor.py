@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.oracle_model import tilting_contacts, tilting_plane
+from tests.oracle_model.tilting_plane import Plane
 from tests.support.kernels_under_test import FLOOR, ContactPass, Placed
-from tests.support.tilted_chains import mirrored, tilted_heap
+from tests.support.tilted_chains import tilted_heap
 from tests.support.tilting_under_test import floor_pass
 from warpchain.inputs.parameters import preset
-from warpchain.oracle import motion_equations, tilting_contacts, tilting_plane
-from warpchain.oracle.tilting_plane import Plane, axes
 
 PAPER = preset("paper")
 HEAPS = range(300)
@@ -59,44 +59,6 @@ def test_pass_equals_reference(passes):
     assert 0 in impulses
 
 
-def touching_points(position, velocity, plane, parameters):
-    """Link and place (X, Y, ζ) [m] of each roller that touches."""
-    ends = np.stack(motion_equations.link_ends(position, parameters), axis=1)
-    sizes = (parameters.circle_radius, parameters.half_width)
-    points = [
-        (link, tilting_contacts.touching_point(end, position[link], velocity[link], plane, plane.rates, *sizes))
-        for link in range(len(position))
-        for end in ends[link]
-    ]
-    return [(link, point) for link, point in points if point is not None]
-
-
-def test_lone_contact_turns_the_approach_back(passes):
-    """If one roller touches, v_n becomes −e v_n at its point, and angular momentum changes by r × J."""
-    lone = 0
-    for heap, outcome in passes:
-        position, velocity, plane, parameters = heap
-        points = touching_points(*heap)
-        if outcome.impulses != 1 or len(points) != 1:
-            continue
-        lone += 1
-        ((link, point),) = points
-        before, after = (
-            plane.y @ tilting_contacts.point_velocity(point, position[link], speeds[link], rates)
-            for speeds, rates in ((velocity, plane.rates), (outcome.velocity, outcome.rates))
-        )
-        assert before < 0
-        assert after == pytest.approx(-parameters.floor_restitution * before, abs=1e-11 * (1 + abs(before)))
-        turning = [
-            tilting_plane.room_angular_momentum(position, *state, parameters, half_width=parameters.half_width)
-            for state in ((velocity, plane), (outcome.velocity, moved(plane, outcome)))
-        ]
-        at = plane.origin + axes(plane) @ point
-        expected = np.cross(at, momentum_gained(heap, outcome))
-        assert_allclose(turning[1] - turning[0], expected, rtol=0, atol=1e-12 * np.abs(turning[0]).max())
-    assert lone >= 15, lone
-
-
 def test_floor_pushes_up_and_within_the_cone_of_friction(passes):
     """The momentum that the floor gives a heap points up, and leans by μ at most, as each of its impulses does."""
     slides = 0
@@ -137,15 +99,6 @@ def test_pushing_floor_does_the_work_that_is_booked():
         assert before - after == pytest.approx(outcome.loss, abs=1e-12 * (before + after))
         gains += after > before
     assert gains > 20
-
-
-def test_mirror_image_meets_the_floor_as_the_mirror_image(passes):
-    """The mirrored plane gets the opposite changes, and links and losses are the same, all to the bit."""
-    for (position, velocity, plane, parameters), outcome in passes:
-        image = floor_pass(position, velocity, mirrored(plane), parameters)
-        assert_array_equal(image.velocity, outcome.velocity)
-        assert_array_equal(image.rates, -outcome.rates)
-        assert (image.loss, image.impulses, image.gap) == (outcome.loss, outcome.impulses, outcome.gap)
 
 
 @pytest.mark.parametrize(("half_width", "push_rate"), [(0.0, 0.0), (4e-3, 0.0), (4e-3, 500.0)])

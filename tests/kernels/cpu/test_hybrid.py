@@ -5,15 +5,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import warpchain
-from tests.support.bouncing_chains import PAPER, falling, loop
-from tests.support.rigid_joints import exact_rigid_flight, projected, rigid_motion
-from tests.support.rigid_under_test import visit
+from tests.oracle_model import motion_equations
+from tests.support.rigid_chains import PAPER, exact_rigid_flight, falling, loop, projected, rigid_motion, visit
 from warpchain import Status, preset
-from warpchain.engine.batch import Batch
-from warpchain.inputs.options import Options
-from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels.methods.w_tableaus import ROS34PW2
-from warpchain.oracle import motion_equations
 
 SOFT = preset("soft")
 LENGTHS = (4, 6, 8, 10, 12, 14, 16, 22, 60)
@@ -185,21 +180,6 @@ def test_flight_agrees_with_springs(name, duration, within):
     assert np.abs(flight.velocity[-1] - velocity[-1])[:, :2].max() < 100 * within
 
 
-def test_flight_takes_a_hundredth_of_the_steps():
-    """At its default tolerance a flight errs by 1e-4 of the speed in a hundredth of the steps that springs take."""
-    position, velocity = lay_chain(ellipse(1.5), 60, PAPER.link_length, 5.0)
-    position[:, 1] += 5.0
-    duration = 0.02
-    flights = {
-        method: warpchain.simulate(PAPER, position, velocity, duration, times=[duration], method=method, **settings)
-        for method, settings in {"hybrid": {}, "dp5": {"tolerance": 1e-9}}.items()
-    }
-    attempts = {method: flight.steps_accepted + flight.steps_rejected for method, flight in flights.items()}
-    assert attempts["hybrid"] < attempts["dp5"] / 100
-    assert np.abs(flights["hybrid"].position[-1] - flights["dp5"].position[-1])[:, :2].max() < 1e-5
-    assert np.abs(flights["hybrid"].velocity[-1] - flights["dp5"].velocity[-1])[:, :2].max() < 1e-3
-
-
 # --- bouncing ---
 
 
@@ -220,33 +200,3 @@ def test_impacts_push_as_with_springs(parameters, duration):
             assert abs(run.losses["joint_switch"]) < 1e-3 * at_start
             assert (run.losses["joint_switch"] != 0) == (method == "hybrid")
     assert np.mean(pushes["hybrid"]) == pytest.approx(np.mean(pushes["rkf78"]), rel=0.02)
-
-
-def test_bursts_of_a_simulation_are_as_exact_as_those_of_a_walk():
-    """Unless a tolerance is given: then `simulate` and `Options` have the same one, and a tighter one gives others."""
-    start = falling(12, SOFT, 0.3)
-    default, same, tighter = (
-        warpchain.simulate(SOFT, *start, 2e-3, times=[2e-3], method="hybrid", **given).position
-        for given in ({}, {"tolerance": Options(method="hybrid").tolerance}, {"tolerance": 1e-5})
-    )
-    assert np.array_equal(default, same)
-    assert not np.array_equal(default, tighter)
-
-
-def test_launch_size_changes_no_bit_of_flights_and_bursts():
-    """A chain of the paper that falls, bounces and flies again ends the same to the bit in any launches."""
-    ends = []
-    for attempts in (1, 13, 1000):
-        batch = Batch(1, 20, Options(method="hybrid", tolerance=1e-5))
-        batch.set_chain(0, PAPER, 20)
-        batch.load(0, *falling(20, PAPER, 0.3), stop_time=6e-3, stop_status=Status.FINISHED)
-        modes = set()
-        while batch.status(0) == Status.RUNNING:
-            batch.launch([0], batch.features(fixed_body="floor", watch="none"), attempts)
-            modes.add(int(batch.state.is_rigid.numpy()[0]))
-        assert attempts > 13 or modes == {0, 1}
-        state = np.hstack([batch.position(0), batch.velocity(0)])
-        ends.append((state, *batch.counts(0).values(), *batch.losses(0).values(), *batch.extremes(0).values()))
-    for end in ends[1:]:
-        for first, other in zip(ends[0], end, strict=True):
-            assert_array_equal(first, other)

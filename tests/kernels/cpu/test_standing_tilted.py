@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from tests.oracle_model import motion_equations, tilting_plane
+from tests.oracle_model.circular_loop import circular_loop
+from tests.oracle_model.tilting_plane import tilted_plane
 from tests.support.tilting_under_test import end_of, tilting_batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.kernels import layout
-from warpchain.oracle import motion_equations, tilting_plane
-from warpchain.oracle.circular_loop import circular_loop
-from warpchain.oracle.tilting_plane import tilted_plane
 from warpchain.status import Status
 
 LINKS = 8

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.oracle_model import tilting_plane
+from tests.oracle_model.tilting_plane import tilt_of, tilted_plane
 from tests.support.tilted_chains import mirrored
 from tests.support.tilting_under_test import end_of, row_of, tilting_batch
 from warpchain.engine.batch import Batch
@@ -14,9 +16,6 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
-from warpchain.oracle import tilting_plane
-from warpchain.oracle.circular_loop import circular_loop
-from warpchain.oracle.tilting_plane import tilt_of, tilted_plane
 from warpchain.status import Status
 
 SOFT = preset("soft")
@@ -195,20 +194,3 @@ def test_hard_case_ends_soundly(name):
     assert_sound(fallen, parameters)
     if name != "no gravity":
         assert fallen.batch.counts(0)["floor"] > 100
-
-
-def test_loop_that_yaws_turns_many_times_in_the_air():
-    """A ring that doesn't circulate turns about the vertical, more slowly as it stretches, and then lands."""
-    parameters = SOFT.with_values({"inner_inertia": 1e-5, "outer_inertia": 1e-5, "viscous_friction": 1.0})
-    position, velocity = circular_loop(8, parameters, 0.0)
-    plane = tilted_plane(turn=(0.0, 200.0), origin=(0.0, 0.4, 0.0))
-    fallen = fall((position, velocity, plane), parameters, tolerance=1e-6)
-    assert_sound(fallen, parameters)
-    assert fallen.batch.status(0) in (Status.AT_REST, Status.FINISHED)  # it spins on as coins do
-    assert fallen.batch.counts(0)["floor"] > 100
-    air = fallen.samples[: int(np.argmax(fallen.samples[:, layout.LOWEST] < 0))]
-    ahead, up = (air[:, layout.PLANE_COLUMN + axis :][:, :3] for axis in (layout.AHEAD, layout.UP))
-    yaw = np.unwrap(np.arctan2(-np.cross(ahead, up)[:, 0], ahead[:, 0]))
-    assert yaw[-1] > 8 * 2 * np.pi and np.all(np.diff(yaw) > 0)
-    assert_allclose(yaw[:20], 200.0 * air[:20, layout.TIME], rtol=2e-3, atol=1e-9)
-    assert_allclose(up[:20], np.tile([0.0, 1.0, 0.0], (20, 1)), atol=1e-3)

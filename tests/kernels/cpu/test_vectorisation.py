@@ -14,15 +14,12 @@ wp.config.kernel_cache_dir = sys.argv[1]
 from warpchain.kernels.cpu import loop
 loop.COMPILER_FLAGS += " -Rpass=loop-vectorize -Rpass-missed=loop-vectorize"
 features = loop.Features(method=sys.argv[2], columns=200, fixed_body=sys.argv[3], self_contact=True,
-                           broad_phase="grid", watch="none", tilts=sys.argv[4] == "tilts")
+                           watch="none", tilts=sys.argv[4] == "tilts")
 wp.load_module(loop.make_advance(features).module, device="cpu")
 """
 
 COMMON = {"place_ends", "attempt", "greatest_opening", "greatest_speed", "greatest_displacement", "evaluate"}
 EXPLICIT = COMMON | {"begin_stages", "derivatives", "commit"}
-IMPLICIT = COMMON | {
-    *("assemble", "first_right_hand_side", "place_stage", "pull_joints", "right_hand_side"),
-}
 RIGID = COMMON | {
     *("fastest_fall", "meeting", "prepare", "place_stage", "assemble", "solve_forces", "damp", "keep_stage"),
     *("openings", "opening_rates", "push", "close", "begin"),
@@ -30,7 +27,7 @@ RIGID = COMMON | {
 TILTING = (EXPLICIT - {"greatest_speed"}) | {
     *("shift_first_stage", "tilting_gap", "greatest_tilting_speed", "resolve_tilting_floor", "write_plane_sums"),
 }
-HOT_FUNCTIONS = {"rkf78": EXPLICIT, "dp5": EXPLICIT, "rodas5p": IMPLICIT, "hybrid": RIGID}
+HOT_FUNCTIONS = {"dp5": EXPLICIT, "hybrid": RIGID}
 
 
 def remarks_by_function(folder: Path, method: str, fixed_body: str, tilts: bool = False) -> list[tuple[str, str]]:
@@ -59,12 +56,8 @@ def remarks_by_function(folder: Path, method: str, fixed_body: str, tilts: bool 
 @pytest.mark.parametrize(
     ("method", "fixed_body", "tilts"),
     [
-        *(
-            ("rkf78", "floor", False),
-            ("dp5", "sprocket", False),
-            ("rodas5p", "floor", False),
-            ("hybrid", "floor", False),
-        ),
+        ("dp5", "sprocket", False),
+        ("hybrid", "floor", False),
         ("dp5", "floor", True),
     ],
 )

@@ -1,4 +1,4 @@
-"""Maxima over the threads of a block, and what the scratch keeps of a board; on CPU fibers."""
+"""Maxima over the threads of a block, on CPU fibers."""
 
 import numpy as np
 import pytest
@@ -6,15 +6,12 @@ import warp as wp
 
 from tests.support.blocks_under_test import fibers
 from warpchain.engine.devices import start_device
-from warpchain.kernels import layout
-from warpchain.kernels.gpu.functions import board_rows, shares_board
-from warpchain.kernels.gpu.threads import barrier, block_maxima, tile_address, vec4i
+from warpchain.kernels.gpu.threads import block_maxima
 from warpchain.kernels.physics.elementary import order_bits_single
 
 DEVICE = start_device("cpu").warp
 THREADS = 24
-GREATEST, WRITE_MAXIMA, READ_MAXIMA = block_maxima(THREADS)
-ADDRESS = tile_address(vec4i, THREADS)
+GREATEST, *_ = block_maxima(THREADS)
 
 
 @wp.kernel(module="unique", enable_backward=False)
@@ -38,36 +35,3 @@ def test_all_threads_find_the_greatest_number_and_miss_no_nan(odd: float, thread
         given = wp.array(numbers, dtype=wp.float32, device=DEVICE)
         wp.launch_tiled(greatest_of, dim=[1], inputs=[given, found], block_dim=THREADS, device=DEVICE)
     np.testing.assert_array_equal(found.numpy(), np.full(THREADS, expected))
-
-
-@wp.kernel(module="unique", enable_backward=False)
-def greatest_of_four(numbers: wp.array(dtype=vec4i), found: wp.array(dtype=vec4i)):
-    """What each thread finds to be the greatest of each of four."""
-    _block, lane = wp.tid()
-    tile = wp.tile_empty(shape=(wp.static(THREADS),), dtype=vec4i, storage="shared")
-    memory = ADDRESS(tile)
-    WRITE_MAXIMA(memory, lane, numbers[lane])
-    barrier()
-    found[lane] = READ_MAXIMA(memory)
-
-
-def test_all_threads_find_the_greatest_of_each_of_four() -> None:
-    """Negative numbers, as keys of negative gaps are, among them."""
-    numbers = np.random.default_rng(1).integers(-(2**31), 2**31, (THREADS, 4)).astype(np.int32)
-    numbers[:, 1] = -np.abs(numbers[:, 1] // 2) - 1
-    found = wp.zeros(THREADS, dtype=vec4i, device=DEVICE)
-    with fibers():
-        given = wp.array(numbers, dtype=vec4i, device=DEVICE)
-        wp.launch_tiled(greatest_of_four, dim=[1], inputs=[given, found], block_dim=THREADS, device=DEVICE)
-    np.testing.assert_array_equal(found.numpy(), np.tile(numbers.max(axis=0), (THREADS, 1)))
-
-
-@pytest.mark.parametrize(("threads", "links"), [(32, 8), (64, 60), (192, 180), (1024, 1000)])
-def test_scratch_holds_what_a_board_leaves_there(threads: int, links: int) -> None:
-    """Between launches the scratch holds what a shared board cannot keep, or all of a board not shared."""
-    columns = layout.padded_width(links)
-    rows = board_rows(threads, columns)
-    if shares_board(threads):
-        assert rows == layout.BOARD_VALUES > layout.BOARD_LOST_SELF
-    else:
-        assert (rows - 1) * columns < layout.board_size(threads) <= rows * columns

@@ -7,13 +7,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import warpchain
+from tests.oracle_model import motion_equations
+from tests.oracle_model.circular_loop import circular_loop, circular_loop_force
 from warpchain import Status, preset
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels.methods.method import find_method, method_names
-from warpchain.oracle import motion_equations
-from warpchain.oracle.circular_loop import circular_loop, circular_loop_force
 
 METHODS = [name for name in method_names() if not find_method(name).has_rigid_flight]
 PAPER, SOFT = preset("paper"), preset("soft")
@@ -23,9 +23,9 @@ HIGH = np.array([0.0, 0.05, 0.0])
 """Where the loops fly: out of the floor's reach, yet so near to the origin that rounding stays small."""
 
 
-def spinning_ellipse(parameters, links=LINKS, speed=2.0):
+def spinning_ellipse(parameters, links=LINKS):
     """An ellipse whose links circulate: a deforming loop high above the floor, its springs unstretched."""
-    position, velocity = lay_chain(ellipse(1.5), links, parameters.link_length, speed, 0.1)
+    position, velocity = lay_chain(ellipse(1.5), links, parameters.link_length, 2.0, 0.1)
     return position + HIGH, velocity
 
 
@@ -33,12 +33,6 @@ def greatest(values, expected):
     """Greatest error over the greatest value, of places and angles (columns 0 and 1, and 2) apart."""
     columns = (slice(0, 2), slice(2, 3))
     return max(np.abs(values[..., c] - expected[..., c]).max() / np.abs(expected[..., c]).max() for c in columns)
-
-
-def assert_same_bits(first, second):
-    """Two trajectories agree in every number."""
-    for name in vars(first):
-        assert_array_equal(getattr(first, name), getattr(second, name), err_msg=name)
 
 
 # --- accuracy ---
@@ -91,62 +85,29 @@ def test_both_controllers_reach_the_same_flight():
     assert flights[0].steps_accepted != flights[1].steps_accepted
 
 
-@pytest.mark.parametrize(("method", "stable"), [("bs32", 2.5), ("os32", 6.2), ("dp5", 3.4)])
-def test_steps_of_a_loose_tolerance_stay_at_the_bound_of_stability(method, stable):
-    """At 1e-3 stability bounds steps, to 1/(1.08e6/s) times what the method bears; `pi` grows back to it for ever."""
-    duration = 2e-3
-    start = spinning_ellipse(PAPER)
-    flight = warpchain.simulate(
-        PAPER, *start, duration, times=[duration], method=method, tolerance=1e-3, controller="pi", step_limit=20_000
-    )
-    assert flight.status == Status.FINISHED
-    assert 0.75 < duration / flight.steps_accepted / (stable / 1.08e6) < 1.05
-
-
-def test_features_left_out_do_not_change_a_flight():
-    """Without floor and self-contacts in the kernel a flight that meets neither is the same to rounding."""
-    start = spinning_ellipse(SOFT)
-    full = warpchain.simulate(SOFT, *start, 2e-3, method="bs32", tolerance=1e-9)
-    bare = warpchain.simulate(SOFT, *start, 2e-3, floor=False, self_contact=False, method="bs32", tolerance=1e-9)
-    assert greatest(bare.position, full.position) < 1e-12
-    assert greatest(bare.velocity, full.velocity) < 1e-10
-
-
 SMOOTH = PAPER.with_values({"joint_stiffness": 1e5, "joint_damping": 0.05, "friction_smoothing": 10.0})
 """Springs and friction so soft that steps of 10 µs are short against everything."""
-SMOOTHER = PAPER.with_values({"joint_stiffness": 2e4, "joint_damping": 1.0, "friction_smoothing": 30.0})
-"""The same for 20 µs: at a speed of 8 m/s errors of `rodas5p` reach its order before they drown in rounding."""
 
 
 @pytest.mark.parametrize(
-    ("method", "order", "steps", "parameters", "speed"),
+    ("method", "order", "steps"),
     [
-        ("rkf78", 8, [8e-5, 6e-5, 5e-5, 4e-5], SMOOTH, 2.0),
-        ("dp5", 5, [4e-5, 2e-5, 1e-5, 5e-6], SMOOTH, 2.0),
-        ("bs32", 3, [2e-5, 1e-5, 5e-6, 2.5e-6], SMOOTH, 2.0),
-        ("os32", 3, [2e-5, 1e-5, 5e-6, 2.5e-6], SMOOTH, 2.0),
-        ("rodas5p", 5, [4e-5, 3e-5, 2e-5, 1.5e-5], SMOOTHER, 8.0),
+        ("rkf78", 8, [8e-5, 6e-5, 5e-5, 4e-5]),
+        ("dp5", 5, [4e-5, 2e-5, 1e-5, 5e-6]),
+        ("bs32", 3, [2e-5, 1e-5, 5e-6, 2.5e-6]),
+        ("os32", 3, [2e-5, 1e-5, 5e-6, 2.5e-6]),
     ],
-    ids=["rkf78", "dp5", "bs32", "os32", "rodas5p"],
 )
-def test_error_falls_with_the_order_of_the_method(method, order, steps, parameters, speed):
+def test_error_falls_with_the_order_of_the_method(method, order, steps):
     """Errors of places and speeds against DOP853 fall as h^order, slope to 0.3, with joints that damp and rub."""
     duration = 4e-3
-    start = spinning_ellipse(parameters, speed=speed)
-    position, velocity, _ = motion_equations.solve_flight(*start, [0.0, duration], parameters, rtol=1e-13, atol=1e-15)
+    start = spinning_ellipse(SMOOTH)
+    position, velocity, _ = motion_equations.solve_flight(*start, [0.0, duration], SMOOTH, rtol=1e-13, atol=1e-15)
     errors = []
     for step in steps:
         # a skin beyond the floor makes the whole flight "near a contact", and the loose tolerance leaves the bound
-        flight = warpchain.simulate(
-            parameters,
-            *start,
-            duration,
-            times=[duration],
-            method=method,
-            tolerance=0.1,
-            contact_step=step,
-            skin=5.0,
-        )
+        near = {"tolerance": 0.1, "contact_step": step, "skin": 5.0}
+        flight = warpchain.simulate(SMOOTH, *start, duration, times=[duration], method=method, **near)
         assert flight.steps_rejected == 0
         # the first steps grow from 0.1 µs to h, each at most fivefold
         assert duration / step <= flight.steps_accepted <= duration / step + 6
@@ -176,15 +137,12 @@ def energies(flight, parameters, *, gravity=False):
 
 @pytest.mark.parametrize("method", [*METHODS, "hybrid"])
 def test_linear_momentum_is_kept_to_rounding(method):
-    """Friction and damping are inner forces: without gravity the momentum stays to 1e-14 of Σ m|v|.
-
-    Coefficients of rodas5p are up to 150, and so is its rounding.
-    """
+    """Friction and damping are inner forces: without gravity the momentum stays to 1e-14 of Σ m|v|."""
     flight = flight_without_gravity(PAPER, method=method, tolerance=1e-6)
     momentum = np.array([motion_equations.linear_momentum(v, PAPER) for v in flight.velocity])
     speeds = np.linalg.norm(flight.velocity[0][:, :2], axis=1)
     scale = motion_equations.link_masses(LINKS, PAPER) @ speeds
-    assert np.abs(momentum - momentum[0]).max() < (3e-13 if method == "rodas5p" else 1e-14) * scale
+    assert np.abs(momentum - momentum[0]).max() < 1e-14 * scale
 
 
 def test_centre_of_mass_falls_freely():
@@ -203,9 +161,8 @@ def test_centre_of_mass_falls_freely():
 @pytest.mark.parametrize("parameters", [PAPER, SOFT], ids=["paper", "soft"])
 @pytest.mark.parametrize("method", METHODS)
 def test_energy_is_kept_without_dissipation(parameters, method):
-    """With β = τ_c = b = 0 the energy stays: to 1e-13 at tolerance 1e-12; order 3 and what rodas rounds allow less."""
-    third = (1e-10, 1e-9)
-    tolerance, bound = {"bs32": third, "os32": third, "rodas5p": (1e-11, 5e-12)}.get(method, (1e-12, 1e-13))
+    """With β = τ_c = b = 0 the energy stays: to 1e-13 at tolerance 1e-12; to 1e-9 at 1e-10 with order 3."""
+    tolerance, bound = (1e-10, 1e-9) if method in ("bs32", "os32") else (1e-12, 1e-13)
     chain = parameters.with_values(FRICTIONLESS)
     flight = flight_without_gravity(chain, method=method, tolerance=tolerance)
     energy = energies(flight, chain)
@@ -223,15 +180,6 @@ def test_angular_momentum_is_kept_to_rounding_without_damping(parameters):
     ]
     assert np.abs(np.array(momentum) / momentum[0] - 1).max() < 1e-13
     assert flight.losses["joint_friction"] > 1e-4
-
-
-def test_damping_turns_the_angular_momentum_by_its_own_torque():
-    """A damper pulls across its open joint, which at k = 1e9 turns the angular momentum by 1e-13 to 1e-11 of it."""
-    flight = flight_without_gravity(PAPER)
-    states = list(zip(flight.position, flight.velocity, strict=True))
-    momentum = np.array([motion_equations.angular_momentum(x, v, PAPER) for x, v in states])
-    change = np.abs(momentum / momentum[0] - 1).max()
-    assert 1e-13 < change < 1e-11
 
 
 @pytest.mark.parametrize("parameters", [PAPER, SOFT], ids=["paper", "soft"])
@@ -393,11 +341,3 @@ def test_broken_world_leaves_the_others_alone():
     run_in_launches(sound, 50)
     assert_same_outcome(outcome(batch, 0), outcome(sound, 0))
     assert_same_outcome(outcome(batch, 2), outcome(sound, 2))
-
-
-def test_repeated_run_gives_the_same_bits():
-    """Two runs of one chain agree in every number."""
-    start = spinning_ellipse(SOFT)
-    runs = [warpchain.simulate(SOFT, *start, 0.1, method="dp5", times=[0.05, 0.1]) for _ in range(2)]
-    assert runs[0].impulses["floor"] > 0
-    assert_same_bits(*runs)

@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.oracle_model import motion_equations, tilting_plane
+from tests.oracle_model.circular_loop import circular_loop
+from tests.oracle_model.tilting_plane import axes, tilted_plane
 from tests.support.mild_parameters import MILD, SILENT
-from tests.support.tilted_chains import mirrored, tumbling_loop
+from tests.support.tilted_chains import tumbling_loop
 from tests.support.tilting_under_test import end_of, fly, row_of
 from warpchain.kernels import layout
-from warpchain.oracle import motion_equations, tilting_plane
-from warpchain.oracle.circular_loop import circular_loop
-from warpchain.oracle.tilting_plane import axes, tilted_plane
 
 WIDE = {"half_width": 0.02}
 """A half width [m] with which S is as large as the links' moments of inertia."""
-TUMBLING = {20: 4e-3, 40: 3e-3, 60: 2e-3}
+TUMBLING = {20: 4e-3, 60: 2e-3}
 """Numbers of links and durations of flights [s], in which the plane turns by 5 to 9 degrees and joints ring."""
 
 
@@ -52,7 +52,7 @@ def greatest_errors(end, expected):
 # 27 rad/s with 20 links. It falls as h²: 1e-6 at 8 µs, 2e-8 at 1 µs. os32 is of third order, and needs 1e-11 for
 # velocities to 1e-8.
 @pytest.mark.parametrize("links", TUMBLING)
-@pytest.mark.parametrize(("method", "tolerance"), [("dp5", 1e-9), ("rkf78", 1e-9), ("os32", 1e-11)])
+@pytest.mark.parametrize(("method", "tolerance"), [("dp5", 1e-9), ("os32", 1e-11)])
 def test_flight_equals_scipy(truth, method, tolerance, links):
     """In steps of 0.5 µs positions, velocities and the plane agree with DOP853 to 1e-8."""
     parameters, start, expected = truth(links)
@@ -73,15 +73,6 @@ def test_error_of_the_splitting_falls_with_the_square_of_the_step(truth):
         errors.append(greatest_errors(end_of(flight), expected))
     slopes = np.log2(np.array(errors[:-1]) / errors[1:])
     assert_allclose(slopes, 2.0, atol=0.05)
-
-
-def test_tolerance_bounds_the_error(truth):
-    """Steps as long as the tolerance has them: a hundredth of it makes the error at least three times smaller."""
-    parameters, start, expected = truth(20)
-    ends = [end_of(fly(start, parameters, TUMBLING[20], tolerance=tolerance)) for tolerance in (1e-5, 1e-7, 1e-9)]
-    errors = [greatest_errors(end, expected) for end in ends]
-    assert np.all(np.array(errors[:-1]) > 3 * np.array(errors[1:]))
-    assert np.all(np.array(errors[-1]) < [1e-7, 1e-5, 1e-5])
 
 
 # --- invariants ---
@@ -134,16 +125,6 @@ def test_joint_friction_takes_what_the_ledger_says():
     lost = sum(flight.losses(0).values())
     assert lost > 1e-3 * before
     assert before - after == pytest.approx(lost, rel=1e-5)
-
-
-def test_mirror_image_flies_as_the_mirror_image():
-    """Mirrored at the upright plane, the flight is the mirrored flight to the bit."""
-    position, velocity, plane = tumbling_loop(20, MILD, 3)
-    one = end_of(fly((position, velocity, plane), MILD, 4e-3))
-    other = end_of(fly((position, velocity, mirrored(plane)), MILD, 4e-3))
-    assert_array_equal(one[0], other[0])
-    assert_array_equal(one[1], other[1])
-    assert_array_equal(row_of(mirrored(one[2])), row_of(other[2]))
 
 
 def test_upright_plane_at_rest_stays_so_exactly():

@@ -1,0 +1,395 @@
+"""Flights that break careless integrators: whatever the method, each ends sound or with a clear status.
+
+Never with a silent NaN, a hang or a wrong number.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import warpchain
+from tests.hard_cases.starts import (
+    ELASTIC,
+    PAPER,
+    SOFT,
+    State,
+    dropped,
+    dropped_circle,
+    energy_error,
+    energy_scale,
+    every_method,
+    folded,
+    overlapping,
+    pulled_apart,
+    reversing_loop,
+    set_down,
+    turning_joints,
+)
+from tests.oracle_model import contact_equations, motion_equations
+from warpchain import Parameters, Status, Trajectory
+from warpchain.engine.batch import Batch
+from warpchain.inputs.options import Options
+from warpchain.kernels.methods.method import find_method
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A chain from a given state, with the floor, for some time [s]."""
+
+    parameters: Parameters
+    start: Callable[[], State]
+    duration: float
+    settings: dict[str, Any] = field(default_factory=dict)
+
+    def simulate(self, method: str) -> Trajectory:
+        """Its end; one that takes 20 million attempts counts as hanging."""
+        limits = {"step_limit": 20_000_000, "flight_tolerance": 1e-4}
+        return simulate(self.parameters, self.start(), self.duration, method=method, **limits | self.settings)
+
+
+def simulate(parameters: Parameters, state: State, duration: float, **settings: Any) -> Trajectory:
+    """`warpchain.simulate` at 1e-6, recording just the end."""
+    return warpchain.simulate(parameters, *state, duration, times=[duration], **{"tolerance": 1e-6, **settings})
+
+
+def assert_sound(flight: Trajectory, parameters: Parameters, state: State, within: float = 1e-5) -> None:
+    """Finished, finite, and the ledger closes to a fraction of the energy of motion and springs at the start."""
+    assert flight.status == Status.FINISHED, flight.status.sentence
+    position, velocity = flight.position[-1], flight.velocity[-1]
+    assert np.all(np.isfinite(position)) and np.all(np.isfinite(velocity))
+    # a flight on rigid joints is looser than springs
+    closes_within = max(within, 1e-4) if flight.losses["joint_switch"] else within
+    assert energy_error(flight, parameters, state) < closes_within
+    assert abs(flight.losses["joint_switch"]) < 1e-3 * energy_scale(parameters, state)
+    losses = [loss for name, loss in flight.losses.items() if name != "joint_switch"]
+    assert all(loss > -within * energy_scale(parameters, state) for loss in losses)
+
+
+def impact(parameters: Parameters, duration: float, **values: float) -> Flight:
+    """An impact of a chain with other values."""
+    return Flight(parameters.with_values(values), partial(dropped, gap=5e-5), duration)
+
+
+PULLED_APART = Flight(PAPER, pulled_apart, 2e-3)
+IN_THE_FLOOR = Flight(SOFT, partial(dropped, gap=-0.3), 5e-3)
+BOUNCING = partial(dropped, links=6, fall=0.0, gap=0.02)
+"""Start of a chain that bounces for as long as nothing dissipates."""
+
+Check = Callable[[Flight, State, Trajectory], None]
+
+
+def hits_the_floor(flight: Flight, start: State, end: Trajectory) -> None:
+    """An impact has impulses."""
+    assert end.impulses["floor"] > 0
+
+
+def opens_little(flight: Flight, start: State, end: Trajectory) -> None:
+    """Joints open as 1/√k at most: none can hold more than the whole energy of the fall and the spin."""
+    hits_the_floor(flight, start, end)
+    energy = motion_equations.total_energy(*start, flight.parameters)
+    assert end.greatest_opening < np.sqrt(2 * energy / flight.parameters.joint_stiffness)
+
+
+def is_damped(flight: Flight, start: State, end: Trajectory) -> None:
+    """Dampers take energy if there are any."""
+    hits_the_floor(flight, start, end)
+    assert (end.losses["joint_damping"] > 0) == (flight.parameters.joint_damping > 0)
+
+
+def pulls_itself_together(flight: Flight, start: State, end: Trajectory) -> None:
+    """Joints opened by 0.1 mm, 40 J at k = 1e9, close; the ledger tells where the energy went."""
+    opening = np.linalg.norm(motion_equations.joint_opening(start[0], flight.parameters), axis=1)
+    assert 1e-4 < opening.max() < 1.5e-4
+    closed = np.linalg.norm(motion_equations.joint_opening(end.position[-1], flight.parameters), axis=1)
+    assert closed.max() < 1e-5
+    stored = motion_equations.spring_energy(start[0], flight.parameters)
+    assert 0.5 * stored < end.losses["joint_damping"] < 1.01 * stored + 0.1
+    assert end.greatest_opening < 2 * opening.max()
+
+
+def is_stopped_in_the_floor(flight: Flight, start: State, end: Trajectory) -> None:
+    """A chain that starts in the floor or far below it gains no energy and is not lifted out."""
+    hits_the_floor(flight, start, end)
+    first, last = (
+        np.concatenate(motion_equations.link_ends(position, SOFT))[:, 1].min() - SOFT.circle_radius
+        for position in (start[0], end.position[-1])
+    )
+    assert -first <= end.greatest_penetration["floor"] < 1e-4 - first
+    assert last < first / 2
+    assert motion_equations.total_energy(end.position[-1], end.velocity[-1], SOFT) < motion_equations.total_energy(
+        *start, SOFT
+    )
+
+
+def falls_flat(flight: Flight, start: State, end: Trajectory) -> None:
+    """A chain folded by 180° at both ends stays whole; strands exactly on each other have no direction to part in."""
+    hits_the_floor(flight, start, end)
+    assert len(contact_equations.touching_pairs(start[0], flight.parameters)) == len(start[0]) // 2 - 1
+    assert end.greatest_opening < 1e-5
+    assert_allclose(end.position[-1][:, 1], start[0][:, 1], atol=3e-5)
+    assert_allclose(end.position[-1][:, 0], start[0][:, 0], atol=1e-5)
+
+
+def collides_at_once(flight: Flight, start: State, end: Trajectory) -> None:
+    """Links that start inside each other and move together collide and gain no energy."""
+    assert len(contact_equations.touching_pairs(start[0], SOFT)) >= 10
+    assert end.impulses["self"] > 10
+    assert end.losses["self_contact"] > 0
+    assert end.greatest_penetration["self"] > SOFT.circle_radius
+    motion = motion_equations.total_energy(end.position[-1], end.velocity[-1], SOFT)
+    assert motion <= motion_equations.total_energy(*start, SOFT) * (1 + 1e-9)
+
+
+def joints_reverse(flight: Flight, start: State, end: Trajectory) -> None:
+    """Joints of a turning loop come to turn the other way within microseconds, without a contact."""
+    assert end.impulses == {"floor": 0, "self": 0}
+    spins = [velocity[:, 2] - np.roll(velocity[:, 2], 1) for velocity in (start[1], end.velocity[-1])]
+    assert np.sum(spins[0] * spins[1] < 0) > 20
+
+
+def set_down_with(values: dict[str, float]) -> Flight:
+    """An impact with values at or far beyond the ends of Table 1."""
+    parameters = SOFT.with_values(values)
+    position, velocity = dropped()
+    return Flight(parameters, lambda: (set_down(position, parameters=parameters), velocity), 5e-3)
+
+
+FLIGHTS: list[tuple[Check, Flight, float]] = [
+    (opens_little, impact(PAPER, 1e-2, joint_stiffness=1e5), 1e-5),
+    (opens_little, impact(PAPER, 1e-2, joint_stiffness=1e7), 1e-5),
+    (opens_little, impact(PAPER, 2e-3, joint_stiffness=1e9), 1e-5),
+    (opens_little, impact(PAPER, 1e-3, joint_stiffness=1e10), 1e-5),
+    (opens_little, impact(PAPER, 1e-3, joint_stiffness=1e11), 1e-5),
+    (is_damped, impact(SOFT, 1e-2, joint_damping=0.0), 3e-4),
+    (is_damped, impact(SOFT, 1e-2, joint_damping=10.0), 3e-4),
+    (is_damped, impact(SOFT, 5e-3, joint_damping=1e4), 1e-5),
+    (is_damped, impact(SOFT, 1e-4, joint_damping=1e6), 1e-5),
+    (pulls_itself_together, PULLED_APART, 1e-5),
+    (pulls_itself_together, replace(PULLED_APART, parameters=SOFT), 1e-5),
+    (is_stopped_in_the_floor, IN_THE_FLOOR, 1e-5),
+    (is_stopped_in_the_floor, replace(IN_THE_FLOOR, start=partial(dropped, gap=-3e-3)), 1e-5),
+    *(
+        (falls_flat, Flight(parameters, partial(folded, n, parameters.circle_radius + 2e-5), 5e-3), 1e-6)
+        for n in (4, 8, 20)
+        for parameters in (PAPER, SOFT)
+    ),
+    (collides_at_once, Flight(SOFT, overlapping, 5e-3), 1e-4),
+    (joints_reverse, Flight(PAPER, reversing_loop, 1e-4), 1e-4),
+    (hits_the_floor, set_down_with({"viscous_friction": 0.0, "coulomb_friction": 0.0}), 1e-4),
+    (hits_the_floor, set_down_with({"viscous_friction": 1e-2}), 1e-4),
+    (hits_the_floor, set_down_with({"coulomb_friction": 1e-2}), 1e-4),
+    (hits_the_floor, set_down_with({"gravity": 0.0}), 1e-4),
+    (hits_the_floor, set_down_with({"gravity": 1e3}), 1e-4),
+    (hits_the_floor, set_down_with({"tangential_restitution": 1.0}), 1e-4),
+    (hits_the_floor, set_down_with({"tangential_restitution": -1.0}), 1e-4),
+    (hits_the_floor, set_down_with({"floor_restitution": 0.0, "chain_restitution": 0.0}), 1e-4),
+    (hits_the_floor, set_down_with({"inner_mass": 1.0, "inner_inertia": 1e-4}), 1e-4),
+    (hits_the_floor, set_down_with({"circle_radius": 6.3e-3}), 1e-4),
+    (hits_the_floor, set_down_with({"circle_radius": 1e-6}), 1e-4),
+]
+"""What must hold, the flight, and how well its energy ledger closes."""
+
+
+@every_method
+@pytest.mark.parametrize(("check", "flight", "within"), FLIGHTS, ids=[check.__name__ for check, _, _ in FLIGHTS])
+def test_flights(check: Check, flight: Flight, within: float, method: str) -> None:
+    """Every flight ends sound, and as its check says."""
+    start, end = flight.start(), flight.simulate(method)
+    assert_sound(end, flight.parameters, start, within)
+    check(flight, start, end)
+
+
+@every_method
+def test_stiff_joints_hit_alike(method):
+    """Right after an impact the centre of mass moves alike for k = 1e9 and 1e11: the model has a rigid limit."""
+    state = dropped()
+    speeds = []
+    for stiffness in (1e9, 1e11):
+        chain = PAPER.with_values({"joint_stiffness": stiffness})
+        flight = simulate(chain, state, 5e-4, method=method)
+        speeds.append(motion_equations.linear_momentum(flight.velocity[-1], chain))
+    momentum = motion_equations.linear_momentum(state[1], PAPER)
+    assert np.linalg.norm(speeds[0] - momentum) > 0.2 * np.linalg.norm(momentum)
+    assert np.linalg.norm(speeds[0] - speeds[1]) < 0.05 * np.linalg.norm(momentum)
+
+
+@every_method
+def test_hopeless_damping_is_a_status(method):
+    """Damping that asks explicit methods for steps of 1e-12 s ends in a limit that says so, where it stood then.
+
+    hybrid, which needs springs only after the first impulse, comes as far as the impact.
+    """
+    hopeless = Flight(SOFT.with_values({"joint_damping": 1e9}), dropped, 1e-2, {"step_limit": 20_000})
+    start, flight = hopeless.start(), hopeless.simulate(method)
+    assert flight.status in (Status.STEP_LIMIT, Status.STEP_TOO_SMALL)
+    assert 0 <= flight.time[-1] < 1e-2
+    assert flight.steps_accepted + flight.steps_rejected <= 20_000
+    assert energy_error(flight, hopeless.parameters, start) < 1e-6
+    if method != "hybrid":
+        assert_allclose(flight.position[-1], start[0] + start[1] * flight.time[-1], rtol=0, atol=1e-6)
+
+
+@every_method
+@pytest.mark.parametrize("smoothing", [1e-3, 1e-4, 1e-6], ids=lambda x: f"{x:g}")
+def test_any_smoothing_of_friction(method, smoothing):
+    """However sharp friction's change of sign, joints that stop turning stay so, to some tens of tolerances of ω."""
+    chain = PAPER.with_values({"friction_smoothing": smoothing, "gravity": 0.0})
+    position, velocity = turning_joints()  # friction stops their relative 0.02 rad/s within 10 µs
+    instants = np.linspace(0.0, 1e-4, 11)
+    flight = warpchain.simulate(chain, position, velocity, 1e-4, times=instants, method=method, step_limit=100_000)
+    assert_sound(flight, chain, (position, velocity))
+    turning = np.ptp(flight.velocity[:, :, 2], axis=1)
+    assert turning[0] == pytest.approx(0.02)
+    assert turning[1:].max() < 50 * 1e-6 * np.abs(velocity[:, 2]).max()
+    # the loop as a whole goes on turning
+    assert_allclose(flight.velocity[-1][:, 2].mean(), velocity[:, 2].mean(), rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("method", "tolerance", "bound"),
+    [
+        ("rkf78", 1e-8, 1e-5),
+        ("dp5", 1e-8, 5e-5),
+        ("bs32", 1e-7, 3e-3),
+        ("os32", 1e-7, 3e-3),
+        ("hybrid", 1e-7, 3e-3),
+    ],
+)
+def test_elastic_bouncing_keeps_the_energy_for_a_second(method, tolerance, bound):
+    """Without any dissipation a bouncing chain keeps its energy and its momentum along the floor over 1 s.
+
+    A step may err by the tolerance, and in a spring that rings 10 000 rad/s for a second without damping nothing
+    forgets an error: the bounds are a few times what this makes of the tolerance.
+    """
+    state = BOUNCING()
+    flight = warpchain.simulate(ELASTIC, *state, 1.0, times=np.linspace(0, 1, 21), method=method, tolerance=tolerance)
+    assert flight.status == Status.FINISHED
+    energy = [
+        motion_equations.total_energy(x, v, ELASTIC) for x, v in zip(flight.position, flight.velocity, strict=True)
+    ]
+    assert np.abs(np.array(energy) / energy[0] - 1).max() < bound
+    assert flight.impulses["floor"] > 10
+    assert flight.impulses["self"] > 10
+    assert max(map(abs, flight.losses.values())) < 1e-12 * energy[0]
+    momentum = np.array([motion_equations.linear_momentum(v, ELASTIC)[0] for v in flight.velocity])
+    speeds = motion_equations.link_masses(6, ELASTIC) @ np.abs(state[1][:, 0])
+    assert np.abs(momentum - momentum[0]).max() < 1e-12 * speeds
+    assert flight.position[:, :, 1].min() > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("method", "links"),
+    [
+        *((method, 1000) for method in ("rkf78", "os32", "hybrid")),
+        *((method, 198) for method in ("dp5", "bs32")),
+    ],
+)
+def test_long_chains(method, links):
+    """1000 links hit the floor like any other number, with explicit methods and hybrid.
+
+    The other methods differ from one of these in coefficients alone; they have the most links that fit into scratch
+    blocks of the usual width, whose kernels other tests compile as well.
+    """
+    fall = Flight(SOFT, partial(dropped_circle, links), 5e-3)
+    flight = fall.simulate(method)
+    assert_sound(flight, SOFT, fall.start())
+    assert flight.impulses["floor"] > 100
+
+
+@every_method
+def test_whole_turns_of_a_link_mean_nothing(method):
+    """Angles that are up to 10 000 turns on give the same motion, to the relative tolerance of such angles."""
+    position, velocity = dropped()
+    plain = simulate(SOFT, (position, velocity), 5e-4, method=method, tolerance=1e-8)
+    for turns in (-1, 10_000):
+        turned = position + np.array([0.0, 0.0, 2 * np.pi * turns])
+        flight = simulate(SOFT, (turned, velocity), 5e-4, method=method, tolerance=1e-8)
+        assert flight.status == Status.FINISHED
+        assert np.abs(flight.position[-1] - plain.position[-1])[:, :2].max() < 1e-6
+
+
+@every_method
+@pytest.mark.parametrize("factor", [1e10, 1e100, 1e200, 1e305])
+def test_absurd_speeds_are_a_status(method, factor):
+    """Speeds beyond what numbers can hold end at the start with a status; no NaN and no infinity comes back."""
+    position, velocity = dropped()
+    flight = simulate(SOFT, (position, velocity * factor), 1e-2, method=method)
+    assert flight.status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE)
+    assert flight.status == Status.NOT_FINITE or factor < 1e305
+    assert flight.time[-1] == 0.0
+    assert_array_equal(flight.position[-1], position)
+    assert_array_equal(flight.velocity[-1], velocity * factor)
+    assert np.all(np.isfinite(list(flight.losses.values())))
+
+
+@every_method
+def test_trajectory_ends_where_the_chain_broke_off(method):
+    """A run that fails midway returns the instants before, then the state in which it stopped, and its status."""
+    state = dropped()
+    instants = np.linspace(0.0, 1e-2, 11)
+    flight = warpchain.simulate(SOFT, *state, 1e-2, times=instants, method=method, step_limit=300)
+    assert flight.status == Status.STEP_LIMIT
+    assert flight.steps_accepted + flight.steps_rejected == 300
+    kept = len(flight.time)
+    assert 1 < kept < 11
+    assert_array_equal(flight.time[:-1], instants[: kept - 1])
+    assert instants[kept - 2] < flight.time[-1] <= instants[kept - 1]
+    assert len(flight.position) == len(flight.velocity) == kept
+    assert np.all(np.isfinite(flight.position))
+
+
+@every_method
+def test_more_pairs_than_the_list_holds_is_a_status(method):
+    """More close pairs than the neighbour list holds end in list_overflow, not in contacts that are overlooked."""
+    flight = simulate(SOFT, folded(60), 1e-3, method=method, skin=1.0)
+    assert flight.status == Status.LIST_OVERFLOW
+    assert flight.time[-1] == 0.0
+
+
+@every_method
+def test_fixed_steps_show_the_order(method: str) -> None:
+    """The energy of undamped bouncing springs falls as h^p for an odd order p, as h^(p + 1) for an even one.
+
+    One step multiplies the energy of an oscillator by |R(iωh)|², which leaves 1 by an even power of h. Springs that
+    nothing damps ring for ever, so hybrid never takes its joints for rigid here: it is os32. All steps have the length
+    that is asked for.
+    """
+    energy, points = motion_equations.total_energy(*BOUNCING(), ELASTIC), []
+    for step in (8e-5, 6e-5, 4e-5, 2e-5, 1e-5, 5e-6, 2.5e-6, 1.25e-6):
+        # a skin beyond the height of the fall makes contact_step, not the loose tolerance, set the step
+        settings = {"tolerance": 0.1, "skin": 3.0, "contact_step": step}
+        flight = Flight(ELASTIC, BOUNCING, 0.3, settings).simulate(method)
+        assert flight.status == Status.FINISHED
+        assert flight.steps_accepted + flight.steps_rejected == pytest.approx(0.3 / step, abs=10)
+        end = motion_equations.total_energy(flight.position[-1], flight.velocity[-1], ELASTIC)
+        points.append((step, abs(energy - end) / energy))
+    # those that are neither unstable nor at rounding
+    steps, drifts = np.log([(step, drift) for step, drift in points if 1e-10 < drift < 1e-2]).T
+    order = find_method(method).order
+    assert np.polyfit(steps, drifts, 1)[0] == pytest.approx(order + (order + 1) % 2, abs=0.5)
+
+
+@every_method
+def test_one_broken_chain_leaves_the_others_alone(method: str) -> None:
+    """Of a thousand chains in a batch one has a NaN: it gets a status, the others the same bits as without it."""
+    worlds, broken = 1000, 500
+    ends = []
+    for spin in (None, np.nan):
+        batch = Batch(worlds, 8, Options.model_validate({"method": method, "step_limit": 1_000_000}))
+        for world in range(worlds):
+            position, velocity = dropped(fall=0.5 + world / worlds)
+            if world == broken and spin is not None:
+                velocity[3, 2] = spin
+            batch.set_chain(world, SOFT, 8)
+            batch.load(world, position, velocity, stop_time=1e-3, stop_status=Status.FINISHED)
+        batch.run(range(worlds), batch.features(fixed_body="floor", watch="none"))
+        ends.append(np.delete(np.array(batch.motions(range(worlds), 8)), broken, axis=1))
+    assert_array_equal(*ends)
+    assert not batch.status(broken).ok
+    assert set(np.delete(batch.statuses(), broken)) == {Status.FINISHED}

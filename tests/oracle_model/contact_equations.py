@@ -1,0 +1,221 @@
+"""Contacts of the model in plain NumPy, with the conventions of :mod:`tests.oracle_model.motion_equations`.
+
+Sources: "A walking roller chain", section 2.2; A. Chatterjee and A. Ruina, "A new algebraic rigid-body collision law
+based on impulse space considerations", Journal of Applied Mechanics 65 (1998) 939-951.
+"""
+
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tests.oracle_model.motion_equations import cross, link_ends, link_inertias, link_masses, turned
+from warpchain.inputs.parameters import Parameters
+
+Array = NDArray[np.float64]
+Sprocket = tuple[Array, float, float]
+"""Centre (2,) in m, radius that the link circles touch in m, angular velocity in rad/s (anticlockwise > 0)."""
+
+
+def collision_impulse(
+    v_rel: Array,
+    normal: Array,
+    lever_a: Array,
+    lever_b: Array,
+    inv_mass_a: float,
+    inv_inertia_a: float,
+    inv_mass_b: float,
+    inv_inertia_b: float,
+    restitution: float,
+    friction: float,
+    tangential_restitution: float,
+) -> Array:
+    """Chatterjee–Ruina law of one collision of bodies A and B at a point P: the impulse J on B; −J acts on A.
+
+    With n̂ from A to B, t̂ = ẑ × n̂, v = v_A − v_B at P and W the matrix for which J changes v to v' = v − W J,
+
+        W = (1/m_A + 1/m_B) 1 + p_A p_Aᵀ/I_A + p_B p_Bᵀ/I_B,   p = ẑ × r   (r: lever from the centre of mass to P)
+        J₁ = v_n/W_nn n̂   (stops the approach),   J₂ = W⁻¹ v   (stops all relative motion),   D = J₂ − J₁
+        J = (1+e) J₁ + (1+e_t) D   if this has |J_t| ≤ μ J_n,
+        J = (1+e) J₁ + κ D         otherwise, with κ = μ (1+e) J_1n / (|D_t| − μ D_n).
+
+    Errata of the paper: it prints α(n̂,n̂), the part of W_nn without the masses, in J₁. Its words ("bring the normal
+    component of the relative velocity to zero") and the original law need W_nn, and a central impact has α = 0.
+    (The other slip, the transposed ∂C/∂q, is named at `acceleration`.)
+
+    What follows from it. W D = (0, s) has no normal part, s = v_t − W_tn v_n/W_nn, so v'_n = −e v_n in both cases,
+    and D is orthogonal to J₁ in W. Hence with κ = 1+e_t in the first case the kinetic energy changes by exactly
+
+        ΔT = −½ (1−e²) J₁ᵀ W J₁ − ½ κ (2−κ) Dᵀ W D.
+
+    The second case needs (1+e_t)(|D_t| − μ D_n) > μ (1+e) J_1n, so κ exists there and 0 ≤ κ < 1+e_t. The energy
+    therefore never rises for e in [0, 1] and e_t in [−1, 1], whatever μ ≥ 0 is; with e > 1 or e_t > 1 it can. (If
+    A is a driven surface this holds in the frame of the surface at P; the surface may do work on B.) The first
+    case leaves v'_t = −e_t s − e v_n W_tn/W_nn: it ends all sliding only if e_t = 0 and e W_tn = 0.
+
+    Args:
+        v_rel: v_A − v_B at P, (2,), m/s.
+        normal: unit vector from A to B, (2,).
+        lever_a: P − centre of mass of A, (2,), m.
+        lever_b: P − centre of mass of B, (2,), m.
+        inv_mass_a: 1/m_A, 1/kg; 0 for an immovable body.
+        inv_inertia_a: 1/I_A, 1/(kg m²); 0 for an immovable body.
+        inv_mass_b: 1/m_B, 1/kg; not both bodies may be immovable.
+        inv_inertia_b: 1/I_B, 1/(kg m²).
+        restitution: e in [0, 1].
+        friction: μ, at least 0.
+        tangential_restitution: e_t in [−1, 1].
+
+    Returns:
+        J in world axes, (2,), N s; zero unless the bodies approach (v_n > 0).
+    """
+    v_n = float(normal @ v_rel)
+    if v_n <= 0:
+        return np.zeros(2)
+    tangent = turned(normal)
+    turn_a, turn_b = turned(lever_a), turned(lever_b)
+    w = (inv_mass_a + inv_mass_b) * np.eye(2)
+    w += inv_inertia_a * np.outer(turn_a, turn_a) + inv_inertia_b * np.outer(turn_b, turn_b)
+    stop_approach = v_n / (normal @ w @ normal) * normal
+    stop_sliding = np.linalg.solve(w, v_rel) - stop_approach
+    # |J_t| ≤ μ J_n with J₁'s part on the right: rounding then can't let the divisor of κ vanish.
+    divisor = float(abs(tangent @ stop_sliding) - friction * (normal @ stop_sliding))
+    limit = float(friction * (1 + restitution) * (normal @ stop_approach))
+    kappa = 1 + tangential_restitution
+    if kappa * divisor > limit:
+        kappa = limit / divisor
+    return (1 + restitution) * stop_approach + kappa * stop_sliding
+
+
+def resolve_contacts(
+    position: Array,
+    velocity: Array,
+    parameters: Parameters,
+    *,
+    floor: bool = True,
+    sprocket: Sprocket | None = None,
+    self_contact: bool = True,
+) -> tuple[Array, dict[str, int]]:
+    """One pass over all touching circles, each contact seeing the velocities that those before it left.
+
+    A link has a circle of radius r at either end. Circles touch when they overlap (gap < 0); a touching contact
+    gets the impulse of `collision_impulse` if it approaches, else nothing. Positions never change. Two circles, or
+    a circle and the sprocket, with exactly the same centre have no normal and are left alone.
+
+    Order: floor, links 0 … n−1, left circle before right; sprocket likewise; then self-contacts in two halves, each by
+    joint pair in the order of `self_contact_order`: of a joint pair (p, q), the first half has the link pairs (p, q)
+    and (p+1, q+1), the second (p, q+1) and (p+1, q), links mod n. Equal and neighbouring links are passed over.
+
+    The point P and the normal: floor (A; y = 0): the circle's lowest point, +y. Sprocket (A): the circle's point
+    nearest the sprocket's centre, radially outwards; the surface moves with Ω ẑ × (P − centre). Two links: midway
+    between the circles' centres, from A, the link at joint p, to B, the link at joint q > p.
+
+    Args:
+        position: (n, 3).
+        velocity: (n, 3); not changed.
+        parameters: the chain and its coefficients of collision.
+        floor: whether there is a floor.
+        sprocket: the sprocket, or None.
+        self_contact: whether links collide with each other.
+
+    Returns:
+        The new velocity (n, 3), and the numbers of impulses by kind: "floor", "sprocket", "self".
+    """
+    n = len(position)
+    velocity = velocity.copy()
+    inv_mass = 1 / link_masses(n, parameters)
+    inv_inertia = 1 / link_inertias(n, parameters)
+    radius = parameters.circle_radius
+    counts = {"floor": 0, "sprocket": 0, "self": 0}
+
+    def collide(
+        a: int | None,
+        b: int,
+        point: Array,
+        normal: Array,
+        law: tuple[float, float],
+        surface: Array | None = None,
+    ) -> bool:
+        """Resolve one contact of link b with link a, or with a surface of the given velocity (at rest if None)."""
+        lever_a, lever_b = np.zeros(2), point - position[b, :2]
+        v_a, inverses_a = np.zeros(2) if surface is None else surface, (0.0, 0.0)
+        v_b = velocity[b, :2] + velocity[b, 2] * turned(lever_b)
+        if a is not None:
+            lever_a, inverses_a = point - position[a, :2], (inv_mass[a], inv_inertia[a])
+            v_a = velocity[a, :2] + velocity[a, 2] * turned(lever_a)
+        inverses = (*inverses_a, inv_mass[b], inv_inertia[b])
+        coefficients = (*law, parameters.tangential_restitution)
+        impulse = collision_impulse(v_a - v_b, normal, lever_a, lever_b, *inverses, *coefficients)
+        if a is not None:
+            velocity[a, :2] -= inv_mass[a] * impulse
+            velocity[a, 2] -= inv_inertia[a] * cross(lever_a, impulse)
+        velocity[b, :2] += inv_mass[b] * impulse
+        velocity[b, 2] += inv_inertia[b] * cross(lever_b, impulse)
+        return bool(impulse.any())
+
+    ends = np.stack(link_ends(position, parameters), axis=1)
+    if floor:
+        law = (parameters.floor_restitution, parameters.floor_friction)
+        upwards = np.array([0.0, 1.0])
+        for link in range(n):
+            for centre in ends[link]:
+                if centre[1] - radius < 0:
+                    counts["floor"] += collide(None, link, centre - radius * upwards, upwards, law)
+    if sprocket is not None:
+        law = (parameters.sprocket_restitution, parameters.sprocket_friction)
+        hub, contact_radius, angular_velocity = sprocket
+        for link in range(n):
+            for centre in ends[link]:
+                distance = np.hypot(*(centre - hub))
+                if 0 < distance < contact_radius + radius:
+                    outwards = (centre - hub) / distance
+                    point = centre - radius * outwards
+                    surface = angular_velocity * turned(point - hub)
+                    counts["sprocket"] += collide(None, link, point, outwards, law, surface)
+    if self_contact:
+        law = (parameters.chain_restitution, parameters.chain_friction)
+        in_order = sorted(touching_pairs(position, parameters), key=self_contact_order)
+        for half, pair in product((0, 1), in_order):
+            for a, b, centre_a, centre_b in _circle_pairs(pair, ends, half):
+                distance = np.hypot(*(centre_b - centre_a))
+                if 0 < distance < 2 * radius:
+                    normal = (centre_b - centre_a) / distance
+                    counts["self"] += collide(a, b, (centre_a + centre_b) / 2, normal, law)
+    return velocity, counts
+
+
+def self_contact_order(pair: tuple[int, int]) -> tuple[int, int, int, int]:
+    """Sort key of a joint pair (p, q), p < q: p mod 2, q mod 2, p, q."""
+    p, q = pair
+    return p % 2, q % 2, p, q
+
+
+def touching_pairs(position: Array, parameters: Parameters) -> list[tuple[int, int]]:
+    """All joint pairs (p, q), p < q, sorted, at which circles of two links overlap, by trying every pair.
+
+    Circles of the same link or of neighbours never count. Exactly concentric circles do overlap.
+    """
+    n = len(position)
+    ends = np.stack(link_ends(position, parameters), axis=1)
+    return [
+        (p, q)
+        for p in range(n)
+        for q in range(p + 1, n)
+        if any(
+            np.hypot(*(centre_b - centre_a)) < 2 * parameters.circle_radius
+            for half in (0, 1)
+            for _, _, centre_a, centre_b in _circle_pairs((p, q), ends, half)
+        )
+    ]
+
+
+def _circle_pairs(pair: tuple[int, int], ends: Array, half: int) -> Iterator[tuple[int, int, Array, Array]]:
+    """Link a at joint p, link b at joint q and the centres of their circles there, for links that can touch."""
+    n = len(ends)
+    p, q = pair
+    for after_p in (0, 1):
+        after_q = after_p ^ half
+        a, b = (p + after_p) % n, (q + after_q) % n
+        if 2 <= (b - a) % n <= n - 2:
+            yield a, b, ends[a, 1 - after_p], ends[b, 1 - after_q]

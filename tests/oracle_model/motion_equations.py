@@ -1,0 +1,239 @@
+"""Equations of motion, energies and momenta of a chain, and its flight by SciPy.
+
+Conventions of all functions:
+
+- A chain of n links (n even, at least 4) has `position` (n, 3): x, y (m) and angle θ (rad) of each link's centre
+  of mass, and `velocity` (n, 3): their time derivatives (m/s, rad/s). Even indices are inner links.
+- u_i = (cos θ_i, sin θ_i) points from the left to the right end of link i, t_i = ẑ × u_i, a = ℓ/2. Joint i joins
+  the right end of link i to the left end of link i+1 (mod n).
+- `parameters` gives the values by the names of `warpchain.inputs.parameters.Parameters`. SI units, y upwards.
+
+Source: "A walking roller chain", section 2.1.
+"""
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from warpchain.inputs.parameters import Parameters
+
+Array = NDArray[np.float64]
+
+
+def link_masses(n: int, parameters: Parameters) -> Array:
+    """Mass of each link, (n,), kg. Raises ValueError unless n is even and at least 4."""
+    return _alternating(n, parameters.inner_mass, parameters.outer_mass)
+
+
+def link_inertias(n: int, parameters: Parameters) -> Array:
+    """Moment of inertia of each link about its centre, (n,), kg m². Raises ValueError as `link_masses`."""
+    return _alternating(n, parameters.inner_inertia, parameters.outer_inertia)
+
+
+def link_ends(position: Array, parameters: Parameters) -> tuple[Array, Array]:
+    """Left and right end of each link, X ∓ a u, (n, 2) each, m."""
+    offset = parameters.link_length / 2 * direction(position[:, 2])
+    return position[:, :2] - offset, position[:, :2] + offset
+
+
+def joint_opening(position: Array, parameters: Parameters) -> Array:
+    """C_i = left end of link i+1 − right end of link i, (n, 2), m; zero when the joint is closed."""
+    left, right = link_ends(position, parameters)
+    return np.roll(left, -1, axis=0) - right
+
+
+def joint_opening_rate(position: Array, velocity: Array, parameters: Parameters) -> Array:
+    """Time derivative of `joint_opening`, (n, 2), m/s."""
+    offset_rate = parameters.link_length / 2 * velocity[:, 2:] * turned(direction(position[:, 2]))
+    return np.roll(velocity[:, :2] - offset_rate, -1, axis=0) - (velocity[:, :2] + offset_rate)
+
+
+def joint_force(position: Array, velocity: Array, parameters: Parameters) -> Array:
+    """F_i = k C_i + b Ċ_i, (n, 2), N: on link i at its right end; −F_i acts on link i+1 at its left end."""
+    spring = parameters.joint_stiffness * joint_opening(position, parameters)
+    return spring + parameters.joint_damping * joint_opening_rate(position, velocity, parameters)
+
+
+def friction_torque(spin: Array, parameters: Parameters) -> Array:
+    """f(w) = β w + τ_c tanh(w/ω_c), N m, of a joint's relative angular velocity w (rad/s, any shape)."""
+    coulomb = parameters.coulomb_friction * np.tanh(spin / parameters.friction_smoothing)
+    return parameters.viscous_friction * spin + coulomb
+
+
+def acceleration(position: Array, velocity: Array, parameters: Parameters, *, gravity: bool = True) -> Array:
+    """Equations of motion of the free chain, (n, 3): ẍ, ÿ (m/s²), θ̈ (rad/s²).
+
+        m_i Ẍ_i = F_i − F_{i−1} − m_i g ŷ
+        I_i θ̈_i = a t_i·(F_i + F_{i−1}) − f(ω_i − ω_{i−1}) − f(ω_i − ω_{i+1})
+
+    These are the paper's equations in components. (Its matrix form needs J_ij = ∂C_i/∂q_j; the index order it
+    prints, ∂C_j/∂q_i, is transposed.) `gravity=False` leaves g out.
+    """
+    n = len(position)
+    here = joint_force(position, velocity, parameters)
+    before = np.roll(here, 1, axis=0)
+    spin = velocity[:, 2]
+    lever = parameters.link_length / 2 * turned(direction(position[:, 2]))
+    torque = np.sum(lever * (here + before), axis=1)
+    torque -= friction_torque(spin - np.roll(spin, 1), parameters)
+    torque -= friction_torque(spin - np.roll(spin, -1), parameters)
+    result = np.empty((n, 3), dtype=torque.dtype)  # complex steps differentiate these equations
+    result[:, :2] = (here - before) / link_masses(n, parameters)[:, None]
+    result[:, 2] = torque / link_inertias(n, parameters)
+    if gravity:
+        result[:, 1] -= parameters.gravity
+    return result
+
+
+def kinetic_energy(velocity: Array, parameters: Parameters) -> float:
+    """Σ ½ m |Ẋ|² + ½ I θ̇², J."""
+    n = len(velocity)
+    translation = link_masses(n, parameters) @ np.sum(velocity[:, :2] ** 2, axis=1)
+    return float(translation + link_inertias(n, parameters) @ velocity[:, 2] ** 2) / 2
+
+
+def gravitational_energy(position: Array, parameters: Parameters) -> float:
+    """Σ m g y, J; zero at y = 0."""
+    return float(parameters.gravity * (link_masses(len(position), parameters) @ position[:, 1]))
+
+
+def spring_energy(position: Array, parameters: Parameters) -> float:
+    """Σ ½ k |C|², J."""
+    return float(parameters.joint_stiffness / 2 * np.sum(joint_opening(position, parameters) ** 2))
+
+
+def total_energy(position: Array, velocity: Array, parameters: Parameters, *, gravity: bool = True) -> float:
+    """Kinetic and spring energy and, unless `gravity=False`, gravitational energy, J."""
+    energy = kinetic_energy(velocity, parameters) + spring_energy(position, parameters)
+    return energy + gravitational_energy(position, parameters) if gravity else energy
+
+
+def friction_power(velocity: Array, parameters: Parameters) -> float:
+    """Power that joint friction dissipates, Σ f(w) w with w = θ̇_i − θ̇_{i+1}, W."""
+    spin = velocity[:, 2] - np.roll(velocity[:, 2], -1)
+    return float(np.sum(friction_torque(spin, parameters) * spin))
+
+
+def damping_power(position: Array, velocity: Array, parameters: Parameters) -> float:
+    """Power that joint damping dissipates, Σ b |Ċ|², W."""
+    return float(parameters.joint_damping * np.sum(joint_opening_rate(position, velocity, parameters) ** 2))
+
+
+def linear_momentum(velocity: Array, parameters: Parameters) -> Array:
+    """Σ m Ẋ, (2,), kg m/s."""
+    return link_masses(len(velocity), parameters) @ velocity[:, :2]
+
+
+def angular_momentum(position: Array, velocity: Array, parameters: Parameters) -> float:
+    """Σ m (X − X_cm) × (Ẋ − Ẋ_cm) + I θ̇, about the chain's centre of mass, kg m²/s, anticlockwise > 0.
+
+    Free flight keeps it for b = 0. A damper acts across an open joint, so each joint adds the torque −b C × Ċ.
+    """
+    n = len(position)
+    mass = link_masses(n, parameters)
+    arm = position[:, :2] - mass @ position[:, :2] / mass.sum()
+    drift = velocity[:, :2] - mass @ velocity[:, :2] / mass.sum()
+    return float(mass @ cross(arm, drift) + link_inertias(n, parameters) @ velocity[:, 2])
+
+
+def solve_flight(
+    position: Array,
+    velocity: Array,
+    times: Array,
+    parameters: Parameters,
+    *,
+    gravity: bool = True,
+    rtol: float = 1e-12,
+    atol: float = 1e-12,
+    method: str = "DOP853",
+) -> tuple[Array, Array, int]:
+    """Integrate the free chain with `scipy.integrate.solve_ivp`.
+
+    Every requested time ends an integration, so that no result is interpolated.
+
+    Args:
+        position: start, (n, 3), at `times[0]`.
+        velocity: start, (n, 3), at `times[0]`.
+        times: (t,), s, strictly increasing.
+        parameters: the chain.
+        gravity: whether gravity acts.
+        rtol: relative tolerance of `solve_ivp`.
+        atol: absolute tolerance of `solve_ivp`, for positions (m, rad) and velocities (m/s, rad/s) alike.
+        method: method of `solve_ivp`.
+
+    Returns:
+        positions (t, n, 3), velocities (t, n, 3) and the number of evaluations of the equations.
+
+    Raises:
+        ValueError: `times` is not a strictly increasing sequence, or the start is not finite.
+        RuntimeError: the solver failed.
+    """
+    n = len(position)
+
+    def derivative(_: float, state: Array) -> Array:
+        x, v = state.reshape(2, n, 3)
+        return np.concatenate([v, acceleration(x, v, parameters, gravity=gravity)]).ravel()
+
+    start = np.stack([position, velocity]).ravel()
+    states, evaluations = integrated(derivative, start, times, rtol=rtol, atol=atol, method=method)
+    motion = states.reshape(-1, 2, n, 3)
+    return motion[:, 0], motion[:, 1], evaluations
+
+
+def integrated(
+    derivative: Callable[[float, Array], Array], start: Array, times: Array, *, rtol: float, atol: float, method: str
+) -> tuple[Array, int]:
+    """Integrate any first-order equations with `scipy.integrate.solve_ivp`, as `solve_flight` does.
+
+    Args:
+        derivative: of the state, from time (s) and state (d,).
+        start: state (d,) at `times[0]`.
+        times: (t,), s, strictly increasing. Every one ends an integration, so that no result is interpolated.
+        rtol: relative tolerance of `solve_ivp`.
+        atol: absolute tolerance of `solve_ivp`.
+        method: method of `solve_ivp`.
+
+    Returns:
+        states (t, d) and the number of evaluations of `derivative`.
+
+    Raises:
+        ValueError: `times` is not a strictly increasing sequence, or the start is not finite.
+        RuntimeError: the solver failed.
+    """
+    times = np.asarray(times, dtype=np.float64)
+    if times.ndim != 1 or len(times) == 0 or not np.all(np.diff(times) > 0):
+        raise ValueError("times must be a strictly increasing sequence of at least one time")
+    states = np.empty((len(times), len(start)))
+    states[0] = start
+    evaluations = 0
+    for step, span in enumerate(pairwise(times)):
+        solution = solve_ivp(derivative, span, states[step], method=method, t_eval=[span[1]], rtol=rtol, atol=atol)
+        evaluations += int(solution.nfev)
+        if not solution.success or not np.all(np.isfinite(solution.y)):
+            raise RuntimeError(f"{method} failed between {span[0]} s and {span[1]} s: {solution.message}")
+        states[step + 1] = solution.y[:, -1]
+    return states, evaluations
+
+
+def _alternating(n: int, inner: float, outer: float) -> Array:
+    if n < 4 or n % 2:
+        raise ValueError(f"a chain has an even number of links, at least 4; got {n}")
+    return np.tile([inner, outer], n // 2)
+
+
+def direction(angle: Array) -> Array:
+    """(cos, sin) of angles [rad], shape (…, 2)."""
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def turned(vector: Array) -> Array:
+    """ẑ × vector, for vectors of shape (…, 2)."""
+    return np.stack([-vector[..., 1], vector[..., 0]], axis=-1)
+
+
+def cross(first: Array, second: Array) -> Array:
+    """The z component of first × second."""
+    return np.asarray(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])

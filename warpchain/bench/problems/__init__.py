@@ -1,1 +1,0 @@
-"""Test problems with known answers, and hard cases that break careless integrators."""

@@ -1,4 +1,0 @@
-"""The model in plain NumPy, written from its equations, for tests and benchmarks.
-
-It shares no code with the kernels, so that it can show their errors, and it is not made to be fast.
-"""

@@ -1,0 +1,258 @@
+"""One block of a sweep as arrays with named axes."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.validation import InputError, plain, shown, suggestion
+from warpchain.status import Status
+from warpchain.store.cell_statistics import CellStatistics
+from warpchain.store.manifest import layouts
+from warpchain.sweeps.plan import Sweep, load_sweep
+from warpchain.sweeps.recording import Recording
+from warpchain.walks.faulty_rows import faults_of_columns, lengths_of_block
+from warpchain.walks.rows import COLUMNS, MISSING, Column, field_column, numbers_of, quantity_of
+from warpchain.walks.walk_result import WalkResult, read_motion
+
+if TYPE_CHECKING:
+    import h5py
+    import pandas
+    import xarray
+
+Array = NDArray[Any]
+
+_Variables = dict[str, tuple[tuple[str, ...], Array, dict[str, Any]]]
+"""Name → axes, values and attributes, as xarray takes them."""
+KeptMotions = Callable[[Iterable[int]], "Iterator[tuple[int, h5py.Group]]"]
+"""Opens the kept motions of some walks, given their places in a flat column of their block; yields place and group."""
+
+
+@dataclass(frozen=True, eq=False)
+class Origin:
+    """What a result was computed from.
+
+    Attributes:
+        sweeps: the resolved sweeps, as in sweep.yaml, whose samples stand one behind the other.
+        provenance: digest of the sweep, version of the numerics, and versions of the software that began it.
+    """
+
+    sweeps: tuple[dict[str, Any], ...]
+    provenance: dict[str, Any]
+
+    @cached_property
+    def planned(self) -> tuple[Sweep, ...]:
+        """The sweeps, checked."""
+        return tuple(map(load_sweep, self.sweeps))
+
+    def samples(self, block: int) -> list[tuple[int, int]]:
+        """For each sample of a block, given its number, the number of its sweep and its own number there."""
+        counts = [layouts(sweep)[block].samples for sweep in self.sweeps]
+        return [(number, sample) for number, count in enumerate(counts) for sample in range(count)]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class BlockResult:
+    """A block of a sweep. Every column is an attribute, an array of shape `shape`: `block.dx`, `block.status`.
+
+    Columns are those of `warpchain.walks.rows.COLUMNS`, and NAME_drawn for each drawn quantity. A missing walk has −1
+    in columns of integers, `status` among them, and NaN in those of floats.
+
+    Attributes:
+        name: name of the block.
+        number: its number in the sweep.
+        axes: name of each axis of the grid → its values, in order; null is None. The samples are one more axis.
+        drawn: names of the quantities that samples draw; the values are in the columns NAME_drawn.
+        columns: name → values.
+        origin: what it was computed from.
+        kept_motions: opens the kept motions.
+    """
+
+    name: str
+    number: int
+    axes: dict[str, Array]
+    drawn: tuple[str, ...]
+    columns: dict[str, Array]
+    origin: Origin
+    kept_motions: KeptMotions
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Names of the axes of every column."""
+        return (*self.axes, "sample")
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values of each axis, then the number of samples."""
+        return self.columns["index"].shape
+
+    def __getattr__(self, name: str) -> Array:
+        """A column."""
+        columns: dict[str, Array] = self.__dict__.get("columns", {})
+        if name not in columns:
+            raise AttributeError(f"{name}: no such column; columns are {', '.join(columns)}", name=name, obj=self)
+        return columns[name]
+
+    def __dir__(self) -> list[str]:
+        """Attributes, columns among them."""
+        return sorted({*super().__dir__(), *self.columns})
+
+    def __repr__(self) -> str:
+        """One line with axes and counts."""
+        sizes = ", ".join(f"{name}: {size}" for name, size in zip(self.dims, self.shape, strict=True))
+        return f"<BlockResult {self.name} ({sizes}): {counted(self.summary())}>"
+
+    def unit(self, name: str) -> str:
+        """SI unit of a column or an axis, "1" for pure numbers; a `KeyError` if there is none of that name."""
+        return self._column(name).unit
+
+    def meaning(self, name: str) -> str:
+        """One line saying what a column or an axis is; a `KeyError` if there is none of that name."""
+        return self._column(name).meaning
+
+    def _column(self, name: str) -> Column:
+        if name == "sample":
+            return Column("<i8", "1", "number of the sample in its cell")
+        if name not in self.columns and name not in self.axes:
+            raise KeyError(f"{shown(name)}: {suggestion(name, (*self.columns, *self.axes))}")
+        return COLUMNS[name] if name in COLUMNS else field_column(name)
+
+    @cached_property
+    def kept(self) -> NDArray[np.bool_]:
+        """Whether the motion of a walk was kept and is there, shape `shape`."""
+        series = [Recording.of(sweep.get("record", {})).series for sweep in self.origin.sweeps]
+        chosen = [
+            (choice := series[number]) is not None and choice.includes(sample)
+            for number, sample in self.origin.samples(self.number)
+        ]
+        kept: NDArray[np.bool_] = np.array(chosen) & (self.columns["status"] != MISSING)
+        return kept
+
+    def series(self, *, sample: int = 0, **at: float | str | None) -> WalkResult:
+        """One walk whose motion was kept: `series(links=60, frequency=15, sample=2).time`.
+
+        Args:
+            sample: number of the sample.
+            at: value of each axis; of an axis with just one value it may be left out.
+
+        Raises:
+            InputError: there is no such walk, or its motion was not kept or is not there yet.
+            OSError: its file cannot be read.
+        """
+        if unknown := [name for name in at if name not in self.axes]:
+            known = suggestion(unknown[0], tuple(self.axes)) if self.axes else "there are no axes"
+            raise InputError(f"{unknown[0]}: no axis of block {self.name}; {known}")
+        place = []
+        for name, values in self.axes.items():
+            found = np.flatnonzero(values == at.get(name, values[0]))
+            if not len(found) or (name not in at and len(values) > 1):
+                problem = f"{shown(at[name])} is not on the axis" if name in at else "missing"
+                raise InputError(f"{name}: {problem}; give one of {', '.join(map(str, values))}")
+            place.append(int(found[0]))
+        if type(plain(sample)) is not int or not 0 <= sample < self.shape[-1]:
+            raise InputError(f"sample: there is no sample {shown(sample)}; give 0 to {self.shape[-1] - 1}")
+        return self.walk_motion((*place, sample))
+
+    def walk_motion(self, place: tuple[int, ...]) -> WalkResult:
+        """The walk at a place along the axes and samples, if its motion was kept; errors as of `series`."""
+        if not self.kept[place]:
+            kept = np.flatnonzero(self.kept.any(axis=tuple(range(len(self.axes)))))
+            samples = ", ".join(map(str, kept[:12]))
+            remedy = f"give one of the samples {samples}" if samples else "a sweep with record: {series: true} keeps it"
+            raise InputError(f"the motion of walk {self.columns['index'][place]} is not there; {remedy}")
+        values = {name: column[place] for name, column in self.columns.items()}
+        sweep = self.origin.planned[self.origin.samples(self.number)[place[-1]][0]]
+        setup = sweep.planned(int(values["index"])).setup
+        ((_, motion),) = (
+            (at, read_motion(group, setup.scene.links))
+            for at, group in self.kept_motions([int(np.ravel_multi_index(place, self.shape))])
+        )
+        return WalkResult(
+            status=Status(int(values["status"])),
+            **numbers_of(values),
+            **motion,
+            wall_time=math.nan,
+            setup=setup,
+            seed=sweep.seed,
+            versions=self.origin.provenance["versions"],
+        )
+
+    def summary(self) -> dict[str, int]:
+        """Number of walks by status label; `at_rest` and `missing` always, others if there are any."""
+        return status_counts(self.columns["status"])
+
+    @cached_property
+    def faults(self) -> dict[str, NDArray[np.bool_]]:
+        """What makes walks inaccurate, a key of `warpchain.walks.faults.FAULTS` → whether each walk has it."""
+        content = self.origin.sweeps[0]["blocks"][self.number]
+        return faults_of_columns(self.columns, lengths_of_block(content, self.shape))
+
+    @property
+    def inaccurate(self) -> NDArray[np.bool_]:
+        """Whether a walk has one of the `faults`, shape `shape`."""
+        found: NDArray[np.bool_] = np.any(list(self.faults.values()), axis=0)
+        return found
+
+    def statistics(self, name: str = "dx") -> CellStatistics:
+        """Statistics of a column in each cell, over the walks at rest that have a number there.
+
+        NaN and −1 stand for none, such as `bounces_before_collapse` of a loop that never collapsed: such walks are in
+        no mean, and `absent` counts them.
+
+        Raises:
+            KeyError: there is no such column.
+        """
+        return CellStatistics.of(self.axes, self.unit(name), self.columns[name], self.columns["status"])
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """The block as a data set with named coordinates, units and meanings."""
+        import xarray
+
+        coordinates, variables = self.variables()
+        return xarray.Dataset(variables, coordinates, {"block": self.name})
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """The block as a table with one row for each walk: values of the axes, sample, columns."""
+        import pandas
+
+        grid = np.meshgrid(*self._places().values(), indexing="ij")
+        places = dict(zip(self.dims, grid, strict=True))
+        return pandas.DataFrame({name: values.ravel() for name, values in (places | self.columns).items()})
+
+    def variables(self) -> tuple[_Variables, _Variables]:
+        """Coordinates and variables."""
+        coordinates: _Variables = {name: ((name,), values, self.notes(name)) for name, values in self._places().items()}
+        return coordinates, {name: (self.dims, values, self.notes(name)) for name, values in self.columns.items()}
+
+    def _places(self) -> dict[str, Array]:
+        """Values of each axis and numbers of the samples; an axis with null has numbers, and NaN for it."""
+        numbers = {name: given.astype(float) if given.dtype.kind == "O" else given for name, given in self.axes.items()}
+        return {**numbers, "sample": np.arange(self.shape[-1])}
+
+    def notes(self, name: str) -> dict[str, Any]:
+        """Attributes of a variable."""
+        column = self._column(name)
+        notes: dict[str, Any] = {"units": column.unit, "description": column.meaning}
+        if quantity_of(name) in Parameters.model_fields:
+            notes["symbol"] = Parameters.quantities()[quantity_of(name)].symbol
+        if name == "status":
+            notes["flag_values"] = np.array([MISSING, *Status], np.int8)
+            notes["flag_meanings"] = " ".join(["missing", *(status.label for status in Status)])
+        return notes
+
+
+def status_counts(status: Array) -> dict[str, int]:
+    """Number of walks by status label, in the order of the codes, missing ones last."""
+    counts = {code.label: int((status == code).sum()) for code in Status}
+    kept = {label: count for label, count in counts.items() if count or label == Status.AT_REST.label}
+    return kept | {"missing": int((status == MISSING).sum())}
+
+
+def counted(summary: Mapping[str, int]) -> str:
+    """Numbers of walks by status, in words."""
+    return ", ".join(f"{count} {label}" for label, count in summary.items() if count)
