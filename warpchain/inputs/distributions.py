@@ -75,6 +75,10 @@ class Uniform:
         """In words, for error messages."""
         return f"between {self.lower} and {self.upper}"
 
+    def canonical(self) -> dict[str, object]:
+        """Its form in a sweep file."""
+        return {"uniform": [self.lower, self.upper]}
+
 
 @dataclass(frozen=True)
 class Gaussian:
@@ -120,6 +124,11 @@ class Gaussian:
     def __str__(self) -> str:
         """In words, for error messages."""
         return f"about {self.mean} with standard deviation {self.sigma}"
+
+    def canonical(self) -> dict[str, object]:
+        """Its form in a sweep file."""
+        mean = {} if self.mean is None else {"mean": self.mean}
+        return {"gaussian": {**mean, "sigma": self.sigma}}
 
 
 Distribution = Uniform | Gaussian
