@@ -6,6 +6,7 @@ that begins with the path of the offending value, such as `sweep.blocks[0].grid.
 
 import math
 import os
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from decimal import Decimal
@@ -155,9 +156,9 @@ def _expanded(values: Any, check: Callable[[Any], list[Any]], info: ValidationIn
             raise InputError(refusals(error, "", _KEYS)[0]) from None
         info.context["expanded"] += len(values)  # type: ignore[index]
     checked = check(values)
-    if len(set(checked)) < len(checked):
-        twice = next(value for value in checked if checked.count(value) > 1)
-        raise ValueError(f"{shown(twice)} is given twice; leave one out")
+    value, count = Counter(checked).most_common(1)[0]
+    if count > 1:
+        raise ValueError(f"{shown(value)} is given twice; leave one out")
     return checked
 
 
