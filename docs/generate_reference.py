@@ -18,7 +18,7 @@ from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.validation import spelled
+from warpchain.inputs.validation import field_unit, spelled
 from warpchain.status import Status
 from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL, Frames
@@ -29,7 +29,8 @@ from warpchain.walks.walk_result import STORED
 FOLDER: Final = Path(__file__).parent / "reference"
 NOTE: Final = "<!-- Written by docs/generate_reference.py; change the code, then run that script. -->\n"
 
-SIGNS: Final = {"ge": "≥ ", "gt": "> ", "le": "≤ ", "lt": "< "}
+JSON: Final = "--json"
+"""An option of most commands, which is explained once."""
 
 SAMPLER_MEANINGS: Final = {
     "random": "independent samples",
@@ -47,81 +48,85 @@ def table(heads: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 
 
+def listing(rows: Iterable[tuple[str, object]]) -> str:
+    """A Markdown list of names and their meanings."""
+    return "\n".join(f"- {name}: {meaning}" for name, meaning in rows) + "\n"
+
+
 def shown(value: object) -> str:
     """A value as YAML has it."""
     if value is None or isinstance(value, bool):
-        return "`" + {None: "null", True: "true", False: "false"}[value] + "`"
-    return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"
+        return {None: "null", True: "true", False: "false"}[value]
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def unit_of(field: FieldInfo) -> str:
-    """SI unit of a field; nothing for pure numbers and names."""
-    extra = field.json_schema_extra
-    unit = str(extra.get("unit", "1")) if isinstance(extra, dict) else "1"
-    return "" if unit == "1" else unit
+def in_unit(text: str, unit: str) -> str:
+    """A text with the unit behind it, unless that is of pure numbers."""
+    return text if unit == "1" else f"{text} {unit}"
 
 
 def values_of(field: FieldInfo) -> str:
-    """What a field may be: its names, or the limits of its number."""
+    """What a field may be: its other names, or the limits of its number with their unit; nothing for any text."""
     kinds = [field.annotation, *get_args(field.annotation)]
-    for kind in kinds:
-        if get_origin(kind) is Literal:
-            return ", ".join(f"`{name}`" for name in get_args(kind))
-    if bool in kinds:
-        return "`true`, `false`"
+    names = next((get_args(kind) for kind in kinds if get_origin(kind) is Literal), (True, False) * (bool in kinds))
+    if names:
+        return ", or " + ", ".join(f"`{shown(name)}`" for name in names if name != field.default)
     if str in kinds:
-        return "name"
-    limits = [
-        sign + format(limit, "g")
+        return ""
+    limits = {
+        name: format(limit, "g")
         for item in field.metadata
-        for name, sign in SIGNS.items()
+        for name in ("ge", "gt", "le", "lt")
         if (limit := getattr(item, name, None)) is not None
-    ]
-    return ", ".join([*(["whole"] if int in kinds else []), *limits])
+    }
+    lower = "[" + limits["ge"] if "ge" in limits else "(" + limits["gt"]
+    upper = limits["le"] + "]" if "le" in limits else limits.get("lt", "∞") + ")"
+    extra = field.json_schema_extra
+    unit = str(extra.get("unit", "1")) if isinstance(extra, dict) else "1"
+    return (", whole, " if int in kinds else ", ") + in_unit(f"{lower}, {upper}", unit)
 
 
-def model_table(model: type[BaseModel]) -> str:
-    """All fields of a model."""
-    rows = (
-        (f"`{name}`", shown(field.default), unit_of(field), values_of(field), field.description)
+def fields_of(model: type[BaseModel], other_meanings: Mapping[str, str] | None = None) -> str:
+    """All fields of a model; `other_meanings` replaces descriptions."""
+    meanings = {name: field.description for name, field in model.model_fields.items()} | dict(other_meanings or {})
+    return listing(
+        (f"`{name}: {shown(field.default)}`{values_of(field)}", meanings[name])
         for name, field in model.model_fields.items()
     )
-    return table(("name", "default", "unit", "values", "meaning"), rows)
 
 
 def parameters_page() -> str:
     """Table 1, bounds and presets."""
     quantities = Parameters.quantities()
-    rows = []
-    for name, row in quantities.items():
-        lower = f"{'≥' if row.bounds.lower_included else '>'} {row.bounds.lower:g}"
-        unit = "" if row.unit == "1" else row.unit
-        sigma = f"{row.sigma:g}" if row.sigma else ""
-        bounds = f"{lower}, ≤ {row.bounds.upper:g}"
-        written = f"`{ascii_symbol}`" if (ascii_symbol := spelled(row.symbol)) != row.symbol else ""
-        rows.append((f"`{name}`", row.symbol, written, f"{row.value:g}", sigma, unit, bounds, row.source, row.meaning))
-    heads = ("name", "symbol", "in ASCII", "value", "σ", "unit", "bounds", "source", "meaning")
-    differing = [
-        (
-            f"`{preset}`",
-            ", ".join(
-                f"`{name}: {getattr(values, name):g}`"
-                for name in quantities
-                if getattr(values, name) != quantities[name].value
-            )
-            or "Table 1",
+    tables = []
+    for source in dict.fromkeys(row.source for row in quantities.values()):
+        rows = []
+        for name, row in quantities.items():
+            if row.source != source:
+                continue
+            ascii_symbol = spelled(row.symbol)
+            symbol = row.symbol if ascii_symbol == row.symbol else f"{row.symbol}, `{ascii_symbol}`"
+            value = f"{row.value:g}" + (f" ± {row.sigma:g}" if row.sigma else "")
+            bounds = f"{'[' if row.bounds.lower_included else '('}{row.bounds.lower:g}, {row.bounds.upper:g}]"
+            rows.append((f"`{name}`", symbol, in_unit(value, row.unit), bounds, row.meaning))
+        tables.append(f"## {source.capitalize()}\n\n" + table(("name", "symbol", "value", "bounds", "meaning"), rows))
+    differing = {
+        preset: ", ".join(
+            f"`{name}: {getattr(values, name):g}`"
+            for name, row in quantities.items()
+            if getattr(values, name) != row.value
         )
         for preset, values in PRESETS.items()
-    ]
+    }
     return (
         "# Parameters\n\n"
-        "The quantities of Table 1 of the paper, in SI units. σ is the standard deviation of the Gaussian that samples "
-        "draw from; a draw outside the bounds is drawn again. `circle_radius` is smaller than half of `link_length`. "
-        "The source *assumed* marks a quantity that the paper does not give. A symbol, also in ASCII, stands for its "
+        "The quantities of Table 1 of the paper, in SI units, by their source; *assumed* ones are not in the paper. "
+        "After ± stands the standard deviation of the Gaussian that samples draw from; a draw outside the bounds is "
+        "drawn again. `circle_radius` is smaller than half of `link_length`. A symbol, also in ASCII, stands for its "
         "name: `mu_fc=0.3` for `floor_friction=0.3`.\n\n"
-        + table(heads, rows)
+        + "\n".join(tables)
         + "\n## Presets\n\n"
-        + table(("preset", "what differs from Table 1"), differing)
+        + listing((f"`{preset}`", text or "Table 1") for preset, text in differing.items())
     )
 
 
@@ -130,53 +135,54 @@ def scene_page() -> str:
     return (
         "# Scene\n\nWhat happens in a walk, from hanging on the sprocket to rest: "
         "[the model](../model.md#the-scene) explains the phases, "
-        "[the stationary loop](../../studies/stationary_loop/README.md) the hold."
-        "\n\n" + model_table(Scene)
+        "[the stationary loop](../../studies/stationary_loop/README.md) the hold. "
+        "Each line has a field with its default, what it may be, and its meaning.\n\n" + fields_of(Scene)
     )
 
 
 def options_page() -> str:
     """How a walk is computed."""
-    words = [
-        (f"`{word}`", ", ".join(f"`{name}: {shown(value).strip('`')}`" for name, value in settings.items()))
-        for word, settings in METHODS_BY_NEED.items()
-    ]
+    words: dict[str, str] = {}
+    for word, settings in METHODS_BY_NEED.items():
+        alike = next((one for one in words if METHODS_BY_NEED[one].keys() == settings.keys()), None)
+        known = METHODS_BY_NEED[alike] if alike else {}
+        own = {name: value for name, value in settings.items() if name not in known or known[name] != value}
+        text = ", ".join(f"`{name}: {shown(value)}`" for name, value in own.items())
+        words[word] = text + (f"; all else as `{alike}`" if alike else "")
+    integrators = ", ".join(f"`{name}`" for name in METHODS)
     return (
         "# Options\n\nHow a walk is computed; see [methods](../methods.md). A method in one word, such as the default, "
-        "has defaults of its own, see below.\n\n"
-        + model_table(Options)
+        "has defaults of its own, see below. Each line has a field with its default, what it may be, and its meaning."
+        "\n\n"
+        + fields_of(
+            Options, {"method": f"a word, see below, or an [integrator](../methods.md#integrators): {integrators}"}
+        )
         + "\n## Methods in one word\n\nSuch a word of `method` sets the defaults of these options. On a GPU `standard` "
-        "means `explicit`. A `tolerance` that is given also replaces `soft_tolerance`.\n\n"
-        + table(("word", "options"), words)
-        + "\n## Integrators\n\n"
-        + table(("method", "what it is"), ((f"`{name}`", title) for name, title in METHODS.items()))
+        "means `explicit`. A `tolerance` that is given also replaces `soft_tolerance`.\n\n" + "\n".join(words) + "\n"
     )
 
 
 def sweep_file_page() -> str:
     """Keys, grids, distributions, samplers and recording of a sweep file."""
-    drawn = [
-        (
-            f"`{name}`",
-            f"uniform in [{law.lower:g}, {law.upper:g}]"
-            if isinstance(law, Uniform)
-            else f"Gaussian about the chain's value, σ = {law.sigma:g}",
-        )
+    gaussian = [f"`{name}`" for name, law in TABLE.items() if not isinstance(law, Uniform)]
+    uniform = [
+        f"`{name}` uniformly in [{law.lower:g}, {law.upper:g}]"
         for name, law in TABLE.items()
+        if isinstance(law, Uniform)
     ]
-    keys = [
-        (f"`{name}`", "file, block" if name in BlockOfFile.model_fields else "file", field.description)
-        for name, field in sorted(SweepFile.model_fields.items(), key=lambda item: item[0] in BlockKeys.model_fields)
-    ]
+    fields = sorted(SweepFile.model_fields.items(), key=lambda item: item[0] in BlockKeys.model_fields)
+    keys = [(f"`{name}`", str(field.description)) for name, field in fields]
     kept = [
-        (f"`{name}`", f"{field.description}" + ", in s" * (unit_of(field) == "s"))
+        (f"`{name}`", f"{field.description}" + ", in s" * (field_unit(field) == "s"))
         for name, field in Frames.model_fields.items()
     ]
+    only_file = [f"`{name}`" for name, _ in fields if name not in BlockOfFile.model_fields]
     numbers = [f"`{name}`" for name, field in Scene.model_fields.items() if field.annotation is float]
     return (
-        "# Sweep file\n\nA sweep file is a YAML mapping with these keys. An error names the path of the value, such as "
-        "`sweep.blocks[0].grid.frequency[3]`. [Sweeps](../sweeps.md) shows how to use it.\n\n"
-        + table(("key", "stands in", "meaning"), keys)
+        "# Sweep file\n\nA sweep file is a YAML mapping with these keys. A block is such a mapping, too, without "
+        f"{', '.join(only_file)}. An error names the path of the value, such as `sweep.blocks[0].grid.frequency[3]`. "
+        "[Sweeps](../sweeps.md) shows how to use it.\n\n"
+        + listing(keys)
         + "\n## Grid\n\nEach key is `preset` or a field of scene, options or parameters. Each value is a list, such as "
         "`[10, 15, 20]`, or a range with both ends: `{from: 5, to: 30, step: 5}` or `{from: 5, to: 30, count: 6}`. The "
         "last axis varies fastest. `null` stands for itself where a field may be null, such as `load_factor: [null, "
@@ -186,40 +192,54 @@ def sweep_file_page() -> str:
         "`{gaussian: {mean: …, sigma: …}}`; without `mean` the Gaussian lies about the chain's value. Given values, "
         "on an axis or not, are exact: `all` does not hold for them. Only a distribution of their own name, such as "
         "`floor_friction: table`, draws about each. Distributions "
-        f"can be given for every parameter and for {', '.join(numbers)}. `table` draws:\n\n"
-        + table(("quantity", "distribution"), drawn)
+        f"can be given for every parameter and for {', '.join(numbers)}. `table` draws {', '.join(uniform)}, and by "
+        f"the Gaussians of [Table 1](parameters.md), about the chain's value, {', '.join(gaussian)}.\n"
         + "\n## Samplers\n\n"
-        + table(("sampler", "what it draws"), ((f"`{name}`", SAMPLER_MEANINGS[name]) for name in SAMPLERS))
+        + listing((f"`{name}`", SAMPLER_MEANINGS[name]) for name in SAMPLERS)
         + "\n## Record\n\n"
         f"`series` keeps the time series of a walk, every {SERIES_INTERVAL:g} s. `frames` keeps positions of "
         f"all joints, every {FRAME_INTERVAL:g} s, of samples whose series are kept. Each is `false`, `true` (all "
-        "samples) or a mapping:\n\n" + table(("key", "meaning"), kept)
+        "samples) or a mapping:\n\n" + listing(kept)
     )
 
 
 def results_page() -> str:
     """Fields of a walk, columns of a sweep, statuses."""
-    fields = []
+    numbers: dict[tuple[str, str], list[str]] = {}
     for name, stored in STORED.items():
-        unit = "" if stored.unit == "1" else stored.unit
-        fields.append((f"`{name}`", unit, stored.described))
-        fields += [(f'`{name}["{key}"]`', unit, meaning) for key, meaning in stored.keys.items()]
-    columns = (
-        (f"`{name}`", "" if column.unit == "1" else column.unit, column.meaning) for name, column in COLUMNS.items()
+        if not stored.shape:
+            for key, meaning in stored.keys.items():
+                numbers[meaning, stored.unit] = [f'`{name}["{key}"]`']
+            if not stored.keys:
+                numbers[stored.meaning, stored.unit] = [f"`{name}`" if name in COLUMNS else f"`{name}` of a walk"]
+    for name, column in COLUMNS.items():
+        fields = numbers.setdefault((column.meaning, column.unit), [])
+        if fields != [f"`{name}`"]:
+            fields.append(f"`{name}`" if fields else f"`{name}` of a sweep")
+    rows = ((f"{', '.join(names)}{bracketed(unit)}", meaning) for (meaning, unit), names in numbers.items())
+    arrays = (
+        (f"`{name}`{bracketed(stored.unit)}", stored.described) for name, stored in STORED.items() if stored.shape
     )
-    statuses = ((f"`{status.label}`", int(status), status.sentence) for status in Status)
+    statuses = ((f"`{status.label}`, {int(status)}", status.sentence) for status in Status)
     return (
-        "# Results\n\n## Status\n\nHow a walk ended. The first error of a walk stays; its Δx is NaN.\n\n"
-        + table(("status", "code", "sentence"), statuses)
-        + "\n## A walk\n\nFields of `warpchain.WalkResult`, and datasets of the file that `save` writes. "
-        "Losses of energy are positive. `sprocket_center` and `sprocket_radius`, in m, follow from them.\n\n"
-        + table(("field", "unit", "meaning"), fields)
-        + "\n## A sweep\n\nColumns of `warpchain.SweepResult`; each drawn quantity has a column, too. "
-        "What a walk does not have is NaN, or −1 in columns of whole numbers, such as `bounces_before_collapse` of a "
-        "loop that never collapsed. `cell_statistics` and figures leave such walks out, column by column: `count` is "
-        "the number of walks that were averaged, `absent` that of walks at rest without the quantity. Averages of your "
-        "own must do so, too.\n\n" + table(("column", "unit", "meaning"), columns)
+        "# Results\n\n## Status\n\nHow a walk ended: name, code, and what to do. The first error of a walk stays; its "
+        "Δx is NaN.\n\n"
+        + listing(statuses)
+        + "\n## Numbers\n\nFields of `warpchain.WalkResult`, datasets of the file that `save` writes, and columns of "
+        "`warpchain.SweepResult`, where each drawn quantity has a column, too; a second name is that of the column. "
+        "Losses of energy are positive. "
+        "What a walk of a sweep does not have is NaN, or −1 in columns of whole numbers. `cell_statistics` and figures "
+        "leave such walks out, column by column: `count` is the number of walks that were averaged, `absent` that of "
+        "walks at rest without the quantity. Averages of your own must do so, too.\n\n"
+        + listing(rows)
+        + "\n## Arrays\n\nOf a walk, at t samples and f frames of n links, in the same file.\n\n"
+        + listing(arrays)
     )
+
+
+def bracketed(unit: str) -> str:
+    """A unit to stand behind a name; nothing for pure numbers."""
+    return "" if unit == "1" else f" [{unit}]"
 
 
 def option_row(name: str, annotation: Any, default: Any) -> tuple[str, str] | None:
@@ -243,15 +263,28 @@ def option_row(name: str, annotation: Any, default: Any) -> tuple[str, str] | No
 
 
 def commands_page() -> str:
-    """Every command with its options."""
-    parts = ["# Commands\n\nThe same text as `--help` of each command.\n"]
-    named = [(command.name or command.callback.__name__, command.callback) for command in app.registered_commands]
-    for name, function in sorted(named, key=lambda item: item[0] != "walk"):
+    """Every command with its options; those that are fields of the scene or of the options by their names only."""
+    parts = [
+        "# Commands\n\nWhat `--help` of each command says. Options that set a field have the meaning, values and "
+        f"default of that field. `{JSON}`, where a command has it, prints one JSON object instead of tables.\n"
+    ]
+    named = [
+        (command.name or function.__name__, function)
+        for command in app.registered_commands
+        if (function := command.callback) is not None
+    ]
+    for command, function in sorted(named, key=lambda item: item[0] != "walk"):
         hints = get_type_hints(function, include_extras=True)
         given = inspect.signature(function).parameters.items()
-        rows = [row for key, one in given if (row := option_row(key, hints[key], one.default)) is not None]
+        found = {name: option_row(name, hints[name], one.default) for name, one in given}
+        rows = {name: row for name, row in found.items() if row is not None and row[0] != f"`{JSON}`"}
+        lines: list[tuple[str, str]] = []
+        for page, model in (("scene", Scene), ("options", Options)):
+            fields = [rows.pop(name)[0] for name in list(rows) if command == "walk" and name in model.model_fields]
+            if fields:
+                lines.append((", ".join(fields), f"fields of the [{page}]({page}.md)"))
         text = "\n\n".join(" ".join(part.split()) for part in (function.__doc__ or "").split("\n\n"))
-        parts.append(f"\n## warpchain {name}\n\n{text}\n\n" + table(("option", "meaning"), rows))
+        parts.append(f"\n## warpchain {command}\n\n{text}\n\n" + listing([*lines, *rows.values()]))
     return "".join(parts)
 
 

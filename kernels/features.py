@@ -17,8 +17,6 @@ class Features:
         columns: Width of a chain's scratch, see :func:`layout.padded_width`.
         fixed_body: ``"floor"``, ``"sprocket"`` or ``"none"``.
         self_contact: Contacts between a chain's own links.
-        watch: What ends the run before its stop time: ``"rest"``, ``"steady"`` or ``"none"``.
-        softens: Whether samples may change the softness of the joints, see :mod:`events.softening`.
         tilts: Whether the plane of the chain may move, see :mod:`physics.plane`; with an explicit method only.
     """
 
@@ -26,11 +24,9 @@ class Features:
     columns: int
     fixed_body: str
     self_contact: bool
-    watch: str
-    softens: bool = False
     tilts: bool = False
 
     @property
     def is_driven(self) -> bool:
-        """Whether the sprocket is driven, and loads and links may change at a sample."""
-        return self.watch == "steady"
+        """Whether there is a driven sprocket: loads and links may change at a sample."""
+        return self.fixed_body == "sprocket"

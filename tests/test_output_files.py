@@ -10,10 +10,9 @@ from pathlib import Path
 import pytest
 
 from tests.support.made_walks import make_walk
-from tests.support.synthetic_sweep import SWEEP, run
-from warpchain.files import NotReplaceable, checked_output, given_path, replacing, write_whole
+from tests.support.synthetic_sweep import run
+from warpchain.files import NotReplaceable, given_path, replacing, write_whole
 from warpchain.store.merged_file import merge
-from warpchain.store.sweep_result import load
 
 
 def parts(folder: Path) -> list[str]:
@@ -43,13 +42,6 @@ def test_only_regular_files_are_replaced(tmp_path: Path, kind: str, reason: str)
         make_walk().save(path)
     assert "\n" not in str(caught.value)
     assert path.lstat() == before and other.read_text() == "mine" and len(list(tmp_path.iterdir())) == 2
-
-
-@pytest.mark.parametrize("path", ["/dev/null", "/dev/stdout"])
-def test_devices_are_refused(path: str) -> None:
-    """The decision that every writer asks for; no test tries to replace a device."""
-    with pytest.raises(NotReplaceable, match=rf"^{path}: cannot be written"):
-        checked_output(path)
 
 
 def test_what_comes_while_a_file_is_written_is_not_replaced(tmp_path: Path) -> None:
@@ -108,17 +100,6 @@ def test_the_part_of_a_killed_walk_goes(tmp_path: Path) -> None:
     assert parts(tmp_path) == sorted(others)
 
 
-def test_the_part_of_a_killed_merge_goes(tmp_path: Path) -> None:
-    """As that of a walk, with what had been written of it."""
-    run(tmp_path / "sweep")
-    path = tmp_path / "merged.h5"
-    program = "from warpchain.store.merged_file import merge\nos.fsync = die\nmerge(*sys.argv[1:])"
-    killed(program, tmp_path / "sweep", path)
-    assert len(parts(tmp_path)) == 1 and not path.exists()
-    merge(tmp_path / "sweep", path)
-    assert parts(tmp_path) == [] and load(tmp_path / "sweep").walk_count == SWEEP.walk_count
-
-
 def test_the_part_of_a_living_writer_stays(tmp_path: Path) -> None:
     """A second writer of the same file, in another process or this one, takes nothing away; the last one counts."""
     path = tmp_path / "file"
@@ -130,21 +111,3 @@ def test_the_part_of_a_living_writer_stays(tmp_path: Path) -> None:
         write_whole(path, "quicker")
         assert path.read_text() == "quicker" and parts(tmp_path) == [part.name]
     assert path.read_text() == "slow" and parts(tmp_path) == []
-
-
-def test_a_part_that_is_taken_for_dead_is_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A writer whose part is deleted before it is locked makes another one."""
-    path, opened, lost = tmp_path / "file", os.open, []
-
-    def open_and_lose(name: os.PathLike[str], flags: int, *mode: int) -> int:
-        descriptor = opened(name, flags, *mode)
-        if flags & os.O_EXCL and len(lost) < 3:
-            lost.append(name)
-            os.unlink(name)
-        return descriptor
-
-    monkeypatch.setattr(os, "open", open_and_lose)
-    with replacing(path) as part:
-        assert part.exists() and part not in lost
-        part.write_text("new")
-    assert path.read_text() == "new" and len(lost) == 3

@@ -144,10 +144,9 @@ def make_advance(features: Features):
     fixed_gap, resolve_fixed = (sprocket_gap, resolve_sprocket) if has_sprocket else (floor_gap, resolve_floor)
     fixed_loss, fixed_depth, fixed_count = of_fixed_body(features.fixed_body)
     reuses_last = method.reuses_last
-    softens = features.softens
     is_driven = features.is_driven
-    sample = sampling(features.watch, softens, tilts)
-    present = present_chain(softens, is_driven)
+    sample = sampling(features.fixed_body, tilts)
+    present = present_chain(is_driven)
     first_stage, attempt, commit = method.first_stage, method.attempt, method.commit
     growth, shrinkage = method.growth, method.shrinkage
     # on the sprocket the pauses between impulses are too short for a flight
@@ -181,12 +180,8 @@ def make_advance(features: Features):
         if state.status[world] != RUNNING:
             return
         chain = present(model, state, control, world)
-        longest = control.contact_step
-        tolerance = control.tolerance
-        if wp.static(softens):
-            longest = contact_step(state, control, world, wp.static(is_driven))
-        if wp.static(softens or is_driven):
-            tolerance = spring_tolerance(drive, state, control, world, wp.static(is_driven))
+        longest = contact_step(state, control, world, wp.static(is_driven))
+        tolerance = spring_tolerance(drive, state, control, world, wp.static(is_driven))
         memory = scratch[world]
         K = wp.array(ptr=memory.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
         list_memory = lists[world]
@@ -225,17 +220,15 @@ def make_advance(features: Features):
                 self_impulses = state.counts[world, layout.SELF_IMPULSES]
                 last_impulse = state.watch[world, layout.LAST_FLOOR_IMPULSE]
                 status = sample(K, chain, drive, state, record, control, world, time, self_impulses, last_impulse)
-                if wp.static(softens):
-                    longest = contact_step(state, control, world, wp.static(is_driven))
-                if wp.static(softens or is_driven):
-                    tolerance = spring_tolerance(drive, state, control, world, wp.static(is_driven))
-                    if has_changed(state, world, softness, load_factor):
-                        after = present(model, state, control, world)
-                        book_softening(chain, after, state, world)
-                        chain = after
-                        if wp.static(is_driven):
-                            write_inertias(K, chain)
-                        has_first_stage = int(0)
+                longest = contact_step(state, control, world, wp.static(is_driven))
+                tolerance = spring_tolerance(drive, state, control, world, wp.static(is_driven))
+                if has_changed(state, world, softness, load_factor):
+                    after = present(model, state, control, world)
+                    book_softening(chain, after, state, world)
+                    chain = after
+                    if wp.static(is_driven):
+                        write_inertias(K, chain)
+                    has_first_stage = int(0)
                 if status != RUNNING:
                     break
             stop_time = state.stop_time[world]

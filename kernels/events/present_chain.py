@@ -19,12 +19,11 @@ def has_changed(state: State, world: int, softness: wp.float64, load_factor: wp.
 
 
 @functools.cache
-def present_chain(softens: bool, is_driven: bool):
+def present_chain(is_driven: bool):
     """Warp function ``present(model, state, control, world)`` → Chain.
 
     Args:
-        softens: Whether the softness of its joints may change, see :mod:`events.softening`.
-        is_driven: Whether its loads may, see :mod:`physics.scaled_loads`.
+        is_driven: Whether its loads may change, see :mod:`physics.scaled_loads`.
     """
 
     @wp.func
@@ -32,8 +31,6 @@ def present_chain(softens: bool, is_driven: bool):
         chain = read_chain(model, world)
         if wp.static(is_driven):
             chain = under_load(chain, state.load_factor[world])
-        if wp.static(softens):
-            chain = softened(chain, control, state.softness[world])
-        return chain
+        return softened(chain, control, state.softness[world])
 
     return present

@@ -6,7 +6,7 @@ gravity, is not at rest: an impulse on the floor must be at most as long ago as 
 
 import warp as wp
 
-from warpchain.kernels.codes import AT_REST, RUNNING
+from warpchain.kernels.codes import AT_REST, FINISHED, RUNNING
 from warpchain.kernels.events.summary import Summary
 from warpchain.kernels.layout import REST_SINCE
 from warpchain.kernels.physics.elementary import ZERO
@@ -19,7 +19,12 @@ wp.set_module_options({"enable_backward": False})
 def watch_rest(
     state: State, control: Control, world: int, time: wp.float64, summary: Summary, last_floor_impulse: wp.float64
 ):
-    """Status AT_REST once both speeds, the centre's and the rms, have been low for the rest time, else RUNNING."""
+    """Status AT_REST once both speeds, the centre's and the rms, have been low for the rest time, else RUNNING.
+
+    A run that is to finish at a given time is not ended earlier.
+    """
+    if state.stop_status[world] == FINISHED:
+        return RUNNING
     speed = wp.sqrt(summary.center_u * summary.center_u + summary.center_v * summary.center_v)
     if wp.max(speed, summary.rms_speed) < control.rest_speed:
         if state.watch[world, REST_SINCE] < ZERO:

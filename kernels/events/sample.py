@@ -30,20 +30,20 @@ def next_mark(state: State, control: Control, world: int):
 
 
 @functools.cache
-def sampling(watch: str, softens: bool = False, tilts: bool = False):
+def sampling(fixed_body: str, tilts: bool = False):
     """Warp function ``sample`` of a chain whose ends are placed: time series, frame, watches; returns the status.
 
-    It is called at or after :func:`next_mark`. If only a frame is due, nothing but the record changes. With
-    ``"steady"`` it may also change the chain's loads and the velocities of its links. Impulses between links so far and
-    the time of the last one on the floor [s] are arguments: on a GPU they are not in the state.
+    It is called at or after :func:`next_mark`. If only a frame is due, nothing but the record changes. It may also
+    change the softness of the joints, and on a sprocket the chain's loads and the velocities of its links. Impulses
+    between links so far and the time of the last one on the floor [s] are arguments: on a GPU they are not in the
+    state.
 
     Args:
-        watch: ``"rest"``, ``"steady"`` or ``"none"``.
-        softens: Whether it may change the softness of the joints, see :mod:`events.softening`.
+        fixed_body: On a ``"sprocket"`` it watches until the loop is stationary, on the ``"floor"`` until it is at rest.
         tilts: Whether the plane of the chain may move; its sums must be those of the present state.
     """
-    watches_rest = watch == "rest"
-    watches_steadiness = watch == "steady"
+    has_floor = fixed_body == "floor"
+    is_driven = fixed_body == "sprocket"
 
     @wp.func
     def sample(
@@ -84,22 +84,21 @@ def sampling(watch: str, softens: bool = False, tilts: bool = False):
                 write_frame_plane(P, record, world)
         passed = wp.int64(wp.floor(time / control.sample_interval))
         state.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
-        if wp.static(not watches_steadiness):
+        if wp.static(not is_driven):
             watch_ending(state, world, time, summary.area, self_impulses, last_floor_impulse, is_first)
-        if wp.static(softens and watches_rest):
+        if wp.static(has_floor):
             watch_stiffening(state, drive, control, world, time)
             watch_collapse(chain, state, control, world, time, summary.area, is_first)
         if wp.static(tilts):
             watch_fall(P, state, world, time)
-        if wp.static(watches_rest):
+        if wp.static(has_floor):
             return watch_rest(state, control, world, time, summary, last_floor_impulse)
-        if wp.static(watches_steadiness):
+        if wp.static(is_driven):
             if state.load_factor[world] > wp.float64(1.0):
                 rate = drag_rate(chain, state, drive, world, summary.height)
                 drag_shape(K, chain, wp.exp(-rate * (time - last_time)))
             watch_steadiness(chain, state, drive, world, time, summary)
             state.load_factor[world] = load_at(state, drive, world, time)
-        if wp.static(softens and watches_steadiness):
             watch_drive(state, drive, control, world, time)
         return RUNNING
 

@@ -111,8 +111,10 @@ def watch_stiffening(state: State, drive: Drive, control: Control, world: int, t
 @wp.func
 def watch_drive(state: State, drive: Drive, control: Control, world: int, time: wp.float64):
     """Makes joints softest until the sprocket has spun up, and as soft as the hold allows by the time it begins."""
-    ahead = (drive.hold_start[world] - time) / control.stiffening_time
     hold = drive.hold_softness[world]
+    if hold == ZERO:
+        return
+    ahead = (drive.hold_start[world] - time) / control.stiffening_time
     if state.load_factor[world] > ONE:
         share = wp.log(state.load_factor[world]) / wp.log(state.watch[world, HOLD_LOAD])
         hold += (drive.loaded_softness[world] - hold) * share

@@ -103,9 +103,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     build_list = block_list(columns, block_dim)
     clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, block_dim, touch)
     chain_values = layout.BOARD_VALUES
-    softens = features.softens
     is_driven = features.is_driven
-    present = present_chain(softens, is_driven)
+    present = present_chain(is_driven)
     take_sample = block_sample(features, touch)
 
     @wp.func
@@ -206,8 +205,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 K[row, lane] = wp.where(is_fresh, ZERO, kept[row, lane])
                 row += 1
         if lane == 0:
-            if wp.static(softens):
-                chain = softened(chain, control, state.softness[world])
+            chain = softened(chain, control, state.softness[world])
             write_constants(K, chain)
             if wp.static(tilts):
                 copy_plane(P, state.plane[world])
@@ -274,10 +272,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 status = T[wp.static(touch.mailbox)]
                 pauses = record_is_full(record, world) or T[wp.static(touch.is_late)] != 0
                 barrier()
-                if wp.static(softens or is_driven):
-                    if has_changed(state, world, softness, load_factor):
-                        next_end = exchange_ends(ends, place, read_link(K, lane))
-                        evaluate_first_stage(forces, K, place, next_end)
+                if has_changed(state, world, softness, load_factor):
+                    next_end = exchange_ends(ends, place, read_link(K, lane))
+                    evaluate_first_stage(forces, K, place, next_end)
                 if pauses or status != RUNNING:
                     break
             stop_time = K[chain_values, layout.VALUE_STOP_TIME]

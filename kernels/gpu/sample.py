@@ -50,10 +50,9 @@ def block_sample(features: Features, touch: TouchLayout):
     The board's rows of ends must be written, and a barrier passed; the caller has a barrier afterwards. The status goes
     to the mailbox, and ``is_late`` is set when the launch has lasted long enough.
     """
-    softens = features.softens
     is_driven = features.is_driven
-    sample = sampling(features.watch, softens, features.tilts)
-    present = present_chain(softens, is_driven)
+    sample = sampling(features.fixed_body, features.tilts)
+    present = present_chain(is_driven)
 
     @wp.func
     def take_sample(
@@ -75,14 +74,13 @@ def block_sample(features: Features, touch: TouchLayout):
         T[wp.static(touch.mailbox)] = sample(
             K, chain, drive, state, record, control, world, time, self_impulses, last_impulse
         )
-        if wp.static(softens or is_driven):
-            if has_changed(state, world, softness, load_factor):
-                after = present(model, state, control, world)
-                book_softening(chain, after, state, world)
-                write_constants(K, after)
-                if wp.static(is_driven):
-                    write_inertias(K, after)
-            write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
+        if has_changed(state, world, softness, load_factor):
+            after = present(model, state, control, world)
+            book_softening(chain, after, state, world)
+            write_constants(K, after)
+            if wp.static(is_driven):
+                write_inertias(K, after)
+        write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
         write_marks(K, state, control, world)
         if clock() > K[BOARD_VALUES, VALUE_DEADLINE]:
             T[wp.static(touch.is_late)] = 1

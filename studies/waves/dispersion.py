@@ -47,7 +47,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpchain import InputError, Parameters
+from warpchain import Parameters
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -55,8 +55,6 @@ Factors = Callable[[Array, float], tuple[Complex, Complex, Array]]
 
 UPPER_BACKWARD, LOWER_BACKWARD, LOWER_FORWARD, UPPER_FORWARD = range(4)
 """Columns of `Waves.rate`: bands and directions. In the ring backward is the slow family, forward the fast one."""
-ZONE_EDGE: Final = np.pi / 2
-"""Greatest phase per link that tells waves of two alternating links apart."""
 FRICTION_STEPS: Final = 64
 """Friction rises from nothing in so many steps, while the branches are followed."""
 PHASE_STEP: Final = 1e-5
@@ -65,8 +63,6 @@ QUADRATURE_POINTS: Final = 2001
 """Points of the integral of Coulomb friction over a period: good to 1e-5."""
 ROUNDING: Final = 1e-12
 """Damping below this part of a rate is rounding."""
-FIRST_MODE: Final = 2
-"""The least mode number that bends a ring: 0 turns it, ±1 move it."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -130,14 +126,7 @@ def straight_waves(parameters: Parameters, tension: float, phase: ArrayLike) -> 
         parameters: of the chain; its Coulomb friction is left out.
         tension: T [N].
         phase: κ per link [rad], in (0, π/2], shape (k,).
-
-    Raises:
-        InputError: the tension is not positive, or a phase is out of its range.
     """
-    _check_positive("tension", tension, "N")
-    phases = _checked("phase", phase)
-    if not np.all((phases > 0) & (phases <= ZONE_EDGE * (1 + 1e-12))):
-        raise InputError("phase: outside of (0, π/2]; a longer phase is one of the upper band, π minus itself")
 
     def factors(phases: Array, friction: float) -> tuple[Complex, Complex, Array]:
         squares = np.sin(phases / 2) ** 2, np.cos(phases / 2) ** 2
@@ -148,7 +137,7 @@ def straight_waves(parameters: Parameters, tension: float, phase: ArrayLike) -> 
         return first.astype(np.complex128), second.astype(np.complex128), np.asarray(squares[0] * squares[1])
 
     inertia, quarter = _mean_inertia(parameters), _mean_mass(parameters) * parameters.link_length**2 / 4
-    return _waves(parameters, phases, factors)
+    return _waves(parameters, np.asarray(phase, dtype=np.float64), factors)
 
 
 def ring_waves(parameters: Parameters, links: int, speed: float, number: ArrayLike) -> Waves:
@@ -162,12 +151,7 @@ def ring_waves(parameters: Parameters, links: int, speed: float, number: ArrayLi
 
     Returns:
         Rates in the frame that turns with the ring, at the phases 2πn/N.
-
-    Raises:
-        InputError: the number of links is odd or less than 8, the speed is not positive, or a mode number is out of
-            its range.
     """
-    numbers = _checked_ring(links, speed, number)
     mass, inertia = _mean_mass(parameters), _mean_inertia(parameters)
     alpha, length = np.pi / links, parameters.link_length
     spin = ring_spin(parameters, links, speed)
@@ -187,7 +171,7 @@ def ring_waves(parameters: Parameters, links: int, speed: float, number: ArrayLi
             weights.append(weight)
         return found[0], found[1], weights[0] * weights[1]
 
-    return _waves(parameters, 2 * alpha * numbers, factors)
+    return _waves(parameters, 2 * alpha * np.asarray(number), factors)
 
 
 def single_band(parameters: Parameters, tension: float, phase: ArrayLike) -> Complex:
@@ -221,11 +205,8 @@ def continuous_ring(parameters: Parameters, links: int, speed: float, number: Ar
 
     Returns:
         λ [1/s], shape (k, 2).
-
-    Raises:
-        InputError: as `ring_waves`.
     """
-    n = _checked_ring(links, speed, number)
+    n = np.asarray(number, dtype=np.float64)
     length = parameters.link_length
     density, radius = _mean_mass(parameters) / length, links * length / (2 * np.pi)
     spin, bend = speed / radius, (n**2 - 1) ** 2
@@ -270,11 +251,7 @@ def equivalent_friction(parameters: Parameters, amplitude: float) -> float:
     Args:
         parameters: of the chain.
         amplitude: W, of the relative angular velocity of two links [rad/s].
-
-    Raises:
-        InputError: the amplitude is not positive.
     """
-    _check_positive("amplitude", amplitude, "rad/s")
     ratio = amplitude / parameters.friction_smoothing
     # By parts the mean of tanh(ratio · cos φ) cos φ is 2/π ∫ sin φ d tanh, over cos φ from 0, where it rises, to 1.
     cosine = np.sinh(np.linspace(0.0, np.arcsinh(ratio), QUADRATURE_POINTS)) / ratio
@@ -341,25 +318,3 @@ def _matched(before: Complex, after: Complex) -> Complex:
     orders = np.array(list(permutations(range(before.shape[1]))))
     apart = np.abs(after[:, orders] - before[:, None, :]).sum(axis=2)
     return np.take_along_axis(after, orders[np.argmin(apart, axis=1)], axis=1)
-
-
-def _checked(name: str, values: ArrayLike) -> Array:
-    array = np.atleast_1d(np.asarray(values, dtype=np.float64))
-    if array.ndim != 1 or not np.all(np.isfinite(array)):
-        raise InputError(f"{name}: not a row of finite numbers; give one")
-    return array
-
-
-def _check_positive(name: str, value: float, unit: str) -> None:
-    if not 0 < value < np.inf:
-        raise InputError(f"{name}: {value!r} {unit} is not positive; give a greater one")
-
-
-def _checked_ring(links: int, speed: float, number: ArrayLike) -> Array:
-    if links < 4 * FIRST_MODE or links % 2:
-        raise InputError(f"links: {links!r} make no ring with bending modes; give an even number, at least 8")
-    _check_positive("speed", speed, "m/s")
-    numbers = _checked("number", number)
-    if not np.all((numbers >= FIRST_MODE) & (numbers <= links / 4) & (numbers % 1 == 0)):
-        raise InputError(f"number: give whole numbers from {FIRST_MODE} to {links // 4}, a quarter of the links")
-    return numbers

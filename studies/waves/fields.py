@@ -22,8 +22,6 @@ NEAR: Final = 0.02
 """A circle touches if its distance is at most this part of its radius."""
 QUIET: Final = 0.01
 """Contacts with the floor less than this time [s] apart are one impact, as in the number of bounces."""
-FEWEST_FRAMES: Final = 3
-"""Frames that velocities need."""
 _CHUNK: Final = 2_000_000
 """Distances of joints that are in memory together."""
 
@@ -78,7 +76,7 @@ def normal_velocities(time: Array, joints: Array, masses: Array) -> Array:
     """Velocity of each joint across the chain, relative to the centre of mass [m/s], outwards, shape (f, n).
 
     Args:
-        time: of the frames [s], shape (f,), at least `FEWEST_FRAMES`.
+        time: of the frames [s], shape (f,), at least three.
         joints: x, y [m], shape (f, n, 2).
         masses: of the links [kg], shape (n,).
     """

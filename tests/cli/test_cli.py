@@ -94,42 +94,21 @@ def test_alone_it_prints_help_and_its_version(command: Command) -> None:
 
 REFUSED = {
     "--links 61": "scene.links: 61 is odd",
-    "--links 16": "scene.links: 16 links",
-    "--links 60.5": "scene.links: 60.5 is of type float",
-    "--links many": "scene.links: 'many' is text",
-    "--links 2": "scene.links: 2 is less than 4",
     "--frequency -5": "scene.frequency: -5 is less than 0 Hz",
-    "--frequency .nan": "scene.frequency: nan is not finite",
-    "--frequency 1e999": "scene.frequency: inf is not finite",
-    "--frequency 15Hz": "scene.frequency: '15Hz' has its unit written with it",
-    "--start up": "scene.start: 'up' is unknown",
     "--method rk4": "options.method: 'rk4' is unknown",
     "--method rodas5p": "options.method: 'rodas5p' was removed; give dp5",
-    "--method hybrid --device cuda": "options.method: 'hybrid' runs on a CPU only; give explicit",
-    "--tol 0": "options.tolerance: 0 is less than 1e-13",
     "--preset hard": "preset: 'hard' is unknown",
     "--seed -1": "seed: -1",
-    "--seed 1.5": "seed: 1.5",
-    "--seed ~": "seed: None",
-    "--set circle_radius=6.34e-3": "parameters.circle_radius: 0.00634 is not smaller than half",
-    "--set inner_mass=-1e-3": "parameters.inner_mass: -0.001 is not greater than 0 kg",
     "--set parameters.gravity=yes": "parameters.gravity: True is of type bool",
-    "--set clearance=": "scene.clearance: empty",
     "--set clearance=[1": "scene.clearance: '[1' cannot be read",
     "--set clearance": "--set: 'clearance' gives no value",
     "--set clearence=0.01": "--set 'clearence': unknown name; did you mean clearance?",
     "--set scene.gravity=1": "--set 'scene.gravity': unknown name; did you mean parameters.gravity?",
     "--set links=62 --links 64": "scene.links: given twice",
-    "--set self_contact=2": "options.self_contact: 2 is not a truth value",
-    "--set device=gpu": "options.device: 'gpu' is no device",
-    "--set device=cuda:99": "options.device: there is no cuda:99 on this machine",
     "--device cuda:98": "options.device: there is no cuda:98 on this machine",
-    "--device gpu": "options.device: 'gpu' is no device",
     "--device cpu --set device=cpu": "options.device: given twice",
-    "--set clearance_of=hanging --start spinning": "scene.clearance_of: 'hanging' needs",
     "--config nowhere.yaml": "nowhere.yaml: No such file",
     "--frame-interval 0": "--frame-interval: 0 is no positive time in s",
-    "--frame-interval soon": "--frame-interval: 'soon' is no positive time in s",
     "--animate avi": "'--animate'",
     "--frobnicate": "(Possible options: --animate); see warpchain walk --help",
     "extra": "unexpected extra argument(s) (extra); see warpchain walk --help",
@@ -162,24 +141,12 @@ def test_what_is_no_command_names_the_help(command: Command, arguments: str, lin
     assert answer.err == f"error: {line}\n"
 
 
-def test_bad_input_is_refused_by_the_process_too(tmp_path: Path) -> None:
-    """The status of the process is 2 and its only output the line."""
-    answer = process("walk", "--links", "61", "-o", "new", folder=tmp_path)
-    assert (answer.status, answer.out) == (2, "")
-    assert answer.err.startswith("error: scene.links: 61 is odd") and answer.err.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize(
     ("content", "problem"),
     [
         ("preset: soft\nscene: {links: 61}", "scene.links: 61 is odd"),
         ("preset: soft\nscene: {gravity: 1.0}", "scene.gravity: unknown name; did you mean parameters.gravity?"),
-        ("preset: soft\nscene: 3", "scene: 3 is not a mapping"),
-        ("preset: soft\nscenes: {links: 60}", "'scenes': unknown key; did you mean scene?"),
-        ("preset: soft\npreset: paper", "file.yaml, line 2: key 'preset' is given twice"),
         ("scene: {links: 60}", "preset: missing"),
-        ("- 60", "file.yaml: no mapping"),
         ("scene: {", "file.yaml, line 1"),
     ],
 )

@@ -116,12 +116,12 @@ def test_a_full_disk_does_not_end_a_walk_badly(tmp_path: Path) -> None:
     """The results are printed, status 1 and one line say what is wrong; no part of a file."""
     program = (
         "import os, resource, sys\n"
-        "from warpchain.cli import main, terminal\n"
-        "write = terminal.write_files\n"
+        "from warpchain.cli import main, walk_files\n"
+        "write = walk_files.write_walk\n"
         "def on_a_full_disk(*arguments):\n"
         "    resource.setrlimit(resource.RLIMIT_FSIZE, (64_000, 64_000))\n"
         "    return write(*arguments)\n"
-        "terminal.write_files = on_a_full_disk\n"
+        "walk_files.write_walk = on_a_full_disk\n"
         "main.main(sys.argv[1:])\n"
     )
     arguments = [sys.executable, "-c", program, "walk", *QUICK, "-o", "new"]
@@ -142,7 +142,7 @@ def test_a_sweep_goes_on_after_a_full_disk(command: Command) -> None:
         path.unlink()
     with small_files(min(map(len, whole.values())) - 1):
         answer = command("sweep", "some.yaml", "-o", "results")
-    assert_refused(answer, 1, "results/shards/", "cannot be written (File too large); make room and start again")
+    assert_refused(answer, 1, "results/shards/", "cannot be written (File too large); make room")
     assert list(Path("results/shards").iterdir()) == []
     assert command("sweep", "some.yaml", "-o", "results").out == expected.out
     assert {path.name: path.read_bytes() for path in Path("results/shards").iterdir()} == whole

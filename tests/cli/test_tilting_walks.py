@@ -47,11 +47,8 @@ def test_a_planar_walk_has_no_plane(tmp_path: Path, command: Command) -> None:
     ("words", "line"),
     [
         (["--set", "tilt=0.1"], "scene.tilt: 0.1 moves the plane of the chain, which is fixed; give plane: tilting"),
-        (["--set", "yaw_rate=-2"], "scene.yaw_rate: -2.0 moves the plane"),
         ([*TAPPED, "--method", "hybrid"], "options.method: 'hybrid' keeps the plane of a chain fixed; give explicit"),
         (["--set", "plane=tilting", "--set", "tilt=1.6"], "scene.tilt: "),
-        (["--set", "plane=wobbling"], "scene.plane: "),
-        (["--set", "plane=tilting", "--set", "half_width=-1e-3"], "parameters.half_width: "),
     ],
 )
 def test_what_cannot_tilt_is_refused(words: list[str], line: str, command: Command) -> None:

@@ -1,9 +1,7 @@
 """The commands that read the file of a saved walk, through `main`: plot, animate, walk --like."""
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
@@ -11,10 +9,8 @@ import pytest
 import warpchain
 from tests.support import command_line
 from tests.support.command_line import Command
-from warpchain.cli import main as command_module
-from warpchain.cli import sweep_commands
+from warpchain.cli import walk_commands
 from warpchain.inputs.validation import InputError
-from warpchain.pictures.walk_shape import Kind
 from warpchain.walks.walk_result import STORED, WalkResult
 
 command = command_line.command
@@ -45,18 +41,6 @@ def saved(tiny_walk: WalkResult, tmp_path: Path) -> Path:
     return tmp_path / "saved/walk.h5"
 
 
-@pytest.fixture
-def fast(tmp_path: Path) -> Path:
-    """File of a brief walk of a loop that runs at 5.6 m/s, with frames 2 ms apart."""
-    (tmp_path / "saved").mkdir()
-    warpchain.walk(**TINY | {"frequency": 15.0}).save(tmp_path / "saved/walk.h5")
-    return tmp_path / "saved/walk.h5"
-
-
-def _without_frames(path: Path) -> None:
-    warpchain.walk(**TINY, frame_interval=None).save(path)
-
-
 @pytest.mark.parametrize("options", [(), ("-o", "new/deep")])
 def test_plot_draws_a_saved_walk_and_tells_what_it_leaves_out(
     command: Command, saved: Path, options: Sequence[str]
@@ -70,16 +54,6 @@ def test_plot_draws_a_saved_walk_and_tells_what_it_leaves_out(
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in drawn)
     assert answer.err.startswith(f"{folder / 'loop.png'}: not drawn; ") and answer.err.count("\n") == 1
     assert {path.name for path in folder.iterdir()} - {"walk.h5"} == {path.name for path in drawn}
-
-
-def test_plot_of_a_walk_without_frames_leaves_the_film_strip_out(command: Command) -> None:
-    """Each figure that is left out has a line with its reason."""
-    _without_frames(Path("walk.h5"))
-    answer = command("plot", "walk.h5")
-    assert answer.status == 0 and sorted(answer.out.splitlines()) == ["energy.png", "figure5.png"]
-    lines = sorted(answer.err.splitlines())
-    assert [line.partition(":")[0] for line in lines] == ["film_strip.png", "loop.png"]
-    assert "not drawn; walk: it has no frames" in lines[0]
 
 
 def test_plot_of_a_walk_that_never_was_released_fails(command: Command) -> None:
@@ -100,11 +74,6 @@ def test_loads_are_recorded(command: Command) -> None:
     walk = warpchain.load_walk("fine/walk.h5")
     assert walk.setup.options.method == "os32"
     assert walk.frame_forces.shape == (len(walk.frame_time), 20, 2) and len(walk.frame_time) > 290
-
-
-def test_figures_of_a_walk_are_those_of_the_library() -> None:
-    """The words of `--kind` are those of `walk.plot`."""
-    assert set(get_args(get_args(get_type_hints(sweep_commands.plot)["kind"])[0])) == set(get_args(Kind))
 
 
 @pytest.mark.parametrize(("suffix", "beginning"), [("gif", b"GIF89a"), ("html", b"<!DOCTYPE html>")])
@@ -166,26 +135,16 @@ def test_a_method_beside_like_brings_its_settings(
 REFUSED = {
     "plot nowhere.h5": "nowhere.h5: cannot be read (No such file or directory)",
     "plot text.h5": "text.h5: not an HDF5 file",
-    "plot text": "text: not an HDF5 file",
     "plot saved/walk.h5 --quantity dx": "--quantity: a saved walk has no columns",
     "plot saved/walk.h5 -o text": "--output: text: Not a directory",
     "animate nowhere.h5 walk.gif": "nowhere.h5: cannot be read (No such file or directory)",
-    "animate text.h5 walk.gif": "text.h5: not an HDF5 file",
-    "animate frameless.h5 walk.gif": "walk: it has no frames",
     "animate saved/walk.h5 walk.avi": "walk.avi: unknown kind of picture",
     "animate saved/walk.h5 walk.gif --fps 0": "fps: 0.0 is not a positive number",
-    "animate saved/walk.h5 walk.gif --slow nan": "slow: nan is not a positive number",
-    "animate saved/walk.h5 walk.gif --fps many": "Invalid value for '--fps'",
     "animate saved/walk.h5 nowhere/walk.gif": "nowhere/walk.gif: cannot be written",
     "animate saved/walk.h5": "Missing argument 'FILE'",
     "walk --like nowhere.h5": "nowhere.h5: cannot be read (No such file or directory)",
-    "walk --like text.h5": "text.h5: not an HDF5 file",
-    "walk --like saved": "saved: is a folder",
     "walk --like saved/walk.h5 --seed 3": "--seed: given together with --like",
-    "walk --like saved/walk.h5 --preset soft": "--preset: given together with --like",
-    "walk --like saved/walk.h5 --config walk.yaml": "--config: given together with --like",
     "walk --like saved/walk.h5 --links 61": "scene.links: 61 is odd",
-    "walk --like saved/walk.h5 --method hybrid --device cuda": "options.method: 'hybrid' runs on a CPU only",
 }
 """Bad arguments → how the line of refusal begins."""
 
@@ -195,23 +154,11 @@ def test_bad_input_is_refused_in_one_line(command: Command, saved: Path, argumen
     """Status 2, one line on stderr, nothing on stdout, nothing written."""
     Path("text").write_text("no walk", encoding="utf-8")
     Path("text.h5").write_text("no walk", encoding="utf-8")
-    if "frameless" in arguments:
-        _without_frames(Path("frameless.h5"))
     before = sorted(Path().rglob("*"))
     answer = command(*arguments.split())
     assert (answer.status, answer.out) == (2, "")
     assert answer.err.startswith(f"error: {REFUSED[arguments]}") and answer.err.count("\n") == 1
     assert sorted(Path().rglob("*")) == before
-
-
-def test_mp4_without_its_extra_is_refused_in_one_line(
-    command: Command, saved: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The line has the command that installs it."""
-    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    answer = command("animate", str(saved), "walk.mp4")
-    assert answer.status == 2 and answer.err.count("\n") == 1 and "pip install 'warpchain[video]'" in answer.err
-    assert not Path("walk.mp4").exists()
 
 
 def test_a_refusal_of_several_lines_is_printed_as_several(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -220,7 +167,7 @@ def test_a_refusal_of_several_lines_is_printed_as_several(command: Command, monk
     def refuse(*_: object) -> None:
         raise InputError("links: 3 is odd;  give an even number", "samples: 0 is less than 1; give 1 or more")
 
-    monkeypatch.setattr(command_module, "_setup", refuse)
+    monkeypatch.setattr(walk_commands, "_setup", refuse)
     answer = command("walk")
     lines = ["error: links: 3 is odd; give an even number", "error: samples: 0 is less than 1; give 1 or more"]
     assert answer.status == 2 and answer.err.splitlines() == lines

@@ -15,7 +15,7 @@ from warpchain.kernels.cpu.loop import make_advance
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.loop import make_advance_block
 
-FEATURES = Features("dp5", layout.padded_width(60), "floor", True, "rest")
+FEATURES = Features("dp5", layout.padded_width(60), "floor", True)
 
 
 def test_an_entry_takes_what_its_kernel_takes() -> None:

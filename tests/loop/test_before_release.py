@@ -81,7 +81,7 @@ def test_loads_are_those_of_the_state() -> None:
     batch = Batch(1, links, Options(method="dp5"), frame_every=1, keeps_loads=True)
     batch.set_chain(0, parameters, links)
     batch.load(0, position, velocity, stop_time=1.0, stop_status=Status.FINISHED)
-    batch.launch([0], batch.features(fixed_body="floor", watch="none"), 1)
+    batch.launch([0], batch.features(fixed_body="floor"), 1)
     loads = batch.frame_loads(0)
     time, joints = batch.drain_frames(0)
     assert time[0] == 0.0

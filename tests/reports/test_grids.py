@@ -16,7 +16,6 @@ from warpchain.pictures.labels import short_texts
 from warpchain.pictures.style import NothingToShow
 from warpchain.reports.sweep_figures import figures
 from warpchain.status import Status
-from warpchain.store.sweep_result import SweepResult
 from warpchain.sweeps.plan import PlannedWalk
 
 FRICTION = [0.4, 0.1, 0.2, 0.6]
@@ -84,21 +83,6 @@ def test_one_axis_is_a_line_with_two_bands(tmp_path: Path) -> None:
     assert not axes.child_axes and axes.get_xscale() == "linear"
 
 
-def test_decades_are_drawn_on_a_logarithmic_axis(tmp_path: Path) -> None:
-    """Values that are evenly spaced in decades are so on the figure, with their own ticks."""
-    result = make_sweep(tmp_path, sweep({"joint_stiffness": [1e6, 1e7, 1e8]}))
-    (axes,) = panels(result.plot()).values()
-    assert axes.get_xscale() == "log"
-    assert [text.get_text() for text in axes.get_xticklabels()] == ["1e6", "1e7", "1e8"]
-
-
-def test_labels_do_not_cover_one_another(tmp_path: Path) -> None:
-    """Values that are too close for a label of their own have none."""
-    result = make_sweep(tmp_path, sweep({"floor_restitution": [0, 0.001, 0.1, 0.2]}))
-    (axes,) = panels(result.plot()).values()
-    assert [text.get_text() for text in axes.get_xticklabels()] == ["0", "0.1", "0.2"]
-
-
 def test_names_are_points_with_bars(tmp_path: Path) -> None:
     """Names on the x axis keep their order, and no line connects them."""
     result = make_sweep(tmp_path, sweep({"start": STARTS}), flawed)
@@ -159,16 +143,6 @@ def test_two_axes_are_lines(tmp_path: Path, grid: dict[str, Any], along: str, ac
     assert [handle.get_color() for handle in handles] == [line.get_color() for line in axes.lines]
 
 
-def test_two_axes_of_names_stand_side_by_side(tmp_path: Path) -> None:
-    """Points of several lines at one name do not cover one another."""
-    result = make_sweep(tmp_path, sweep({"start": STARTS, "soften_drive": [True, False]}))
-    (axes,) = panels(result.plot()).values()
-    drawn = lines(axes)
-    np.testing.assert_array_equal([mean for _, mean in drawn], result.statistics().mean.T)
-    np.testing.assert_allclose(np.mean([places for places, _ in drawn], axis=0), [0, 1, 2])
-    assert (drawn[0][0] < drawn[1][0]).all()
-
-
 def test_three_axes_are_small_multiples(tmp_path: Path) -> None:
     """The shortest axis gives the panels; all have the same axes and colours."""
     grid = {"floor_friction": FRICTION, "start": ["rest", "ellipse"], "gravity": GRAVITY}
@@ -219,30 +193,12 @@ def test_two_long_axes_are_a_map(tmp_path: Path) -> None:
     assert bar.get_ylabel() == "distance walked $Δx$ / m"
 
 
-def test_a_third_axis_gives_maps_in_common_colours(tmp_path: Path) -> None:
-    """One map for each value of the shortest axis, and one scale of colours."""
-    result = make_sweep(tmp_path, sweep({"gravity": EIGHT, "floor_friction": NINE, "links": [60, 90]}))
-    drawn = panels(result.plot())
-    assert list(drawn) == ["$n$ = 60", "$n$ = 90"]
-    means = result.statistics().mean
-    for number, axes in enumerate(drawn.values()):
-        np.testing.assert_array_equal(axes.images[0].get_array(), means[:, :, number])
-        assert axes.images[0].get_clim() == (means.min(), means.max())
-
-
 def test_a_small_map_has_numbers(tmp_path: Path) -> None:
     """A map may be asked for; with few cells it has means and failures in numbers."""
     result = make_sweep(tmp_path, sweep({"gravity": GRAVITY, "floor_friction": [0.1, 0.2]}), flawed)
     (axes,) = panels(result.plot("map")).values()
     texts = [text.get_text() for text in axes.texts]
     assert f"{result.statistics().mean[0, 0]:.3g}" in texts and "–" in texts and "3 failed" in texts
-
-
-def test_lines_may_be_asked_for(tmp_path: Path) -> None:
-    """More lines than usual have colours of their own."""
-    result = make_sweep(tmp_path, sweep({"gravity": EIGHT, "floor_friction": NINE}, samples=1))
-    (axes,) = panels(result.plot("lines")).values()
-    assert len({line.get_color() for line in axes.lines}) == len(axes.lines) == len(EIGHT)
 
 
 # Blocks, quantities, places to draw
@@ -420,25 +376,6 @@ def test_plot_draws_another_quantity(compared: Path, tmp_path: Path, capsys: pyt
     assert [Path(path).name for path in written] == ["against_tolerance_walk_time.png"]
     assert run_plot(compared, "-o", tmp_path) == 0
     assert [Path(path).name for path in capsys.readouterr().out.split()] == ["tolerance.png", "status_counts.png"]
-
-
-def test_plot_refuses_an_unknown_quantity(compared: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The reason is one line with the closest name; nothing is written."""
-    assert run_plot(compared, "-o", tmp_path, "--quantity", "bouncs") == 2
-    assert "quantity: 'bouncs' is no column of numbers; did you mean bounces?" in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
-
-
-def test_results_have_statistics_of_all_blocks(tmp_path: Path) -> None:
-    """Blocks that do not draw a quantity have no statistics of it."""
-    blocks = [
-        {"name": "a", "grid": {"gravity": GRAVITY}},
-        {"name": "b", "distributions": {"floor_friction": "table"}, "grid": {"gravity": GRAVITY}},
-    ]
-    result: SweepResult = make_sweep(tmp_path, sweep(blocks=blocks))
-    assert list(result.cell_statistics()) == ["a", "b"]
-    assert list(result.cell_statistics("floor_friction_drawn")) == ["b"]
-    assert list(panels(result.plot(quantity="floor_friction_drawn"))) == [""]
 
 
 def test_a_third_quantity_runs_along_x(tmp_path: Path) -> None:

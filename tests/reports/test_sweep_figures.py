@@ -13,7 +13,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from tests.support.made_sweeps import FIGURE_6, SENSITIVITY, TOLERANCE, distance, make_sweep
-from warpchain.inputs.validation import InputError
 from warpchain.pictures.style import GREEN, RED, NothingToShow, Picture
 from warpchain.reports.statistics import sensitivities, tolerance_agreement
 from warpchain.reports.sweep_figures import (
@@ -81,18 +80,6 @@ def means(axes: Axes, color: str) -> dict[float, tuple[float, str]]:
 # Figure 6
 
 
-def test_figure6_has_a_panel_for_each_number_of_links(sweep6: SweepResult) -> None:
-    """One panel for each n, with common axes, and nothing else but a legend that explains all signs."""
-    picture = figure6(sweep6)
-    drawn = panels(picture)
-    assert [axes.get_title(loc="left") for axes in drawn] == [f"$n$ = {n}" for n in (60, 90, 120, 150, 180)]
-    assert len({(axes.get_xlim(), axes.get_ylim()) for axes in drawn}) == 1
-    assert drawn[0].get_ylim()[0] == 0.0
-    legend = next(axes.get_legend() for axes in picture.figure.axes if axes.get_legend())
-    texts = [text.get_text() for text in legend.get_texts()]
-    assert texts[:2] == ["started at rest", "started as an ellipse"] and "2 standard" in texts[-1]
-
-
 def test_figure6_shows_means_boxes_and_bars(sweep6: SweepResult) -> None:
     """The dot is the mean, the box one and the bar two standard deviations of the samples, each way."""
     axes = panels(figure6(sweep6))[0]
@@ -125,13 +112,6 @@ def test_figure6_counts_what_is_not_in_the_means(flawed6: SweepResult) -> None:
     assert list(dots) == [10.0]
     np.testing.assert_allclose(dots[10.0][0], flawed6.blocks["rest"].dx[0, 0, 1:].mean())
     assert len(means(second, GREEN)) == 1
-
-
-def test_figure6_of_one_walk_has_no_box(tmp_path: Path) -> None:
-    """One sample has a mean and no spread."""
-    result = make_sweep(tmp_path, one_block(samples=1, grid={"frequency": [10, 20]}))
-    (axes,) = panels(figure6(result))
-    assert len(means(axes, RED)) == 2 and not axes.patches
 
 
 def test_figure6_tells_blocks_of_one_start_apart(tmp_path: Path) -> None:
@@ -177,23 +157,6 @@ def test_heat_map_shows_the_statistics(flawed6: SweepResult) -> None:
     ]
 
 
-def test_heat_map_of_any_quantity(sweep6: SweepResult) -> None:
-    """Any column can be mapped, in its unit; an unknown one is refused."""
-    assert "mean walk time / s" in [axes.get_ylabel() for axes in heat_map(sweep6, "walk_time").figure.axes]
-    assert "mean bounces" in [axes.get_ylabel() for axes in heat_map(sweep6, "bounces").figure.axes]
-    assert heat_map(sweep6, "bounces").name == "heat_map_bounces"
-    with pytest.raises(InputError, match=r"^quantity: 'bouncs' is no column of numbers; did you mean bounces\?$"):
-        heat_map(sweep6, "bouncs")
-
-
-def test_heat_map_of_many_cells(tmp_path: Path) -> None:
-    """A large map has no numbers in it, and no more ticks than there is room for."""
-    grid = {"links": [60, 80, 100, 120, 140], "frequency": {"from": 5, "to": 34, "step": 1}}
-    axes = heat_map(make_sweep(tmp_path, one_block(samples=2, grid=grid))).figure.axes[0]
-    assert not axes.texts and len(axes.get_xticks()) <= 16
-    assert [text.get_text() for text in axes.get_xticklabels()][:2] == ["5", "7"]
-
-
 # Tolerances
 
 
@@ -204,12 +167,11 @@ def test_tolerance_numbers(tmp_path: Path) -> None:
     loose, tight = result.dx[:, :, 0].reshape(4, 12), result.dx[:, :, 1].reshape(4, 12)
     assert (agreement.loose, agreement.tight, agreement.lost) == (1e-6, 1e-9, 0)
     np.testing.assert_allclose(agreement.differences, (loose / tight - 1).ravel())
-    assert agreement.greatest == np.abs(loose / tight - 1).max()
     ratios = loose.mean(axis=1) / tight.mean(axis=1) - 1
     np.testing.assert_allclose([cell.difference for cell in agreement.cells], ratios)
     errors = (loose - tight).std(axis=1, ddof=1) / 12**0.5 / tight.mean(axis=1)
     np.testing.assert_allclose([cell.standard_error for cell in agreement.cells], errors)
-    assert agreement.worst_cell.difference == pytest.approx(ratios[np.abs(ratios).argmax()])
+    assert f"means of a cell by at most {np.abs(ratios).max():.2%}" in str(agreement)
     picture = tolerance(result)
     left, right = picture.figure.axes
     np.testing.assert_array_equal(left.collections[1].get_offsets(), np.stack([tight.ravel(), loose.ravel()], 1))
@@ -229,7 +191,7 @@ def test_tolerance_leaves_out_incomplete_pairs(tmp_path: Path) -> None:
     result = make_sweep(tmp_path, content, outcome)
     agreement = tolerance_agreement(result)
     assert agreement.lost == 3 and len(agreement.differences) == 1
-    assert agreement.greatest == abs(result.dx[2, 3] / result.dx[0, 3] - 1)
+    assert agreement.differences[0] == result.dx[2, 3] / result.dx[0, 3] - 1
     assert math.isnan(agreement.cells[0].standard_error) and agreement.cells[0].cell == "main"
     assert "3 pairs are not complete" in tolerance(result).figure.axes[1].get_xlabel()
     assert "3 more pairs" in str(agreement)
@@ -288,40 +250,6 @@ def test_sensitivity_is_scipys(saltelli: SweepResult) -> None:
         assert (cell.samples, cell.lost) == (64, 0)
 
 
-def test_sensitivity_finds_what_matters(tmp_path: Path) -> None:
-    """With Δx = g + 2 R the shares of the variance are known, and the intervals hold them; all else has none."""
-    distributions = {
-        "all": "fixed",
-        "gravity": {"uniform": [9.0, 10.0]},
-        "sprocket_radius": {"uniform": [0.05, 0.06]},
-        "floor_friction": "table",
-    }
-    content = one_block(sampler="saltelli", samples=256, distributions=distributions, grid={"frequency": [10]})
-
-    def outcome(walk: PlannedWalk) -> float:
-        parameters = walk.setup.parameters
-        return parameters.gravity + 50 * parameters.sprocket_radius
-
-    (cell,) = sensitivities(make_sweep(tmp_path, content, outcome=outcome))
-    assert cell.names == ("gravity", "sprocket_radius", "floor_friction")
-    exact = np.array([0.8, 0.2, 0.0])
-    for values, ends in ((cell.first_order, cell.first_order_interval), (cell.total_order, cell.total_order_interval)):
-        np.testing.assert_allclose(values, exact, atol=0.12)
-        assert ((ends[:, 0] <= exact) & (exact <= ends[:, 1])).all()
-
-
-def test_sensitivity_figure(saltelli: SweepResult) -> None:
-    """A panel for each cell, quantities in a common order with their symbols, two bars for each; always the same."""
-    cells, drawn = sensitivities(saltelli), panels(sensitivity(saltelli))
-    assert [cell.cell for cell in cells] == ["ν = 10 Hz", "ν = 20 Hz"]
-    assert [axes.get_title(loc="left") for axes in drawn] == ["ν = 10 Hz", "ν = 20 Hz"]
-    assert drawn[0].get_yticklabels()[0].get_text() == "floor friction $μ_\\mathrm{fc}$"
-    assert len(drawn[0].patches) == 2 * len(saltelli.drawn)
-    place = cells[0].names.index("floor_friction")
-    assert drawn[0].patches[place].get_width() == cells[0].total_order[place]
-    np.testing.assert_array_equal(cells[0].total_order_interval, sensitivities(saltelli)[0].total_order_interval)
-
-
 def test_sensitivity_leaves_out_incomplete_samples(tmp_path: Path) -> None:
     """A sample with a failed walk is left out as a whole and counted; a block without two samples has no indices."""
     distributions = {"all": "fixed", "floor_friction": "table", "phase": "table", "clearance": "table"}
@@ -362,14 +290,6 @@ def test_status_counts(flawed6: SweepResult, sweep6: SweepResult) -> None:
     }
     assert " 1 (8.33%)" in [text.get_text() for text in axes.texts]
     assert [text.get_text() for text in status_counts(sweep6).figure.axes[0].texts] == [" 360", " 120"]
-
-
-def test_status_counts_of_many_blocks(tmp_path: Path) -> None:
-    """Many blocks are counted together."""
-    blocks = [{"name": f"b{number}", "grid": {"frequency": [10]}} for number in range(8)]
-    axes = status_counts(make_sweep(tmp_path, one_block(blocks=blocks))).figure.axes[0]
-    assert [text.get_text() for text in axes.get_yticklabels()] == ["at rest"]
-    assert [patch.get_width() for patch in axes.patches] == [32]
 
 
 def test_figures_are_those_that_a_sweep_has_something_for(

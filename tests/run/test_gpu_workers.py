@@ -38,21 +38,11 @@ def test_each_worker_has_a_gpu_of_its_own(monkeypatch: pytest.MonkeyPatch) -> No
     assert visible_gpus(3) == ["0", "1", "2"]
 
 
-def test_each_worker_is_asked_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """However quickly the first one answers; what fails in one of them reaches the caller, and nothing hangs."""
-    monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
-    with gpu_workers(3) as executor:
-        first, again = executor.in_each(os.getpid), executor.in_each(os.getpid)
-        assert len(set(first)) == 3 and set(first) == set(again)
-    with gpu_workers(2) as executor, pytest.raises(ZeroDivisionError):
-        executor.in_each(eval, "1 // int(__import__('os').environ['CUDA_VISIBLE_DEVICES'])")
-
-
 def test_an_exception_ends_what_workers_are_doing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C does not wait for tasks under way, nor for those that the pool has handed out already."""
     monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
     with pytest.raises(KeyboardInterrupt), gpu_workers(1) as executor:
-        executor.in_each(os.getpid)
+        executor.submit(os.getpid).result()
         for _ in range(3):
             executor.submit(time.sleep, 30)
         began = time.monotonic()
@@ -131,7 +121,7 @@ def test_a_worker_that_is_killed_ends_the_sweep_in_one_line(tmp_path: Path) -> N
             os.kill(pids[0], signal.SIGKILL)
 
     with gpu_workers(2) as executor:
-        pids = executor.in_each(os.getpid)
+        pids = [executor.submit(os.getpid).result()]
         with pytest.raises(LostWorkersError, match="start again, shards written are kept") as lost:
             sweep(TINY | {"samples": 200}, tmp_path / "sweep", executor=executor, workers=2, on_progress=kill)
     assert len(str(lost.value)) < 200 and "\n" not in str(lost.value)

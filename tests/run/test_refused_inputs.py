@@ -7,7 +7,7 @@ import pytest
 
 import warpchain
 from tests.oracle_model.circular_loop import circular_loop
-from warpchain import InputError, Status
+from warpchain import InputError
 from warpchain.engine.batch import Batch
 from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.parameters import preset
@@ -77,18 +77,10 @@ def test_good_input_is_computed():
             {"method": "rk4"},
             rf"options\.method: 'rk4' is unknown; give one of {', '.join((*METHODS_BY_NEED, *METHODS))}",
         ),
-        ({"method": None}, r"options\.method: .*"),
         ({"tolerance": 0.0}, r"options\.tolerance: .*"),
         ({"tolerance": 1.0}, r"options\.tolerance: .*"),
-        ({"tolerance": float("nan")}, r"options\.tolerance: .*"),
-        ({"tolerance": "1e-6"}, r"options\.tolerance: .*"),
         ({"device": "gpu"}, r"options\.device: 'gpu' is no device; .*"),
-        ({"device": None}, r"options\.device: .*"),
         ({"self_contact": "yes"}, r"options\.self_contact: .*"),
-        ({"self_contact": 1}, r"options\.self_contact: .*"),
-        ({"skin": -1.0}, r"options\.skin: .*"),
-        ({"step_limit": 0}, r"options\.step_limit: .*"),
-        ({"contact_step": 0.0}, r"options\.contact_step: .*"),
         ({"controller": "pid"}, r"options\.controller: .*"),
         ({"smallest_step": 1e-3}, r"options\.smallest_step: 0.001 is not smaller than contact_step 2e-05 s; .*"),
         ({"toleranze": 1e-3}, r"options\.toleranze: .*"),
@@ -115,15 +107,10 @@ def test_simulate_refuses_unknown_parameters(parameters):
     [
         ("abc", "not an array of numbers; .*"),
         ([[0.0, 1.0, 2.0], [0.0, 1.0]], "not an array of numbers; .*"),
-        ({}, "not an array of numbers; .*"),
         (None, r"its shape is \(\); give \(n, 3\), one row x, y, θ per link"),
         (POSITION.ravel(), r"its shape is \(24,\); .*"),
-        (POSITION[:, :2], r"its shape is \(8, 2\); .*"),
-        (POSITION[None], r"its shape is \(1, 8, 3\); .*"),
         (with_value(POSITION, np.nan), "holds a number that is not finite; .*"),
-        (with_value(POSITION, -np.inf), "holds a number that is not finite; .*"),
         (with_value(POSITION, 1j), ".+; give .*"),
-        (POSITION.astype(str), ".+; give .*"),
     ],
     ids=brief,
 )
@@ -141,12 +128,6 @@ def test_simulate_refuses_chains_that_cannot_be(links):
     assert told == f"position: {links} links; a closed chain has an even number of at least 4"
 
 
-def test_simulate_refuses_chains_too_long_for_a_gpu():
-    """On a GPU a block has a thread for each link."""
-    told = refused(warpchain.simulate, "soft", np.zeros((1026, 3)), np.zeros((1026, 3)), 1.0, device="cuda")
-    assert told.startswith("position: ")
-
-
 def test_simulate_refuses_states_of_different_length():
     """Position and velocity have one row per link each."""
     told = refused(warpchain.simulate, "soft", POSITION, VELOCITY[:6], 1.0)
@@ -159,14 +140,10 @@ def test_simulate_refuses_states_of_different_length():
         ("1", "'1' is not a number; give seconds"),
         (None, "None is not a number; give seconds"),
         (True, "True is not a number; give seconds"),
-        ([1.0], r"\[1\.0\] is not a number; give seconds"),
-        (np.array([1.0]), ".* is not a number; give seconds"),
         (-1, "-1 is not a time; give a number of seconds, at least 0"),
-        (-1e-300, "-1e-300 is not a time; .*"),
         (float("nan"), "nan is not a time; .*"),
         (float("inf"), "inf is not a time; .*"),
         (1j, ".+; give .*"),
-        (np.complex128(1), ".+; give .*"),
         (10**400, ".+; give .*"),
     ],
     ids=brief,
@@ -182,17 +159,12 @@ def test_simulate_refuses_durations(duration, message):
     [
         ("abc", "not an array of numbers; give rising instants in s"),
         ([1j], "not an array of numbers; .*"),
-        ({}, "not an array of numbers; .*"),
         (0.5, r"its shape is \(\); give a row of at least one instant"),
-        ([[0.5]], r"its shape is \(1, 1\); .*"),
         ([], r"its shape is \(0,\); .*"),
         ([0.0, 1.5], r"give rising instants between 0 and the duration of 1.0 s"),
         ([-0.1, 0.5], "give rising instants .*"),
-        ([0.5, 0.4], "give rising instants .*"),
         ([0.5, 0.5], "give rising instants .*"),
-        ([0.1, float("nan")], "give rising instants .*"),
         ([float("nan")], "give rising instants .*"),
-        ([None], "give rising instants .*"),
     ],
     ids=brief,
 )
@@ -232,30 +204,23 @@ def test_good_walk_is_computed():
         # the scene
         ({"links": 61}, r"scene\.links: 61 is odd; .*"),
         ({"links": 2}, r"scene\.links: .*"),
-        ({"links": "60"}, r"scene\.links: .*"),
-        ({"links": 60.0}, r"scene\.links: .*"),
         ({"links": 28}, r"scene\.links: 28 links of 0.01268 m do not reach round .*; give at least 30"),
         ({"frequency": -1.0}, r"scene\.frequency: .*"),
         ({"frequency": "15 Hz"}, r"scene\.frequency: .*"),
-        ({"frequency": float("nan")}, r"scene\.frequency: .*"),
         ({"start": "flying"}, r"scene\.start: .*"),
         ({"phase": 1.0}, r"scene\.phase: .*"),
         ({"clearance": -1e-3}, r"scene\.clearance: .*"),
         ({"clearance_of": "hanging", "start": "spinning"}, r"scene\.clearance_of: 'hanging' needs .*; give .*"),
-        ({"walk_limit": 0.0}, r"scene\.walk_limit: .*"),
         # the parameters
         ({"preset": "hard"}, r"preset: 'hard' is unknown; presets are paper, soft"),
-        ({"preset": 1}, r"preset: 1 is unknown; .*"),
         ({"inner_mass": -1.0}, r"parameters\.inner_mass: .*"),
         ({"circle_radius": 0.1}, r"parameters\.circle_radius: 0.1 is not smaller than half the link .*; .*"),
         ({"floor_friction": 1.5}, r"parameters\.floor_friction: .*"),
-        ({"joint_stiffness": float("inf")}, r"parameters\.joint_stiffness: .*"),
         (
             {"sprocket_radius": 3e-3, "sprocket_radius_is": "pitch"},
             r"parameters\.sprocket_radius: 0.003 is not greater than the circle radius 0.0042, .*; .*",
         ),
         # the options
-        ({"method": "rk4"}, r"options\.method: 'rk4' is unknown; .*"),
         ({"tolerance": 1.0}, r"options\.tolerance: .*"),
         ({"device": "gpu"}, r"options\.device: 'gpu' is no device; .*"),
         ({"smallest_step": 1.0}, r"options\.smallest_step: 1.0 is not smaller than contact_step .*; .*"),
@@ -263,9 +228,6 @@ def test_good_walk_is_computed():
         ({"clearence": 0.1}, r"'clearence': unknown name; did you mean scene\.clearance\?"),
         ({"parameters": {}}, r"'parameters': unknown name; give one of .*"),
         ({"seed": -1}, r"seed: -1 is no whole number from 0 to 2\*\*128 - 1; .*"),
-        ({"seed": 2**128}, r"seed: \d+ is no whole number .*; .*"),
-        ({"seed": 1.5}, r"seed: 1.5 is no whole number .*; .*"),
-        ({"seed": "1"}, r"seed: '1' is no whole number .*; .*"),
         ({"seed": True}, r"seed: True is no whole number .*; .*"),
         # setups of other walks
         ({"setup": SETUP, "links": 60}, r"links: given together with setup, which is complete; leave one out"),
@@ -274,13 +236,9 @@ def test_good_walk_is_computed():
         ({"setup": SETUP, "seed": -1}, r"seed: -1 is no whole number from 0 .*; .*"),
         # frames
         ({"frame_interval": 0}, r"frame_interval: 0 is not a positive time in s; give one, or None"),
-        ({"frame_interval": -1e-3}, r"frame_interval: -0.001 is not a positive time in s; .*"),
         ({"frame_interval": float("nan")}, r"frame_interval: nan is not a positive time in s; .*"),
-        ({"frame_interval": float("inf")}, r"frame_interval: inf is not a positive time in s; .*"),
         ({"frame_interval": "2 ms"}, r"frame_interval: .*"),
-        ({"frame_interval": [2e-3]}, r"frame_interval: .*"),
         ({"frame_interval": True}, r"frame_interval: .*"),
-        ({"frame_interval": 10**400}, r"frame_interval: .*"),
         # the number of samples per frame must fit into 64 bits: 2⁶⁴ and its multiples would be 0
         ({"frame_interval": 1e300}, r"frame_interval: .*"),
         ({"record_interval": 1e-300}, r"(options\.record_interval|frame_interval): .*"),
@@ -292,40 +250,6 @@ def test_good_walk_is_computed():
 def test_walk_refuses(settings, message):
     """What a walk can't use is refused by its name, with a remedy."""
     assert re.fullmatch(message, refused(warpchain.walk, **settings))
-
-
-@pytest.mark.parametrize(
-    ("settings", "field"),
-    [
-        ({"links": 0}, "scene.links"),
-        ({"links": 10**8}, "scene.links"),
-        ({"links": 99999999999999999998}, "scene.links"),
-        ({"links": 1026, "device": "cuda"}, "scene.links"),
-        ({"sprocket_radius": 0.5}, "scene.links"),
-        ({"sprocket_radius": 1e300}, "parameters.sprocket_radius"),
-        ({"sprocket_radius": 1e-9, "circle_radius": 1e-9}, "parameters.sprocket_radius"),
-        ({"circle_radius": 6.34e-3}, "parameters.circle_radius"),
-        ({"link_length": 8.4e-3}, "parameters.circle_radius"),
-        ({"link_length": 1e300}, "parameters.link_length"),
-        ({"link_length": 1e-300, "circle_radius": 1e-301}, "parameters.link_length"),
-        ({"inner_mass": 1e300}, "parameters.inner_mass"),
-        ({"outer_inertia": 0.0}, "parameters.outer_inertia"),
-        ({"gravity": float("nan")}, "parameters.gravity"),
-        ({"joint_stiffness": 0.0}, "parameters.joint_stiffness"),
-        ({"friction_smoothing": 0.0}, "parameters.friction_smoothing"),
-        ({"floor_restitution": 1.1}, "parameters.floor_restitution"),
-        ({"frequency": 1e200}, "scene.frequency"),
-        ({"frequency": 1e308}, "scene.frequency"),
-        ({"walk_limit": 1e300}, "scene.walk_limit"),
-        ({"clearance": 1e300}, "scene.clearance"),
-        ({"smallest_step": 1e-4}, "options.smallest_step"),
-    ],
-    ids=brief,
-)
-def test_walk_refuses_what_cannot_be(settings, field):
-    """Extreme values, and values that contradict one another, are refused by the field's name, with a remedy."""
-    told = refused(warpchain.walk, **settings)
-    assert told.startswith(f"{field}: ") and ";" in told
 
 
 @pytest.mark.parametrize(("aspect", "links"), [(1e6, 6), (1e12, 60), (1e-12, 180), (1e300, 60)])
@@ -347,10 +271,3 @@ def test_seed_that_draws_an_impossible_chain_is_refused():
             told.add("refused")
             assert re.fullmatch(r"scene\.links: 30 links of .* do not reach round .*; give at least 32", str(error))
     assert told == {"computed", "refused"}
-
-
-def test_statuses_have_sentences():
-    """Each way to end has a sentence of one line, and each failure says what to try."""
-    for status in Status:
-        assert "\n" not in status.sentence
-        assert status.ok or ";" in status.sentence

@@ -10,7 +10,6 @@ import pytest
 
 import warpchain
 from warpchain.inputs.validation import InputError
-from warpchain.run import sweep_run
 from warpchain.run.sweep_keywords import sweep_of_keywords
 from warpchain.sweeps.plan import load_sweep
 
@@ -77,24 +76,6 @@ def test_a_sweep_runs_from_keywords(tmp_path, capfd):
     assert (result.name, result.seed, result.shape, result.missing_count) == ("short", 0, (1, 2, 1), 0)
     assert warpchain.sweep(**keywords, out=tmp_path / "short").provenance == result.provenance
     assert capfd.readouterr() == ("", "")
-
-
-def test_a_sweep_on_a_gpu_is_that_of_the_file(tmp_path, monkeypatch):
-    """The device changes both alike."""
-    planned = []
-
-    def stop(sweep, *arguments):
-        planned.append(sweep)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(sweep_run, "_run_in_folder", stop)
-    path = tmp_path / "speeds.yaml"
-    path.write_text(FILE, encoding="utf-8")
-    for keywords in ({"source": path}, KEYWORDS):
-        with pytest.raises(KeyboardInterrupt):
-            warpchain.sweep(**keywords, out=tmp_path / "speeds", device="cuda")
-    assert planned[0].canonical() == planned[1].canonical()
-    assert planned[0].blocks[0].sections["options"]["method"] == "os32"
 
 
 def test_all_errors_are_told_at_once(tmp_path):

@@ -16,16 +16,12 @@ import pytest
 import yaml
 
 import warpchain
-import warpchain.run.sweep_run as runner
 from warpchain.cli.main import main
 from warpchain.engine.processors import processors
 from warpchain.inputs.setup import Setup
 from warpchain.run.single_walk import setup_walk
-from warpchain.run.sweep_run import run_shards, shard_size, sweep
+from warpchain.run.sweep_run import run_shards, sweep
 from warpchain.status import Status
-from warpchain.store.manifest import Manifest
-from warpchain.sweeps.block import Block
-from warpchain.sweeps.plan import load_sweep
 from warpchain.walks.scheduler import run_setups
 
 BRIEF = {"start": "ellipse", "walk_limit": 0.01}
@@ -85,19 +81,6 @@ def test_walks_do_not_depend_on_their_batch():
     assert len(set(alone)) == len(alone)
 
 
-def test_long_chains_begin_first():
-    """Those take longest, and a run should not wait for them in the end; each walk is drawn once, when it begins."""
-    setups = [brief_setup(seed, links=links) for seed, links in enumerate((30, 240, 60, 32, 120, 238))]
-    begun: list[int] = []
-
-    def draw(place: int) -> Setup:
-        begun.append(setups[place].scene.links)
-        return setups[place]
-
-    assert len(list(run_setups(setups, draw=draw))) == 6
-    assert begun == [240, 238, 120, 60, 32, 30]
-
-
 def test_one_broken_walk_among_a_thousand_changes_no_other():
     """A chain whose mass is forced to NaN ends as not_finite; the other 999 are what they are without it."""
     setups = [brief_setup(seed, walk_limit=5e-4) for seed in range(1000)]
@@ -142,31 +125,6 @@ def test_progress_tells_when_the_walks_begin(tmp_path):
     assert seen[2][1] > 0 and seen[2][2] > 0 and seen[-1][1] == 80
 
 
-def test_progress_shows_the_shards_of_a_task_under_way(tmp_path, monkeypatch, uninterrupted):
-    """With all shards in one task, each is counted once, and most of them before the task is over."""
-    monkeypatch.setattr(runner, "POLL", 0.01)
-    monkeypatch.setattr(runner, "_tasks", lambda planned, missing, workers: iter([list(missing)]))
-    seen = []
-    sweep(TINY, tmp_path / "sweep", workers=1, on_progress=lambda p: seen.append((p.done, sum(p.statuses.values()))))
-    assert all(done == counted for done, counted in seen)
-    assert len({done for done, _ in seen}) > 5 and seen[-1] == (80, 80)
-    assert data_of(tmp_path / "sweep") == uninterrupted
-
-
-def test_walks_are_drawn_when_they_begin(tmp_path, monkeypatch):
-    """A task asks for the draw of a walk when the one before it is over, and for no walk twice."""
-    planned, events = load_sweep(TINY), []
-    draw, write = type(planned).drawn, runner.write_shard
-    monkeypatch.setattr(type(planned), "drawn", lambda self, walk: events.append(walk.index) or draw(self, walk))
-    monkeypatch.setattr(runner, "write_shard", lambda *given: events.append("written") or write(*given))
-    monkeypatch.setattr(runner, "_tasks", lambda planned, missing, workers: iter([list(missing)]))
-    monkeypatch.setattr(runner, "prepare", lambda planned: None)
-    sweep(TINY, tmp_path / "sweep", workers=1)
-    drawn = [event for event in events if event != "written"]
-    assert sorted(drawn) == list(range(80))
-    assert events.index("written") < 10
-
-
 def test_a_finished_sweep_is_not_run_again(tmp_path, uninterrupted):
     """A second run of a complete sweep computes nothing and gives the same result."""
     folder = tmp_path / "sweep"
@@ -199,14 +157,6 @@ def test_a_failing_walk_stops_the_sweep_and_keeps_what_is_done(tmp_path, monkeyp
     assert kept.items() <= uninterrupted.items()
     sweep(TINY, tmp_path / "sweep")
     assert data_of(tmp_path / "sweep") == uninterrupted
-
-
-def test_memory_does_not_grow_with_the_sweep():
-    """A sweep of 10⁷ walks is planned, and a walk of it drawn, without a table of its walks."""
-    huge = load_sweep(TINY | {"samples": 2_500_000})
-    assert huge.walk_count == 10_000_000
-    assert huge.planned(9_999_999).setup.scene.links == 44
-    assert shard_size(huge.walk_count) == 256
 
 
 @pytest.mark.slow
@@ -381,40 +331,6 @@ def test_sweep_refuses_what_it_cannot_do(tmp_path):
     assert not (tmp_path / "a").exists()
 
 
-def test_tasks_of_gpus_are_alike(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every shard is in one task; tasks hold like walks and hardly more of them than a GPU is given."""
-    grid = {"links": [60, 90, 120, 150, 180], "frequency": [5.0, 10.0]}
-    given = {"version": 1, "name": "alike", "seed": 1, "preset": "soft", "samples": 24, "grid": grid}
-    planned = load_sweep(given | {"options": {"device": "cuda"}})
-    missing = Manifest.of(planned, 8).shards
-    for most, workers, count in ((1000, 3, 3), (60, 2, 4), (1000, 40, 30)):
-        monkeypatch.setattr(runner, "GPU_TASK_WALKS", most)
-        tasks = list(runner._tasks(planned, missing, workers))
-        assert len(tasks) == count
-        assert sorted((shard for task in tasks for shard in task), key=lambda shard: shard.name) == [*missing]
-        assert max(sum(map(len, task)) for task in tasks) <= most + 8
-        means = [np.mean([planned.planned(int(shard.walks[0])).setup.scene.links for shard in task]) for task in tasks]
-        assert workers > 4 or np.ptp(means) <= 12
-
-
-def test_a_task_that_failed_is_run_again_by_the_same_client(tmp_path: Path) -> None:
-    """Dask takes equal tasks for pure ones unless told otherwise, and answers with what it remembers."""
-    asked = []
-
-    class Client:
-        """Like a Dask client, on a thread of this process."""
-
-        def get_executor(self, **how: object) -> concurrent.futures.Executor:
-            asked.append(how)
-            return concurrent.futures.ThreadPoolExecutor(1)
-
-        def nthreads(self) -> dict[str, int]:
-            return {"here": 1}
-
-    sweep(TINY | {"samples": 1}, tmp_path / "sweep", executor=Client())
-    assert asked == [{"pure": False}]
-
-
 def test_processors_are_those_of_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Counted are the processors that the process may use; on macOS, which does not tell, all; at least one."""
     monkeypatch.setattr(os, "cpu_count", lambda: 7)
@@ -424,44 +340,3 @@ def test_processors_are_those_of_this_process(monkeypatch: pytest.MonkeyPatch) -
     assert processors() == 7
     monkeypatch.setattr(os, "cpu_count", lambda: None)
     assert processors() == 1
-
-
-MANY = {
-    **{name: value for name, value in TINY.items() if name not in ("grid", "samples")},
-    "samples": 1,
-    "scene": BRIEF | {"links": 30},
-    "blocks": [{"name": f"b{number}", "scene": {"frequency": 5 + number / 10}} for number in range(150)],
-}
-"""A sweep of many blocks, each of one walk, and so with a task for each walk."""
-
-
-def test_a_task_checks_only_the_cells_of_its_walks(tmp_path, monkeypatch):
-    """Each of 150 tasks makes the setup of its own cell and is sent only its block."""
-    planned, made, sent = load_sweep(MANY), [], []
-    usual, usual_run = Block.fixed_in, run_shards
-
-    def counted(block, cells):
-        for setup in usual(block, cells):
-            made.append(setup)
-            yield setup
-
-    def noted(part, *arguments):
-        sent.append(len(part.blocks))
-        before = len(made)
-        usual_run(part, *arguments)
-        assert len(made) - before <= 2
-
-    monkeypatch.setattr(Block, "fixed_in", counted)
-    monkeypatch.setattr(runner, "run_shards", noted)
-    sweep(planned, tmp_path / "sweep", workers=1)
-    assert sent == [1] * 150
-    assert len(made) <= 10 * 150  # canonical forms, kinds of kernels, tasks
-
-
-def test_kernels_are_chosen_from_a_cell_of_each_kind():
-    """Cells that differ in what no kernel depends on are one kind; methods, links and starts make others."""
-    values = {"from": 1.0, "to": 9.0, "count": 100}
-    grid = {"links": [30, 44], "start": ["ellipse", "spinning"], "gravity": values, "frequency": [5, 9]}
-    planned = load_sweep(TINY | {"scene": {}, "samples": 1, "grid": grid})
-    kinds = {(setup.scene.links, setup.scene.start) for setup in runner.one_of_each_kind(planned)}
-    assert len(runner.one_of_each_kind(planned)) == len(kinds) == 4

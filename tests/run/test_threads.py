@@ -31,15 +31,16 @@ def test_threads_take_turns_on_a_gpu(monkeypatch: pytest.MonkeyPatch, device: st
     planned = load_sweep(TINY | {"options": {"method": "dp5", "device": device}})
     inside, most = [], []
 
-    def run_walks(*given: object) -> None:
+    def run_walks(*given: object, **named: object) -> list[object]:
         inside.append(given)
         time.sleep(0.2)
         most.append(len(inside))
         inside.pop()
+        return []
 
     shards = Manifest.of(planned, 8).shards
     monkeypatch.setattr(runner, "compile_kernels", lambda setups, threads: None)
-    monkeypatch.setattr(runner, "_run_shards", run_walks)
+    monkeypatch.setattr(runner, "run_setups", run_walks)
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         for task in [pool.submit(run_shards, planned, "", "", [shard]) for shard in shards[:2]]:
             task.result()

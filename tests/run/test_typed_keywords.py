@@ -1,6 +1,5 @@
 """Types of keyword arguments say what the models check; a type checker finds a misspelt or ill-typed setting."""
 
-import inspect
 import subprocess
 import sys
 from pathlib import Path
@@ -8,11 +7,10 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import pytest
 
-import warpchain
 from warpchain.inputs import keywords
 from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.parameters import PRESETS
-from warpchain.inputs.sections import NAME_OF_SYMBOL, SECTION_OF, SECTIONS, SYMBOL_OF
+from warpchain.inputs.sections import SECTIONS, SYMBOL_OF
 from warpchain.sweeps.designs import SAMPLERS
 
 ROOT = Path(__file__).parents[2]
@@ -67,17 +65,6 @@ def test_names_are_all_there() -> None:
     assert set(get_args(keywords.Method)) == {*METHODS, *METHODS_BY_NEED}
     assert set(get_args(keywords.Preset)) == set(PRESETS)
     assert set(get_args(keywords.Sampler)) == set(SAMPLERS)
-
-
-def test_a_walk_takes_every_setting_once() -> None:
-    """Named arguments and typed settings together are the fields of all sections, and no name is in both."""
-    named = set(inspect.signature(warpchain.walk).parameters) & SECTION_OF.keys()
-    others = get_type_hints(keywords.WalkSettings).keys() - NAME_OF_SYMBOL.keys()
-    assert named | others == SECTION_OF.keys() and not named & others
-    named = set(inspect.signature(warpchain.simulate).parameters)
-    others = get_type_hints(keywords.OtherOptions).keys()
-    options = hints_of("options").keys()
-    assert not named & others and options - named - others == {"soften_pile", "soften_drive"}
 
 
 @pytest.mark.slow

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import xarray
 
 from tests.support.made_walks import make_walk
 from tests.support.synthetic_sweep import SWEEP, run
@@ -81,14 +80,6 @@ def test_damage_is_refused_or_does_no_harm(tmp_path: Path, kind: str) -> None:
         assert found == expected, number
         assert kind == "sweep.json" or damaged == whole, number
     assert refusals > FLIPS
-
-
-def test_a_merged_file_is_still_one_to_others(tmp_path: Path) -> None:
-    """Checksums behind the content are no matter to xarray, which finds out by itself what the file is."""
-    run(tmp_path / "sweep")
-    merge(tmp_path / "sweep", tmp_path / "all.h5")
-    with xarray.open_dataset(tmp_path / "all.h5", group="rest") as data:
-        assert data.dx.shape == (3, 2, 20)
 
 
 def test_info_compares_a_merged_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,10 +3,6 @@
 import concurrent.futures
 import multiprocessing
 import pickle
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +10,6 @@ import h5py
 import numpy as np
 import pytest
 import xarray
-import yaml
 
 import warpchain
 from tests.run.test_sweep_run import BRIEF, TINY, brief_setup, data_of
@@ -179,24 +174,6 @@ def test_workers_and_interruptions_leave_the_same_bytes(
     assert load(tmp_path / "stopped").kept.sum() == 3  # walks 0, 3 and 5
     sweep(KEPT, tmp_path / "stopped")
     assert data_of(tmp_path / "stopped") == uninterrupted
-
-
-@pytest.mark.slow
-def test_killed_with_series_a_sweep_goes_on(kept: Path, tmp_path: Path) -> None:
-    """SIGKILL whenever some more shards are there, resumed each time: the bytes are those of one run."""
-    source, folder = tmp_path / "kept.yaml", tmp_path / "sweep"
-    source.write_text(yaml.safe_dump(KEPT, sort_keys=False))
-    command = [sys.executable, "-m", "warpchain", "sweep", str(source), "-o", str(folder), "--workers", "2"]
-    kills = 0
-    for least in (1, 6, 13):
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        while process.poll() is None and len(list(folder.glob("shards/[0-9]*.h5"))) < least:
-            time.sleep(0.002)
-        process.send_signal(signal.SIGKILL)
-        kills += process.wait() == -signal.SIGKILL
-    assert kills >= 2
-    subprocess.run(command, check=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    assert data_of(folder) == data_of(kept)
 
 
 def test_a_walk_that_was_never_released_has_no_motion(tmp_path: Path) -> None:

@@ -1,9 +1,7 @@
 """Results of sweeps: arrays with named axes, statistics, xarray, pandas, and the one merged file."""
 
-import copy
 import json
 import math
-import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -17,7 +15,6 @@ from tests.support.synthetic_sweep import SHARD_SIZE, SWEEP, run, synthetic_rows
 from warpchain.cli.main import main
 from warpchain.inputs.validation import InputError
 from warpchain.status import Status
-from warpchain.store.block_result import BlockResult
 from warpchain.store.folder import SweepFolder
 from warpchain.store.manifest import Manifest
 from warpchain.store.merged_file import merge
@@ -192,14 +189,6 @@ def test_statistics_are_over_walks_at_rest(tmp_path: Path) -> None:
         load(tmp_path).statistics("bounce")
 
 
-def test_results_can_be_copied(single: Path) -> None:
-    """Copies and pickles are whole."""
-    result = load(single)
-    for copied in (copy.deepcopy(result), pickle.loads(pickle.dumps(result))):
-        assert isinstance(copied, SweepResult) and isinstance(copied.blocks["main"], BlockResult)
-        assert copied.dx.tobytes() == result.dx.tobytes()
-
-
 def test_no_sweep_no_result(tmp_path: Path, single: Path) -> None:
     """A folder without a sweep, or none at all, is named; a bad shard is no missing one."""
     for nothing in (tmp_path, tmp_path / "none"):
@@ -326,14 +315,6 @@ def test_merged_file_is_plain_hdf5(folder: Path, tmp_path: Path) -> None:
         assert json.loads(file.attrs["sweep"]) == SWEEP.canonical()
         assert json.loads(file.attrs["versions"]).keys() == {"warpchain", "warp-lang", "numpy"}
         assert file.attrs["numerics_version"] == NUMERICS_VERSION and file.attrs["digest"] == SWEEP.digest()
-
-
-def test_merged_files_are_equal(folder: Path, tmp_path: Path) -> None:
-    """Merging twice gives the same bytes; an older file is replaced."""
-    for name in ("one.h5", "two.h5", "one.h5"):
-        merge(folder, tmp_path / name)
-    assert (tmp_path / "one.h5").read_bytes() == (tmp_path / "two.h5").read_bytes()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.h5", "two.h5"]
 
 
 def test_a_merge_that_fails_leaves_the_older_file(folder: Path, single: Path, tmp_path: Path) -> None:

@@ -115,7 +115,7 @@ def hold(loop: Loop, parameters: Parameters, duration: float, load_factor: float
         samples.append(batch.drain_samples(0))
         frames.append(batch.drain_frames(0))
 
-    batch.run([0], batch.features(fixed_body="sprocket", watch="steady"), drain)
+    batch.run([0], batch.features(fixed_body="sprocket"), drain)
     assert batch.status(0) == Status.NOT_STEADY
     rows, times, joints = np.concatenate(samples), *(np.concatenate(parts) for parts in zip(*frames, strict=True))
     since = duration - period_of(setup)

@@ -1,42 +1,16 @@
 """Walks whose plane tilts that nobody ran."""
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tests.support.made_walks import make_walk
-from warpchain.inputs.setup import Setup
-from warpchain.loop.before_release import BeforeRelease
-from warpchain.status import Status
-from warpchain.walks.walk_result import Drawn
+from warpchain.inputs.setup import resolve
+from warpchain.walks.walk_result import WalkResult
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class MadeWalk(Drawn):
-    """What pictures need of a walk, see `warpchain.pictures.walk_shape.TiltingWalk`."""
-
-    setup: Setup
-    status: Status
-    dx: float
-    time: Array
-    center: Array
-    center_velocity: Array
-    center_z: Array
-    tilt: Array
-    yaw: Array
-    fell_at: float
-    collapsed_at: float
-    frame_time: Array
-    frame_joints: Array
-    joints_in_room: Array | None
-    sprocket_center: Array | None
-    sprocket_radius: float
-    before_release: BeforeRelease | None = None
 
 
 def plane_axes(tilt: Array, yaw: Array) -> Array:
@@ -47,11 +21,11 @@ def plane_axes(tilt: Array, yaw: Array) -> Array:
     return np.stack([ahead, upward], axis=-2)
 
 
-def make_tilting_walk(links: int = 30, frames: int = 41, **changes: Any) -> MadeWalk:
+def make_tilting_walk(links: int = 30, frames: int = 41, **changes: Any) -> WalkResult:
     """A ring that rolls forward on its edge, turns to the left and falls over to the left within 1 s."""
-    time, frame_time = np.linspace(0.0, 1.0, 501), np.linspace(0.0, 1.0, frames)
-    flat = make_walk(links)
-    parameters = flat.setup.parameters
+    time, frame_time = np.linspace(0.0, 1.0, 801), np.linspace(0.0, 1.0, frames)
+    setup = resolve("soft", scene={"links": links, "plane": "tilting"}, options={"method": "explicit"}, parameters={})
+    parameters = setup.parameters
     radius = parameters.link_length / (2 * math.sin(math.pi / links))
 
     def middle(moment: Array) -> tuple[Array, Array, Array]:
@@ -64,10 +38,8 @@ def make_tilting_walk(links: int = 30, frames: int = 41, **changes: Any) -> Made
     center, tilt, yaw = middle(time)
     place, lean, heading = middle(frame_time)
     angle = -8 * frame_time[:, None] + 2 * np.pi * np.arange(links) / links
-    ring = radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     values: dict[str, Any] = {
-        "setup": flat.setup,
-        "status": Status.AT_REST,
+        "setup": setup,
         "dx": float(center[-1, 0]),
         "time": time,
         "center": center[:, :2],
@@ -76,11 +48,10 @@ def make_tilting_walk(links: int = 30, frames: int = 41, **changes: Any) -> Made
         "tilt": tilt,
         "yaw": yaw,
         "fell_at": float(time[np.argmax(tilt > math.pi / 4)]),
-        "collapsed_at": math.nan,
         "frame_time": frame_time,
-        "frame_joints": ring,
-        "joints_in_room": place[:, None] + ring @ plane_axes(lean, heading),
+        "frame_joints": radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1),
+        "frame_origin": place,
+        "frame_axes": plane_axes(lean, heading),
         "sprocket_center": np.array([0.0, 0.07]),
-        "sprocket_radius": 0.0556,
     }
-    return MadeWalk(**(values | changes))
+    return make_walk(links, **(values | changes))

@@ -95,7 +95,7 @@ def fly(
     """
     options = Options(method=method, tolerance=tolerance)
     batch = tilting_batch([start], [parameters], options, duration, longest_step=longest_step)
-    batch.run([0], batch.features(fixed_body="none", watch="none", tilts=True))
+    batch.run([0], batch.features(fixed_body="none", tilts=True))
     assert batch.status(0) == Status.FINISHED
     assert batch.counts(0)["self"] == 0
     return batch

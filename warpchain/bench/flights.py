@@ -138,7 +138,7 @@ def fly(start: State, method: str, chains: int, device: str) -> Flight:
         for world in worlds:
             batch.set_chain(world, PARAMETERS, len(start[0]))
             batch.load(world, *start, stop_time=COMPARED_TIME, stop_status=Status.FINISHED)
-        features = batch.features(fixed_body="floor", watch="none")
+        features = batch.features(fixed_body="floor")
         batch.run(worlds, features)
         compared, before = (batch.position(0), batch.velocity(0)), batch.counts(0)
         batch.resume(list(worlds), TIMED, Status.FINISHED)

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from warpchain.cli.output_paths import output_path
+from warpchain.cli.words import output_path
 
 STEPS: Final = {
     "links": "{.links}",

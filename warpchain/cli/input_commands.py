@@ -2,13 +2,13 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from warpchain.cli import completions
-from warpchain.cli.output_paths import output_path
+from warpchain.cli.words import argument, option, output
 
 if TYPE_CHECKING:
     from warpchain.inputs.value_list import ValueEntry
@@ -17,6 +17,7 @@ WIDE: Final = 160
 """Columns of the tables where there is no terminal to ask."""
 ROOM_FOR_MEANINGS: Final = 120
 """Columns from which a table of many values also says what they mean."""
+_NAMES: Final = "Names or symbols, such as floor_friction, mu_fc or scene.phase, or a section. Default: all."
 _TITLES: Final = {
     "parameters": "parameters, preset {} (measured, looked up, adjusted: Table 1)",
     "scene": "scene",
@@ -25,23 +26,8 @@ _TITLES: Final = {
 
 
 def parameters(
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="[NAME]...",
-            help="Names or symbols, such as floor_friction, mu_fc or scene.phase, or a section. Default: all.",
-            autocompletion=completions.names,
-            show_default=False,
-        ),
-    ] = None,
-    preset: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME",
-            help="Whose values: paper, Table 1 of the paper, or soft.",
-            autocompletion=completions.presets,
-        ),
-    ] = "paper",
+    names: Annotated[list[str] | None, argument("[NAME]...", _NAMES)] = None,
+    preset: Annotated[str, option("NAME", "Whose values: paper, Table 1 of the paper, or soft.")] = "paper",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")] = False,
 ) -> None:
     """List what can be set: parameters, scene and options, with symbols, units, values, bounds and sources."""
@@ -62,16 +48,7 @@ def parameters(
 
 
 def schema(
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE",
-            parser=output_path,
-            help="Write it to this file instead of standard output.",
-        ),
-    ] = None,
+    path: Annotated[Path | None, output("FILE", "Write it to this file instead of standard output.")] = None,
 ) -> None:
     """Print a JSON schema of sweep files, with which editors check and complete them.
 
@@ -83,32 +60,25 @@ def schema(
     from warpchain.sweeps.sweep_file import sweep_schema
 
     text = json.dumps(sweep_schema(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-    if output is None:
+    if path is None:
         print(text, end="")
         return
-    write_whole(output, text)
-    print(printable(str(output)))
+    write_whole(path, text)
+    print(printable(str(path)))
 
 
 def _content(entry: "ValueEntry") -> dict[str, Any]:
     """An entry as JSON has it."""
-    limits = entry.limits
+    content = asdict(entry)
+    del content["name"]
+    limits = content.pop("limits")
     bounds = {
         "lower": limits.get("ge", limits.get("gt")),
         "lower_included": "ge" in limits,
         "upper": limits.get("le", limits.get("lt")),
         "upper_included": "le" in limits,
     }
-    return {
-        "symbol": entry.symbol,
-        "unit": entry.unit,
-        "value": entry.value,
-        "sigma": entry.sigma,
-        "bounds": bounds if limits else None,
-        "choices": list(entry.choices) or None,
-        "source": entry.source,
-        "meaning": entry.meaning,
-    }
+    return content | {"bounds": bounds if limits else None, "choices": list(entry.choices) or None}
 
 
 def _print_tables(listed: "Mapping[str, Sequence[ValueEntry]]", preset: str, *, all_meanings: bool) -> None:
@@ -123,15 +93,14 @@ def _print_tables(listed: "Mapping[str, Sequence[ValueEntry]]", preset: str, *, 
     for section, entries in listed.items():
         if not entries:
             continue
-        cells = [_cells(entry) for entry in entries]
+        rows = [_cells(entry) for entry in entries]
+        headings = [heading for heading in rows[0] if any(row[heading] for row in rows)]
         console.print(_TITLES[section].format(preset), style="bold")
         table = Table(box=None, padding=(0, 1, 0, 0), header_style="")
-        headings = [heading for heading in cells[0] if any(row[heading] for row in cells)]
-        for heading in headings:
+        for heading in headings if meanings else headings[:-1]:
             right, wraps = heading in ("value", "sigma"), heading in ("bounds", "meaning")
-            if meanings or heading != "meaning":
-                table.add_column(heading, justify="right" if right else "left", no_wrap=not wraps)
-        for row in cells:
+            table.add_column(heading, justify="right" if right else "left", no_wrap=not wraps)
+        for row in rows:
             table.add_row(*(row[heading] for heading in headings[: len(table.columns)]))
         console.print(table, "")
     if not meanings:
@@ -139,37 +108,30 @@ def _print_tables(listed: "Mapping[str, Sequence[ValueEntry]]", preset: str, *, 
 
 
 def _cells(entry: "ValueEntry") -> dict[str, str]:
-    """An entry as cells of a table, by their headings."""
+    """An entry as cells of a table, by their headings; bounds as an interval, or the choices."""
     from warpchain.inputs.validation import DIMENSIONLESS
 
+    limits, bounds = entry.limits, ", ".join(map(_written, entry.choices))
+    if limits:
+        lower = f"[{_written(limits['ge'])}" if "ge" in limits else f"({_written(limits.get('gt', '−∞'))}"
+        upper = f"{_written(limits['le'])}]" if "le" in limits else f"{_written(limits.get('lt', '∞'))})"
+        bounds = f"{lower}, {upper}"
     return {
         "name": entry.name,
         "symbol": entry.symbol or "",
         "value": _written(entry.value),
         "sigma": "" if entry.sigma is None else _written(entry.sigma),
         "unit": "" if entry.unit == DIMENSIONLESS else entry.unit,
-        "bounds": _bounds(entry),
+        "bounds": bounds,
         "source": entry.source.removeprefix("Table 1, "),
         "meaning": entry.meaning,
     }
-
-
-def _bounds(entry: "ValueEntry") -> str:
-    """Bounds as an interval, or the choices."""
-    limits = entry.limits
-    if not limits:
-        return ", ".join(_written(choice) for choice in entry.choices)
-    lower = f"[{_written(limits['ge'])}" if "ge" in limits else f"({_written(limits.get('gt', '−∞'))}"
-    upper = f"{_written(limits['le'])}]" if "le" in limits else f"{_written(limits.get('lt', '∞'))})"
-    return f"{lower}, {upper}"
 
 
 def _written(value: Any) -> str:
     """A value as a sweep file has it."""
     from warpchain.inputs.validation import short
 
-    if value is None:
-        return "null"
-    if isinstance(value, bool):
-        return str(value).lower()
+    if value is None or isinstance(value, bool):
+        return json.dumps(value)
     return short(value) if isinstance(value, int | float) else str(value)

@@ -10,80 +10,56 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
-from warpchain.cli import completions
-from warpchain.cli.output_paths import output_path
-from warpchain.cli.walk_commands import plot_walk
+from warpchain.cli.walk_commands import FAILED, plot_walk
+from warpchain.cli.words import JSON, argument, option, output, output_path
 
 if TYPE_CHECKING:
     from warpchain.run.sweep_run import DaskClient, Executor
     from warpchain.store.sweep_result import SweepResult
 
-FAILED: Final = 1
-"""Exit status of a command whose walks failed."""
-
 LOG_EVERY: Final = 30.0
 """Time [s] between two lines of progress where there is no terminal."""
 
-SWEEP_FILE: Final = typer.Argument(
-    metavar="FILE.yaml",
-    help="The sweep, or the bare name of one that comes with warpchain, such as figure6.",
-    autocompletion=completions.sweep_files,
-    show_default=False,
-)
-SweepFile = Annotated[Path, SWEEP_FILE]
-Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a sweep, or a merged file.", show_default=False)]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, in SI units, instead of a table.")]
+_FILE: Final = "The sweep, or the bare name of one that comes with warpchain, such as figure6."
+_DEVICE: Final = "cpu, cuda (the first GPU) or cuda:N, instead of what the sweep says."
+_SCHEDULER: Final = "Run on the workers of this Dask scheduler; they must see DIR."
+
+SweepFile = Annotated[Path, argument("FILE.yaml", _FILE)]
+AsJson = Annotated[bool, JSON]
 
 
 def sweep(
     context: typer.Context,
-    source: Annotated[Path | None, SWEEP_FILE] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="DIR",
-            parser=output_path,
-            help="Folder of the results; a killed sweep goes on in it.",
-        ),
-    ] = None,
-    device: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="cpu, cuda (the first GPU) or cuda:N, instead of what the sweep says."),
-    ] = None,
+    source: Annotated[Path | None, argument("FILE.yaml", _FILE)] = None,
+    folder: Annotated[Path | None, output("DIR", "Folder of the results; a killed sweep goes on in it.")] = None,
+    device: Annotated[str | None, option("NAME", _DEVICE)] = None,
     workers: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=1, help="Shards in work at once. Default: processors, or Dask's threads."),
+        int | None, option("N", "Shards in work at once. Default: processors, or Dask's threads.", min=1)
     ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="tcp://HOST:PORT", help="Run on the workers of this Dask scheduler; they must see DIR."),
-    ] = None,
+    scheduler: Annotated[str | None, option("tcp://HOST:PORT", _SCHEDULER)] = None,
     gpus: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=1, help="Run on the first N GPUs of this machine, a process for each."),
+        int | None, option("N", "Run on the first N GPUs of this machine, a process for each.", min=1)
     ] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Discard what another sweep left in the folder.")] = False,
     new: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE.yaml",
-            parser=output_path,
-            help="Write a small sweep file that explains its keys; run nothing.",
-        ),
+        option("FILE.yaml", "Write a small sweep file that explains its keys; run nothing.", parser=output_path),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Run a sweep, or what is left of it: many walks over a grid, with random samples in each cell."""
-    from warpchain.inputs.validation import InputError
+    from warpchain.inputs.validation import InputError, printable
+    from warpchain.sweeps.shipped import write_new_sweep
 
     if new is not None:
-        _write_new(new, alone=not any(value for name, value in context.params.items() if name != "new"))
+        if any(value for name, value in context.params.items() if name != "new"):
+            raise InputError("--new: given together with other arguments; leave them out")
+        write_new_sweep(new)
+        print(printable(str(new)))
         return
     if source is None:
         raise InputError("FILE.yaml: missing; give a sweep file, or --new FILE.yaml to have one written")
-    if output is None:
+    if folder is None:
         raise InputError("--output: missing; give a folder for the results with -o DIR")
     from warpchain.cli.terminal import print_sweep, status_line, sweep_progress_text
     from warpchain.run.sweep_run import sweep as run
@@ -95,13 +71,13 @@ def sweep(
         if device not in (None, "cuda"):
             raise InputError(f"--device: {device} is given together with --gpus; give cuda, or leave one out")
         device = "cuda"
-    with status_line(LOG_EVERY) as show, _executor(gpus, scheduler) as (executor, count):
+    with status_line(LOG_EVERY) as show, _executor(gpus, scheduler) as executor:
         result = run(
             source,
-            output,
+            folder,
             device=device,
             executor=executor,
-            workers=workers or count,
+            workers=workers or gpus,
             fresh=fresh,
             on_progress=lambda progress: show(sweep_progress_text(progress)),
         )
@@ -109,25 +85,8 @@ def sweep(
     _note_failures(result)
 
 
-def _write_new(path: Path, *, alone: bool) -> None:
-    """Write a sweep file to start from.
-
-    Raises:
-        InputError: other arguments are given, or there is such a file already.
-        OSError: it cannot be written.
-    """
-    from warpchain.inputs.validation import InputError, printable
-    from warpchain.sweeps.shipped import write_new_sweep
-
-    if not alone:
-        raise InputError("--new: given together with other arguments; leave them out")
-    write_new_sweep(path)
-    print(printable(str(path)))
-
-
 def info(
-    directory: Folder,
-    as_json: AsJson = False,
+    directory: Annotated[Path, argument("DIR", "Folder of a sweep, or a merged file.")], as_json: AsJson = False
 ) -> None:
     """Show how far a sweep is and what it has found so far; of a merged file, after its checksum is compared."""
     from warpchain.cli.terminal import print_sweep
@@ -138,23 +97,11 @@ def info(
 
 
 def plot(
-    path: Annotated[
-        Path,
-        typer.Argument(
-            metavar="PATH", help="Folder of a sweep, a merged file, or the file of a saved walk.", show_default=False
-        ),
-    ],
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", metavar="DIR", parser=output_path, help="Folder of the figures. Default: that of PATH."
-        ),
-    ] = None,
+    path: Annotated[Path, argument("PATH", "Folder of a sweep, a merged file, or the file of a saved walk.")],
+    folder: Annotated[Path | None, output("DIR", "Folder of the figures. Default: that of PATH.")] = None,
     quantity: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME", help="Column of a sweep to draw: dx, walk_time, bounces, hold_time ... Default: dx."
-        ),
+        option("NAME", "Column of a sweep to draw: dx, walk_time, bounces, hold_time ... Default: dx."),
     ] = None,
     kind: Annotated[
         Literal["figure5", "film_strip", "loop", "energy", "tilt"] | None,
@@ -176,18 +123,17 @@ def plot(
     ) or (path.suffix == ".h5" and not os.path.exists(path)):
         if quantity is not None:
             raise InputError("--quantity: a saved walk has no columns; leave it out, or give the folder of a sweep")
-        if not plot_walk(path, output, kind):
-            raise typer.Exit(FAILED)
+        plot_walk(path, folder, kind)
         return
     if kind is not None:
         raise InputError("--kind: a sweep has none; leave it out, or give the file of a saved walk")
-    from warpchain.cli.terminal import try_folder
+    from warpchain.cli.walk_files import try_folder
     from warpchain.files import make_folder
     from warpchain.reports.sweep_figures import figures
     from warpchain.store.sweep_result import load
 
     result = load(path)
-    folder = output or (path.parent if is_file else path)
+    folder = folder or (path.parent if is_file else path)
     try_folder(folder)
     make_folder(folder)
     drawn = False
@@ -201,32 +147,15 @@ def plot(
 
 
 def report(
-    directory: Folder,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE.html",
-            parser=output_path,
-            help="The page, which replaces an older one only. Default: DIR/report.html.",
-        ),
+    directory: Annotated[Path, argument("DIR", "Folder of a sweep.")],
+    path: Annotated[
+        Path | None, output("FILE.html", "The page, which replaces an older one only. Default: DIR/report.html.")
     ] = None,
     walk: Annotated[
         int | None,
-        typer.Option(
-            metavar="INDEX",
-            min=0,
-            help="Show this walk in motion: its frames if the sweep kept them, or else run again.",
-        ),
+        option("INDEX", "Show this walk in motion: its frames if the sweep kept them, or else run again.", min=0),
     ] = None,
-    device: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="Where the walk is run again: cpu, cuda (the first GPU) or cuda:N, instead of what the sweep says.",
-        ),
-    ] = None,
+    device: Annotated[str | None, option("NAME", f"Where the walk is run again: {_DEVICE}")] = None,
 ) -> None:
     """Write one self-contained HTML page: figures, table, parameters, provenance, failed walks, a walk in motion."""
     from warpchain.inputs.validation import InputError, printable
@@ -234,19 +163,14 @@ def report(
 
     if device is not None and walk is None:
         raise InputError("--device: no walk is run for this page; add --walk INDEX, or leave it out")
-    path = output or (directory.parent if os.path.isfile(directory) else directory) / "report.html"
+    path = path or (directory.parent if os.path.isfile(directory) else directory) / "report.html"
     write_report(directory, path, animation_of=walk, device=device)
     print(printable(str(path)))
 
 
 def merge(
-    directories: Annotated[
-        list[Path],
-        typer.Argument(metavar="DIR...", help="Folder of a sweep, or several; merged files, too.", show_default=False),
-    ],
-    output: Annotated[
-        Path, typer.Argument(metavar="FILE.h5", parser=output_path, help="The file to write.", show_default=False)
-    ],
+    directories: Annotated[list[Path], argument("DIR...", "Folder of a sweep, or several; merged files, too.")],
+    path: Annotated[Path, argument("FILE.h5", "The file to write.", parser=output_path)],
 ) -> None:
     """Put all results into one HDF5 file with named axes and units, which xarray opens.
 
@@ -255,19 +179,13 @@ def merge(
     from warpchain.inputs.validation import printable
     from warpchain.store.merged_file import merge as merge_shards
 
-    merge_shards(directories, output)
-    print(printable(str(output)))
-
-
-def add_commands(app: typer.Typer) -> None:
-    """Register the commands."""
-    for command in (sweep, info, plot, report, merge):
-        app.command()(command)
+    merge_shards(directories, path)
+    print(printable(str(path)))
 
 
 @contextlib.contextmanager
-def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[tuple[Executor | DaskClient | None, int | None]]":
-    """Workers on GPUs, and their number, or the client of a Dask cluster; (None, None) if neither is asked for.
+def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[Executor | DaskClient | None]":
+    """Workers on GPUs, or the client of a Dask cluster; None if neither is asked for.
 
     Raises:
         InputError: there are not so many GPUs, Dask is not installed, or the scheduler does not answer.
@@ -281,22 +199,16 @@ def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[tuple[Execut
         if gpus > (there := gpu_count()):
             raise InputError(f"--gpus: {gpus} wanted, but this machine has {there}; give at most {there}")
         with gpu_workers(gpus) as executor:
-            yield executor, gpus
+            yield executor
     elif scheduler is not None:
-        with _without_logs(), _dask_client(scheduler) as client:
-            yield client, None
+        logging.disable(logging.ERROR)  # Dask logs tracebacks of what is said in one line
+        try:
+            with _dask_client(scheduler) as client:
+                yield client
+        finally:
+            logging.disable(logging.NOTSET)
     else:
-        yield None, None
-
-
-@contextlib.contextmanager
-def _without_logs() -> Iterator[None]:
-    """Keep tracebacks that Dask logs off the terminal: what is wrong is said in one line."""
-    logging.disable(logging.ERROR)
-    try:
-        yield
-    finally:
-        logging.disable(logging.NOTSET)
+        yield None
 
 
 def _dask_client(address: str) -> Any:

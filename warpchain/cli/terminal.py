@@ -1,15 +1,12 @@
-"""What the command line shows and writes: progress, tables, and a folder with record and pictures."""
+"""What the command line shows: progress and tables."""
 
 import itertools
 import json
 import math
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -17,10 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from warpchain.engine.tallies import LOST
-from warpchain.files import DISK_FAILURES, checked_output, failure, make_folder, remedy, remove_output
-from warpchain.inputs.validation import InputError, one_line, printable
-from warpchain.pictures.style import save_figure
-from warpchain.pictures.walk_shape import Kind
+from warpchain.inputs.validation import printable
 from warpchain.run.progress_bar import counts_text
 from warpchain.walks.faulty_rows import fault_remedies
 from warpchain.walks.walk_result import WalkResult
@@ -34,42 +28,6 @@ _MOST_CELLS: Final = 1000
 """Most cells of a sweep that a table lists; one of 100,000 would take minutes to lay out."""
 
 COMPILING: Final = "compiling kernels; later runs find them ready"
-
-
-RECORD: Final = "walk.h5"
-PICTURES: Final = ("figure5.png", "film_strip.png", "loop.png", "tilt.png")
-"""Files of a walk, beside its animation."""
-
-
-def try_walk_folder(folder: Path, animation: str | None) -> None:
-    """Check before a walk that all its files can be written; errors as of `try_folder` and `checked_output`."""
-    try_folder(folder)
-    for name in (RECORD, *PICTURES, *([] if animation is None else [f"walk.{animation}"])):
-        if folder.is_dir():
-            checked_output(folder / name)
-
-
-def try_folder(folder: Path) -> None:
-    """Check before a long run that a folder can be written to; nothing is left there.
-
-    Raises:
-        InputError: it cannot.
-        OSError: the disk is full or broken.
-    """
-    nearest = folder.absolute()
-    try:
-        while True:
-            try:
-                nearest.lstat()
-                break
-            except FileNotFoundError:
-                nearest = nearest.parent
-        with tempfile.TemporaryDirectory(prefix=".warpchain-", dir=nearest):
-            pass
-    except OSError as error:
-        if error.errno in DISK_FAILURES:
-            raise failure(error.errno, f"--output: {folder}: {error.strerror}; {remedy(error.errno)}") from None
-        raise InputError(f"--output: {folder}: {error.strerror}; give a folder that can be written to") from None
 
 
 @contextmanager
@@ -123,20 +81,17 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
         rate: walks per second of the process that runs the sweep; None if none does.
     """
     time_left = result.missing_count / rate if rate else None
-    summary = result.summary()
-    statistics = {name: block.statistics() for name, block in result.blocks.items()}
+    summary, statistics = result.summary(), result.cell_statistics()
     if as_json:
-        numbers = ("mean", "sd", "count", "failed", "missing")
         blocks = {
             name: {
-                "axes": {axis: _plain(values) for axis, values in of_block.axes.items()},
-                "dx": {key: _plain(getattr(of_block, key)) for key in numbers},
+                "axes": {axis: _plain(values) for axis, values in cells.axes.items()},
+                "dx": {key: _plain(getattr(cells, key)) for key in ("mean", "sd", "count", "failed", "missing")},
             }
-            for name, of_block in statistics.items()
+            for name, cells in statistics.items()
         }
         whole = {"name": result.name, "walks": result.walk_count, "statuses": summary}
-        whole["inaccurate"] = result.inaccurate_count
-        whole |= {"rate": rate, "time_left": time_left, "blocks": blocks}
+        whole |= {"inaccurate": result.inaccurate_count, "rate": rate, "time_left": time_left, "blocks": blocks}
         print(json.dumps(whole, indent=2, allow_nan=False))
         return
     console = Console(highlight=False, markup=False)
@@ -145,27 +100,25 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
     for remedy_of_fault, number in fault_remedies(block.faults for block in result.blocks.values()).items():
         console.print(f"{number:,} inaccurate: {remedy_of_fault}")
     if rate is not None:
-        console.print(
-            f"running: {rate:.2f} walks a second" + ("" if time_left is None else f", {_duration(time_left)} left")
-        )
-    left = _MOST_CELLS
-    for name, of_block in statistics.items():
-        if left == 0:
-            break
-        table = Table(
-            box=None, pad_edge=False, title=printable(name) if len(statistics) > 1 else None, title_justify="left"
-        )
-        for heading in (*map(printable, of_block.axes), "mean Δx / m", "s.d. / m", "at rest", "failed", "missing"):
+        left = "" if time_left is None else f", {_duration(time_left)} left"
+        console.print(f"running: {rate:.2f} walks a second{left}")
+    room = _MOST_CELLS
+    for name, cells in statistics.items():
+        title = printable(name) if len(statistics) > 1 else None
+        table = Table(box=None, pad_edge=False, title=title, title_justify="left")
+        for heading in (*map(printable, cells.axes), "mean Δx / m", "s.d. / m", "at rest", "failed", "missing"):
             table.add_column(heading, justify="right")
-        for cell in itertools.islice(np.ndindex(*of_block.mean.shape), left):
-            at = (values[index] for values, index in zip(of_block.axes.values(), cell, strict=True))
-            place = ["null" if value is None else printable(str(value)) for value in at]
-            lengths = [f"{array[cell]:.4f}" for array in (of_block.mean, of_block.sd)]
-            walks = [str(array[cell]) for array in (of_block.count, of_block.failed, of_block.missing)]
-            table.add_row(*place, *lengths, *walks)
-        console.print(table)
-        left -= len(table.rows)
-    if more := sum(of_block.mean.size for of_block in statistics.values()) - _MOST_CELLS + left:
+        for place in itertools.islice(np.ndindex(*cells.mean.shape), room):
+            at = (values[index] for values, index in zip(cells.axes.values(), place, strict=True))
+            texts = ["null" if value is None else printable(str(value)) for value in at]
+            lengths = [f"{array[place]:.4f}" for array in (cells.mean, cells.sd)]
+            table.add_row(
+                *texts, *lengths, *(str(array[place]) for array in (cells.count, cells.failed, cells.missing))
+            )
+        if table.rows:
+            console.print(table)
+        room -= len(table.rows)
+    if more := sum(cells.mean.size for cells in statistics.values()) - _MOST_CELLS + room:
         console.print(f"… and {more:,} more cells, which --json lists")
 
 
@@ -220,50 +173,3 @@ def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
         yield "unaccounted for", f"{energy['residual']:.1e} J"
     for warning in result.warnings():
         yield "warning", warning
-
-
-def write_files(result: WalkResult, folder: Path, animation: str | None) -> Iterator[Path]:
-    """Write the record, then its pictures, each whole or not at all; yield the path of each.
-
-    A failed walk may have nothing to show in a picture, and a sprocket that stands still no loop that runs. That
-    picture is left out, and so is one of an earlier walk, which does not belong to this record.
-
-    Raises:
-        OSError: a file cannot be written.
-    """
-    make_folder(folder)
-    record = folder / RECORD
-    result.save(record)
-    yield record
-    figure5, film_strip, loop, tilt = PICTURES
-    pictures: dict[str, Callable[[WalkResult, Path], None]] = {
-        figure5: partial(_draw, "figure5"),
-        film_strip: partial(_draw, "film_strip"),
-    }
-    if result.before_release is not None:
-        pictures[loop] = partial(_draw, "loop")
-    else:
-        remove_output(folder / loop)
-    if result.joints_in_room is not None:
-        pictures[tilt] = partial(_draw, "tilt")
-    else:
-        remove_output(folder / tilt)
-    if animation is not None:
-        from warpchain.pictures.animation import animate
-
-        pictures[f"walk.{animation}"] = animate
-    for name, draw in pictures.items():
-        path = folder / name
-        try:
-            draw(result, path)
-        except ValueError as error:
-            if result.status.ok and name != loop:
-                raise
-            remove_output(path)
-            print(one_line(f"{path}: not drawn; {error}"), file=sys.stderr)
-        else:
-            yield path
-
-
-def _draw(kind: Kind, result: WalkResult, path: Path) -> None:
-    save_figure(result.plot(kind), path)

@@ -1,80 +1,131 @@
-"""What the command line does with the file of a saved walk: its figures, its animation, the same walk again."""
+"""The commands about single walks: walk, animate, and the figures of a saved walk."""
 
+import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
-from warpchain.cli.output_paths import output_path
+from warpchain.cli.words import JSON, argument, option, output, output_path
+from warpchain.inputs.methods import METHODS
 
 if TYPE_CHECKING:
     from warpchain.inputs.setup import Setup
     from warpchain.pictures.walk_shape import Kind
 
+FAILED: Final = 1
+"""Exit status of a command whose walks failed."""
 
-def plot_walk(path: Path, output: Path | None, kind: "Kind | None" = None) -> bool:
-    """Draw every figure that a saved walk has something for, and say on stderr what is left out and why.
+_STARTS: Final = "rest: spin up on the sprocket; spinning: circulate on it; ellipse: without a sprocket. Default: rest."
+_PRESETS: Final = "Parameters to start from. paper: Table 1 of the paper; soft: softer joints. Default: paper."
+_METHODS: Final = (
+    "standard: hybrid at 3e-3, joints softened on the sprocket and in the pile, on a GPU the next; explicit: os32 at "
+    "3e-3, softened likewise; reference: rkf78 at 1e-6, as in the paper; or an integrator, "
+    f"{'; '.join(f'{name}: {title}' for name, title in METHODS.items())}. Default: standard."
+)
+_TOLERANCE: Final = (
+    "Error allowed in a step, in SI units and relative alike. Default: that of the word, 1e-6 for an integrator, 1e-4 "
+    "for hybrid."
+)
+_SET: Final = (
+    "Any other value by its name or symbol, in SI units, as clearance=0.005 or mu_fc=0.3; may be repeated. "
+    "`warpchain parameters` lists them."
+)
+_SEED: Final = "Draw what is not given at random, one sample for each whole number. Without it: means, phase 0."
+_CONFIG: Final = "Read preset, scene, options and parameters from a file; what the command line gives counts more."
+_LIKE: Final = (
+    "Take setup and seed of a saved walk, which repeats it to the bit; other options change single values. Not with "
+    "--config, --preset or --seed."
+)
+_OUTPUT: Final = (
+    "Write walk.h5, figure5.png, film_strip.png, of a chain on a sprocket loop.png, and if its plane tilts tilt.png to "
+    "this folder; files of these names are replaced."
+)
+_FRAMES: Final = "Simulated time between two pictures of the chain, in s; needs a folder. Default: 0.002."
+_LOADS: Final = (
+    "Record forces and moments of the joints with each picture, by default every 0.0001 s; needs a folder. standard "
+    "then is explicit: rigid joints have no forces. 60 links take 24 MB a second."
+)
 
-    Args:
-        path: file of the walk.
-        output: folder of the figures; None: that of the file.
-        kind: the only figure to draw; None: all.
+Sections = Mapping[str, Mapping[str, object]]
 
-    Returns:
-        Whether anything was drawn.
+_Text = str | None
 
-    Raises:
-        InputError: the file is no walk, or the folder cannot be written to.
-        OSError: a file cannot be read or written.
-    """
-    from warpchain.cli.terminal import try_folder
-    from warpchain.files import make_folder
-    from warpchain.inputs.validation import one_line, printable
-    from warpchain.pictures.style import save_figure
-    from warpchain.pictures.walk_shape import kinds_of
-    from warpchain.walks.walk_result import load_walk
 
-    walk, folder, drawn = load_walk(path), path.parent if output is None else output, False
-    try_folder(folder)
-    make_folder(folder)
-    for each in kinds_of(walk) if kind is None else (kind,):
-        target = folder / f"{each}.png"
-        try:
-            figure = walk.plot(each)
-        except ValueError as error:
-            print(one_line(f"{target}: not drawn; {error}"), file=sys.stderr)
-            continue
-        save_figure(figure, target)
-        print(printable(str(target)))
-        drawn = True
-    return drawn
+def walk(
+    links: Annotated[_Text, option("N", "Number of links of the loop, an even number. Default: 60.")] = None,
+    frequency: Annotated[_Text, option("HZ", "Turns of the sprocket per second, in Hz. Default: 15.")] = None,
+    start: Annotated[_Text, option("NAME", _STARTS)] = None,
+    preset: Annotated[_Text, option("NAME", _PRESETS)] = None,
+    method: Annotated[_Text, option("NAME", _METHODS)] = None,
+    tolerance: Annotated[_Text, option("NUMBER", _TOLERANCE, "--tol")] = None,
+    device: Annotated[
+        _Text, option("NAME", "Where it runs: cpu, cuda (the first GPU) or cuda:N. Default: cpu.")
+    ] = None,
+    assignments: Annotated[list[str] | None, option("NAME=VALUE", _SET, "--set")] = None,
+    seed: Annotated[_Text, option("S", _SEED)] = None,
+    config: Annotated[Path | None, option("FILE.yaml", _CONFIG)] = None,
+    like: Annotated[Path | None, option("WALK.h5", _LIKE)] = None,
+    folder: Annotated[Path | None, output("DIR", _OUTPUT)] = None,
+    animation: Annotated[
+        Literal["gif", "mp4", "html"] | None,
+        typer.Option("--animate", help="Write walk.gif, walk.mp4 or walk.html to the folder as well."),
+    ] = None,
+    frame_interval: Annotated[_Text, option("SECONDS", _FRAMES)] = None,
+    record_loads: Annotated[bool, typer.Option("--record-loads", help=_LOADS)] = False,
+    as_json: Annotated[bool, JSON] = False,
+) -> None:
+    """Let one chain walk: hang it on its sprocket, spin it up, drop it and follow it until it rests."""
+    from warpchain.cli.terminal import print_walk, progress_text, status_line
+    from warpchain.cli.walk_files import try_walk_folder, write_walk
+    from warpchain.inputs.distributions import LARGEST_SEED
+    from warpchain.inputs.validation import InputError, checked_whole, printable
+    from warpchain.inputs.yaml_files import parse_yaml
+    from warpchain.run.single_walk import run_walk
+
+    named = {"links": links, "frequency": frequency, "start": start}
+    given = _given_values(named | {"method": method, "tolerance": tolerance, "device": device}, assignments or [])
+    if like is not None:
+        for name, value in (("--config", config), ("--preset", preset), ("--seed", seed)):
+            if value is not None:
+                raise InputError(f"{name}: given together with --like, and a saved walk has its own; leave one out")
+        setup, number = _setup_like(like, given, record_loads)
+    else:
+        number = None if seed is None else checked_whole(parse_yaml(seed, "seed"), "seed", 0, LARGEST_SEED)
+        setup = _setup(config, preset, given, number, record_loads)
+    interval = _frame_interval(folder, animation, frame_interval, record_loads)
+    if folder is not None:
+        try_walk_folder(folder, animation)
+    with status_line() as show:
+        result = run_walk(
+            setup,
+            seed=number,
+            frame_interval=interval,
+            record_loads=record_loads,
+            on_progress=lambda progress: show(progress_text(progress)),
+        )
+    if as_json:
+        print(json.dumps(result.to_dict(), indent=2, allow_nan=False))
+    else:
+        print_walk(result)
+    if folder is not None:
+        for path in write_walk(result, folder, animation):
+            if not as_json:
+                print(printable(str(path)))
+    if not result.status.ok:
+        print(f"{result.status.label}: {result.status.sentence}", file=sys.stderr)
+        raise typer.Exit(FAILED)
 
 
 def animate(
-    walk: Annotated[
-        Path, typer.Argument(metavar="WALK.h5", help="A walk that `warpchain walk -o DIR` wrote.", show_default=False)
+    walk: Annotated[Path, argument("WALK.h5", "A walk that `warpchain walk -o DIR` wrote.")],
+    path: Annotated[
+        Path, argument("FILE", "The file to write; its name ends in .gif, .mp4 or .html.", parser=output_path)
     ],
-    output: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FILE",
-            parser=output_path,
-            help="The file to write; its name ends in .gif, .mp4 or .html.",
-            show_default=False,
-        ),
-    ],
-    fps: Annotated[
-        float,
-        typer.Option(
-            metavar="NUMBER", help="Pictures per second; in HTML the browser decides. Default: 30.", show_default=False
-        ),
-    ] = 30.0,
-    slow: Annotated[
-        float,
-        typer.Option(metavar="NUMBER", help="Playing time per simulated time. Default: 4.", show_default=False),
-    ] = 4.0,
+    fps: Annotated[float, option("NUMBER", "Pictures per second; in HTML the browser decides. Default: 30.")] = 30.0,
+    slow: Annotated[float, option("NUMBER", "Playing time per simulated time. Default: 4.")] = 4.0,
 ) -> None:
     """Write a moving picture of a saved walk: GIF, MP4 or a page with a player."""
     from warpchain.inputs.validation import InputError, printable
@@ -82,48 +133,125 @@ def animate(
 
     result = load_walk(walk)
     try:
-        result.animate(output, fps=fps, slow=slow)
+        result.animate(path, fps=fps, slow=slow)
     except (ValueError, ImportError) as error:
         raise InputError(str(error)) from None
-    print(printable(str(output)))
+    print(printable(str(path)))
 
 
-def setup_like(
-    path: Path, given: Mapping[str, Mapping[str, object]], records_loads: bool
-) -> "tuple[Setup, int | None]":
+def plot_walk(path: Path, folder: Path | None, kind: "Kind | None") -> None:
+    """Draw one figure of a saved walk, or each that it has something for; a line tells what is left out and why.
+
+    Raises:
+        InputError: the file is no walk, or the folder cannot be written to.
+        OSError: a file cannot be read or written.
+        Exit: nothing was drawn.
+    """
+    from warpchain.cli.walk_files import draw_figures, try_folder
+    from warpchain.files import make_folder
+    from warpchain.inputs.validation import printable
+    from warpchain.pictures.walk_shape import kinds_of
+    from warpchain.walks.walk_result import load_walk
+
+    walk, folder = load_walk(path), path.parent if folder is None else folder
+    try_folder(folder)
+    make_folder(folder)
+    drawn = False
+    for drawing in draw_figures(walk, folder, kinds_of(walk) if kind is None else (kind,)):
+        print(printable(str(drawing)))
+        drawn = True
+    if not drawn:
+        raise typer.Exit(FAILED)
+
+
+def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -> dict[str, dict[str, object]]:
+    """Values of the command line by section; named options and `NAME=VALUE` are on a par.
+
+    Raises:
+        InputError: an assignment is not of that form, its name is unknown, or a name is given twice.
+    """
+    from warpchain.inputs.sections import SECTION_OF, by_section, dotted_name
+    from warpchain.inputs.validation import InputError, shown
+    from warpchain.inputs.yaml_files import parse_yaml
+
+    pairs = [(name, text) for name, text in named.items() if text is not None]
+    for assignment in assignments:
+        written, equals, text = assignment.partition("=")
+        if not equals:
+            raise InputError(f"--set: {shown(assignment)} gives no value; write NAME=VALUE, as in clearance=0.005")
+        written = written.strip()
+        pairs.append((dotted_name(written, f"--set {shown(written)}"), text))
+    values: dict[str, object] = {}
+    for name, text in pairs:
+        path = f"{SECTION_OF[name]}.{name}"
+        if name in values:
+            raise InputError(f"{path}: given twice on the command line; give it once")
+        values[name] = parse_yaml(text, path)
+    return by_section(values)
+
+
+def _setup(config: Path | None, preset: str | None, given: Sections, seed: int | None, records_loads: bool) -> "Setup":
+    """The setup of a walk: the file's values, the command line's over them, and the sample of the seed."""
+    from warpchain.inputs.distributions import random_generator, sampled
+    from warpchain.inputs.setup import read_setup
+    from warpchain.inputs.validation import InputError
+
+    file_preset, sections = read_setup(config) if config is not None else ("paper", {section: {} for section in given})
+    preset = file_preset if preset is None else preset
+    if preset is None:
+        raise InputError("preset: missing; name the parameters to start from, such as preset: paper")
+    for section, values in given.items():
+        if isinstance(sections[section], Mapping):  # `resolve` refuses anything else
+            sections[section] = {**sections[section], **values}
+    setup = _resolved(preset, sections, sections["parameters"], records_loads)
+    kept = {*sections["scene"], *sections["parameters"]}
+    return setup if seed is None else sampled(setup, random_generator(seed), kept=kept)
+
+
+def _setup_like(path: Path, given: Sections, records_loads: bool) -> "tuple[Setup, int | None]":
     """Setup of a saved walk with other values in place of some of its own, and its seed.
 
     A method that is given brings its own settings, and a tolerance also holds where joints are soft, as in a new walk.
-
-    Args:
-        path: file of the walk.
-        given: section → field → value.
-        records_loads: whether joint forces are recorded; `standard` then is another integrator.
-
-    Raises:
-        InputError: the file is no walk, or a value is refused.
-        OSError: the file cannot be read.
     """
     from warpchain.inputs.methods import METHODS_BY_NEED
-    from warpchain.inputs.parameters import warn_of_units
-    from warpchain.inputs.setup import resolve
     from warpchain.walks.walk_result import load_walk
 
     saved = load_walk(path)
-    options = given["options"]
-    replaced = {"soft_tolerance"} if "tolerance" in options else set()
-    if "method" in options:
+    replaced = {"soft_tolerance"} if "tolerance" in given["options"] else set()
+    if "method" in given["options"]:
         replaced |= {"tolerance", "soft_tolerance"}.union(*METHODS_BY_NEED.values())
-    sections = {
-        section: {**getattr(saved.setup, section).model_dump(exclude=replaced), **values}
-        for section, values in given.items()
-    }
-    setup = resolve(
-        saved.setup.preset,
-        scene=sections["scene"],
-        options=sections["options"],
-        parameters=sections["parameters"],
-        records_loads=records_loads,
-    )
-    warn_of_units((f"parameters.{name}", name, value) for name, value in given["parameters"].items())
-    return setup, saved.seed
+    own = {section: getattr(saved.setup, section).model_dump(exclude=replaced) for section in given}
+    sections = {section: {**own[section], **values} for section, values in given.items()}
+    return _resolved(saved.setup.preset, sections, given["parameters"], records_loads), saved.seed
+
+
+def _resolved(preset: str, sections: Mapping[str, Any], given: Mapping[str, object], records_loads: bool) -> "Setup":
+    """The checked setup of some sections; a warning for each given parameter that looks like one in another unit."""
+    from warpchain.inputs.parameters import warn_of_units
+    from warpchain.inputs.setup import resolve
+
+    setup = resolve(preset, **sections, records_loads=records_loads)
+    warn_of_units((f"parameters.{name}", name, value) for name, value in given.items())
+    return setup
+
+
+def _frame_interval(folder: Path | None, animation: str | None, text: str | None, records_loads: bool) -> float | None:
+    """Time between two frames [s]; None without a folder to write them to.
+
+    Raises:
+        InputError: an option needs a folder, the time is not a positive number, or MP4 cannot be written.
+    """
+    from importlib.util import find_spec
+
+    from warpchain.inputs.validation import InputError, checked_positive
+    from warpchain.inputs.yaml_files import parse_yaml
+
+    needing = (("--animate", animation), ("--frame-interval", text), ("--record-loads", records_loads or None))
+    for name, value in needing:
+        if value is not None and folder is None:
+            raise InputError(f"{name}: there is no folder to write to; add -o DIR")
+    if animation == "mp4" and find_spec("imageio_ffmpeg") is None:
+        raise InputError("--animate mp4: imageio-ffmpeg is not installed; pip install 'warpchain[video]'")
+    usual = 1e-4 if records_loads else 2e-3
+    interval = usual if text is None else parse_yaml(text, "--frame-interval")
+    return float(checked_positive(interval, "--frame-interval", "time in s")) if folder is not None else None

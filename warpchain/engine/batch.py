@@ -242,9 +242,9 @@ class Batch:
         for name, value in values.items():
             self._edit(getattr(self.drive, name))[world] = value
 
-    def features(self, *, fixed_body: str, watch: str, tilts: bool = False) -> Features:
+    def features(self, *, fixed_body: str, tilts: bool = False) -> Features:
         """Kernel features for these worlds."""
-        return features_of(self.options, self.columns, fixed_body=fixed_body, watch=watch, tilts=tilts)
+        return features_of(self.options, self.columns, fixed_body=fixed_body, tilts=tilts)
 
     def run(self, worlds: Sequence[int], features: Features, after_launch: Callable[[], None] | None = None) -> None:
         """Carry worlds on until none of them is running. Results do not depend on how a run is cut into launches.

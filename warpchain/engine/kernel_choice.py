@@ -72,16 +72,14 @@ def shared_threads(method: str, links: Iterable[int], walks: int) -> int | None:
     return max(sizes)
 
 
-def features_of(options: Options, columns: int, *, fixed_body: str, watch: str, tilts: bool = False) -> Features:
+def features_of(options: Options, columns: int, *, fixed_body: str, tilts: bool = False) -> Features:
     """Kernel features for chains with these options in scratch of this width."""
     return Features(
         method=options.method,
         columns=columns,
         fixed_body=fixed_body,
         self_contact=options.self_contact,
-        watch=watch,
         tilts=tilts,
-        softens=(watch == "rest" and options.soften_pile) or (watch in ("rest", "steady") and options.soften_drive),
     )
 
 

@@ -4,8 +4,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, get_args
 
-from pydantic.fields import FieldInfo
-
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene
@@ -56,18 +54,11 @@ def list_values(preset_name: str) -> dict[str, list[ValueEntry]]:
     return {section: list(_entries(section, values[section], preset_name)) for section in values}
 
 
-def field_choices(field: FieldInfo) -> tuple[Any, ...]:
-    """The possible values of a field, if these are words or truth values, else empty."""
-    if field.annotation is bool:
-        return (True, False)
-    if isinstance(field.json_schema_extra, dict) and "enum" in field.json_schema_extra:
-        return tuple(field.json_schema_extra["enum"])  # type: ignore[arg-type]
-    return tuple(word for word in get_args(field.annotation) if isinstance(word, str))
-
-
 def _entries(section: str, values: Mapping[str, Any], preset_name: str) -> Iterator[ValueEntry]:
     quantities = Parameters.quantities()
     for name, field in SECTIONS[section].model_fields.items():
+        extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+        words: Any = extra.get("enum", [word for word in get_args(field.annotation) if isinstance(word, str)])
         sigma, source, quantity = None, "chosen here", quantities.get(name)
         if quantity is not None:
             sigma = quantity.sigma or None
@@ -82,7 +73,7 @@ def _entries(section: str, values: Mapping[str, Any], preset_name: str) -> Itera
             value=values[name],
             sigma=sigma,
             limits=field_limits(field),
-            choices=field_choices(field),
+            choices=(True, False) if field.annotation is bool else tuple(words),
             source=source,
             meaning=str(field.description),
         )

@@ -1,8 +1,7 @@
 """The catenary: the curve in which a chain hangs that neither runs nor resists bending."""
 
 import math
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +12,8 @@ POINTS: Final = 801
 """Number of points of a catenary."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Catenary:
-    """A hanging chain, as functions of the arc length s at g points; signs as of a `StationaryLoop`.
+class Catenary(NamedTuple):
+    """A hanging chain, as functions of the arc length at g points; signs as of a `StationaryLoop`.
 
     Attributes:
         s: arc length from the lowest point [m], shape (g,).

@@ -249,7 +249,6 @@ def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Ar
     tangent = first / per_q[:, None]
     normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
     curvature = np.sum(second * normal, axis=1) / per_q**2
-    bending = _periodic_slope(curvature, links) / per_q
     mass = parameters.density * parameters.link_length
     effective = force - mass * rate**2 * (first + third / 12)
 
@@ -263,7 +262,18 @@ def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Ar
     def on_grid(values: Array) -> Array:
         return np.interp(grid, s - lowest, values, period=length)
 
+    functions = {
+        "spread": _spread(joints, moved, curve.at(0, 8 * POINTS_PER_LINK), normal),
+        "curvature": curvature,
+        "bending": _periodic_slope(curvature, links) / per_q,
+        "tension": np.sum(force * tangent, axis=1),
+        "effective_tension": np.sum(effective * tangent, axis=1),
+        "shear": np.sum(effective * normal, axis=1),
+        "moment": moment,
+    }
     position = np.stack([on_grid(place[:, axis]) for axis in (0, 1)], axis=1)
+    # The angle of t = (−cos φ, sin φ), near 0 in the middle of the arrays, where s = 0.
+    angle = np.unwrap(np.arctan2(on_grid(tangent[:, 1]), -on_grid(tangent[:, 0])))
     return StationaryLoop(
         parameters=parameters,
         speed=rate * parameters.link_length,
@@ -272,25 +282,18 @@ def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Ar
         center=np.asarray(center, dtype=np.float64),
         s=grid,
         position=position + center,
-        spread=on_grid(_spread(joints, moved, curve.at(0, 8 * POINTS_PER_LINK), normal)),
-        angle=_angle(on_grid(tangent[:, 0]), on_grid(tangent[:, 1])),
-        curvature=on_grid(curvature),
-        bending=on_grid(bending),
-        tension=on_grid(np.sum(force * tangent, axis=1)),
-        effective_tension=on_grid(np.sum(effective * tangent, axis=1)),
-        shear=on_grid(np.sum(effective * normal, axis=1)),
-        moment=on_grid(moment),
+        angle=angle - 2 * np.pi * np.round(angle[count // 2] / (2 * np.pi)),
         free=_free_part(grid, np.hypot(*position.T), radius + OFF_SPROCKET),
+        **{name: on_grid(values) for name, values in functions.items()},
     )
 
 
 def _periodic_slope(values: Array, period: float) -> Array:
-    """Derivative of a periodic function from even samples of one period, shape (g,) or (g, c)."""
+    """Derivative of a periodic function from even samples of one period, shape (g,)."""
     waves = 2j * np.pi * np.fft.rfftfreq(len(values), period / len(values))
     if len(values) % 2 == 0:
         waves[-1] = 0.0
-    spectrum = np.fft.rfft(values, axis=0) * waves.reshape(-1, *[1] * (values.ndim - 1))
-    slope: Array = np.fft.irfft(spectrum, len(values), axis=0)
+    slope: Array = np.fft.irfft(np.fft.rfft(values) * waves, len(values))
     return slope
 
 
@@ -366,13 +369,6 @@ def _vertex(s: Array, values: Array, middle: int, period: float | None = None) -
     if square == 0 or abs(slope) > 2 * abs(square) * np.abs(offset).max():
         return float(s[middle]), float(values[middle])
     return float(s[middle] - slope / (2 * square)), float(height - slope**2 / (4 * square))
-
-
-def _angle(cosine: Array, sine: Array) -> Array:
-    """Angle φ of tangents t = (cosine, sine) along the loop, near 0 in the middle of the arrays, where s = 0."""
-    angle: Array = np.unwrap(np.arctan2(sine, -cosine))
-    angle -= 2 * np.pi * np.round(angle[len(angle) // 2] / (2 * np.pi))
-    return angle
 
 
 def _free_part(s: Array, distance: Array, least: float) -> tuple[float, float]:

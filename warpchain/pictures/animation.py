@@ -6,32 +6,28 @@ import itertools
 import json
 import math
 import os
-from contextlib import closing
+import subprocess
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.files import checked_output, replacing, write_whole
-from warpchain.pictures.film import EDGE, INNER, OUTER, Film, side_view
-from warpchain.pictures.room import check_room
-from warpchain.pictures.strip_parts import center_at
-from warpchain.pictures.walk_shape import Walk, check_frames, setting, tilting
-
-Array = NDArray[np.float64]
+from warpchain.pictures.film import DPI, EDGE, INNER, OUTER, Film, floor_marks, side_box
+from warpchain.pictures.walk_shape import Walk, checked_joints, setting
 
 _PLAYER: Final = Path(__file__).with_name("player.html")
 """The page with a player, which says what its data are."""
 _HOLD: Final = 1.5
 """Time for which GIF and MP4 show their last picture [s]."""
 _GIF_PICTURES: Final = 1200
-"""Most pictures of a GIF: all are in memory at once, 0.5 MB each."""
+"""Most pictures of a GIF: all are in memory at once, up to 0.5 MB each."""
 _PLAYER_FRAMES: Final = 2000
 """Most frames of a page, which then has about 1 MB with 60 links."""
 
-_SLOWEST_GIF, _FASTEST_GIF = 0.002, 50
-"""Pictures per second of a GIF, whose delays are 16-bit numbers of hundredths of a second."""
+_SLOWEST_GIF, _FASTEST_GIF = 1, 50
+"""Pictures per second of a GIF."""
 
 
 def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
@@ -54,8 +50,7 @@ def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow
         OSError: the file cannot be written, or something else than a regular file is there.
     """
     suffix = Path(path).suffix.lower()
-    writers = {".gif": _write_gif, ".mp4": _write_mp4, ".html": _write_html}
-    if suffix not in writers:
+    if suffix not in (".gif", ".mp4", ".html"):
         raise ValueError(f"{path}: unknown kind of picture; give a name that ends in .gif, .mp4 or .html")
     for name, value in (("fps", fps), ("slow", slow)):
         if not (math.isfinite(value) and value > 0):
@@ -63,8 +58,14 @@ def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow
     if suffix == ".gif" and not _SLOWEST_GIF <= fps <= _FASTEST_GIF:
         problem = "fast" if fps > _FASTEST_GIF else "slow"
         raise ValueError(f"fps: {fps} is too {problem} for a GIF; give {_SLOWEST_GIF} to {_FASTEST_GIF}")
-    check_frames(walk)
-    writers[suffix](walk, checked_output(path), fps, slow)
+    checked_joints(walk)
+    target = checked_output(path)
+    if suffix == ".html":
+        write_whole(target, player(walk, slow))
+    elif suffix == ".gif":
+        _write_gif(walk, target, fps, slow)
+    else:
+        _write_mp4(walk, target, fps, slow)
 
 
 def _chosen_frames(walk: Walk, fps: float, slow: float) -> list[int]:
@@ -76,72 +77,54 @@ def _chosen_frames(walk: Walk, fps: float, slow: float) -> list[int]:
 
 
 def _write_gif(walk: Walk, path: Path, fps: float, slow: float) -> None:
-    """Write each frame once; durations are hundredths of a second, rounded so that errors do not add up."""
+    """Write pictures with equal delays in whole hundredths of a second; Pillow writes equal ones once.
+
+    matplotlib's writer of GIFs cuts its delays off: at 30 pictures a second they would be 10 % too short.
+    """
     from PIL import Image
 
-    chosen = _chosen_frames(walk, fps, slow)
-    pictures = [frame for frame, _ in itertools.groupby(chosen)]
-    repeats = [len(list(group)) for _, group in itertools.groupby(chosen)]
-    if len(pictures) > _GIF_PICTURES:
-        raise ValueError(f"{path}: {len(pictures)} pictures are too many for a GIF; lower fps or slow, or give .mp4")
-    ends = np.rint(np.cumsum([0, *repeats]) * 100 / fps)
-    durations = [int(hundredths) * 10 for hundredths in np.diff(ends)]
-    durations[-1] = int(_HOLD * 1000)
-    if max(durations) >= 1000 / _SLOWEST_GIF:
-        raise ValueError(f"slow: {slow} shows a picture for more than {1 / _SLOWEST_GIF:g} s; give a smaller number")
+    delay = round(100 / fps)
+    chosen = _chosen_frames(walk, 100 / delay, slow)
+    if len(chosen) > _GIF_PICTURES:
+        raise ValueError(f"{path}: {len(chosen)} pictures are too many for a GIF; lower fps or slow, or give .mp4")
     film = Film(walk)
-    # One palette for all, from the first, the middle and the last picture; otherwise each picture has its own.
-    samples = [film.picture(pictures[round(part * (len(pictures) - 1))]) for part in (0, 0.5, 1)]
-    palette = Image.fromarray(np.concatenate(samples)).quantize(64, dither=Image.Dither.NONE)
+    palette = Image.fromarray(film.picture(len(walk.frame_time) // 2)).quantize(64)
     palette.putpalette([255 if part > 247 else part for part in palette.getpalette() or []])  # its white is a mean
-    reduced = (
-        Image.fromarray(film.picture(frame)).quantize(palette=palette, dither=Image.Dither.NONE) for frame in pictures
-    )
+
+    def reduced(frame: int) -> Image.Image:
+        return Image.fromarray(film.picture(frame)).quantize(palette=palette, dither=Image.Dither.NONE)
+
+    chosen += chosen[-1:] * (round(_HOLD * 100 / delay) - 1)
+    pictures = (each for frame, group in itertools.groupby(chosen) for each in [reduced(frame)] * len(list(group)))
     with replacing(path) as part:
-        first = next(reduced)
-        first.save(part, format="GIF", save_all=True, append_images=reduced, duration=durations, loop=0)
+        next(pictures).save(part, format="GIF", save_all=True, append_images=pictures, duration=10 * delay, loop=0)
 
 
 def _write_mp4(walk: Walk, path: Path, fps: float, slow: float) -> None:
+    """Let ffmpeg code the pictures; `imageio_ffmpeg` brings it."""
+    import matplotlib as mpl
+    from matplotlib.animation import FFMpegWriter
+
     try:
-        ffmpeg = importlib.import_module("imageio_ffmpeg")
+        ffmpeg = importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
     except ImportError:
         raise ImportError(f"{path}: MP4 needs imageio-ffmpeg; pip install 'warpchain[video]'") from None
-    film = Film(walk)
     chosen = _chosen_frames(walk, fps, slow)
     chosen += chosen[-1:] * round(_HOLD * fps)
-    # imageio-ffmpeg lets the lines of ffmpeg through to the terminal, and hides how it ends.
-    coding = {"fps": fps, "quality": 8, "macro_block_size": 2, "ffmpeg_log_level": "quiet"}
-    with replacing(path) as part:
+    film = Film(walk)
+    # What ffmpeg says would be lines on the terminal.
+    writer = FFMpegWriter(
+        fps=cast(Any, fps), codec="h264", extra_args=["-crf", "20", "-loglevel", "quiet", "-f", "mp4"]
+    )
+    with replacing(path) as part, mpl.rc_context({"animation.ffmpeg_path": ffmpeg}):
         try:
-            with closing(ffmpeg.write_frames(str(part), film.size, **coding)) as writer:
-                writer.send(None)
+            with writer.saving(film.figure, str(part), DPI):
                 for frame, group in itertools.groupby(chosen):
-                    content = film.picture(frame).tobytes()
+                    film.draw(frame)
                     for _ in group:
-                        writer.send(content)
-        except OSError as error:
+                        writer.grab_frame()
+        except (subprocess.CalledProcessError, BrokenPipeError) as error:
             raise OSError("ffmpeg ended early") from error
-        if not _is_whole_mp4(part):
-            raise OSError("ffmpeg did not write it to the end")
-
-
-def _is_whole_mp4(path: Path) -> bool:
-    """Whether the boxes of an MP4 fill its file and the index, which is written last, is among them."""
-    kinds, place, end = [], 0, path.stat().st_size
-    with path.open("rb") as content:
-        while place < end:
-            content.seek(place)
-            size, kind = int.from_bytes(content.read(4)), content.read(4)
-            if size == 1:  # the size does not fit and follows in 8 bytes
-                size = int.from_bytes(content.read(8))
-            kinds.append(kind)
-            place += max(size, 8)
-    return place == end and b"moov" in kinds
-
-
-def _write_html(walk: Walk, path: Path, fps: float, slow: float) -> None:
-    write_whole(path, player(walk, slow))
 
 
 def player(walk: Walk, slow: float = 4.0) -> str:
@@ -154,30 +137,29 @@ def player(walk: Walk, slow: float = 4.0) -> str:
     Raises:
         ValueError: the walk has no frames or broken ones.
     """
-    check_frames(walk)
+    joints, sprocket = checked_joints(walk), walk.sprocket_center
     count = min(len(walk.frame_time), _PLAYER_FRAMES)
     frames = np.rint(np.linspace(0, len(walk.frame_time) - 1, count)).astype(int)
-    in_room, times, sprocket = tilting(walk), walk.frame_time[frames], walk.sprocket_center
-    joints = walk.frame_joints if in_room is None else check_room(in_room)[..., :2]
+    times, box = walk.frame_time[frames], side_box(walk, joints)
+    center = np.stack([np.interp(times, walk.time, walk.center[:, axis]) for axis in (0, 1)], axis=1)
     title = setting(walk) + (f": \u0394x = {walk.dx:.3f} m" if math.isfinite(walk.dx) else "")
-    *view, marks = side_view(walk)
     data = {
         "time": _whole(times, 1e6),
-        "joints": _whole(joints[frames].reshape(len(frames), -1)),
-        "center": _whole(center_at(walk, times)),
+        "joints": _whole(joints[frames, :, :2].reshape(count, -1)),
+        "center": _whole(center),
         "radius": walk.setup.parameters.circle_radius * 1e4,
         "sprocket": None if sprocket is None else _whole(np.array([*sprocket, walk.sprocket_radius])),
-        "view": _whole(np.array(view)),
-        "marks": marks,
+        "view": _whole(box.ravel()),
+        "marks": floor_marks(*box[0]),
         "slow": slow,
         "colors": {"inner": INNER, "outer": OUTER, "edge": EDGE},
     }
-    title = html.escape(title if in_room is None else f"{title}, from the side")
+    title = html.escape(title if walk.joints_in_room is None else f"{title}, from the side")
     content = json.dumps(data, separators=(",", ":"), allow_nan=False)
     return _PLAYER.read_text(encoding="utf-8").replace("{{title}}", title).replace("{{data}}", content)
 
 
-def _whole(values: Array, parts: float = 1e4) -> list[int] | list[list[int]]:
+def _whole(values: NDArray[np.float64], parts: float = 1e4) -> list[int] | list[list[int]]:
     """Numbers in whole parts, as lists: lengths [m] in tenths of a millimetre."""
     whole: list[int] | list[list[int]] = np.rint(values * parts).astype(int).tolist()
     return whole

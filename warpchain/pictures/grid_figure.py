@@ -7,8 +7,10 @@ from typing import Any, Final
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullLocator, PercentFormatter
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 from warpchain.pictures.grid_panels import MOST_LINES, Axis, Cells, Kind, Panel, grid_panels, line_values
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.labels import (
+    COUNTS,
     lost_note,
     math_symbol,
     quantity_label,
@@ -25,8 +28,7 @@ from warpchain.pictures.labels import (
     unit_text,
     with_unit,
 )
-from warpchain.pictures.maps import draw_failed, draw_map, write_values
-from warpchain.pictures.style import BLUE, FAINT, LINE_COLORS, RED, label_room, panel_grid, tidy
+from warpchain.pictures.style import BLUE, FAINT, GROUND, INK, LINE_COLORS, RED, label_room, panel_grid, tidy
 
 Array = NDArray[Any]
 
@@ -35,6 +37,12 @@ _MOST_NUMBERS: Final = 60
 
 _MOST_TICKS: Final = 8
 """Up to so many values have a tick each, as far as there is room."""
+
+_MOST_ROWS: Final = 16
+"""Greatest number of labelled rows or columns of a map."""
+
+_LARGEST_DOT: Final = 0.75
+"""Diameter of the dot of a cell whose walks all failed, relative to the cell."""
 
 _DECADES: Final = 30
 """From such a ratio of the greatest value to the least on, an axis is logarithmic if its values are more even so."""
@@ -56,6 +64,7 @@ def draw_grid(
     *,
     ax: Axes | None = None,
     figure: Figure | SubFigure | None = None,
+    label: str = "",
 ) -> Figure | SubFigure:
     """Draw a quantity over the grids of one block or several.
 
@@ -68,6 +77,7 @@ def draw_grid(
         kind: `lines` or `map`; None for what shows a grid best.
         ax: where to draw a figure of one panel.
         figure: an empty figure to draw into; by default a new one.
+        label: what is shown, without its unit; by default name and symbol of the quantity.
 
     Returns:
         The figure.
@@ -81,55 +91,52 @@ def draw_grid(
     if ax is not None and figure is not None:
         raise ValueError("ax: given together with figure; leave one out")
     panels, left_out = grid_panels(blocks, kind)
-    label = with_unit(quantity_text(quantity), next(iter(blocks.values())).unit)
-    if ax is not None:
-        if len(panels) > 1:
-            raise ValueError(f"ax: this figure has {len(panels)} panels; leave ax out, or give figure")
-        _draw_panels([ax], panels, label)
-        _label(None, [ax], panels, label)
-        _draw_legends(ax, [ax], panels)
-        return ax.figure
-    columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
-    figure = InlineFigure(figsize=_size(panels, columns), layout="constrained") if figure is None else figure
-    alike = _are_alike(panels)
+    label = with_unit(label or quantity_text(quantity), next(iter(blocks.values())).unit)
+    if ax is not None and len(panels) > 1:
+        raise ValueError(f"ax: this figure has {len(panels)} panels; leave ax out, or give figure")
+    alike = len({panel.signature for panel in panels}) == 1
     apart = _are_apart(panels)
-    sharey = (alike or all(panel.kind == "lines" for panel in panels)) and not apart
-    areas, _ = panel_grid(figure, len(panels), columns, sharex=alike, sharey=sharey)
-    _draw_panels(areas, panels, label)
+    if ax is not None:
+        areas, owner = [ax], None
+    else:
+        columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
+        figure = InlineFigure(figsize=_size(panels, columns), layout="constrained") if figure is None else figure
+        sharey = (alike or all(panel.kind == "lines" for panel in panels)) and not apart
+        areas, _ = panel_grid(figure, len(panels), columns, sharex=alike, sharey=sharey)
+        owner = figure
     drawn = list(zip(areas, panels, strict=True))
-    for group in [[one] for one in drawn] if apart else [drawn]:
-        _set_limits(*zip(*group, strict=True), from_zero=apart)
-    _label(figure, areas, panels, label)
-    if left_out:
-        figure.suptitle(
-            f"{len(panels)} of {len(panels) + left_out} panels, chosen evenly", fontsize="medium", color=RED
-        )
-    beside = any(panel.along for panel in panels if panel.kind == "lines")
-    place = "outside right upper" if beside else "outside upper right"
-    _draw_legends(figure, areas, panels, loc=place, ncols=1 if beside else 2)
-    return figure
-
-
-def _draw_panels(areas: Sequence[Axes], panels: Sequence[Panel], label: str) -> None:
-    """Draw all panels; `label` is that of the colours of maps."""
     values = line_values(panels)
     most_failed = max(float(panel.failed_share.max()) for panel in panels)
-    maps = [(axes, panel) for axes, panel in zip(areas, panels, strict=True) if panel.kind == "map"]
-    for axes, panel in zip(areas, panels, strict=True):
+    for axes, panel in drawn:
         axes.set_title(panel.title, fontsize="medium", loc="left")
         if panel.kind == "lines":
             colors = _colors(panel, values)
             _draw_lines(axes, panel, colors)
             _set_ticks(axes, panel.across, panels)
-            if panel.failed.any():
+            if panel.cells.failed.any():
                 _draw_failed_strip(axes, panel, colors, most_failed)
-    if maps:
-        _draw_maps(maps, label, with_numbers=_has_numbers(panels))
+    _draw_maps([each for each in drawn if each[1].kind == "map"], label, with_numbers=_has_numbers(panels))
+    for group in [[each] for each in drawn] if apart else [drawn]:
+        _set_limits([each for each in group if each[1].kind == "lines"], from_zero=apart)
+    _label(owner, drawn, label, alike=alike)
+    if owner is None:
+        _draw_legends(areas[0], drawn)
+        return areas[0].figure
+    if left_out:
+        note = f"{len(panels)} of {len(panels) + left_out} panels, chosen evenly"
+        owner.suptitle(note, fontsize="medium", color=RED)
+    beside = any(panel.along for panel in panels if panel.kind == "lines")
+    _draw_legends(
+        owner, drawn, loc="outside right upper" if beside else "outside upper right", ncols=1 if beside else 2
+    )
+    return owner
 
 
 def _has_numbers(panels: Sequence[Panel]) -> bool:
-    """Whether there is just one map, with room for numbers."""
-    return len(panels) == 1 and panels[0].mean.size <= _MOST_NUMBERS
+    """Whether there are only maps, with room for numbers."""
+    return (
+        all(panel.kind == "map" for panel in panels) and sum(panel.cells.mean.size for panel in panels) <= _MOST_NUMBERS
+    )
 
 
 def _size(panels: Sequence[Panel], columns: int) -> tuple[float, float]:
@@ -140,25 +147,25 @@ def _size(panels: Sequence[Panel], columns: int) -> tuple[float, float]:
     return max(4.2, beside + width * columns), above + 0.3 + height * -(-len(panels) // columns)
 
 
-def _palette(count: int) -> list[str]:
-    """So many colours, from dark to light if there are more than can be told apart otherwise."""
-    if count <= MOST_LINES:
-        return list(LINE_COLORS[:count])
-    return [to_hex(color) for color in colormaps["viridis"](np.linspace(0.0, 0.95, count))]
+def _palette(values: Array) -> dict[Any, str]:
+    """Value of an axis → its colour, from dark to light if there are more than can be told apart otherwise."""
+    colors = list(LINE_COLORS)
+    if len(values) > MOST_LINES:
+        colors = [to_hex(color) for color in colormaps["viridis"](np.linspace(0.0, 0.95, len(values)))]
+    return dict(zip(values.tolist(), colors, strict=False))
 
 
 def _colors(panel: Panel, values: Mapping[str, Array]) -> list[str]:
     """Colour of each line of a panel, given the values of all panels: each has the same colour everywhere."""
     if panel.along is None:
         return [BLUE]
-    shared = values[panel.along.name].tolist()
-    palette = _palette(len(shared))
-    return [palette[shared.index(value)] for value in panel.along.values.tolist()]
+    palette = _palette(values[panel.along.name])
+    return [palette[value] for value in panel.along.values.tolist()]
 
 
 def _places(panel: Panel) -> list[Array]:
     """Places along x of each line; names have the points of several lines side by side."""
-    count = len(panel.mean)
+    count = len(panel.cells.mean)
     shifts = np.zeros(count) if panel.across.is_numeric else (np.arange(count) - (count - 1) / 2) * 0.7 / count
     return [panel.across.places + shift for shift in shifts]
 
@@ -167,7 +174,7 @@ def _draw_lines(axes: Axes, panel: Panel, colors: Sequence[str]) -> None:
     """The lines of a panel with their bands, or points with bars where x has names."""
     is_numeric = panel.across.is_numeric
     for places, color, mean, sd, error in zip(
-        _places(panel), colors, panel.mean, panel.sd, panel.standard_error, strict=True
+        _places(panel), colors, panel.cells.mean, panel.cells.sd, panel.cells.standard_error, strict=True
     ):
         bands = [(error, _DEEP, 3.5)] if panel.along else [(sd, _LIGHT, 7.0), (error, _DEEP, 3.5)]
         for half, opacity, width in bands:
@@ -204,12 +211,10 @@ def _set_ticks(axes: Axes, across: Axis, panels: Sequence[Panel]) -> None:
     if len(values) <= _MOST_TICKS:
         texts = short_texts(values)
         needed = float(np.ptp(placed)) / label_room(axes, texts)[0]
-        last = len(values) - 1
-        shown = [0]
-        for number in range(1, last):
-            if placed[number] - placed[shown[-1]] >= needed <= placed[last] - placed[number]:
-                shown.append(number)
-        shown.append(last)
+        shown = [0, len(values) - 1]
+        for number in range(1, len(values) - 1):
+            if placed[number] - placed[shown[-2]] >= needed <= placed[-1] - placed[number]:
+                shown.insert(-1, number)
         axes.set_xticks(values[shown], [texts[number] for number in shown])
         axes.xaxis.set_minor_locator(NullLocator())
     elif axes.get_xscale() == "linear":
@@ -238,93 +243,139 @@ def _draw_failed_strip(axes: Axes, panel: Panel, colors: Sequence[str], most: fl
 
 def _draw_maps(maps: Sequence[tuple[Axes, Panel]], label: str, *, with_numbers: bool) -> None:
     """Maps in common colours, whose meaning is the label."""
-    known = np.concatenate([panel.mean[np.isfinite(panel.mean)] for _, panel in maps])
+    if not maps:
+        return
+    known = np.concatenate([panel.cells.mean[np.isfinite(panel.cells.mean)] for _, panel in maps])
     colors = {"vmin": known.min(), "vmax": known.max(), "cmap": "viridis"} if len(known) else {}
     for axes, panel in maps:
         assert panel.along is not None
-        image = draw_map(axes, panel.mean, panel.across.texts, panel.along.texts, **colors)
+        image = _draw_map(axes, panel.cells.mean, panel.across.texts, panel.along.texts, **colors)
         if with_numbers:
-            write_values(axes, image, panel.mean, panel.count + panel.absent, panel.failed, panel.missing)
+            _write_values(axes, image, panel.cells.mean, panel.counts)
         else:
-            draw_failed(axes, panel.failed_share)
+            _draw_failed(axes, panel.failed_share)
     areas = [axes for axes, _ in maps]
     areas[0].figure.colorbar(image, ax=areas, label=label).outline.set_visible(False)
 
 
-def _set_limits(areas: Sequence[Axes], panels: Sequence[Panel], *, from_zero: bool) -> None:
+def _draw_map(axes: Axes, table: Array, columns: Sequence[str], rows: Sequence[str], **colors: Any) -> AxesImage:
+    """Draw a table from the bottom row up; cells that are NaN stay empty.
+
+    Args:
+        axes: where to draw.
+        table: values, shape (rows, columns).
+        columns: label of each column.
+        rows: label of each row.
+        colors: `cmap`, `vmin` and `vmax`, as of matplotlib's `imshow`.
+    """
+    image = axes.imshow(table, origin="lower", aspect="auto", **colors)
+    for axis, texts, room in zip((axes.xaxis, axes.yaxis), (columns, rows), label_room(axes, columns), strict=True):
+        every = slice(None, None, math.ceil(len(texts) / max(1, min(_MOST_ROWS, int(room)))))
+        axis.set_ticks(range(len(texts))[every], list(texts[every]))
+    axes.set_facecolor(GROUND)
+    axes.spines[:].set_visible(False)
+    axes.tick_params(color=FAINT)
+    return image
+
+
+def _write_values(axes: Axes, image: AxesImage, table: Array, cells: Mapping[str, Array]) -> None:
+    """Write into each cell of a map its value, and how many of its walks failed or have not been run.
+
+    Args:
+        axes: where the map is.
+        image: the map.
+        table: its values; a dash stands for NaN, unless the cell has no walks at all.
+        cells: numbers of walks: name of `COUNTS` → table.
+    """
+    for (row, column), value in np.ndenumerate(table):
+        rested, absent, lost, waiting = (cells[name][row, column] for name in COUNTS)
+        if not (rested or absent or lost or waiting):
+            continue
+        text = f"{value:.3g}" if np.isfinite(value) else "–"
+        parts = [f"{lost:.0f} failed"] * bool(lost) + [f"{waiting:.0f} to run"] * bool(waiting)
+        red, green, blue, _ = image.to_rgba(value) if np.isfinite(value) else (1.0, 1.0, 1.0, 1.0)
+        color = INK if 0.3 * red + 0.59 * green + 0.11 * blue > 0.5 else "white"
+        axes.text(column, row, text, ha="center", va="bottom" if parts else "center", color=color, fontsize="small")
+        if parts:
+            axes.text(column, row, "\n".join(parts), ha="center", va="top", color=color, fontsize="xx-small")
+
+
+def _draw_failed(axes: Axes, share: Array) -> None:
+    """Mark cells of a map in which walks failed by a dot, whose area is proportional to the share that failed."""
+    rows, columns = np.nonzero(share > 0)
+    sizes = _LARGEST_DOT * np.sqrt(share[rows, columns])
+    places: dict[str, Any] = {"offsets": np.stack([columns, rows], axis=1), "offset_transform": axes.transData}
+    style: dict[str, Any] = {"facecolor": RED, "edgecolor": "white", "linewidth": 0.5}
+    dots = EllipseCollection(sizes, sizes, np.zeros(len(sizes)), units="xy", **places, **style)
+    axes.add_collection(dots, autolim=False)
+
+
+def _set_limits(drawn: Sequence[tuple[Axes, Panel]], *, from_zero: bool) -> None:
     """Give all lines the same y axis, from zero if that is asked for or the values need more than half of that."""
-    ends = [
-        [panel.mean - half, panel.mean + half]
-        for panel in panels
-        if panel.kind == "lines"
-        for half in (np.nan_to_num(panel.standard_error if panel.along else panel.sd),)
-    ]
+    ends = []
+    for _, panel in drawn:
+        half = np.nan_to_num(panel.cells.standard_error if panel.along else panel.cells.sd)
+        ends += [panel.cells.mean - half, panel.cells.mean + half]
     if not ends or not np.isfinite(known := np.concatenate(ends, axis=None)).any():
         return
     low, high = np.nanmin(known), np.nanmax(known)
-    if 0 <= low < 0.5 * high or (0 <= low and from_zero):
+    if low >= 0 and (low < 0.5 * high or from_zero):
         low = 0.0
     margin = 0.05 * (high - low)
-    for axes, panel in zip(areas, panels, strict=True):
-        if panel.kind == "lines" and margin > 0:
+    for axes, _ in drawn:
+        if margin > 0:
             axes.set_ylim(low - margin * (low != 0), high + margin)
 
 
-def _label(figure: Figure | SubFigure | None, areas: Sequence[Axes], panels: Sequence[Panel], label: str) -> None:
+def _label(figure: Figure | SubFigure | None, drawn: Sequence[tuple[Axes, Panel]], label: str, *, alike: bool) -> None:
     """Label axes: common ones once for the figure, if there is one, others at each panel; say which walks are lost."""
-    alike = figure is not None and _are_alike(panels)
-    all_lines = figure is not None and all(panel.kind == "lines" for panel in panels)
-    for axes, panel in zip(areas, panels, strict=True):
-        across, note = quantity_label(panel.across.name), lost_note([panel])
+    common_x = figure is not None and alike
+    common_y = common_x or (figure is not None and all(panel.kind == "lines" for _, panel in drawn))
+    for axes, panel in drawn:
+        across, note = quantity_label(panel.across.name), lost_note([panel.counts])
         rows = quantity_label(panel.along.name) if panel.kind == "map" and panel.along else label
-        if alike:
+        if common_x:
             axes.set_xlabel(note, color=RED, fontsize="small")
         else:
             axes.set_xlabel(f"{across}\n{note}" if note else across)
-        if not alike and not all_lines:
+        if not common_y:
             axes.set_ylabel(rows)
-    if figure is not None and alike:
+    if figure is not None and common_x:
         figure.supxlabel(across, fontsize="medium")
-    if figure is not None and (alike or all_lines):
+    if figure is not None and common_y:
         figure.supylabel(rows, fontsize="medium")
 
 
 def _are_apart(panels: Sequence[Panel]) -> bool:
     """Whether lines of one panel would be flat on the y axis of another."""
-    tops = [np.nanmax(np.abs(panel.mean)) for panel in panels if np.isfinite(panel.mean).any()]
+    tops = [np.nanmax(np.abs(panel.cells.mean)) for panel in panels if np.isfinite(panel.cells.mean).any()]
     return all(panel.kind == "lines" for panel in panels) and max(tops) >= _MOST_APART * min(tops)
 
 
-def _are_alike(panels: Sequence[Panel]) -> bool:
-    """Whether all panels have the same axes."""
-    return len({panel.signature for panel in panels}) == 1
-
-
-def _draw_legends(
-    owner: Axes | Figure | SubFigure, areas: Sequence[Axes], panels: Sequence[Panel], **place: Any
-) -> None:
+def _draw_legends(owner: Axes | Figure | SubFigure, drawn: Sequence[tuple[Axes, Panel]], **place: Any) -> None:
     """One legend of all panels; if their lines are of several axes, each panel has one of its own, too."""
+    panels = [panel for _, panel in drawn]
     values = line_values(panels)
-    settings: dict[str, Any] = {"frameon": False, "fontsize": "small"}
+    style: dict[str, Any] = {"frameon": False, "fontsize": "small"}
     title, handles = _line_handles(*next(iter(values.items()))) if len(values) == 1 else (None, [])
-    for axes, panel in zip(areas, panels, strict=True):
+    for axes, panel in drawn:
         if len(values) > 1 and panel.kind == "lines" and panel.along:
             own, lines = _line_handles(panel.along.name, values[panel.along.name])
-            axes.legend(handles=lines, title=own, **settings)
+            axes.legend(handles=lines, title=own, **style)
     if any(panel.kind == "lines" for panel in panels):
         handles.append(Patch(color=(FAINT, _DEEP), linewidth=0, label="± standard error"))
     if any(panel.along is None for panel in panels):
         handles.append(Patch(color=(FAINT, _LIGHT), linewidth=0, label="± standard deviation"))
-    if not _has_numbers(panels) and any(panel.kind == "map" and panel.failed.any() for panel in panels):
+    if not _has_numbers(panels) and any(panel.kind == "map" and panel.cells.failed.any() for panel in panels):
         handles.append(Line2D([], [], color=RED, marker="o", linestyle="", label="share of walks failed"))
     if handles:
-        owner.legend(handles=handles, title=title, **settings, **place)
+        owner.legend(handles=handles, title=title, **style, **place)
 
 
 def _line_handles(name: str, values: Array) -> tuple[str, list[Line2D | Patch]]:
     """Title and entries of the legend of lines."""
     handles: list[Line2D | Patch] = [
         Line2D([], [], color=color, marker="o", markersize=3.5, label=text)
-        for color, text in zip(_palette(len(values)), short_texts(values), strict=True)
+        for color, text in zip(_palette(values).values(), short_texts(values), strict=True)
     ]
     return with_unit(math_symbol(name), unit_text(name)), handles

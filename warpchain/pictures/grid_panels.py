@@ -5,13 +5,13 @@ all other axes give panels. What varies beside links and frequency runs along x,
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.pictures.labels import Counts, math_symbol, short_texts, unit_text
+from warpchain.pictures.labels import COUNTS, math_symbol, short_texts, unit_text
 from warpchain.pictures.style import LINE_COLORS, NothingToShow
 
 Array = NDArray[Any]
@@ -26,28 +26,25 @@ MOST_PANELS: Final = 24
 
 
 @dataclass(frozen=True, match_args=False, kw_only=True)  # frozen: its attributes are only read
-class Cells(Counts, Protocol):
-    """Statistics of a quantity in each cell of a grid; arrays over its axes.
-
-    Attributes:
-        axes: name of each axis → its values.
-        unit: unit of the quantity.
-        mean: mean of the walks at rest that have the quantity; NaN without any.
-        sd: standard deviation; NaN with fewer than two.
-    """
+class Cells(Protocol):
+    """Statistics of a quantity in each cell of a grid, see `CellStatistics`; arrays over its axes."""
 
     axes: dict[str, Array]
     unit: str
     mean: Array
     sd: Array
+    count: Array
+    absent: Array
+    failed: Array
+    missing: Array
 
     @property
     def standard_error(self) -> Array:
-        """Standard error of the mean; NaN with fewer than two such walks."""
+        """Standard error of the mean; NaN with fewer than two walks."""
         ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Axis:
     """An axis of a grid: numbers in rising order, or names in the order given."""
 
@@ -72,32 +69,32 @@ class Axis:
 
 @dataclass(frozen=True)
 class Panel:
-    """One panel. Arrays have the shape (values of `along`, values of `across`), with one row if `along` is None.
+    """One panel.
 
     Attributes:
         kind: lines, or a map.
         across: the x axis.
         along: the axis of the lines, or the y axis of a map; None for a single line.
         title: what else the cells have in common.
-        mean: see `Cells`, as the others.
+        cells: their statistics; arrays of shape (values of `along`, values of `across`), of one row if it is None.
     """
 
     kind: Kind
     across: Axis
     along: Axis | None
     title: str
-    mean: Array
-    sd: Array
-    standard_error: Array
-    count: Array
-    absent: Array
-    failed: Array
-    missing: Array
+    cells: Cells
+
+    @property
+    def counts(self) -> dict[str, Array]:
+        """Numbers of walks by name."""
+        return {name: getattr(self.cells, name) for name in COUNTS}
 
     @property
     def failed_share(self) -> Array:
         """Share of the walks of a cell that failed, of those that were run."""
-        share: Array = self.failed / np.maximum(self.count + self.absent + self.failed, 1)
+        cells = self.cells
+        share: Array = cells.failed / np.maximum(cells.count + cells.absent + cells.failed, 1)
         return share
 
     @property
@@ -118,20 +115,22 @@ def grid_panels(blocks: Mapping[str, Cells], kind: Kind | None) -> tuple[list[Pa
     Raises:
         NothingToShow: no block has an axis of several values, or two for a map, or there is no mean.
     """
-    several = [frozenset(_axes(cells)) for cells in blocks.values()]
+    axes = {name: [name for name, values in cells.axes.items() if len(values) > 1] for name, cells in blocks.items()}
     panels: list[Panel] = []
     left_out = 0
-    for (name, cells), own in zip(blocks.items(), several, strict=True):
-        found = list(_panels(cells, kind, name if several.count(own) > 1 else ""))
-        if found:
-            chosen = np.unique(np.linspace(0, len(found) - 1, MOST_PANELS).round().astype(int))
-            panels += [found[number] for number in chosen]
-            left_out += len(found) - len(chosen)
+    for name, cells in blocks.items():
+        if len(axes[name]) < (2 if kind == "map" else 1):
+            continue
+        is_named = sum(set(own) == set(axes[name]) for own in axes.values()) > 1
+        found = list(_panels(cells, kind, name if is_named else ""))
+        chosen = np.unique(np.linspace(0, len(found) - 1, MOST_PANELS).round().astype(int))
+        panels += [found[number] for number in chosen]
+        left_out += len(found) - len(chosen)
     if not panels:
-        axes = "two axes of several values" if kind == "map" else "an axis of several values"
-        raise NothingToShow(f"a figure of a grid takes a block with {axes}")
-    if not any(np.isfinite(panel.mean).any() for panel in panels):
-        rested = any(panel.absent.any() for panel in panels)
+        needed = "two axes of several values" if kind == "map" else "an axis of several values"
+        raise NothingToShow(f"a figure of a grid takes a block with {needed}")
+    if not any(np.isfinite(panel.cells.mean).any() for panel in panels):
+        rested = any(panel.cells.absent.any() for panel in panels)
         raise NothingToShow("no walk at rest has this quantity" if rested else "no walk has come to rest")
     return panels, left_out
 
@@ -148,36 +147,28 @@ def line_values(panels: Iterable[Panel]) -> dict[str, Array]:
     return found
 
 
-def _axes(cells: Cells) -> dict[str, Axis]:
-    """The axes of several values, by name."""
-    axes = (Axis(name, np.asarray(values)) for name, values in cells.axes.items() if len(values) > 1)
-    return {axis.name: Axis(axis.name, np.sort(axis.values)) if axis.is_numeric else axis for axis in axes}
-
-
 def _panels(cells: Cells, kind: Kind | None, block: str) -> Iterator[Panel]:
     """The panels of a block; titles begin with `block`, if it is not empty."""
-    axes = _axes(cells)
-    if len(axes) < (2 if kind == "map" else 1):
-        return
-    chosen, across, along, others = _roles(list(axes.values()), kind)
-    order = [list(axes).index(axis.name) for axis in (*others, along, across) if axis is not None]
+    given = [Axis(name, np.asarray(values)) for name, values in cells.axes.items()]
+    rising = [np.argsort(axis.values) if axis.is_numeric else np.arange(len(axis.values)) for axis in given]
+    axes = [Axis(axis.name, axis.values[order]) for axis, order in zip(given, rising, strict=True)]
+    several = [axis for axis in axes if len(axis.values) > 1]
+    chosen, across, along, others = _roles(several, kind)
+    order = [several.index(axis) for axis in (*others, along, across) if axis is not None]
 
     def arranged(table: Array) -> Array:
-        for number, (name, values) in enumerate(cells.axes.items()):
-            if name in axes and axes[name].is_numeric:
-                table = table.take(np.argsort(values), number)
-        table = table.reshape([len(axis.values) for axis in axes.values()]).transpose(order)
+        table = table[np.ix_(*rising)].reshape([len(axis.values) for axis in several]).transpose(order)
         return table[..., np.newaxis, :] if along is None else table
 
-    names = ("mean", "sd", "standard_error", "count", "absent", "failed", "missing")
-    tables = [arranged(getattr(cells, name)) for name in names]
+    tables = {name: arranged(getattr(cells, name)) for name in ("mean", "sd", *COUNTS)}
     for place in np.ndindex(*(len(axis.values) for axis in others)):
         values = (
             f"{math_symbol(axis.name)} = {axis.texts[number]} {unit_text(axis.name)}".rstrip()
             for axis, number in zip(others, place, strict=True)
         )
         title = ", ".join([*[block] * bool(block), *values])
-        yield Panel(chosen, across, along, title, *(table[place] for table in tables))
+        here: dict[str, Any] = {name: table[place] for name, table in tables.items()}
+        yield Panel(chosen, across, along, title, replace(cells, **here))
 
 
 def _roles(axes: Sequence[Axis], kind: Kind | None) -> tuple[Kind, Axis, Axis | None, list[Axis]]:

@@ -2,8 +2,7 @@
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,28 +17,14 @@ _SYMBOLS: Final = {"dx": "Δx", "links": "n", "frequency": "ν"}
 _NAMES: Final = {"dx": "distance walked", "links": "number of links", "frequency": "frequency of the sprocket"}
 """Names that say more than those of the fields."""
 
+COUNTS: Final = ("count", "absent", "failed", "missing")
+"""Numbers of walks of a cell: at rest with the quantity, at rest without it, ended otherwise, not computed yet."""
+
 _MOST_DIGITS: Final = 6
 """Up to so many significant digits, a number is written exactly."""
 
 _EXACT: Final = 17
 """Significant digits that tell any two numbers apart."""
-
-
-@dataclass(frozen=True, match_args=False)  # frozen: its attributes are only read
-class Counts(Protocol):
-    """Numbers of walks of one cell or several.
-
-    Attributes:
-        count: walks at rest that have the quantity.
-        absent: walks at rest that have none.
-        failed: walks that ended otherwise.
-        missing: walks not computed yet.
-    """
-
-    count: Any
-    absent: Any
-    failed: Any
-    missing: Any
 
 
 def number_text(value: float, digits: int = _MOST_DIGITS) -> str:
@@ -115,7 +100,6 @@ def quantity_label(name: str) -> str:
 
 DISTANCE: Final = with_unit(quantity_text("dx"), "m")
 FREQUENCY: Final = quantity_label("frequency")
-LINKS: Final = quantity_label("links")
 
 
 def cell_values(axes: Mapping[str, NDArray[Any]], place: Iterable[int]) -> dict[str, Any]:
@@ -133,15 +117,13 @@ def cell_text(values: Mapping[str, Any]) -> str:
     return ", ".join(text.rstrip() for text in texts)
 
 
-def lost_note(cells: Sequence[Counts]) -> str:
-    """Number of walks that are not in the means of some cells; empty if all are."""
-    counted, absent, failed, missing = (
-        sum(int(np.sum(getattr(cell, name))) for cell in cells) for name in ("count", "absent", "failed", "missing")
-    )
-    walks = counted + absent + failed + missing
+def lost_note(cells: Sequence[Mapping[str, Any]]) -> str:
+    """Number of walks that are not in the means of some cells, each with numbers of `COUNTS`; empty if all are."""
+    counts = {name: sum(int(np.sum(cell[name])) for cell in cells) for name in COUNTS}
+    walks = sum(counts.values())
     texts = {
-        f"{failed} of {walks} walks failed": failed,
-        f"{absent} of {walks} have none": absent,
-        f"{missing} of {walks} not run yet": missing,
+        "failed": f"of {walks} walks failed",
+        "absent": f"of {walks} have none",
+        "missing": f"of {walks} not run yet",
     }
-    return ", ".join(text for text, count in texts.items() if count)
+    return ", ".join(f"{counts[name]} {text}" for name, text in texts.items() if counts[name])

@@ -26,6 +26,9 @@ GROUND: Final = "#E3E3E3"
 DASHES: Final[Any] = (0, (4, 3))
 """A dashed line, as matplotlib takes it."""
 
+DOTS: Final[Any] = (0, (1, 1.5))
+"""A dotted line, as matplotlib takes it."""
+
 PICTURE_DPI: Final = 200
 """Resolution of a figure in a file of its own [dots per inch]."""
 

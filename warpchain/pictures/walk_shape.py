@@ -1,7 +1,10 @@
-"""What figures need of a walk, whichever class holds it."""
+"""What figures need of a walk, whichever class holds it.
+
+Room axes are X forward, Y up and Z = X × Y, to the right of the way the chain walks.
+"""
 
 from dataclasses import dataclass
-from typing import Literal, Protocol, cast, get_args
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +22,21 @@ Kind = Literal["figure5", "film_strip", "loop", "energy", "tilt"]
 class Walk(HeldWalk, Protocol):
     """A walk with t instants and f frames of a chain of n links.
 
+    It may also have `fell_at` and `collapsed_at`, the moments at which it was first tilted by 45° and at which its loop
+    collapsed [s], or NaN.
+
     Attributes:
         status: how it ended.
         dx: distance walked [m]; NaN unless the chain came to rest.
         time: time since the release [s], shape (t,).
-        center: centre of mass x, y [m], shape (t, 2).
+        center: centre of mass x, y in the room [m], shape (t, 2).
         center_velocity: its velocity [m/s], shape (t, 2).
+        center_z: centre of mass z [m], shape (t,); empty if the plane is fixed, like tilt and yaw.
+        tilt: angle between the plane and the upright, positive if its top leans to the left [rad], shape (t,).
+        yaw: heading of the plane, anticlockwise from above, all turns counted [rad], shape (t,).
         frame_time: times of the frames [s], shape (f,).
-        frame_joints: joints x, y [m], shape (f, n, 2); joint i ends link i.
+        frame_joints: joints x, y in the plane [m], shape (f, n, 2); joint i ends link i.
+        joints_in_room: joints x, y, z [m], shape (f, n, 3); None if the plane is fixed.
     """
 
     status: Status
@@ -34,6 +44,9 @@ class Walk(HeldWalk, Protocol):
     time: Array
     center: Array
     center_velocity: Array
+    center_z: Array
+    tilt: Array
+    yaw: Array
     frame_time: Array
     frame_joints: Array
 
@@ -42,16 +55,14 @@ class Walk(HeldWalk, Protocol):
         """Radius of the sprocket that links touch [m]; NaN without one."""
         ...
 
+    @property
+    def joints_in_room(self) -> Array | None:
+        """See above."""
+        ...
+
 
 class EnergyWalk(Walk, Protocol):
-    """A walk with the energies of its chain.
-
-    Attributes:
-        energy: ledger of the walk [J], see `WalkResult.energy`.
-        kinetic_energy: kinetic energy [J], shape (t,).
-        gravitational_energy: energy in the field of gravity [J], shape (t,).
-        spring_energy: energy of the joint springs [J], shape (t,).
-    """
+    """A walk with energies [J]: the ledger of `WalkResult.energy`, and three series of shape (t,)."""
 
     energy: dict[str, float]
     kinetic_energy: Array
@@ -59,46 +70,30 @@ class EnergyWalk(Walk, Protocol):
     spring_energy: Array
 
 
-class TiltingWalk(Walk, Protocol):
-    """A walk whose plane tilts. Room axes: X forward, Y up, Z = X × Y, to the right of the way the chain walks.
-
-    Its `center` is in the room, its `frame_joints` are coordinates in the plane. It may also have `fell_at` and
-    `collapsed_at`, the moments at which it was first tilted by 45° and at which its loop collapsed [s], or NaN.
-
-    Attributes:
-        joints_in_room: joints x, y, z [m], shape (f, n, 3); None if the plane is fixed.
-        center_z: centre of mass z [m], shape (t,).
-        tilt: angle between the plane and the upright, positive if its top leans to the left [rad], shape (t,).
-        yaw: heading of the plane, anticlockwise from above, all turns counted [rad], shape (t,).
-    """
-
-    joints_in_room: Array | None
-    center_z: Array
-    tilt: Array
-    yaw: Array
-
-
-def tilting(walk: Walk) -> TiltingWalk | None:
-    """The walk itself if its plane tilts, None if it is fixed."""
-    return cast(TiltingWalk, walk) if getattr(walk, "joints_in_room", None) is not None else None
-
-
 def kinds_of(walk: Walk) -> tuple[Kind, ...]:
     """The figures that a walk has, if it was recorded."""
     kinds: tuple[Kind, ...] = get_args(Kind)
-    return tuple(kind for kind in kinds if kind != "tilt" or tilting(walk) is not None)
+    return tuple(kind for kind in kinds if kind != "tilt" or walk.joints_in_room is not None)
 
 
-def check_frames(walk: Walk) -> None:
-    """Refuse a walk that cannot be drawn.
+def checked_joints(walk: Walk) -> Array:
+    """The joints of a walk in the room [m], shape (f, n, 3); z = 0 if its plane is fixed.
 
     Raises:
         ValueError: the walk has no frames or broken ones.
     """
     if len(walk.frame_time) == 0:
         raise ValueError(f"walk: it has no frames ({walk.status.label}); run it again with a frame_interval")
-    if not np.all(np.isfinite(walk.frame_joints)):
+    in_room = walk.joints_in_room
+    joints = np.insert(walk.frame_joints, 2, 0.0, axis=2) if in_room is None else np.asarray(in_room)
+    if not np.all(np.isfinite(joints)):
         raise ValueError(f"walk: its frames are not all finite numbers. {walk.status.sentence}")
+    return joints
+
+
+def center_in_room(walk: Walk) -> Array:
+    """Centre of mass x, y, z [m], shape (t, 3); z = 0 if the plane is fixed."""
+    return np.column_stack([walk.center, np.zeros(len(walk.time)) if walk.joints_in_room is None else walk.center_z])
 
 
 def setting(walk: Walk) -> str:

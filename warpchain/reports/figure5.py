@@ -27,17 +27,17 @@ def sweep_figure5(result: SweepResult) -> Picture:
         NothingToShow: there is no series of any walk that was released.
     """
     cells = [
-        (block, place, np.flatnonzero(block.kept[place]))
+        (block, place)
         for block in result.blocks.values()
         for place in np.ndindex(*block.shape[:-1])
         if block.kept[place].any()
     ]
-    chosen = np.unique(np.linspace(0, len(cells) - 1, MOST_CELLS).round().astype(int)) if cells else ()
     walks: list[WalkResult] = []
     labels: list[str] = []
-    for block, place, samples in (cells[number] for number in chosen):
-        released = (walk for sample in samples if len((walk := block.walk_motion((*place, int(sample)))).time))
-        found = list(islice(released, MOST_SAMPLES))
+    for number in dict.fromkeys(np.linspace(0, len(cells) - 1, MOST_CELLS).round().astype(int)) if cells else ():
+        block, place = cells[number]
+        motions = (block.walk_motion((*place, int(sample))) for sample in np.flatnonzero(block.kept[place]))
+        found = list(islice((walk for walk in motions if len(walk.time)), MOST_SAMPLES))
         names = [block.name] * (len(result.blocks) > 1) + [cell_text(cell_values(block.axes, place))] * bool(place)
         walks += found
         labels += [", ".join(names) or result.name] * len(found)

@@ -68,7 +68,9 @@ def picture(figure: "Figure", caption: str) -> str:
     return f"<figure>{image}<figcaption>{escape(caption)}</figcaption></figure>"
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[str]], *, numbers_from: int, marked: Sequence[bool] = ()) -> str:
+def table(
+    head: Sequence[str], rows: Iterable[Sequence[str]], *, numbers_from: int = 99, marked: Iterable[bool] = ()
+) -> str:
     """A table of texts.
 
     Args:

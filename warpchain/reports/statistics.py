@@ -64,11 +64,11 @@ class PairedCell:
 
 @dataclass(frozen=True)
 class ToleranceAgreement:
-    """How well the distances of the same walks agree at two tolerances.
+    """How well the distances of the same walks agree at the greatest and the least tolerance of a sweep.
 
     Attributes:
-        loose: greatest tolerance of the sweep.
-        tight: least one.
+        loose: the greatest.
+        tight: the least.
         cells: the cells that have pairs.
         lost: number of pairs left out, see `PairedCell`.
     """
@@ -83,29 +83,14 @@ class ToleranceAgreement:
         """Differences of all walks, see `PairedCell`, shape (pairs,)."""
         return np.concatenate([cell.differences for cell in self.cells])
 
-    @property
-    def greatest(self) -> float:
-        """Greatest absolute difference of a walk."""
-        return float(np.abs(self.differences).max())
-
-    @property
-    def median(self) -> float:
-        """Median absolute difference of a walk."""
-        return float(np.median(np.abs(self.differences)))
-
-    @property
-    def worst_cell(self) -> PairedCell:
-        """The cell whose means differ most."""
-        return max(self.cells, key=lambda cell: abs(cell.difference))
-
     def __str__(self) -> str:
         """The numbers in one or two sentences."""
-        worst, loose, tight = self.worst_cell, number_text(self.loose), number_text(self.tight)
+        worst, sizes = max(self.cells, key=lambda cell: abs(cell.difference)), np.abs(self.differences)
         text = (
-            f"The same {len(self.differences)} walks at tolerances {loose} and {tight}: distances of single walks "
-            f"differ by at most {self.greatest:.2%} (median {self.median:.2%}), means of a cell by at most "
-            f"{abs(worst.difference):.2%} ({worst.cell}, {worst.distances.shape[1]} walks, "
-            f"standard error {worst.standard_error:.2%})."
+            f"The same {len(sizes)} walks at tolerances {number_text(self.loose)} and {number_text(self.tight)}: "
+            f"distances of single walks differ by at most {sizes.max():.2%} (median {np.median(sizes):.2%}), means of "
+            f"a cell by at most {abs(worst.difference):.2%} ({worst.cell}, {worst.distances.shape[1]} walks, standard "
+            f"error {worst.standard_error:.2%})."
         )
         return text + (f" {self.lost} more pairs are not complete." if self.lost else "")
 

@@ -6,6 +6,7 @@ been run yet, is on the figure.
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from typing import Any, Final
 
@@ -17,17 +18,16 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from warpchain.pictures.grid_figure import draw_grid
 from warpchain.pictures.labels import (
+    COUNTS,
     DISTANCE,
     FREQUENCY,
-    LINKS,
     lost_note,
     number_text,
     quantity_name,
     quantity_text,
-    with_unit,
 )
-from warpchain.pictures.maps import draw_map, write_values
 from warpchain.pictures.style import (
     BLUE,
     FAINT,
@@ -52,9 +52,6 @@ Array = NDArray[np.float64]
 
 _MOST_BLOCKS: Final = 6
 """Greatest number of blocks whose walks are counted separately."""
-
-_MOST_NUMBERS: Final = 120
-"""Greatest number of cells of a map with numbers in them."""
 
 
 def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
@@ -88,29 +85,30 @@ def figure6(result: SweepResult) -> Picture:
         NothingToShow: no walk of such a block has come to rest, or none of the blocks has several cells.
     """
     series = all_series(result)
-    drawn = [cell for item in series for cell in item.cells.values() if cell.count]
-    if not drawn or all(len(item.cells) == 1 for item in series):
+    if not any(item.cells.count.any() for item in series) or all(item.has.sum() == 1 for item in series):
         raise NothingToShow("Figure 6 takes walks at rest in a block with nothing but links and frequency as axes")
-    numbers = sorted({links for item in series for links, _ in item.cells})
-    frequencies = sorted({frequency for item in series for _, frequency in item.cells})
+    numbers, frequencies = series[0].cells.axes.values()
     gap = float(np.diff(frequencies).min()) if len(frequencies) > 1 else 1.0
     columns = {1: 1, 2: 2, 4: 2}.get(len(numbers), 3)
     figure, used, empty = _grid(len(numbers), columns, (3.1, 2.6), (0.0, 1.0))
-    for axes, links in zip(used, numbers, strict=True):
-        here = [item for item in series if any(key[0] == links for key in item.cells)]
+    for row, axes in enumerate(used):
+        here = [item for item in series if item.has[row].any()]
         for place, item in enumerate(here):
             # Boxes of several series stand side by side about their frequency.
             shift = gap * (place - (len(here) - 1) / 2) * 0.7 / len(here)
-            _draw_boxes(axes, item, links, shift, gap * min(0.36, 0.6 / len(here)))
-        axes.set_title(f"$n$ = {links}", fontsize="medium", loc="left")
-        note = lost_note([cell for item in here for key, cell in item.cells.items() if key[0] == links])
-        axes.set_xlabel(note, color=RED, fontsize="small")
+            _draw_boxes(axes, item, row, shift, gap * min(0.36, 0.6 / len(here)))
+        axes.set_title(f"$n$ = {numbers[row]}", fontsize="medium", loc="left")
+        lost = [{name: getattr(item.cells, name)[row] for name in COUNTS} for item in here]
+        axes.set_xlabel(lost_note(lost), color=RED, fontsize="small")
         tidy(axes, grid="y")
     first = used[0]
     if len(frequencies) <= 8:
         first.set_xticks(frequencies, [f"{frequency:g}" for frequency in frequencies])
     first.set_xlim(frequencies[0] - 0.6 * gap, frequencies[-1] + 0.6 * gap)
-    first.set_ylim(bottom=min(0.0, *(1.05 * (cell.mean - 2 * np.nan_to_num(cell.sd)) for cell in drawn)))
+    lowest = min(
+        np.nanmin(item.cells.mean - 2 * np.nan_to_num(item.cells.sd)) for item in series if item.cells.count.any()
+    )
+    first.set_ylim(bottom=min(0.0, 1.05 * lowest))
     figure.supxlabel(FREQUENCY, fontsize="medium")
     figure.supylabel(DISTANCE, fontsize="medium")
     _draw_legend(figure, empty[-1] if empty else None, series)
@@ -130,36 +128,19 @@ def heat_map(result: SweepResult, quantity: str = "dx") -> Picture:
         NothingToShow: no walk at rest has the quantity in a block that has several links and frequencies, and no other
             axes.
     """
-    series = [item for item in all_series(result, quantity) if item.is_map]
-    if not any(cell.count for item in series for cell in item.cells.values()):
+    shown = {item.label: item.cells for item in all_series(result, quantity) if item.is_map}
+    if not any(cells.count.any() for cells in shown.values()):
         raise NothingToShow(
             "a map takes walks at rest in a block with several links and frequencies, and no other axes"
         )
-    links = sorted({key[0] for item in series for key in item.cells})
-    frequencies = sorted({key[1] for item in series for key in item.cells})
     name, symbol = ("distance walked", "$Δx$") if quantity == "dx" else (quantity_name(quantity_of(quantity)),) * 2
-    texts = [f"{frequency:g}" for frequency in frequencies]
-    has_numbers = len(links) * len(frequencies) <= _MOST_NUMBERS
-    width, height = (0.6, 0.42) if has_numbers else (0.24, 0.24)
-    width, height = max(3.8, 1.5 + width * len(frequencies)), max(1.6, 0.4 + height * len(links))
-    figure = Figure(figsize=(2 * width, 0.6 + (0.3 + height) * len(series)), layout="constrained")
-    grid = figure.subplots(len(series), 2, sharex=True, sharey=True, squeeze=False)
-    for column, (title, colors) in enumerate((("mean", "viridis"), ("standard deviation of", "cividis"))):
-        tables = [item.table("sd" if column else "mean", links, frequencies) for item in series]
-        known = np.concatenate([table[np.isfinite(table)] for table in tables])
-        low, high = (known.min(), known.max()) if len(known) else (0.0, 1.0)
-        for axes, item, table in zip(grid[:, column], series, tables, strict=True):
-            image = draw_map(axes, table, texts, [f"{number}" for number in links], cmap=colors, vmin=low, vmax=high)
-            if len(series) > 1 and not column:
-                axes.set_title(item.label, fontsize="medium", loc="left")
-            if has_numbers:
-                names = ("count", "absent", "failed", "missing")
-                count, absent, *others = (item.table(name, links, frequencies) for name in names)
-                write_values(axes, image, table, count + absent, *others)
-        label = with_unit(f"{title} {symbol}", series[0].unit)
-        figure.colorbar(image, ax=list(grid[:, column]), label=label).outline.set_visible(False)
-    figure.supxlabel(FREQUENCY, fontsize="medium")
-    figure.supylabel(LINKS, fontsize="medium")
+    rows, columns = (len(values) for values in next(iter(shown.values())).axes.values())
+    width, height = max(3.6, 0.8 + 0.6 * min(20, columns)), max(2.8, 1.0 + 0.4 * min(20, rows))
+    figure = Figure(figsize=(1.2 + width * min(3, len(shown)), 2 * height), layout="constrained")
+    upper, lower = np.asarray(figure.subfigures(2, 1))
+    draw_grid(shown, kind="map", figure=upper, label=f"mean {symbol}")
+    spread = {label: replace(cells, mean=cells.sd) for label, cells in shown.items()}
+    draw_grid(spread, kind="map", figure=lower, label=f"standard deviation of {symbol}")
     over = "the walks at rest" if quantity == "dx" else "the walks at rest that have it"
     caption = f"Mean and standard deviation of the {name}, over {over} in each cell."
     return Picture(named("heat_map", quantity), caption, figure)
@@ -200,7 +181,7 @@ def tolerance(result: SweepResult) -> Picture:
         right.errorbar(100 * cell.difference, row + 0.16, xerr=error, label=labels[1], **style)
     right.set_yticks(range(len(cells)), [cell.cell for cell in cells])
     right.set_ylim(len(cells) - 0.5, -0.5)
-    widest = 110 * max(0.1, agreement.greatest)
+    widest = 110 * max(0.1, float(np.abs(agreement.differences).max()))
     right.set_xlim(-widest, widest)
     lost = f"\n{agreement.lost} pairs are not complete" if agreement.lost else ""
     right.set_xlabel(f"difference of $Δx$ ({loose} less {tight}) / %{lost}")
@@ -303,18 +284,18 @@ def _grid(
     return figure, *panel_grid(figure, count, columns, sharex=True)
 
 
-def _draw_boxes(axes: Axes, series: Series, links: int, shift: float, width: float) -> None:
+def _draw_boxes(axes: Axes, series: Series, row: int, shift: float, width: float) -> None:
     """Mean, box and bar at each frequency of one number of links."""
-    for (number, frequency), cell in series.cells.items():
-        if number != links or not cell.count:
-            continue
-        x, color = frequency + shift, series.color
-        if np.isfinite(cell.sd):
-            axes.plot([x, x], [cell.mean - 2 * cell.sd, cell.mean + 2 * cell.sd], color=color, linewidth=1.2)
-            corner = x - width / 2, cell.mean - cell.sd
-            axes.add_patch(Rectangle(corner, width, 2 * cell.sd, facecolor="white", zorder=2.1))
-            axes.add_patch(Rectangle(corner, width, 2 * cell.sd, facecolor=(color, 0.2), edgecolor=color, zorder=2.2))
-        axes.plot([x], [cell.mean], series.marker, color=color, markersize=4.5, zorder=3)
+    cells, color = series.cells, series.color
+    for frequency, mean, sd in zip(cells.axes["frequency"], cells.mean[row], cells.sd[row], strict=True):
+        x = frequency + shift
+        if np.isfinite(sd):
+            axes.plot([x, x], [mean - 2 * sd, mean + 2 * sd], color=color, linewidth=1.2)
+            box = (x - width / 2, mean - sd), width, 2 * sd
+            axes.add_patch(Rectangle(*box, facecolor="white", zorder=2.1))
+            axes.add_patch(Rectangle(*box, facecolor=(color, 0.2), edgecolor=color, zorder=2.2))
+        if np.isfinite(mean):
+            axes.plot([x], [mean], series.marker, color=color, markersize=4.5, zorder=3)
 
 
 def _draw_legend(figure: Figure, empty: Axes | None, series: Sequence[Series]) -> None:

@@ -4,15 +4,15 @@ It has figures and tables of the walks that are there, the failed walks and what
 the software; on demand also one walk in motion. The same folder always gives the same page.
 """
 
-import itertools
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import Any, Final
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from warpchain.files import checked_output, write_whole
 from warpchain.inputs.sections import SECTIONS
@@ -30,6 +30,8 @@ from warpchain.version import VERSION
 from warpchain.walks.faulty_rows import fault_remedies
 from warpchain.walks.rows import MISSING, field_column
 
+Array = NDArray[Any]
+
 FRAME_INTERVAL: Final = 2e-3
 """Time between two frames of the walk in motion [s]."""
 
@@ -37,8 +39,8 @@ _WRITER: Final = "warpchain report"
 _REPORTS: Final = pages_of(_WRITER)
 """All that a report replaces."""
 
-_MOST_FAILED: Final = 100
-"""Greatest number of walks of each status that are listed one by one."""
+_MOST_LISTED: Final = 100
+"""Greatest number of failed walks of each status, and of inaccurate ones, that are listed one by one."""
 
 
 def write_report(
@@ -101,70 +103,80 @@ def _cells(result: SweepResult) -> str:
     for block in result.blocks.values():
         found = block.statistics("dx")
         head = [with_unit(axis_symbol(name), unit_text(name)) for name in block.axes]
-        head += ["mean Δx / m", "s.d. / m", "s.e. / m", "at rest", "failed"]
-        lengths, counts = [found.mean, found.sd, found.standard_error], [found.count, found.failed]
-        if found.missing.any():
-            head, counts = [*head, "not run yet"], [*counts, found.missing]
+        lengths = {"mean Δx / m": found.mean, "s.d. / m": found.sd, "s.e. / m": found.standard_error}
+        counts = {"at rest": found.count, "failed": found.failed}
+        counts |= {"not run yet": found.missing} if found.missing.any() else {}
         rows = [
             [
                 *(_plain(np.asarray(value).item()) for value in cell_values(block.axes, place).values()),
-                *(_meters(float(values[place])) for values in lengths),
-                *(f"{values[place]}" for values in counts),
+                *(_meters(float(values[place])) for values in lengths.values()),
+                *(f"{values[place]}" for values in counts.values()),
             ]
             for place in np.ndindex(*block.shape[:-1])
         ]
-        marked = [bool(count) for count in found.failed.ravel()]
-        heading = [f"<h3>{escape(block.name)}</h3>"] * (len(result.blocks) > 1)
-        parts += [*heading, table(head, rows, numbers_from=0, marked=marked)]
+        parts += [f"<h3>{escape(block.name)}</h3>"] * (len(result.blocks) > 1)
+        parts.append(table([*head, *lengths, *counts], rows, numbers_from=0, marked=found.failed.ravel() > 0))
     return "\n".join(parts)
 
 
 def _failed(result: SweepResult) -> str:
     """The failed walks by status, with the meaning of the status and what to try."""
     parts = []
-    several = len(result.blocks) > 1
-    head = ["walk", *["block"] * several, "cell", "sample"]
     for status in Status:
-        if status == Status.AT_REST:
-            continue
-        rows = []
-        for block in result.blocks.values():
-            for *place, sample in np.argwhere(block.columns["status"] == status):
-                index, cell = block.columns["index"][(*place, sample)], cell_text(cell_values(block.axes, place))
-                rows.append([f"{index}", *[block.name] * several, cell or "–", f"{sample}"])
-        if not rows:
-            continue
-        parts.append(f"<h3>{status.label}: {len(rows):,}</h3><p>{escape(status.sentence)}</p>")
-        parts.append(table(head, rows[:_MOST_FAILED], numbers_from=len(head)))
-        if len(rows) > _MOST_FAILED:
-            parts.append(f"<p>… and {len(rows) - _MOST_FAILED:,} more.</p>")
+        chosen = [block.columns["status"] == status for block in result.blocks.values()]
+        count = sum(int(mask.sum()) for mask in chosen)
+        if status != Status.AT_REST and count:
+            parts.append(f"<h3>{status.label}: {count:,}</h3><p>{escape(status.sentence)}</p>")
+            parts.append(_walk_table(result, chosen, count))
     return "\n".join(parts) or "<p>None.</p>"
 
 
 def _inaccurate(result: SweepResult) -> str:
     """The inaccurate walks, with what to try; empty if there is none."""
-    several = len(result.blocks) > 1
-    head = ["walk", *["block"] * several, "cell", "sample", "energy error", "opening / m", "penetration / m"]
-    rows: list[list[str]] = []
-    for block in result.blocks.values():
-        for *place, sample in itertools.islice(np.argwhere(block.inaccurate), _MOST_FAILED - len(rows)):
-            values = {name: column[(*place, sample)] for name, column in block.columns.items()}
-            deepest = max(value for name, value in values.items() if name.startswith("penetration_"))
-            numbers = [f"{size:.1e}" for size in (values["energy_error"], values["greatest_opening"], deepest)]
-            cell = cell_text(cell_values(block.axes, place)) or "–"
-            rows.append([f"{values['index']}", *[block.name] * several, cell, f"{sample}", *numbers])
-    if not rows:
+    count = result.inaccurate_count
+    if not count:
         return ""
-    counts = fault_remedies(block.faults for block in result.blocks.values())
-    parts = [f"<p>{count:,}: {escape(remedy)}</p>" for remedy, count in counts.items()]
-    parts.append(table(head, rows, numbers_from=len(head)))
-    more = result.inaccurate_count - len(rows)
-    return "\n".join(parts + [f"<p>… and {more:,} more.</p>"] * (more > 0))
+
+    def numbers(block: BlockResult) -> dict[str, Array]:
+        depths = [column for name, column in block.columns.items() if name.startswith("penetration_")]
+        names = {"energy error": "energy_error", "opening / m": "greatest_opening"}
+        return {head: block.columns[name] for head, name in names.items()} | {"penetration / m": np.max(depths, axis=0)}
+
+    remedies = fault_remedies(block.faults for block in result.blocks.values())
+    parts = [f"<p>{number:,}: {escape(remedy)}</p>" for remedy, number in remedies.items()]
+    chosen = [block.inaccurate for block in result.blocks.values()]
+    return "\n".join([*parts, _walk_table(result, chosen, count, numbers)])
+
+
+def _walk_table(
+    result: SweepResult,
+    chosen: Sequence[Array],
+    count: int,
+    numbers: Callable[[BlockResult], dict[str, Array]] = lambda block: {},
+) -> str:
+    """A table of walks with their block, cell and sample; of many only the first.
+
+    Args:
+        result: the sweep.
+        chosen: which walks of each block are meant.
+        count: how many that are.
+        numbers: heading → value for each walk of a block, of further columns.
+    """
+    several, head, rows = len(result.blocks) > 1, ["walk", "cell", "sample"], list[list[str]]()
+    for block, mask in zip(result.blocks.values(), chosen, strict=True):
+        further = numbers(block)
+        head = ["walk", *["block"] * several, "cell", "sample", *further]
+        for *place, sample in np.argwhere(mask)[: _MOST_LISTED - len(rows)]:
+            index, cell = block.columns["index"][(*place, sample)], cell_text(cell_values(block.axes, place)) or "–"
+            sizes = [f"{values[(*place, sample)]:.1e}" for values in further.values()]
+            rows.append([f"{index}", *[block.name] * several, cell, f"{sample}", *sizes])
+    return table(head, rows) + f"<p>… and {count - len(rows):,} more.</p>" * (count > len(rows))
 
 
 def _walk(result: SweepResult, index: int, device: str | None) -> str:
     """One walk, as kept or else run again: its numbers, a player, and its pictures."""
-    from warpchain.pictures.walk_figures import figure5, film_strip
+    from warpchain.pictures.film_strip import film_strip
+    from warpchain.pictures.walk_figures import figure5
     from warpchain.run.single_walk import run_walk
     from warpchain.run.sweep_run import on_device
 
@@ -193,7 +205,7 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
         parts += [picture(film_strip(walk), "The walk, drawn to scale."), picture(figure5([walk]), caption)]
     if planned.drawn:
         rows = [[name, number_text(value), unit_text(name)] for name, value in planned.drawn.items()]
-        parts.append("<h3>Drawn for this walk</h3>" + table(["name", "value", "unit"], rows, numbers_from=3))
+        parts.append("<h3>Drawn for this walk</h3>" + table(["name", "value", "unit"], rows))
     return "\n".join(parts)
 
 
@@ -237,7 +249,7 @@ def _parameters(result: SweepResult) -> str:
             texts = "" if symbol == name.replace("_", " ") else symbol, values, unit_text(name)
             rows.append([name, *texts, field_column(name).meaning])
         head = ["name", "symbol", "value", "unit", "meaning"]
-        parts += [f"<h3>{section}</h3>", table(head, rows, numbers_from=len(head))]
+        parts += [f"<h3>{section}</h3>", table(head, rows)]
     return "\n".join(parts)
 
 
@@ -281,7 +293,7 @@ def _provenance(result: SweepResult) -> str:
         ["software that wrote this page", f"warpchain {VERSION}"],
     ]
     again = "<p>With the text under Sweep in a file: <code>warpchain sweep FILE.yaml -o DIR</code></p>"
-    return table(["", ""], rows, numbers_from=2) + again
+    return table(["", ""], rows) + again
 
 
 def _plain(value: object) -> str:

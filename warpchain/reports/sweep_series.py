@@ -1,18 +1,17 @@
-"""The cells of a sweep that a figure shows together, with their colour and marker."""
+"""The cells of a sweep over links and frequency, by block and start, with their colour and marker."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpchain.pictures.labels import cell_values
+from warpchain.pictures.labels import COUNTS
 from warpchain.pictures.style import BLUE, GREEN, INK, LINE_COLORS, RED
 from warpchain.store.block_result import BlockResult
+from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.sweep_result import SweepResult
 
-Array = NDArray[np.float64]
+_AXES: Final = ("start", "links", "frequency")
 
 _STARTS: Final = {
     "rest": ("started at rest", RED, "o"),
@@ -27,37 +26,30 @@ _OTHER_MARKERS: Final = "s^vP*X"
 
 
 @dataclass(frozen=True)
-class Cell:
-    """Statistics of one cell, see `warpchain.store.cell_statistics.CellStatistics`."""
-
-    mean: float
-    sd: float
-    count: int
-    absent: int
-    failed: int
-    missing: int
-
-
-@dataclass(frozen=True)
 class Series:
-    """The cells of one block and start, by links and frequency [Hz]."""
+    """The cells of one block and start.
+
+    Attributes:
+        label: for the legend.
+        color: of its marks.
+        marker: of its means.
+        cells: tables of shape (links, frequencies).
+    """
 
     label: str
     color: str
     marker: str
-    unit: str
-    cells: dict[tuple[int, float], Cell]
+    cells: CellStatistics
+
+    @property
+    def has(self) -> Any:
+        """Whether the block has a cell, shape (links, frequencies)."""
+        return sum(getattr(self.cells, name) for name in COUNTS) > 0
 
     @property
     def is_map(self) -> bool:
         """Whether it has several numbers of links and several frequencies."""
-        return all(len(set(values)) > 1 for values in zip(*self.cells, strict=True))
-
-    def table(self, name: str, links: Sequence[int], frequencies: Sequence[float]) -> Array:
-        """A statistic, NaN where there is no cell, shape (links, frequencies)."""
-        empty = Cell(np.nan, np.nan, 0, 0, 0, 0)
-        cells = [[self.cells.get((number, frequency), empty) for frequency in frequencies] for number in links]
-        return np.array([[getattr(cell, name) for cell in row] for row in cells])
+        return bool(min(self.has.any(axis=axis).sum() for axis in (0, 1)) > 1)
 
 
 def several(block: BlockResult) -> set[str]:
@@ -71,35 +63,36 @@ def has_series(block: BlockResult) -> bool:
 
 
 def all_series(result: SweepResult, quantity: str = "dx") -> list[Series]:
-    """The series of every block in which nothing but links, frequency and start varies.
+    """The series of every block in which nothing but links, frequency and start varies, all over the same axes.
+
+    Where a block has no cell, means are NaN and counts 0.
 
     Raises:
         InputError: there is no such column of numbers.
     """
     statistics = result.cell_statistics(quantity)
-    series: list[Series] = []
+    found = []
     for block, given in zip(result.blocks.values(), result.sweep["blocks"], strict=True):
-        if block.name not in statistics or not has_series(block):
-            continue
-        found = statistics[block.name]
-        by_start: dict[str, dict[tuple[int, float], Cell]] = {}
-        for place in np.ndindex(*block.shape[:-1]):
-            at = given["scene"] | cell_values(block.axes, place)
-            cells = by_start.setdefault(str(at["start"]), {})
-            cells[int(at["links"]), float(at["frequency"])] = Cell(
-                mean=float(found.mean[place]),
-                sd=float(found.sd[place]),
-                count=int(found.count[place]),
-                absent=int(found.absent[place]),
-                failed=int(found.failed[place]),
-                missing=int(found.missing[place]),
-            )
-        for start, cells in by_start.items():
-            label, color, marker = _STARTS[start]
+        if block.name in statistics and has_series(block):
+            fixed = {name: np.array([value]) for name, value in given["scene"].items()}
+            axes = {name: block.axes[name] if name in block.axes else fixed[name] for name in _AXES}
+            found.append((block, axes))
+    union = {name: np.unique([value for _, axes in found for value in axes[name]]) for name in ("links", "frequency")}
+    series: list[Series] = []
+    for block, axes in found:
+        own = list(block.axes)
+        order = sorted(range(len(own)), key=lambda axis: _AXES.index(own[axis]) if own[axis] in _AXES else len(_AXES))
+        place = np.ix_(*(np.searchsorted(union[name], axes[name]) for name in union))
+        for number, start in enumerate(axes["start"]):
+            tables: dict[str, Any] = {}
+            for name in ("mean", "sd", *COUNTS):
+                table = getattr(statistics[block.name], name).transpose(order)
+                tables[name] = np.full([len(values) for values in union.values()], 0 if name in COUNTS else np.nan)
+                tables[name][place] = table.reshape([len(axes[each]) for each in _AXES])[number]
+            label, color, marker = _STARTS[str(start)]
             if any(item.color == color for item in series):
                 # Another block has this start: this one gets its name in the legend, another colour and marker.
-                label, number = f"{block.name}, {label}", len(series)
-                marker = _OTHER_MARKERS[number % len(_OTHER_MARKERS)]
+                label, marker = f"{block.name}, {label}", _OTHER_MARKERS[len(series) % len(_OTHER_MARKERS)]
                 color = next((other for other in _OTHER_COLORS if all(other != item.color for item in series)), INK)
-            series.append(Series(label, color, marker, found.unit, cells))
+            series.append(Series(label, color, marker, replace(statistics[block.name], axes=union, **tables)))
     return series

@@ -106,7 +106,7 @@ def _follow(
     batch = Batch(1, len(start), options)
     batch.set_chain(0, chain, len(start))
     batch.load(0, start, rates, stop_time=instants[0], stop_status=Status.FINISHED)
-    features = batch.features(fixed_body="floor" if floor else "none", watch="none")
+    features = batch.features(fixed_body="floor" if floor else "none")
     reached, positions, velocities = [], [], []
     for instant in instants:
         batch.resume(0, instant, Status.FINISHED)

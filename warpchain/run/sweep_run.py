@@ -33,7 +33,7 @@ from warpchain.store.shards import read_shard, write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
 from warpchain.walks.faulty_rows import LENGTHS, faults_of_columns, lengths_of_block
-from warpchain.walks.rows import derived_columns, fill_row, missing_rows
+from warpchain.walks.rows import MISSING, derived_columns, fill_row, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
 
 SHARD_WALKS = 256
@@ -252,15 +252,15 @@ def on_device(planned: Sweep, device: str) -> Sweep:
     return load_sweep(canonical)
 
 
-def _is_on_gpu(planned: Sweep) -> bool:
-    """Whether all walks go to a GPU."""
-    return all(on_gpu(str(block.sections["options"].get("device", "cpu"))) for block in planned.blocks)
-
-
 def _devices(planned: Sweep) -> set[str]:
     """Devices of all walks."""
     given = [block.axes.get("device") or (block.sections["options"].get("device", "cpu"),) for block in planned.blocks]
     return {str(device) for devices in given for device in devices}
+
+
+def _is_on_gpu(planned: Sweep) -> bool:
+    """Whether all walks go to a GPU."""
+    return all(map(on_gpu, _devices(planned)))
 
 
 def shard_size(walks: int) -> int:
@@ -287,41 +287,26 @@ def run_shards(
         stop: When set, the work is abandoned: unfinished shards are not written.
     """
     walks = list(planned.undrawn(index for shard in shards for index in shard.walks.tolist()))
-    with gpu_turn((walk.setup.options.device for walk in walks), stop):
-        # all at once, and in this process: a walk that needs one would wait for it alone
-        compile_kernels(one_of_each_kind(planned) if _is_on_gpu(planned) else [walk.setup for walk in walks], threads)
-        _run_shards(planned, walks, directory, stamp, shards, threads, stop)
-
-
-def _run_shards(
-    planned: Sweep,
-    walks: Sequence[PlannedWalk],
-    directory: str,
-    stamp: str,
-    shards: Sequence[Shard],
-    threads: int | None,
-    stop: threading.Event | None,
-) -> None:
-    """Run the walks of some shards whose kernels are compiled, see `run_shards`."""
-    under_way: dict[int, PlannedWalk] = {}
+    setups, keeps = [walk.setup for walk in walks], [planned.keep(walk) for walk in walks]
+    places = [(shard, row) for shard in shards for row in range(len(shard))]
     rows = {shard: missing_rows(shard.kind, shard.keys) for shard in shards}
     motions: dict[Shard, dict[int, dict[str, Any]]] = {shard: {} for shard in shards}
-    left = {shard: len(shard) for shard in shards}
-    stored = [(shard, row) for shard in shards for row in range(len(shard))]
-    setups, keeps = [walk.setup for walk in walks], [planned.keep(walk) for walk in walks]
+    under_way: dict[int, PlannedWalk] = {}
 
     def draw(number: int) -> Setup:
         under_way[number] = planned.drawn(walks[number])
         return under_way[number].setup
 
-    for number, run in run_setups(setups, draw=draw, keeps=keeps, threads=threads, stop=stop):
-        shard, row = stored[number]
-        fill_row(rows[shard][row], run.outcome(), under_way.pop(number).drawn)
-        if keeps[number].series_every is not None:
-            motions[shard][row] = run.recorder.motion()
-        left[shard] -= 1
-        if left[shard] == 0:
-            write_shard(directory, stamp, shard, rows.pop(shard), motions.pop(shard))
+    with gpu_turn((setup.options.device for setup in setups), stop):
+        # all at once, and in this process: a walk that needs one would wait for it alone
+        compile_kernels(one_of_each_kind(planned) if _is_on_gpu(planned) else setups, threads)
+        for number, run in run_setups(setups, draw=draw, keeps=keeps, threads=threads, stop=stop):
+            shard, row = places[number]
+            fill_row(rows[shard][row], run.outcome(), under_way.pop(number).drawn)
+            if keeps[number].series_every is not None:
+                motions[shard][row] = run.recorder.motion()
+            if (rows[shard]["status"] != MISSING).all():
+                write_shard(directory, stamp, shard, rows.pop(shard), motions.pop(shard))
 
 
 @contextlib.contextmanager

@@ -138,7 +138,8 @@ def _fill(file: "h5py.File", results: Sequence[SweepResult]) -> None:
             part = list(result.blocks.values())[block.number]
             places = np.arange(block.columns["index"].size).reshape(block.shape)[..., first : first + part.shape[-1]]
             for place, motion in part.kept_motions(np.flatnonzero(part.kept)):
-                group.copy(motion, group, f"motion/{places.ravel()[place]}")
+                kept = group.require_group("motion")
+                group.copy(motion, kept, str(places.ravel()[place]))
             first += part.shape[-1]
 
 

@@ -1,6 +1,6 @@
 """Takes the time series and frames of a walk out of its world, between launches."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,14 +16,23 @@ from warpchain.walks.walk_result import BEFORE, MOTION
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(kw_only=True)
 class _Piece:
-    """What one launch has recorded: samples (t, SAMPLE_COLUMNS), frames (f, n, 2) at times (f,), loads (f, n, 3)."""
+    """What one launch has recorded: t samples and f frames of a chain of n links.
+
+    Attributes:
+        samples: Shape (t, columns of a sample).
+        times: Of the frames [s], shape (f,).
+        frames: Joints [m], shape (f, n, 2).
+        loads: Forces [N] and moment [N m] of each joint, shape (f, n, 3); f is 0 if they are not kept.
+        planes: Of the frames, shape (f, PLANE_VALUES).
+    """
 
     samples: Array
-    frame_times: Array
+    times: Array
     frames: Array
     loads: Array
+    planes: Array
 
 
 class Recorder:
@@ -50,43 +59,48 @@ class Recorder:
         self._width = batch.record.samples.shape[2]
         self._last: Array = np.empty((0, self._width))
         self._tilts = tilts
-        self._planes: list[Array] = []
-        self._samples: list[Array] = []
-        self._frame_times: list[Array] = []
-        self._frames: list[Array] = []
-        self._loads: list[Array] = []
         self._drive: list[_Piece] = []
+        self._pieces: list[_Piece] = []
+
+    def _nothing(self) -> _Piece:
+        """What a launch has recorded that recorded nothing."""
+        links = self._batch.links[self._world]
+        return _Piece(
+            samples=np.empty((0, self._width)),
+            times=np.empty(0),
+            frames=np.empty((0, links, 2)),
+            loads=np.empty((0, links, 3)),
+            planes=np.empty((0, layout.PLANE_VALUES)),
+        )
 
     def drain(self, released: bool) -> None:
         """Take what the last launch wrote; before the release only what `release` may want is kept."""
-        if not released and self.keep.before > 0:
-            self._drain_drive()
-            return
+        piece, keep, batch, world = self._nothing(), self.keep, self._batch, self._world
         if self._has_samples:
-            samples = self._batch.drain_samples(self._world)
-            if released and self.keep.series_every is not None and len(samples):
-                self._samples.append(self._thinned(samples, self.keep.series_every))
-                self._last = samples[-1:]
+            samples = batch.drain_samples(world)
+            if not released:
+                piece.samples = samples
+            elif keep.series_every is not None and len(samples):
+                piece.samples, self._last = self._thinned(samples, keep.series_every), samples[-1:]
         if self._has_frames:
-            planes = self._batch.frame_planes(self._world)
-            if released and self.keep.loads:
-                self._loads.append(self._batch.frame_loads(self._world))
-            times, frames = self._batch.drain_frames(self._world)
-            if released and self.keep.frame_every is not None:
-                self._frame_times.append(times)
-                self._frames.append(frames)
-                self._planes.append(planes)
+            if self._tilts and released:
+                piece.planes = batch.frame_planes(world)
+            if keep.loads or not released:
+                piece.loads = batch.frame_loads(world)
+            piece.times, piece.frames = batch.drain_frames(world)
+        if keep.frame_every is None:
+            piece = replace(self._nothing(), samples=piece.samples)
+        if released:
+            self._pieces.append(piece)
+        elif keep.before > 0:
+            self._drive.append(piece)
+            oldest = batch.time(world) - keep.before
+            while self._drive and _ends_before(self._drive[0], oldest):
+                del self._drive[0]
 
-    def _drain_drive(self) -> None:
-        """Take what the last launch wrote, and forget what is too old already."""
-        world = self._world
-        samples = self._batch.drain_samples(world) if self._has_samples else np.empty((0, self._width))
-        loads = self._batch.frame_loads(world)
-        times, frames = self._batch.drain_frames(world)
-        self._drive.append(_Piece(samples, times, frames, loads))
-        oldest = self._batch.time(world) - self.keep.before
-        while self._drive and _ends_before(self._drive[0], oldest):
-            del self._drive[0]
+    def _joined(self, pieces: list[_Piece], *names: str) -> list[Array]:
+        """Attributes of pieces, each of all one behind the other."""
+        return [np.concatenate([getattr(piece, name) for piece in (self._nothing(), *pieces)]) for name in names]
 
     def release(self, moment: float, raised: float, earliest: float) -> None:
         """Keep what was recorded in the last moments of the drive, all of which has been drained.
@@ -96,16 +110,11 @@ class Recorder:
             raised: Height [m] by which the chain was raised at the release.
             earliest: When the loop was last given its own loads [s]; nothing older is kept.
         """
-        pieces, self._drive = self._drive, []
-        if not pieces:
+        if not self._drive:
             return
-        samples, times, frames, loads = (
-            np.concatenate([getattr(piece, name) for piece in pieces])
-            for name in ("samples", "frame_times", "frames", "loads")
-        )
+        samples, times, frames, loads = self._joined(self._drive, "samples", "times", "frames", "loads")
         oldest = max(moment - self.keep.before, earliest)
-        is_wanted = (samples[:, layout.TIME] >= oldest) & (samples[:, layout.TIME] < moment)
-        samples = samples[is_wanted]
+        samples = samples[(samples[:, layout.TIME] >= oldest) & (samples[:, layout.TIME] < moment)]
         wanted = (times >= oldest) & (times < moment)
         raise_by = np.array([0.0, raised])
         self.before = BeforeRelease(
@@ -127,26 +136,21 @@ class Recorder:
         self._place = places[-1]
         return samples[is_first]
 
-    def samples(self) -> Array:
-        """Samples (t, SAMPLE_COLUMNS) that are kept, and the last one in any case."""
-        kept = np.concatenate([np.empty((0, self._width)), *self._samples])
-        is_there = len(kept) == 0 or kept[-1, layout.TIME] == self._last[0, layout.TIME]
-        return kept if is_there else np.concatenate([kept, self._last])
-
     def motion(self) -> dict[str, Any]:
         """The arrays of a `WalkResult` by name, and its `before_release`."""
-        samples, links = self.samples(), self._batch.links[self._world]
+        names = ("samples", "times", "frames", "loads", "planes")
+        samples, frame_time, joints, loads, planes = self._joined(self._pieces, *names)
+        if len(samples) and samples[-1, layout.TIME] != self._last[0, layout.TIME]:
+            samples = np.concatenate([samples, self._last])
         tilting = samples if self._tilts else np.empty((0, layout.ALL_COLUMNS))
         tilt, yaw = angles(tilting[:, layout.PLANE_COLUMN :])
-        loads = np.concatenate([np.empty((0, links, 3)), *self._loads])
-        planes = np.concatenate([np.empty((0, layout.PLANE_VALUES)), *(self._planes if self._tilts else [])])
         return {
             **{name: samples[:, stored.sample] for name, stored in MOTION.items() if stored.sample is not None},
             "center_z": tilting[:, layout.CENTER_Z],
             "tilt": tilt,
             "yaw": np.unwrap(yaw),
-            "frame_time": np.concatenate([np.empty(0), *self._frame_times]),
-            "frame_joints": np.concatenate([np.empty((0, links, 2)), *self._frames]),
+            "frame_time": frame_time,
+            "frame_joints": joints,
             "frame_forces": loads[:, :, :2],
             "frame_moments": loads[:, :, 2],
             "frame_origin": planes[:, layout.ORIGIN : layout.ORIGIN + 3],
@@ -157,5 +161,5 @@ class Recorder:
 
 def _ends_before(piece: _Piece, moment: float) -> bool:
     """Whether all of a piece is older than a moment [s]."""
-    ends = [times[-1] for times in (piece.samples[:, layout.TIME], piece.frame_times) if len(times)]
+    ends = [times[-1] for times in (piece.samples[:, layout.TIME], piece.times) if len(times)]
     return all(end < moment for end in ends)

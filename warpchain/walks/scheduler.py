@@ -141,10 +141,9 @@ def compile_kernels(setups: Iterable[Setup], threads: int | None = None) -> None
     wanted: set[tuple[str, Features, int]] = set()
     for setup in setups:
         columns = layout.padded_width(setup.scene.links)
-        bodies = [("floor", "rest")] + [("sprocket", "steady")] * (setup.scene.start != "ellipse")
-        for fixed_body, watch in bodies:
+        for fixed_body in ["floor"] + ["sprocket"] * (setup.scene.start != "ellipse"):
             tilts = fixed_body == "floor" and setup.scene.plane == "tilting"
-            features = features_of(setup.options, columns, fixed_body=fixed_body, watch=watch, tilts=tilts)
+            features = features_of(setup.options, columns, fixed_body=fixed_body, tilts=tilts)
             size = (threads or block_threads(setup.scene.links)) if on_gpu(setup.options.device) else 1
             wanted.add((setup.options.device, features, size))
     with gpu_turn(device for device, _, _ in wanted):

@@ -160,8 +160,8 @@ class WalkRun:
     def features(self) -> Features:
         """What the kernel that carries the world on must be compiled for."""
         if self._released:
-            return self._batch.features(fixed_body="floor", watch="rest", tilts=self._tilts)
-        return self._batch.features(fixed_body="sprocket", watch="steady")
+            return self._batch.features(fixed_body="floor", tilts=self._tilts)
+        return self._batch.features(fixed_body="sprocket")
 
     @property
     def counts(self) -> dict[str, int]:

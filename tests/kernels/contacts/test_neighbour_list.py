@@ -227,7 +227,7 @@ def run_pile(parameters, position, velocity, duration, *, poison=False, **settin
     if poison:
         batch.scratch.fill_(np.nan)
         batch.lists.fill_(2**30)
-    batch.run([0], batch.features(fixed_body="floor", watch="none"))
+    batch.run([0], batch.features(fixed_body="floor"))
     assert batch.status(0) == Status.FINISHED
     state = np.hstack([batch.position(0), batch.velocity(0)])
     return state, batch.counts(0), batch.losses(0), batch.extremes(0)

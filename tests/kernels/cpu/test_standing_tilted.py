@@ -55,7 +55,7 @@ def let_go(start, parameters, duration, longest_step=None):
     options = Options(method="dp5", tolerance=1e-6, rest_time=100.0)
     batch = tilting_batch([start], [parameters], options, duration, longest_step=longest_step, keeps_samples=True)
     rows = []
-    features = batch.features(fixed_body="floor", watch="rest", tilts=True)
+    features = batch.features(fixed_body="floor", tilts=True)
     batch.run([0], features, lambda: rows.append(batch.drain_samples(0)))
     assert batch.status(0) == Status.FINISHED
     position, _, plane = end_of(batch)

@@ -49,7 +49,7 @@ def released(links=30, parameters=SOFT, tilt=0.0, **tap):
 def run(batch, tilts):
     """Runs the only chain to its end; samples (t, columns)."""
     rows = []
-    features = batch.features(fixed_body="floor", watch="rest", tilts=tilts)
+    features = batch.features(fixed_body="floor", tilts=tilts)
     batch.run([0], features, lambda: rows.append(batch.drain_samples(0)))
     return np.concatenate(rows)
 

@@ -14,7 +14,7 @@ wp.config.kernel_cache_dir = sys.argv[1]
 from warpchain.kernels.cpu import loop
 loop.COMPILER_FLAGS += " -Rpass=loop-vectorize -Rpass-missed=loop-vectorize"
 features = loop.Features(method=sys.argv[2], columns=200, fixed_body=sys.argv[3], self_contact=True,
-                           watch="none", tilts=sys.argv[4] == "tilts")
+                           tilts=sys.argv[4] == "tilts")
 wp.load_module(loop.make_advance(features).module, device="cpu")
 """
 

@@ -4,7 +4,6 @@ Fibers take their turns in the order of their numbers, from barrier to barrier, 
 there for the others even where a barrier is missing. With the links given to them the other way round it is not.
 """
 
-import dataclasses
 import importlib.util
 import sys
 from collections.abc import Callable, Iterator
@@ -52,8 +51,8 @@ def everything(batch: Batch, world: int) -> dict[str, NDArray[np.generic]]:
 
 
 def features_of(batch: Batch) -> Features:
-    """A walk's features, with joints that soften."""
-    return dataclasses.replace(batch.features(fixed_body="floor", watch="rest"), softens=True)
+    """A walk's features."""
+    return batch.features(fixed_body="floor")
 
 
 def run(factory: Callable[[Features, int], wp.Kernel], attempts: int) -> list[dict[str, NDArray[np.generic]]]:

@@ -41,7 +41,7 @@ def fixed_steps(device: str, method: str, fixed_body: str) -> dict[str, np.ndarr
         batch.load(world, position, velocity, stop_time=STEPS * FIXED_STEP, stop_status=Status.FINISHED)
         batch.set_drive(world, sprocket_speed=-50.0)
         batch._edit(batch.state.step)[world] = FIXED_STEP
-    batch.run(range(2), batch.features(fixed_body=fixed_body, watch="none"))
+    batch.run(range(2), batch.features(fixed_body=fixed_body))
     worlds = range(2)
     return {
         "position": np.array([batch.position(world) for world in worlds]),

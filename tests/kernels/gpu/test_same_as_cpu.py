@@ -48,7 +48,7 @@ def test_fixed_steps_equal_a_cpu_kernel(method: str, fixed_body: str, self_conta
     raised = 0.9 * SOFT.sprocket_radius if fixed_body == "sprocket" else 0.0
     chains = [heap(LINKS, 3, raised=raised), heap(LINKS, 18, tilt=np.pi, raised=raised)]
     ours, theirs = (batch_of(chains, method=method, self_contact=self_contact) for _ in range(2))
-    features = ours.features(fixed_body=fixed_body, watch="none")
+    features = ours.features(fixed_body=fixed_body)
     launch_blocks(ours, features, 40, block_dim=block_dim)
     launch_chains(theirs, features, 40)
     for counts in map(theirs.counts, range(2)):
@@ -64,7 +64,7 @@ def test_chains_too_long_for_shared_memory_equal_a_cpu_kernel(block_dim: int, mo
     monkeypatch.setattr(functions, "LARGEST_SHARED_BLOCK", LINKS - 1)
     make_advance_block.cache_clear()
     ours, theirs = (batch_of([heap(LINKS)], method="bs32") for _ in range(2))
-    features = ours.features(fixed_body="floor", watch="none")
+    features = ours.features(fixed_body="floor")
     launch_blocks(ours, features, 20, block_dim=block_dim)
     make_advance_block.cache_clear()
     launch_chains(theirs, features, 20)
@@ -80,7 +80,7 @@ def test_free_flight_equals_a_cpu_kernel() -> None:
     ours, theirs = (
         batch_of([(position, velocity)], method="rkf78", self_contact=False, fixed_step=False) for _ in range(2)
     )
-    features = ours.features(fixed_body="none", watch="none")
+    features = ours.features(fixed_body="none")
     launch_blocks(ours, features, 60, block_dim=LINKS)
     launch_chains(theirs, features, 60)
     assert ours.counts(0) == theirs.counts(0)
@@ -104,7 +104,8 @@ def test_samples_frames_and_rest_equal_a_cpu_kernel() -> None:
     ours, theirs = bounded_heaps(2), bounded_heaps(2)
     for batch in (ours, theirs):
         batch.control.rest_speed, batch.control.rest_time = 100.0, 20 * FIXED_STEP
-    features = ours.features(fixed_body="floor", watch="rest")
+        batch.state.stop_status.numpy()[:] = int(Status.TIME_LIMIT)
+    features = ours.features(fixed_body="floor")
     launch_blocks(ours, features, 100, block_dim=LINKS)
     launch_chains(theirs, features, 100)
     assert theirs.status(0) == Status.AT_REST
@@ -132,7 +133,7 @@ def test_frames_between_samples_equal_a_cpu_kernel() -> None:
         batch = bounded_heaps(2)
         batch.control.frame_interval = 2.5 * FIXED_STEP
         batch.state.next_frame.numpy()[1] = 0 if len(runs) < 2 else -1
-        features = batch.features(fixed_body="floor", watch="rest")
+        features = batch.features(fixed_body="floor")
         while batch.status(1) == Status.RUNNING:
             if launch is launch_blocks:
                 launch_blocks(batch, features, attempts, block_dim=LINKS)
@@ -160,7 +161,7 @@ def test_failures_stop_one_chain_and_leave_the_others() -> None:
     batch.control.contact_step = FIXED_STEP
     alone = batch_of([good], method="dp5", fixed_step=False)
     alone.control.contact_step = FIXED_STEP
-    features = batch.features(fixed_body="floor", watch="rest")
+    features = batch.features(fixed_body="floor")
     for each in (batch, alone):
         launch_blocks(each, features, 10, block_dim=LINKS)
     assert [batch.status(world) for world in range(3)] == [Status.RUNNING, Status.NOT_FINITE, Status.RUNNING]
@@ -199,5 +200,5 @@ def compiles_for_gpus(folder: Path, features: Features, block_dim: int) -> None:
 
 def test_a_kernel_compiles_for_gpus(tmp_path: Path) -> None:
     """The kernel of the drive compiles for sm_80 and sm_90."""
-    features = Features("os32", layout.padded_width(60), "sprocket", True, "steady", softens=True)
+    features = Features("os32", layout.padded_width(60), "sprocket", True)
     compiles_for_gpus(tmp_path, features, 64)

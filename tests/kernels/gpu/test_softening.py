@@ -1,6 +1,5 @@
 """GPU kernels soften, stiffen and load a chain in the same steps, and to the same bits, as CPU kernels."""
 
-import dataclasses
 from collections.abc import Iterator
 
 import numpy as np
@@ -95,11 +94,6 @@ def assert_same_bits(ours: Batch, theirs: Batch) -> None:
         assert_array_equal(ours.drain_samples(world), theirs.drain_samples(world))
 
 
-def softening_features(batch: Batch, fixed_body: str, watch: str) -> Features:
-    """What the kernels are compiled for."""
-    return dataclasses.replace(batch.features(fixed_body=fixed_body, watch=watch), softens=True)
-
-
 def launch_both(ours: Batch, theirs: Batch, features: Features, cut: int, attempts: int = 60) -> None:
     """Make so many attempts or a few more: ``cut`` to a launch in the GPU kernel, all at once in the CPU kernel."""
     launches = -(-attempts // cut)
@@ -113,7 +107,7 @@ def launch_both(ours: Batch, theirs: Batch, features: Features, cut: int, attemp
 def test_a_gpu_kernel_softens_a_pile_as_a_cpu_kernel_does(area: float, softness: float, cut: int) -> None:
     """The GPU kernel softens at the same samples, frees the same energy, and ends in the same bits, however cut."""
     ours, theirs = heaps(area), heaps(area)
-    features = softening_features(ours, "floor", "rest")
+    features = ours.features(fixed_body="floor")
     launch_both(ours, theirs, features, cut)
     first, second = (theirs.watched(world, layout.SOFTENED_AT) for world in range(2))
     assert 0 < first <= second < theirs.time(0)
@@ -127,7 +121,7 @@ def test_a_gpu_kernel_softens_a_pile_as_a_cpu_kernel_does(area: float, softness:
 def test_a_gpu_kernel_stiffens_as_a_cpu_kernel_does(cut: int) -> None:
     """The GPU kernel returns joints to their own values in the same steps, however cut into launches."""
     ours, theirs = released(), released()
-    features = softening_features(ours, "floor", "rest")
+    features = ours.features(fixed_body="floor")
     launch_both(ours, theirs, features, cut)
     assert theirs.state.softness.numpy()[0] == 0.0
     assert theirs.state.losses.numpy()[0, layout.LOSS_SOFTENING] < 0
@@ -138,7 +132,7 @@ def test_a_gpu_kernel_stiffens_as_a_cpu_kernel_does(cut: int) -> None:
 def test_a_gpu_kernel_drives_under_load_as_a_cpu_kernel_does(cut: int, quick_unloading: None) -> None:
     """In the GPU kernel loads and softness change in the same steps of the drive, however cut: on, falling, off."""
     ours, theirs = driven(), driven()
-    features = softening_features(ours, "sprocket", "steady")
+    features = ours.features(fixed_body="sprocket")
     launch_both(ours, theirs, features, cut, attempts=80)
     assert theirs.counts(0)["sprocket"] > 10
     assert theirs.time(0) > UNLOADED + LOAD_FALLS + 12 * FIXED_STEP

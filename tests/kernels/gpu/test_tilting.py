@@ -44,7 +44,7 @@ def falling_batch(fixed_step: float | None = None) -> Batch:
 
 def features_of(batch: Batch) -> Features:
     """Those of a walk whose plane tilts."""
-    return batch.features(fixed_body="floor", watch="rest", tilts=True)
+    return batch.features(fixed_body="floor", tilts=True)
 
 
 def test_a_gpu_kernel_tilts_as_a_cpu_kernel_does() -> None:
@@ -84,5 +84,5 @@ def test_cuts_change_no_bit(kind: str) -> None:
 
 def test_it_compiles_for_gpus(tmp_path: Path) -> None:
     """The kernel of a tilting walk compiles for two generations of GPUs."""
-    features = Features("os32", layout.padded_width(60), "floor", True, "rest", softens=True, tilts=True)
+    features = Features("os32", layout.padded_width(60), "floor", True, tilts=True)
     compiles_for_gpus(tmp_path, features, 64)

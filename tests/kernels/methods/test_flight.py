@@ -287,7 +287,7 @@ def assert_same_outcome(first, second):
 
 def run_in_launches(batch, attempts):
     """Run all worlds to their ends in launches of this many attempts; returns the number of launches."""
-    features = batch.features(fixed_body="floor", watch="none")
+    features = batch.features(fixed_body="floor")
     worlds = range(len(batch.links))
     launches = 0
     while any(batch.status(world) == Status.RUNNING for world in worlds):

@@ -1,0 +1,182 @@
+"""Moving pictures of walks."""
+
+import json
+import math
+import os
+import re
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image, ImageSequence
+
+from tests.support.made_tilting_walks import make_tilting_walk
+from tests.support.made_walks import make_unreleased, make_walk
+from warpchain.pictures import animation
+from warpchain.pictures.animation import animate
+from warpchain.pictures.film import Film
+from warpchain.status import Status
+
+
+def data_of(path: Path) -> dict[str, Any]:
+    """The numbers on a page."""
+    found = re.search(r"const walk = (\{.*\});\n", path.read_text(encoding="utf-8"))
+    assert found is not None
+    data: dict[str, Any] = json.loads(found.group(1))
+    return data
+
+
+@pytest.mark.parametrize(
+    ("fps", "slow", "count"),
+    [
+        (10, 5, 41),  # one picture per frame
+        (30, 4, 41),  # more pictures than frames: each frame once
+        (10, 2, 17),  # fewer
+    ],
+)
+def test_gif_frames_and_times(fps: float, slow: float, count: int, tmp_path: Path) -> None:
+    """A GIF has the right number of pictures, and lasts `slow` times as long as the walk, then rests."""
+    animate(make_walk(), tmp_path / "walk.gif", fps=fps, slow=slow)
+    with Image.open(tmp_path / "walk.gif") as gif:
+        durations = [picture.info["duration"] for picture in ImageSequence.Iterator(gif)]
+    assert len(durations) == count
+    assert durations[-1] == 1500
+    assert sum(durations[:-1]) == pytest.approx(800 * slow, abs=1000 / fps)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["walk.gif"]
+
+
+@pytest.mark.parametrize("make", [make_walk, make_tilting_walk])
+def test_gif_draws_the_chain_where_it_is(make: Any, tmp_path: Path) -> None:
+    """In each picture outer links are darker than inner ones, blue, and where they are; the size suits video."""
+    walk = make()
+    animate(walk, tmp_path / "walk.gif", fps=10, slow=5 if make is make_walk else 4)
+    film = Film(walk)
+    with Image.open(tmp_path / "walk.gif") as gif:
+        pictures = [np.asarray(picture.convert("RGB")).astype(int) for picture in ImageSequence.Iterator(gif)]
+    height, width, _ = pictures[0].shape
+    assert len(pictures) == 41 and height % 2 == width % 2 == 0 and height <= 560 and width <= 960
+    for frame in (0, 10):
+        joints = film._joints[frame]
+        middles = film._project((joints + np.roll(joints, 1, axis=0)) / 2).T
+        x, y = (film._axes.transData.transform(middles) * (1, -1) + (0, height)).astype(int).T
+        red, _, blue = pictures[frame][y, x].T
+        assert np.mean(blue[1::2] - red[1::2] > 60) > 0.9
+        brightness = pictures[frame][y, x].sum(axis=1)
+        assert np.median(brightness[0::2]) > 1.4 * np.median(brightness[1::2])
+
+
+def test_broken_walks_and_long_films_are_refused(tmp_path: Path) -> None:
+    """A walk without frames, or with broken ones, or with too many for a GIF, is refused before anything is drawn."""
+    path, walk = tmp_path / "walk.gif", make_walk()
+    with pytest.raises(ValueError, match=r"no frames \(not_steady\)"):
+        animate(make_unreleased(), path)
+    with pytest.raises(ValueError, match="not all finite numbers"):
+        animate(make_walk(status=Status.NOT_FINITE, frame_joints=np.full((41, 30, 2), math.nan)), path)
+    long: dict[str, Any] = {
+        "frame_time": np.linspace(0.0, 20.0, 2001),
+        "frame_joints": np.resize(walk.frame_joints, (2001, 30, 2)),
+    }
+    with pytest.raises(ValueError, match="pictures are too many for a GIF; lower fps or slow"):
+        animate(make_walk(**long), path, fps=50, slow=8)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("make", [make_walk, make_tilting_walk])
+def test_html_is_complete_in_itself(make: Any, tmp_path: Path) -> None:
+    """The page loads nothing, and holds the joints to a tenth of a millimetre, the times to a microsecond."""
+    walk = make()
+    animate(walk, tmp_path / "walk.html", slow=3)
+    page = (tmp_path / "walk.html").read_text(encoding="utf-8")
+    assert not re.search(r"https?:|//cdn|\bsrc\s*=|\bhref\s*=|@import|\burl\(|\bfetch\(|\bimport\b|{{", page)
+    data = data_of(tmp_path / "walk.html")
+    expected = walk.frame_joints if walk.joints_in_room is None else walk.joints_in_room[..., :2]
+    joints = np.array(data["joints"]).reshape(expected.shape) * 1e-4
+    assert np.max(np.abs(joints - expected)) <= 0.5e-4 * (1 + 1e-9)
+    np.testing.assert_allclose(np.array(data["time"]) * 1e-6, walk.frame_time, atol=5e-7)
+    assert data["slow"] == 3 and data["sprocket"] == [0, round(1e4 * walk.sprocket_center[1]), 556]
+    seen = "" if walk.joints_in_room is None else ", from the side"
+    assert f"<title>30 links, 15 Hz: \u0394x = {walk.dx:.3f} m{seen}</title>" in page
+
+
+def test_titles_are_escaped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a title says is text of the page, never a part of it."""
+    monkeypatch.setattr(animation, "setting", lambda walk: "</title><script>&")
+    animate(make_walk(), tmp_path / "walk.html")
+    page = (tmp_path / "walk.html").read_text(encoding="utf-8")
+    assert page.count("&lt;/title&gt;&lt;script&gt;&amp;") == 2 and page.count("<script>") == 1
+
+
+def test_html_thins_long_recordings(tmp_path: Path) -> None:
+    """A page holds at most 2,000 frames, evenly chosen, the first and the last among them."""
+    joints = np.resize(make_walk().frame_joints, (5001, 30, 2))
+    animate(make_walk(frame_time=np.linspace(0.0, 0.8, 5001), frame_joints=joints), tmp_path / "walk.html")
+    times = data_of(tmp_path / "walk.html")["time"]
+    assert len(times) == 2000 and times[0] == 0 and times[-1] == 800_000
+    assert set(np.diff(np.rint(np.array(times) / 160))) <= {2, 3}
+
+
+def test_mp4_without_encoder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the video extra an MP4 is refused in one line that says what to install."""
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(ImportError, match=r"pip install 'warpchain\[video\]'") as caught:
+        animate(make_walk(), tmp_path / "walk.mp4")
+    assert "\n" not in str(caught.value) and not list(tmp_path.iterdir())
+
+
+def test_mp4_frames(tmp_path: Path) -> None:
+    """With the video extra an MP4 has a picture per tick of its clock, and its last one for 1.5 s."""
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    animate(make_tilting_walk(), tmp_path / "walk.mp4", fps=20, slow=2)
+    assert ffmpeg.count_frames_and_secs(str(tmp_path / "walk.mp4"))[0] == 41 + 30
+
+
+@pytest.mark.parametrize("program", ["exit 1", "cat > /dev/null; exit 1"])
+def test_a_film_that_was_not_written_to_its_end_is_not_kept(
+    program: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """ffmpeg may fail as it is fed, or at its end, on a full disk for one; the older film stays."""
+    ffmpeg, path = tmp_path / "ffmpeg", tmp_path / "walk.mp4"
+    ffmpeg.write_text(f"#!/bin/sh\n{program}\n")
+    ffmpeg.chmod(0o755)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", SimpleNamespace(get_ffmpeg_exe=lambda: str(ffmpeg)))
+    path.write_bytes(b"old")
+    with pytest.raises(OSError, match=r"^.*walk\.mp4: cannot be written \(ffmpeg ended early\); see to the disk$"):
+        animate(make_walk(), path, fps=10, slow=1)
+    assert path.read_bytes() == b"old" and len(list(tmp_path.iterdir())) == 2
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "message"),
+    [
+        ("walk.avi", {}, "unknown kind of picture"),
+        ("walk.gif", {"fps": 0}, "fps: 0 is not a positive number"),
+        ("walk.html", {"slow": math.inf}, "slow: inf is not a positive number"),
+        ("walk.gif", {"fps": 51}, "fps: 51 is too fast for a GIF"),
+        ("walk.gif", {"fps": 0.5}, "fps: 0.5 is too slow for a GIF; give 1 to 50"),
+        ("walk.gif", {"slow": 1e4}, "pictures are too many for a GIF"),
+    ],
+)
+def test_refused_settings(name: str, settings: dict[str, float], message: str, tmp_path: Path) -> None:
+    """Unknown suffixes and impossible speeds are refused before anything is written."""
+    with pytest.raises(ValueError, match=message):
+        animate(make_walk(), tmp_path / name, **settings)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["walk.gif", "walk.html"])
+def test_interrupted_animation_keeps_old_file(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Moving pictures, too, are written whole or not at all."""
+    path = tmp_path / name
+    path.write_text("old")
+
+    def fail(*_: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", fail)
+    with pytest.raises(OSError, match="cannot be written"):
+        animate(make_walk(), path, fps=5, slow=2)
+    assert path.read_text() == "old" and [entry.name for entry in tmp_path.iterdir()] == [name]

@@ -1,0 +1,251 @@
+"""A film strip: the chain at instants along its walk, drawn to scale.
+
+Sizes on paper are in inches: constrained layout clips labels of axes with a fixed aspect.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
+
+from warpchain.pictures.chain import ABOVE, FRONT, SIDE, draw_chain, draw_ground, sprocket_circle, walk_box
+from warpchain.pictures.inline import InlineFigure
+from warpchain.pictures.style import DASHES, DOTS, FAINT, GROUND, INK, tidy
+from warpchain.pictures.walk_shape import Walk, center_in_room, checked_joints, setting
+from warpchain.status import Status
+
+Array = NDArray[np.float64]
+
+_WIDTH: Final = 10.0
+_HIGHEST: Final = 4.6
+_DEEPEST: Final = 8.0
+"""Width of the paper, greatest height of the side view, and of it and the view from above together."""
+_LEFT, _BETWEEN, _RIGHT, _TOP, _BELOW, _FOOT = 0.9, 0.85, 0.25, 0.35, 0.85, 0.75
+"""Room for labels: beside, between and above the views, below each row, and for the legend at the foot."""
+_NARROWEST: Final = 1.3
+"""Least width of the view from the front."""
+_FLOOR: Final = 0.4
+"""Height of the floor in the side view."""
+_CLOSE_UP_LINKS, _CLOSE_UP_ASPECT = 9, 1.5
+"""Width of a close-up [links], and its width over its height."""
+
+
+def film_strip(walk: Walk, *, count: int | None = None, figure: Figure | None = None) -> Figure:
+    """The chain along its walk, drawn to scale, and close-ups of up to four moments.
+
+    In the strip the centre of mass moves equally far from each instant to the next. Colour is time; outer links are
+    darker than inner ones. The close-ups show the first touch of the floor, the first self-contact, the collapse and
+    the end. A chain whose plane tilts is seen from the side, from the front and from above instead, all to one scale.
+    From the front z grows to the left, and from above downwards, as such a viewer sees it.
+
+    Args:
+        walk: a walk with frames.
+        count: number of instants in the strip, at least 2; by default 6 to 12, as many as stay legible.
+        figure: an empty figure to draw into; by default a new one that suits the walk.
+
+    Raises:
+        ValueError: the walk has no frames or broken ones, or fewer than 2 instants are asked for.
+    """
+    joints = checked_joints(walk)
+    if count is not None and count < 2:
+        raise ValueError(f"count: {count} is too few; give 2 or more")
+    tilts = walk.joints_in_room is not None
+    low, high = walk_box(walk, joints)
+    close_ups = [] if tilts else _close_ups(walk)
+    for close_up in close_ups:
+        low[0], high[0] = min(low[0], close_up.low[0]), max(high[0], close_up.high[0])
+    size = high - low
+    # A chain that stays upright is thin from above and from the front: room for the numbers on the axes.
+    broad = max(size[1], size[2]) if tilts else 0.0
+    across = _WIDTH - _LEFT - _RIGHT - (_BETWEEN if tilts else 0.0)
+    scale = min(across / (size[0] + broad), _HIGHEST / size[1], (_DEEPEST - _FLOOR) / (size[1] + broad))
+    if tilts and scale * broad < _NARROWEST:
+        scale = (across - _NARROWEST) / size[0]
+        broad = _NARROWEST / scale
+    close_up_width = min((across + 0.1) / max(1, len(close_ups)), _WIDTH / 3)
+    lower = scale * broad + 0.5 if tilts else (close_up_width - 0.1) / _CLOSE_UP_ASPECT
+    width, height, depth = scale * size[0], scale * size[1] + _FLOOR, _FLOOR / scale
+    paper = np.array([_WIDTH, _TOP + height + _BELOW + lower + _FOOT])
+    figure = InlineFigure(tuple(paper)) if figure is None else figure
+
+    def panel(left: float, bottom: float, width: float, height: float) -> Axes:
+        return figure.add_axes((left / paper[0], bottom / paper[1], width / paper[0], height / paper[1]))
+
+    left = _LEFT + (across - scale * (size[0] + broad)) / 2
+    bottom = _FOOT + lower + _BELOW
+    side = panel(left, bottom, width, height)
+    side.set(xlim=(low[0], high[0]), ylim=(-depth, high[1]), xlabel="$x$ / m", ylabel="$y$ / m")
+    views = [("from the side", side, SIDE)]
+    draw_ground(side, low[0], high[0], -depth)
+    _draw_distance(side, walk, -0.5 * depth)
+    if tilts:
+        z = (low[2] + high[2]) / 2 + np.array([0.5, -0.5]) * broad
+        front = panel(left + width + _BETWEEN, bottom, scale * broad, height)
+        front.set(xlim=z, ylim=(-depth, high[1]), xlabel="$z$ / m", ylabel="$y$ / m")
+        above = panel(left, _FOOT + 0.5, width, scale * broad)
+        above.set(xlim=(low[0], high[0]), ylim=z, xlabel="$x$ / m", ylabel="$z$ / m", facecolor=GROUND)
+        draw_ground(front, z[0], z[1], -depth)
+        views += [("from the front", front, FRONT), ("from above", above, ABOVE)]
+    color_of = _time_colors(walk)
+    center = center_in_room(walk)
+    path = np.stack([np.interp(walk.frame_time, walk.time, row) for row in center.T], axis=1)
+    radius = walk.setup.parameters.circle_radius
+    shown = _instants(path, float(np.ptp(joints[0, :, 0])), count)
+    for title, axes, view in views:
+        for frame in shown:
+            draw_chain(axes, joints[frame], radius, view, _link_colors(color_of, walk.frame_time[frame]), edge=0.25)
+        _draw_way(axes, walk, center, view)
+        tidy(axes)
+        if tilts:
+            axes.set_title(title, fontsize="medium", loc="left")
+    for number, close_up in enumerate(close_ups):
+        axes = panel(_LEFT + number * close_up_width, _FOOT, close_up_width - 0.1, lower)
+        colors = _link_colors(color_of, walk.frame_time[close_up.frame])
+        draw_chain(axes, joints[close_up.frame], radius, SIDE, colors, edge=0.6)
+        _frame_close_up(axes, side, close_up, number, walk.frame_time[close_up.frame])
+    bar = panel(_LEFT, 0.45, 4.4, 0.14)
+    colorbar = figure.colorbar(color_of, cax=bar, orientation="horizontal", label="time since release / s")
+    colorbar.outline.set_visible(False)
+    style: dict[str, Any] = {"frameon": False, "title": setting(walk), "alignment": "left", "borderaxespad": 0.0}
+    place = (1 - _RIGHT / paper[0], 0.05 / paper[1])
+    figure.legend(*side.get_legend_handles_labels(), loc="lower right", bbox_to_anchor=place, ncols=2, **style)
+    return figure
+
+
+def _time_colors(walk: Walk) -> ScalarMappable:
+    """Colours of the times of the frames: viridis without its palest end, which can hardly be seen on white paper."""
+    colors = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)), name="time")
+    return ScalarMappable(Normalize(float(walk.frame_time[0]), float(walk.frame_time[-1])), colors)
+
+
+def _link_colors(color_of: ScalarMappable, moment: float) -> tuple[Array, Array, Array]:
+    """Colours of inner links, of outer links and of edges at a time [s], shape (3,) each."""
+    color = color_of.to_rgba(np.array([moment]))[0, :3]
+    return 1 - 0.45 * (1 - color), color, 0.6 * color
+
+
+def _instants(path: Array, width: float, count: int | None) -> list[int]:
+    """Frames between which the centre of mass moves equally far, the first and the last among them.
+
+    Args:
+        path: centre of mass in each frame [m], shape (f, 3).
+        width: width of the chain in the first frame [m].
+        count: number of frames; None: 6 to 12, as many as stay legible.
+    """
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    if count is None:
+        count = int(np.clip(1 + way[-1] / (0.6 * width), 6, 12))
+    marks = np.linspace(0.0, way[-1], count)[1:-1]
+    return sorted({0, *(int(np.argmin(np.abs(way - mark))) for mark in marks), len(way) - 1})
+
+
+def _draw_way(axes: Axes, walk: Walk, center: Array, view: Array) -> None:
+    """The sprocket, its height above the floor, and the path of the centre of mass."""
+    circle = sprocket_circle(walk)
+    if circle is not None:
+        style: dict[str, Any] = {"color": FAINT, "linewidth": 1.0, "linestyle": DASHES, "zorder": 1.5}
+        middle = circle[:-1].mean(axis=0)
+        upright = np.stack([middle, middle * (1.0, 0.0, 1.0)])
+        ends = np.stack([circle.min(axis=0), circle.max(axis=0)])  # from its edge the circle is a line
+        for part, label in ((circle if view is SIDE else ends, "sprocket until release"), (upright, "_")):
+            axes.plot(*(view @ part.T)[:2], label=label, **style)
+    axes.plot(*(view @ center.T)[:2], color=INK, linewidth=1.4, linestyle=DOTS, label="centre of mass", zorder=4)
+
+
+def _draw_distance(axes: Axes, walk: Walk, depth: float) -> None:
+    """The distance walked, if there is one, at height `depth` [m]."""
+    if not np.isfinite(walk.dx):
+        return
+    end = float(walk.center[-1, 0])
+    start = end - walk.dx
+    arrow = {"arrowstyle": "<|-|>", "color": INK, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", (end, depth), (start, depth), arrowprops=arrow, zorder=4)
+    for x in (start, end):
+        axes.plot([x, x], [0.0, 1.6 * depth], color=INK, linewidth=0.8, zorder=4)
+    box = {"facecolor": GROUND, "edgecolor": "none", "pad": 2.0}
+    text = f"$\\Delta x$ = {walk.dx:.3f} m"
+    axes.text((start + end) / 2, depth, text, ha="center", va="center", bbox=box, zorder=4)
+
+
+@dataclass(frozen=True)
+class _CloseUp:
+    """Title, number of the frame, and lower left and upper right corner of the picture [m], shape (2,) each."""
+
+    title: str
+    frame: int
+    low: Array
+    high: Array
+
+
+def _frame_close_up(axes: Axes, strip: Axes, close_up: _CloseUp, number: int, moment: float) -> None:
+    """The floor and the title of a close-up, and its box with a letter in the strip."""
+    (x, y), (right, top) = close_up.low, close_up.high
+    letter = f"$\\mathbf{{{'abcd'[number]}}}$"
+    draw_ground(axes, x, right, min(y, 0.0))
+    axes.set(xlim=(x, right), ylim=(y, top), xticks=[], yticks=[])
+    axes.set_title(f"{letter}  {close_up.title}, {moment:.3f} s", fontsize="medium", loc="left")
+    strip.add_patch(Rectangle((x, y), right - x, top - y, fill=False, edgecolor=INK, linewidth=0.8, zorder=5))
+    # Neighbouring boxes often overlap, so their letters are at alternate corners.
+    side = {"ha": "right", "x": right} if number % 2 else {"ha": "left", "x": x}
+    halo = [withStroke(linewidth=3.0, foreground="white")]
+    strip.text(y=top, s=letter, va="bottom", zorder=5, path_effects=halo, **side)
+
+
+def _close_ups(walk: Walk) -> list[_CloseUp]:
+    """At most four moments in order of time, no frame twice.
+
+    They are the first touch of the floor, the first self-contact, the collapse and the end, as far as they happen. The
+    collapse is the last time at which the top of the chain is half as high as at the release.
+    """
+    joints, radius = walk.frame_joints, walk.setup.parameters.circle_radius
+    height, last = joints[:, :, 1].max(axis=1), len(joints) - 1
+    found: dict[int, tuple[str, Array]] = {}
+    touching = np.flatnonzero(joints[:, :, 1].min(axis=1) < 1.02 * radius)
+    if touching.size:
+        frame = int(touching[0])
+        found[frame] = "first touch", joints[frame, np.argmin(joints[frame, :, 1])]
+    meeting = _first_meeting(joints, 2.02 * radius)
+    if meeting is not None:
+        found[meeting[0]] = "first self-contact", meeting[1]
+    frame = int(np.flatnonzero(height >= 0.5 * height[0])[-1])
+    found[frame] = "collapse", joints[frame, _sharpest_bend(joints[frame])]
+    found[last] = (
+        "rest" if walk.status is Status.AT_REST else "end",
+        np.array([np.median(joints[last, :, 0]), 0.0]),
+    )
+    size = np.array([1.0, 1.0 / _CLOSE_UP_ASPECT]) * _CLOSE_UP_LINKS * walk.setup.parameters.link_length
+    close_ups = []
+    for frame, (title, spot) in sorted(found.items()):
+        low = np.maximum(spot - size / 2, (-np.inf, -0.1 * size[1]))
+        close_ups.append(_CloseUp(title, frame, low, low + size))
+    return close_ups
+
+
+def _first_meeting(joints: Array, distance: float) -> tuple[int, Array] | None:
+    """First frame in which two joints at least 3 links apart are closer than `distance`, and where."""
+    count = joints.shape[1]
+    apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    excluded = np.minimum(apart, count - apart) < 3
+    for frame, (x, y) in enumerate(joints.transpose(0, 2, 1)):
+        squares = np.subtract.outer(x, x) ** 2 + np.subtract.outer(y, y) ** 2
+        squares[excluded] = np.inf
+        nearest = np.unravel_index(np.argmin(squares), squares.shape)
+        if squares[nearest] < distance**2:
+            return frame, joints[frame, list(nearest)].mean(axis=0)
+    return None
+
+
+def _sharpest_bend(joints: Array) -> int:
+    """Number of the joint at which the chain turns most over three links."""
+    step = joints - np.roll(joints, 1, axis=0)
+    direction = np.arctan2(step[:, 1], step[:, 0])
+    turn = np.angle(np.exp(1j * (np.roll(direction, -2) - np.roll(direction, 1))))
+    return int(np.argmax(np.abs(turn)))
