@@ -19,8 +19,8 @@ from warpchain.inputs.scene import Scene
 from warpchain.inputs.sections import NAME_OF_SYMBOL, SECTION_OF, SECTIONS
 from warpchain.store.folder import SweepFolder
 from warpchain.sweeps.plan import Sweep, load_sweep
-from warpchain.sweeps.schema import sweep_schema
 from warpchain.sweeps.shipped import shipped_sweeps
+from warpchain.sweeps.sweep_file import sweep_schema
 
 command = command_line.command
 
@@ -78,8 +78,7 @@ def test_parameters_as_tables(command: Command) -> None:
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        ("parameters floor_frictoin", "'floor_frictoin': unknown name; did you mean floor_friction?"),
-        ("parameters mu", "'mu': unknown name; did you mean mu_fc, mu_cc or mu_sc?"),
+        ("parameters floor_frictoin", "'floor_frictoin': unknown name; did you mean parameters.floor_friction?"),
         ("parameters --preset hard", "preset: 'hard' is unknown; presets are paper, soft"),
         (
             "walk --set mu_fc=0.3 --set floor_friction=0.3",
