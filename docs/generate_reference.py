@@ -18,10 +18,11 @@ from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.symbols import spelled
+from warpchain.inputs.validation import field_unit, spelled
 from warpchain.status import Status
 from warpchain.sweeps.designs import SAMPLERS
-from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL
+from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL, Frames
+from warpchain.sweeps.sweep_file import BlockKeys, BlockOfFile, SweepFile
 from warpchain.walks.rows import COLUMNS
 from warpchain.walks.walk_result import STORED
 
@@ -30,24 +31,6 @@ NOTE: Final = "<!-- Written by docs/generate_reference.py; change the code, then
 
 JSON: Final = "--json"
 """An option of most commands, which is explained once."""
-
-KEYS: Final = {
-    "version": ("file", "version of the format: 1"),
-    "name": ("file, block", "name of the sweep, in figures and pages; of a block, unique in its sweep"),
-    "seed": ("file", "whole number from which all random numbers follow"),
-    "preset": ("file, block", "parameters to start from; may also be an axis of the grid"),
-    "samples": ("file, block", "samples in each cell of the grid"),
-    "sampler": ("file, block", "how samples are drawn, see below; default: random"),
-    "scene": ("file, block", "fields of the [scene](scene.md) that differ from their defaults"),
-    "options": ("file, block", "[options](options.md) that differ from their defaults"),
-    "parameters": ("file, block", "[parameters](parameters.md) that differ from the preset"),
-    "distributions": ("file, block", "what samples draw, see below"),
-    "grid": ("file, block", "axes of the grid, see below; not in a file with blocks"),
-    "blocks": ("file", "list of blocks; what a block does not say is taken from the file"),
-    "same_samples_along": ("file", "axes along which the samples of all cells draw the same numbers"),
-    "record": ("file", "what is kept of the motion of walks, see below"),
-}
-"""Key of a sweep file → where it may stand, and its meaning."""
 
 SAMPLER_MEANINGS: Final = {
     "random": "independent samples",
@@ -187,13 +170,19 @@ def sweep_file_page() -> str:
         for name, law in TABLE.items()
         if isinstance(law, Uniform)
     ]
-    only_file = [f"`{key}`" for key, (where, _) in KEYS.items() if "block" not in where]
+    fields = sorted(SweepFile.model_fields.items(), key=lambda item: item[0] in BlockKeys.model_fields)
+    keys = [(f"`{name}`", str(field.description)) for name, field in fields]
+    kept = [
+        (f"`{name}`", f"{field.description}" + ", in s" * (field_unit(field) == "s"))
+        for name, field in Frames.model_fields.items()
+    ]
+    only_file = [f"`{name}`" for name, _ in fields if name not in BlockOfFile.model_fields]
     numbers = [f"`{name}`" for name, field in Scene.model_fields.items() if field.annotation is float]
     return (
         "# Sweep file\n\nA sweep file is a YAML mapping with these keys. A block is such a mapping, too, without "
         f"{', '.join(only_file)}. An error names the path of the value, such as `sweep.blocks[0].grid.frequency[3]`. "
         "[Sweeps](../sweeps.md) shows how to use it.\n\n"
-        + listing((f"`{key}`", meaning) for key, (_, meaning) in KEYS.items())
+        + listing(keys)
         + "\n## Grid\n\nEach key is `preset` or a field of scene, options or parameters. Each value is a list, such as "
         "`[10, 15, 20]`, or a range with both ends: `{from: 5, to: 30, step: 5}` or `{from: 5, to: 30, count: 6}`. The "
         "last axis varies fastest. `null` stands for itself where a field may be null, such as `load_factor: [null, "
@@ -210,14 +199,7 @@ def sweep_file_page() -> str:
         + "\n## Record\n\n"
         f"`series` keeps the time series of a walk, every {SERIES_INTERVAL:g} s. `frames` keeps positions of "
         f"all joints, every {FRAME_INTERVAL:g} s, of samples whose series are kept. Each is `false`, `true` (all "
-        "samples) or a mapping:\n\n"
-        + listing(
-            (
-                ("`interval`", "time between two, in s; a whole multiple of `record_interval`"),
-                ("`samples`", "`all` or numbers of samples, such as `[0, 1]`, the same in each cell"),
-                ("`before`", "of frames: time before the release that is kept as well, with the joints' loads, in s"),
-            )
-        )
+        "samples) or a mapping:\n\n" + listing(kept)
     )
 
 

@@ -1,95 +1,223 @@
-"""Hostile inputs of every kind end soon, in little memory, in the right result or in one printable line."""
+"""Hostile settings, sweeps, YAML and command lines end soon: in what they say, or in short lines that refuse them.
 
-import itertools
+`pytest tests/test_fuzz.py --hypothesis-profile=long` tries for minutes.
+"""
+
+import contextlib
+import io
 import json
 import time
-from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
-from hypothesis import HealthCheck, Phase, given, seed, settings
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
-from tests.support import watched_process
-from tests.support.fuzzed_inputs import INPUTS
-from tests.support.watched_process import WatchedProcess
+from warpchain.cli.main import main
+from warpchain.inputs.distributions import DRAWABLE
+from warpchain.inputs.setup import read_setup, resolve
+from warpchain.inputs.validation import FIELDS, LONGEST_LINE, NAME_OF_SYMBOL, SECTION_OF, InputError
+from warpchain.inputs.value_list import list_values
+from warpchain.inputs.yaml_files import parse_yaml
+from warpchain.run import single_walk
+from warpchain.run.single_walk import setup_walk
+from warpchain.sweeps.designs import SAMPLERS
+from warpchain.sweeps.plan import load_sweep
 
-pytestmark = pytest.mark.slow
+SECONDS = 5.0
+"""Most processor time of an input."""
 
-EXAMPLES = 60
-"""Inputs of each kind."""
-FEWER = {"bytes of sweep.yaml": 5, "bytes of log.txt": 5, "shards run again": 30}
-"""Inputs of kinds that take longer: most of them end in reading a whole sweep."""
-BATCH = 200
-"""Inputs between two looks at the clock, when a time is given."""
-SEED = 20180601
+hostile_inputs = settings(deadline=None, suppress_health_check=list(HealthCheck))
 
+# Values: most are plausible, so that many inputs get past the first check
 
-@pytest.fixture(scope="module")
-def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[WatchedProcess]:
-    """The process that takes the inputs."""
-    process = WatchedProcess(tmp_path_factory.mktemp("fuzz"))
-    yield process
-    process.close()
-
-
-@pytest.mark.parametrize("kind", INPUTS)
-def test_hostile_inputs_end_well(
-    watched: WatchedProcess, kind: str, request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Within 5 s and 500 MB: what undamaged input gives, or a line and exit status 2, 1 for damage."""
-    minutes = request.config.getoption("fuzz_minutes")
-    play, strategy = INPUTS[kind]
-    counts: Counter[str] = Counter()
-    failures: list[str] = []
-    seconds = megabytes = 0.0
-
-    def ask(hostile: object) -> None:
-        nonlocal seconds, megabytes
-        answer = watched.ask(play, hostile)
-        seconds, megabytes = max(seconds, answer.seconds), max(megabytes, answer.megabytes)
-        counts[answer.outcome] += 1
-        if answer.problem is not None:
-            failures.append(f"{answer.outcome}: {json.dumps([play, hostile])}\n{answer.problem}")
-            if minutes:
-                with capsys.disabled():
-                    print(f"\n{failures[-1]}", flush=True)
-
-    end = time.monotonic() + 60 * minutes / len(INPUTS)
-    for number in itertools.count():
-        limits = settings(
-            max_examples=BATCH if minutes else FEWER.get(kind, EXAMPLES),
-            database=None,
-            deadline=None,
-            phases=[Phase.generate],
-            suppress_health_check=list(HealthCheck),
-        )
-        limits(seed(SEED + number)(given(strategy)(ask)))()
-        if time.monotonic() > end:
-            break
-    if minutes:
-        with capsys.disabled():
-            outcomes = ", ".join(f"{name} {number}" for name, number in counts.most_common())
-            print(f"\n{kind}: {counts.total()}; {outcomes}; at most {seconds:.2f} s, {megabytes:.0f} MB", flush=True)
-    assert not failures, f"{len(failures)} of {counts.total()}\n" + "\n\n".join(failures[:3])
-
-
-@pytest.mark.parametrize(
-    ("given", "outcome", "words"),
-    [
-        ("__import__('time').sleep(60)", "hung", "no answer within 3 s"),
-        ("__import__('os').abort()", "crashed", "Fatal Python error: Aborted"),
-        ("sum(range(5 * 10**6))", "slow", "s of processor time"),
-        ("b'x' * 6 * 10**8", "large", "MB"),
-        ("1 / 0", "traceback", "ZeroDivisionError"),
-        ("walk(links=3)", "exit 2", None),
-    ],
+NUMBERS = st.one_of(
+    st.integers(-5, 200),
+    st.floats(),
+    st.sampled_from([0.1, 1e-9, 1e9, 2**53 + 1, 2**63, 10**400, 5e-324, -0.0, 1.7e308]),
 )
-def test_the_watched_process_is_watched(
-    watched: WatchedProcess, monkeypatch: pytest.MonkeyPatch, given: str, outcome: str, words: str | None
-) -> None:
-    """What must not happen is told, and the next input finds a process that answers."""
-    monkeypatch.setattr(watched_process, "PATIENCE", 3 if outcome == "hung" else 60)
-    monkeypatch.setattr(watched_process, "SECONDS", 0.01 if outcome == "slow" else 5.0)
-    answer = watched.ask("python", given)
-    assert answer.outcome == outcome
-    assert answer.problem is None if words is None else words in str(answer.problem)
+TEXTS = st.one_of(
+    st.text(max_size=30), st.sampled_from(["", "\x1b[2J", "\u202e", "\ud800", "15 Hz", "060", "x" * 3000])
+)
+OBJECTS = st.sampled_from(
+    [None, 1j, b"60", object(), range(30, 60, 10), range(10**30), np.float32(0.1), np.longdouble("1e4000"), np.bool_(1),
+     np.timedelta64(60, "s"), np.zeros(10**6), np.array(60), np.array([30, 32], np.uint8), np.array([object()]),
+     np.zeros(2, "i4,f8"), np.ma.masked, np.nan, int, {1: 2}, {(1, 2): 3}, {"from": 30, "to": 60, "step": 10}]
+)  # fmt: skip
+HOSTILE = st.recursive(
+    st.one_of(NUMBERS, st.booleans(), TEXTS, OBJECTS),
+    lambda inner: st.one_of(st.lists(inner, max_size=4), st.dictionaries(TEXTS, inner, max_size=3)),
+    max_leaves=8,
+)
+NAMES = st.one_of(st.sampled_from([*FIELDS, *NAME_OF_SYMBOL, "preset", "__class__", "<<"]), TEXTS)
+ENTRIES = {entry.name: entry for entries in list_values("soft").values() for entry in entries}
+
+
+def mostly(usual: st.SearchStrategy[Any], hostile: st.SearchStrategy[Any] = HOSTILE) -> st.SearchStrategy[Any]:
+    """The one, and now and then the other."""
+    return st.integers(0, 15).flatmap(lambda chance: hostile if chance == 1 else usual)
+
+
+def plausible(name: str) -> st.SearchStrategy[Any]:
+    """Values that a field may have, and some just beyond."""
+    entry = ENTRIES.get(name)
+    if name == "links":
+        return st.sampled_from([60, 40, 90, 62, 31, 4, 400])
+    if entry is None or entry.value is None:
+        return NUMBERS
+    if entry.choices or isinstance(entry.value, str):
+        return st.sampled_from([*entry.choices, entry.value, "other"])
+    return st.sampled_from([1, 1.0, 0.9, 1.1, 0.5, 3.0, -1.0, 0.0]).map(lambda factor: entry.value * factor)
+
+
+def mapping_of(
+    names: st.SearchStrategy[str], values: Callable[[str], st.SearchStrategy[Any]]
+) -> st.SearchStrategy[Any]:
+    """Names with values that suit them, mostly."""
+    some = st.lists(mostly(names, NAMES), max_size=3, unique=True)
+    return some.flatmap(lambda found: st.fixed_dictionaries({name: mostly(values(name)) for name in found}))
+
+
+def axis(name: str) -> st.SearchStrategy[Any]:
+    """Values of an axis."""
+    ends = {"from": plausible(name), "to": plausible(name)}
+    spans = st.fixed_dictionaries(ends, optional={"step": NUMBERS, "count": NUMBERS})
+    return st.one_of(st.lists(mostly(plausible(name)), min_size=1, max_size=3), spans)
+
+
+def law(name: str) -> st.SearchStrategy[Any]:
+    """What samples draw of a quantity."""
+    return st.one_of(
+        st.sampled_from(["fixed", "table", "gauss"]),
+        st.lists(plausible(name), min_size=2, max_size=2).map(lambda ends: {"uniform": ends}),
+        st.fixed_dictionaries({"sigma": NUMBERS}, optional={"mean": plausible(name)}).map(lambda m: {"gaussian": m}),
+    )
+
+
+def section(of: str) -> st.SearchStrategy[Any]:
+    """Content of a section."""
+    return mapping_of(st.sampled_from([name for name in FIELDS if SECTION_OF[name] == of]), plausible)
+
+
+KEPT = st.fixed_dictionaries(
+    {},
+    optional={
+        "interval": st.sampled_from([0.001, 0.01, 1e-12, 1e300]),
+        "samples": st.lists(st.integers(-1, 5), max_size=3),
+        "before": NUMBERS,
+    },
+)
+BLOCK = {
+    **{of: mostly(section(of)) for of in ("scene", "options", "parameters")},
+    "distributions": mostly(mapping_of(st.sampled_from(["all", *DRAWABLE]), law)),
+    "grid": mostly(mapping_of(st.sampled_from(["links", "frequency", "mu_fc", "tolerance", "preset", "start"]), axis)),
+    "samples": mostly(st.sampled_from([1, 2, 4, 8, 2**30])),
+    "sampler": mostly(st.sampled_from(SAMPLERS)),
+    "preset": mostly(st.sampled_from(["soft", "paper"])),
+}
+SWEEPS = st.fixed_dictionaries(
+    {"version": mostly(st.just(1)), "name": mostly(st.just("a")), "seed": mostly(st.integers(0, 2**128))}
+    | {key: BLOCK[key] for key in ("samples", "preset")},
+    optional={
+        **{key: BLOCK[key] for key in BLOCK if key not in ("samples", "preset")},
+        "blocks": st.lists(st.fixed_dictionaries({"name": st.sampled_from("abc")}, optional=BLOCK), max_size=3),
+        "same_samples_along": mostly(st.lists(NAMES, max_size=2)),
+        "record": mostly(st.fixed_dictionaries({}, optional={"series": st.booleans() | KEPT, "frames": KEPT})),
+    },
+)
+SETTINGS = mapping_of(
+    st.sampled_from([*FIELDS, *NAME_OF_SYMBOL]), lambda name: plausible(NAME_OF_SYMBOL.get(name, name))
+)
+
+YAML_WORDS = (
+    "~", "yes", "0x10", "1_000", "1e400", ".nan", "2020-01-01", "!!int ''", "!!float x", "!!bool ''", "!!set {a}",
+    "!!binary aGk=", "!!python/object/apply:os.system [true]", "!x y", "&a [*a]", "*a", "<<: {a: 1}", "? {a: 1}",
+    "[" * 30, "9" * 5000, '"\\Uffffffff"', "%YAML 9.9", "--- a\n--- b", "|\n x", "@", "\t", "{a: 1, a: 2}", "[a, b",
+)  # fmt: skip
+
+
+def in_yaml(value: Any) -> str:
+    """A value in one line, with words of YAML for what JSON does not have."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(str(key))}: {in_yaml(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(in_yaml, value)) + "]"
+    return (
+        json.dumps(value) if isinstance(value, str | float | int) else YAML_WORDS[hash(type(value)) % len(YAML_WORDS)]
+    )
+
+
+FILES = st.builds(
+    lambda text, word, place, cut: text[: place % (len(text) + 1)] + word + text[(place + cut) % (len(text) + 1) :],
+    st.one_of(SWEEPS, st.fixed_dictionaries({}, optional={**BLOCK})).map(in_yaml),
+    st.sampled_from(["", "", *YAML_WORDS]),
+    st.integers(0, 2**20),
+    st.integers(0, 20),
+)
+
+
+def taken(call: Callable[[], Any]) -> Any:
+    """What a call gives; None if it is refused, in short printable lines. Either way it takes little time."""
+    begun = time.process_time()
+    try:
+        return call()
+    except InputError as error:
+        assert error.args and all(line.isprintable() and 0 < len(line) <= LONGEST_LINE for line in error.args)
+        return None
+    finally:
+        assert time.process_time() - begun < SECONDS
+
+
+@hostile_inputs
+@given(settings=SETTINGS, preset=mostly(st.sampled_from(["soft", "paper"])), seed=mostly(st.none() | st.integers(0, 9)))
+def test_settings_of_a_walk(settings: Any, preset: Any, seed: Any) -> None:
+    """Keywords from Python; a setup given again means itself."""
+    setup = taken(lambda: setup_walk(preset, settings, seed))
+    if setup is not None:
+        sections = {name: getattr(setup, name).model_dump() for name in ("parameters", "scene", "options")}
+        assert resolve(setup.preset, **sections) == setup
+
+
+@hostile_inputs
+@given(SWEEPS)
+def test_content_of_a_sweep(content: Any) -> None:
+    """Content from Python; the canonical form of what is taken is the same sweep, and its walks can be planned."""
+    sweep = taken(lambda: load_sweep(content))
+    if sweep is not None:
+        assert load_sweep(json.loads(json.dumps(sweep.canonical()))).digest() == sweep.digest()
+        assert sweep.planned(sweep.walk_count - 1).index == sweep.walk_count - 1
+
+
+@hostile_inputs
+@given(text=FILES)
+def test_yaml(tmp_path: Path, text: str) -> None:
+    """Files of setups and of sweeps."""
+    path = tmp_path / "given.yaml"
+    path.write_bytes(text.encode("utf-8", "surrogatepass"))
+    taken(lambda: parse_yaml(text, "text"))
+    taken(lambda: load_sweep(path))
+    found = taken(lambda: read_setup(path))
+    if found is not None:
+        taken(lambda: resolve(found[0], **found[1]))
+
+
+@hostile_inputs
+@given(words=st.lists(st.tuples(NAMES, mostly(NUMBERS).map(in_yaml)), max_size=3), more=st.lists(TEXTS, max_size=1))
+def test_command_lines(monkeypatch: pytest.MonkeyPatch, words: list[tuple[str, str]], more: list[str]) -> None:
+    """`--set NAME=VALUE` comes to the walk, or ends in one line with exit status 2."""
+
+    def begin(setups: Any, **_: object) -> Any:
+        raise SystemExit(0)
+
+    monkeypatch.setattr(single_walk, "run_setups", begin)
+    sets = [word for name, value in words for word in ("--set", f"{name}={value}")]
+    err = io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True)
+    with contextlib.redirect_stderr(err), pytest.raises(SystemExit) as end:
+        main(["walk", *sets, *more])
+    lines = err.buffer.getvalue().decode().splitlines()  # type: ignore[attr-defined]
+    refusals = [line for line in lines if not line.startswith("warning: ")]
+    assert all(line.isprintable() and len(line) <= LONGEST_LINE for line in lines)
+    assert end.value.code in (0, None) if not refusals else end.value.code == 2 and len(refusals) == 1

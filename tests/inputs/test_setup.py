@@ -1,25 +1,26 @@
-"""The setup of a walk: completed values, and YAML files."""
+"""The setup of a walk: completed values, names and the paper's symbols in their place, YAML files."""
 
 from pathlib import Path
 
 import pytest
 
+import warpchain
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import PRESETS
+from warpchain.inputs.parameters import PRESETS, Parameters, preset
 from warpchain.inputs.scene import Scene
+from warpchain.inputs.sections import NAME_OF_SYMBOL, SECTION_OF, SYMBOL_OF
 from warpchain.inputs.setup import Setup, read_setup, resolve
 from warpchain.inputs.validation import InputError
+from warpchain.run.single_walk import setup_walk
 
-
-def test_resolve_completes() -> None:
-    """Values that are not given come from the preset and from the defaults."""
-    setup = resolve("soft", scene={"links": 80}, options={"method": "dp5"}, parameters={"gravity": 1.62})
-    assert setup == Setup(
-        preset="soft",
-        parameters=PRESETS["soft"].with_values({"gravity": 1.62}),
-        scene=Scene(links=80),
-        options=Options(method="dp5"),
-    )
+SYMBOLS = {
+    "links": "n", "frequency": "nu", "link_length": "ell", "sprocket_radius": "R", "inner_mass": "m_inner",
+    "outer_mass": "m_outer", "inner_inertia": "I_inner", "outer_inertia": "I_outer", "viscous_friction": "beta",
+    "coulomb_friction": "tau_c", "floor_restitution": "e_fc", "floor_friction": "mu_fc", "gravity": "g",
+    "chain_restitution": "e_cc", "chain_friction": "mu_cc", "sprocket_restitution": "e_sc",
+    "sprocket_friction": "mu_sc", "joint_stiffness": "k", "joint_damping": "b", "friction_smoothing": "omega_c",
+    "tangential_restitution": "e_t", "circle_radius": "r", "half_width": "h",
+}  # fmt: skip
 
 
 def written(folder: Path, text: str) -> Path:
@@ -29,14 +30,15 @@ def written(folder: Path, text: str) -> Path:
     return path
 
 
-def loaded(path: Path | str) -> Setup:
-    """The setup of a YAML file."""
-    preset, sections = read_setup(path)
-    return resolve(preset, **sections)
+def test_values_are_completed() -> None:
+    """Values that are not given come from the preset and from the defaults."""
+    setup = resolve("soft", scene={"links": 80}, options={"method": "dp5"}, parameters={"gravity": 1.62})
+    parameters = PRESETS["soft"].with_values({"gravity": 1.62})
+    assert setup == Setup("soft", parameters, Scene(links=80), Options(method="dp5"))
 
 
-def test_setup_of_a_file(tmp_path: Path) -> None:
-    """A YAML file gives the same setup as the same values given as arguments; 1e7 is a number."""
+def test_a_file_gives_the_setup_of_its_values(tmp_path: Path) -> None:
+    """Sections without values, or no section at all, leave the defaults."""
     text = """
     preset: paper
     scene: {links: 80, frequency: 2e1, start: ellipse}
@@ -45,80 +47,56 @@ def test_setup_of_a_file(tmp_path: Path) -> None:
       step_limit: 1_000_000
       self_contact: no
     parameters:
-      joint_stiffness: 1e7
-      tangential_restitution: -.5
-      gravity: 10
     """
-    assert loaded(written(tmp_path, text)) == resolve(
+    name, sections = read_setup(written(tmp_path, text))
+    assert resolve(name, **sections) == resolve(
         "paper",
         scene={"links": 80, "frequency": 20.0, "start": "ellipse"},
         options={"tolerance": 1e-7, "step_limit": 1_000_000, "self_contact": False},
-        parameters={"joint_stiffness": 1e7, "tangential_restitution": -0.5, "gravity": 10.0},
+        parameters={},
     )
+    assert read_setup(written(tmp_path, "scene: {n: 8}")) == (
+        None, {"scene": {"links": 8}, "options": {}, "parameters": {}}
+    )  # fmt: skip
 
 
-def test_setup_of_a_file_with_empty_sections(tmp_path: Path) -> None:
-    """A section without values, or no section at all, leaves the defaults."""
-    expected = resolve("soft", scene={}, options={}, parameters={})
-    assert loaded(written(tmp_path, "preset: soft")) == expected
-    assert loaded(str(written(tmp_path, "preset: soft\nscene:\noptions: {}\n"))) == expected
-    assert read_setup(written(tmp_path, "scene: {links: 8}")) == (
-        None,
-        {"scene": {"links": 8}, "options": {}, "parameters": {}},
-    )
+def test_every_parameter_has_one_symbol() -> None:
+    """Symbols are typed here from the paper; none is a name, and all is ASCII."""
+    assert SYMBOL_OF == SYMBOLS
+    assert not NAME_OF_SYMBOL.keys() & SECTION_OF.keys()
+    assert all(symbol.isascii() and symbol.isidentifier() for symbol in NAME_OF_SYMBOL)
+
+
+@pytest.mark.parametrize("name", Parameters.model_fields)
+def test_symbols_stand_for_names(tmp_path: Path, name: str) -> None:
+    """A value by its symbol, in ASCII or as printed, is the value by its name: in a call, in a file, in a change."""
+    value = 1.1 * Parameters.quantities()[name].value if name != "sprocket_friction" else 0.5
+    expected = setup_walk("soft", {name: value}, None)
+    for symbol in (SYMBOLS[name], Parameters.quantities()[name].symbol):
+        assert setup_walk("soft", {symbol: value}, None) == expected
+        assert preset("soft").with_values({symbol: value}) == expected.parameters
+        path = written(tmp_path, f"preset: soft\nparameters: {{{symbol}: {value!r}}}")
+        assert read_setup(path)[1]["parameters"] == {name: value}
+
+
+def test_a_value_is_given_once(tmp_path: Path) -> None:
+    """A value by name and by symbol is refused."""
+    path = written(tmp_path, "preset: soft\nparameters: {mu_fc: 0.3, floor_friction: 0.3}")
+    with pytest.raises(InputError, match=r"^parameters\.floor_friction: given twice, also as 'mu_fc'; leave one out$"):
+        read_setup(path)
+    for call in (warpchain.walk, lambda **both: preset("soft").with_values(both)):
+        with pytest.raises(InputError, match=r"^(parameters\.)?gravity: given twice, also as 'g'; leave one out$"):
+            call(gravity=9.0, g=9.0)
+    with pytest.raises(InputError, match=r"^n: an argument of its own has this value; give links=…$"):
+        warpchain.walk(n=80)
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("preset: paper\nscene: {links: 61}", "scene.links: 61 is odd"),
-        ("preset: paper\nscene: {links: 060}", "scene.links: '060' is text; give a whole number"),
-        (
-            "preset: paper\nscene: {frequency: 1:30}",
-            "scene.frequency: '1:30' is text; give a plain number in Hz",
-        ),
-        ("preset: paper\nscene: {frequency: 15 Hz}", "scene.frequency: '15 Hz' has its unit written"),
-        ("preset: paper\nscene: {frequency: .nan}", "scene.frequency: nan is not finite"),
-        ("preset: paper\nscene: {frequency: -.inf}", "scene.frequency: -inf is not finite"),
-        ("preset: paper\nscene: {frequency: }", "scene.frequency: empty"),
-        ("preset: paper\nscene: [1]", "scene: [1] is not a mapping"),
-        ("preset: papr", "preset: 'papr' is unknown; presets are paper, soft"),
-        ("preset: [paper]", "preset: ['paper'] is unknown"),
-        ("preset: paper\nsceen: {}", "'sceen': unknown key; did you mean scene?"),
-        ("preset: paper\n7: {}", "7: unknown key; give one of preset, scene, options, parameters"),
-        ("preset: paper\nscene: {links: 60, links: 80}", "{path}, line 2: key 'links' is given twice"),
-        ("preset: paper\nscene: {links: 60, 'links': 60}", "{path}, line 2: key 'links' is given twice"),
-        ("preset: paper\npreset: soft", "{path}, line 2: key 'preset' is given twice"),
-        ("preset: paper\nscene: {links: 60", "{path}, line 2: while parsing a flow mapping, expected ',' or '}'"),
-        (
-            "preset: paper\n---\npreset: soft",
-            "{path}, line 2: expected a single document in the stream, but found another document; correct the YAML",
-        ),
-        ("preset: paper\nscene: {? [1, 2] : 3}", "{path}, line 2: "),
-        ("preset: !!python/object:os.system x", "{path}, line 1: "),
-        ("preset: !!map [a]", "{path}, line 1: "),
-        ("preset: !!int abc", "{path}, line 1: 'abc' is no number"),
-        ("preset: \x00", "{path}: "),
-        ("[" * 5000, "{path}, line 1: more than 20 lists or mappings inside of one another"),
-        ("", "{path}: no mapping at the top"),
-        ("- paper", "{path}: no mapping at the top"),
-    ],
+    ("written", "meant"),
+    [("floor_frictoin", "parameters.floor_friction"), ("mu_fd", "parameters.mu_fc"), ("frequncy", "scene.frequency")],
 )
-def test_setup_of_a_file_refusals(tmp_path: Path, text: str, message: str) -> None:
-    """A bad file is refused in one line that says where and why."""
-    path = written(tmp_path, text)
-    with pytest.raises(InputError) as caught:
-        loaded(path)
-    assert str(caught.value).startswith(message.replace("{path}", str(path)))
-    assert "\n" not in str(caught.value)
-
-
-def test_setup_of_a_file_unreadable(tmp_path: Path) -> None:
-    """A missing file, a folder and a file that is no text are refused in one line."""
-    binary = tmp_path / "binary.yaml"
-    binary.write_bytes(b"\xff\xfe\xff")
-    for path in (tmp_path / "none.yaml", tmp_path, binary):
-        with pytest.raises(InputError) as caught:
-            loaded(path)
-        assert str(caught.value).startswith(f"{path}: ")
-        assert "\n" not in str(caught.value)
+def test_an_unknown_name_is_looked_for_everywhere(written: str, meant: str) -> None:
+    """The remedy names the closest name or symbol, whatever its section."""
+    for call in (lambda: warpchain.walk(**{written: 1}), lambda: preset("paper").with_values({written: 1})):
+        with pytest.raises(InputError, match=rf"{written}'?: unknown name; did you mean {meant}\?$"):
+            call()

@@ -109,9 +109,9 @@ def test_a_walk_and_a_trajectory_of_numpy_numbers():
 def test_what_is_no_number_is_still_refused():
     """An array is no number, whole numbers have no fractions, and messages show Python's numbers."""
     for settings, message in (
-        ({"links": np.array([30])}, r"scene\.links: \[30\] is of type list; give a whole number"),
-        ({"links": np.float64(30.0)}, r"scene\.links: 30.0 is of type float; .*"),
-        ({"frequency": np.float64("nan")}, r"scene\.frequency: nan is not finite; .*"),
+        ({"links": np.array([30])}, r"scene\.links: .*; given \[30\]"),
+        ({"links": np.float64(30.0)}, r"scene\.links: .*; given 30.0"),
+        ({"frequency": np.float64("nan")}, r"scene\.frequency: .*; given nan"),
         ({"seed": np.float64(1.0)}, r"seed: 1.0 is no whole number .*"),
         ({"frame_interval": np.bool_(True)}, r"frame_interval: True is not a positive time .*"),
     ):

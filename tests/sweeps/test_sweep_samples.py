@@ -11,7 +11,7 @@ import pytest
 from scipy import stats
 
 from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content, drawn
-from warpchain.inputs.distributions import Gaussian, Uniform, random_generator, sampled
+from warpchain.inputs.distributions import Gaussian, random_generator, sampled
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import check_scene, fewest_links
 from warpchain.inputs.setup import resolve
@@ -229,16 +229,6 @@ def test_quantiles_of_truncated_gaussians(ends: tuple[float, float]) -> None:
     for fraction in (1e-12, 1e-3, 0.3, 0.5, 0.9, 1 - 1e-9):
         expected = stats.truncnorm(*ends, loc=0.25, scale=0.5).ppf(fraction)
         assert gaussian.quantile(fraction) == pytest.approx(expected, rel=1e-8, abs=1e-12)
-
-
-def test_shares_and_quantiles_stay_inside() -> None:
-    """The share of physical draws is that of the interval; quantiles never leave it."""
-    assert Gaussian(0.0, 2.0, Bounds(0.0)).share() == pytest.approx(0.5)
-    assert Gaussian(0.0, 1.0, Bounds(-1.0, 1.0)).share() == pytest.approx(0.6826894921)
-    half = Uniform(0.0, 1.0, Bounds(0.5))
-    assert (half.share(), half.quantile(0.0), half.quantile(0.5)) == (0.5, 0.5, 0.75)
-    with pytest.raises(ValueError, match="no mean"):
-        Gaussian(None, 1.0, Bounds(0.0)).quantile(0.5)
 
 
 @pytest.mark.parametrize("sampler", ["random", "sobol", "latin_hypercube", "saltelli"])

@@ -10,7 +10,7 @@ from warpchain.inputs.scene import Scene
 from warpchain.store.block_result import BlockResult
 from warpchain.store.sweep_result import SweepResult
 from warpchain.walks.rows import COLUMNS, KEYS, MISSING, field_column, fill_row, missing_rows, numbers_of, row_type
-from warpchain.walks.walk_result import NUMBERS, STORED
+from warpchain.walks.walk_result import NUMBERS
 
 
 def test_names_of_columns_mean_one_thing() -> None:
@@ -19,17 +19,6 @@ def test_names_of_columns_mean_one_thing() -> None:
     assert not fields & COLUMNS.keys()
     taken = {*dir(BlockResult), *dir(SweepResult), *BlockResult.__annotations__, *SweepResult.__annotations__}
     assert not taken & (fields | COLUMNS.keys())
-
-
-def test_columns_of_a_row() -> None:
-    """The numbers of a walk and what is drawn, in the order of the table, are columns, without padding."""
-    bare = row_type([])
-    assert {"dx", "walk_time", "bounces", "impulses_self", "penetration_floor", "loss_floor"} < set(bare.names or ())
-    assert "wall_time" not in COLUMNS
-    assert bare.itemsize == sum(bare[name].itemsize for name in bare.names or ())
-    one, other = row_type(["clearance", "phase", "link_length"]), row_type(["link_length", "clearance", "phase"])
-    assert one == other and one.names == (*(bare.names or ()), "link_length_drawn", "phase_drawn", "clearance_drawn")
-    assert COLUMNS["dx"].meaning == STORED["dx"].meaning and COLUMNS["loss_floor"].unit == "J"
 
 
 def test_a_row_has_all_numbers_of_a_walk() -> None:

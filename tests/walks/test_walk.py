@@ -315,39 +315,15 @@ def test_step_limit(start, limit):
     assert walk.walk_time > 0
 
 
-def test_step_too_small():
-    """A smallest step above what the springs allow ends in step_too_small."""
-    walk = short_walk(smallest_step=1.9e-5, tolerance=1e-9)
-    assert walk.status == Status.STEP_TOO_SMALL
+@pytest.mark.parametrize(
+    ("settings", "status"),
+    [
+        ({"smallest_step": 1.9e-5, "tolerance": 1e-9}, Status.STEP_TOO_SMALL),
+        ({"links": 100, "skin": 1.0}, Status.LIST_OVERFLOW),
+    ],
+)
+def test_settings_that_end_a_walk_at_once(settings, status):
+    """A smallest step above what the springs allow, and a skin that makes every joint a neighbour of all others."""
+    walk = short_walk(**settings)
+    assert walk.status == status
     assert np.isnan(walk.dx)
-
-
-def test_list_overflow():
-    """A skin that makes every joint a neighbour of all others ends in list_overflow before the first step."""
-    walk = short_walk(links=100, skin=1.0)
-    assert walk.status == Status.LIST_OVERFLOW
-    assert np.isnan(walk.dx)
-    assert walk.steps_accepted == 0
-
-
-# --- the whole range ---
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("links", [60, 180])
-def test_whole_range_ends_at_rest(links):
-    """From 5 to 30 Hz chains of 60 and of 180 links come to rest, further off the faster the sprocket turned.
-
-    The slowest walk of the longest is the case ``pile-slow-walk`` of the hard ones: a pile beside the sprocket.
-    """
-    walks = [soft_walk(links=links, frequency=frequency, start="spinning") for frequency in (5.0, 15.0, 30.0)]
-    assert [walk.status for walk in walks] == [Status.AT_REST] * 3
-    dx = [walk.dx for walk in walks]
-    assert 0 < dx[0] < dx[1] < dx[2] < 5
-    for walk in walks:
-        assert_ledger_closes(walk, 1e-4)
-        assert walk.center[-1, 1] < 0.06
-        assert walk.greatest_penetration["floor"] < SOFT.circle_radius / 2
-    if links == 180:
-        assert dx[0] < 0.3
-        assert walks[0].impulses["self"] > 1e5

@@ -57,7 +57,7 @@ def schema(
     """
     from warpchain.files import write_whole
     from warpchain.inputs.validation import printable
-    from warpchain.sweeps.schema import sweep_schema
+    from warpchain.sweeps.sweep_file import sweep_schema
 
     text = json.dumps(sweep_schema(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     if path is None:

@@ -82,6 +82,7 @@ def walk(
     from warpchain.cli.walk_files import try_walk_folder, write_walk
     from warpchain.inputs.distributions import LARGEST_SEED
     from warpchain.inputs.validation import InputError, checked_whole, printable
+    from warpchain.inputs.yaml_files import parse_yaml
     from warpchain.run.single_walk import run_walk
 
     named = {"links": links, "frequency": frequency, "start": start}
@@ -92,7 +93,7 @@ def walk(
                 raise InputError(f"{name}: given together with --like, and a saved walk has its own; leave one out")
         setup, number = _setup_like(like, given, record_loads)
     else:
-        number = None if seed is None else checked_whole(_parsed("seed", seed), "seed", 0, LARGEST_SEED)
+        number = None if seed is None else checked_whole(parse_yaml(seed, "seed"), "seed", 0, LARGEST_SEED)
         setup = _setup(config, preset, given, number, record_loads)
     interval = _frame_interval(folder, animation, frame_interval, record_loads)
     if folder is not None:
@@ -155,11 +156,11 @@ def plot_walk(path: Path, folder: Path | None, kind: "Kind | None") -> None:
     walk, folder = load_walk(path), path.parent if folder is None else folder
     try_folder(folder)
     make_folder(folder)
-    drawn = False
+    plotted = False
     for drawing in draw_figures(walk, folder, kinds_of(walk) if kind is None else (kind,)):
         print(printable(str(drawing)))
-        drawn = True
-    if not drawn:
+        plotted = True
+    if not plotted:
         raise typer.Exit(FAILED)
 
 
@@ -171,6 +172,7 @@ def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -
     """
     from warpchain.inputs.sections import SECTION_OF, by_section, dotted_name
     from warpchain.inputs.validation import InputError, shown
+    from warpchain.inputs.yaml_files import parse_yaml
 
     pairs = [(name, text) for name, text in named.items() if text is not None]
     for assignment in assignments:
@@ -184,25 +186,8 @@ def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -
         path = f"{SECTION_OF[name]}.{name}"
         if name in values:
             raise InputError(f"{path}: given twice on the command line; give it once")
-        values[name] = _parsed(path, text)
+        values[name] = parse_yaml(text, path)
     return by_section(values)
-
-
-def _parsed(path: str, text: str) -> Any:
-    """The value of a text, read as in a YAML file.
-
-    Raises:
-        InputError: the text is not YAML.
-    """
-    import yaml
-
-    from warpchain.inputs.validation import InputError, shown
-    from warpchain.inputs.yaml_files import parse_yaml
-
-    try:
-        return parse_yaml(text)
-    except yaml.YAMLError:
-        raise InputError(f"{path}: {shown(text)} cannot be read; give a number, true, false or a name") from None
 
 
 def _setup(config: Path | None, preset: str | None, given: Sections, seed: int | None, records_loads: bool) -> "Setup":
@@ -259,6 +244,7 @@ def _frame_interval(folder: Path | None, animation: str | None, text: str | None
     from importlib.util import find_spec
 
     from warpchain.inputs.validation import InputError, checked_positive
+    from warpchain.inputs.yaml_files import parse_yaml
 
     needing = (("--animate", animation), ("--frame-interval", text), ("--record-loads", records_loads or None))
     for name, value in needing:
@@ -267,5 +253,5 @@ def _frame_interval(folder: Path | None, animation: str | None, text: str | None
     if animation == "mp4" and find_spec("imageio_ffmpeg") is None:
         raise InputError("--animate mp4: imageio-ffmpeg is not installed; pip install 'warpchain[video]'")
     usual = 1e-4 if records_loads else 2e-3
-    interval = usual if text is None else _parsed("--frame-interval", text)
+    interval = usual if text is None else parse_yaml(text, "--frame-interval")
     return float(checked_positive(interval, "--frame-interval", "time in s")) if folder is not None else None

@@ -17,9 +17,9 @@ import numpy as np
 
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene
-from warpchain.inputs.sections import SECTION_OF, SECTIONS
+from warpchain.inputs.sections import SECTION_OF
 from warpchain.inputs.setup import Setup
-from warpchain.inputs.validation import DIMENSIONLESS, Bounds, InputError, checked_whole, field_bounds, field_unit
+from warpchain.inputs.validation import Bounds, InputError, checked_whole, field_bounds
 
 CLEARANCE_RANGE: Final = (0.005, 0.015)
 """Interval of the release height that a sample draws from, in m."""
@@ -71,9 +71,13 @@ class Uniform:
     def _physical_ends(self) -> tuple[float, float]:
         return max(self.lower, self.bounds.lower), min(self.upper, self.bounds.upper)
 
-    def described(self, unit: str) -> str:
-        """In words, for error messages; `unit` begins with a space unless it is empty."""
-        return f"between {self.lower} and {self.upper}{unit}"
+    def __str__(self) -> str:
+        """In words, for error messages."""
+        return f"between {self.lower} and {self.upper}"
+
+    def canonical(self) -> dict[str, object]:
+        """Its form in a sweep file."""
+        return {"uniform": [self.lower, self.upper]}
 
 
 @dataclass(frozen=True)
@@ -117,9 +121,14 @@ class Gaussian:
         mean = self._placed_mean
         return (self.bounds.lower - mean) / self.sigma, (self.bounds.upper - mean) / self.sigma
 
-    def described(self, unit: str) -> str:
-        """In words, for error messages; `unit` begins with a space unless it is empty."""
-        return f"about {self.mean}{unit} with standard deviation {self.sigma}"
+    def __str__(self) -> str:
+        """In words, for error messages."""
+        return f"about {self.mean} with standard deviation {self.sigma}"
+
+    def canonical(self) -> dict[str, object]:
+        """Its form in a sweep file."""
+        mean = {} if self.mean is None else {"mean": self.mean}
+        return {"gaussian": {**mean, "sigma": self.sigma}}
 
 
 Distribution = Uniform | Gaussian
@@ -188,12 +197,9 @@ def _physical_draw(name: str, distribution: Distribution, rng: np.random.Generat
         value = distribution.draw(rng)
         if distribution.bounds.admit(value):
             return value
-    section = SECTION_OF[name]
-    unit = field_unit(SECTIONS[section].model_fields[name])
-    described = distribution.described("" if unit == DIMENSIONLESS else f" {unit}")
     raise InputError(
-        f"{section}.{name}: {DRAW_LIMIT} draws {described} were all outside the physical "
-        "bounds; give a mean inside them"
+        f"{SECTION_OF[name]}.{name}: {DRAW_LIMIT} draws {distribution} were all outside the physical bounds; "
+        "give a mean inside them"
     )
 
 

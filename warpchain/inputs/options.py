@@ -2,12 +2,12 @@
 
 import re
 from collections.abc import Mapping
-from typing import Final, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
-from pydantic import BaseModel, Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from warpchain.inputs.methods import BURST_TOLERANCE, FORMER_METHODS, METHODS, METHODS_BY_NEED
-from warpchain.inputs.validation import STRICT, number_field, refusal, shown, suggestion
+from warpchain.inputs.validation import InputError, Section, number_field, shown, suggestion
 from warpchain.kernels.methods.explicit_tableaus import HYBRID
 from warpchain.kernels.methods.method import find_method, method_names
 
@@ -25,7 +25,24 @@ def on_gpu(device: str) -> bool:
     return device != "cpu"
 
 
-class Options(BaseModel):
+def _known_method(method: str) -> str:
+    """The word or integrator, if there is one of this name."""
+    if method in FORMER_METHODS:
+        raise ValueError(f"{shown(method)} was removed; give {FORMER_METHODS[method]}")
+    known = (*METHODS_BY_NEED, *method_names())
+    if method not in known:
+        raise ValueError(f"{shown(method)} is unknown; {suggestion(method, known)}")
+    return method
+
+
+def _supported_device(device: str) -> str:
+    """The device, if it is written as one."""
+    if not re.fullmatch(rf"cpu|cuda(:\d{{1,3}})?|{FIBERS}", device):
+        raise ValueError(f"{shown(device)} is no device; give cpu, cuda or cuda:N")
+    return device
+
+
+class Options(Section):
     """How a walk is computed.
 
     `method` is an integrator or a word of `METHODS_BY_NEED`. A word supplies its own defaults; an explicit `tolerance`
@@ -37,10 +54,9 @@ class Options(BaseModel):
             the device is not supported, or the method does not run on it.
     """
 
-    model_config = STRICT
-
-    method: str = Field(
+    method: Annotated[str, AfterValidator(_known_method)] = Field(
         default="standard",
+        json_schema_extra={"enum": [*METHODS_BY_NEED, *METHODS]},
         description="; ".join(
             [
                 f"{', '.join(METHODS_BY_NEED)}: an integrator with its settings",
@@ -96,19 +112,18 @@ class Options(BaseModel):
         description="whether joints are softened on the sprocket: softest until it has spun up, then at least soft; "
         "within 0.03 s after the release they return to their own values",
     )
-    device: str = Field(default="cpu", description="where walks run: cpu, cuda (the first GPU) or cuda:N")
+    device: Annotated[str, AfterValidator(_supported_device)] = Field(
+        default="cpu", description="where walks run: cpu, cuda (the first GPU) or cuda:N"
+    )
 
     @model_validator(mode="before")
     @classmethod
     def _with_defaults_of_method(cls, values: object) -> object:
         if not isinstance(values, Mapping):
             return values
-        word, known = values.get("method", "standard"), (*METHODS_BY_NEED, *method_names())
-        if not isinstance(word, str) or word not in known:
-            if isinstance(word, str) and word in FORMER_METHODS:
-                raise refusal("method", f"{shown(word)} was removed; give {FORMER_METHODS[word]}")
-            raise refusal("method", f"{shown(word)} is unknown; {suggestion(word, known)}")
-        device = values.get("device")
+        word, device = values.get("method", "standard"), values.get("device")
+        if not isinstance(word, str):
+            return values
         if word == "standard" and isinstance(device, str) and on_gpu(device):
             word = "explicit"
         defaults = {"method": word, **METHODS_BY_NEED.get(word, {})}
@@ -118,34 +133,26 @@ class Options(BaseModel):
             defaults.pop("soft_tolerance", None)  # an explicit tolerance is meant everywhere
         return {**defaults, **{name: value for name, value in values.items() if name != "method"}}
 
-    @field_validator("device")
-    @classmethod
-    def _device_supported(cls, device: str) -> str:
-        if not re.fullmatch(rf"cpu|cuda(:\d{{1,3}})?|{FIBERS}", device):
-            raise refusal("device", f"{shown(device)} is no device; give cpu, cuda or cuda:N")
-        return device
-
     @model_validator(mode="after")
     def _method_runs_on_device(self) -> Self:
         if on_gpu(self.device) and not find_method(self.method).runs_on_gpus:
-            raise refusal("method", f"{shown(self.method)} runs on a CPU only; give explicit, or device: cpu")
+            raise InputError(f"method: {shown(self.method)} runs on a CPU only; give explicit, or device: cpu")
         return self
 
     @model_validator(mode="after")
     def _steps_ordered(self) -> Self:
         if self.smallest_step >= self.contact_step:
-            raise refusal(
-                "smallest_step",
-                f"{self.smallest_step} is not smaller than contact_step {self.contact_step} s; give a smaller step",
+            raise InputError(
+                f"smallest_step: {self.smallest_step} is not smaller than contact_step {self.contact_step} s; "
+                "give a smaller step"
             )
         return self
 
     @model_validator(mode="after")
     def _stiffens_in_small_steps(self) -> Self:
         if self.soften_drive and self.record_interval > LONGEST_DRIVE_INTERVAL:
-            raise refusal(
-                "soften_drive",
-                f"joints stiffen at each record_interval, and {self.record_interval} s is too long for that; "
-                f"give a record_interval of at most {LONGEST_DRIVE_INTERVAL} s, or soften_drive: false",
+            raise InputError(
+                f"soften_drive: joints stiffen at each record_interval, and {self.record_interval} s is too long for "
+                f"that; give a record_interval of at most {LONGEST_DRIVE_INTERVAL} s, or soften_drive: false"
             )
         return self

@@ -14,19 +14,18 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any, Final, Literal, Self
 
-from pydantic import BaseModel, model_validator
+from pydantic import model_validator
 
-from warpchain.inputs.symbols import by_full_name, names_by_symbol
 from warpchain.inputs.validation import (
     DIMENSIONLESS,
-    STRICT,
     Bounds,
     InputError,
     InputWarning,
+    Section,
+    by_name,
     field_bounds,
     field_unit,
     number_field,
-    refusal,
     short,
     shown,
     validated,
@@ -84,7 +83,7 @@ def _row(symbol: str, unit: str, value: float, sigma: float, limits: Limits, sou
     return number_field(..., unit, meaning, symbol=symbol, value=value, sigma=sigma, source=source, **limits)
 
 
-class Parameters(BaseModel):
+class Parameters(Section):
     """Physical parameters of one chain, its sprocket and the floor, in SI units.
 
     No field has a default: a set of parameters comes from a named preset (`preset`), with changes made by
@@ -94,8 +93,6 @@ class Parameters(BaseModel):
         pydantic.ValidationError: a value is missing, unknown, not a finite number or out of bounds, or
             `circle_radius` is not smaller than half of `link_length`.
     """
-
-    model_config = STRICT
 
     link_length: float = _row("ℓ", "m", 1.268e-2, 1e-5, LENGTH, "measured", "distance between the two joints of a link")
     sprocket_radius: float = _row(
@@ -146,10 +143,9 @@ class Parameters(BaseModel):
     @model_validator(mode="after")
     def _circles_apart(self) -> Self:
         if not self.circle_radius < self.link_length / 2:
-            raise refusal(
-                "circle_radius",
-                f"{self.circle_radius} is not smaller than half the link length {self.link_length / 2}; "
-                "give a smaller radius",
+            raise InputError(
+                f"circle_radius: {self.circle_radius} is not smaller than half the link length "
+                f"{self.link_length / 2}; give a smaller radius"
             )
         return self
 
@@ -170,16 +166,14 @@ class Parameters(BaseModel):
         Raises:
             InputError: a name is unknown, a value is given twice, or the new set is not physical.
         """
-        named = by_full_name(values, names_by_symbol(type(self)), "parameters")
-        given = {name: value for name, (_, value) in named.items()}
-        return validated(type(self), {**self.model_dump(), **given}, "parameters")
+        return validated(type(self), {**vars(self), **by_name(values, "parameters")}, "parameters")
 
 
 _TABLE_1: Final = Parameters.model_validate({name: q.value for name, q in Parameters.quantities().items()})
 
 PRESETS: Final[dict[str, Parameters]] = {
     "paper": _TABLE_1,
-    "soft": _TABLE_1.with_values({"joint_stiffness": 1e7, "joint_damping": 100.0, "friction_smoothing": 0.1}),
+    "soft": _TABLE_1.model_copy(update={"joint_stiffness": 1e7, "joint_damping": 100.0, "friction_smoothing": 0.1}),
 }
 """Named sets of parameters. `paper` is Table 1 as it is. `soft` has softer joints and a smoother joint
 friction, which take far fewer steps with `reference`, not with `standard`; the paper found that these adjusted

@@ -1,13 +1,13 @@
 """What happens in a walk: how long the chain is, how fast it is spun, from which height it is released."""
 
 import math
-from typing import Final, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
-from pydantic import BaseModel, Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from warpchain.inputs.options import on_gpu
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.validation import STRICT, InputError, number_field, refusal
+from warpchain.inputs.validation import InputError, Section, number_field
 
 MOST_LINKS: Final = 100_000
 """A chain of so many links takes 0.4 GB, and kernels of its own."""
@@ -35,7 +35,13 @@ TAP: Final = ("lateral_speed", "tilt", "tilt_rate", "yaw_rate")
 upright, so that a scene with a tilting plane alone is the paper's."""
 
 
-class Scene(BaseModel):
+def _even(links: int) -> int:
+    if links % 2:
+        raise ValueError(f"{links} is odd; a chain alternates inner and outer links, so give an even number")
+    return links
+
+
+class Scene(Section):
     """What happens in one walk, from hanging on the sprocket to the end.
 
     Raises:
@@ -43,9 +49,7 @@ class Scene(BaseModel):
             hanging chain although the chain never hangs, or the release disturbs a plane that is fixed.
     """
 
-    model_config = STRICT
-
-    links: int = number_field(
+    links: Annotated[int, AfterValidator(_even)] = number_field(
         60,
         "1",
         "number of links around the loop, even: inner and outer links alternate",
@@ -143,29 +147,21 @@ class Scene(BaseModel):
         le=FASTEST_TAP,
     )
 
-    @field_validator("links")
-    @classmethod
-    def _links_even(cls, links: int) -> int:
-        if links % 2:
-            raise refusal("links", f"{links} is odd; a chain alternates inner and outer links, so give an even number")
-        return links
-
     @model_validator(mode="after")
     def _tap_needs_tilting_plane(self) -> Self:
         for name in TAP:
             if getattr(self, name) != 0 and self.plane == "fixed":
-                raise refusal(
-                    name, f"{getattr(self, name)} moves the plane of the chain, which is fixed; give plane: tilting"
+                raise InputError(
+                    f"{name}: {getattr(self, name)} moves the plane of the chain, which is fixed; give plane: tilting"
                 )
         return self
 
     @model_validator(mode="after")
     def _hanging_needs_rest(self) -> Self:
         if self.clearance_of == "hanging" and self.start != "rest":
-            raise refusal(
-                "clearance_of",
-                f"'hanging' needs a chain that hangs, but start is {self.start!r}; "
-                "give 'spinning' here, or start: rest",
+            raise InputError(
+                f"clearance_of: 'hanging' needs a chain that hangs, but start is {self.start!r}; "
+                "give 'spinning' here, or start: rest"
             )
         return self
 

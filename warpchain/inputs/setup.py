@@ -13,8 +13,8 @@ from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import Scene, check_links_on_gpu, check_scene
-from warpchain.inputs.sections import SECTION_OF, SECTIONS, by_name
-from warpchain.inputs.validation import InputError, shown, suggestion, validated
+from warpchain.inputs.sections import SECTION_OF, SECTIONS
+from warpchain.inputs.validation import InputError, by_name, path_of, shown, suggestion, validated
 from warpchain.inputs.yaml_files import read_yaml
 from warpchain.kernels.methods.method import find_method
 
@@ -149,25 +149,21 @@ def check_has_joint_forces(options: Options) -> None:
 
 
 def read_setup(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
-    """Preset (None if there is none) and sections of a YAML file by full names, values not yet checked by `resolve`.
-
-    `1e9` is a number, as in YAML 1.2, and so is `1_000`; `060` and `1:30`, which the versions of YAML read
-    differently, are text and therefore refused.
+    """Preset (None if there is none) and sections of a YAML file by full names, not yet checked by `resolve`.
 
     Raises:
-        InputError: the file cannot be read, is not YAML, gives a value twice, or has other keys or names.
+        InputError: the file cannot be read, is not YAML, gives a value twice, or has other keys.
     """
     content = read_yaml(path)
     if not isinstance(content, dict):
         raise InputError(f"{path}: no mapping at the top; give the keys preset, {', '.join(SECTIONS)}")
     for key in content:
         if key != "preset" and key not in SECTIONS:
-            raise InputError(f"{shown(key)}: unknown key; {suggestion(key, ('preset', *SECTIONS))}")
+            raise InputError(f"{path_of('', key)}: unknown key; {suggestion(key, ('preset', *SECTIONS))}")
     sections: dict[str, Any] = {}
-    for section, model in SECTIONS.items():
+    for section in SECTIONS:
         values = content.get(section)
-        sections[section] = {} if values is None else values  # what has nothing under it changes nothing
         if isinstance(values, Mapping):
-            named = by_name(values, section, model.model_fields)
-            sections[section] = {name: value for name, (_, value) in named.items()}
+            values = by_name(values, section)
+        sections[section] = {} if values is None else values  # what has nothing under it changes nothing
     return content.get("preset"), sections

@@ -1,30 +1,29 @@
-"""What every check of a user's values shares: the error, bounds, and refusals in one line.
+"""What every check of a user's values shares: the error, fields with units, and refusals in one line.
 
-A refusal reads `path.of.field: what is wrong; what to do`. Models raise `refusal`, `validated` turns pydantic's errors
-into such lines.
+A refusal reads `path.of.field: what is wrong; what to do`. Validators raise an `InputError` that begins with the name
+of a field, or a `ValueError` about their own field; `refusals` makes lines of these and of pydantic's own errors.
 """
 
 import difflib
-import itertools
 import math
 import os
 import re
+import reprlib
 import sys
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+import textwrap
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, TypeVar, get_args
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
-from pydantic_core import ErrorDetails, PydanticCustomError
 
 STRICT: Final = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 """Of models that hold a user's values."""
 
 DIMENSIONLESS: Final = "1"
-
 
 LONGEST_LINE: Final = 200
 """Most characters of a line of a message."""
@@ -36,6 +35,8 @@ _LONGEST_PATH: Final = 120
 """Most characters of a path with which a line begins that is too long; one can go to a path only if it is whole."""
 _LONGEST_CHOICE: Final = 125
 """Most characters of a list of possible words in a message."""
+MOST_PROBLEMS: Final = 20
+"""Most problems that are described, each in a line; the others are counted."""
 
 DEEPEST: Final = 20
 """Most lists and mappings inside of one another; a sweep file has eight at most."""
@@ -103,7 +104,7 @@ def number_field(default: Any, unit: str, description: str, **more: Any) -> Any:
 def field_unit(field: FieldInfo) -> str:
     """Unit of a field that `number_field` made; `DIMENSIONLESS` for any other."""
     extra = field.json_schema_extra
-    return str(extra["unit"]) if isinstance(extra, dict) else DIMENSIONLESS
+    return str(extra.get("unit", DIMENSIONLESS)) if isinstance(extra, dict) else DIMENSIONLESS
 
 
 def field_limits(field: FieldInfo) -> dict[str, float]:
@@ -121,16 +122,78 @@ def field_bounds(field: FieldInfo) -> Bounds:
     return Bounds(limits.get("ge", limits.get("gt", -math.inf)), upper, "gt" not in limits)
 
 
-def refusal(field: str, message: str) -> PydanticCustomError:
-    """An error for a pydantic validator to raise; `validated` turns it into `….field: message`."""
-    return PydanticCustomError("refusal", "{text}", {"field": field, "text": message})
+FIELDS: Final[dict[str, FieldInfo]] = {}
+"""Name of each field of parameters, scene and options → the field; no name is in two sections."""
+SECTION_OF: Final[dict[str, str]] = {}
+"""Name of each field → its section."""
+SYMBOL_OF: Final[dict[str, str]] = {}
+"""Name → the paper's symbol, in ASCII; no symbol is the name of a field."""
+NAME_OF_SYMBOL: Final[dict[str, str]] = {}
+
+_SPELLINGS: Final = str.maketrans(
+    {"ℓ": "ell", "β": "beta", "μ": "mu", "\N{MICRO SIGN}": "mu", "ν": "nu", "τ": "tau", "ω": "omega"}
+)
+
+
+def spelled(symbol: str) -> str:
+    """A symbol in ASCII, Greek letters by their names."""
+    return symbol.translate(_SPELLINGS)
+
+
+class Section(BaseModel):
+    """A section of a user's values: parameters, scene or options; its fields have their names from then on."""
+
+    model_config = STRICT
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        """Tell the names of the fields."""
+        for name, field in cls.model_fields.items():
+            FIELDS[name], SECTION_OF[name] = field, cls.__name__.lower()
+            if isinstance(field.json_schema_extra, dict) and "symbol" in field.json_schema_extra:
+                SYMBOL_OF[name] = spelled(str(field.json_schema_extra["symbol"]))
+                NAME_OF_SYMBOL[SYMBOL_OF[name]] = name
+
+
+def full_name(written: Any) -> Any:
+    """Name of the field that is written as its name or symbol, `mu_fc` or μ_fc; anything else stays as it is."""
+    return NAME_OF_SYMBOL.get(spelled(written), written) if isinstance(written, str) else written
+
+
+T = TypeVar("T")
+
+
+def by_name(values: Mapping[Any, T], path: str = "") -> dict[Any, T]:
+    """Values by the full names of their fields; neither names nor values are checked.
+
+    Args:
+        values: name or symbol → value.
+        path: where the values were given.
+
+    Raises:
+        InputError: a value is given twice, by name and by symbol.
+    """
+    named: dict[Any, T] = {}
+    for written, value in values.items():
+        name = full_name(written)
+        if name in named:
+            raise InputError(f"{path_of(path, name)}: given twice, also as {shown(SYMBOL_OF[name])}; leave one out")
+        named[name] = value
+    return named
+
+
+def suggested_name(written: object, keys: Iterable[str] = ()) -> str:
+    """The remedy for an unknown name of a field, or for one of these keys."""
+    fields = {name: f"{section}.{name}" for name, section in SECTION_OF.items()}
+    symbols = {symbol: f"{SECTION_OF[name]}.{symbol}" for symbol, name in NAME_OF_SYMBOL.items()}
+    return suggestion(written, {key: key for key in keys} | fields | symbols)
 
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
 
 def validated(model: type[ModelT], values: Mapping[str, object], path: str) -> ModelT:
-    """Build a pydantic model, with errors as one line that names the field and the remedy.
+    """Build a pydantic model, with errors as one line that names the field and what to give.
 
     Args:
         model: `Parameters`, or another model whose fields carry a unit.
@@ -140,91 +203,83 @@ def validated(model: type[ModelT], values: Mapping[str, object], path: str) -> M
     Raises:
         InputError: some value is refused; the first is described, the others are counted.
     """
-    few = len(values) <= 2 * len(model.model_fields)
-    own = few and all(type(name) is str and type(value) in _OWN for name, value in values.items())
+    own = all(type(value) in _OWN for value in values.values())  # as in the millions of walks of a sweep
     try:
-        return model.model_validate(dict(values) if own else plain(values, path))
+        return model.model_validate(values if own else plain(values, path))
     except ValidationError as error:
-        first, *others = error.errors()
-        count = f" (and {len(others)} more)" if others else ""
-        raise InputError(_described(first, model, path) + count) from None
+        others = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
+        raise InputError(refusals(error, path)[0] + others) from None
 
 
 _OWN: Final = frozenset((float, int, str, bool, type(None)))
-"""Python's own types; sweeps have millions of such values."""
+
+
+def refusals(error: ValidationError, path: str, keys: Iterable[str] = ()) -> list[str]:
+    """A line for each of pydantic's errors, `MOST_PROBLEMS` at most: the field's path, the problem, and what was given.
+
+    Args:
+        error: pydantic's.
+        path: of the value that was validated.
+        keys: that may be meant by an unknown one, beside names of fields.
+    """
+    lines = []
+    for problem in error.errors(include_url=False)[:MOST_PROBLEMS]:
+        where, cause = path, problem.get("ctx", {}).get("error")
+        for part in problem["loc"]:
+            if not (isinstance(part, str) and part.startswith("(")):  # the branch of a union
+                where = path_of(where, part)
+        if isinstance(cause, InputError):
+            lines.append(f"{where}.{cause}".removeprefix("."))
+        elif problem["type"] == "extra_forbidden":
+            lines.append(f"{where}: unknown name; {suggested_name(problem['loc'][-1], keys)}")
+        elif problem["type"] == "model_type":
+            lines.append(f"{where}: {shown(problem['input'])} is no mapping; give names with values")
+        elif cause is not None or problem["type"] == "missing":
+            lines.append(f"{where}: {cause or problem['msg']}")
+        else:
+            unit = next((field_unit(FIELDS[name]) for name in problem["loc"] if name in FIELDS), DIMENSIONLESS)
+            in_unit = "" if unit == DIMENSIONLESS else f", in {unit}"
+            lines.append(f"{where}: {problem['msg']}{in_unit}; given {shown(problem['input'])}")
+    if error.error_count() > len(lines):
+        lines.append(f"{error.error_count() - len(lines)} more problems; correct these first")
+    return lines
 
 
 def plain(value: object, path: str = "value") -> Any:
     """A user's value in Python's own types, as a YAML file gives it; what is none of these is left as it is.
 
-    NumPy's numbers, truth values and texts become Python's, and so do classes derived from these; arrays, ranges and
-    tuples become lists, also inside of lists and mappings.
+    NumPy's numbers, truth values and texts become Python's; arrays, ranges and tuples become lists, also inside of
+    lists and mappings. NumPy's times become texts, which no number can be.
 
     Raises:
-        InputError: there are more than `MOST_VALUES` of them, or deeper than `DEEPEST`, a key is no text or number, or
-            a value is a span of time; the message begins with `path`.
+        InputError: there are more than `MOST_VALUES` of them, or deeper than `DEEPEST`; the message begins with `path`.
     """
     left = MOST_VALUES
 
-    def counted(count: int) -> None:
-        if count > left:
-            raise InputError(f"{path}: more than {MOST_VALUES} values; give fewer")
-
-    def listed(items: Iterable[object], count: int, depth: int) -> list[Any]:
-        counted(count)
-        return [converted(item, depth) for item in items]
-
-    def converted(value: object, depth: int) -> Any:
+    def converted(value: Any, depth: int) -> Any:
         nonlocal left
         left -= 1
+        if left < 0:
+            raise InputError(f"{path}: more than {MOST_VALUES} values; give fewer")
         if type(value) in _OWN:
             return value
-        for kind, copied in _OWN_CONTAINERS:
-            if isinstance(value, kind) and type(value) is not kind:
-                value = copied(value)
-        if isinstance(value, np.ndarray | list | tuple | range | Mapping) and depth > DEEPEST:
+        if isinstance(value, np.ndarray) and value.ndim == 0:
+            value = value[()]
+        if isinstance(value, np.generic):
+            return float(value) if isinstance(value, np.floating) else _OF_KIND.get(value.dtype.kind, str)(value)
+        if not isinstance(value, Mapping | np.ndarray | list | tuple | range) or value is np.ma.masked:
+            return value
+        if depth == DEEPEST:
             raise InputError(f"{path}: more than {DEEPEST} lists or mappings inside of one another; give fewer")
         if isinstance(value, Mapping):
-            keys = listed(value, len(value), depth + 1)
-            for key in keys:
-                if not isinstance(key, str | int | float | None):
-                    raise InputError(f"{path}: {shown(key)} is no name; give names as text")
-            return dict(zip(keys, listed(value.values(), len(value), depth + 1), strict=True))
-        if isinstance(value, np.ndarray):
-            counted(value.size)
-            items = value if value.dtype.kind in "mMV" and value.ndim else value.tolist()  # times are no numbers
-            return listed(items, len(items), depth + 1) if value.ndim else converted(items, depth + 1)
-        if isinstance(value, range):
-            return listed(value, left + 1 if value[left:] else len(value), depth + 1)  # len() has a limit of its own
-        if isinstance(value, list | tuple):
-            return listed(value, len(value), depth + 1)
-        if isinstance(value, np.timedelta64):  # a whole number to NumPy and pydantic, in whatever unit
-            raise InputError(f"{path}: {shown(value)} is of type timedelta64; give a plain number")
-        for kind, own in _OWN_TYPES:
-            if isinstance(value, kind):
-                return own(value)
-        return value
+            return {key: converted(item, depth + 1) for key, item in value.items()}
+        return [converted(item, depth + 1) for item in value]
 
     return converted(value, 0)
 
 
-_OWN_TYPES: Final[Sequence[tuple[type, Callable[[Any], object]]]] = (
-    (bool, bool),
-    (np.bool_, bool),
-    (np.integer, int),
-    (np.floating, float),
-    (int, int.__int__),
-    (float, float.__float__),
-    (str, str.__str__),
-)
-"""Types of numbers, truth values and texts → what makes Python's own of them, past what a derived class overrides."""
-
-_OWN_CONTAINERS: Final[Sequence[tuple[type, Callable[[Any], object]]]] = (
-    (dict, lambda items: dict(dict.items(items))),
-    (list, list.copy),
-    (tuple, lambda items: tuple.__getitem__(items, slice(None))),
-)
-"""Likewise of lists and mappings."""
+_OF_KIND: Final[Mapping[str, Any]] = {"b": bool, "i": int, "u": int, "c": complex, "S": bytes}
+"""Kind of NumPy's types → Python's; what is in none of them becomes a text."""
 
 
 def checked_whole(value: object, path: str, least: int, most: int) -> int:
@@ -259,33 +314,29 @@ def checked_path(value: object, path: str) -> Path:
     text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
     if not isinstance(text, str) or re.search("[\0\ud800-\udc7f\udd00-\udfff]", text):
         raise InputError(f"{path}: {shown(value)} is no path; give one as text")
-    return Path(str.__str__(text))
+    return Path(text)
 
 
-def suggestion(given: object, known: Iterable[str]) -> str:
-    """The remedy for an unknown name: the closest known one, or all of them."""
-    names = list(known)
-    close = difflib.get_close_matches(as_word(given), names, n=1)
-    return f"did you mean {close[0]}?" if close else f"give one of {choice(names)}"
+def suggestion(given: object, known: Mapping[str, str] | Iterable[str]) -> str:
+    """The remedy for an unknown name: the closest known one, or as many as find room.
 
-
-def as_word(given: object) -> str:
-    """What was given for a name, as a text of bounded length to compare with known names."""
-    return given[:_LONGEST_VALUE] if isinstance(given, str) else shown(given)
-
-
-def choice(names: Iterable[str]) -> str:
-    """Names with commas between them, and dots for those that find no room in a message."""
-    text = ", ".join(names)
-    if len(text) <= _LONGEST_CHOICE:
-        return text
-    return text[: text.rindex(", ", 0, _LONGEST_CHOICE)] + ", ..."
+    Args:
+        given: the name.
+        known: names that may be given; a mapping says how each is shown.
+    """
+    names = known if isinstance(known, Mapping) else {name: name for name in known}
+    close = difflib.get_close_matches(str(given)[:_LONGEST_VALUE], names, n=1) if isinstance(given, str) else []
+    if close:
+        return f"did you mean {names[close[0]]}?"
+    return f"give one of {textwrap.shorten(', '.join(names.values()), _LONGEST_CHOICE, placeholder=' ...')}"
 
 
 def path_of(path: str, key: object) -> str:
-    """Path of what stands behind a key of the mapping at `path`, for errors."""
+    """Path of what stands behind a key of the mapping, or at a place of the list, at `path`, for errors."""
+    if isinstance(key, int):
+        return f"{path}[{key}]"
     is_plain = isinstance(key, str) and len(key) <= _LONGEST_VALUE and key.isidentifier()
-    return f"{path}.{key if is_plain else shown(key)}"
+    return f"{path}.{key if is_plain else shown(key)}".removeprefix(".")
 
 
 def printable(text: str) -> str:
@@ -328,118 +379,25 @@ def shown(value: object) -> str:
 
     No more of the value is written out than is shown, so that large and nested ones cost nothing.
     """
-    text = printable(" ".join(_written(value, 3).split()))
+    text = printable(" ".join(_BRIEF.repr(value).split()))
     return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 3] + "..."
 
 
-def _written(value: object, depth: int) -> str:
-    """The first characters, or a few more, of a value as Python writes it; `depth`: of the containers written out."""
-    try:
-        if isinstance(value, str):
-            return repr(str.__str__(value)[: _LONGEST_VALUE + 1])
-        if isinstance(value, bytes | bytearray):
-            return repr(value[: _LONGEST_VALUE + 1])
-        if isinstance(value, int) and value.bit_length() > _WRITTEN_BITS:
-            return f"{'-' if value < 0 else ''}about 1e{int(value.bit_length() * math.log10(2))}"
-        if isinstance(value, int | float):
-            return str(value)
-        if isinstance(value, np.ndarray) and (value.size > _WRITTEN_ITEMS or value.dtype == object):
-            return f"array of shape {value.shape}"
-        if isinstance(value, list | tuple | set | frozenset | dict):
-            return _container(value, depth)
-        return repr(value)[: 2 * _LONGEST_VALUE]
-    except Exception:  # whatever an object of a foreign class raises when it is asked for its text
-        return f"<{type(value).__name__}>"
+class _Brief(reprlib.Repr):
+    """The first characters of a value as Python writes it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlevel, self.maxstring, self.maxother = 3, _LONGEST_VALUE, 2 * _LONGEST_VALUE
+        self.maxlist = self.maxtuple = self.maxdict = 20
+
+    def repr_int(self, value: int, level: int) -> str:
+        """A whole number; Python refuses to write very long ones."""
+        return str(value) if value.bit_length() < 1000 else f"a whole number of {value.bit_length()} bits"
+
+    def repr_ndarray(self, value: Any, level: int) -> str:
+        """An array, of any size and content."""
+        return f"array of shape {value.shape}"
 
 
-_WRITTEN_BITS: Final = 10_000
-"""Most bits of a whole number that is written out; Python refuses very long ones."""
-_WRITTEN_ITEMS: Final = 20
-"""Most items of a container that are written out; they fill the room for a value."""
-
-
-def _container(value: Collection[object], depth: int) -> str:
-    """The first items of a list, a tuple, a set or a mapping."""
-    opening, closing = "[]" if isinstance(value, list) else "()" if isinstance(value, tuple) else "{}"
-    if depth == 0:
-        return f"{opening}...{closing}"
-    items = itertools.islice(value, _WRITTEN_ITEMS)
-    if isinstance(value, dict):
-        texts = [f"{_written(key, depth - 1)}: {_written(value[key], depth - 1)}" for key in items]
-    else:
-        texts = [_written(item, depth - 1) for item in items]
-    return opening + ", ".join(texts) + (", ..." if len(value) > _WRITTEN_ITEMS else "") + closing
-
-
-def _described(error: ErrorDetails, model: type[BaseModel], path: str) -> str:
-    """One line for one of pydantic's errors: the field's path, the problem and the remedy."""
-    key = error.get("ctx", {}).get("field", error["loc"][0] if error["loc"] else "")
-    name = as_word(key)
-    where = path_of(path, key)
-    if error["type"] in ("extra_forbidden", "invalid_key"):
-        return f"{where}: unknown key; {suggestion(name, model.model_fields)}"
-    if error["type"] == "refusal" or name not in model.model_fields:
-        return f"{where}: {error['msg']}"
-    return f"{where}: {_problem(error, model.model_fields[name], name)}"
-
-
-_LIMITS: Final = {
-    "greater_than": ("gt", "not greater than", "a greater value"),
-    "greater_than_equal": ("ge", "less than", "{limit} or more"),
-    "less_than": ("lt", "not less than", "a smaller value"),
-    "less_than_equal": ("le", "greater than", "{limit} or less"),
-}
-"""Kind of pydantic's error → its key for the limit, how a value breaks it, and what to give."""
-
-
-def _problem(error: ErrorDetails, field: FieldInfo, name: str) -> str:
-    """What is wrong with the value of a known field, in the words of the field's own unit, and the remedy."""
-    kind, given, value = error["type"], error["input"], shown(error["input"])
-    unit = field_unit(field)
-    in_unit = "" if unit == DIMENSIONLESS else f" {unit}"
-    number = "whole number" if field.annotation is int else "plain number"
-    number += f" in{in_unit}" if in_unit else ""
-    if kind in _LIMITS:
-        key, breach, remedy = _LIMITS[kind]
-        limit = f"{error['ctx'][key]:.12g}"
-        if kind == "greater_than" and limit == "0":
-            remedy = f"a positive {name.rpartition('_')[2]}"
-        return f"{value} is {breach} {limit}{in_unit}; give {remedy.format(limit=limit)}"
-    match kind:
-        case "missing":
-            return f"missing; give a {number}"
-        case "finite_number":
-            return f"{value} is not finite; give a {number}"
-        case "float_type" | "int_type":
-            return _not_a_number(given, number, unit)
-        case "literal_error":
-            return f"{value} is unknown; {suggestion(given, get_args(field.annotation))}"
-        case "bool_type":
-            return f"{value} is not a truth value; give true or false"
-        case "string_type":
-            return f"{value} is not text; give a name"
-        case _:
-            return str(error["msg"])
-
-
-_NUMBER_IN_TEXT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\W\d_].*|[%°].*)?", re.DOTALL)
-
-
-def _not_a_number(value: object, number: str, unit: str) -> str:
-    """Why `value` is no number, and what to give; text such as "15 Hz" gets advice about units."""
-    if value is None:
-        return f"empty; give a {number}"
-    if isinstance(value, str):
-        match = _NUMBER_IN_TEXT.fullmatch(value) if len(value) <= _LONGEST_VALUE else None
-        if match is None:
-            return f"{shown(value)} is text; give a {number}"
-        digits, written = match.groups()
-        if written is None:
-            return f"{shown(value)} is text; give a {number}, without quotes or leading zeros"
-        if written.strip() == unit:
-            return f"{shown(value)} has its unit written with it; give a {number}: {digits}"
-        remedy = "give a plain number" if unit == DIMENSIONLESS else f"convert it and give a {number}"
-        return f"{shown(value)} has a unit written with it; {remedy}"
-    if isinstance(value, int) and not isinstance(value, bool):
-        return f"{shown(value)} is too large; give a {number}"
-    return f"{shown(value)} is of type {type(value).__name__}; give a {number}"
+_BRIEF: Final = _Brief()

@@ -2,19 +2,13 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, get_args
+from typing import Any, get_args
 
-from pydantic.fields import FieldInfo
-
-from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.sections import SECTIONS, SYMBOL_OF
 from warpchain.inputs.validation import field_limits, field_unit
-
-METHOD_WORDS: Final = (*METHODS_BY_NEED, *METHODS)
-"""What `method` can be."""
 
 
 @dataclass(frozen=True)
@@ -60,18 +54,11 @@ def list_values(preset_name: str) -> dict[str, list[ValueEntry]]:
     return {section: list(_entries(section, values[section], preset_name)) for section in values}
 
 
-def field_choices(name: str, field: FieldInfo) -> tuple[Any, ...]:
-    """The possible values of a field, if these are words or truth values, else empty."""
-    if field.annotation is bool:
-        return (True, False)
-    if name == "method":
-        return METHOD_WORDS
-    return tuple(word for word in get_args(field.annotation) if isinstance(word, str))
-
-
 def _entries(section: str, values: Mapping[str, Any], preset_name: str) -> Iterator[ValueEntry]:
     quantities = Parameters.quantities()
     for name, field in SECTIONS[section].model_fields.items():
+        extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+        words: Any = extra.get("enum", [word for word in get_args(field.annotation) if isinstance(word, str)])
         sigma, source, quantity = None, "chosen here", quantities.get(name)
         if quantity is not None:
             sigma = quantity.sigma or None
@@ -86,7 +73,7 @@ def _entries(section: str, values: Mapping[str, Any], preset_name: str) -> Itera
             value=values[name],
             sigma=sigma,
             limits=field_limits(field),
-            choices=field_choices(name, field),
+            choices=(True, False) if field.annotation is bool else tuple(words),
             source=source,
             meaning=str(field.description),
         )

@@ -11,10 +11,9 @@ from warpchain.inputs.distributions import LARGEST_SEED, random_generator, sampl
 from warpchain.inputs.keywords import Method, Number, Preset, Truth, WalkSettings, Whole
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import warn_of_units
-from warpchain.inputs.sections import NAME_OF_SYMBOL, by_section
+from warpchain.inputs.sections import by_section
 from warpchain.inputs.setup import DEFAULT_PRESET, Setup, check_has_joint_forces, resolve
-from warpchain.inputs.symbols import full_name
-from warpchain.inputs.validation import InputError, checked_whole, plain, shown
+from warpchain.inputs.validation import InputError, checked_whole, full_name, plain, shown
 from warpchain.walks.motion import LONGEST_INTERVAL, Keep
 from warpchain.walks.scheduler import run_setups
 from warpchain.walks.walk_phases import WalkRun
@@ -104,7 +103,7 @@ def walk(
     """
     named = {"links": links, "frequency": frequency, "method": method, "tolerance": tolerance, "start": start}
     for symbol in settings:
-        name = full_name(symbol, NAME_OF_SYMBOL)
+        name = full_name(symbol)
         if name in named:
             raise InputError(f"{symbol}: an argument of its own has this value; give {name}=…")
     given: dict[str, object] = {name: value for name, value in named.items() if value is not None}

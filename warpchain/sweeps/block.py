@@ -171,14 +171,6 @@ class Block:
                 }
                 for section in SECTIONS
             },
-            "distributions": {"all": "fixed"}
-            | {name: _canonical(distribution) for name, distribution in self.distributions.items()},
+            "distributions": {"all": "fixed"} | {name: each.canonical() for name, each in self.distributions.items()},
             "grid": {name: list(values) for name, values in self.axes.items()},
         }
-
-
-def _canonical(distribution: Distribution) -> dict[str, Any]:
-    if isinstance(distribution, Gaussian):
-        mean = {} if distribution.mean is None else {"mean": distribution.mean}
-        return {"gaussian": {**mean, "sigma": distribution.sigma}}
-    return {"uniform": [distribution.lower, distribution.upper]}

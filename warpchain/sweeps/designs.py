@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpchain.inputs.validation import InputError
-from warpchain.sweeps.sizes import check_design_size
 
 Array = NDArray[np.float64]
 
@@ -27,6 +26,9 @@ row of which becomes two points and their crossings."""
 
 EXTENSIBLE: Final = ("random", "sobol", "saltelli")
 """Samplers whose samples stay the same when more follow; a latin hypercube of another size has other points."""
+
+DESIGN_LIMIT: Final = 2**24
+"""Most numbers of the design of a cell, 128 MiB: it is made as a whole, and those of four cells are kept."""
 
 _END: Final = 2.0**-53
 """Distance that designed points keep from the ends 0 and 1, where a Gaussian has no quantile."""
@@ -60,7 +62,12 @@ def check_design(sampler: str, samples: int, dimensions: int, path: str) -> None
         return
     if sampler == "random":
         return
-    check_design_size(samples, dimensions * (2 if sampler == "saltelli" else 1), path)
+    columns = dimensions * (2 if sampler == "saltelli" else 1)
+    if samples * columns > DESIGN_LIMIT:
+        raise InputError(
+            f"{path}.samples: {samples} designed samples of {columns} numbers each are too many; "
+            f"give at most {1 << (DESIGN_LIMIT // columns).bit_length() - 1}, or sampler: random"
+        )
     if sampler in ("sobol", "saltelli") and samples & (samples - 1):
         lower = 1 << (samples.bit_length() - 1)
         raise InputError(

@@ -86,15 +86,9 @@ class Sweep:
 
         The walks keep their numbers; name, `walk_count` and `digest` of a part mean nothing.
         """
-        if len(self.blocks) == 1:
-            return self
-        numbers = np.unique(np.searchsorted(self._firsts, np.asarray(indices), side="right") - 1)
+        firsts = [block.first for block in self.blocks]
+        numbers = np.unique(np.searchsorted(firsts, np.asarray(indices), side="right") - 1)
         return replace(self, blocks=tuple(self.blocks[number] for number in numbers))
-
-    @cached_property
-    def _firsts(self) -> NDArray[np.int64]:
-        """Number of the first walk of each block."""
-        return np.array([block.first for block in self.blocks])
 
     def planned(self, index: int) -> PlannedWalk:
         """The walk with a number.
@@ -142,17 +136,12 @@ class Sweep:
 
     def _located(self, index: int) -> tuple[int, tuple[int, ...], int]:
         """Number of a walk's block, its cell and its sample."""
-        number = self._block_of(index)
+        number = bisect.bisect_right(self.blocks, index, key=lambda block: block.first) - 1
         block = self.blocks[number]
+        if not 0 <= index - block.first < block.walk_count:
+            raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
         *cell, sample = (int(place) for place in np.unravel_index(index - block.first, block.shape))
         return number, tuple(cell), sample
-
-    def _block_of(self, index: int) -> int:
-        """Number of a walk's block."""
-        number = bisect.bisect_right(self.blocks, index, key=lambda block: block.first) - 1
-        if number < 0 or index >= self.blocks[number].first + self.blocks[number].walk_count:
-            raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
-        return number
 
     def keep(self, walk: PlannedWalk) -> Keep:
         """What is kept of the motion of a walk."""
@@ -191,7 +180,7 @@ class Sweep:
                     if distribution != checked.get(name) and distribution.share() < LEAST_SHARE:
                         raise InputError(
                             f"{block.path}.distributions.{name}: less than {LEAST_SHARE:.0%} of the draws "
-                            f"{distribution.described('')} are physical; give a uniform distribution"
+                            f"{distribution} are physical; give a uniform distribution"
                         )
                 checked = distributions
                 self._first_possible(block, cell, fixed, distributions, 0, designed=False)
@@ -280,30 +269,15 @@ class Sweep:
         Args:
             samples: samples of each block, in place of the sweep's own.
         """
-        return self._own_digest if samples is None else digest_of(self.canonical(), samples)
-
-    @cached_property
-    def _own_digest(self) -> str:
-        return digest_of(self.canonical())
-
-
-def digest_of(canonical: Mapping[str, Any], samples: Sequence[int] | None = None) -> str:
-    """`Sweep.digest`, given the canonical form of the sweep.
-
-    Raises:
-        KeyError: a preset on an axis is none.
-    """
-    content = {name: value for name, value in canonical.items() if name != "name"}
-    content["blocks"] = []
-    for number, block in enumerate(canonical["blocks"]):
-        given = {name: value for name, value in block.items() if name != "name"}
-        if samples is not None:
-            given["samples"] = samples[number]
-        for name in block["grid"].get("preset", ()):
-            given.setdefault("presets", {})[name] = PRESETS[str(name)].model_dump()
-        content["blocks"].append(given)
-    text = json.dumps(content, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
+        content = {name: value for name, value in self.canonical().items() if name != "name"}
+        for number, block in enumerate(content["blocks"]):
+            del block["name"]
+            if samples is not None:
+                block["samples"] = samples[number]
+            for name in block["grid"].get("preset", ()):
+                block.setdefault("presets", {})[name] = PRESETS[name].model_dump()
+        text = json.dumps(content, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()
 
 
 def load_sweep(source: "str | os.PathLike[str] | Mapping[str, object] | Sweep") -> Sweep:

@@ -1,11 +1,12 @@
 """What a sweep keeps of the motion of its walks, beside their rows: time series, and frames of all joints."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Annotated, Any, Final, Literal, Self
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, field_serializer, model_validator
 
 from warpchain.inputs.options import Options
-from warpchain.inputs.validation import InputError
+from warpchain.inputs.validation import STRICT, InputError, number_field
+from warpchain.walks.motion import LONGEST_INTERVAL
 
 SERIES_INTERVAL: Final = 1e-3
 """Default time [s] between two samples of a series."""
@@ -13,25 +14,44 @@ FRAME_INTERVAL: Final = 2e-3
 """Default time [s] between two frames."""
 
 
-@dataclass(frozen=True)
-class Choice:
-    """How often a series or frames are kept, and for which samples of each cell.
+def _rising(samples: tuple[int, ...] | None) -> tuple[int, ...] | None:
+    if samples is not None and len(set(samples)) < len(samples):
+        raise ValueError("a number is given twice; leave one out")
+    return None if samples is None else tuple(sorted(samples))
 
-    Attributes:
-        interval: time [s] between two.
-        samples: numbers of the samples, sorted; None: all.
-        before: time [s] before the release in which they are kept as well, with the loads of the joints; 0: none.
-    """
 
-    interval: float
-    samples: tuple[int, ...] | None = None
-    before: float = 0.0
+_Sample = Annotated[int, Field(ge=0, le=2**30)]
+_Samples = Annotated[
+    Annotated[tuple[_Sample, ...], Field(min_length=1)] | None,
+    BeforeValidator(
+        lambda given: None if given == "all" else tuple(given) if isinstance(given, list) else given,
+        json_schema_input_type=Literal["all"] | list[_Sample],
+    ),
+    AfterValidator(_rising),
+]
+
+
+class Series(BaseModel):
+    """How often the centre of mass is kept, and of which samples of each cell."""
+
+    model_config = STRICT
+
+    interval: float = number_field(
+        SERIES_INTERVAL, "s", "time between two, a whole multiple of `record_interval`", gt=0, le=LONGEST_INTERVAL
+    )
+    samples: _Samples = Field(
+        None, description="`all` or numbers of samples, such as `[0, 1]`, the same in each cell", validate_default=False
+    )
+
+    @field_serializer("samples")
+    def _samples_in_words(self, samples: tuple[int, ...] | None) -> object:
+        return "all" if samples is None else list(samples)
 
     def includes(self, sample: int) -> bool:
         """Whether a sample is chosen."""
         return self.samples is None or sample in self.samples
 
-    def covers(self, other: "Choice") -> bool:
+    def covers(self, other: "Series") -> bool:
         """Whether every sample of another choice is chosen."""
         return self.samples is None or (other.samples is not None and set(other.samples) <= set(self.samples))
 
@@ -50,39 +70,56 @@ class Choice:
             )
         return steps
 
-    def canonical(self) -> dict[str, Any]:
-        """Its form in a sweep file."""
-        before = {"before": self.before} if self.before > 0 else {}
-        return {"interval": self.interval, "samples": "all" if self.samples is None else list(self.samples), **before}
+
+class Frames(Series):
+    """How often all joints are kept, and of which samples of each cell."""
+
+    interval: float = number_field(
+        FRAME_INTERVAL, "s", "time between two, a whole multiple of `record_interval`", gt=0, le=LONGEST_INTERVAL
+    )
+    before: float = number_field(
+        0.0,
+        "s",
+        "time before the release that is kept as well, with the loads of the joints",
+        ge=0,
+        le=LONGEST_INTERVAL,
+    )
 
 
-@dataclass(frozen=True)
-class Recording:
+_SWITCH: Final = BeforeValidator(
+    lambda given: ({} if given else None) if isinstance(given, bool) else given,
+    json_schema_input_type=bool | Frames,
+)
+
+
+class Recording(BaseModel):
     """What a sweep keeps of the motion of its walks.
 
-    Attributes:
-        series: time series of the centre of mass; None: none.
-        frames: positions of all joints, only of samples whose series are kept; None: none.
+    Raises:
+        pydantic.ValidationError: a value is refused, or frames are chosen of samples whose series are not.
     """
 
-    series: Choice | None = None
-    frames: Choice | None = None
+    model_config = STRICT
+
+    series: Annotated[Series | None, _SWITCH] = Field(None, description="time series of the centre of mass")
+    frames: Annotated[Frames | None, _SWITCH] = Field(None, description="positions of all joints")
+
+    @model_validator(mode="after")
+    def _frames_beside_series(self) -> Self:
+        if self.frames is not None and not (self.series is not None and self.series.covers(self.frames)):
+            raise InputError("frames: kept of samples without series; give them in series as well")
+        return self
 
     @property
-    def choices(self) -> dict[str, Choice]:
+    def choices(self) -> dict[str, Series]:
         """The choices that are made, by their keys in a sweep file."""
-        given = {"series": self.series, "frames": self.frames}
-        return {name: choice for name, choice in given.items() if choice is not None}
+        return {name: choice for name, choice in (("series", self.series), ("frames", self.frames)) if choice}
 
     def canonical(self) -> dict[str, Any]:
         """Its form in a sweep file."""
-        return {"series": False} | {name: choice.canonical() for name, choice in self.choices.items()}
+        return {"series": False} | self.model_dump(exclude_none=True)
 
     @classmethod
-    def of(cls, canonical: Mapping[str, Any]) -> "Recording":
-        """The recording of a canonical form that this package has written; not checked."""
-        choices = {name: given for name, given in canonical.items() if given is not False}
-        for name, given in choices.items():
-            samples = None if given["samples"] == "all" else tuple(given["samples"])
-            choices[name] = Choice(**{**given, "samples": samples})
-        return cls(**choices)
+    def of(cls, canonical: object) -> "Recording":
+        """The recording of a canonical form."""
+        return cls.model_validate(canonical)

@@ -1,51 +1,328 @@
-"""What a sweep file says, checked and completed, before any walk is planned.
+"""The grammar of sweep files: `SweepFile` says it once, for checks, the JSON schema of editors and the reference page.
 
-`read_sweep` turns the content of a YAML file into `Block`s: every value converted by its model, every range written
-out, every distribution resolved. An error is one line that begins with the path of the offending value, such as
-`sweep.blocks[0].grid.frequency[3]`.
+`read_sweep` makes `Block`s of a file, with every range written out and every distribution resolved. An error is a line
+that begins with the path of the offending value, such as `sweep.blocks[0].grid.frequency[3]`.
 """
 
 import math
 import os
-import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from decimal import Decimal
-from typing import Any, Final
+from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    GetPydanticSchema,
+    Tag,
+    ValidationError,
+    ValidationInfo,
+    WrapValidator,
+    create_model,
+    model_validator,
+)
 
 from warpchain.inputs.distributions import DRAWABLE, LARGEST_SEED, TABLE, Distribution, Gaussian, Uniform
-from warpchain.inputs.methods import METHODS_BY_NEED
-from warpchain.inputs.parameters import Parameters, preset
-from warpchain.inputs.sections import NAME_OF_SYMBOL, SECTION_OF, SECTIONS, by_name
-from warpchain.inputs.symbols import full_name
+from warpchain.inputs.keywords import Preset, Sampler
+from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.validation import (
+    FIELDS,
     LONGEST_NAME,
-    Bounds,
+    MOST_VALUES,
+    SECTION_OF,
+    STRICT,
+    SYMBOL_OF,
     InputError,
-    checked_positive,
-    checked_whole,
+    by_name,
     field_bounds,
-    path_of,
+    full_name,
     plain,
+    refusals,
     shown,
     suggestion,
-    validated,
 )
 from warpchain.inputs.yaml_files import read_yaml
 from warpchain.sweeps.block import Block, Value
-from warpchain.sweeps.designs import SAMPLERS, check_design
-from warpchain.sweeps.recording import FRAME_INTERVAL, SERIES_INTERVAL, Choice, Recording
+from warpchain.sweeps.designs import check_design
+from warpchain.sweeps.recording import Frames, Recording
 from warpchain.sweeps.shipped import sweep_path
-from warpchain.sweeps.sizes import AXIS_LIMIT, check_count, check_declared
-from warpchain.walks.motion import LONGEST_INTERVAL
 
 VERSION: Final = 1
 """Version of the file format."""
 
-_BLOCK_KEYS: Final = ("name", "preset", "samples", "sampler", *SECTIONS, "distributions", "grid")
-_TOP_KEYS: Final = ("version", "seed", "blocks", "same_samples_along", "record", *_BLOCK_KEYS)
+AXIS_LIMIT: Final = 10_000
+"""Most values of one axis."""
+CELL_LIMIT: Final = 100_000
+"""Most cells of a sweep, because each is checked when the sweep is loaded."""
+WALK_LIMIT: Final = 2**24
+"""Most walks of a sweep, 17 million: results are read as a whole, some 700 bytes a walk, and have to fit into memory.
+
+A power of two, because numbers of designed samples are.
+"""
+
+# Fields by name or symbol
+
+
+def _with_symbols(schema: dict[str, Any]) -> None:
+    """Let a JSON schema take symbols for names, without defaults, some of which depend on the method."""
+    fields = schema["properties"]
+    for given in fields.values():
+        given.pop("default", None)
+    fields |= {SYMBOL_OF[name]: given for name, given in fields.items() if name in SYMBOL_OF}
+
+
+class _Given(BaseModel):
+    """A mapping of names or symbols; what comes of it is a dict of what is given, by full names and in its order."""
+
+    model_config = STRICT | ConfigDict(json_schema_extra=_with_symbols)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _in_its_order(cls, values: Any, check: Callable[[Any], Self]) -> Any:
+        if not isinstance(values, Mapping):
+            return check(values)
+        named = by_name(values)
+        checked = check(named)
+        return {name: getattr(checked, name) for name in named}
+
+
+_TYPES: Final[Mapping[str, Any]] = {
+    name: Annotated[
+        field.annotation,
+        Field(description=field.description, json_schema_extra=field.json_schema_extra),
+        *field.metadata,
+    ]
+    for name, field in FIELDS.items()
+}
+
+
+def _mapping_of(title: str, types: Mapping[str, Any]) -> Any:
+    """Annotation of a mapping of names with values of these types."""
+    fields: dict[str, Any] = {name: (kind, None) for name, kind in types.items()}
+    model = create_model(title, __base__=_Given, **fields)
+    return GetPydanticSchema(lambda _, handler: handler(model))
+
+
+def _section(name: str) -> Any:
+    """Annotation of the values of a section."""
+    return _mapping_of(name, {field: _TYPES[field] for field in SECTIONS[name].model_fields})
+
+
+# Grid
+
+
+class _Range(BaseModel):
+    """Values from one to another, both included, in steps or of a number."""
+
+    model_config = STRICT
+    first: float = Field(alias="from")
+    last: float = Field(alias="to")
+    step: float | None = Field(None, gt=0)
+    count: int | None = Field(None, ge=2, le=AXIS_LIMIT)
+
+    def values(self) -> list[int | float]:
+        """All values, computed in decimals, so that three steps of 0.1 from 0 lead to 0.3 and to no other number."""
+        first, last = Decimal(str(self.first)), Decimal(str(self.last))
+        if first >= last:
+            raise InputError(f"to: {self.last} is not greater than from: {self.first}; give a greater value")
+        if (self.step is None) == (self.count is None):
+            raise InputError("step: a range needs either step or count; give one of them")
+        step = (last - first) / (self.count - 1) if self.count else Decimal(str(self.step))
+        if (last - first) / step >= AXIS_LIMIT:
+            raise InputError(f"step: gives more than {AXIS_LIMIT} values; give a larger step")
+        intervals = int((last - first) / step) if self.count is None else self.count - 1
+        below = first + intervals * step
+        if self.count is None and below != last:
+            raise InputError(
+                f"to: steps of {step} from {first} miss {last}; give {below} or {below + step}, or a count"
+            )
+        values = [first + number * step for number in range(intervals)] + [last]
+        return [int(value) if value == int(value) and abs(value) < 2**53 else float(value) for value in values]
+
+
+def _expanded(values: Any, check: Callable[[Any], list[Any]], info: ValidationInfo) -> list[Any]:
+    """The values of an axis, those of a range written out; together no more than sweeps of `CELL_LIMIT` cells have."""
+    if isinstance(values, Mapping):
+        if info.context["expanded"] > CELL_LIMIT + MOST_VALUES:  # type: ignore[index]
+            raise ValueError(f"more than {CELL_LIMIT} values in the ranges of all axes; give fewer")
+        try:
+            values = _Range.model_validate(values).values()
+        except ValidationError as error:
+            raise InputError(refusals(error, "", _KEYS)[0]) from None
+        info.context["expanded"] += len(values)  # type: ignore[index]
+    checked = check(values)
+    value, count = Counter(checked).most_common(1)[0]
+    if count > 1:
+        raise ValueError(f"{shown(value)} is given twice; leave one out")
+    return checked
+
+
+def _axis(kind: Any) -> Any:
+    """Annotation of the values of an axis, a list or a range."""
+    listed = Annotated[list[kind], Field(min_length=1, max_length=AXIS_LIMIT)]
+    return Annotated[listed, WrapValidator(_expanded, json_schema_input_type=listed | _Range)]
+
+
+# Distributions
+
+
+class _Moments(BaseModel):
+    model_config = STRICT
+    mean: float | None = None
+    sigma: float = Field(gt=0)
+
+
+class _Law(BaseModel):
+    """A distribution of one quantity."""
+
+    model_config = STRICT
+    uniform: list[float] | None = Field(None, min_length=2, max_length=2)
+    gaussian: _Moments | None = None
+
+    @model_validator(mode="after")
+    def _one_of_them(self) -> Self:
+        if (self.uniform is None) == (self.gaussian is None):
+            raise ValueError("no distribution; give {uniform: [lower, upper]} or {gaussian: {mean: …, sigma: …}}")
+        return self
+
+
+def _distribution(given: Any, info: ValidationInfo) -> Distribution | None:
+    """What is drawn of the quantity; None for what is fixed."""
+    name = str(info.field_name)
+    if given == "table" and name not in TABLE:
+        raise ValueError(f"there is no uncertainty of {name} in Table 1; give uniform or gaussian")
+    if isinstance(given, str):
+        return TABLE[name] if given == "table" else None
+    bounds = field_bounds(FIELDS[name])
+    if given.gaussian is not None:
+        if given.gaussian.mean is not None and not bounds.admit(given.gaussian.mean):
+            raise InputError(f"gaussian.mean: {given.gaussian.mean} is not physical; see `warpchain parameters {name}`")
+        return Gaussian(given.gaussian.mean, given.gaussian.sigma, bounds)
+    lower, upper = given.uniform
+    if lower >= upper:
+        raise InputError(f"uniform[1]: {upper} is not greater than {lower}; give a greater value")
+    for place, end, inwards in ((0, lower, math.inf), (1, upper, -math.inf)):  # an end may be an open bound
+        if not (bounds.admit(end) or bounds.admit(math.nextafter(end, inwards))):
+            raise InputError(f"uniform[{place}]: {end} is not physical; see `warpchain parameters {name}`")
+    return Uniform(lower, upper, bounds)
+
+
+_Word = Literal["table", "fixed"]
+_Drawn = Annotated[
+    Annotated[_Word, Tag("(word)")] | Annotated[_Law, Tag("(law)")],
+    Discriminator(lambda given: "(law)" if isinstance(given, Mapping) else "(word)"),
+    AfterValidator(_distribution),
+]
+
+
+# The file
+
+
+def _printable(name: str) -> str:
+    if not name.strip() or not name.isprintable():
+        raise ValueError(f"{shown(name)} is no name; give a line of text")
+    return name
+
+
+class BlockKeys(BaseModel):
+    """The keys that a block and the file itself may have; what has nothing behind it is not given."""
+
+    model_config = STRICT
+
+    preset: Preset | None = Field(None, description="parameters to start from; may also be an axis of the grid")
+    samples: int | None = Field(None, ge=1, le=2**30, description="samples in each cell of the grid")
+    sampler: Sampler | None = Field(None, description="how samples are drawn, see below; default: random")
+    scene: Annotated[dict[str, Value], _section("scene")] = Field(
+        {}, description="fields of the [scene](scene.md) that differ from their defaults"
+    )
+    options: Annotated[dict[str, Value], _section("options")] = Field(
+        {}, description="[options](options.md) that differ from their defaults"
+    )
+    parameters: Annotated[dict[str, Value], _section("parameters")] = Field(
+        {}, description="[parameters](parameters.md) that differ from the preset"
+    )
+    distributions: Annotated[
+        dict[str, Any], _mapping_of("distributions", {"all": _Word, **dict.fromkeys(DRAWABLE, _Drawn)})
+    ] = Field({}, description="what samples draw, see below")
+    grid: Annotated[
+        dict[str, list[Value]],
+        _mapping_of("grid", {"preset": _axis(Preset), **{name: _axis(kind) for name, kind in _TYPES.items()}}),
+    ] = Field({}, description="axes of the grid, see below; not in a file with blocks")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_empty_keys(cls, values: Any) -> Any:
+        return {k: value for k, value in values.items() if value is not None} if isinstance(values, dict) else values
+
+    @model_validator(mode="after")
+    def _axes_have_no_other_value(self) -> Self:
+        for name in self.grid:
+            home = SECTION_OF.get(name, name)
+            if self.preset is not None if name == "preset" else name in getattr(self, home):
+                raise InputError(f"grid.{name}: also given in {home}; leave one out")
+        return self
+
+
+class BlockOfFile(BlockKeys):
+    """An item of `blocks`."""
+
+    name: str = Field(
+        pattern="^[A-Za-z0-9][A-Za-z0-9_-]*$",
+        max_length=LONGEST_NAME,
+        description="name of the block, unique in its sweep",
+    )
+
+
+class SweepFile(BlockKeys):
+    """A sweep file."""
+
+    version: Literal[1] = Field(description="version of the format: 1")
+    name: Annotated[str, AfterValidator(_printable)] = Field(
+        max_length=LONGEST_NAME, description="name of the sweep, in figures and pages; of a block, unique in its sweep"
+    )
+    seed: int = Field(ge=0, le=LARGEST_SEED, description="whole number from which all random numbers follow")
+    blocks: list[BlockOfFile] | None = Field(
+        None, min_length=1, description="list of blocks; what a block does not say is taken from the file"
+    )
+    same_samples_along: list[str] = Field(
+        [], description="axes along which the samples of all cells draw the same numbers"
+    )
+    record: Recording = Field(Recording.of({}), description="what is kept of the motion of walks, see below")
+
+    @model_validator(mode="after")
+    def _one_grid_or_blocks(self) -> Self:
+        names = [block.name for block in self.blocks or ()]
+        if names and self.grid:
+            raise InputError("grid: given together with blocks; move it into a block")
+        for number, name in enumerate(names):
+            if name in names[:number]:
+                raise InputError(f"blocks[{number}].name: {shown(name)} is given twice; give another name")
+        return self
+
+
+_KEYS: Final = (
+    *SweepFile.model_fields,
+    *Recording.model_fields,
+    *Frames.model_fields,
+    *_Law.model_fields,
+    "from",
+    "to",
+    "step",
+    "count",
+)
+
+
+def sweep_schema() -> dict[str, Any]:
+    """The JSON schema of sweep files, draft 07; what only whole cells can tell is left to `load_sweep`."""
+    return {"$schema": "http://json-schema.org/draft-07/schema#", **SweepFile.model_json_schema()}
+
+
+# From a file to blocks
 
 
 def read_sweep(
@@ -60,120 +337,73 @@ def read_sweep(
         InputError: the file cannot be read, or something in it is refused.
     """
     content = plain(source, "sweep") if isinstance(source, Mapping) else read_yaml(sweep_path(source))
-    if not isinstance(content, Mapping):
-        raise InputError(f"{source}: no mapping at the top; give the keys {', '.join(_TOP_KEYS)}")
-    top = _keys(content, "sweep", _TOP_KEYS)
-    version = _needed(top, "version", "sweep", f"give {VERSION}")
-    if type(version) is not int or version != VERSION:
-        raise InputError(f"sweep.version: {shown(version)} is not supported; give {VERSION}")
-    recording = _recording(top.get("record"))
-    name = _text(_needed(top, "name", "sweep", "give the sweep a name"), "sweep.name")
-    seed = checked_whole(_needed(top, "seed", "sweep", "give a whole number"), "sweep.seed", 0, LARGEST_SEED)
-    check_declared(top)
-    blocks = tuple(_blocks(top))
-    same = _same_samples_along(top.get("same_samples_along"), blocks)
-    return name, seed, same, tuple(_numbered(blocks, same)), recording
+    if not isinstance(content, dict):
+        raise InputError(f"{source}: no mapping at the top; give the keys {', '.join(SweepFile.model_fields)}")
+    try:
+        file = SweepFile.model_validate(content, context={"expanded": 0})
+    except ValidationError as error:
+        raise InputError(*refusals(error, "sweep", _KEYS)) from None
+    if file.blocks is None:
+        blocks = [_block("main", "sweep", None, file)]
+    else:
+        blocks = [_block(each.name, f"sweep.blocks[{i}]", file, each) for i, each in enumerate(file.blocks)]
+    same = _same_samples_along(file.same_samples_along, {name for block in blocks for name in block.axes})
+    return file.name, file.seed, same, tuple(_numbered(blocks, same)), file.record
 
 
-def _recording(content: object) -> Recording:
-    """What is kept of the motion of walks."""
-    given = _keys(content, "sweep.record", ("series", "frames"))
-    series = _choice(given.get("series", False), "sweep.record.series", SERIES_INTERVAL)
-    frames = _choice(given.get("frames", False), "sweep.record.frames", FRAME_INTERVAL, ("before",))
-    if frames is not None and (series is None or not series.covers(frames)):
-        raise InputError(
-            "sweep.record.frames: kept of samples without series; give them in sweep.record.series as well"
-        )
-    return Recording(series, frames)
-
-
-def _choice(content: object, path: str, interval: float, more: tuple[str, ...] = ()) -> Choice | None:
-    """The samples that something is kept of, and how often; None: not at all. `more` are further keys."""
-    if content is False:
-        return None
-    if not (content is True or isinstance(content, Mapping)):
-        raise InputError(f"{path}: {shown(content)}; give true, false or {{interval: {interval}, samples: [0, 1]}}")
-    keys = {} if content is True else _keys(content, path, ("interval", "samples", *more))
-    chosen = keys.get("samples", "all")
-    samples = None
-    if not isinstance(chosen, str) or chosen != "all":
-        numbers = _sequence(chosen, f"{path}.samples", "give all, or a list such as [0, 1]")
-        samples = tuple(checked_whole(item, f"{path}.samples[{place}]", 0, 2**30) for place, item in enumerate(numbers))
-        if len(set(samples)) < len(samples):
-            raise InputError(f"{path}.samples: a number is given twice; leave one out")
-        samples = tuple(sorted(samples))
-    times = {"before": 0.0, "interval": interval}
-    for key in times.keys() & keys.keys():
-        times[key] = float(checked_positive(keys[key], f"{path}.{key}"))
-        if times[key] > LONGEST_INTERVAL:
-            raise InputError(f"{path}.{key}: {shown(keys[key])} s is too long; give at most {LONGEST_INTERVAL} s")
-    return Choice(times["interval"], samples, times["before"])
-
-
-def _blocks(top: Mapping[str, Any]) -> Iterator[Block]:
-    """The blocks of a file; a file without the key `blocks` is itself one."""
-    outer = _level(top, "sweep")
-    if "blocks" not in top:
-        yield _block("main", "sweep", {}, outer)
-        return
-    if "grid" in top:
-        raise InputError("sweep.grid: given together with blocks; move it into a block")
-    names: set[str] = set()
-    for number, content in enumerate(_sequence(top["blocks"], "sweep.blocks", "give a list of blocks")):
-        path = f"sweep.blocks[{number}]"
-        keys = _keys(content, path, _BLOCK_KEYS)
-        name = _text(_needed(keys, "name", path, "give the block a name"), f"{path}.name")
-        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
-            raise InputError(
-                f"{path}.name: {shown(name)} is no plain name; give letters, digits, - and _, "
-                "beginning with a letter or digit"
-            )
-        if name in names:
-            raise InputError(f"{path}.name: {shown(name)} is given twice; give another name")
-        names.add(name)
-        yield _block(name, path, outer, _level(keys, path))
-
-
-def _level(keys: Mapping[str, Any], path: str) -> dict[str, Any]:
-    """The keys of one level, the top or a block, with the values of its sections and distributions checked one by one.
-
-    Behind each name of a distribution stand the path where it was given, and a distribution, `table` or `fixed`.
-    """
-    level = dict(keys)
-    for section, model in SECTIONS.items():
-        where = f"{path}.{section}"
-        values = _named(keys.get(section), where, tuple(model.model_fields))
-        level[section] = {name: _checked(name, value, place) for name, (place, value) in values.items()}
-    given = _named(keys.get("distributions"), f"{path}.distributions", ("all", *DRAWABLE), elsewhere=False)
-    level["distributions"] = {
-        name: (place, _distribution(name, value, place)) for name, (place, value) in given.items()
-    }
-    return level
-
-
-def _block(name: str, path: str, outer: Mapping[str, Any], inner: Mapping[str, Any]) -> Block:
+def _block(name: str, path: str, outer: BlockKeys | None, inner: BlockKeys) -> Block:
     """A block: its own keys and values, and those of the top level that it does not give."""
-    merged = {key: {**outer.get(key, {}), **inner[key]} for key in (*SECTIONS, "distributions")}
-    keys = {**outer, **inner}
-    axes = _axes(inner, path)
-    sections = {
-        section: {key: value for key, value in merged[section].items() if key not in axes} for section in SECTIONS
-    }
-    chosen = None
-    if "preset" not in axes:
-        chosen = _needed(keys, "preset", path, "name the parameters to start from, such as preset: paper")
-        chosen = str(_checked("preset", chosen, f"{path}.preset"))
-    sampler = keys.get("sampler", "random")
-    if not isinstance(sampler, str) or sampler not in SAMPLERS:
-        raise InputError(f"{path}.sampler: {shown(sampler)} is unknown; {suggestion(sampler, SAMPLERS)}")
-    samples = _needed(keys, "samples", path, "give the number of samples per cell")
-    samples = checked_whole(samples, f"{path}.samples", 1, 2**30)
-    drawn = _drawn(merged["distributions"], sections, axes)
-    check_design(sampler, samples, len(drawn), path)
-    return Block(path, name, chosen, sections, axes, drawn, sampler, samples)
+
+    def either(key: str) -> Any:
+        return getattr(inner, key) or (getattr(outer, key) if outer else None)
+
+    def merged(key: str) -> dict[str, Any]:
+        return {**(getattr(outer, key) if outer else {}), **getattr(inner, key)}
+
+    axes = {axis: tuple(values) for axis, values in inner.grid.items()}
+    sections = {key: {name: value for name, value in merged(key).items() if name not in axes} for key in SECTIONS}
+    preset, samples, sampler = (either(key) for key in ("preset", "samples", "sampler"))
+    if preset is None and "preset" not in axes:
+        raise InputError(f"{path}.preset: missing; name the parameters to start from, such as preset: paper")
+    if samples is None:
+        raise InputError(f"{path}.samples: missing; give the number of samples per cell")
+    drawn = _drawn(merged("distributions"), sections, axes, f"{path}.distributions")
+    check_design(sampler or "random", samples, len(drawn), path)
+    return Block(path, name, None if "preset" in axes else preset, sections, axes, drawn, sampler or "random", samples)
 
 
-def _numbered(blocks: Iterable[Block], same_samples_along: Collection[str]) -> Iterator[Block]:
+def _drawn(
+    given: Mapping[str, Any], sections: Mapping[str, Mapping[str, Value]], axes: Mapping[str, object], path: str
+) -> dict[str, Distribution]:
+    """What a block draws, in the order of drawing.
+
+    Given values are exact, on an axis or not. A distribution of the quantity's own name is drawn about each of them,
+    and refused if it has a mean or ends of its own.
+    """
+    drawn: dict[str, Distribution] = {}
+    for name in DRAWABLE:
+        home = "grid" if name in axes else SECTION_OF[name] if name in sections[SECTION_OF[name]] else None
+        usual = TABLE.get(name) if home is None and given.get("all", "table") == "table" else None
+        distribution = given.get(name, usual)
+        if distribution is None:
+            continue
+        if home is not None and not (isinstance(distribution, Gaussian) and distribution.mean is None):
+            raise InputError(f"{path}.{name}: {name} also has a value in {home}; leave one out, or give fixed")
+        drawn[name] = distribution
+    return drawn
+
+
+def _same_samples_along(written: list[str], known: set[str]) -> tuple[str, ...]:
+    """The axes along which the same samples are used, sorted."""
+    names = {full_name(name) for name in written}
+    for name in names - known:
+        raise InputError(
+            f"sweep.same_samples_along: {shown(name)} is no axis of any block; {suggestion(name, sorted(known))}"
+        )
+    return tuple(sorted(names))
+
+
+def _numbered(blocks: list[Block], same_samples_along: tuple[str, ...]) -> Iterator[Block]:
     """The blocks with their first walks and streams, numbered through all of them.
 
     Raises:
@@ -184,245 +414,10 @@ def _numbered(blocks: Iterable[Block], same_samples_along: Collection[str]) -> I
         yield replace(block, first=first, first_stream=first_stream)
         cells += math.prod(block.shape[:-1])
         first += block.walk_count
-        check_count(cells, first, block.path)
-        first_stream += math.prod(len(values) for name, values in block.axes.items() if name not in same_samples_along)
-
-
-def _checked(name: str, value: object, path: str) -> Value:
-    """One value, checked by itself and converted as its model does.
-
-    Args:
-        name: `preset`, or a field of one of the `SECTIONS`.
-        value: the value.
-        path: where it was given, for errors.
-
-    Raises:
-        InputError: the field refuses the value, whatever the others are.
-    """
-    try:
-        if name == "preset":
-            preset(value)  # type: ignore[arg-type]
-            return str(value)
-        model = SECTIONS[SECTION_OF[name]]
-        values = {**(preset("paper").model_dump() if model is Parameters else {}), name: value}
-        try:
-            result: Value = getattr(model.model_validate(values), name)
-            return str(value) if name == "method" and value in METHODS_BY_NEED else result
-        except ValidationError as error:
-            if any(problem["loc"] for problem in error.errors()):
-                validated(model, values, "")
-        # Refused only beside the defaults of other fields: the check of the cells decides.
-        result = float(value) if model.model_fields[name].annotation is float else value  # type: ignore
-        return result
-    except InputError as error:
-        raise InputError(path + str(error).removeprefix(".").removeprefix(name)) from None
-
-
-def _number(name: str, value: object, path: str) -> float:
-    """The same for a field that can be drawn, which is a number and never null."""
-    number = _checked(name, value, path)
-    assert number is not None
-    return float(number)
-
-
-def _axes(level: Mapping[str, Any], level_path: str) -> dict[str, tuple[Value, ...]]:
-    """The axes of a level's grid; an axis whose name also has a fixed value there is refused."""
-    axes = {}
-    for name, (path, content) in _named(level.get("grid"), f"{level_path}.grid", ("preset", *SECTION_OF)).items():
-        home = SECTION_OF.get(name, name)
-        if name in (level if home == "preset" else level[home]):
-            raise InputError(f"{path}: also given in {level_path}.{home}; leave one out")
-        if isinstance(content, Mapping):
-            content = _range(name, content, path)
-        values: dict[Value, None] = {}  # in order, and quick to look up
-        remedy = f"give a list such as [{shown(content)}], or {{from:, to:, step:}}"
-        for number, item in enumerate(_sequence(content, path, remedy)):
-            value = _checked(name, item, f"{path}[{number}]")
-            if value in values:
-                raise InputError(f"{path}[{number}]: {shown(value)} is given twice; leave one out")
-            values[value] = None
-        axes[name] = tuple(values)
-    return axes
-
-
-def _range(name: str, content: Mapping[object, object], path: str) -> list[Value]:
-    """The values of an axis given as {from, to, step} or {from, to, count}, both ends included.
-
-    They are computed in decimals, so that three steps of 0.1 from 0 lead to 0.3 and to no other number.
-    """
-    kind = None if name == "preset" else SECTIONS[SECTION_OF[name]].model_fields[name].annotation
-    if kind not in (int, float):
-        raise InputError(f"{path}: {name} is no number and has no range; give a list of values")
-    keys = _keys(content, path, ("from", "to", "step", "count"))
-    ends = [
-        _checked(name, _needed(keys, key, path, f"give the {which} value"), f"{path}.{key}")
-        for key, which in (("from", "first"), ("to", "last"))
-    ]
-    first, last = (Decimal(str(end)) for end in ends)
-    if first >= last:
-        raise InputError(f"{path}.to: {ends[1]} is not greater than from: {ends[0]}; give a greater value")
-    if ("step" in keys) == ("count" in keys):
-        raise InputError(f"{path}: a range needs either step or count; give one of them")
-    if "count" in keys:
-        intervals = checked_whole(keys["count"], f"{path}.count", 2, AXIS_LIMIT) - 1
-        step = (last - first) / intervals
-    else:
-        step = Decimal(str(checked_positive(keys["step"], f"{path}.step")))
-        if (last - first) / step >= AXIS_LIMIT:
-            raise InputError(f"{path}.step: gives more than {AXIS_LIMIT} values; give a larger step")
-        intervals = int((last - first) / step)
-        below = first + intervals * step
-        if below != last:
+        if cells > CELL_LIMIT:
+            raise InputError(f"{block.path}.grid: {cells:.6g} cells; give fewer values, for {CELL_LIMIT} cells at most")
+        if first > WALK_LIMIT:
             raise InputError(
-                f"{path}.to: steps of {step} from {first} miss {last}; give {below} or {below + step}, "
-                "or a count instead of the step"
+                f"{block.path}.samples: {first:.6g} walks; give fewer samples, for {WALK_LIMIT} walks at most"
             )
-    values = [first + number * step for number in range(intervals)] + [last]
-    if kind is float:
-        return [float(value) for value in values]
-    if any(value != int(value) for value in values):
-        key = "count" if "count" in keys else "step"
-        raise InputError(f"{path}.{key}: {shown(keys[key])} gives values that are not whole; give another")
-    return [int(value) for value in values]
-
-
-def _distribution(name: str, content: object, path: str) -> Distribution | str:
-    """What a level says about one quantity, or about `all`."""
-    if name == "all":
-        if not isinstance(content, str) or content not in ("table", "fixed"):
-            raise InputError(f"{path}: {shown(content)} is unknown; give table or fixed")
-        return content
-    if isinstance(content, str) and content == "fixed":
-        return "fixed"
-    if isinstance(content, str) and content == "table":
-        if name not in TABLE:
-            raise InputError(f"{path}: there is no uncertainty of {name} in Table 1; give uniform or gaussian")
-        return "table"
-    forms = _keys(content, path, ("uniform", "gaussian")) if isinstance(content, Mapping) else {}
-    if len(forms) != 1:
-        raise InputError(
-            f"{path}: {shown(content)} is no distribution; "
-            "give table, fixed, {uniform: [lower, upper]} or {gaussian: {mean: …, sigma: …}}"
-        )
-    bounds = field_bounds(SECTIONS[SECTION_OF[name]].model_fields[name])
-    if "uniform" in forms:
-        path += ".uniform"
-        ends = forms["uniform"]
-        if not isinstance(ends, Sequence) or isinstance(ends, str) or len(ends) != 2:
-            raise InputError(f"{path}: {shown(ends)} is no interval; give [lower, upper]")
-        lower = _end(name, ends[0], f"{path}[0]", bounds, inwards=math.inf)
-        upper = _end(name, ends[1], f"{path}[1]", bounds, inwards=-math.inf)
-        if lower >= upper:
-            raise InputError(f"{path}[1]: {upper} is not greater than {lower}; give a greater value")
-        return Uniform(lower, upper, bounds)
-    path += ".gaussian"
-    gaussian = _keys(forms["gaussian"], path, ("mean", "sigma"))
-    mean = _number(name, gaussian["mean"], f"{path}.mean") if "mean" in gaussian else None
-    sigma = checked_positive(_needed(gaussian, "sigma", path, "give the standard deviation"), f"{path}.sigma")
-    return Gaussian(mean, sigma, bounds)
-
-
-def _end(name: str, value: object, path: str, bounds: Bounds, inwards: float) -> float:
-    """An end of an interval; it may be a bound that is itself not physical, as 1 is for a phase."""
-    try:
-        return _number(name, value, path)
-    except InputError:
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise
-        if not bounds.admit(math.nextafter(value, inwards)):
-            raise
-        return float(value)
-
-
-def _drawn(
-    given: Mapping[str, tuple[str, Distribution | str]],
-    sections: Mapping[str, Mapping[str, Value]],
-    axes: Mapping[str, tuple[Value, ...]],
-) -> dict[str, Distribution]:
-    """What a block draws, in the order of drawing.
-
-    Given values are exact, on an axis or not. A distribution of the quantity's own name is drawn about each of them,
-    and refused if it has a mean or ends of its own.
-    """
-    _, default = given.get("all", ("", "table"))
-    drawn: dict[str, Distribution] = {}
-    for name in DRAWABLE:
-        home = "grid" if name in axes else SECTION_OF[name] if name in sections[SECTION_OF[name]] else None
-        path, choice = given.get(name, ("", None))
-        if choice is None:
-            if default == "table" and name in TABLE and home is None:
-                drawn[name] = TABLE[name]
-        elif choice != "fixed":
-            distribution = TABLE[name] if isinstance(choice, str) else choice
-            if home is not None and not (isinstance(distribution, Gaussian) and distribution.mean is None):
-                raise InputError(f"{path}: {name} also has a value in {home}; leave one out, or give fixed")
-            drawn[name] = distribution
-    return drawn
-
-
-def _same_samples_along(content: object, blocks: Sequence[Block]) -> tuple[str, ...]:
-    """The axes along which the same samples are used, sorted."""
-    if content is None:
-        return ()
-    path = "sweep.same_samples_along"
-    known = sorted({name for block in blocks for name in block.axes})
-    if not isinstance(content, Sequence) or isinstance(content, str):
-        raise InputError(f"{path}: {shown(content)} is no list; give names of axes, such as [tolerance]")
-    names: list[str] = []
-    for number, written in enumerate(content):
-        name = full_name(written, NAME_OF_SYMBOL)
-        if not isinstance(name, str) or name not in known:
-            remedy = suggestion(name, known) if known else "leave it out"
-            raise InputError(f"{path}[{number}]: {shown(written)} is no axis of any block; {remedy}")
-        if name in names:
-            raise InputError(f"{path}[{number}]: {shown(written)} is given twice; leave one out")
-        names.append(name)
-    return tuple(sorted(names))
-
-
-def _mapping(content: object, path: str) -> Mapping[Any, Any]:
-    """A mapping; nothing at all is an empty one."""
-    if content is None:
-        return {}
-    if not isinstance(content, Mapping):
-        raise InputError(f"{path}: {shown(content)} is not a mapping; give keys with values")
-    return content
-
-
-def _named(content: object, path: str, known: Sequence[str], *, elsewhere: bool = True) -> dict[str, tuple[str, Any]]:
-    """The values of a mapping by full names, each with the path where it was given, see `by_name`."""
-    return by_name(_mapping(content, path), path, known, elsewhere=elsewhere)
-
-
-def _keys(content: object, path: str, known: Sequence[str]) -> dict[str, Any]:
-    """A mapping with known keys, without those that have nothing behind them."""
-    given = _mapping(content, path)
-    for key in given:
-        if key not in known:
-            raise InputError(f"{path_of(path, key)}: unknown key; {suggestion(key, known)}")
-    return {key: value for key, value in given.items() if value is not None}
-
-
-def _needed(keys: Mapping[str, Any], key: str, path: str, remedy: str) -> Any:
-    if key not in keys:
-        raise InputError(f"{path}.{key}: missing; {remedy}")
-    return keys[key]
-
-
-def _sequence(content: object, path: str, remedy: str) -> Sequence[object]:
-    """A list with at least one item."""
-    if not isinstance(content, Sequence) or isinstance(content, str):
-        raise InputError(f"{path}: {shown(content)} is no list; {remedy}")
-    if not content:
-        raise InputError(f"{path}: empty; give one item or more")
-    if len(content) > AXIS_LIMIT:
-        raise InputError(f"{path}: {len(content)} items; give at most {AXIS_LIMIT}")
-    return content
-
-
-def _text(value: object, path: str) -> str:
-    if not isinstance(value, str) or not value.strip() or not value.isprintable():
-        raise InputError(f"{path}: {shown(value)} is no name; give a line of text")
-    if len(value) > LONGEST_NAME:
-        raise InputError(f"{path}: {len(value)} characters are no name; give at most {LONGEST_NAME}")
-    return value
+        first_stream += math.prod(len(values) for name, values in block.axes.items() if name not in same_samples_along)

@@ -60,13 +60,6 @@ def test_both_starts_release_the_same_loop() -> None:
     assert rest.hold_time < 2.5 and spinning.hold_time < 2.5
 
 
-def test_further_hold_prolongs_the_hold() -> None:
-    """Half a second more of it is half a second more before the release, to the sample interval."""
-    usual, longer = (released_loop(start="spinning", **CELL, further_hold=hold) for hold in (0.0, 0.5))
-    assert longer.hold_time - usual.hold_time == pytest.approx(0.5, abs=1e-9)
-    assert longer.drift == usual.drift
-
-
 def test_hold_time_and_drift_are_those_of_the_drive() -> None:
     """A walk tells them; without a sprocket there are none."""
     settings = {"start": "spinning", "method": "explicit", "walk_limit": 1e-3, **CELL}

@@ -1,0 +1,284 @@
+"""What is refused, and how: in one short printable line that begins with the field, at little cost."""
+
+import datetime
+import math
+import pickle
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import warpchain
+from warpchain.inputs.sections import SECTION_OF, SECTIONS
+from warpchain.inputs.setup import read_setup, resolve
+from warpchain.inputs.validation import (
+    DEEPEST,
+    LONGEST_LINE,
+    MOST_VALUES,
+    InputError,
+    field_limits,
+    one_line,
+    plain,
+    printable,
+    shown,
+    suggestion,
+)
+from warpchain.inputs.yaml_files import LARGEST_FILE, read_yaml
+from warpchain.kernels.methods.method import find_method, method_names
+from warpchain.run.single_walk import setup_walk
+from warpchain.sweeps.plan import load_sweep
+
+SWEEP = {"version": 1, "name": "x", "seed": 1, "samples": 1, "preset": "soft"}
+FIELDS = {name: field for model in SECTIONS.values() for name, field in model.model_fields.items()}
+LIMITS = [(name, limit, value) for name, field in FIELDS.items() for limit, value in field_limits(field).items()]
+
+
+def refusal(call: Callable[[], object]) -> str:
+    """The text with which a call is refused within a few seconds."""
+    begun = time.process_time()
+    with pytest.raises(InputError) as caught:
+        call()
+    assert time.process_time() - begun < 5
+    for line in caught.value.args:
+        assert line.isprintable() and 0 < len(line) <= LONGEST_LINE
+    return str(caught.value)
+
+
+def refused(name: str, value: object) -> str:
+    """How the value of a field is refused."""
+    sections: dict[str, Any] = {section: {} for section in SECTIONS}
+    sections[SECTION_OF[name]] = {name: value}
+    message = refusal(lambda: resolve("paper", **sections))
+    assert "\n" not in message
+    return message
+
+
+@pytest.mark.parametrize(("name", "limit", "value"), LIMITS)
+def test_each_bound_is_refused_by_name(name: str, limit: str, value: float) -> None:
+    """What lies just beyond a bound, or on one that is excluded."""
+    beyond = math.nextafter(value, math.inf if limit.startswith("l") else -math.inf) if limit in ("ge", "le") else value
+    if FIELDS[name].annotation is int:
+        beyond = round(value) + (1 if limit == "le" else -1)
+    assert refused(name, beyond).startswith(f"{SECTION_OF[name]}.{name}: Input should be ")
+
+
+def test_the_bounds_that_documents_promise() -> None:
+    """Fractions, masses, links and tolerances."""
+    bounds = {(name, limit): value for name, limit, value in LIMITS}
+    for pair in ("floor", "chain", "sprocket"):
+        for kind in ("restitution", "friction"):
+            assert (bounds[f"{pair}_{kind}", "ge"], bounds[f"{pair}_{kind}", "le"]) == (0, 1)
+    for name in ("inner_mass", "outer_mass", "inner_inertia", "outer_inertia", "joint_stiffness", "friction_smoothing"):
+        assert bounds[name, "gt"] == 0
+    for name in ("spin_up_time", "hold_limit", "walk_limit", "contact_step", "skin", "rest_speed", "rest_time"):
+        assert bounds[name, "gt"] == 0
+    assert (bounds["links", "ge"], bounds["links", "le"], bounds["frequency", "le"]) == (4, 100_000, 1e4)
+    assert (bounds["tolerance", "ge"], bounds["tolerance", "le"], bounds["phase", "lt"]) == (1e-13, 0.1, 1)
+
+
+@pytest.mark.parametrize("name", FIELDS)
+@pytest.mark.parametrize("value", [math.nan, math.inf, "0.5", "15 Hz", [0.5], {}, 1j, b"60", datetime.date(2020, 1, 1)])
+def test_what_is_no_value_is_refused_by_name(name: str, value: object) -> None:
+    """A number is finite and no text, list or date; a word is one of those that there are."""
+    assert refused(name, value).startswith(f"{SECTION_OF[name]}.{name}: ")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("links", 61, "scene.links: 61 is odd; "),
+        ("links", 60.0, "scene.links: Input should be a valid integer; given 60.0"),
+        ("links", True, "scene.links: Input should be a valid integer; given True"),
+        ("links", 28, "scene.links: 28 links of 0.01268 m do not reach round the sprocket"),
+        ("frequency", "15 Hz", "scene.frequency: Input should be a valid number, in Hz; given '15 Hz'"),
+        ("frequency", None, "scene.frequency: Input should be a valid number, in Hz; given None"),
+        ("start", "elipse", "scene.start: Input should be 'rest', 'spinning' or 'ellipse'; given 'elipse'"),
+        ("tilt", 0.1, "scene.tilt: 0.1 moves the plane of the chain, which is fixed; give plane: tilting"),
+        ("circle_radius", 0.007, "parameters.circle_radius: 0.007 is not smaller than half the link length 0.00634; "),
+        ("self_contact", 1, "options.self_contact: Input should be a valid boolean; given 1"),
+        ("method", "hybird", "options.method: 'hybird' is unknown; did you mean hybrid?"),
+        ("method", None, "options.method: Input should be a valid string; given None"),
+        ("device", "gpu", "options.device: 'gpu' is no device; give cpu, cuda or cuda:N"),
+        ("contact_step", 1e-13, "options.smallest_step: 1e-12 is not smaller than contact_step 1e-13 s; "),
+    ],
+)
+def test_refusals_say_what_to_give(name: str, value: object, message: str) -> None:
+    """The field's path, what it should be with its unit, and what was given."""
+    assert refused(name, value).startswith(message)
+
+
+@pytest.mark.parametrize("method", [name for name in method_names() if not find_method(name).runs_on_gpus])
+def test_methods_that_a_gpu_has_no_kernel_for_are_refused_there(method: str) -> None:
+    """With what to give instead."""
+    text = refusal(lambda: setup_walk("soft", {"method": method, "device": "cuda:1"}, None))
+    assert text == f"options.method: {method!r} runs on a CPU only; give explicit, or device: cpu"
+
+
+def test_several_problems_and_what_is_no_section() -> None:
+    """The first is described, the others are counted; a section is a mapping with known names."""
+    several = {"frequency": -1.0, "phase": 2.0, "walk_limit": 0}
+    assert refusal(lambda: resolve("paper", scene=several, options={}, parameters={})).endswith(" (and 2 more)")
+    for scene in ([60], None, {3: 4}, {"x\ny" * 1000: 1}):
+        assert refusal(lambda scene=scene: resolve("paper", scene=scene, options={}, parameters={})).startswith("scene")
+    with pytest.raises(InputError) as caught:
+        warpchain.sweep(grid={"frequency": [-1 - i for i in range(1000)]}, out="x")
+    assert len(caught.value.args) == 21 and caught.value.args[-1] == "980 more problems; correct these first"
+
+
+# Hostile values
+
+
+class Mute:
+    """An object that cannot be shown."""
+
+    def __repr__(self) -> str:
+        """Fails."""
+        raise RuntimeError("no text")
+
+
+def nested(depth: int) -> list[Any]:
+    """Lists inside of one another; of depth 0 one that contains itself."""
+    items: list[Any] = []
+    if depth == 0:
+        items.append(items)
+    for _ in range(depth):
+        items = [items]
+    return items
+
+
+HOSTILE: dict[str, Callable[[], Any]] = {
+    "mute": Mute,
+    "endless": lambda: nested(0),
+    "deep": lambda: nested(100_000),
+    "long number": lambda: 10**5000,
+    "escape": lambda: "\x1b[2J",
+    "surrogate": lambda: "\ud800",
+    "long text": lambda: "x" * 10**6,
+    "time": lambda: np.timedelta64(60),
+    "array of times": lambda: np.array(["2020"], dtype="M8[ns]"),
+    "array": lambda: np.zeros(10**7),
+    "array of objects": lambda: np.array([Mute()], dtype=object),
+    "range": lambda: range(10**30),
+    "long double": lambda: np.longdouble("1e4000"),
+    "mapping": lambda: {Mute(): 1},
+    "large": lambda: {"a": [{"b": ["\x1b"] * 1000}] * 1000},
+}
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_a_hostile_value_is_refused_in_short_lines(kind: str) -> None:
+    """Numbers, words and truth values, given by keyword; every key of a sweep, given from Python."""
+    value = HOSTILE[kind]()
+    for name in ("links", "frequency", "start", "device", "method", "self_contact"):
+        assert refusal(lambda name=name: setup_walk("soft", {name: value}, None))
+    for key in ("seed", "samples", "sampler", "preset", "scene", "grid", "distributions", "record", "blocks"):
+        assert refusal(lambda key=key: load_sweep({**SWEEP, key: value})).startswith("sweep")
+
+
+def test_values_have_bounds_of_number_and_depth() -> None:
+    """As many values and as deep as the limits say pass the door, one more does not."""
+    assert plain([0] * (MOST_VALUES - 1)) == [0] * (MOST_VALUES - 1)
+    assert "more than" in refusal(lambda: plain([0] * MOST_VALUES, "grid"))
+    assert plain(nested(DEEPEST - 1)) == nested(DEEPEST - 1)
+    assert "inside of one another" in refusal(lambda: plain(nested(DEEPEST), "grid"))
+
+
+@given(st.text(max_size=90))
+def test_texts_of_any_characters_are_printable_and_short(text: str) -> None:
+    """Printed, shown and looked for among known names."""
+    assert printable(text).isprintable() and (printable(text) == text or not text.isprintable())
+    assert shown([text, {text: text}]).isprintable() and len(shown({text: [text]})) <= 60
+    assert len(suggestion(text, ("links", "frequency"))) <= 60
+
+
+def test_a_refusal_keeps_its_lines() -> None:
+    """Several problems have a line each, also on the other side of a pickle, and no value adds one."""
+    error = InputError("links: 3 is odd", "name: 'a\nb\u2028c\x1b' is no name")
+    assert str(error).splitlines() == ["links: 3 is odd", "name: 'a b c\\x1b' is no name"]
+    assert str(pickle.loads(pickle.dumps(error))) == str(error)
+    path, problem = "/x" * 300 + "/file.yaml", "no mapping at the top; give keys"
+    assert one_line(f"{path}: {problem}", "error: ").endswith(f"{path[-80:]}: {problem}")
+
+
+# Hostile files
+
+
+LEVELS = ("ab", "bc", "cd", "de", "ef", "fg")
+"""Names of anchors, each with that of what it repeats before it."""
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "- paper",
+        "preset: {a: 1, a: 1}",
+        "preset: {a: 1, 'a': 1}",
+        "preset: soft\nscene: {links: 60",
+        "preset: soft\n---\npreset: soft",
+        "scene: {? [1, 2] : 3}",
+        *(f"preset: {tag} x" for tag in ("!!int", "!!float", "!!bool", "!!timestamp", "!!binary", "!!map", "!!merge")),
+        "preset: !!python/object:os.system x",
+        "preset: !!set {a}",
+        "scene: {links: 060}",
+        "scene: {frequency: 1:30}",
+        "scene: {frequency: 2020-01-01}",
+        "scene: {links: " + "1" * 5000 + "}",
+        'preset: "\\Uffffffff"',
+        "%YAML " + "9" * 5000 + ".1\n---\na",
+        "preset: \0",
+        "[" * 100_000,
+        "- " * 50_000,
+        "&a [*a]",
+        "x: &a {y: [*a]}",
+        "[&a [x,x,x,x,x,x,x,x,x]" + "".join(f",&{b} [{f'*{a},' * 9}]" for a, b in LEVELS) + "]",
+        "&a {x: 1, <<: [" + "{y: 1}," * 1000 + "]}",
+        "[" + "a," * (LARGEST_FILE // 2 - 1) + "]",
+        "#" * (LARGEST_FILE + 1),
+        "preset: soft\nscene: [1]",
+        "preset: papr",
+        "preset: [paper]",
+        "sceen: {}",
+        "7: {}",
+    ],
+)  # fmt: skip
+def test_a_hostile_file_is_refused_in_one_line(tmp_path: Path, text: str) -> None:
+    """Repeated keys, tags, bombs, depths, sizes and what versions of YAML read differently."""
+    path = tmp_path / "x"
+    path.write_text(text, encoding="utf-8")
+
+    def setup() -> None:
+        preset, sections = read_setup(path)
+        resolve(preset, **sections)
+
+    assert "\n" not in refusal(setup)
+
+
+@pytest.mark.parametrize("path", ["a\0b", "\ud800", "/dev/zero", "x" * 300, "x/" * 3000, "none.yaml", "/"])
+def test_what_is_no_regular_file_is_refused(path: str) -> None:
+    """NULs, halves of characters, devices, folders and names that no file can have, of sweeps and of walks."""
+    for read in (read_setup, load_sweep):
+        refusal(lambda read=read: read(path))
+
+
+def test_numbers_aliases_and_dates_mean_what_they_say(tmp_path: Path) -> None:
+    """`1e9` is a number, an alias repeats a value, and a date is a text; a file that is no text is refused."""
+    path = tmp_path / "x"
+    path.write_text("{a: &b [1e3, -.5], c: *b, d: 1_000, e: 2020-01-01, f: no, g: .inf, <<: 1}")
+    assert read_yaml(path) == {
+        "a": [1e3, -0.5], "c": [1e3, -0.5], "d": 1000, "e": "2020-01-01", "f": False, "g": math.inf, "<<": 1
+    }  # fmt: skip
+    path.write_bytes(b"\xff\xfe\xff")
+    assert refusal(lambda: read_yaml(path)).startswith(str(path))
+
+
+def test_a_folder_that_no_file_system_has_is_refused() -> None:
+    """A NUL in the folder of the results, and what is no path at all."""
+    for out in ("a\0b", "\ud800", 5, b"x"):
+        with pytest.raises(InputError, match=r"^out: .* is no path"):
+            warpchain.sweep(grid={"links": [40]}, samples=1, out=out)  # type: ignore[arg-type]
