@@ -64,26 +64,13 @@ def test_help_tells_the_defaults(command: Command) -> None:
     """The defaults that help names are those of the models."""
     words = " ".join(re.sub("[│╭╮╰╯─]", " ", command("walk", "--help").out).split())
     scene, options = Scene(), Options()
-    named = {
-        "links": scene.links,
-        "frequency": scene.frequency,
-        "start": scene.start,
-        "preset": "paper",
-        "device": options.device,
-        "frame-interval": 2e-3,
-    }
-    for name, default in named.items():
+    named = {"links": scene.links, "frequency": scene.frequency, "start": scene.start, "device": options.device}
+    for name, default in (named | {"preset": "paper", "frame-interval": 2e-3, "method": "standard"}).items():
         match = re.search(rf"--{name} .*?Default: (\S+)\.(?: |$)", words)
-        assert match is not None, name
-        assert type(default)(match[1]) == default
-    method = re.search(r"--method .*?Default: (\S+)\.(?: |$)", words)[1]
-    assert options == Options(method=method)
-    assert f"{method}: {options.method} at 3e-3, joints softened on the sprocket and in the pile" in words
-    assert (options.tolerance, options.soften_drive, options.soften_pile) == (3e-3, True, True)
+        assert match is not None and type(default)(match[1]) == default, name
+    assert options == Options(method="standard") and options.tolerance == 3e-3
+    assert f"standard: {options.method} at 3e-3" in words
     assert all(f"{name}: {title}" in words for name, title in METHODS.items())
-    assert "Default: that of the word, 1e-6 for an integrator, 1e-4 for hybrid." in words
-    assert Options(method="rkf78") == Options(method="reference")
-    assert Options(method="bs32").tolerance == 1e-6
 
 
 def test_alone_it_prints_help_and_its_version(command: Command) -> None:
@@ -226,16 +213,10 @@ def test_table_and_paths(command: Command) -> None:
     assert answer.status == 0 and answer.err == ""
     words = " ".join(answer.out.split())
     for part in (
-        r"Δx 0\.\d{4} m",
-        "status at_rest",
-        r"walk time 0\.\d{3} s",
-        r"bounces \d",
+        r"Δx 0\.\d{4} m status at_rest walk time 0\.\d{3} s bounces \d",
         r"steps [\d,]+ accepted, [\d,]+ rejected",
-        r"greatest joint opening [\d.e-]+ mm",
         r"greatest penetration floor [\d.e-]+ mm, sprocket 0 mm, self [\d.e-]+ mm",
-        r"energy at release 0\.\d{5} J",
-        r"lost to floor 0\.\d{5} J",
-        r"unaccounted for -?[\d.]+e-\d+ J",
+        r"energy at release 0\.\d{5} J.*lost to floor 0\.\d{5} J.*unaccounted for -?[\d.]+e-\d+ J",
     ):
         assert re.search(part, words), part
     assert answer.out.splitlines()[-3:] == ["new/walk.h5", "new/figure5.png", "new/film_strip.png"]

@@ -146,14 +146,3 @@ def test_a_sweep_goes_on_after_a_full_disk(command: Command) -> None:
     assert list(Path("results/shards").iterdir()) == []
     assert command("sweep", "some.yaml", "-o", "results").out == expected.out
     assert {path.name: path.read_bytes() for path in Path("results/shards").iterdir()} == whole
-
-
-def test_a_film_that_ffmpeg_cannot_end_is_not_kept(command: Command) -> None:
-    """An MP4 whose writer died on a full disk: status 1, one line, no part."""
-    pytest.importorskip("imageio_ffmpeg")
-    prepare()
-    before = content()
-    with small_files(20_000):
-        answer = command("animate", "walk.h5", "walk.mp4")
-    assert_refused(answer, 1, "walk.mp4: cannot be written (ffmpeg")
-    assert content() == before

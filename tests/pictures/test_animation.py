@@ -2,7 +2,6 @@
 
 import json
 import math
-import os
 import re
 import sys
 from pathlib import Path
@@ -165,18 +164,3 @@ def test_refused_settings(name: str, settings: dict[str, float], message: str, t
     with pytest.raises(ValueError, match=message):
         animate(make_walk(), tmp_path / name, **settings)
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("name", ["walk.gif", "walk.html"])
-def test_interrupted_animation_keeps_old_file(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Moving pictures, too, are written whole or not at all."""
-    path = tmp_path / name
-    path.write_text("old")
-
-    def fail(*_: Any) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", fail)
-    with pytest.raises(OSError, match="cannot be written"):
-        animate(make_walk(), path, fps=5, slow=2)
-    assert path.read_text() == "old" and [entry.name for entry in tmp_path.iterdir()] == [name]

@@ -200,7 +200,6 @@ def test_tolerance_leaves_out_incomplete_pairs(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "outcome", "problem"),
     [
-        (one_block(grid={"frequency": [10]}), distance, "no block has several"),
         (one_block(grid={"tolerance": [1e-6, 1e-9]}), distance, "same_samples_along"),
         (one_block(grid={"tolerance": [1e-6, 1e-9]}), lambda walk: Status.NOT_FINITE, "come to rest"),
         (

@@ -43,6 +43,7 @@ def tilting_batch(
     stop_time: float,
     *,
     longest_step: float | None = None,
+    stop_status: Status = Status.FINISHED,
     **kept: bool | int,
 ) -> Batch:
     """A batch of chains of equal length, about to start.
@@ -54,6 +55,7 @@ def tilting_batch(
         stop_time: s.
         longest_step: no step is longer, s; all are that long if the tolerance allows more. It needs contacts, among
             links or with the floor, in the kernel's features. None: as the tolerance will have it.
+        stop_status: with which a run ends there; `FINISHED`: it doesn't end at rest before.
         kept: what `Batch` is to keep.
     """
     links = len(starts[0][0])
@@ -62,7 +64,7 @@ def tilting_batch(
         batch.control.skin, batch.control.contact_step = 1e-9, longest_step
     for world, ((position, velocity, plane), chain) in enumerate(zip(starts, parameters, strict=True)):
         batch.set_chain(world, chain, links)
-        batch.load(world, position, velocity, stop_time=stop_time, stop_status=Status.FINISHED)
+        batch.load(world, position, velocity, stop_time=stop_time, stop_status=stop_status)
         if longest_step is not None:
             batch.state.step.numpy()[world] = longest_step
         batch.set_plane(world, row_of(plane))

@@ -136,11 +136,11 @@ def plot(
     folder = folder or (path.parent if is_file else path)
     try_folder(folder)
     make_folder(folder)
-    drawn = False
+    plotted = False
     for picture in figures(result, quantity or "dx"):
         print(printable(str(picture.save(folder))))
-        drawn = True
-    if not drawn:
+        plotted = True
+    if not plotted:
         raise InputError(
             f"--quantity: {quantity}: no walk at rest has one, or no axis has several values; give another"
         )

@@ -156,11 +156,11 @@ def plot_walk(path: Path, folder: Path | None, kind: "Kind | None") -> None:
     walk, folder = load_walk(path), path.parent if folder is None else folder
     try_folder(folder)
     make_folder(folder)
-    drawn = False
+    plotted = False
     for drawing in draw_figures(walk, folder, kinds_of(walk) if kind is None else (kind,)):
         print(printable(str(drawing)))
-        drawn = True
-    if not drawn:
+        plotted = True
+    if not plotted:
         raise typer.Exit(FAILED)
 
 

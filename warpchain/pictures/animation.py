@@ -34,20 +34,8 @@ def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow
     """Write a moving picture of a walk; the suffix of `path` gives the format: .gif, .mp4 or .html.
 
     If there are more pictures than frames, each frame is shown until the next one. A chain whose plane tilts is seen
-    from the front right and slightly above; in a .html file from the side.
-
-    Args:
-        walk: a walk with frames.
-        path: the file to write, whole or not at all; an older one is replaced. A .html file loads nothing else, and
-            has play, pause, speed and a slider.
-        fps: pictures per second of playing time; in a .html file the browser decides.
-        slow: playing time per simulated time; in a .html file the value at the start.
-
-    Raises:
-        ValueError: the suffix is unknown, the walk has no frames or broken ones, fps or slow is not positive, or a
-            GIF would have too many pictures, in all or per second (viewers slow down over 50), or too few.
-        ImportError: an .mp4 is asked for and `imageio-ffmpeg` is not installed.
-        OSError: the file cannot be written, or something else than a regular file is there.
+    from the front right and slightly above; in a .html file, which loads nothing else, from the side. Arguments and
+    errors are those of `WalkResult.animate`.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (".gif", ".mp4", ".html"):

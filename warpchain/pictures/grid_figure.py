@@ -74,16 +74,12 @@ def draw_grid(
     Args:
         blocks: name of each block → the statistics of its cells.
         quantity: name of the quantity, for labels.
-        kind: `lines` or `map`; None for what shows a grid best.
-        ax: where to draw a figure of one panel.
-        figure: an empty figure to draw into; by default a new one.
+        kind: as `ax`, `figure`, what is returned and errors, see `SweepResult.plot`.
+        ax: see there.
+        figure: see there.
         label: what is shown, without its unit; by default name and symbol of the quantity.
 
-    Returns:
-        The figure.
-
     Raises:
-        ValueError: the kind is unknown, or `ax` is given together with `figure` or for several panels.
         NothingToShow: no block has an axis of several values, or two for a map, or there is no mean.
     """
     if kind not in (None, "lines", "map"):
@@ -104,10 +100,10 @@ def draw_grid(
         sharey = (alike or all(panel.kind == "lines" for panel in panels)) and not apart
         areas, _ = panel_grid(figure, len(panels), columns, sharex=alike, sharey=sharey)
         owner = figure
-    drawn = list(zip(areas, panels, strict=True))
+    plotted = list(zip(areas, panels, strict=True))
     values = line_values(panels)
     most_failed = max(float(panel.failed_share.max()) for panel in panels)
-    for axes, panel in drawn:
+    for axes, panel in plotted:
         axes.set_title(panel.title, fontsize="medium", loc="left")
         if panel.kind == "lines":
             colors = _colors(panel, values)
@@ -115,19 +111,19 @@ def draw_grid(
             _set_ticks(axes, panel.across, panels)
             if panel.cells.failed.any():
                 _draw_failed_strip(axes, panel, colors, most_failed)
-    _draw_maps([each for each in drawn if each[1].kind == "map"], label, with_numbers=_has_numbers(panels))
-    for group in [[each] for each in drawn] if apart else [drawn]:
+    _draw_maps([each for each in plotted if each[1].kind == "map"], label, with_numbers=_has_numbers(panels))
+    for group in [[each] for each in plotted] if apart else [plotted]:
         _set_limits([each for each in group if each[1].kind == "lines"], from_zero=apart)
-    _label(owner, drawn, label, alike=alike)
+    _label(owner, plotted, label, alike=alike)
     if owner is None:
-        _draw_legends(areas[0], drawn)
+        _draw_legends(areas[0], plotted)
         return areas[0].figure
     if left_out:
         note = f"{len(panels)} of {len(panels) + left_out} panels, chosen evenly"
         owner.suptitle(note, fontsize="medium", color=RED)
     beside = any(panel.along for panel in panels if panel.kind == "lines")
     _draw_legends(
-        owner, drawn, loc="outside right upper" if beside else "outside upper right", ncols=1 if beside else 2
+        owner, plotted, loc="outside right upper" if beside else "outside upper right", ncols=1 if beside else 2
     )
     return owner
 
@@ -310,10 +306,10 @@ def _draw_failed(axes: Axes, share: Array) -> None:
     axes.add_collection(dots, autolim=False)
 
 
-def _set_limits(drawn: Sequence[tuple[Axes, Panel]], *, from_zero: bool) -> None:
+def _set_limits(plotted: Sequence[tuple[Axes, Panel]], *, from_zero: bool) -> None:
     """Give all lines the same y axis, from zero if that is asked for or the values need more than half of that."""
     ends = []
-    for _, panel in drawn:
+    for _, panel in plotted:
         half = np.nan_to_num(panel.cells.standard_error if panel.along else panel.cells.sd)
         ends += [panel.cells.mean - half, panel.cells.mean + half]
     if not ends or not np.isfinite(known := np.concatenate(ends, axis=None)).any():
@@ -322,16 +318,18 @@ def _set_limits(drawn: Sequence[tuple[Axes, Panel]], *, from_zero: bool) -> None
     if low >= 0 and (low < 0.5 * high or from_zero):
         low = 0.0
     margin = 0.05 * (high - low)
-    for axes, _ in drawn:
+    for axes, _ in plotted:
         if margin > 0:
             axes.set_ylim(low - margin * (low != 0), high + margin)
 
 
-def _label(figure: Figure | SubFigure | None, drawn: Sequence[tuple[Axes, Panel]], label: str, *, alike: bool) -> None:
+def _label(
+    figure: Figure | SubFigure | None, plotted: Sequence[tuple[Axes, Panel]], label: str, *, alike: bool
+) -> None:
     """Label axes: common ones once for the figure, if there is one, others at each panel; say which walks are lost."""
     common_x = figure is not None and alike
-    common_y = common_x or (figure is not None and all(panel.kind == "lines" for _, panel in drawn))
-    for axes, panel in drawn:
+    common_y = common_x or (figure is not None and all(panel.kind == "lines" for _, panel in plotted))
+    for axes, panel in plotted:
         across, note = quantity_label(panel.across.name), lost_note([panel.counts])
         rows = quantity_label(panel.along.name) if panel.kind == "map" and panel.along else label
         if common_x:
@@ -352,13 +350,13 @@ def _are_apart(panels: Sequence[Panel]) -> bool:
     return all(panel.kind == "lines" for panel in panels) and max(tops) >= _MOST_APART * min(tops)
 
 
-def _draw_legends(owner: Axes | Figure | SubFigure, drawn: Sequence[tuple[Axes, Panel]], **place: Any) -> None:
+def _draw_legends(owner: Axes | Figure | SubFigure, plotted: Sequence[tuple[Axes, Panel]], **place: Any) -> None:
     """One legend of all panels; if their lines are of several axes, each panel has one of its own, too."""
-    panels = [panel for _, panel in drawn]
+    panels = [panel for _, panel in plotted]
     values = line_values(panels)
     style: dict[str, Any] = {"frameon": False, "fontsize": "small"}
     title, handles = _line_handles(*next(iter(values.items()))) if len(values) == 1 else (None, [])
-    for axes, panel in drawn:
+    for axes, panel in plotted:
         if len(values) > 1 and panel.kind == "lines" and panel.along:
             own, lines = _line_handles(panel.along.name, values[panel.along.name])
             axes.legend(handles=lines, title=own, **style)

@@ -26,10 +26,6 @@ IN_LINKS: Final = 2.0
 def loop_figure(walk: Walk, *, figure: Figure | None = None) -> Figure:
     """The mean loop of a walk before its release, to scale, and its curvature and tension along the arc.
 
-    Args:
-        walk: a walk with `before_release`.
-        figure: an empty figure to draw into; by default a new one.
-
     Raises:
         ValueError: the time before the release was not kept, or is not enough for a mean loop.
     """

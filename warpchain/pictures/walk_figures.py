@@ -78,14 +78,6 @@ def energy_figure(walk: Walk, *, figure: Figure | None = None, ax: Axes | None =
     Lost is the energy at the release less that of the moment. The dot at the end is the sum of the ledger's losses,
     which counts each cause by itself: it lies on the line if the integration conserved energy.
 
-    Args:
-        walk: a walk with energies.
-        figure: an empty figure to draw into; by default a new one.
-        ax: axes to draw into instead.
-
-    Returns:
-        The figure, that of `ax` if it is given.
-
     Raises:
         ValueError: figure and axes are given, the walk has no time series, or its energies were not kept.
     """
@@ -121,10 +113,6 @@ def tilt_figure(walk: Walk, *, figure: Figure | None = None) -> Figure:
 
     Marked are the moments at which the chain was first tilted by 45°, beyond which it has fallen over, and at which
     its loop collapsed, if the walk says when.
-
-    Args:
-        walk: a walk whose plane tilts.
-        figure: an empty figure to draw into; by default a new one.
 
     Raises:
         ValueError: the plane of the walk is fixed, or it has no time series.

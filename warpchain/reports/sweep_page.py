@@ -91,7 +91,7 @@ def _tiles(result: SweepResult) -> dict[str, tuple[int, str]]:
 def _figures(result: SweepResult) -> str:
     from warpchain.reports.sweep_figures import figures
 
-    return "\n".join(picture(drawn.figure, drawn.caption) for drawn in figures(result))
+    return "\n".join(picture(each.figure, each.caption) for each in figures(result))
 
 
 def _cells(result: SweepResult) -> str:

@@ -57,7 +57,7 @@ def run(batch, tilts):
 def fall(start, parameters=SOFT, tolerance=1e-4):
     """Lets a chain fall by dp5."""
     options = Options(method="dp5", tolerance=tolerance)
-    batch = tilting_batch([start], [parameters], options, LIMIT, keeps_samples=True)
+    batch = tilting_batch([start], [parameters], options, LIMIT, stop_status=Status.TIME_LIMIT, keeps_samples=True)
     return Fall(batch, run(batch, True), start)
 
 
@@ -95,7 +95,7 @@ def test_upright_chain_walks_as_the_planar_chain():
     fallen = fall((position, velocity, tilted_plane()))
     planar = Batch(1, 30, fallen.batch.options, keeps_samples=True)
     planar.set_chain(0, SOFT, 30)
-    planar.load(0, position, velocity, stop_time=LIMIT, stop_status=Status.FINISHED)
+    planar.load(0, position, velocity, stop_time=LIMIT, stop_status=Status.TIME_LIMIT)
     expected = run(planar, False)
     assert fallen.batch.status(0) == planar.status(0) == Status.AT_REST
     assert_array_equal(
@@ -180,7 +180,7 @@ HARD = {
     "tumbles": ({"turn": (60.0, 0.0), "speed": -2.0}, {}, Status.AT_REST),
     "ice": (TAP, {"floor_friction": 0.0}, None),
     "elastic floor": (TAP, {"floor_restitution": 1.0}, None),
-    "no gravity": (TAP, {"gravity": 0.0}, Status.FINISHED),
+    "no gravity": (TAP, {"gravity": 0.0}, Status.TIME_LIMIT),
 }
 
 
@@ -190,7 +190,7 @@ def test_hard_case_ends_soundly(name):
     tap, values, status = HARD[name]
     parameters = SOFT.with_values(values)
     fallen = fall(released(20, parameters, **tap), parameters)
-    assert fallen.batch.status(0) in ((Status.AT_REST, Status.FINISHED) if status is None else (status,))
+    assert fallen.batch.status(0) in ((Status.AT_REST, Status.TIME_LIMIT) if status is None else (status,))
     assert_sound(fallen, parameters)
     if name != "no gravity":
         assert fallen.batch.counts(0)["floor"] > 100
