@@ -136,7 +136,7 @@ def test_the_command_prints_tables_and_writes_a_record(
     ("arguments", "problem"),
     [
         ("--links 61", "bench.links: 61 is odd"),
-        ("--links 60 --links 2", "bench.links: 2 is less than 4"),
+        ("--links 60 --links 2", "bench.links: Input should be greater than or equal to 4"),
         ("--device gpu", "bench.device: 'gpu' is no device"),
         ("--device cuda:99", "options.device: there is no cuda:99 on this machine"),
         ("--device cuda:99 --links 2000", "bench.links: 2000 links are more than a GPU's block has threads"),

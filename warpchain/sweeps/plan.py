@@ -150,7 +150,7 @@ class Sweep:
             for name, choice in self.recording.choices.items()
         }
         frames = self.recording.frames
-        before = frames.before if frames is not None and frames.includes(walk.sample) else 0.0
+        before = (frames.before or 0.0) if frames is not None and frames.includes(walk.sample) else 0.0
         return Keep(series_every=every.get("series"), frame_every=every.get("frames"), before=before)
 
     def check(self) -> None:

@@ -70,6 +70,10 @@ class Series(BaseModel):
             )
         return steps
 
+    def canonical(self) -> dict[str, Any]:
+        """Its form in a sweep file."""
+        return {name: given for name, given in self.model_dump().items() if given is not None}
+
 
 class Frames(Series):
     """How often all joints are kept, and of which samples of each cell."""
@@ -77,11 +81,11 @@ class Frames(Series):
     interval: float = number_field(
         FRAME_INTERVAL, "s", "time between two, a whole multiple of `record_interval`", gt=0, le=LONGEST_INTERVAL
     )
-    before: float = number_field(
-        0.0,
+    before: float | None = number_field(
+        None,
         "s",
         "time before the release that is kept as well, with the loads of the joints",
-        ge=0,
+        gt=0,
         le=LONGEST_INTERVAL,
     )
 
@@ -117,7 +121,7 @@ class Recording(BaseModel):
 
     def canonical(self) -> dict[str, Any]:
         """Its form in a sweep file."""
-        return {"series": False} | self.model_dump(exclude_none=True)
+        return {"series": False} | {name: choice.canonical() for name, choice in self.choices.items()}
 
     @classmethod
     def of(cls, canonical: object) -> "Recording":
