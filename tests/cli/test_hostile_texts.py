@@ -91,7 +91,7 @@ def test_names_of_files_are_printed_without_control_characters(command: Command,
 def test_a_folder_cannot_hide_its_name(command: Command, tmp_path: Path) -> None:
     """The name in a folder's sweep.json may have been changed; the table of the sweep writes escapes."""
     result = make_sweep(tmp_path / "s", content())
-    object.__setattr__(result, "name", ESCAPE)
+    result.sweep["name"] = ESCAPE
     with contextlib.redirect_stdout(io.StringIO()) as out:
         print_sweep(result, as_json=False)
     assert "\x1b" not in out.getvalue() and "\x07" not in out.getvalue() and "\\x1b]0;owned" in out.getvalue()
