@@ -24,7 +24,6 @@ _FILE: Final = "The sweep, or the bare name of one that comes with warpchain, su
 _DEVICE: Final = "cpu, cuda (the first GPU) or cuda:N, instead of what the sweep says."
 _SCHEDULER: Final = "Run on the workers of this Dask scheduler; they must see DIR."
 
-SweepFile = Annotated[Path, argument("FILE.yaml", _FILE)]
 AsJson = Annotated[bool, JSON]
 
 

@@ -16,46 +16,42 @@ if TYPE_CHECKING:
 _DPI: Final = 160
 
 
-def page(writer: str, title: str, tiles: Mapping[str, tuple[int, str]], sections: Mapping[str, str]) -> str:
+_HEAD: Final = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="generator" content="warpchain report">
+"""
+"""What a report begins with."""
+
+
+def _is_report(path: Path) -> bool:
+    with path.open("rb") as content:
+        return content.read(len(_HEAD)) == _HEAD.encode()
+
+
+REPORTS: Final = Kind("page that warpchain report has written", _is_report)
+"""All that a report replaces."""
+
+
+def page(title: str, tiles: Mapping[str, tuple[int, str]], sections: Mapping[str, str]) -> str:
     """A whole page.
 
     Args:
-        writer: what writes the page, see `pages_of`.
         title: heading of the page.
         tiles: numbers at the top of the page: label → number, and ``"bad"`` if it needs attention or else ``""``.
         sections: heading → content in HTML.
     """
-    numbers = [
+    numbers = (
         f'<div class="{kind}"><dt>{label}</dt><dd>{count:,}</dd></div>' for label, (count, kind) in tiles.items()
-    ]
-    anchors = {heading: heading.lower().replace(" ", "-") for heading in sections}
-    return _head(writer) + _PAGE.format(
-        title=escape(title),
-        style=_STYLE,
-        numbers="".join(numbers),
-        links="".join(f'<a href="#{anchor}">{heading}</a> ' for heading, anchor in anchors.items()),
-        sections="\n".join(
-            f'<section id="{anchors[heading]}"><h2>{heading}</h2>\n{text}\n</section>'
-            for heading, text in sections.items()
-        ),
     )
-
-
-def pages_of(writer: str) -> Kind:
-    """The kind of page that one writer has written: it begins with a mark."""
-    head = _head(writer).encode()
-
-    def has(path: Path) -> bool:
-        with path.open("rb") as content:
-            return content.read(len(head)) == head
-
-    return Kind(f"page that {writer} has written", has)
-
-
-def _head(writer: str) -> str:
-    """What a page begins with."""
-    mark = f'<meta name="generator" content="{escape(writer)}">'
-    return f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n{mark}\n'
+    links, parts = [], []
+    for heading, text in sections.items():
+        anchor = heading.lower().replace(" ", "-")
+        links.append(f'<a href="#{anchor}">{heading}</a>')
+        parts.append(f'<section id="{anchor}"><h2>{heading}</h2>\n{text}\n</section>')
+    content = {"numbers": "".join(numbers), "links": " ".join(links), "sections": "\n".join(parts)}
+    return _HEAD + _PAGE.format(title=escape(title), style=_STYLE, **content)
 
 
 def picture(figure: "Figure", caption: str) -> str:
@@ -69,25 +65,25 @@ def picture(figure: "Figure", caption: str) -> str:
 
 
 def table(
-    head: Sequence[str], rows: Iterable[Sequence[str]], *, numbers_from: int = 99, marked: Iterable[bool] = ()
+    head: Sequence[str], rows: Iterable[Sequence[str]], *, numeric: bool = False, marked: Iterable[bool] = ()
 ) -> str:
     """A table of texts.
 
     Args:
         head: one text for each column; if all are empty, the table has no head.
         rows: as many texts each.
-        numbers_from: number of the first column with numbers; all columns after it have numbers, too.
+        numeric: whether the texts are numbers.
         marked: whether a row needs attention; none by default.
     """
 
     def cells(tag: str, texts: Sequence[str]) -> str:
-        kinds = ["" if column < numbers_from else ' class="number"' for column in range(len(head))]
-        return "".join(f"<{tag}{kind}>{escape(text)}</{tag}>" for text, kind in zip(texts, kinds, strict=True))
+        return "".join(f"<{tag}>{escape(text)}</{tag}>" for text in texts)
 
     top = f"<thead><tr>{cells('th', head)}</tr></thead>" if any(head) else ""
     kinds = (" class=bad" if bad else "" for bad in chain(marked, repeat(False)))
     body = "\n".join(f"<tr{kind}>{cells('td', row)}</tr>" for row, kind in zip(rows, kinds, strict=False))
-    return f'<div class="wide"><table>{top}<tbody>\n{body}\n</tbody></table></div>'
+    kind = ' class="number"' if numeric else ""
+    return f'<div class="wide"><table{kind}>{top}<tbody>\n{body}\n</tbody></table></div>'
 
 
 _STYLE: Final = """
@@ -111,7 +107,7 @@ figcaption { max-width: 46rem; margin-top: .5rem; color: #555; font-size: .9rem;
 table { border-collapse: collapse; font-size: .9rem; }
 th, td { padding: .2rem .8rem .2rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid #e3e3e3; }
 th { border-bottom: 1px solid #777; }
-.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+.number td, .number th { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 tr.bad td, p.bad { color: #a84a00; }
 iframe { width: 100%; border: 1px solid #ccc; }
 pre { max-height: 30rem; overflow: auto; padding: 1rem; background: #f3f4f5; font-size: .8rem; line-height: 1.35; }

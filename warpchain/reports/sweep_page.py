@@ -19,7 +19,7 @@ from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.validation import InputError
 from warpchain.pictures.labels import axis_symbol, cell_text, cell_values, number_text, unit_text, with_unit
 from warpchain.pictures.walk_shape import Walk
-from warpchain.reports.html_page import page, pages_of, picture, table
+from warpchain.reports.html_page import REPORTS, page, picture, table
 from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
 from warpchain.store.manifest import Folder
@@ -34,10 +34,6 @@ Array = NDArray[Any]
 
 FRAME_INTERVAL: Final = 2e-3
 """Time between two frames of the walk in motion [s]."""
-
-_WRITER: Final = "warpchain report"
-_REPORTS: Final = pages_of(_WRITER)
-"""All that a report replaces."""
 
 _MOST_LISTED: Final = 100
 """Greatest number of failed walks of each status, and of inaccurate ones, that are listed one by one."""
@@ -60,7 +56,7 @@ def write_report(
             is one of the sweep's own.
     """
     result = load(directory)
-    checked_output(path, _REPORTS)
+    checked_output(path, REPORTS)
     if animation_of is not None and not 0 <= animation_of < result.walk_count:
         raise InputError(f"--walk: there is no walk {animation_of}; give 0 … {result.walk_count - 1}")
     sections = {
@@ -73,8 +69,8 @@ def write_report(
         "Sweep": _sweep(result),
         "Provenance": _provenance(result),
     }
-    text = page(_WRITER, result.name, _tiles(result), {title: text for title, text in sections.items() if text})
-    write_whole(path, text, _REPORTS)
+    text = page(result.name, _tiles(result), {title: text for title, text in sections.items() if text})
+    write_whole(path, text, REPORTS)
 
 
 def _tiles(result: SweepResult) -> dict[str, tuple[int, str]]:
@@ -115,7 +111,7 @@ def _cells(result: SweepResult) -> str:
             for place in np.ndindex(*block.shape[:-1])
         ]
         parts += [f"<h3>{escape(block.name)}</h3>"] * (len(result.blocks) > 1)
-        parts.append(table([*head, *lengths, *counts], rows, numbers_from=0, marked=found.failed.ravel() > 0))
+        parts.append(table([*head, *lengths, *counts], rows, numeric=True, marked=found.failed.ravel() > 0))
     return "\n".join(parts)
 
 
