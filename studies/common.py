@@ -1,11 +1,15 @@
-"""What all studies share: how their figures look, and how their tables get into their pages."""
+"""What all studies share: their commands, how their figures look, and how their tables get into their pages."""
 
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final, Literal
 
+import typer
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+from warpchain import InputError
 
 LINE_COLORS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008)."""
@@ -17,6 +21,20 @@ DASHES: Final[Any] = (0, (4, 3))
 
 DISTANCE: Final = "distance walked $Δx$ / m"
 FREQUENCY: Final = "frequency of the sprocket $ν$ / Hz"
+
+
+def run_study(main: Callable[..., None]) -> None:
+    """Run a study's command, whose arguments are those of the function; what is refused is one line."""
+    try:
+        typer.run(main)
+    except (InputError, OSError) as error:
+        sys.exit(str(error))
+
+
+def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """A table in Markdown."""
+    head = list(head)
+    return "\n".join(f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *rows))
 
 
 def save_figure(figure: Figure, path: Path, dpi: int = 200) -> None:

@@ -8,14 +8,13 @@ It prints the relative difference of the mean Δx of each cell with the standard
 cells their mean and χ², scatter and bounces; and how exact either is.
 """
 
-import argparse
-import sys
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 import warpchain
+from studies.common import run_study
 
 Array = NDArray[np.float64]
 
@@ -83,11 +82,4 @@ def main(folder: str, base: str) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("folder", metavar="FOLDER", help="results of a sweep")
-    parser.add_argument("base", metavar="BASE", help="results of the sweep that it is compared with")
-    given = parser.parse_args()
-    try:
-        main(given.folder, given.base)
-    except (warpchain.InputError, OSError) as error:
-        sys.exit(str(error))
+    run_study(main)

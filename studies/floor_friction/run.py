@@ -6,8 +6,6 @@
 The numbers are printed, the figure is written beside the page.
 """
 
-import argparse
-import sys
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,7 +14,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import warpchain
-from studies.common import DISTANCE, LINE_COLORS, save_figure, tidy
+from studies.common import DISTANCE, LINE_COLORS, run_study, save_figure, table, tidy
 
 Array = NDArray[np.float64]
 Block = Any
@@ -39,10 +37,9 @@ def ledger(block: Block, links: int, frequency: float) -> str:
         np.ma.masked_array(block.columns[name][tuple(cell)], ~rest).mean(axis=-1)
         for name in ("dx", "walk_time", "loss_self_contact")
     )
-    lines = ["| μ_fc | Δx / m | Δx / t / (m/s) | t / s | lost to self-contacts / J |", "|---|---|---|---|---|"]
     values = zip(block.axes["floor_friction"], dx, dx / time, time, lost, strict=True)
-    lines += [f"| {friction:g} | {a:.3f} | {b:.2f} | {c:.2f} | {d:.2f} |" for friction, a, b, c, d in values]
-    return "\n".join(lines)
+    rows = ((f"{friction:g}", f"{a:.3f}", f"{b:.2f}", f"{c:.2f}", f"{d:.2f}") for friction, a, b, c, d in values)
+    return table(("μ_fc", "Δx / m", "Δx / t / (m/s)", "t / s", "lost to self-contacts / J"), rows)
 
 
 def draw(blocks: dict[str, Block]) -> Figure:
@@ -87,9 +84,4 @@ def main(folder: str) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("folder", metavar="FOLDER", help="results of the sweep")
-    try:
-        main(parser.parse_args().folder)
-    except (warpchain.InputError, OSError) as error:
-        sys.exit(str(error))
+    run_study(main)

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from studies.common import table
 from studies.paper.claims import CLAIMS
 from studies.paper.findings import changes, percent
 from studies.paper.reduction import effect_of
@@ -48,12 +49,6 @@ def page(numbers: Numbers) -> str:
     if unused := parts.keys() - set(names):
         raise ValueError(f"{TEMPLATE.name} leaves out {', '.join(sorted(unused))}")
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)
-
-
-def table(head: list[str], rows: list[list[str]]) -> str:
-    """A table in Markdown."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def claims_table(numbers: Numbers) -> str:

@@ -88,11 +88,7 @@ def reduced(result: SweepResult) -> Numbers:
 
 
 def content_digest(sweep: Mapping[str, Any]) -> str:
-    """SHA-256 of what a sweep varies and draws, whatever computes it and however many samples it has.
-
-    Args:
-        sweep: in canonical form, as `Sweep.canonical` and `SweepResult.sweep` have it.
-    """
+    """SHA-256 of what a sweep varies and draws, whatever computes it and however many samples it has."""
     content = dict(sweep)
     content["blocks"] = [
         {name: value for name, value in block.items() if name not in ("options", "samples")}
@@ -110,13 +106,7 @@ def at_rest(block: Block, quantity: str = "dx") -> Array:
 
 
 def effects(table: Array, block: Block, name: str, reference: float | str) -> Numbers:
-    """What each value of a block's further axis does to a quantity, against a reference on the axis.
-
-    Args:
-        table: the quantity, see `at_rest`.
-        block: the block.
-        name: its further axis.
-        reference: value on the axis.
+    """What each value of a block's further axis `name` does to a quantity, against a reference on the axis.
 
     Raises:
         InputError: the reference is not on the axis.
@@ -169,12 +159,7 @@ def shares_of_losses(block: Block) -> dict[str, Array]:
 
 
 def self_contact(block: Block, start: int) -> Numbers:
-    """After how many bounces loops first touched themselves and collapsed, and what early contact does to Δx.
-
-    Args:
-        block: with the start as its further axis.
-        start: number of the start on it.
-    """
+    """After how many bounces loops first touched themselves and collapsed, and what early contact does to Δx."""
     contact, collapse, distance = (at_rest(block, name)[:, :, start] for name in (CONTACT, COLLAPSE, "dx"))
     # Relative to the mean of the cell, so that walks of all frequencies of one number of links can be put together.
     relative = distance / mean(distance)[..., np.newaxis]

@@ -9,14 +9,14 @@ The numbers go to results/paper_claims.json, and the page is rendered from that 
 figures are made anew. Sweeps whose folder is not given keep their numbers.
 """
 
-import argparse
 import json
-import sys
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
+
+import typer
 
 import warpchain
-from studies.common import save_figure, write_text
+from studies.common import run_study, save_figure, write_text
 from studies.paper.drawing import figures
 from studies.paper.page import page
 from studies.paper.reduction import SWEEPS, reduced, text_of
@@ -28,21 +28,12 @@ PAGE: Final = Path("README.md")
 FIGURES: Final = Path("figures")
 
 
-def make(folders: list[Path], out: Path) -> None:
-    """Reduce sweeps, draw their figures and write the page.
-
-    Args:
-        folders: of sweeps; may be empty.
-        out: folder of the page.
-
-    Raises:
-        InputError: a folder has no sweep of the page, or one that is not complete, or numbers of a sweep are missing.
-        OSError: a folder cannot be read, or a file not be written.
-    """
+def make(folders: Annotated[list[Path] | None, typer.Argument()] = None, out: Path = FOLDER) -> None:
+    """Reduce the sweeps of these folders, draw the figures and write the page; without folders from known numbers."""
     results = out / RESULTS
     known: dict[str, Any] = json.loads(results.read_text(encoding="utf-8")) if results.exists() else {}
     sweeps: dict[str, warpchain.SweepResult] = {}
-    for folder in folders:
+    for folder in folders or ():
         sweep = warpchain.load(folder)
         known[sweep.name] = reduced(sweep)
         sweeps[sweep.name] = sweep
@@ -56,19 +47,5 @@ def make(folders: list[Path], out: Path) -> None:
     write_text(out / PAGE, page(json.loads(text_of(numbers))))
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """The command; its exit status."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folders", nargs="*", type=Path, metavar="FOLDER", help="results of a sweep")
-    parser.add_argument("-o", "--out", type=Path, default=FOLDER, help="folder of the page; default: studies/paper/")
-    given = parser.parse_args(arguments)
-    try:
-        make(given.folders, given.out)
-    except (warpchain.InputError, OSError) as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(make)

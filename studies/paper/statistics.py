@@ -1,7 +1,7 @@
 """Differences of mean distances between cells of a sweep, with their errors.
 
-A cell is a number of links and a frequency. Walks that did not come to rest are NaN and take no part; what they leave
-is counted.
+A cell is a number of links and a frequency. Values have the shape (..., samples). Walks that did not come to rest are
+NaN and take no part; what they leave is counted.
 """
 
 import math
@@ -66,14 +66,10 @@ class Summary:
 
 
 def paired(values: Array, reference: Array) -> Effect:
-    """Compare the same samples after and before a change.
+    """Compare the same samples after and before a change, `reference`.
 
     The sign is that of a t test of the mean difference; the interval of the ratio of the means follows from its
     linearisation.
-
-    Args:
-        values: after the change, shape (..., samples), NaN for walks that did not come to rest.
-        reference: before it, the same shape.
     """
     both = np.isfinite(values) & np.isfinite(reference)
     pairs = both.sum(axis=-1)
@@ -93,12 +89,7 @@ def paired(values: Array, reference: Array) -> Effect:
 
 
 def unpaired(values: Array, reference: Array) -> Effect:
-    """Compare independent samples by Welch's t test.
-
-    Args:
-        values: after the change, shape (..., samples), NaN for walks that did not come to rest.
-        reference: before it; the number of samples may be another.
-    """
+    """Compare independent samples by Welch's t test."""
     parts = []
     with np.errstate(invalid="ignore", divide="ignore"):
         for each in (values, reference):
@@ -154,11 +145,7 @@ def by_chance(cells: int) -> int:
 
 
 def mean(values: Array) -> Array:
-    """Mean over the samples of each cell, shape (...,); NaN without a walk.
-
-    Args:
-        values: shape (..., samples), NaN for walks that did not come to rest.
-    """
+    """Mean over the samples of each cell, shape (...,); NaN without a walk."""
     there = np.isfinite(values)
     with np.errstate(invalid="ignore", divide="ignore"):
         means: Array = np.where(there, values, 0.0).sum(axis=-1) / there.sum(axis=-1)
@@ -166,11 +153,7 @@ def mean(values: Array) -> Array:
 
 
 def spread(values: Array) -> Array:
-    """Standard deviation of a walk over the mean of its cell, shape (...,); NaN with fewer than two walks.
-
-    Args:
-        values: shape (..., samples), NaN for walks that did not come to rest.
-    """
+    """Standard deviation of a walk over the mean of its cell, shape (...,); NaN with fewer than two walks."""
     there = np.isfinite(values)
     count = there.sum(axis=-1)
     with np.errstate(invalid="ignore", divide="ignore"):

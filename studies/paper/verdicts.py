@@ -25,13 +25,7 @@ class Verdict(StrEnum):
 
 
 def direction(with_claim: int, against: int, comparisons: int) -> Verdict:
-    """A claim that something rises, or falls.
-
-    Args:
-        with_claim: comparisons with a significant change in the direction claimed.
-        against: comparisons with a significant change in the other one.
-        comparisons: all.
-    """
+    """A claim that something rises, or falls, from the significant comparisons with it and against it, and all."""
     if not comparisons:
         return Verdict.OPEN
     if with_claim >= MOST * comparisons and against <= FEW * comparisons:
@@ -41,12 +35,7 @@ def direction(with_claim: int, against: int, comparisons: int) -> Verdict:
 
 
 def smallness(exceeding: int, comparisons: int) -> Verdict:
-    """A claim that an effect is small.
-
-    Args:
-        exceeding: comparisons in which it is greater than its bound with its whole interval.
-        comparisons: all.
-    """
+    """A claim that an effect is small; `exceeding` comparisons are greater than its bound with their whole interval."""
     return share(comparisons - exceeding, comparisons)
 
 

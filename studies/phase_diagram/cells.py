@@ -2,8 +2,7 @@
 
 import csv
 import json
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -35,74 +34,31 @@ COLUMNS: Final = (
 """Columns of the sweep that are needed."""
 
 
-@dataclass(frozen=True)
-class Part:
-    """Walks over links and frequencies.
-
-    Attributes:
-        name: for messages.
-        settings: what all parts must share, see `settings_of`.
-        links: values of the first axis.
-        frequency: values of the second one [Hz].
-        columns: `COLUMNS`, shape (links, frequencies, samples).
-    """
-
-    name: str
-    settings: str
-    links: Array
-    frequency: Array
-    columns: dict[str, Array]
-
-
-def parts_of(result: SweepResult, name: str) -> list[Part]:
-    """The parts in a sweep, one for each block.
-
-    Args:
-        result: the sweep.
-        name: for messages.
+def walks_by_cell(parts: Sequence[SweepResult]) -> dict[Cell, dict[str, Array]]:
+    """The walks of all parts of a sweep by cell: `COLUMNS`, shape (walks,), missing walks included.
 
     Raises:
-        InputError: it has other axes than links and frequency.
-    """
-    parts = []
-    for block in result.blocks.values():
-        if set(block.axes) != {"links", "frequency"}:
-            raise InputError(f"{name}: axes are {', '.join(block.axes)}; give a sweep of links and frequency")
-        order = [list(block.axes).index(axis) for axis in ("links", "frequency")] + [2]
-        columns = {column: block.columns[column].transpose(order) for column in COLUMNS}
-        parts.append(Part(name, settings_of(result), block.axes["links"], block.axes["frequency"], columns))
-    return parts
-
-
-def walks_by_cell(parts: Iterable[Part]) -> dict[Cell, dict[str, Array]]:
-    """The walks of all parts by cell: `COLUMNS`, shape (walks,), missing walks included.
-
-    Raises:
-        InputError: a part has other settings than the first, or the same walks as another one.
+        InputError: a part has other axes than links and frequency, other settings than the first, or its seed.
     """
     found: dict[Cell, list[dict[str, Array]]] = {}
-    settings = ""
-    for part in parts:
-        settings = settings or part.settings
-        if part.settings != settings:
+    for number, part in enumerate(parts):
+        if axes := [block.axes for block in part.blocks.values() if set(block.axes) != {"links", "frequency"}]:
+            raise InputError(f"{part.name}: axes are {', '.join(axes[0])}; give a sweep of links and frequency")
+        if settings_of(part) != settings_of(parts[0]):
             raise InputError(f"{part.name}: other settings than the parts before; reduce it alone")
-        for i, links in enumerate(part.links):
-            for j, frequency in enumerate(part.frequency):
-                walks = {name: column[i, j].copy() for name, column in part.columns.items()}
-                others = found.setdefault((int(links), float(frequency)), [])
-                if any(are_same(walks["dx"], other["dx"]) for other in others):
-                    raise InputError(f"{part.name}: walks of another part, the seed is the same; leave one out")
-                others.append(walks)
+        if part.sweep["seed"] in [other.sweep["seed"] for other in parts[:number]]:
+            raise InputError(f"{part.name}: walks of another part, the seed is the same; leave one out")
+        for block in part.blocks.values():
+            order = [list(block.axes).index(axis) for axis in ("links", "frequency")] + [2]
+            columns = {name: block.columns[name].transpose(order) for name in COLUMNS}
+            for i, links in enumerate(block.axes["links"]):
+                for j, frequency in enumerate(block.axes["frequency"]):
+                    walks = {name: column[i, j] for name, column in columns.items()}
+                    found.setdefault((int(links), float(frequency)), []).append(walks)
     return {
         cell: {name: np.concatenate([walks[name] for walks in cells]) for name in cells[0]}
         for cell, cells in sorted(found.items())
     }
-
-
-def are_same(dx: Array, others: Array) -> bool:
-    """Whether most distances [m] occur among others to seven digits: by chance hardly one does."""
-    known = np.float32(dx[np.isfinite(dx)])
-    return len(known) > 1 and bool(np.isin(known, np.float32(others)).mean() > 0.5)
 
 
 def settings_of(result: SweepResult) -> str:
@@ -116,13 +72,7 @@ def settings_of(result: SweepResult) -> str:
 
 
 def reduced(links: int, frequency: float, walks: Mapping[str, Array]) -> dict[str, float]:
-    """Statistics of one cell: a row of the file. NaN where there are too few walks.
-
-    Args:
-        links: of the chain.
-        frequency: of the sprocket [Hz].
-        walks: `COLUMNS`, shape (walks,).
-    """
+    """Statistics of one cell: a row of the file. NaN where there are too few walks."""
     status = walks["status"]
     rest = status == Status.AT_REST
     dx, codes = walks["dx"][rest].astype(float), endings(walks)[rest]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.optimize import minimize, minimize_scalar
 
+from studies.common import table as markdown
 from warpchain import preset
 
 Array = NDArray[Any]
@@ -222,11 +223,11 @@ def table(cells: Mapping[str, Array]) -> str:
         if len(chosen.links) < FEWEST:
             lines.append(f"{title}: too few for a curve of {NUMBERS} numbers.\n")
             continue
-        lines += [f"| law, {title} | residual | farthest cells |", "|---|---|---|"]
-        lines += [
-            f"| {name} | {root_mean_square(left, numbers):.1f} % | {worst(chosen, left)} |"
+        rows = (
+            (name, f"{root_mean_square(left, numbers):.1f} %", worst(chosen, left))
             for name, left, numbers in laws_of(chosen)
-        ]
+        )
+        lines += [markdown((f"law, {title}", "residual", "farthest cells"), rows)]
         lines += ["", f"{slopes(chosen)} {drift(chosen)}".rstrip(), ""]
     return "\n".join(lines).rstrip()
 

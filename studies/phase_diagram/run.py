@@ -8,29 +8,23 @@ Parts are folders of ``warpchain sweep``. They have other seeds; they may be unf
 Without a folder it takes 10 to 25 s.
 """
 
-import argparse
-import sys
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
+
+import typer
 
 import warpchain
-from studies.common import write_tables
+from studies.common import run_study, write_tables
 from studies.phase_diagram import cells, drawing, scales
 from studies.phase_diagram.tables import TABLES
 
 FOLDER: Final = Path(__file__).parent
 
 
-def make(parts: Sequence[str], scaling: str | None) -> None:
-    """Reduce the sweeps that are given into the committed files; then draw and write all that is in them.
-
-    Raises:
-        InputError: a sweep is another one, or parts do not belong together.
-        OSError: a folder cannot be read, or a file not be written.
-    """
+def make(parts: Annotated[list[str] | None, typer.Argument()] = None, scaling: str | None = None) -> None:
+    """Reduce the sweeps that are given into the committed files; then draw and write all that is in them."""
     if parts:
-        walks = cells.walks_by_cell(part for path in parts for part in cells.parts_of(warpchain.load(path), path))
+        walks = cells.walks_by_cell([warpchain.load(path) for path in parts])
         cells.write_csv([cells.reduced(*cell, columns) for cell, columns in walks.items()], cells.CSV)
     if scaling is not None:
         cells.write_csv(scales.reduced(warpchain.load(scaling)), scales.CSV)
@@ -44,11 +38,4 @@ def make(parts: Sequence[str], scaling: str | None) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("parts", nargs="*", metavar="FOLDER", help="of the sweep; none: the committed file")
-    parser.add_argument("--scaling", metavar="FOLDER", help="of the sweep scaling; none: the committed file")
-    given = parser.parse_args()
-    try:
-        make(given.parts, given.scaling)
-    except (warpchain.InputError, OSError) as error:
-        sys.exit(str(error))
+    run_study(make)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from studies.common import FAINT, INK, save_figure, tidy
+from studies.common import table as markdown
 from studies.phase_diagram import laws
 from warpchain import InputError, Status, SweepResult, preset
 
@@ -149,11 +150,10 @@ def table(cells: Cells, curve: Curve) -> str:
     """Markdown: residuals of the cells with each time, and the best exponents."""
     groups = {name: cells.varied(word) for word, (name, _) in BLOCKS.items()}
     groups["all"] = np.ones(len(cells.names), dtype=bool)
-    lines = ["| time τ | " + " | ".join(groups) + " |", "|---|" + "---|" * len(groups)]
+    rows = []
     for name, exponents in TIMES.items():
         left = curve.left(cells, exponents)
-        shares = [f"{laws.root_mean_square(left[chosen], 0):.0f} %" for chosen in groups.values()]
-        lines.append(f"| {name} | {' | '.join(shares)} |")
+        rows.append([name, *(f"{laws.root_mean_square(left[chosen], 0):.0f} %" for chosen in groups.values())])
     count = len(cells.names)
     a, b, c = curve.best_exponents(cells, groups["all"])
     rng = np.random.default_rng(1)
@@ -168,7 +168,7 @@ def table(cells: Cells, curve: Curve) -> str:
     described = [f"{curve(np.array([place / NORMAL_TIME]))[0]:.2g} at {place:g}" for place in PLACES]
     return "\n".join(
         [
-            *lines,
+            markdown(("time τ", *groups), rows),
             "",
             f"{count} cells; g, R and ℓ are {spans[0]}, {spans[1]} and {spans[2]} times those of the phase diagram, Δx "
             f"is {_span(cells.lengths)} lengths of the chain. The best exponents of g, R and ℓ are {', '.join(shares)} "

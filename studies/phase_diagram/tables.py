@@ -6,6 +6,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.common import table
 from studies.phase_diagram import laws
 from studies.phase_diagram.cells import FAILURES, WAYS
 from studies.phase_diagram.endings import Ending
@@ -19,15 +20,14 @@ FEW: Final = 100
 def table_of_cells(cells: Mapping[str, Array]) -> str:
     """Markdown: Δx ± s.d. for some links and frequencies."""
     shown_links, shown_frequencies = chosen(cells["links"]), chosen(cells["frequency"])
-    head = "| links | " + " | ".join(f"{frequency:g} Hz" for frequency in shown_frequencies) + " |"
-    lines = [head, "|" + "---|" * (1 + len(shown_frequencies))]
+    rows = []
     for links in shown_links:
         texts = []
         for frequency in shown_frequencies:
             at = np.flatnonzero((cells["links"] == links) & (cells["frequency"] == frequency))
             texts.append(text_of_cell({name: column[at[0]] for name, column in cells.items()}) if len(at) else "")
-        lines.append(f"| {links:g} | " + " | ".join(texts) + " |")
-    return "\n".join(lines)
+        rows.append([f"{links:g}", *texts])
+    return table(("links", *(f"{frequency:g} Hz" for frequency in shown_frequencies)), rows)
 
 
 def text_of_cell(cell: Mapping[str, float]) -> str:
@@ -78,10 +78,7 @@ def table_of_endings(cells: Mapping[str, Array]) -> str:
     """Markdown: share of each ending among all walks at rest, where it is the most frequent one, how far they went."""
     counts = np.stack([cells[way.label] for way in WAYS], axis=1)
     most = np.where(counts.sum(axis=1) > 0, counts.argmax(axis=1), -1)
-    lines = [
-        "| way of ending | share | cells where it is the most frequent | Δx, paper's range | elsewhere |",
-        "|---|---|---|---|---|",
-    ]
+    rows = []
     inside = laws.in_papers_range(cells["links"], cells["frequency"])
     flights = int(cells["flight_told"].sum())
     for number, way in enumerate(WAYS):
@@ -89,9 +86,9 @@ def table_of_endings(cells: Mapping[str, Array]) -> str:
         base = flights if way is Ending.IN_FLIGHT else counts.sum()
         share = counts[:, number].sum() / max(base, 1)
         ratios = over_others(cells, [way])
-        texts = " | ".join(text_of_ratios(ratios[where]) for where in (inside, ~inside))
+        texts = (text_of_ratios(ratios[where]) for where in (inside, ~inside))
         percent = "not recorded" if way is Ending.IN_FLIGHT and not flights else f"{100 * share:.2g} %"
-        lines.append(f"| {way.meaning} | {percent} | {np.sum(most == number)} | {texts} |")
+        rows.append([way.meaning, percent, f"{np.sum(most == number)}", *texts])
     text = f"{counts.sum():,.0f} walks of which this is known; a collapse in flight is known of {flights:,} of them."
     early = over_others(cells, [Ending.FOLDED_AT_FIRST, Ending.FOLDED_AT_SECOND], [Ending.FOLDED_LATER])
     touched = (
@@ -99,21 +96,22 @@ def table_of_endings(cells: Mapping[str, Array]) -> str:
         f"{text_of_ratios(early[inside]) or 'too few'} in the paper's range, "
         f"{text_of_ratios(early[~inside]) or 'too few'} elsewhere."
     )
-    return "\n".join([*lines, "", text, "", touched])
+    head = ("way of ending", "share", "cells where it is the most frequent", "Δx, paper's range", "elsewhere")
+    return "\n\n".join([table(head, rows), text, touched])
 
 
 def table_of_failures(cells: Mapping[str, Array]) -> str:
     """Markdown: walks by status."""
     walks = cells["walks"].sum()
-    lines = ["| status | walks | cells | where |", "|---|---|---|---|"]
+    rows = []
     for name in ("at_rest", *(code.label for code in FAILURES), "missing"):
         number = cells[name]
         if number.sum() == 0 and name != "at_rest":
             continue
         there = number > 0
         where = "" if there.all() else f"{span(cells['links'][there])} links, {span(cells['frequency'][there])} Hz"
-        lines.append(f"| `{name}` | {number.sum():,.0f} | {there.sum()} | {where} |")
-    return "\n".join([*lines, "", f"{walks:,.0f} walks in {len(cells['links'])} cells."])
+        rows.append((f"`{name}`", f"{number.sum():,.0f}", f"{there.sum()}", where))
+    return f"{table(('status', 'walks', 'cells', 'where'), rows)}\n\n{walks:,.0f} walks in {len(cells['links'])} cells."
 
 
 def span(values: Array) -> str:

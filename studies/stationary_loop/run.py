@@ -6,17 +6,17 @@
 Numbers are printed.
 """
 
-import argparse
 import dataclasses
-import sys
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+import typer
 from matplotlib.figure import Figure
 
 import warpchain
-from studies.common import DASHES, RED, save_figure
+from studies.common import DASHES, RED, run_study, save_figure
 from studies.stationary_loop.balances import imbalances
 from studies.stationary_loop.kinks import draw_kinks
 from studies.stationary_loop.theory import MeanLoop, NoSolutionError, TheoreticalLoop, predict
@@ -120,7 +120,7 @@ def draw(walk: warpchain.WalkResult) -> Figure:
     return figure
 
 
-def main(kinks: str | None) -> None:
+def main(kinks: Annotated[str | None, typer.Argument()] = None) -> None:
     """Print all tables and draw the figures."""
     if kinks is not None:
         save_figure(draw_kinks(warpchain.load(kinks)), FIGURES / "kink.png", dpi=100)
@@ -135,9 +135,4 @@ def main(kinks: str | None) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("kinks", nargs="?", metavar="FOLDER", help="of the sweep kink")
-    try:
-        main(parser.parse_args().kinks)
-    except (warpchain.InputError, OSError) as error:
-        sys.exit(str(error))
+    run_study(main)

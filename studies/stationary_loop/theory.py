@@ -9,8 +9,6 @@ tanh(w/ω_c):
 These are seven functions with seven conditions: x, y, φ, κ at the lift-off and x, y, φ at the touch-down, because the
 theory does not include the sprocket. κ is given at the lift-off because the motion carries standing waves along: they
 start there, and not at the touch-down. The length of the free part is given, too: it follows from the number of links.
-(Tried: the length unknown and κ given at both ends. The sides of a loop are almost vertical whatever their length, so
-that κ hardly determines it: 1 % too long with 60 links, 40 % with 120.)
 Without friction p = N / (j v²), and φ at the touch-down is not given either. Without friction and inertia
 T_e κ = ρ g cos φ: the catenary, for which only its ends and its length are given.
 

@@ -6,15 +6,13 @@
 The table is also printed.
 """
 
-import argparse
-import sys
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 import warpchain
-from studies.common import save_figure, write_tables
+from studies import common
 
 FOLDER: Final = Path(__file__).parent
 
@@ -24,11 +22,8 @@ def table(result: warpchain.SweepResult) -> str:
     fixed, tilted = (result.blocks[name] for name in ("fixed", "tilted"))
     columns, reference = tilted.columns, fixed.statistics()
     cells = tilted.statistics()
-    lines = [
-        "| tilt / rad | fell over | before the loop collapsed | Δx, tilting over fixed | least and greatest cell "
-        "| drift / m | yaw / ° |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    head = ("tilt / rad", "fell over", "before the loop collapsed", "Δx, tilting over fixed", "least and greatest cell")
+    rows = []
     for size, tilt in enumerate(tilted.axes["tilt"]):
         ratio = cells.mean[:, :, size] / reference.mean
         errors = np.hypot(
@@ -39,11 +34,13 @@ def table(result: warpchain.SweepResult) -> str:
         drift, yaw = (
             np.sqrt(np.nanmean(columns[name][:, :, size].astype(float) ** 2)) for name in ("lateral_drift", "final_yaw")
         )
-        lines.append(
-            f"| {tilt:g} | {100 * fell:.3g} % | {100 * early:.2g} % | {ratio.mean():.3f} ± {error:.3f} "
-            f"| {ratio.min():.2f}, {ratio.max():.2f} | {drift:.3f} | {np.degrees(yaw):.2g} |"
+        rows.append(
+            (
+                *(f"{tilt:g}", f"{100 * fell:.3g} %", f"{100 * early:.2g} %", f"{ratio.mean():.3f} ± {error:.3f}"),
+                *(f"{ratio.min():.2f}, {ratio.max():.2f}", f"{drift:.3f}", f"{np.degrees(yaw):.2g}"),
+            )
         )
-    return "\n".join(lines)
+    return common.table((*head, "drift / m", "yaw / °"), rows)
 
 
 def main(folder: str) -> None:
@@ -51,14 +48,9 @@ def main(folder: str) -> None:
     result = warpchain.load(folder)
     if not {"fixed", "tilted"} <= result.blocks.keys():
         raise warpchain.InputError(f"{folder}: no blocks fixed and tilted; give a folder of the sweep tilt")
-    write_tables(FOLDER / "README.md", {"tilt": table(result)})
-    save_figure(result.plot(quantity="fell_over"), FOLDER / "figures" / "falls.png")
+    common.write_tables(FOLDER / "README.md", {"tilt": table(result)})
+    common.save_figure(result.plot(quantity="fell_over"), FOLDER / "figures" / "falls.png")
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("folder", metavar="FOLDER", help="results of the sweep")
-    try:
-        main(parser.parse_args().folder)
-    except (warpchain.InputError, OSError) as error:
-        sys.exit(str(error))
+    common.run_study(main)

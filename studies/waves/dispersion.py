@@ -4,36 +4,8 @@ Joints are closed and friction is viscous. Small changes of the links' angles ϑ
 link and the rate λ = −γ − iω: ω > 0 runs towards greater j. Inner links have m̄ + μ and Ī + δ, outer ones m̄ − μ and
 Ī − δ. They couple the wave of phase κ with that of phase κ + π: two bands in 0 < κ ≤ π/2.
 
-**The straight chain.** Let η_j be the transverse place of joint j. A link has its centre at (η_{j−1} + η_j)/2 and the
-angle ϑ_j = (η_j − η_{j−1})/ℓ. Its ends pull with T, which stores T ℓ ϑ²/2, and a joint loses β (ϑ̇_{j+1} − ϑ̇_j)².
-In terms of the angles, with c = cos(κ/2), s = sin(κ/2), this is A(λ) B(λ) = h² λ⁴ with
-
-    A = (Ī + ¼ m̄ℓ² c²/s²) λ² + 4β s² λ + Tℓ,    B = (Ī + ¼ m̄ℓ² s²/c²) λ² + 4β c² λ + Tℓ,    h = δ − ¼ μℓ².
-
-Links with h = 0, equal ones above all, have a single band, A = 0:
-
-    ω² [m̄ c² + (4Ī/ℓ²) s²] + iωβ (16/ℓ²) s⁴ = (4T/ℓ) s².
-
-Others have a gap at κ = π/2, where inner links turn and outer ones move across, or the other way round: its edges,
-without friction, are 4T/ℓ over m_outer + 4 I_inner/ℓ² and over m_inner + 4 I_outer/ℓ². The upper band ends, at κ → 0,
-at ω² = Tℓ/Ī. Long waves run at c = √(Tℓ/m̄).
-
-**The ring.** It turns at Ω and its links are seen from the centre under 2α = 2π/N. Let ζ_j be the place of joint j as a
-complex number in the frame that turns along. A change ϑ of the angles moves joints by ζ_j − ζ_{j−1} = −ℓ ϑ_j at the
-direction of link j, and forces change by what m (λ + iΩ)² needs; the conjugate does the same with −Ω and κ/2 − α in
-place of κ/2 + α. With x = κ/2 + α, y = κ/2 − α, κ = 2αn the torques on a link are in balance if A B = h² λ⁴ with
-
-    A = Ī λ² + 4β s² λ + ¼ m̄ℓ²Ω² cot²α + ⅛ m̄ℓ² [(λ + iΩ)² cot²x + (λ − iΩ)² cot²y]
-
-and B the same with c² for s² and tan² for cot². This is exact. The straight chain is its limit α → 0 with
-T = m̄ v² cos α/ℓ, Ω = 2v sin α/ℓ; v is the speed of the joints.
-
-**The continuous ring** of density ρ, with j = (Ī − m̄ℓ²/6)/ℓ and the moment βℓ κ̇ of its curvature, obeys
-
-    (1 + n² + (n² − 1)² j/ρR²) λ² + [(n² − 1)² n² βℓ/ρR⁴ − 4inΩ] λ + n² (n² − 3) Ω² = 0.
-
-With j = β = 0 it is a string, whose modes are λ = inΩ and λ = −in (n² − 3)/(n² + 1) Ω: in the room, where rates are
-λ − inΩ, the slow family stands still and the fast one runs at 2v (n² − 1)/(n² + 1).
+README.md derives what is solved here: A(λ) B(λ) = h² λ⁴ with h = δ − ¼ μℓ², and A, B of the straight chain and of the
+ring; a single band, A = 0, if h = 0; and the continuous ring.
 
 Coulomb friction is left out: it is not linear. `equivalent_friction` replaces it in joints that only swing. Joints that
 keep their sense of rotation, because the loop bends there, do not feel it in small waves.
@@ -109,24 +81,9 @@ class Waves:
         damped = self.damping > ROUNDING * np.abs(self.rate)
         return np.where(damped, np.abs(self.group_speed) / np.where(damped, self.damping, 1.0), np.inf)
 
-    @property
-    def loss_per_wavelength(self) -> Array:
-        """By how much the logarithm of the amplitude falls while a packet runs one wavelength, shape (k, 4).
-
-        Infinite for waves that decay where they are.
-        """
-        with np.errstate(divide="ignore"):
-            return 2 * np.pi / self.phase[:, None] / self.reach
-
 
 def straight_waves(parameters: Parameters, tension: float, phase: ArrayLike) -> Waves:
-    """Transverse waves of a straight chain under tension.
-
-    Args:
-        parameters: of the chain; its Coulomb friction is left out.
-        tension: T [N].
-        phase: κ per link [rad], in (0, π/2], shape (k,).
-    """
+    """Transverse waves of a straight chain under the tension T [N], at phases κ per link in (0, π/2], shape (k,)."""
 
     def factors(phases: Array, friction: float) -> tuple[Complex, Complex, Array]:
         squares = np.sin(phases / 2) ** 2, np.cos(phases / 2) ** 2
@@ -143,11 +100,7 @@ def straight_waves(parameters: Parameters, tension: float, phase: ArrayLike) -> 
 def ring_waves(parameters: Parameters, links: int, speed: float, number: ArrayLike) -> Waves:
     """Bending modes of a circulating ring without gravity, exact for rigid links and closed joints.
 
-    Args:
-        parameters: of the chain; its Coulomb friction is left out.
-        links: N, even.
-        speed: v of the joints [m/s], towards the next links.
-        number: n, whole wavelengths around the ring, from 2 to N/4, shape (k,).
+    Its N links, N even, move at `speed` [m/s]; `number` has whole wavelengths around it, from 2 to N/4, shape (k,).
 
     Returns:
         Rates in the frame that turns with the ring, at the phases 2πn/N.
@@ -174,34 +127,10 @@ def ring_waves(parameters: Parameters, links: int, speed: float, number: ArrayLi
     return _waves(parameters, 2 * alpha * np.asarray(number), factors)
 
 
-def single_band(parameters: Parameters, tension: float, phase: ArrayLike) -> Complex:
-    """Rates of a straight chain of equal links with the mean mass and inertia, backward and forward.
-
-    Args:
-        parameters: of the chain; its Coulomb friction is left out.
-        tension: T [N].
-        phase: κ per link [rad], shape (k,).
-
-    Returns:
-        λ [1/s], shape (k, 2). If friction keeps a wave from swinging both are real, the faster decay first.
-    """
-    length, half = parameters.link_length, np.asarray(phase, dtype=np.float64) / 2
-    inertia = _mean_mass(parameters) * np.cos(half) ** 2 + 4 * _mean_inertia(parameters) / length**2 * np.sin(half) ** 2
-    damping = 8 * parameters.viscous_friction / length**2 * np.sin(half) ** 4 / inertia
-    root = np.sqrt((4 * tension / length * np.sin(half) ** 2 / inertia - damping**2).astype(np.complex128))
-    return np.stack([-damping + 1j * root, -damping - 1j * root], axis=-1)
-
-
 def continuous_ring(parameters: Parameters, links: int, speed: float, number: ArrayLike) -> Complex:
     """Rates of the continuous ring, slow and fast, in the frame that turns along: `ring_waves` for long waves.
 
     The ring has the length Nℓ.
-
-    Args:
-        parameters: of the chain; its Coulomb friction is left out.
-        links: N.
-        speed: v [m/s].
-        number: n, from 2, shape (k,).
 
     Returns:
         λ [1/s], shape (k, 2).
@@ -243,14 +172,10 @@ def ring_spin(parameters: Parameters, links: int, speed: float) -> float:
 
 
 def equivalent_friction(parameters: Parameters, amplitude: float) -> float:
-    """Viscous friction [N m s] that takes as much energy as joint friction does where joints swing about rest.
+    """Viscous friction [N m s] that takes as much energy as joint friction where joints swing at `amplitude` W [rad/s].
 
     Harmonic balance: (2/W) times the mean of f(W cos φ) cos φ over a period, with f(w) = β w + τ_c tanh(w/ω_c). It is
     β + 4τ_c/πW for W far above ω_c and β + τ_c/ω_c far below.
-
-    Args:
-        parameters: of the chain.
-        amplitude: W, of the relative angular velocity of two links [rad/s].
     """
     ratio = amplitude / parameters.friction_smoothing
     # By parts the mean of tanh(ratio · cos φ) cos φ is 2/π ∫ sin φ d tanh, over cos φ from 0, where it rises, to 1.

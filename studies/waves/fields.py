@@ -5,8 +5,9 @@ own frame, in which long transverse waves run at ±c, c = √(Tℓ/m̄), with th
 chain itself runs along its loop at the speed v, and v ≈ c because the tension bends the path of the links. In the frame
 of the room one of the two waves hence hardly moves, and the other one runs twice as fast as the chain.
 
-Contacts are taken from the frames: a joint touches if its circle is not farther than a tolerance from the floor, or
-from the circle of a joint that is no neighbour.
+Functions take the `time` of f frames [s], shape (f,), `joints`, their x, y [m], shape (f, n, 2), and the `masses` of n
+links [kg]. Contacts are taken from the frames: a joint touches if its circle is not farther than a tolerance from the
+floor, or from the circle of a joint that is no neighbour.
 """
 
 from dataclasses import dataclass
@@ -47,10 +48,7 @@ def tensions(joints: Array, forces: Array) -> Array:
     """Force in each joint along the chain [N], positive if it pulls, shape (f, n).
 
     The direction of the chain at a joint is that of the line between its two neighbours.
-
-    Args:
-        joints: x, y [m], shape (f, n, 2).
-        forces: on the link that the joint ends [N], shape (f, n, 2).
+    `forces` are those on the link that the joint ends [N], shape (f, n, 2).
     """
     tension: Array = np.sum(forces * _tangents(joints), axis=2)
     return tension
@@ -60,10 +58,6 @@ def curvatures(joints: Array, link_length: float) -> Array:
     """Angle between the two links at each joint over their length [1/m], shape (f, n).
 
     It is positive where the chain bends as the loop of the first frame does, also if that runs clockwise.
-
-    Args:
-        joints: x, y [m], shape (f, n, 2).
-        link_length: ℓ [m].
     """
     link = joints - np.roll(joints, 1, axis=1)
     ahead = np.roll(link, -1, axis=1)
@@ -73,32 +67,16 @@ def curvatures(joints: Array, link_length: float) -> Array:
 
 
 def normal_velocities(time: Array, joints: Array, masses: Array) -> Array:
-    """Velocity of each joint across the chain, relative to the centre of mass [m/s], outwards, shape (f, n).
-
-    Args:
-        time: of the frames [s], shape (f,), at least three.
-        joints: x, y [m], shape (f, n, 2).
-        masses: of the links [kg], shape (n,).
-    """
+    """Velocity of each joint across the chain, relative to the centre of mass [m/s], outwards, shape (f, n)."""
     velocity = np.gradient(joints, time, axis=0) - np.gradient(centers(joints, masses), time, axis=0)[:, None]
     return -_turning(joints) * _cross(_tangents(joints), velocity)
 
 
 def centers(joints: Array, masses: Array) -> Array:
-    """Centre of mass of links that lie between joints [m], shape (f, 2); arguments as of `normal_velocities`."""
+    """Centre of mass of links that lie between joints [m], shape (f, 2)."""
     middle = (joints + np.roll(joints, 1, axis=1)) / 2
     weighted: Array = np.einsum("fnk,n->fk", middle, masses) / masses.sum()
     return weighted
-
-
-def loop_speeds(time: Array, joints: Array, masses: Array) -> Array:
-    """Mean speed of the joints along the chain relative to the centre of mass [m/s], in the order of their numbers.
-
-    Shape (f,); arguments as of `normal_velocities`.
-    """
-    velocity = np.gradient(joints, time, axis=0) - np.gradient(centers(joints, masses), time, axis=0)[:, None]
-    speed: Array = np.sum(velocity * _tangents(joints), axis=2).mean(axis=1)
-    return speed
 
 
 def wave_speeds(tension: Array, link_length: float, mean_mass: float) -> Array:
@@ -108,13 +86,7 @@ def wave_speeds(tension: Array, link_length: float, mean_mass: float) -> Array:
 
 
 def moving_average(time: Array, values: Array, width: float) -> Array:
-    """Mean of values over `width` [s] around each time, less at both ends.
-
-    Args:
-        time: ascending, evenly spaced or not [s], shape (f,).
-        values: shape (f,).
-        width: [s], at least 0.
-    """
+    """Mean of values (f,) over `width` [s] around each time, less at both ends."""
     area = np.concatenate([[0.0], np.cumsum((values[1:] + values[:-1]) / 2 * np.diff(time))])
     first, last = np.maximum(time - width / 2, time[0]), np.minimum(time + width / 2, time[-1])
     span = last - first
@@ -146,11 +118,6 @@ def bin_means(time: Array, values: Array, most: int) -> tuple[Array, Array]:
     """Edges of even spans of time, at most `most`, and the mean of the values in each, shapes (b + 1,) and (b, n).
 
     There are as many as frames if these are fewer; a span without frames has the values of the one before.
-
-    Args:
-        time: ascending [s], shape (f,), not all equal.
-        values: shape (f, n).
-        most: greatest number of spans.
     """
     count = min(most, len(time))
     edges = np.linspace(time[0], time[-1], count + 1)
@@ -163,12 +130,7 @@ def bin_means(time: Array, values: Array, most: int) -> tuple[Array, Array]:
 def characteristic(time: Array, speed: Array, start: int, joint: float, link_length: float) -> Array:
     """Path of a wave in the chain's frame: joint number at each time from frame `start` on, not wrapped, (f − start,).
 
-    Args:
-        time: [s], shape (f,).
-        speed: of the wave in the order of the joints' numbers [m/s], shape (f,).
-        start: frame in which the wave begins.
-        joint: joint at which it begins.
-        link_length: ℓ [m].
+    It begins at `joint` and runs at `speed` [m/s], shape (f,), in the order of the joints' numbers.
     """
     time, speed = time[start:], speed[start:]
     way = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(time))])
@@ -180,10 +142,6 @@ def joints_below(joints: Array, masses: Array) -> Array:
 
     Numbers go on beyond n − 1 and below 0, so that they change little from frame to frame. Unlike the lowest joint,
     this point moves smoothly while the bottom of the loop lies flat on the floor.
-
-    Args:
-        joints: x, y [m], shape (f, n, 2).
-        masses: of the links [kg], shape (n,).
     """
     place = joints - centers(joints, masses)[:, None]
     x, y = place[..., 0], place[..., 1]
@@ -227,10 +185,6 @@ def self_contacts(joints: Array, radius: float) -> Truths:
     """Whether the circles of a joint touch those of one that is no neighbour, shape (f, n).
 
     They are then at most `NEAR` of their diameter apart.
-
-    Args:
-        joints: x, y [m], shape (f, n, 2).
-        radius: of the circles [m].
     """
     frames, links = joints.shape[:2]
     touching = np.zeros((frames, links), dtype=np.bool_)
@@ -248,13 +202,7 @@ def self_contacts(joints: Array, radius: float) -> Truths:
 
 
 def impacts(time: Array, joints: Array, touching: Truths) -> list[Impact]:
-    """Impacts on the floor: contacts with less than `QUIET` between them.
-
-    Args:
-        time: of the frames [s], shape (f,).
-        joints: x, y [m], shape (f, n, 2).
-        touching: joints at the floor, shape (f, n).
-    """
+    """Impacts on the floor: contacts with less than `QUIET` between them."""
     frames = np.flatnonzero(touching.any(axis=1))
     if not len(frames):
         return []

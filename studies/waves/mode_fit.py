@@ -10,11 +10,7 @@ Complex = NDArray[np.complex128]
 
 
 def mode_amplitudes(angles: Array, number: int) -> Complex:
-    """Fourier components of links' angles, of inner and outer links apart.
-
-    Args:
-        angles: of all links at t instants [rad], shape (t, n), n even.
-        number: whole wavelengths around the ring.
+    """Fourier components of links' angles [rad], shape (t, n), of inner and outer links apart.
 
     Returns:
         2/n Σ ϑ_j exp(−2πi · number · j/n) over even and over odd j [rad], shape (t, 2).
@@ -26,15 +22,10 @@ def mode_amplitudes(angles: Array, number: int) -> Complex:
 
 
 def fit_rates(signals: Complex, interval: float, count: int) -> Complex:
-    """Rates λ of the sum of exponentials Σ a exp(λt) that signals have in common.
+    """Rates λ of the sum of `count` exponentials Σ a exp(λt) that signals, shape (t, s), have in common.
 
     ESPRIT (Roy and Kailath, IEEE Trans. ASSP 37 (1989) 984): stretches of the signals span a space that is the same one
     sample later but for the factors exp(λ · interval), which are the eigenvalues of the map between both.
-
-    Args:
-        signals: s signals at t instants, shape (t, s).
-        interval: time from one instant to the next [s]; the frequencies must be below π/interval.
-        count: number of exponentials, at most t/3.
 
     Returns:
         λ [1/s], by falling imaginary part, shape (count,).
@@ -76,14 +67,9 @@ class Packet:
 
 
 def find_packet(angles: Array, link: float, width: float) -> Packet:
-    """The packet near a place of a ring.
+    """The packet of a ring's angles (n,) at most `width` links from the place `link`, on an endless count of links.
 
     The envelope is that of the waves with n > 0 in exp(2πinj/N), twice their absolute value.
-
-    Args:
-        angles: of all links, less those of the ring [rad], shape (n,).
-        link: about where the packet is, on an endless count of links.
-        width: how far to either side it reaches [links], at most n/2.
     """
     links = len(angles)
     spectrum = np.fft.fft(angles)

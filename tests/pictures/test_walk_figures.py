@@ -154,7 +154,7 @@ def test_film_strip_shows_the_walk(tmp_path: Path) -> None:
 
 def test_film_strips_of_odd_walks() -> None:
     """A walk that did not rest gets no distance, and its last close-up is the end; one frame is enough."""
-    figure = film_strip(make_walk(status=Status.TIME_LIMIT, dx=math.nan, sprocket_center=None))
+    figure = film_strip(make_walk(status=Status.TIME_LIMIT, dx=math.nan, sprocket_height=math.nan))
     assert not any("Delta" in text.get_text() for text in figure.axes[0].texts)
     assert "end" in figure.axes[-2].get_title("left")
     for walk, make in ((make_walk(), make_walk), (make_tilting_walk(), make_tilting_walk)):

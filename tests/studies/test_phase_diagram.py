@@ -80,7 +80,7 @@ def test_parts_are_reduced_together(tmp_path: Path) -> None:
     """Means, deviations and counts are those of the walks of all parts; failed and missing ones are counted."""
     other = SWEEP | {"seed": 2, "name": "other", "grid": {"frequency": [15, 24], "links": [60, 90]}}
     parts = [make_sweep(tmp_path / str(number), sweep, outcome) for number, sweep in enumerate((SWEEP, other))]
-    walks = cells.walks_by_cell(part for result in parts for part in cells.parts_of(result, result.name))
+    walks = cells.walks_by_cell(parts)
     assert list(walks) == [(30, 3.0), (30, 15.0), (60, 3.0), (60, 15.0), (60, 24.0), (90, 3.0), (90, 15.0), (90, 24.0)]
     both = cells.reduced(60, 15.0, walks[60, 15.0])
     dx = np.concatenate([parts[0].dx[1, 1, :4], parts[1].dx[0, 0, :4]])
@@ -95,7 +95,7 @@ def test_parts_are_reduced_together(tmp_path: Path) -> None:
 
 def read(*paths: Path) -> dict[tuple[int, float], dict[str, np.ndarray]]:
     """The walks of some parts by cell."""
-    return cells.walks_by_cell(part for path in paths for part in cells.parts_of(warpchain.load(path), path.name))
+    return cells.walks_by_cell([warpchain.load(path) for path in paths])
 
 
 def test_parts_that_do_not_belong_together_are_refused(tmp_path: Path) -> None:
@@ -110,7 +110,7 @@ def test_parts_that_do_not_belong_together_are_refused(tmp_path: Path) -> None:
         make_sweep(tmp_path / name, SWEEP | change)
         with pytest.raises(InputError, match=message):
             read(first, tmp_path / name)
-    apart = {"grid": {"links": [120], "frequency": [3]}, "options": {"device": "cpu"}}
+    apart = {"seed": 3, "grid": {"links": [120], "frequency": [3]}, "options": {"device": "cpu"}}
     make_sweep(tmp_path / "apart", SWEEP | apart)
     assert len(read(first, tmp_path / "apart")) == 7
 

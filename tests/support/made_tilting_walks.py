@@ -52,6 +52,6 @@ def make_tilting_walk(links: int = 30, frames: int = 41, **changes: Any) -> Walk
         "frame_joints": radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1),
         "frame_origin": place,
         "frame_axes": plane_axes(lean, heading),
-        "sprocket_center": np.array([0.0, 0.07]),
+        "sprocket_height": 0.07,
     }
     return make_walk(links, **(values | changes))

@@ -103,7 +103,7 @@ def step_costs(
     """
     methods = [name for name in method_names() if find_method(name).runs_on_gpus or not on_gpu(device)]
     flights: dict[tuple[int, str], list[Flight]] = {key: [] for key in itertools.product(links, methods)}
-    starts = {n: flying(n) for n in links}
+    starts = {n: flying(n, device) for n in links}
     for turn, (n, method) in itertools.product(range(rounds), flights):
         report(f"round {turn + 1} of {rounds}: {n} links, {method}")
         flights[n, method].append(fly(starts[n], method, chains, device))
@@ -117,11 +117,11 @@ def step_costs(
     return costs
 
 
-def flying(links: int) -> State:
+def flying(links: int, device: str = "cpu") -> State:
     """A circulating ellipse in the air, whose joints have come to bear their loads."""
     position, velocity = lay_chain(ellipse(1.5), links, PARAMETERS.link_length, speed=5.0)
     position[:, 1] += 5.0
-    ended = simulate(PARAMETERS, position, velocity, 2e-3, times=[2e-3], method="dp5", tolerance=1e-9)
+    ended = simulate(PARAMETERS, position, velocity, 2e-3, times=[2e-3], method="dp5", tolerance=1e-9, device=device)
     return ended.position[-1], ended.velocity[-1]
 
 

@@ -13,6 +13,7 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
@@ -39,13 +40,17 @@ from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
 from warpchain.loop.before_release import FIELDS, BeforeRelease
+from warpchain.pictures.walk_shape import Kind
 from warpchain.status import Status
-from warpchain.walks.drawn import Drawn
 from warpchain.walks.faults import FAULTS, MOST_ENERGY_ERROR, energy_error, faults
 from warpchain.walks.moving_plane import in_room
 
 if TYPE_CHECKING:
     import h5py
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from warpchain.loop.stationary_loop import StationaryLoop
 
 Array = NDArray[np.float64]
 
@@ -67,7 +72,7 @@ ENERGIES: Final = {
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class WalkResult(Drawn):
+class WalkResult:
     """One walk, from the release to its end: t instants and f frames of a chain of n links.
 
     Time counts from the release, x from the centre of sprocket or ellipse, y up from the floor. Units, meanings and
@@ -232,16 +237,86 @@ class WalkResult(Drawn):
 
     def facts(self) -> list[tuple[str, str]]:
         """Names and values that a notebook shows beside the picture."""
+        scene = self.setup.scene
         return [
-            *super().facts(),
+            ("status", self.status.label if self.status.ok else f"{self.status.label}: {self.status.sentence}"),
+            ("distance Δx", f"{self.dx:.4g} m"),
+            ("chain", f"{scene.links} links at {scene.frequency:g} Hz, preset {self.setup.preset}"),
             ("walk time", f"{self.walk_time:.4g} s"),
             ("seed", "none, nothing was drawn" if self.seed is None else str(self.seed)),
             ("bounces", str(self.bounces)),
             ("steps", f"{self.steps_accepted:,} accepted, {self.steps_rejected:,} rejected"),
             ("energy unaccounted for", f"{self.energy['residual']:.1e} J"),
             *(("warning", remedy) for remedy in self.warnings()),
-            ("computed in", f"{self.wall_time:.1f} s"),
+            *([] if np.isnan(self.wall_time) else [("computed in", f"{self.wall_time:.1f} s")]),
         ]
+
+    def plot(
+        self,
+        kind: Kind = "figure5",
+        *,
+        figure: "Figure | None" = None,
+        ax: "Axes | None" = None,
+    ) -> "Figure":
+        """Draw the walk.
+
+        Args:
+            kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself, `loop` for
+                its loop on the sprocket just before the release, `energy` for its energies, `tilt` for tilt, yaw and
+                lateral drift of a plane that tilts.
+            figure: an empty matplotlib figure to draw into; by default a new one, which a notebook shows.
+            ax: where to draw `energy`, the only figure with one pair of axes.
+
+        Returns:
+            The figure, that of `ax` if it is given.
+
+        Raises:
+            ValueError: the kind is unknown, the walk does not have what it shows (frames, `before_release`,
+                energies), or `ax` does not suit the kind.
+        """
+        from warpchain.pictures.walk_figures import draw
+
+        return draw(self, kind, figure=figure, ax=ax)
+
+    def mean_loop(self) -> "StationaryLoop":
+        """The loop on its sprocket just before the release: its mean shape, the forces in it, its kink.
+
+        Raises:
+            ValueError: the walk has kept nothing of that time, or too little.
+        """
+        from warpchain.loop.stationary_loop import average_loop
+
+        return average_loop(self)
+
+    def animate(self, path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
+        """Write a moving picture of the walk; the suffix of `path` gives the format: .gif, .mp4 or .html.
+
+        Args:
+            path: the file to write, whole or not at all; an older one is replaced.
+            fps: pictures per second of playing time; in a .html file the browser decides.
+            slow: playing time per simulated time; in a .html file the value at the start.
+
+        Raises:
+            ValueError: the walk has no frames, the suffix is another, `fps` or `slow` is not positive, or a GIF would
+                have too many pictures.
+            ImportError: an .mp4 is asked for, and imageio-ffmpeg is not installed.
+            OSError: the file cannot be written.
+        """
+        from warpchain.pictures.animation import animate
+
+        animate(self, path, fps=fps, slow=slow)
+
+    def _repr_png_(self) -> bytes | None:
+        """The film strip, or Figure 5 if there are no frames; None if there is nothing to draw."""
+        from warpchain.pictures.inline import first_png
+
+        return first_png(partial(self.plot, kind) for kind in ("film_strip", "figure5"))
+
+    def _repr_html_(self) -> str:
+        """The most important numbers, and the picture."""
+        from warpchain.pictures.inline import page
+
+        return page(type(self).__name__, self.facts(), self._repr_png_())
 
     def unit(self, name: str) -> str:
         """SI unit of a field; a `KeyError` if there is none of that name."""
