@@ -1,4 +1,4 @@
-"""Warp functions of the contact pass, called from NumPy one by one.
+"""Warp functions of the kernels, called from NumPy one by one.
 
 What a kernel must fill is poisoned before its first launch: numbers with NaN, list entries with a joint that no
 chain has. Kernels are compiled with the flags of the step kernels.
@@ -47,14 +47,21 @@ def poisoned(*shape: int) -> wp.array:
     return wp.full(shape, np.nan, dtype=wp.float64, device=DEVICE)
 
 
+def model_of(chains: Sequence[tuple[int, Parameters]]) -> Model:
+    """Constants of chains of so many links each."""
+    model = Model()
+    model.link_count = wp.array([links for links, _ in chains], dtype=wp.int32, device=DEVICE)
+    for name in Parameters.model_fields:
+        values = [getattr(parameters, name) for _, parameters in chains]
+        setattr(model, name, wp.array(values, dtype=wp.float64, device=DEVICE))
+    return model
+
+
 def chain_on_cpu(position: Array, velocity: Array, parameters: Parameters) -> tuple[Model, State]:
     """Structs of one chain; of its state only the links are set."""
-    model, state = Model(), State()
-    model.link_count = wp.array([len(position)], dtype=wp.int32, device=DEVICE)
-    for name, value in parameters:
-        setattr(model, name, wp.array([value], dtype=wp.float64, device=DEVICE))
+    state = State()
     state.links = wp.array(np.hstack([position, velocity]).T[None], dtype=wp.float64, device=DEVICE)
-    return model, state
+    return model_of([(len(position), parameters)]), state
 
 
 # --- the impulse law ---
@@ -245,11 +252,7 @@ class ContactPass:
         self.links = [len(chain.position) for chain in chains]
         self.columns = layout.padded_width(max(self.links))
         self.skin, self.sprocket_speed, self.push_rate = skin, sprocket_speed, push_rate
-        self.model = Model()
-        self.model.link_count = wp.array(self.links, dtype=wp.int32, device=DEVICE)
-        for name in Parameters.model_fields:
-            values = [getattr(chain.parameters, name) for chain in chains]
-            setattr(self.model, name, wp.array(values, dtype=wp.float64, device=DEVICE))
+        self.model = model_of([(len(chain.position), chain.parameters) for chain in chains])
         worlds, rows, size = len(chains), layout.scratch_rows(0), list_layout(self.columns).size
         self.state = State()
         self.state.links = poisoned(worlds, 6, max(self.links))

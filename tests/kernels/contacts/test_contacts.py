@@ -124,25 +124,6 @@ def test_a_sunken_circle_leaves_at_push_rate_times_its_depth(body, speed):
     assert seen > 10
 
 
-def test_left_circle_goes_first():
-    """A flat link that falls on the floor is hit on its left circle, then on its right one."""
-    position = chain_of_angles(np.array([0.0, np.pi, 0.0, np.pi]), PAPER.link_length)
-    position[:, 1] = [4e-3, 1.0, 1.0, 1.0]
-    velocity = np.zeros((4, 3))
-    velocity[:, 1] = -1.0
-    smooth = PAPER.with_values({"floor_friction": 0.0, "floor_restitution": 0.0})
-    contact_pass = ContactPass([Placed(position, velocity, smooth)])
-    (result,) = contact_pass.run(FLOOR)
-    # W = 1/m + a²/I = (1 + s)/m with s = m a²/I. Left, J = m/(1 + s): v = −s/(1 + s), aω = −s/(1 + s). So the right
-    # circle comes with v + aω = −2s/(1 + s), and J = 2 s m/(1 + s)².
-    s = smooth.inner_mass * (smooth.link_length / 2) ** 2 / smooth.inner_inertia
-    rise = -s / (1 + s) + 2 * s / (1 + s) ** 2
-    turn = (-s / (1 + s) + 2 * s**2 / (1 + s) ** 2) / (smooth.link_length / 2)
-    assert result["floor"] == 2
-    assert_allclose(contact_pass.velocity(0)[0], [0.0, rise, turn], rtol=1e-12, atol=1e-15)
-    assert_array_equal(contact_pass.velocity(0)[1:], velocity[1:])
-
-
 def test_circles_almost_as_wide_as_links_meet_past_one_link():
     """If r is close to ℓ/2, circles at both ends of one link, of the links before and after it, can touch."""
     wide = PAPER.with_values({"circle_radius": 0.4999 * PAPER.link_length})

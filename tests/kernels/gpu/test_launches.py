@@ -50,15 +50,10 @@ def everything(batch: Batch, world: int) -> dict[str, NDArray[np.generic]]:
     return found
 
 
-def features_of(batch: Batch) -> Features:
-    """A walk's features."""
-    return batch.features(fixed_body="floor")
-
-
 def run(factory: Callable[[Features, int], wp.Kernel], attempts: int) -> list[dict[str, NDArray[np.generic]]]:
     """Both piles to their end, in launches of so many attempts."""
     batch = piles()
-    kernel = factory(features_of(batch), LINKS)
+    kernel = factory(batch.features(fixed_body="floor"), LINKS)
     while batch.status(0) == Status.RUNNING or batch.status(1) == Status.RUNNING:
         launch_kernel(batch, kernel, [0, 1], attempts, block_dim=LINKS)
     return [everything(batch, world) for world in (0, 1)]
@@ -83,7 +78,7 @@ def test_cuts_change_no_number() -> None:
     for attempts in (1, 7):
         assert_same(run(make_advance_block, attempts), whole)
     alone = piles()
-    launch_kernel(alone, make_advance_block(features_of(alone), LINKS), [1], 10**6, block_dim=LINKS)
+    launch_kernel(alone, make_advance_block(alone.features(fixed_body="floor"), LINKS), [1], 10**6, block_dim=LINKS)
     assert_same([everything(alone, 1)], whole[1:])
 
 

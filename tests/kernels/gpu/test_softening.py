@@ -14,7 +14,6 @@ from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels import layout
 from warpchain.kernels.events import release
 from warpchain.kernels.events.sample import sampling
-from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.sample import block_sample
 from warpchain.status import Status
 
@@ -94,9 +93,9 @@ def assert_same_bits(ours: Batch, theirs: Batch) -> None:
         assert_array_equal(ours.drain_samples(world), theirs.drain_samples(world))
 
 
-def launch_both(ours: Batch, theirs: Batch, features: Features, cut: int, attempts: int = 60) -> None:
+def launch_both(ours: Batch, theirs: Batch, fixed_body: str, cut: int, attempts: int = 60) -> None:
     """Make so many attempts or a few more: ``cut`` to a launch in the GPU kernel, all at once in the CPU kernel."""
-    launches = -(-attempts // cut)
+    features, launches = ours.features(fixed_body=fixed_body), -(-attempts // cut)
     for _ in range(launches):
         launch_blocks(ours, features, cut, block_dim=LINKS)
     launch_chains(theirs, features, cut * launches)
@@ -107,8 +106,7 @@ def launch_both(ours: Batch, theirs: Batch, features: Features, cut: int, attemp
 def test_a_gpu_kernel_softens_a_pile_as_a_cpu_kernel_does(area: float, softness: float, cut: int) -> None:
     """The GPU kernel softens at the same samples, frees the same energy, and ends in the same bits, however cut."""
     ours, theirs = heaps(area), heaps(area)
-    features = ours.features(fixed_body="floor")
-    launch_both(ours, theirs, features, cut)
+    launch_both(ours, theirs, "floor", cut)
     first, second = (theirs.watched(world, layout.SOFTENED_AT) for world in range(2))
     assert 0 < first <= second < theirs.time(0)
     assert theirs.state.softness.numpy().tolist() == [softness, softness]
@@ -121,8 +119,7 @@ def test_a_gpu_kernel_softens_a_pile_as_a_cpu_kernel_does(area: float, softness:
 def test_a_gpu_kernel_stiffens_as_a_cpu_kernel_does(cut: int) -> None:
     """The GPU kernel returns joints to their own values in the same steps, however cut into launches."""
     ours, theirs = released(), released()
-    features = ours.features(fixed_body="floor")
-    launch_both(ours, theirs, features, cut)
+    launch_both(ours, theirs, "floor", cut)
     assert theirs.state.softness.numpy()[0] == 0.0
     assert theirs.state.losses.numpy()[0, layout.LOSS_SOFTENING] < 0
     assert_same_bits(ours, theirs)
@@ -132,8 +129,7 @@ def test_a_gpu_kernel_stiffens_as_a_cpu_kernel_does(cut: int) -> None:
 def test_a_gpu_kernel_drives_under_load_as_a_cpu_kernel_does(cut: int, quick_unloading: None) -> None:
     """In the GPU kernel loads and softness change in the same steps of the drive, however cut: on, falling, off."""
     ours, theirs = driven(), driven()
-    features = ours.features(fixed_body="sprocket")
-    launch_both(ours, theirs, features, cut, attempts=80)
+    launch_both(ours, theirs, "sprocket", cut, attempts=80)
     assert theirs.counts(0)["sprocket"] > 10
     assert theirs.time(0) > UNLOADED + LOAD_FALLS + 12 * FIXED_STEP
     assert theirs.state.load_factor.numpy()[0] == 1.0
