@@ -32,7 +32,8 @@ State = tuple[Array, Array]
 PARAMETERS: Final = preset("paper")
 SCIPY: Final = "DOP853 (SciPy)"
 SCIPY_TOLERANCE: Final = 1e-6
-REFERENCE_TOLERANCE: Final = 1e-12
+REFERENCE_TOLERANCE: Final = 1e-10
+"""Of SciPy's DOP853, whose error is below 1e-9 m/s then; at 1e-12 it follows rounding errors in tiny steps."""
 COMPARED_TIME: Final = 1e-3
 """Simulated time [s] after which errors are taken; SciPy needs seconds for it."""
 TIMED: Final = 0.05
@@ -118,9 +119,9 @@ def step_costs(
 
 
 def flying(links: int) -> State:
-    """A circulating ellipse in the air, whose joints have come to bear their loads."""
+    """A circulating ellipse above the floor, whose joints have come to bear their loads."""
     position, velocity = lay_chain(ellipse(1.5), links, PARAMETERS.link_length, speed=5.0)
-    position[:, 1] += 5.0
+    position[:, 1] += 0.1 - position[:, 1].min()
     ended = simulate(PARAMETERS, position, velocity, 2e-3, times=[2e-3], method="dp5", tolerance=1e-9)
     return ended.position[-1], ended.velocity[-1]
 
@@ -145,9 +146,8 @@ def fly(start: State, method: str, chains: int, device: str) -> Flight:
         began = time.perf_counter()
         batch.run(worlds, features)
         seconds = time.perf_counter() - began
-        failed = next((world for world in worlds if batch.status(world) != Status.FINISHED), None)
-        if failed is not None:
-            raise RuntimeError(f"{method}: {batch.status(failed).sentence}")
+        if (batch.statuses() != Status.FINISHED).any():
+            raise RuntimeError(f"{method}: {batch.status(0).sentence}")  # all chains are alike
         after = batch.counts(0)
     return Flight(compared, seconds, *(after[name] - before[name] for name in ("accepted", "rejected")))
 
