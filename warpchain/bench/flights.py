@@ -8,7 +8,7 @@ import itertools
 import math
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -17,10 +17,13 @@ from numpy.typing import NDArray
 
 from warpchain.bench import numpy_model
 from warpchain.engine.batch import Batch
-from warpchain.engine.devices import gpu_turn
+from warpchain.engine.devices import gpu_turn, start_device
+from warpchain.engine.kernel_choice import block_threads, features_of, load_kernels
 from warpchain.inputs.options import Options, on_gpu
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain
+from warpchain.kernels import layout
+from warpchain.kernels.features import Features
 from warpchain.kernels.methods.method import find_method, method_names
 from warpchain.run.simulation import simulate
 from warpchain.status import Status
@@ -104,6 +107,8 @@ def step_costs(
     """
     methods = [name for name in method_names() if find_method(name).runs_on_gpus or not on_gpu(device)]
     flights: dict[tuple[int, str], list[Flight]] = {key: [] for key in itertools.product(links, methods)}
+    report("compiling kernels; later runs find them ready")
+    _load_kernels(device, flights)
     starts = {n: flying(n) for n in links}
     for turn, (n, method) in itertools.product(range(rounds), flights):
         report(f"round {turn + 1} of {rounds}: {n} links, {method}")
@@ -118,6 +123,15 @@ def step_costs(
     return costs
 
 
+def _load_kernels(device: str, wanted: Iterable[tuple[int, str]]) -> None:
+    """Load the kernels of chains of so many links with these methods, compiled at the same time if need be."""
+    with gpu_turn([device]):
+        found = start_device(device)
+        load_kernels(
+            (found, _features(method, device, n), block_threads(n) if on_gpu(device) else 1) for n, method in wanted
+        )
+
+
 def flying(links: int) -> State:
     """A circulating ellipse above the floor, whose joints have come to bear their loads."""
     position, velocity = lay_chain(ellipse(1.5), links, PARAMETERS.link_length, speed=5.0)
@@ -127,7 +141,7 @@ def flying(links: int) -> State:
 
 
 def fly(start: State, method: str, chains: int, device: str) -> Flight:
-    """Carry identical chains through the air by the kernel that `simulate` takes.
+    """Carry identical chains of a batch through the air.
 
     Raises:
         InputError: There is no such device.
@@ -135,11 +149,11 @@ def fly(start: State, method: str, chains: int, device: str) -> Flight:
     """
     worlds = range(chains)
     with gpu_turn([device]):
-        batch = Batch(chains, len(start[0]), Options.model_validate({"method": method, "device": device}))
+        batch = Batch(chains, len(start[0]), _options(method, device))
         for world in worlds:
             batch.set_chain(world, PARAMETERS, len(start[0]))
             batch.load(world, *start, stop_time=COMPARED_TIME, stop_status=Status.FINISHED)
-        features = batch.features(fixed_body="floor", watch="none")
+        features = _features(method, device, len(start[0]))
         batch.run(worlds, features)
         compared, before = (batch.position(0), batch.velocity(0)), batch.counts(0)
         batch.resume(list(worlds), TIMED, Status.FINISHED)
@@ -158,10 +172,20 @@ def errors(end: State, true: State) -> tuple[float, float]:
     return position, velocity
 
 
+def _options(method: str, device: str) -> Options:
+    """Default options of a method."""
+    return Options.model_validate({"method": method, "device": device})
+
+
+def _features(method: str, device: str, links: int) -> Features:
+    """What a kernel is compiled for that carries chains above a floor, as of `simulate`."""
+    return features_of(_options(method, device), layout.padded_width(links), fixed_body="floor", watch="none")
+
+
 def _cost(links: int, method: str, chains: int, flights: Sequence[Flight], true: State) -> StepCost:
     """The cost of a method; all its flights are alike but for their wall times."""
     flight, seconds = flights[0], statistics.median(flight.seconds for flight in flights)
-    options, attempts = Options.model_validate({"method": method}), flight.accepted + flight.rejected
+    options, attempts = _options(method, "cpu"), flight.accepted + flight.rejected
     position_error, velocity_error = errors(flight.compared, true)
     return StepCost(
         links=links,
