@@ -60,7 +60,7 @@ def bench(
     """Measure steps and errors of each method beside SciPy's DOP853, and walks a second of a small sweep.
 
     A step is an attempted one of one chain in flight, at Table 1's values and the method's default tolerance. Errors
-    are the greatest of a link's position and velocity after a millisecond, against DOP853 at 1e-12 on a model in
+    are the greatest of a link's position and velocity after a millisecond, against DOP853 at 1e-10 on a model in
     NumPy. Walks are those of 60 links at 15 Hz with the default method, kernels loaded before.
     """
     from warpchain.bench.flights import step_costs
