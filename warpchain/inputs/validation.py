@@ -324,7 +324,8 @@ def suggestion(given: object, known: Mapping[str, str] | Iterable[str]) -> str:
         given: the name.
         known: names that may be given; a mapping says how each is shown.
     """
-    names = known if isinstance(known, Mapping) else {name: name for name in known}
+    named = known if isinstance(known, Mapping) else {name: name for name in known}
+    names = {name: shown_as for name, shown_as in named.items() if shown_as != given}  # known, but not here
     close = difflib.get_close_matches(str(given)[:_LONGEST_VALUE], names, n=1) if isinstance(given, str) else []
     if close:
         return f"did you mean {names[close[0]]}?"
