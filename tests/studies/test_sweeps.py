@@ -49,6 +49,7 @@ def path_of(name: str) -> Path:
         ("paper_shapes", {"main": (5, 6, 4)}),
         *((name, {"rest": (4, 4, 400), "ellipse": (4, 4, 400)}) for name in ("defaults", "finer", "soft")),
         ("reference", {"main": (4, 200)}),
+        ("reference_rest", {"main": (4, 200)}),
     ],
 )
 def test_sweeps_of_studies(name: str, shapes: dict[str, tuple[int, ...]]) -> None:
@@ -59,7 +60,7 @@ def test_sweeps_of_studies(name: str, shapes: dict[str, tuple[int, ...]]) -> Non
     assert sweep.walk_count == sum(math.prod(shape) for shape in shapes.values())
     stiff = {"steadiness": ["paper", "paper_undamped"], "unsoftened_hold": list(shapes)}
     stiff |= {"paper_claims": ["start"]}
-    stiff |= {every: list(shapes) for every in ("paper_joints", "defaults", "finer", "reference")}
+    stiff |= {every: list(shapes) for every in ("paper_joints", "defaults", "finer", "reference", "reference_rest")}
     for block in sweep.blocks:
         preset = "paper" if block.name in stiff.get(name, []) else "soft"
         for index in {0, math.prod(block.shape) // 2, math.prod(block.shape) - 1}:
