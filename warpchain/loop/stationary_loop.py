@@ -1,26 +1,14 @@
-"""The stationary loop of a chain on its sprocket: its mean shape, the forces in it, and their balances.
+"""The stationary loop of a chain on its sprocket: its mean shape and the forces in it.
 
-In a stationary loop every joint follows the same path at the same speed. All joints in all frames are therefore samples
-of one periodic function of q = i + o(t), where i is the number of the joint and o(t) the distance, in links, that the
-chain has moved along the loop. The phase of the first harmonic of each frame gives o(t). Averages over frames at equal
-q are functions in space, expressed by the arc length s from the lowest point along the motion.
+Every joint follows the same path at the same speed. All joints in all frames are therefore samples of one periodic
+function of q = i + o(t), where i is the number of the joint and o(t) the distance, in links, that the chain has moved.
+Averages over frames at equal q are functions of the arc length s from the lowest point along the motion.
 
-Signs. The loop runs clockwise: down on the right of the sprocket, along the bottom to the left, up again. The tangent
-is t = (−cos φ, sin φ): its angle φ is measured clockwise, is 0 at the lowest point and grows along the motion.
-n = (sin φ, cos φ) is the normal towards the inside, κ = φ' the curvature, positive where the loop bends inwards. Force
-and moment are those of the part ahead on the part behind, the moment positive clockwise.
-
-Balances. With the line density ρ = m̄/ℓ and the speed v, effective tension and shear are the force less what changes the
-direction of the momentum,
-
-    T_e t + N n = F − ρ v² (t + ℓ²/12 t''),
-
-with a second term because rigid links take short cuts: F_{i+1} − F_i = m (dV/dt + g ŷ) for plane waves e^{iκ q} that
-are at rest in space, with the expansion (κ/2) cot(κ/2) = 1 − κ²/12. Then, to order ℓ²,
-
-    (T_e t + N n)' = ρ g ŷ        M' + N = j v² κ'        j = (Ī − m̄ ℓ²/6) / ℓ.
-
-The inertia of the links resists changes of their direction; their length has the opposite effect.
+The loop runs clockwise. The tangent is t = (−cos φ, sin φ): its angle φ is measured clockwise, is 0 at the lowest point
+and grows along the motion. n = (sin φ, cos φ) is the normal towards the inside, κ = φ' the curvature, positive where
+the loop bends inwards. Force F and moment M are those of the part ahead on the part behind, M positive clockwise. With
+the line density ρ and the speed v, effective tension and shear are the force less what turns the momentum of links of
+length ℓ: T_e t + N n = F − ρ v² (t + ℓ²/12 t'').
 """
 
 from dataclasses import dataclass

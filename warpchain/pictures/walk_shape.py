@@ -22,18 +22,19 @@ Kind = Literal["figure5", "film_strip", "loop", "energy", "tilt"]
 class Walk(HeldWalk, Protocol):
     """A walk with t instants and f frames of a chain of n links.
 
-    It may also have `fell_at` and `collapsed_at`, the moments at which it was first tilted by 45° and at which its loop
-    collapsed [s], or NaN.
-
     Attributes:
         status: how it ended.
         dx: distance walked [m]; NaN unless the chain came to rest.
+        fell_at: when it was first tilted by 45° [s]; NaN if it never was.
+        collapsed_at: when its loop collapsed [s]; NaN if it never did.
+        energy: its ledger [J], see `WalkResult.energy`.
         time: time since the release [s], shape (t,).
         center: centre of mass x, y in the room [m], shape (t, 2).
         center_velocity: its velocity [m/s], shape (t, 2).
         center_z: centre of mass z [m], shape (t,); empty if the plane is fixed, like tilt and yaw.
         tilt: angle between the plane and the upright, positive if its top leans to the left [rad], shape (t,).
         yaw: heading of the plane, anticlockwise from above, all turns counted [rad], shape (t,).
+        kinetic_energy, gravitational_energy, spring_energy: [J], shape (t,).
         frame_time: times of the frames [s], shape (f,).
         frame_joints: joints x, y in the plane [m], shape (f, n, 2); joint i ends link i.
         joints_in_room: joints x, y, z [m], shape (f, n, 3); None if the plane is fixed.
@@ -41,12 +42,18 @@ class Walk(HeldWalk, Protocol):
 
     status: Status
     dx: float
+    fell_at: float
+    collapsed_at: float
+    energy: dict[str, float]
     time: Array
     center: Array
     center_velocity: Array
     center_z: Array
     tilt: Array
     yaw: Array
+    kinetic_energy: Array
+    gravitational_energy: Array
+    spring_energy: Array
     frame_time: Array
     frame_joints: Array
 
@@ -59,15 +66,6 @@ class Walk(HeldWalk, Protocol):
     def joints_in_room(self) -> Array | None:
         """See above."""
         ...
-
-
-class EnergyWalk(Walk, Protocol):
-    """A walk with energies [J]: the ledger of `WalkResult.energy`, and three series of shape (t,)."""
-
-    energy: dict[str, float]
-    kinetic_energy: Array
-    gravitational_energy: Array
-    spring_energy: Array
 
 
 def kinds_of(walk: Walk) -> tuple[Kind, ...]:
