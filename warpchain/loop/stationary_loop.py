@@ -12,7 +12,7 @@ length ℓ: T_e t + N n = F − ρ v² (t + ℓ²/12 t'').
 """
 
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,15 +85,10 @@ class LoopParameters:
         )
 
 
-@dataclass(frozen=True)
-class Kink:
-    """The extreme curvatures near the lowest point.
+class Kink(NamedTuple):
+    """The greatest and the least curvature [1/m] near the lowest point, and their places s [m].
 
-    Attributes:
-        peak: greatest curvature [1/m].
-        peak_at: its place s [m].
-        dip: least curvature [1/m], negative if the loop bulges.
-        dip_at: its place s [m], positive after the lowest point along the motion.
+    The least, `dip`, is negative if the loop bulges; places are positive after the lowest point along the motion.
     """
 
     peak: float
@@ -175,38 +170,24 @@ class StationaryLoop:
         return catenary_between(first, last, self.free[1] - self.free[0], weight)
 
 
-@dataclass(frozen=True, kw_only=True)  # frozen: its attributes are only read
-class HeldWalk(Protocol):
-    """What a mean loop needs of a walk, whichever class holds it.
-
-    Attributes:
-        setup: parameters, scene and options.
-        before_release: the motion on the sprocket just before the release; None if it was not kept.
-    """
-
-    setup: Setup
-    before_release: BeforeRelease | None
-
-    @property
-    def sprocket_center(self) -> Array | None:
-        """Centre of the sprocket x, y at the release [m], shape (2,); None without one."""
-        ...
-
-
-def average_loop(walk: HeldWalk) -> StationaryLoop:
+def average_loop(setup: Setup, before: BeforeRelease | None, center: Array | None) -> StationaryLoop:
     """The mean loop of a walk in the last moments before its release.
+
+    Args:
+        setup: parameters, scene and options of the walk.
+        before: the motion on the sprocket just before the release; None if it was not kept.
+        center: the sprocket's centre x, y [m] at the release, shape (2,); None without one.
 
     Raises:
         ValueError: the walk has kept nothing of that time, or too little.
     """
-    before, setup = walk.before_release, walk.setup
-    if before is None or walk.sprocket_center is None:
+    if before is None or center is None:
         raise ValueError("walk: nothing was kept of the time before its release; run it again with record_before")
     smoothing = setup.parameters.friction_smoothing
     if setup.options.soften_drive:
         smoothing = max(smoothing, preset("soft").friction_smoothing)  # of joints that are softened on the sprocket
     parameters = LoopParameters.of(setup.parameters, smoothing)
-    return average_frames(before, parameters, walk.sprocket_center, joint_radius(setup.scene, setup.parameters))
+    return average_frames(before, parameters, center, joint_radius(setup.scene, setup.parameters))
 
 
 def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Array, radius: float) -> StationaryLoop:

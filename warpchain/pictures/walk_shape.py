@@ -9,7 +9,8 @@ from typing import Literal, Protocol, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.loop.stationary_loop import HeldWalk
+from warpchain.inputs.setup import Setup
+from warpchain.loop.stationary_loop import StationaryLoop
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
@@ -19,10 +20,11 @@ Kind = Literal["figure5", "film_strip", "loop", "energy", "tilt"]
 
 
 @dataclass(frozen=True, kw_only=True)  # frozen: its attributes are only read
-class Walk(HeldWalk, Protocol):
+class Walk(Protocol):
     """A walk with t instants and f frames of a chain of n links.
 
     Attributes:
+        setup: parameters, scene and options.
         status: how it ended.
         dx: distance walked [m]; NaN unless the chain came to rest.
         fell_at: when it was first tilted by 45° [s]; NaN if it never was.
@@ -40,6 +42,7 @@ class Walk(HeldWalk, Protocol):
         joints_in_room: joints x, y, z [m], shape (f, n, 3); None if the plane is fixed.
     """
 
+    setup: Setup
     status: Status
     dx: float
     fell_at: float
@@ -58,6 +61,11 @@ class Walk(HeldWalk, Protocol):
     frame_joints: Array
 
     @property
+    def sprocket_center(self) -> Array | None:
+        """Centre of the sprocket x, y at the release [m], shape (2,); None without one."""
+        ...
+
+    @property
     def sprocket_radius(self) -> float:
         """Radius of the sprocket that links touch [m]; NaN without one."""
         ...
@@ -65,6 +73,10 @@ class Walk(HeldWalk, Protocol):
     @property
     def joints_in_room(self) -> Array | None:
         """See above."""
+        ...
+
+    def mean_loop(self) -> StationaryLoop:
+        """The mean loop just before the release; a ValueError if that was not kept."""
         ...
 
 
