@@ -14,11 +14,11 @@ from matplotlib.patches import Rectangle
 
 from tests.support.made_sweeps import FIGURE_6, SENSITIVITY, TOLERANCE, distance, make_sweep
 from warpchain.pictures.style import GREEN, RED, NothingToShow, Picture
+from warpchain.reports.grids import heat_map
 from warpchain.reports.statistics import sensitivities, tolerance_agreement
 from warpchain.reports.sweep_figures import (
     figure6,
     figures,
-    heat_map,
     sensitivity,
     status_counts,
     tolerance,

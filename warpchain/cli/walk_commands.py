@@ -81,20 +81,26 @@ def walk(
     from warpchain.cli.terminal import print_walk, progress_text, status_line
     from warpchain.cli.walk_files import try_walk_folder, write_walk
     from warpchain.inputs.distributions import LARGEST_SEED
+    from warpchain.inputs.setup import DEFAULT_PRESET, read_setup
     from warpchain.inputs.validation import InputError, checked_whole, printable
     from warpchain.inputs.yaml_files import parse_yaml
     from warpchain.run.single_walk import run_walk
 
     named = {"links": links, "frequency": frequency, "start": start}
     given = _given_values(named | {"method": method, "tolerance": tolerance, "device": device}, assignments or [])
+    own: Mapping[str, Any] = {}
+    number = None if seed is None else checked_whole(parse_yaml(seed, "seed"), "seed", 0, LARGEST_SEED)
     if like is not None:
         for name, value in (("--config", config), ("--preset", preset), ("--seed", seed)):
             if value is not None:
                 raise InputError(f"{name}: given together with --like, and a saved walk has its own; leave one out")
-        setup, number = _setup_like(like, given, record_loads)
-    else:
-        number = None if seed is None else checked_whole(parse_yaml(seed, "seed"), "seed", 0, LARGEST_SEED)
-        setup = _setup(config, preset, given, number, record_loads)
+        preset, own, number = _saved_values(like, given["options"])
+    elif config is not None:
+        file_preset, own = read_setup(config)
+        preset = preset or file_preset
+        if preset is None:
+            raise InputError("preset: missing; name the parameters to start from, such as preset: paper")
+    setup = _setup(preset or DEFAULT_PRESET, own, given, number, record_loads)
     interval = _frame_interval(folder, animation, frame_interval, record_loads)
     if folder is not None:
         try_walk_folder(folder, animation)
@@ -190,49 +196,38 @@ def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -
     return by_section(values)
 
 
-def _setup(config: Path | None, preset: str | None, given: Sections, seed: int | None, records_loads: bool) -> "Setup":
-    """The setup of a walk: the file's values, the command line's over them, and the sample of the seed."""
-    from warpchain.inputs.distributions import random_generator, sampled
-    from warpchain.inputs.setup import read_setup
-    from warpchain.inputs.validation import InputError
+def _setup(preset: str, own: Mapping[str, Any], given: Sections, seed: int | None, records_loads: bool) -> "Setup":
+    """The setup of a walk: the command line's values over those of a file or a saved walk, and the sample of the seed.
 
-    file_preset, sections = read_setup(config) if config is not None else ("paper", {section: {} for section in given})
-    preset = file_preset if preset is None else preset
-    if preset is None:
-        raise InputError("preset: missing; name the parameters to start from, such as preset: paper")
+    A parameter that looks like one in another unit brings a warning.
+    """
+    from warpchain.inputs.parameters import warn_of_units
+    from warpchain.run.single_walk import complete_setup
+
+    sections = {section: own.get(section, {}) for section in given}
     for section, values in given.items():
-        if isinstance(sections[section], Mapping):  # `resolve` refuses anything else
+        if isinstance(sections[section], Mapping):  # `complete_setup` refuses anything else
             sections[section] = {**sections[section], **values}
-    setup = _resolved(preset, sections, sections["parameters"], records_loads)
-    kept = {*sections["scene"], *sections["parameters"]}
-    return setup if seed is None else sampled(setup, random_generator(seed), kept=kept)
+    setup = complete_setup(preset, sections, seed, records_loads)
+    warn_of_units((f"parameters.{name}", name, value) for name, value in sections["parameters"].items())
+    return setup
 
 
-def _setup_like(path: Path, given: Sections, records_loads: bool) -> "tuple[Setup, int | None]":
-    """Setup of a saved walk with other values in place of some of its own, and its seed.
+def _saved_values(path: Path, options: Mapping[str, object]) -> tuple[str, dict[str, Any], int | None]:
+    """Preset, values by section, and seed of a saved walk, without those that some given options bring anew.
 
-    A method that is given brings its own settings, and a tolerance also holds where joints are soft, as in a new walk.
+    A method brings its own settings, and a tolerance also holds where joints are soft, as in a new walk.
     """
     from warpchain.inputs.methods import METHODS_BY_NEED
+    from warpchain.inputs.sections import SECTIONS
     from warpchain.walks.walk_result import load_walk
 
     saved = load_walk(path)
-    replaced = {"soft_tolerance"} if "tolerance" in given["options"] else set()
-    if "method" in given["options"]:
+    replaced = {"soft_tolerance"} if "tolerance" in options else set()
+    if "method" in options:
         replaced |= {"tolerance", "soft_tolerance"}.union(*METHODS_BY_NEED.values())
-    own = {section: getattr(saved.setup, section).model_dump(exclude=replaced) for section in given}
-    sections = {section: {**own[section], **values} for section, values in given.items()}
-    return _resolved(saved.setup.preset, sections, given["parameters"], records_loads), saved.seed
-
-
-def _resolved(preset: str, sections: Mapping[str, Any], given: Mapping[str, object], records_loads: bool) -> "Setup":
-    """The checked setup of some sections; a warning for each given parameter that looks like one in another unit."""
-    from warpchain.inputs.parameters import warn_of_units
-    from warpchain.inputs.setup import resolve
-
-    setup = resolve(preset, **sections, records_loads=records_loads)
-    warn_of_units((f"parameters.{name}", name, value) for name, value in given.items())
-    return setup
+    sections = {section: getattr(saved.setup, section).model_dump(exclude=replaced) for section in SECTIONS}
+    return saved.setup.preset, sections, saved.seed
 
 
 def _frame_interval(folder: Path | None, animation: str | None, text: str | None, records_loads: bool) -> float | None:

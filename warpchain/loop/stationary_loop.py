@@ -1,30 +1,18 @@
-"""The stationary loop of a chain on its sprocket: its mean shape, the forces in it, and their balances.
+"""The stationary loop of a chain on its sprocket: its mean shape and the forces in it.
 
-In a stationary loop every joint follows the same path at the same speed. All joints in all frames are therefore samples
-of one periodic function of q = i + o(t), where i is the number of the joint and o(t) the distance, in links, that the
-chain has moved along the loop. The phase of the first harmonic of each frame gives o(t). Averages over frames at equal
-q are functions in space, expressed by the arc length s from the lowest point along the motion.
+Every joint follows the same path at the same speed. All joints in all frames are therefore samples of one periodic
+function of q = i + o(t), where i is the number of the joint and o(t) the distance, in links, that the chain has moved.
+Averages over frames at equal q are functions of the arc length s from the lowest point along the motion.
 
-Signs. The loop runs clockwise: down on the right of the sprocket, along the bottom to the left, up again. The tangent
-is t = (−cos φ, sin φ): its angle φ is measured clockwise, is 0 at the lowest point and grows along the motion.
-n = (sin φ, cos φ) is the normal towards the inside, κ = φ' the curvature, positive where the loop bends inwards. Force
-and moment are those of the part ahead on the part behind, the moment positive clockwise.
-
-Balances. With the line density ρ = m̄/ℓ and the speed v, effective tension and shear are the force less what changes the
-direction of the momentum,
-
-    T_e t + N n = F − ρ v² (t + ℓ²/12 t''),
-
-with a second term because rigid links take short cuts: F_{i+1} − F_i = m (dV/dt + g ŷ) for plane waves e^{iκ q} that
-are at rest in space, with the expansion (κ/2) cot(κ/2) = 1 − κ²/12. Then, to order ℓ²,
-
-    (T_e t + N n)' = ρ g ŷ        M' + N = j v² κ'        j = (Ī − m̄ ℓ²/6) / ℓ.
-
-The inertia of the links resists changes of their direction; their length has the opposite effect.
+The loop runs clockwise. The tangent is t = (−cos φ, sin φ): its angle φ is measured clockwise, is 0 at the lowest point
+and grows along the motion. n = (sin φ, cos φ) is the normal towards the inside, κ = φ' the curvature, positive where
+the loop bends inwards. Force F and moment M are those of the part ahead on the part behind, M positive clockwise. With
+the line density ρ and the speed v, effective tension and shear are the force less what turns the momentum of links of
+length ℓ: T_e t + N n = F − ρ v² (t + ℓ²/12 t'').
 """
 
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,15 +85,10 @@ class LoopParameters:
         )
 
 
-@dataclass(frozen=True)
-class Kink:
-    """The extreme curvatures near the lowest point.
+class Kink(NamedTuple):
+    """The greatest and the least curvature [1/m] near the lowest point, and their places s [m].
 
-    Attributes:
-        peak: greatest curvature [1/m].
-        peak_at: its place s [m].
-        dip: least curvature [1/m], negative if the loop bulges.
-        dip_at: its place s [m], positive after the lowest point along the motion.
+    The least, `dip`, is negative if the loop bulges; places are positive after the lowest point along the motion.
     """
 
     peak: float
@@ -187,38 +170,24 @@ class StationaryLoop:
         return catenary_between(first, last, self.free[1] - self.free[0], weight)
 
 
-@dataclass(frozen=True, kw_only=True)  # frozen: its attributes are only read
-class HeldWalk(Protocol):
-    """What a mean loop needs of a walk, whichever class holds it.
-
-    Attributes:
-        setup: parameters, scene and options.
-        before_release: the motion on the sprocket just before the release; None if it was not kept.
-    """
-
-    setup: Setup
-    before_release: BeforeRelease | None
-
-    @property
-    def sprocket_center(self) -> Array | None:
-        """Centre of the sprocket x, y at the release [m], shape (2,); None without one."""
-        ...
-
-
-def average_loop(walk: HeldWalk) -> StationaryLoop:
+def average_loop(setup: Setup, before: BeforeRelease | None, center: Array | None) -> StationaryLoop:
     """The mean loop of a walk in the last moments before its release.
+
+    Args:
+        setup: parameters, scene and options of the walk.
+        before: the motion on the sprocket just before the release; None if it was not kept.
+        center: the sprocket's centre x, y [m] at the release, shape (2,); None without one.
 
     Raises:
         ValueError: the walk has kept nothing of that time, or too little.
     """
-    before, setup = walk.before_release, walk.setup
-    if before is None or walk.sprocket_center is None:
+    if before is None or center is None:
         raise ValueError("walk: nothing was kept of the time before its release; run it again with record_before")
     smoothing = setup.parameters.friction_smoothing
     if setup.options.soften_drive:
         smoothing = max(smoothing, preset("soft").friction_smoothing)  # of joints that are softened on the sprocket
     parameters = LoopParameters.of(setup.parameters, smoothing)
-    return average_frames(before, parameters, walk.sprocket_center, joint_radius(setup.scene, setup.parameters))
+    return average_frames(before, parameters, center, joint_radius(setup.scene, setup.parameters))
 
 
 def average_frames(before: BeforeRelease, parameters: LoopParameters, center: Array, radius: float) -> StationaryLoop:

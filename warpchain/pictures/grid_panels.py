@@ -178,7 +178,8 @@ def _roles(axes: Sequence[Axis], kind: Kind | None) -> tuple[Kind, Axis, Axis | 
     if kind != "map" and len(axes) == 3 and len(third) == 1 and third[0].is_numeric:
         return "lines", third[0], named["links"], [named["frequency"]]
     across = max(reversed(axes), key=lambda axis: (axis.is_numeric, len(axis.values)))
-    others = sorted((axis for axis in axes if axis is not across), key=lambda axis: len(axis.values))
+    others = [axis for axis in axes if axis is not across]
+    others.sort(key=lambda axis: (kind == "map" and axis.is_numeric, len(axis.values)))
     along = others.pop() if others else None
     if along is not None and len(along.values) > MOST_LINES:
         is_short = len(across.values) <= MOST_LINES

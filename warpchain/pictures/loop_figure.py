@@ -9,7 +9,7 @@ from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
 from warpchain.loop.catenary import Catenary
-from warpchain.loop.stationary_loop import StationaryLoop, average_loop
+from warpchain.loop.stationary_loop import StationaryLoop
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.style import BLUE, FAINT, GREEN, GROUND, INK, tidy
 from warpchain.pictures.walk_shape import Walk, setting
@@ -29,7 +29,7 @@ def loop_figure(walk: Walk, *, figure: Figure | None = None) -> Figure:
     Raises:
         ValueError: the time before the release was not kept, or is not enough for a mean loop.
     """
-    loop = average_loop(walk)
+    loop = walk.mean_loop()
     hanging, kink = loop.catenary(), loop.kink()
     figure = InlineFigure(figsize=(10.0, 6.4), layout="constrained") if figure is None else figure
     width, height = np.ptp(loop.position, axis=0)

@@ -4,7 +4,7 @@ Figures are made without pyplot: nothing is global, no display is needed, the ca
 """
 
 from collections.abc import Sequence
-from typing import Final, cast, get_args
+from typing import Final, get_args
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,7 +14,7 @@ from warpchain.pictures.film_strip import film_strip
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.loop_figure import loop_figure
 from warpchain.pictures.style import BLUE, DASHES, DOTS, FAINT, GREEN, INK, LINE_COLORS, RED, tidy
-from warpchain.pictures.walk_shape import EnergyWalk, Kind, Walk, setting
+from warpchain.pictures.walk_shape import Kind, Walk, setting
 
 FALLEN: Final = 45.0
 """Tilt beyond which a chain has fallen over [degrees]."""
@@ -79,14 +79,11 @@ def energy_figure(walk: Walk, *, figure: Figure | None = None, ax: Axes | None =
     which counts each cause by itself: it lies on the line if the integration conserved energy.
 
     Raises:
-        ValueError: figure and axes are given, the walk has no time series, or its energies were not kept.
+        ValueError: figure and axes are given, or the walk has no time series.
     """
     if figure is not None and ax is not None:
         raise ValueError("ax: given together with figure; leave one out")
-    if not hasattr(walk, "kinetic_energy"):
-        raise ValueError("walk: a sweep does not keep its energies; run it by itself, warpchain.walk(setup=….setup)")
     _check_series(walk)
-    walk = cast(EnergyWalk, walk)
     if ax is None:
         figure = InlineFigure(figsize=(6.4, 4.0), layout="constrained") if figure is None else figure
         ax = figure.subplots()
@@ -112,7 +109,7 @@ def tilt_figure(walk: Walk, *, figure: Figure | None = None) -> Figure:
     """Tilt and yaw of the plane, and lateral drift of the centre of mass, against time.
 
     Marked are the moments at which the chain was first tilted by 45°, beyond which it has fallen over, and at which
-    its loop collapsed, if the walk says when.
+    its loop collapsed, if they came.
 
     Raises:
         ValueError: the plane of the walk is fixed, or it has no time series.
@@ -127,11 +124,10 @@ def tilt_figure(walk: Walk, *, figure: Figure | None = None) -> Figure:
     angles.plot(walk.time, np.degrees(walk.tilt), color=BLUE, linewidth=1.4, label="tilt, to the left")
     angles.plot(walk.time, np.degrees(walk.yaw), color=GREEN, linewidth=1.4, label="yaw, to the left")
     drift.plot(walk.time, walk.center_z, color=INK, linewidth=1.4)
-    events = (("fell_at", "fell over (45°)", "-"), ("collapsed_at", "loop collapsed", DASHES))
+    events = ((walk.fell_at, "fell over (45°)", "-"), (walk.collapsed_at, "loop collapsed", DASHES))
     for axes in (angles, drift):
         axes.axhline(0.0, color=FAINT, linewidth=0.8)
-        for name, label, dashes in events:
-            moment = float(getattr(walk, name, np.nan))
+        for moment, label, dashes in events:
             if np.isfinite(moment):
                 text = f"{label}, {moment:.3f} s"
                 axes.axvline(moment, color=RED, linewidth=1.0, linestyle=dashes, label=text, zorder=1.5)

@@ -9,7 +9,8 @@ from typing import Literal, Protocol, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.loop.stationary_loop import HeldWalk
+from warpchain.inputs.setup import Setup
+from warpchain.loop.stationary_loop import StationaryLoop
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
@@ -19,36 +20,50 @@ Kind = Literal["figure5", "film_strip", "loop", "energy", "tilt"]
 
 
 @dataclass(frozen=True, kw_only=True)  # frozen: its attributes are only read
-class Walk(HeldWalk, Protocol):
+class Walk(Protocol):
     """A walk with t instants and f frames of a chain of n links.
 
-    It may also have `fell_at` and `collapsed_at`, the moments at which it was first tilted by 45° and at which its loop
-    collapsed [s], or NaN.
-
     Attributes:
+        setup: parameters, scene and options.
         status: how it ended.
         dx: distance walked [m]; NaN unless the chain came to rest.
+        fell_at: when it was first tilted by 45° [s]; NaN if it never was.
+        collapsed_at: when its loop collapsed [s]; NaN if it never did.
+        energy: its ledger [J], see `WalkResult.energy`.
         time: time since the release [s], shape (t,).
         center: centre of mass x, y in the room [m], shape (t, 2).
         center_velocity: its velocity [m/s], shape (t, 2).
         center_z: centre of mass z [m], shape (t,); empty if the plane is fixed, like tilt and yaw.
         tilt: angle between the plane and the upright, positive if its top leans to the left [rad], shape (t,).
         yaw: heading of the plane, anticlockwise from above, all turns counted [rad], shape (t,).
+        kinetic_energy, gravitational_energy, spring_energy: [J], shape (t,).
         frame_time: times of the frames [s], shape (f,).
         frame_joints: joints x, y in the plane [m], shape (f, n, 2); joint i ends link i.
         joints_in_room: joints x, y, z [m], shape (f, n, 3); None if the plane is fixed.
     """
 
+    setup: Setup
     status: Status
     dx: float
+    fell_at: float
+    collapsed_at: float
+    energy: dict[str, float]
     time: Array
     center: Array
     center_velocity: Array
     center_z: Array
     tilt: Array
     yaw: Array
+    kinetic_energy: Array
+    gravitational_energy: Array
+    spring_energy: Array
     frame_time: Array
     frame_joints: Array
+
+    @property
+    def sprocket_center(self) -> Array | None:
+        """Centre of the sprocket x, y at the release [m], shape (2,); None without one."""
+        ...
 
     @property
     def sprocket_radius(self) -> float:
@@ -60,14 +75,9 @@ class Walk(HeldWalk, Protocol):
         """See above."""
         ...
 
-
-class EnergyWalk(Walk, Protocol):
-    """A walk with energies [J]: the ledger of `WalkResult.energy`, and three series of shape (t,)."""
-
-    energy: dict[str, float]
-    kinetic_energy: Array
-    gravitational_energy: Array
-    spring_energy: Array
+    def mean_loop(self) -> StationaryLoop:
+        """The mean loop just before the release; a ValueError if that was not kept."""
+        ...
 
 
 def kinds_of(walk: Walk) -> tuple[Kind, ...]:

@@ -6,7 +6,7 @@ been run yet, is on the figure.
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
@@ -18,19 +18,19 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from warpchain.pictures.grid_figure import draw_grid
 from warpchain.pictures.labels import (
     COUNTS,
     DISTANCE,
     FREQUENCY,
+    cell_values,
     lost_note,
     number_text,
-    quantity_name,
     quantity_text,
 )
 from warpchain.pictures.style import (
     BLUE,
     FAINT,
+    GREEN,
     GROUND,
     INK,
     LINE_COLORS,
@@ -41,17 +41,26 @@ from warpchain.pictures.style import (
     tidy,
 )
 from warpchain.reports.figure5 import sweep_figure5
-from warpchain.reports.grids import grid_pictures, named
+from warpchain.reports.grids import grid_pictures, has_series, heat_map
 from warpchain.reports.statistics import CONFIDENCE, sensitivities, tolerance_agreement
-from warpchain.reports.sweep_series import Series, all_series
 from warpchain.status import Status
+from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.sweep_result import SweepResult
-from warpchain.walks.rows import quantity_of
 
 Array = NDArray[np.float64]
 
 _MOST_BLOCKS: Final = 6
 """Greatest number of blocks whose walks are counted separately."""
+
+_STARTS: Final = {
+    "rest": ("started at rest", RED, "o"),
+    "ellipse": ("started as an ellipse", GREEN, "D"),
+    "spinning": ("started spinning", BLUE, "s"),
+}
+"""How the chain started → legend, colour, marker."""
+_OTHER_COLORS: Final = (BLUE, *LINE_COLORS[3:6], INK)
+_OTHER_MARKERS: Final = "s^vP*X"
+"""For further blocks of the same start."""
 
 
 def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
@@ -84,21 +93,26 @@ def figure6(result: SweepResult) -> Picture:
     Raises:
         NothingToShow: no walk of such a block has come to rest, or none of the blocks has several cells.
     """
-    series = all_series(result)
-    if not any(item.cells.count.any() for item in series) or all(item.has.sum() == 1 for item in series):
+    series = _all_series(result)
+    if not any(item.cells.count.any() for item in series) or all(len(item.places) == 1 for item in series):
         raise NothingToShow("Figure 6 takes walks at rest in a block with nothing but links and frequency as axes")
-    numbers, frequencies = series[0].cells.axes.values()
+    numbers = sorted({links for item in series for links, _ in item.places})
+    frequencies = sorted({frequency for item in series for _, frequency in item.places})
     gap = float(np.diff(frequencies).min()) if len(frequencies) > 1 else 1.0
     columns = {1: 1, 2: 2, 4: 2}.get(len(numbers), 3)
     figure, used, empty = _grid(len(numbers), columns, (3.1, 2.6), (0.0, 1.0))
-    for row, axes in enumerate(used):
-        here = [item for item in series if item.has[row].any()]
-        for place, item in enumerate(here):
+    for links, axes in zip(numbers, used, strict=True):
+        here = [item for item in series if item.at(links)]
+        for number, item in enumerate(here):
             # Boxes of several series stand side by side about their frequency.
-            shift = gap * (place - (len(here) - 1) / 2) * 0.7 / len(here)
-            _draw_boxes(axes, item, row, shift, gap * min(0.36, 0.6 / len(here)))
-        axes.set_title(f"$n$ = {numbers[row]}", fontsize="medium", loc="left")
-        lost = [{name: getattr(item.cells, name)[row] for name in COUNTS} for item in here]
+            shift = gap * (number - (len(here) - 1) / 2) * 0.7 / len(here)
+            _draw_boxes(axes, item, links, shift, gap * min(0.36, 0.6 / len(here)))
+        axes.set_title(f"$n$ = {links}", fontsize="medium", loc="left")
+        lost = [
+            {name: getattr(item.cells, name)[place] for name in COUNTS}
+            for item in here
+            for place in item.at(links).values()
+        ]
         axes.set_xlabel(lost_note(lost), color=RED, fontsize="small")
         tidy(axes, grid="y")
     first = used[0]
@@ -114,36 +128,6 @@ def figure6(result: SweepResult) -> Picture:
     _draw_legend(figure, empty[-1] if empty else None, series)
     caption = "Distance walked against the frequency of the sprocket, as in the paper's Figure 6: mean, box of one and "
     return Picture("figure6", caption + "bar of two standard deviations.", figure)
-
-
-def heat_map(result: SweepResult, quantity: str = "dx") -> Picture:
-    """Mean and standard deviation of a quantity over links and frequency, two maps for each block and start.
-
-    Args:
-        result: a sweep.
-        quantity: a column, such as ``dx``, ``walk_time`` or ``bounces``.
-
-    Raises:
-        InputError: there is no such column.
-        NothingToShow: no walk at rest has the quantity in a block that has several links and frequencies, and no other
-            axes.
-    """
-    shown = {item.label: item.cells for item in all_series(result, quantity) if item.is_map}
-    if not any(cells.count.any() for cells in shown.values()):
-        raise NothingToShow(
-            "a map takes walks at rest in a block with several links and frequencies, and no other axes"
-        )
-    name, symbol = ("distance walked", "$Δx$") if quantity == "dx" else (quantity_name(quantity_of(quantity)),) * 2
-    rows, columns = (len(values) for values in next(iter(shown.values())).axes.values())
-    width, height = max(3.6, 0.8 + 0.6 * min(20, columns)), max(2.8, 1.0 + 0.4 * min(20, rows))
-    figure = Figure(figsize=(1.2 + width * min(3, len(shown)), 2 * height), layout="constrained")
-    upper, lower = np.asarray(figure.subfigures(2, 1))
-    draw_grid(shown, kind="map", figure=upper, label=f"mean {symbol}")
-    spread = {label: replace(cells, mean=cells.sd) for label, cells in shown.items()}
-    draw_grid(spread, kind="map", figure=lower, label=f"standard deviation of {symbol}")
-    over = "the walks at rest" if quantity == "dx" else "the walks at rest that have it"
-    caption = f"Mean and standard deviation of the {name}, over {over} in each cell."
-    return Picture(named("heat_map", quantity), caption, figure)
 
 
 def tolerance(result: SweepResult) -> Picture:
@@ -284,11 +268,51 @@ def _grid(
     return figure, *panel_grid(figure, count, columns, sharex=True)
 
 
-def _draw_boxes(axes: Axes, series: Series, row: int, shift: float, width: float) -> None:
+@dataclass(frozen=True)
+class Series:
+    """The cells of one block and start in Figure 6.
+
+    Attributes:
+        label: for the legend.
+        color: of its marks.
+        marker: of its means.
+        cells: statistics of the block.
+        places: links and frequency → place of the cell in the block's grid.
+    """
+
+    label: str
+    color: str
+    marker: str
+    cells: CellStatistics
+    places: dict[tuple[int, float], tuple[int, ...]]
+
+    def at(self, links: int) -> dict[float, tuple[int, ...]]:
+        """Frequency → place of the cells with a number of links."""
+        return {frequency: place for (number, frequency), place in self.places.items() if number == links}
+
+
+def _all_series(result: SweepResult) -> list[Series]:
+    """The series of every block in which nothing but links, frequency and start varies."""
+    series: list[Series] = []
+    for block, given in zip(result.blocks.values(), result.sweep["blocks"], strict=True):
+        starts: dict[str, dict[tuple[int, float], tuple[int, ...]]] = {}
+        for place in np.ndindex(*block.shape[:-1]) if has_series(block) else ():
+            values = {**given["scene"], **cell_values(block.axes, place)}
+            starts.setdefault(str(values["start"]), {})[values["links"], values["frequency"]] = place
+        for start, places in starts.items():
+            label, color, marker = _STARTS[start]
+            if any(item.color == color for item in series):
+                # Another block has this start: this one gets its name in the legend, another colour and marker.
+                label, marker = f"{block.name}, {label}", _OTHER_MARKERS[len(series) % len(_OTHER_MARKERS)]
+                color = next((other for other in _OTHER_COLORS if all(other != item.color for item in series)), INK)
+            series.append(Series(label, color, marker, block.statistics("dx"), places))
+    return series
+
+
+def _draw_boxes(axes: Axes, series: Series, links: int, shift: float, width: float) -> None:
     """Mean, box and bar at each frequency of one number of links."""
-    cells, color = series.cells, series.color
-    for frequency, mean, sd in zip(cells.axes["frequency"], cells.mean[row], cells.sd[row], strict=True):
-        x = frequency + shift
+    for frequency, place in series.at(links).items():
+        x, mean, sd, color = frequency + shift, series.cells.mean[place], series.cells.sd[place], series.color
         if np.isfinite(sd):
             axes.plot([x, x], [mean - 2 * sd, mean + 2 * sd], color=color, linewidth=1.2)
             box = (x - width / 2, mean - sd), width, 2 * sd

@@ -184,15 +184,12 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
     names += [cell_text(cell_values(block.axes, planned.cell))] * bool(planned.cell)
     names += [f"sample {planned.sample}"]
     frames = Recording.of(result.sweep.get("record", {})).frames
-    walk: Walk
     if frames is not None and frames.includes(planned.sample) and block.kept[place]:
         walk, again, source = block.walk_motion(place), "", "Its frames were kept by the sweep."
-        seconds, bounces = block.columns["walk_time"][place], block.columns["bounces"][place]
     else:
-        walk = ran = run_walk(planned.setup, frame_interval=FRAME_INTERVAL)
-        again, source = ", run again for this page", _compared(ran, block, place)
-        seconds, bounces = ran.walk_time, ran.bounces
-    distance = f"Δx = {walk.dx:.4f} m in {seconds:.2f} s with {bounces} bounces"
+        walk = run_walk(planned.setup, frame_interval=FRAME_INTERVAL)
+        again, source = ", run again for this page", _compared(walk, block, place)
+    distance = f"Δx = {walk.dx:.4f} m in {walk.walk_time:.2f} s with {walk.bounces} bounces"
     end = distance if math.isfinite(walk.dx) else walk.status.label
     text = f"Walk {index} ({', '.join(names)}){again}: {end}. {source}"
     parts = [f"<p>{escape(text)}</p>", _player(walk)]

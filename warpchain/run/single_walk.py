@@ -110,11 +110,12 @@ def walk(
     given.update(settings)
     loads = _truth(record_loads, "record_loads")
     if setup is None:
-        setup = setup_walk(DEFAULT_PRESET if preset is None else preset, given, seed, loads)
+        sections = by_section(given)
+        setup = complete_setup(DEFAULT_PRESET if preset is None else preset, sections, seed, loads)
+        parameters = plain(sections["parameters"], "parameters")
+        warn_of_units((f"parameters.{name}", name, value) for name, value in parameters.items())
     else:
         _check_repeated(setup, given if preset is None else {"preset": preset, **given}, seed)
-    parameters = by_section(plain(settings, "settings"))["parameters"]
-    warn_of_units((f"parameters.{name}", name, value) for name, value in parameters.items())
     return run_walk(
         setup,
         seed=seed,
@@ -138,7 +139,14 @@ def _check_repeated(setup: object, others: Mapping[str, object], seed: Whole | N
 
 
 def setup_walk(preset: str, settings: Mapping[str, object], seed: Whole | None, records_loads: bool = False) -> Setup:
-    """Sort settings by name into parameters, scene and options, check them, and draw the sample of a seed.
+    """The setup of settings by name or symbol; arguments and errors as of `complete_setup`."""
+    return complete_setup(preset, by_section(settings), seed, records_loads)
+
+
+def complete_setup(
+    preset: str, sections: Mapping[str, Mapping[str, object]], seed: Whole | None, records_loads: bool = False
+) -> Setup:
+    """Check values by section, complete them, and draw the sample of a seed.
 
     From the seed's generator come first the parameters, then phase and clearance, of what is not set, as in the first
     walk of a sweep. `records_loads` is as in :func:`resolve`.
@@ -146,7 +154,6 @@ def setup_walk(preset: str, settings: Mapping[str, object], seed: Whole | None, 
     Raises:
         InputError: A name is unknown or a value is refused.
     """
-    sections = by_section(settings)
     setup = resolve(preset, **sections, records_loads=records_loads)
     kept = {*sections["scene"], *sections["parameters"]}
     return setup if seed is None else sampled(setup, random_generator(plain(seed, "seed")), kept=kept)

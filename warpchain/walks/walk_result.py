@@ -286,7 +286,7 @@ class WalkResult:
         """
         from warpchain.loop.stationary_loop import average_loop
 
-        return average_loop(self)
+        return average_loop(self.setup, self.before_release, self.sprocket_center)
 
     def animate(self, path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
         """Write a moving picture of the walk; the suffix of `path` gives the format: .gif, .mp4 or .html.
