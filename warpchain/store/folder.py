@@ -154,7 +154,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             remove_output(description)
             write_whole(self.directory / "sweep.json", self.manifest.text())
         if not description.exists():
-            sweep = self.manifest.sweep
+            sweep = self.manifest.sweep.canonical()
             dumper = _FAST_DUMPER if sweep["name"].isascii() else yaml.SafeDumper  # they fold other text otherwise
             text = yaml.dump(sweep, Dumper=dumper, sort_keys=False, allow_unicode=True)
             write_whole(description, _YAML_HEAD + text)
@@ -234,11 +234,11 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
     there = list(found.growth[-1].samples)
     if len(there) != len(sweep.blocks) or sweep.digest(there) != found.digest:
         raise InputError(
-            f"{folder}: holds another sweep ({found.sweep['name']}), or this one before it was changed; "
+            f"{folder}: holds another sweep ({found.sweep.name}), or this one before it was changed; "
             "give another folder, or start anew with --fresh, which deletes what is there"
         )
-    for count, block in zip(there, manifest.sweep["blocks"], strict=True):
-        name, asked, sampler = block["name"], block["samples"], block["sampler"]
+    for count, block in zip(there, sweep.blocks, strict=True):
+        name, asked, sampler = block.name, block.samples_given, block.sampler
         if asked < count:
             raise InputError(
                 f"{folder}: holds {count} samples of each cell of block {name}, but {asked} are asked for; "

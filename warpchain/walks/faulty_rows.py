@@ -1,37 +1,17 @@
 """Which walks of a sweep are inaccurate, by their columns."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.engine.tallies import CONTACTS
-from warpchain.inputs.parameters import preset
 from warpchain.walks.faults import FAULTS, faults
 from warpchain.walks.rows import drawn_column
 
 LENGTHS: Final = ("link_length", "circle_radius")
 """Against which openings and penetrations are held."""
-
-
-def lengths_of_block(block: Mapping[str, Any], shape: Sequence[int]) -> dict[str, NDArray[Any]]:
-    """:data:`LENGTHS` [m] of each walk of a block before anything is drawn, in the block's shape.
-
-    Args:
-        block: In the canonical form of its sweep.
-        shape: Number of values of each axis, then walks per cell.
-    """
-    grid, given = block["grid"], block.get("parameters", {})
-    found = {}
-    for name in LENGTHS:
-        along, values = name, grid.get(name) or ([given[name]] if name in given else None)
-        if values is None:
-            presets = grid.get("preset") or [block["preset"]]
-            along, values = "preset", [getattr(preset(chosen), name) for chosen in presets]
-        sizes = [len(values) if axis == along else 1 for axis in grid]
-        found[name] = np.broadcast_to(np.reshape(values, (*sizes, 1)), shape)
-    return found
 
 
 def faults_of_columns(
@@ -41,7 +21,7 @@ def faults_of_columns(
 
     Args:
         columns: of a sweep, by name.
-        lengths: as of `lengths_of_block`.
+        lengths: `LENGTHS` [m] before anything was drawn, along the axes of the columns.
     """
     own = dict(lengths)
     for name in own:
