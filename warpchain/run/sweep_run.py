@@ -32,8 +32,7 @@ from warpchain.store.manifest import Shard
 from warpchain.store.shards import read_shard, write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
-from warpchain.walks.faulty_rows import LENGTHS, faults_of_columns
-from warpchain.walks.rows import MISSING, derived_columns, fill_row, missing_rows
+from warpchain.walks.rows import LENGTHS, MISSING, derived_columns, faults_of_columns, fill_row, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
 
 SHARD_WALKS = 256

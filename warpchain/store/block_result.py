@@ -14,8 +14,16 @@ from warpchain.inputs.validation import InputError, plain, shown, suggestion
 from warpchain.status import Status
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.sweeps.plan import Sweep
-from warpchain.walks.faulty_rows import LENGTHS, faults_of_columns
-from warpchain.walks.rows import COLUMNS, MISSING, Column, field_column, numbers_of, quantity_of
+from warpchain.walks.rows import (
+    COLUMNS,
+    LENGTHS,
+    MISSING,
+    Column,
+    faults_of_columns,
+    field_column,
+    numbers_of,
+    quantity_of,
+)
 from warpchain.walks.walk_result import WalkResult, read_motion
 
 if TYPE_CHECKING:
