@@ -9,7 +9,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -174,6 +174,14 @@ def _keys(block: int, cells: int, samples: Sequence[int]) -> Rows:
     return keys
 
 
+def stored_sweep(path: Folder, content: Mapping[str, object]) -> Sweep:
+    """The sweep in a file of results, given its canonical form; an `InputError` if this warpchain refuses it."""
+    try:
+        return Sweep.of(content)
+    except InputError as error:
+        raise InputError(f"{path}: {error.args[0]}; read it with the version that wrote it") from None
+
+
 def read_manifest(directory: Folder) -> Manifest:
     """The manifest of a folder.
 
@@ -199,4 +207,4 @@ def read_manifest(directory: Folder) -> Manifest:
         )
     content = json.loads(text)
     growth = tuple(Growth(**{**each, "samples": tuple(each["samples"])}) for each in content["growth"])
-    return Manifest(Sweep.of(content["sweep"]), content["numerics_version"], growth, content["versions"])
+    return Manifest(stored_sweep(path, content["sweep"]), content["numerics_version"], growth, content["versions"])

@@ -19,10 +19,9 @@ from warpchain.inputs.validation import InputError, shown, suggestion
 from warpchain.store.block_result import BlockResult, KeptMotions, Origin, counted, status_counts
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.folder import read_rows
-from warpchain.store.manifest import Folder, Manifest, read_manifest
+from warpchain.store.manifest import Folder, Manifest, read_manifest, stored_sweep
 from warpchain.store.shards import opened_motions
 from warpchain.sweeps.block import Block
-from warpchain.sweeps.plan import Sweep
 from warpchain.walks.rows import COLUMNS, MISSING, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
 
 if TYPE_CHECKING:
@@ -254,7 +253,9 @@ def _load_merged(path: Folder) -> SweepResult:
             "numerics_version": int(file.attrs["numerics_version"]),
             "versions": versions,
         }
-        origin = Origin(tuple(map(Sweep.of, given if isinstance(given, list) else [given])), provenance)
+        origin = Origin(
+            tuple(stored_sweep(path, each) for each in (given if isinstance(given, list) else [given])), provenance
+        )
         several = len(origin.sweeps[0].blocks) > 1
 
         def columns(block: Block) -> dict[str, Array]:
