@@ -4,18 +4,17 @@ A file takes the place of nothing or of a regular file, never of a folder, devic
 is refused, not followed: a folder of unknown origin could point it at any file. Links among the folders of a path are
 followed.
 
-Content is written to a part beside the file, `.NAME.01234567.part.SUFFIX`, which its writer locks (flock). The system
-unlocks the part of a writer that was killed, so the next writer of the file can tell that it is dead and delete it.
-Names with process and host were rejected: numbers of processes are used again, and containers share names of hosts. So
-was an unnamed file (O_TMPFILE): it cannot replace another one.
+Content is written to a part beside the file, `.NAME.01234567.part.SUFFIX`. A later writer of the file deletes the part
+that a killed one left, once nothing has been written to it for `DEAD_AFTER`. An unnamed file (O_TMPFILE) was rejected:
+it cannot replace another one.
 """
 
 import errno
-import fcntl
 import os
 import re
 import secrets
 import stat
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -24,15 +23,8 @@ from typing import Final, NamedTuple
 DISK_FAILURES: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
 """Numbers (errno) of an `OSError` that no other path or permission would have avoided."""
 
-_WRONG_TYPES: Final = {
-    stat.S_IFDIR: ("Is a directory", "give the path of a file"),
-    stat.S_IFLNK: ("it is a symbolic link", "give the path of the file itself, or remove the link"),
-    stat.S_IFCHR: ("it is a device", "give the path of a regular file"),
-    stat.S_IFBLK: ("it is a device", "give the path of a regular file"),
-    stat.S_IFIFO: ("it is a pipe", "give the path of a regular file"),
-    stat.S_IFSOCK: ("it is a socket", "give the path of a regular file"),
-}
-"""Type of what is at a path → why it is not replaced, and what to do."""
+DEAD_AFTER: Final = 3600.0
+"""Time [s] after which a part to which nothing was written is one of a killed writer."""
 
 
 class NotReplaceable(OSError):  # noqa: N818 - the path is refused, nothing went wrong
@@ -102,8 +94,8 @@ def checked_output(path: str | os.PathLike[str], only: Kind | None = None) -> Pa
         except FileNotFoundError:
             return target
     if not stat.S_ISREG(mode):
-        problem, advice = _WRONG_TYPES.get(stat.S_IFMT(mode), ("it is no regular file", "give another path"))
-        raise NotReplaceable(f"{target}: cannot be written ({problem}); {advice}")
+        kind = "a folder" if stat.S_ISDIR(mode) else "a symbolic link" if stat.S_ISLNK(mode) else "no regular file"
+        raise NotReplaceable(f"{target}: cannot be written (it is {kind}); give another path")
     if only is not None and not only.has(target):
         raise NotReplaceable(f"{target}: is there and is no {only.name}; give another name")
     return target
@@ -129,8 +121,9 @@ def replacing(path: str | os.PathLike[str], only: Kind | None = None, *, clear: 
     target = checked_output(path, only)
     if clear:
         _clear_parts(target)
+    part = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.part{target.suffix}")
     with naming(target):
-        part, descriptor = _new_part(target)
+        descriptor = os.open(part, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o666)
     try:
         with naming(target):
             yield part
@@ -186,42 +179,14 @@ def naming(target: Path) -> Iterator[None]:
         raise failure(number, f"{target}: cannot be written ({reason(error)}); {remedy(number)}") from error
 
 
-def _new_part(target: Path) -> tuple[Path, int]:
-    """Make a part of a file; its path and a descriptor that holds its lock."""
-    while True:
-        part = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.part{target.suffix}")
-        descriptor = os.open(part, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o666)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:  # another writer takes it for dead: it looked between the two calls
-            os.close(descriptor)
-            continue
-        except OSError:  # a file system without locks, where nobody can lock the part to delete it, either
-            return part, descriptor
-        if os.fstat(descriptor).st_nlink:
-            return part, descriptor
-        os.close(descriptor)  # as above, and it is deleted already
-
-
 def _clear_parts(target: Path) -> None:
-    """Delete the parts of a file that nobody is writing; what cannot be deleted stays and does no harm."""
+    """Delete the parts of a file that killed writers left; what cannot be deleted stays and does no harm."""
     named = re.compile(rf"\.{re.escape(target.stem)}\.[0-9a-f]{{8}}\.part{re.escape(target.suffix)}")
-    with suppress(OSError):  # a folder that can be written but not read
-        for name in filter(named.fullmatch, os.listdir(target.parent)):
-            with suppress(OSError):  # locked by its writer, gone, or of another user
-                _remove_unlocked(target.with_name(name))
-
-
-def _remove_unlocked(part: Path) -> None:
-    """Delete a part; an `OSError` if another process has locked it."""
-    if not stat.S_ISREG(part.lstat().st_mode):
-        return
-    descriptor = os.open(part, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        part.unlink()
-    finally:
-        os.close(descriptor)
+    with suppress(OSError):  # a folder that can be written but not read, a part that is gone or of another user
+        for entry in os.scandir(target.parent):
+            is_part = named.fullmatch(entry.name) and entry.is_file(follow_symlinks=False)
+            if is_part and time.time() - entry.stat().st_mtime > DEAD_AFTER:
+                os.unlink(entry)
 
 
 _REMEDIES: Final = {

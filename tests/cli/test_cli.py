@@ -279,7 +279,7 @@ def test_what_a_file_cannot_replace_is_found_before_the_walk(
     monkeypatch.setattr(WALK_MODULE, "run_walk", None)
     answer = command("walk", *QUICK, "--animate", "gif", "-o", "new")
     assert (answer.status, answer.out) == (2, "")
-    assert answer.err == f"error: new/{name}: cannot be written (Is a directory); give the path of a file\n"
+    assert answer.err == f"error: new/{name}: cannot be written (it is a folder); give another path\n"
     assert [path.name for path in Path("new").iterdir()] == [name]
 
 

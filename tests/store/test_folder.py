@@ -1,7 +1,9 @@
 """Folders of sweeps: killed at any moment, gone on with, locked, refused, and full disks."""
 
+import hashlib
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -292,6 +294,17 @@ def test_a_folder_of_an_older_version_names_it(tmp_path: Path) -> None:
         InputError, tmp_path, f"{path}: format version 5 of warpchain 0.1, which reads it; run the sweep again"
     ):
         open_folder(tmp_path)
+
+
+def test_a_sweep_that_is_refused_now_is_named(tmp_path: Path) -> None:
+    """A method that was removed since: one line with the file and what to do."""
+    run(tmp_path)
+    path = tmp_path / "sweep.json"
+    text, _ = path.read_text().split(',\n "sha256"')
+    text = re.sub(r'"method": "\w+"', '"method": "rodas5p"', text)
+    path.write_text(f'{text},\n "sha256": "{hashlib.sha256(text.encode()).hexdigest()}"\n}}\n')
+    with refused(InputError, tmp_path, f"{path}: sweep.blocks[0].options.method: 'rodas5p' was removed", "version"):
+        read_manifest(tmp_path)
 
 
 def test_workers_need_the_folder(tmp_path: Path) -> None:

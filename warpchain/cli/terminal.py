@@ -16,7 +16,7 @@ from rich.table import Table
 from warpchain.engine.tallies import LOST
 from warpchain.inputs.validation import printable
 from warpchain.run.progress_bar import counts_text
-from warpchain.walks.faulty_rows import fault_remedies
+from warpchain.walks.rows import fault_remedies
 from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:

@@ -27,8 +27,7 @@ from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import load_sweep
 from warpchain.sweeps.recording import Recording
 from warpchain.version import VERSION
-from warpchain.walks.faulty_rows import fault_remedies
-from warpchain.walks.rows import MISSING, field_column
+from warpchain.walks.rows import MISSING, fault_remedies, field_column
 
 Array = NDArray[Any]
 

@@ -32,8 +32,7 @@ from warpchain.store.manifest import Shard
 from warpchain.store.shards import read_shard, write_shard
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
-from warpchain.walks.faulty_rows import LENGTHS, faults_of_columns, lengths_of_block
-from warpchain.walks.rows import MISSING, derived_columns, fill_row, missing_rows
+from warpchain.walks.rows import LENGTHS, MISSING, derived_columns, faults_of_columns, fill_row, missing_rows
 from warpchain.walks.scheduler import compile_kernels, run_setups
 
 SHARD_WALKS = 256
@@ -374,11 +373,11 @@ def _run(
             pending[executor.submit(run_shards, *given)] = task
         return True
 
-    blocks = [
-        lengths_of_block(content, layout.shape)
-        for content, layout in zip(store.manifest.sweep["blocks"], store.manifest.blocks, strict=True)
-    ]
-    lengths = {name: np.concatenate([block[name].ravel() for block in blocks]) for name in LENGTHS}
+    blocks = planned.blocks
+    lengths = {
+        name: np.concatenate([np.broadcast_to(block.parameter(name), block.shape).ravel() for block in blocks])
+        for name in LENGTHS
+    }
     while len(pending) < 2 * workers and submit():
         pass
     try:

@@ -13,11 +13,17 @@ from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError, plain, shown, suggestion
 from warpchain.status import Status
 from warpchain.store.cell_statistics import CellStatistics
-from warpchain.store.manifest import layouts
-from warpchain.sweeps.plan import Sweep, load_sweep
-from warpchain.sweeps.recording import Recording
-from warpchain.walks.faulty_rows import faults_of_columns, lengths_of_block
-from warpchain.walks.rows import COLUMNS, MISSING, Column, field_column, numbers_of, quantity_of
+from warpchain.sweeps.plan import Sweep
+from warpchain.walks.rows import (
+    COLUMNS,
+    LENGTHS,
+    MISSING,
+    Column,
+    faults_of_columns,
+    field_column,
+    numbers_of,
+    quantity_of,
+)
 from warpchain.walks.walk_result import WalkResult, read_motion
 
 if TYPE_CHECKING:
@@ -38,21 +44,16 @@ class Origin:
     """What a result was computed from.
 
     Attributes:
-        sweeps: the resolved sweeps, as in sweep.yaml, whose samples stand one behind the other.
+        sweeps: the sweeps whose samples stand one behind the other.
         provenance: digest of the sweep, version of the numerics, and versions of the software that began it.
     """
 
-    sweeps: tuple[dict[str, Any], ...]
+    sweeps: tuple[Sweep, ...]
     provenance: dict[str, Any]
-
-    @cached_property
-    def planned(self) -> tuple[Sweep, ...]:
-        """The sweeps, checked."""
-        return tuple(map(load_sweep, self.sweeps))
 
     def samples(self, block: int) -> list[tuple[int, int]]:
         """For each sample of a block, given its number, the number of its sweep and its own number there."""
-        counts = [layouts(sweep)[block].samples for sweep in self.sweeps]
+        counts = [sweep.blocks[block].samples for sweep in self.sweeps]
         return [(number, sample) for number, count in enumerate(counts) for sample in range(count)]
 
 
@@ -125,7 +126,7 @@ class BlockResult:
     @cached_property
     def kept(self) -> NDArray[np.bool_]:
         """Whether the motion of a walk was kept and is there, shape `shape`."""
-        series = [Recording.of(sweep.get("record", {})).series for sweep in self.origin.sweeps]
+        series = [sweep.recording.series for sweep in self.origin.sweeps]
         chosen = [
             (choice := series[number]) is not None and choice.includes(sample)
             for number, sample in self.origin.samples(self.number)
@@ -166,7 +167,7 @@ class BlockResult:
             remedy = f"give one of the samples {samples}" if samples else "a sweep with record: {series: true} keeps it"
             raise InputError(f"the motion of walk {self.columns['index'][place]} is not there; {remedy}")
         values = {name: column[place] for name, column in self.columns.items()}
-        sweep = self.origin.planned[self.origin.samples(self.number)[place[-1]][0]]
+        sweep = self.origin.sweeps[self.origin.samples(self.number)[place[-1]][0]]
         setup = sweep.planned(int(values["index"])).setup
         ((_, motion),) = (
             (at, read_motion(group, setup.scene.links))
@@ -189,8 +190,8 @@ class BlockResult:
     @cached_property
     def faults(self) -> dict[str, NDArray[np.bool_]]:
         """What makes walks inaccurate, a key of `warpchain.walks.faults.FAULTS` → whether each walk has it."""
-        content = self.origin.sweeps[0]["blocks"][self.number]
-        return faults_of_columns(self.columns, lengths_of_block(content, self.shape))
+        planned = self.origin.sweeps[0].blocks[self.number]
+        return faults_of_columns(self.columns, {name: planned.parameter(name) for name in LENGTHS})
 
     @property
     def inaccurate(self) -> NDArray[np.bool_]:

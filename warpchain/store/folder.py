@@ -19,7 +19,6 @@ import os
 import re
 import shutil
 import socket
-import stat
 import time
 import warnings
 from contextlib import AbstractContextManager
@@ -47,9 +46,6 @@ LOCK_PAUSE: Final = 0.02
 
 _PART: Final = re.compile(r"\.(?:sweep|\d+-\d{6,}(?:-motion)?)\.[0-9a-f]{8}\.part\.(?:json|yaml|h5)")
 _HOLDER: Final = re.compile(r"process \d+ on \S*")
-
-_FAST_DUMPER: Final = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
-"""That of libyaml, if it is there: ten times faster, and the same text if that is ASCII."""
 
 _YAML_HEAD: Final = """\
 # The sweep of this folder with all its values. A copy with more samples adds them to this folder; a copy that is
@@ -98,7 +94,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         """
         path = given_path(directory)
         make_folder(path)
-        _refuse_links(path)
+        _refuse_strangers(path)
         lock = _locked(path)
         try:
             folder = cls(path, _prepared(path, sweep, Manifest.of(sweep, shard_size), fresh), lock)
@@ -113,7 +109,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         """Add a line with the time to log.txt; an `OSError` if it cannot be written."""
         path = self.directory / "log.txt"
         now = datetime.datetime.now().astimezone().isoformat(timespec="seconds")
-        with naming(path), open(_opened_own(path, os.O_WRONLY | os.O_APPEND), "a", encoding="utf-8") as file:
+        with naming(path), open(path, "a", encoding="utf-8") as file:
             file.write(f"{now}  {text}\n")
 
     def missing(self) -> list[Shard]:
@@ -154,9 +150,8 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             remove_output(description)
             write_whole(self.directory / "sweep.json", self.manifest.text())
         if not description.exists():
-            sweep = self.manifest.sweep
-            dumper = _FAST_DUMPER if sweep["name"].isascii() else yaml.SafeDumper  # they fold other text otherwise
-            text = yaml.dump(sweep, Dumper=dumper, sort_keys=False, allow_unicode=True)
+            sweep = self.manifest.sweep.canonical()
+            text = yaml.safe_dump(sweep, sort_keys=False, allow_unicode=True)
             write_whole(description, _YAML_HEAD + text)
 
 
@@ -234,11 +229,11 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
     there = list(found.growth[-1].samples)
     if len(there) != len(sweep.blocks) or sweep.digest(there) != found.digest:
         raise InputError(
-            f"{folder}: holds another sweep ({found.sweep['name']}), or this one before it was changed; "
+            f"{folder}: holds another sweep ({found.sweep.name}), or this one before it was changed; "
             "give another folder, or start anew with --fresh, which deletes what is there"
         )
-    for count, block in zip(there, manifest.sweep["blocks"], strict=True):
-        name, asked, sampler = block["name"], block["samples"], block["sampler"]
+    for count, block in zip(there, sweep.blocks, strict=True):
+        name, asked, sampler = block.name, block.samples_given, block.sampler
         if asked < count:
             raise InputError(
                 f"{folder}: holds {count} samples of each cell of block {name}, but {asked} are asked for; "
@@ -271,24 +266,12 @@ def _clear_leftovers(folder: Path) -> None:
                     path.unlink(missing_ok=True)
 
 
-def _refuse_links(folder: Path) -> None:
-    """Refuse a folder in which a name of the sweep's own leads somewhere else; an `InputError`."""
-    for name in (*OWN, "lock"):
-        if (folder / name).is_symlink():
-            raise InputError(
-                f"{folder / name}: a symbolic link, where a sweep writes and deletes; remove it, or put what it leads "
-                "to in its place"
-            )
-
-
-def _opened_own(path: Path, flags: int) -> int:
-    """A descriptor of a file that a sweep writes to, made if need be; an `InputError` if it is no regular file."""
-    with naming(path):
-        descriptor = os.open(path, flags | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
-    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-        os.close(descriptor)
-        raise InputError(f"{path}: a pipe or a device in the way of a sweep; give another folder")
-    return descriptor
+def _refuse_strangers(folder: Path) -> None:
+    """Refuse a folder in which a name of the sweep's own is a link, pipe or device; an `InputError`."""
+    for path in (folder / name for name in (*OWN, "lock")):
+        if path.is_symlink() or (path.exists() and not (path.is_file() or path.is_dir())):
+            kind = "a symbolic link" if path.is_symlink() else "a pipe or a device"
+            raise InputError(f"{path}: {kind}, where a sweep writes and deletes; remove it, or give another folder")
 
 
 _held: set[int] = set()
@@ -307,7 +290,8 @@ os.register_at_fork(after_in_child=_give_up)
 def _locked(folder: Path) -> int:
     """Lock a folder and say in the lock file who has it; the descriptor of the lock."""
     path = folder / "lock"
-    descriptor = _opened_own(path, os.O_RDWR)
+    with naming(path):
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
     try:
         holder = os.pread(descriptor, 200, 0).decode(errors="replace").strip()
         if holder and not _HOLDER.fullmatch(holder):

@@ -13,16 +13,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.hdf5_files import open_regular
 from warpchain.inputs.validation import DamagedFileError, InputError
-from warpchain.sweeps.designs import walks_per_sample
 from warpchain.sweeps.plan import Sweep
-from warpchain.sweeps.recording import Recording
 from warpchain.version import FORMAT_VERSION, NUMERICS_VERSION, package_versions, version_refusal
 from warpchain.walks.rows import KEYS, Rows, row_type
 
@@ -35,43 +33,6 @@ MOST_BYTES: Final = 2**24
 
 _HEAD: Final = re.compile(rb'\{\s*"format": "warpchain sweep",\s*"format_version": (\d{1,9}),')
 _CHECKED: Final = re.compile(rb'(.*),\n "sha256": "([0-9a-f]{64})"\n\}\n', re.DOTALL)
-
-
-@dataclass(frozen=True)
-class Layout:
-    """The walks of a block: from `first` on, in C order over the axes and then the samples.
-
-    Attributes:
-        name: name of the block.
-        axes: name of each axis of the grid → its values, in order.
-        samples: walks in each cell.
-        first: number of the first walk.
-        drawn: names of the quantities that the samples draw.
-    """
-
-    name: str
-    axes: dict[str, tuple[float | int | str | None, ...]]
-    samples: int
-    first: int
-    drawn: tuple[str, ...]
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Number of values of each axis, then the number of samples."""
-        return (*(len(values) for values in self.axes.values()), self.samples)
-
-
-def layouts(sweep: Mapping[str, Any]) -> tuple[Layout, ...]:
-    """The blocks of a sweep, given its canonical form."""
-    found: list[Layout] = []
-    first = 0
-    for block in sweep["blocks"]:
-        drawn = tuple(name for name in block["distributions"] if name != "all")
-        samples = block["samples"] * walks_per_sample(block["sampler"], len(drawn))
-        axes = {name: tuple(values) for name, values in block["grid"].items()}
-        found.append(Layout(block["name"], axes, samples, first, drawn))
-        first += math.prod(found[-1].shape)
-    return tuple(found)
 
 
 @dataclass(frozen=True)
@@ -129,13 +90,13 @@ class Manifest:
     """What a folder holds.
 
     Attributes:
-        sweep: `Sweep.canonical`, as it is now.
+        sweep: the sweep as it is now.
         numerics_version: version of the numbers of its walks.
         growth: what it was given, the present sweep last.
         versions: the software that began the sweep.
     """
 
-    sweep: dict[str, Any]
+    sweep: Sweep
     numerics_version: int
     growth: tuple[Growth, ...]
     versions: dict[str, str]
@@ -144,7 +105,7 @@ class Manifest:
     def of(cls, sweep: Sweep, shard_size: int) -> Self:
         """The manifest of a new folder."""
         growth = Growth(sweep.digest(), tuple(block.samples_given for block in sweep.blocks), shard_size)
-        return cls(sweep.canonical(), NUMERICS_VERSION, (growth,), package_versions())
+        return cls(sweep, NUMERICS_VERSION, (growth,), package_versions())
 
     @property
     def digest(self) -> str:
@@ -152,28 +113,14 @@ class Manifest:
         return self.growth[-1].digest
 
     @cached_property
-    def blocks(self) -> tuple[Layout, ...]:
-        """The blocks of the sweep."""
-        return layouts(self.sweep)
-
-    @property
-    def walk_count(self) -> int:
-        """Number of walks."""
-        return sum(math.prod(block.shape) for block in self.blocks)
-
-    @property
-    def recording(self) -> Recording:
-        """What is kept of the motion of walks."""
-        return Recording.of(self.sweep.get("record", {}))
-
-    @cached_property
     def row_type(self) -> np.dtype[np.void]:
         """Type of the rows: the quantities drawn by any block are columns in all."""
-        return row_type([name for block in self.blocks for name in block.drawn])
+        return row_type([name for block in self.sweep.blocks for name in block.drawn])
 
     def numbers(self, keys: Rows) -> NDArray[np.int64]:
         """Numbers of walks in the sweep, given their keys."""
-        firsts, samples = (np.array([getattr(block, name) for block in self.blocks]) for name in ("first", "samples"))
+        blocks = self.sweep.blocks
+        firsts, samples = (np.array([getattr(block, name) for block in blocks]) for name in ("first", "samples"))
         numbers: NDArray[np.int64] = firsts[keys["block"]] + keys["cell"] * samples[keys["block"]] + keys["sample"]
         return numbers
 
@@ -181,24 +128,23 @@ class Manifest:
     def shards(self) -> tuple[Shard, ...]:
         """All shards, in the order in which they are computed."""
         found: list[Shard] = []
-        series = self.recording.series
-        per_sample = [
-            block.samples // given["samples"] for block, given in zip(self.blocks, self.sweep["blocks"], strict=True)
-        ]
-        before = [0] * len(self.blocks)
-        for number, growth in enumerate(self.growth):
-            upto = [count * walks for count, walks in zip(growth.samples, per_sample, strict=True)]
+        blocks, series = self.sweep.blocks, self.sweep.recording.series
+        before = [0] * len(blocks)
+        for step, growth in enumerate(self.growth):
+            upto = [
+                replace(block, samples_given=count).samples for block, count in zip(blocks, growth.samples, strict=True)
+            ]
             keys = np.concatenate(
                 [
-                    _keys(block, math.prod(layout.shape[:-1]), range(first, stop))
-                    for block, (layout, first, stop) in enumerate(zip(self.blocks, before, upto, strict=True))
+                    _keys(number, math.prod(block.shape[:-1]), range(first, stop))
+                    for number, (block, first, stop) in enumerate(zip(blocks, before, upto, strict=True))
                 ]
             )
             walks, before = self.numbers(keys), upto
             for place, start in enumerate(range(0, len(keys), growth.shard_size)):
                 part = slice(start, start + growth.shard_size)
                 keeps = series is not None and any(map(series.includes, keys["sample"][part].tolist()))
-                name = f"{number}-{place:06d}.h5"
+                name = f"{step}-{place:06d}.h5"
                 found.append(Shard(name, growth.digest, self.row_type, keys[part], walks[part], keeps))
         return tuple(found)
 
@@ -214,7 +160,7 @@ class Manifest:
             "numerics_version": self.numerics_version,
             "growth": [vars(growth) for growth in self.growth],
             "versions": self.versions,
-            "sweep": self.sweep,
+            "sweep": self.sweep.canonical(),
         }
         text = json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False).removesuffix("\n}")
         return f'{text},\n "sha256": "{hashlib.sha256(text.encode()).hexdigest()}"\n}}\n'
@@ -226,6 +172,14 @@ def _keys(block: int, cells: int, samples: Sequence[int]) -> Rows:
     keys["block"] = block
     keys["cell"], keys["sample"] = np.repeat(np.arange(cells), len(samples)), np.tile(samples, cells)
     return keys
+
+
+def stored_sweep(path: Folder, content: Mapping[str, object]) -> Sweep:
+    """The sweep in a file of results, given its canonical form; an `InputError` if this warpchain refuses it."""
+    try:
+        return Sweep.of(content)
+    except InputError as error:
+        raise InputError(f"{path}: {error.args[0]}; read it with the version that wrote it") from None
 
 
 def read_manifest(directory: Folder) -> Manifest:
@@ -253,4 +207,4 @@ def read_manifest(directory: Folder) -> Manifest:
         )
     content = json.loads(text)
     growth = tuple(Growth(**{**each, "samples": tuple(each["samples"])}) for each in content["growth"])
-    return Manifest(content["sweep"], content["numerics_version"], growth, content["versions"])
+    return Manifest(stored_sweep(path, content["sweep"]), content["numerics_version"], growth, content["versions"])

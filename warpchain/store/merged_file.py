@@ -65,7 +65,7 @@ def _check_fit(folders: Sequence[Folder], results: Sequence[SweepResult]) -> Non
     seeds: dict[int, Folder] = {}
     expected = None
     for folder, result in zip(folders, results, strict=True):
-        for sweep in result.origin.planned:
+        for sweep in result.origin.sweeps:
             if (other := seeds.get(sweep.seed)) is not None:
                 if os.path.samefile(other, folder):
                     raise InputError(f"{folder}: given twice; give each folder once")
@@ -128,7 +128,7 @@ def _fill(file: "h5py.File", results: Sequence[SweepResult]) -> None:
         group.attrs["block"] = name
         coordinates, variables = block.variables()
         if len(whole.origin.sweeps) > 1:
-            seeds = [str(whole.origin.sweeps[number]["seed"]) for number, _ in whole.origin.samples(block.number)]
+            seeds = [str(whole.origin.sweeps[number].seed) for number, _ in whole.origin.samples(block.number)]
             notes = {"units": "1", "description": "seed of the sweep that the sample belongs to"}
             variables["seed"] = (("sample",), np.array(seeds, object), notes)
         for name, (dims, values, notes) in {**coordinates, **variables}.items():

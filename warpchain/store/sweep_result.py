@@ -4,11 +4,10 @@ A folder can be read while its sweep runs: walks that are not there yet are miss
 """
 
 import json
-import math
 import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -20,8 +19,9 @@ from warpchain.inputs.validation import InputError, shown, suggestion
 from warpchain.store.block_result import BlockResult, KeptMotions, Origin, counted, status_counts
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.folder import read_rows
-from warpchain.store.manifest import Folder, Layout, Manifest, layouts, read_manifest
+from warpchain.store.manifest import Folder, Manifest, read_manifest, stored_sweep
 from warpchain.store.shards import opened_motions
+from warpchain.sweeps.block import Block
 from warpchain.walks.rows import COLUMNS, MISSING, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
 
 if TYPE_CHECKING:
@@ -50,10 +50,10 @@ class SweepResult:
     blocks: dict[str, BlockResult]
     origin: Origin
 
-    @property
+    @cached_property
     def sweep(self) -> dict[str, Any]:
         """The resolved sweep, as in sweep.yaml; of several that were merged the first one."""
-        return self.origin.sweeps[0]
+        return self.origin.sweeps[0].canonical()
 
     @property
     def name(self) -> str:
@@ -191,7 +191,7 @@ class SweepResult:
 
     def notes(self) -> dict[str, Any]:
         """Attributes of a file: what the result is and how to make it again."""
-        sweeps = self.origin.sweeps
+        sweeps = [sweep.canonical() for sweep in self.origin.sweeps]
         return {
             "title": self.name,
             "seed": ", ".join(str(sweep["seed"]) for sweep in sweeps),
@@ -218,8 +218,8 @@ def _load_folder(directory: Folder) -> SweepResult:
     present = read_rows(directory, manifest)
     numbers = manifest.numbers(present)
 
-    def columns(block: Layout) -> dict[str, Array]:
-        stop = block.first + math.prod(block.shape)
+    def columns(block: Block) -> dict[str, Array]:
+        stop = block.first + block.walk_count
         here = slice(*np.searchsorted(numbers, [block.first, stop]))
         found = {"index": np.arange(block.first, stop)}
         for name in ("status", *STORED_COLUMNS, *map(drawn_column, block.drawn)):
@@ -253,10 +253,12 @@ def _load_merged(path: Folder) -> SweepResult:
             "numerics_version": int(file.attrs["numerics_version"]),
             "versions": versions,
         }
-        origin = Origin(tuple(given) if isinstance(given, list) else (given,), provenance)
-        several = len(origin.sweeps[0]["blocks"]) > 1
+        origin = Origin(
+            tuple(stored_sweep(path, each) for each in (given if isinstance(given, list) else [given])), provenance
+        )
+        several = len(origin.sweeps[0].blocks) > 1
 
-        def columns(block: Layout) -> dict[str, Array]:
+        def columns(block: Block) -> dict[str, Array]:
             group = file[block.name] if several else file
             names = ("index", "status", *STORED_COLUMNS, *map(drawn_column, block.drawn))
             return {name: group[name][()] for name in names}
@@ -272,7 +274,7 @@ def _motions_in_file(path: Path, group: str, places: Iterable[int]) -> "Iterator
 
 
 def _result(
-    origin: Origin, columns: Callable[[Layout], dict[str, Array]], motion: Callable[[Layout], KeptMotions]
+    origin: Origin, columns: Callable[[Block], dict[str, Array]], motion: Callable[[Block], KeptMotions]
 ) -> SweepResult:
     """A result, given the stored columns of each block and what reads its motions."""
     blocks = {
@@ -285,7 +287,7 @@ def _result(
             origin=origin,
             kept_motions=motion(block),
         )
-        for number, block in enumerate(layouts(origin.sweeps[0]))
+        for number, block in enumerate(origin.sweeps[0].blocks)
     }
     return SweepResult(blocks=blocks, origin=origin)
 

@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpchain.inputs.distributions import Distribution, Gaussian, Uniform, placed
 from warpchain.inputs.options import Options
@@ -127,6 +128,17 @@ class Block:
             return f"{self.path}.grid.{name}[{at[name]}]: {problem}"
         place = ", ".join(f"{name} {self.axes[name][number]}" for name, number in at.items())
         return f"{self.path}.{where}: {problem}" + (f" (in the cell {place})" if place else "")
+
+    def parameter(self, name: str) -> NDArray[Any]:
+        """Values of a parameter before anything is drawn, along the axes and one for all samples, shape (…, 1)."""
+        along, values = name, self.axes.get(name)
+        if values is None and name in self.sections["parameters"]:
+            values = (self.sections["parameters"][name],)
+        if values is None:
+            presets = self.axes.get("preset", (self.preset,))
+            along, values = "preset", tuple(getattr(parameter_preset(str(preset)), name) for preset in presets)
+        sizes = [len(values) if axis == along else 1 for axis in self.axes]
+        return np.broadcast_to(np.reshape(np.array(values), (*sizes, 1)), (*self.shape[:-1], 1))
 
     def given_parameters(self) -> Iterator[tuple[str, str, float]]:
         """Path, name and value of every parameter that is given; of a distribution the mean or the upper end."""

@@ -76,6 +76,11 @@ class Sweep:
     blocks: tuple[Block, ...]
     recording: Recording
 
+    @classmethod
+    def of(cls, source: "str | os.PathLike[str] | Mapping[str, object]") -> "Sweep":
+        """The sweep of a file, or of the content of one, whose cells were checked before; errors as of `read_sweep`."""
+        return cls(*read_sweep(source))
+
     @cached_property
     def walk_count(self) -> int:
         """Number of walks."""
@@ -294,7 +299,7 @@ def load_sweep(source: "str | os.PathLike[str] | Mapping[str, object] | Sweep") 
     """
     if isinstance(source, Sweep):
         return source
-    sweep = Sweep(*read_sweep(source))
+    sweep = Sweep.of(source)
     sweep.check()
     return sweep
 

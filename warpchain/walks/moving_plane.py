@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 
@@ -34,8 +35,7 @@ def released_plane(setup: Setup, position: Array) -> Array:
     scene, parameters = setup.scene, setup.parameters
     masses = np.resize([parameters.inner_mass, parameters.outer_mass], len(position))
     center_x, center_y, _ = masses @ position / masses.sum()
-    ends = position[:, 1] - parameters.link_length / 2 * np.abs(np.sin(position[:, 2]))
-    lowest = float(ends.min()) - parameters.circle_radius
+    lowest = lowest_point(position, parameters)
     sine, cosine = math.sin(scene.tilt), math.cos(scene.tilt)
     turn_x, turn_y = -scene.tilt_rate, scene.yaw_rate
     plane = np.zeros(layout.PLANE_VALUES)
@@ -46,6 +46,12 @@ def released_plane(setup: Setup, position: Array) -> Array:
     raised = lowest * (1 - cosine) + parameters.half_width * abs(sine)
     plane[layout.ORIGIN : layout.ORIGIN + 3] = 0.0, raised, center_y * sine
     return plane
+
+
+def lowest_point(position: Array, parameters: Parameters) -> float:
+    """Height [m] of the lowest point of a chain's circles; position (n, 3)."""
+    ends = position[:, 1] - parameters.link_length / 2 * np.abs(np.sin(position[:, 2]))
+    return float(np.min(ends)) - parameters.circle_radius
 
 
 def angles(planes: Array) -> tuple[Array, Array]:

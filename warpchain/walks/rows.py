@@ -7,17 +7,20 @@ from typing import Any, Final, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.engine.tallies import LOST
+from warpchain.engine.tallies import CONTACTS, LOST
 from warpchain.inputs.distributions import DRAWABLE
 from warpchain.inputs.sections import SECTION_OF, SECTIONS
 from warpchain.inputs.validation import field_unit
-from warpchain.walks.faults import MOST_ENERGY_ERROR, energy_error
+from warpchain.walks.faults import FAULTS, MOST_ENERGY_ERROR, energy_error, faults
 from warpchain.walks.walk_result import NUMBERS, WalkResult
 
 Rows = NDArray[np.void]
 
 KEYS: Final = np.dtype([("block", "<i4"), ("cell", "<i4"), ("sample", "<i4")])
 """What a row is found by: number of its block, of its cell in C order over the axes, of its sample in the cell."""
+
+LENGTHS: Final = ("link_length", "circle_radius")
+"""Against which openings and penetrations are held."""
 
 MISSING: Final = -1
 """Status of a walk that has not been computed yet; no code of `Status` is negative."""
@@ -155,3 +158,31 @@ def field_column(name: str) -> Column:
     field = SECTIONS[SECTION_OF[quantity_of(name)]].model_fields[quantity_of(name)]
     meaning = field.description or name
     return Column("<f8", field_unit(field), f"{meaning}; as drawn for the walk" if name.endswith(_DRAWN) else meaning)
+
+
+def faults_of_columns(
+    columns: Mapping[str, NDArray[Any]], lengths: Mapping[str, NDArray[Any]]
+) -> dict[str, NDArray[np.bool_]]:
+    """Whether each walk has each of `warpchain.walks.faults.FAULTS`.
+
+    Args:
+        columns: of a sweep, by name.
+        lengths: `LENGTHS` [m] before anything was drawn, along the axes of the columns.
+    """
+    own = dict(lengths)
+    for name in own:
+        if (column := drawn_column(name)) in columns:  # NaN in rows of blocks that do not draw it
+            own[name] = np.where(np.isnan(columns[column]), own[name], columns[column])
+    deepest = np.max([columns[f"penetration_{kind}"] for kind in CONTACTS], axis=0)
+    return faults(columns["energy_error"], columns["greatest_opening"], deepest, **own)
+
+
+def fault_remedies(blocks: Iterable[Mapping[str, NDArray[np.bool_]]]) -> dict[str, int]:
+    """What inaccurate walks mean and what to try → number of walks of all blocks; only what there is.
+
+    Args:
+        blocks: as of `faults_of_columns`, for each block.
+    """
+    found = list(blocks)
+    counts = {remedy: sum(int(block[name].sum()) for block in found) for name, remedy in FAULTS.items()}
+    return {remedy: count for remedy, count in counts.items() if count}

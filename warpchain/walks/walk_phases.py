@@ -23,7 +23,6 @@ from warpchain.engine.control import (
     suitable_load,
 )
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
-from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import contact_radius, joint_radius, loop_speed, settling_time
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
@@ -32,7 +31,7 @@ from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
 from warpchain.walks.motion import NOTHING, Keep
-from warpchain.walks.moving_plane import angles, released_plane
+from warpchain.walks.moving_plane import angles, lowest_point, released_plane
 from warpchain.walks.recorder import Recorder
 
 Array = NDArray[np.float64]
@@ -333,9 +332,3 @@ class WalkRun:
         if self._tilts:
             self._batch.set_plane(self._world, released_plane(self.setup, position))
         self._released = True
-
-
-def lowest_point(position: Array, parameters: Parameters) -> float:
-    """Height [m] of the lowest point of a chain's circles; position (n, 3)."""
-    ends = position[:, 1] - parameters.link_length / 2 * np.abs(np.sin(position[:, 2]))
-    return float(np.min(ends)) - parameters.circle_radius

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 from pydantic_core import to_jsonable_python
 
 from warpchain.engine.tallies import COUNTS, DEPTHS, EXTREMES, IMPULSES, LOST
@@ -37,7 +36,7 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, contact_radius
 from warpchain.inputs.setup import Setup
-from warpchain.inputs.validation import InputError
+from warpchain.inputs.validation import InputError, validated
 from warpchain.kernels import layout
 from warpchain.loop.before_release import FIELDS, BeforeRelease
 from warpchain.pictures.walk_shape import Kind
@@ -403,15 +402,12 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
         try:
             setup = Setup(
                 preset=given["preset"],
-                parameters=Parameters.model_validate(given["parameters"]),
-                scene=Scene.model_validate(given["scene"]),
-                options=Options.model_validate(given["options"]),
+                parameters=validated(Parameters, given["parameters"], "parameters"),
+                scene=validated(Scene, given["scene"], "scene"),
+                options=validated(Options, given["options"], "options"),
             )
-        except ValidationError as error:
-            first = ".".join(str(part) for part in error.errors()[0]["loc"])
-            raise InputError(
-                f"{path}: this warpchain refuses its setup ({first}); read it with the version that wrote it"
-            ) from None
+        except InputError as error:
+            raise InputError(f"{path}: {error}; read it with the version that wrote it") from None
         return WalkResult(
             status=Status[file.attrs["status"].upper()],
             setup=setup,
