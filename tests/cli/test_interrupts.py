@@ -13,7 +13,6 @@ import yaml
 
 from tests.run.test_sweep_run import TINY, data_of
 from tests.support.command_line import Command, command  # noqa: F401
-from warpchain.cli.interrupts import interrupts_heard
 from warpchain.cli.main import main
 from warpchain.run.sweep_run import sweep
 
@@ -26,25 +25,6 @@ def heard_signal() -> Iterator[None]:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
-
-
-class Interrupted:
-    """Python ignores what is raised when this is deleted."""
-
-    def __del__(self) -> None:
-        """Play Ctrl-C."""
-        signal.raise_signal(signal.SIGINT)
-
-
-def test_an_interrupt_that_python_loses_is_raised_again(capfd: pytest.CaptureFixture[str]) -> None:
-    """Raised where exceptions are ignored, it comes again a moment later, and nothing is printed."""
-    before = signal.getsignal(signal.SIGINT), sys.unraisablehook
-    with pytest.raises(KeyboardInterrupt), interrupts_heard() as heard:
-        Interrupted()
-        assert heard()
-        time.sleep(10)
-    assert (signal.getsignal(signal.SIGINT), sys.unraisablehook) == before
-    assert capfd.readouterr().err == ""
 
 
 def test_an_error_that_a_library_makes_of_an_interrupt_is_one(

@@ -1,25 +1,19 @@
 """Batches side by side, their memory, and the copies of their arrays on the host; what of it needs no GPU."""
 
 import threading
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
 import warp as wp
 
 from tests.run.test_sweep_run import brief_setup, outcomes
-from warpchain.cli.terminal import sweep_progress_text
 from warpchain.engine.batch import Batch
-from warpchain.engine.devices import Device, start_device
+from warpchain.engine.devices import start_device
 from warpchain.engine.memory import CAPACITY_FRAMES, CAPACITY_SAMPLES, world_bytes
 from warpchain.inputs.options import Options
-from warpchain.kernels.features import Features
-from warpchain.run.progress_bar import SweepProgress
-from warpchain.run.sweep_run import prepare
-from warpchain.sweeps.plan import load_sweep
 from warpchain.walks import scheduler
 
-FEW = {"version": 1, "name": "few", "seed": 1, "preset": "soft", "samples": 2, "grid": {"links": [60, 150]}}
 """Content of a sweep of two lengths."""
 
 
@@ -85,27 +79,3 @@ def test_memory_of_a_world_is_what_a_batch_takes(keeps_samples: bool, frame_ever
     samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * (frame_every is not None)
     planned = world_bytes(60, options, samples, frames, device)
     assert 0.99 * planned <= (taken(80) - taken(40)) / 40 <= planned
-
-
-def test_kernels_of_a_sweep_are_those_that_its_walks_ask_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is compiled beforehand for few walks on a GPU is one kernel for the drive and one for the walk."""
-    loaded: set[tuple[str, str, int]] = set()
-
-    def note(wanted: Iterable[tuple[Device, Features, int]]) -> None:
-        loaded.update((features.method, features.fixed_body, threads) for _, features, threads in wanted)
-
-    monkeypatch.setattr(scheduler, "load_kernels", note)
-    monkeypatch.setattr(scheduler, "start_device", lambda _: None)
-    prepare(load_sweep(FEW | {"options": {"device": "cuda"}}))
-    assert loaded == {("os32", "floor", 160), ("os32", "sprocket", 160)}
-    loaded.clear()
-    prepare(load_sweep(FEW | {"samples": 2000, "options": {"device": "cuda"}}))
-    assert loaded == {("os32", body, threads) for body in ("floor", "sprocket") for threads in (64, 160)}
-
-
-def test_progress_says_when_kernels_are_compiled() -> None:
-    """The line on the terminal speaks of compiling, then of walks."""
-    progress = SweepProgress(walks=10, done=0, before=0, compiling=True)
-    assert "compiling" in sweep_progress_text(progress)
-    progress.compiling = False
-    assert "0 of 10 walks" in sweep_progress_text(progress)

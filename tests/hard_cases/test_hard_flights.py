@@ -32,9 +32,6 @@ from tests.hard_cases.starts import (
 )
 from tests.oracle_model import contact_equations, motion_equations
 from warpchain import Parameters, Status, Trajectory
-from warpchain.engine.batch import Batch
-from warpchain.inputs.options import Options
-from warpchain.kernels.methods.method import find_method
 
 
 @dataclass(frozen=True)
@@ -350,46 +347,3 @@ def test_more_pairs_than_the_list_holds_is_a_status(method):
     flight = simulate(SOFT, folded(60), 1e-3, method=method, skin=1.0)
     assert flight.status == Status.LIST_OVERFLOW
     assert flight.time[-1] == 0.0
-
-
-@every_method
-def test_fixed_steps_show_the_order(method: str) -> None:
-    """The energy of undamped bouncing springs falls as h^p for an odd order p, as h^(p + 1) for an even one.
-
-    One step multiplies the energy of an oscillator by |R(iωh)|², which leaves 1 by an even power of h. Springs that
-    nothing damps ring for ever, so hybrid never takes its joints for rigid here: it is os32. All steps have the length
-    that is asked for.
-    """
-    energy, points = motion_equations.total_energy(*BOUNCING(), ELASTIC), []
-    for step in (8e-5, 6e-5, 4e-5, 2e-5, 1e-5, 5e-6, 2.5e-6, 1.25e-6):
-        # a skin beyond the height of the fall makes contact_step, not the loose tolerance, set the step
-        settings = {"tolerance": 0.1, "skin": 3.0, "contact_step": step}
-        flight = Flight(ELASTIC, BOUNCING, 0.3, settings).simulate(method)
-        assert flight.status == Status.FINISHED
-        assert flight.steps_accepted + flight.steps_rejected == pytest.approx(0.3 / step, abs=10)
-        end = motion_equations.total_energy(flight.position[-1], flight.velocity[-1], ELASTIC)
-        points.append((step, abs(energy - end) / energy))
-    # those that are neither unstable nor at rounding
-    steps, drifts = np.log([(step, drift) for step, drift in points if 1e-10 < drift < 1e-2]).T
-    order = find_method(method).order
-    assert np.polyfit(steps, drifts, 1)[0] == pytest.approx(order + (order + 1) % 2, abs=0.5)
-
-
-@every_method
-def test_one_broken_chain_leaves_the_others_alone(method: str) -> None:
-    """Of a thousand chains in a batch one has a NaN: it gets a status, the others the same bits as without it."""
-    worlds, broken = 1000, 500
-    ends = []
-    for spin in (None, np.nan):
-        batch = Batch(worlds, 8, Options.model_validate({"method": method, "step_limit": 1_000_000}))
-        for world in range(worlds):
-            position, velocity = dropped(fall=0.5 + world / worlds)
-            if world == broken and spin is not None:
-                velocity[3, 2] = spin
-            batch.set_chain(world, SOFT, 8)
-            batch.load(world, position, velocity, stop_time=1e-3, stop_status=Status.FINISHED)
-        batch.run(range(worlds), batch.features(fixed_body="floor"))
-        ends.append(np.delete(np.array(batch.motions(range(worlds), 8)), broken, axis=1))
-    assert_array_equal(*ends)
-    assert not batch.status(broken).ok
-    assert set(np.delete(batch.statuses(), broken)) == {Status.FINISHED}

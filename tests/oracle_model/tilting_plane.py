@@ -103,12 +103,6 @@ def tilt_of(plane: Plane) -> float:
     return float(np.arcsin(np.clip(plane.y[2], -1.0, 1.0)))
 
 
-def yaw_of(plane: Plane) -> float:
-    """Heading of e1, rad, anticlockwise from X̂ seen from above; without meaning if e1 is vertical."""
-    forward = axes(plane)[:, 0]
-    return float(np.arctan2(-forward[2], forward[0]))
-
-
 def lateral_speed(position: Array, plane: Plane) -> Array:
     """w = u + ω1 y − ω2 x of each link's centre along the plane's normal, (n,), m/s."""
     return np.asarray(plane.speed + plane.turn[0] * position[:, 1] - plane.turn[1] * position[:, 0])

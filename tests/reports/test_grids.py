@@ -83,16 +83,6 @@ def test_one_axis_is_a_line_with_two_bands(tmp_path: Path) -> None:
     assert not axes.child_axes and axes.get_xscale() == "linear"
 
 
-def test_names_are_points_with_bars(tmp_path: Path) -> None:
-    """Names on the x axis keep their order, and no line connects them."""
-    result = make_sweep(tmp_path, sweep({"start": STARTS}), flawed)
-    (axes,) = panels(result.plot()).values()
-    assert [text.get_text() for text in axes.get_xticklabels()] == STARTS
-    (line,) = axes.lines
-    assert line.get_linestyle() == "None"
-    np.testing.assert_array_equal(line.get_ydata(), result.statistics().mean)
-
-
 def test_cells_without_walks_are_gaps_and_failures_a_strip(tmp_path: Path) -> None:
     """No mean is drawn of a cell whose walks failed; a strip has the share of failures in each cell."""
     result = make_sweep(tmp_path, sweep({"floor_friction": [0.1, 0.2, 0.3, 0.4]}), flawed)

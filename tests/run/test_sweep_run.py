@@ -17,7 +17,6 @@ import yaml
 
 import warpchain
 from warpchain.cli.main import main
-from warpchain.engine.processors import processors
 from warpchain.inputs.setup import Setup
 from warpchain.run.single_walk import setup_walk
 from warpchain.run.sweep_run import run_shards, sweep
@@ -114,15 +113,6 @@ def test_threads_and_processes_write_the_same_bytes(tmp_path, uninterrupted):
     with concurrent.futures.ProcessPoolExecutor(2, mp_context=context) as processes:
         sweep(TINY, tmp_path / "processes", executor=processes, workers=2)
     assert data_of(tmp_path / "processes") == uninterrupted
-
-
-def test_progress_tells_when_the_walks_begin(tmp_path):
-    """First kernels are compiled; then the walks begin, and no time has passed; then shards are done."""
-    seen = []
-    sweep(TINY, tmp_path / "sweep", workers=1, on_progress=lambda p: seen.append((p.compiling, p.done, p.seconds)))
-    assert seen[:2] == [(True, 0, 0.0), (False, 0, 0.0)]
-    assert [compiling for compiling, _, _ in seen].count(True) == 1
-    assert seen[2][1] > 0 and seen[2][2] > 0 and seen[-1][1] == 80
 
 
 def test_a_finished_sweep_is_not_run_again(tmp_path, uninterrupted):
@@ -248,18 +238,6 @@ def test_a_dask_cluster_of_separate_processes(tmp_path, uninterrupted):
     assert data_of(tmp_path / "sweep") == uninterrupted
 
 
-def test_a_dask_client_is_an_executor(tmp_path, uninterrupted):
-    """`executor=` takes a Dask client or what it gives as an executor: the bytes are the same."""
-    distributed = pytest.importorskip("distributed")
-    with (
-        distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        for name, executor in (("client", client), ("executor", client.get_executor())):
-            sweep(TINY, tmp_path / name, executor=executor)
-            assert data_of(tmp_path / name) == uninterrupted
-
-
 @pytest.mark.parametrize("address", ("tls://127.0.0.1:1", "ucx://127.0.0.1:1", "inproc://1", "http://a:1"))
 def test_a_scheduler_that_cannot_be_reached_is_refused(tmp_path, capsys, address):
     """Whatever class of error Dask raises: one line, status 2, no folder, and no client that closes itself later."""
@@ -329,14 +307,3 @@ def test_sweep_refuses_what_it_cannot_do(tmp_path):
     with pytest.raises(warpchain.InputError, match=r"options\.device: 'gpu' is no device"):
         sweep(TINY, tmp_path / "a", device="gpu")
     assert not (tmp_path / "a").exists()
-
-
-def test_processors_are_those_of_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Counted are the processors that the process may use; on macOS, which does not tell, all; at least one."""
-    monkeypatch.setattr(os, "cpu_count", lambda: 7)
-    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {1, 5}, raising=False)
-    assert processors() == 2
-    monkeypatch.delattr(os, "sched_getaffinity")
-    assert processors() == 7
-    monkeypatch.setattr(os, "cpu_count", lambda: None)
-    assert processors() == 1

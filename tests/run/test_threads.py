@@ -6,23 +6,19 @@ import subprocess
 import sys
 import threading
 import time
-import weakref
 from pathlib import Path
 
 import pytest
-import warp as wp
 
 import warpchain
-import warpchain.engine.kernel_choice as kernel_choice
 import warpchain.run.sweep_run as runner
 import warpchain.walks.scheduler as scheduler
-from tests.run.test_sweep_run import TINY, brief_setup
+from tests.run.test_sweep_run import TINY
 from warpchain.engine.devices import gpu_turn, has_gpu_turn
 from warpchain.run.sweep_run import run_shards, sweep
 from warpchain.store.manifest import Manifest, read_manifest
 from warpchain.store.shards import stamp
 from warpchain.sweeps.plan import load_sweep
-from warpchain.walks.scheduler import compile_kernels
 
 
 @pytest.mark.parametrize(("device", "at_most"), [("cuda", 1), ("cpu", 2)])
@@ -67,28 +63,6 @@ def test_a_thread_that_waits_for_its_turn_can_be_stopped() -> None:
         assert pool.submit(wait, "cuda").result(5) and not has_gpu_turn()
 
 
-def test_an_error_keeps_nothing_of_a_turn() -> None:
-    """What the frames of an error held is gone when the turn ends, also of the error that it arose from."""
-    held = []
-
-    class Stream:
-        """Stands for one on a GPU."""
-
-    def fail(depth: int) -> None:
-        stream = Stream()
-        held.append(weakref.ref(stream))
-        try:
-            if depth:
-                fail(depth - 1)
-        finally:
-            raise ValueError(str(depth))
-
-    with pytest.raises(ValueError, match="2") as caught, gpu_turn(["cuda"]):
-        fail(2)
-    assert caught.value.__context__ is not None and len(held) == 3
-    assert [reference() for reference in held] == [None] * 3
-
-
 def test_a_sweep_on_a_gpu_is_refused_within_a_walk_there(tmp_path: Path) -> None:
     """Its task would wait for a turn that the walk does not end."""
     with (
@@ -123,32 +97,6 @@ def test_a_task_frees_what_it_made_on_a_device(tmp_path: Path, monkeypatch: pyte
         assert made == freed and made.count(threading.get_ident()) > 0
     finally:
         gc.enable()
-
-
-def test_kernels_are_made_by_one_thread_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tasks of several threads each load what they need, but not at once."""
-    inside, most = [], []
-
-    class Forgetful(dict[object, wp.Kernel]):
-        """Kernels that are loaded again each time."""
-
-        def __contains__(self, key: object) -> bool:
-            return False
-
-    def make(features: object, *sizes: object) -> wp.Kernel:
-        inside.append(features)
-        time.sleep(0.1)
-        most.append(len(inside))
-        inside.pop()
-        return made(features, *sizes)
-
-    made = kernel_choice.kernel_entry
-    monkeypatch.setattr(kernel_choice, "kernel_entry", make)
-    monkeypatch.setattr(kernel_choice, "_loaded", Forgetful())
-    setups = [brief_setup(seed) for seed in range(2)]
-    with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        list(pool.map(compile_kernels, [[setup] for setup in setups]))
-    assert most == [1] * len(most) and len(most) >= 2
 
 
 def test_threads_start_a_device_once() -> None:

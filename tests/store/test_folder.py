@@ -240,16 +240,6 @@ def test_files_of_others_are_not_touched(tmp_path: Path, name: str, fresh: bool)
     assert (tmp_path / name).read_text() == "mine: true"
 
 
-@pytest.mark.parametrize("fresh", [False, True])
-def test_a_foreign_file_among_the_shards_is_refused(tmp_path: Path, fresh: bool) -> None:
-    """A file that is no shard of the sweep is named, however many there are, and starting anew spares it."""
-    run(tmp_path)
-    for name in ("notes.txt", "0-000008.h5", "0-000000-motion.h5"):
-        (tmp_path / "shards" / name).write_text("mine")
-    with refused(InputError, tmp_path, "shards/0-000000-motion.h5: not a shard", "move it", "(and 2 more)"):
-        open_folder(tmp_path, fresh=fresh)
-
-
 def test_a_shard_of_another_sweep_is_refused(tmp_path: Path) -> None:
     """A shard with the right name but of another sweep, or of other walks, is named; nothing is deleted meanwhile."""
     run(tmp_path / "one")
@@ -329,11 +319,3 @@ def test_a_full_disk(tmp_path: Path) -> None:
     writing, opening = done["messages"]
     assert "0-000001.h5: cannot be written (No space left on device); make room" in writing
     assert "make room" in opening and done["missing"] == 0
-
-
-def test_a_folder_that_is_a_file(tmp_path: Path) -> None:
-    """A file in the place of the folder is named."""
-    (tmp_path / "file").write_text("mine")
-    for place in (tmp_path / "file", tmp_path / "file" / "below"):
-        with refused(OSError, tmp_path, f"{place}: cannot be written"):
-            open_folder(place)

@@ -2,7 +2,6 @@
 
 import concurrent.futures
 import multiprocessing
-import pickle
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,7 @@ from warpchain.reports.sweep_page import write_report
 from warpchain.run.sweep_run import sweep
 from warpchain.store.merged_file import merge
 from warpchain.store.shards import write_shard
-from warpchain.store.sweep_result import SweepResult, load
+from warpchain.store.sweep_result import load
 from warpchain.walks.motion import Keep
 from warpchain.walks.scheduler import run_setups
 
@@ -133,21 +132,6 @@ def test_only_chosen_samples_are_kept(kept: Path) -> None:
     ):
         with pytest.raises(InputError, match=message):
             result.series(**at)
-
-
-def test_a_sweep_without_series_is_as_ever(kept: Path, tmp_path: Path) -> None:
-    """Its canonical form, its digest and its shards know nothing of motions; the rows are the same with and without."""
-    bare = sweep({name: value for name, value in KEPT.items() if name != "record"}, tmp_path / "bare")
-    said = sweep(KEPT | {"record": {"series": False, "frames": False}}, tmp_path / "said")
-    assert bare.sweep["record"] == said.sweep["record"] == {"series": False}
-    assert data_of(tmp_path / "bare") == data_of(tmp_path / "said")
-    assert not list((tmp_path / "bare/shards").glob("*motion*"))
-    result = load(kept)
-    assert result.provenance["digest"] != bare.provenance["digest"]
-    for name, column in bare.columns.items():
-        np.testing.assert_array_equal(column, result.columns[name])
-    with pytest.raises(InputError, match=r"is not there; a sweep with record: \{series: true\} keeps it"):
-        bare.series(links=30, frequency=5)
 
 
 def test_workers_and_interruptions_leave_the_same_bytes(
@@ -282,9 +266,3 @@ def test_report_and_pictures_use_kept_frames(kept: Path, tmp_path: Path, monkeyp
     assert page.count("<iframe") == 1 and "as in the paper&#x27;s Figure 5" in page
     with pytest.raises(AssertionError, match="run again"):
         write_report(kept, tmp_path / "page.html", animation_of=0)
-
-
-def test_results_with_motions_can_be_copied(kept: Path) -> None:
-    """A pickled result still finds its series."""
-    result: SweepResult = pickle.loads(pickle.dumps(load(kept)))
-    assert len(result.series(links=30, frequency=5).time) > 90

@@ -127,16 +127,6 @@ def test_units_and_meanings(folder: Path) -> None:
         result.unit("walktime")
 
 
-def test_several_blocks_have_no_common_attributes(folder: Path) -> None:
-    """Of several blocks none is guessed; the error names them."""
-    result = load(folder)
-    with pytest.raises(AttributeError, match=r"dx: .* blocks\[…\] with rest, ellipse"):
-        _ = result.dx
-    with pytest.raises(AttributeError, match="dz: no such column; columns are index, status, dx"):
-        _ = result.blocks["rest"].dz
-    assert not hasattr(result, "__array__")
-
-
 def test_missing_walks_are_counted(single: Path) -> None:
     """Walks that are not there have status −1 and NaN; the attributes of an only block are those of the result."""
     result = load(single)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from studies.paper import impacts, reduction, run, statistics, verdicts
+from studies.paper import impacts, reduction, run, statistics
 from tests.support.made_sweeps import make_sweep
 from warpchain import InputError, Status
 from warpchain.sweeps.plan import PlannedWalk, load_sweep
@@ -63,27 +63,6 @@ def test_intervals_cover_the_truth(name: str) -> None:
     ]
     covered = np.array([abs(found.mean - (ratio - 1)) <= found.half_width for found in means])
     assert abs(covered.mean() - 0.95) < 3 * (0.95 * 0.05 / len(means)) ** 0.5
-
-
-def test_verdicts_follow_their_rules() -> None:
-    """Each rule gives each of its verdicts at its bounds."""
-    rules = verdicts
-    agrees, in_part, differs, left_open = rules.Verdict
-    directions = {
-        (15, 3): agrees,
-        (14, 3): in_part,
-        (15, 4): in_part,
-        (4, 20): differs,
-        (20, 10): in_part,
-        (3, 0): differs,
-        (0, 30): differs,
-    }
-    for (with_claim, against), verdict in directions.items():
-        assert rules.direction(with_claim, against, 30) is verdict
-    for exceeding, verdict in {0: agrees, 3: agrees, 4: in_part, 15: in_part, 16: differs}.items():
-        assert rules.smallness(exceeding, 30) is verdict
-    assert rules.direction(0, 0, 0) is rules.share(0, 0) is left_open
-    assert rules.together([agrees, agrees]) is agrees and rules.together([agrees, differs]) is in_part
 
 
 def made(folder: Path, name: str = "paper_claims", **changes: Any) -> Any:

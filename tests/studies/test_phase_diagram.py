@@ -10,10 +10,9 @@ import pytest
 import warpchain
 from studies.common import with_tables
 from studies.phase_diagram import cells, laws, run, scales, tables
-from studies.phase_diagram.endings import IN_FLIGHT, Ending, endings
+from studies.phase_diagram.endings import Ending, endings
 from tests.support.made_sweeps import distance, make_sweep
 from warpchain import InputError, Status
-from warpchain.kernels.events.tallies import BOUNCE_PAUSE
 from warpchain.sweeps.plan import PlannedWalk
 
 NAN = math.nan
@@ -60,11 +59,6 @@ def test_every_case_has_its_ending(columns: tuple[int, float, int, float, int], 
         "bounces_before_self_contact",
     )
     assert endings({name: np.array([value]) for name, value in zip(names, columns, strict=True)}).tolist() == [ending]
-
-
-def test_flight_is_what_ends_a_bounce() -> None:
-    """A chain is in flight as soon as an impulse on the floor would begin a new bounce."""
-    assert float(BOUNCE_PAUSE) == IN_FLIGHT
 
 
 def outcome(walk: PlannedWalk) -> "float | Status | None":
@@ -242,9 +236,3 @@ def test_the_command_draws_and_writes_the_page(tmp_path: Path, monkeypatch: pyte
     run.make([], None)
     assert (tmp_path / "README.md").read_text(encoding="utf-8") == page
     assert {path.stem for path in (tmp_path / "figures").iterdir()} == {"maps", "laws", "scales"}
-
-
-def test_a_page_without_markers_is_refused() -> None:
-    """Tables are put between markers only."""
-    with pytest.raises(ValueError, match="needs <!-- cells --> and <!-- end of cells --> once each"):
-        with_tables("<!-- cells -->", {"cells": ""})

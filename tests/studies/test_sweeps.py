@@ -67,47 +67,6 @@ def test_sweeps_of_studies(name: str, shapes: dict[str, tuple[int, ...]]) -> Non
             assert sweep.planned(block.first + index).setup.preset == preset
 
 
-def test_steadiness_holds_loops_under_their_own_loads_for_comparison() -> None:
-    """Its undamped blocks, and that of `unsoftened_hold`, neither multiply loads nor look at the shape before 30 s."""
-    steadiness, unsoftened = (load_sweep(path_of(name)) for name in ("steadiness", "unsoftened_hold"))
-    undamped = {"undamped", "paper_undamped", "own_joints"}
-    for sweep in (steadiness, unsoftened):
-        for block in sweep.blocks:
-            setup = sweep.planned(block.first).setup
-            scene = setup.scene
-            if block.name in undamped:
-                held = (scene.load_factor, scene.steady_time, scene.steady_tolerance, scene.further_hold)
-                assert held == (1.0, 0.0, 1.0, 30.0)
-                assert scene.hold_limit >= 30
-            else:
-                assert scene.load_factor is None and scene.steady_time is None
-            assert setup.options.soften_drive == (block.name != "own_joints")
-    held_on = next(block for block in steadiness.blocks if block.name == "held_on")
-    assert held_on.axes["further_hold"] == (0.0, 1.0, 2.0, 5.0, 10.0, 20.0)
-
-
-def test_floor_friction_is_that_of_the_grid() -> None:
-    """Walks have the frictions of the floor that the grid says; restitution and all else are drawn."""
-    sweep = load_sweep(path_of("floor_friction"))
-    frictions = (0.05, 0.1, 0.15, 0.2, 0.27, 0.4, 0.6)
-    for block in sweep.blocks:
-        for sample in (0, 7):
-            setups = [sweep.planned(block.first + 100 * place + sample).setup for place in range(7)]
-            assert tuple(setup.parameters.floor_friction for setup in setups) == frictions
-        assert setups[0].scene.start == block.name
-        assert "floor_friction" not in block.drawn and "floor_restitution" in block.drawn
-
-
-def test_softened_drive_repeats_the_same_samples() -> None:
-    """In `softened_drive` walks that differ in whether the drive is softened share everything else."""
-    sweep = load_sweep(path_of("softened_drive"))
-    for cell in range(12):
-        for sample in (0, 199):
-            soft, stiff = (sweep.planned(400 * cell + 200 * place + sample).setup for place in (0, 1))
-            assert (soft.options.soften_drive, stiff.options.soften_drive) == (True, False)
-            assert (soft.scene, soft.parameters) == (stiff.scene, stiff.parameters)
-
-
 @pytest.mark.parametrize("name", ["paper_claims", "paper_joints", "paper_tolerance"])
 def test_sweeps_of_the_paper_vary_one_quantity_at_a_time(name: str) -> None:
     """Each block has the paper's 30 cells; walks along its further axis share all but what stands there."""

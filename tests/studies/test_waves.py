@@ -19,7 +19,7 @@ from studies.waves.dispersion import (
 )
 from studies.waves.mode_fit import find_packet, fit_rates, mode_amplitudes
 from studies.waves.tapped_ring import tapped_ring
-from tests.oracle_model.circular_loop import circular_loop_force, tapped_loop
+from tests.oracle_model.circular_loop import circular_loop_force
 from tests.oracle_model.motion_equations import acceleration, friction_torque
 from tests.oracle_model.ring_modes import ring_modes
 from warpchain import Status, preset
@@ -208,10 +208,3 @@ def test_equivalent_friction_takes_as_much_energy(amplitude):
     spin = amplitude * np.cos(2 * np.pi * (np.arange(200_000) + 0.5) / 200_000)
     power = np.mean(friction_torque(spin, chain) * spin)
     assert equivalent_friction(chain, amplitude) * amplitude**2 / 2 == pytest.approx(power, rel=1e-4)
-
-
-def test_a_tapped_ring_is_that_of_the_model():
-    """Places and velocities are those of the NumPy model's loop; a spin that would move the ring is left out."""
-    spins = np.random.default_rng(1).normal(size=12)
-    for ours, theirs in zip(tapped_ring(12, SOFT, SPEED, spins), tapped_loop(12, SOFT, SPEED, spins), strict=True):
-        assert_allclose(ours, theirs, rtol=1e-12, atol=1e-12)

@@ -49,19 +49,3 @@ def folded_chain(
     position[:, :2] -= position[:, :2].mean(axis=0)
     position[:, :2] += generator.normal(size=(n, 2)) * opening
     return position, generator.normal(size=(n, 3)) * [1.0, 1.0, 2 / link_length]
-
-
-def accordion(n: int, link_length: float, opening: float = 1e-5) -> tuple[Array, Array]:
-    """A chain at rest, folded back by 180° at each joint, so that its joints lie on two spots, n/2 on each.
-
-    Args:
-        n: number of links, even.
-        link_length: in m.
-        opening: standard deviation of the links' displacements in x and in y, in m.
-
-    Returns:
-        position (n, 3), velocity (n, 3).
-    """
-    position = chain_of_angles(np.pi * np.arange(n), link_length)
-    position[:, :2] += np.random.default_rng(n).normal(size=(n, 2)) * opening
-    return position, np.zeros((n, 3))

@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 from warpchain.engine.devices import start_device
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
-from warpchain.kernels.contacts.impulse import fixed_contact
-from warpchain.kernels.contacts.link_pair import circles_of_links, collide
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu.contacts.neighbour_list import greatest_displacement, list_slack, neighbour_list
 from warpchain.kernels.cpu.contacts.proximity import (
@@ -30,7 +28,7 @@ from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
 from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.loop import load_state
 from warpchain.kernels.features import COMPILER_FLAGS
-from warpchain.kernels.types import Chain, Model, State, read_chain
+from warpchain.kernels.types import Model, State, read_chain
 
 Array = NDArray[np.float64]
 
@@ -65,113 +63,6 @@ def chain_on_cpu(position: Array, velocity: Array, parameters: Parameters) -> tu
 
 
 # --- the impulse law ---
-
-
-@compiled
-def _fixed(cases: wp.array2d(dtype=wp.float64), results: wp.array2d(dtype=wp.float64)):
-    i = wp.tid()
-    chain = Chain()
-    chain.tangential_restitution = cases[i, 14]
-    u, v, omega, lost, hits = fixed_contact(
-        chain,
-        cases[i, 0],
-        cases[i, 1],
-        cases[i, 2],
-        cases[i, 3],
-        cases[i, 4],
-        cases[i, 5],
-        cases[i, 6],
-        cases[i, 7],
-        cases[i, 8],
-        cases[i, 9],
-        cases[i, 10],
-        cases[i, 11],
-        cases[i, 12],
-        cases[i, 13],
-    )
-    results[i, 0] = u
-    results[i, 1] = v
-    results[i, 2] = omega
-    results[i, 3] = lost
-    results[i, 4] = wp.float64(hits)
-
-
-def fixed_contacts(cases: Array) -> Array:
-    """`fixed_contact` of many links: (N, 15), its arguments after the chain, then e_t → results (N, 5)."""
-    return _map_rows(_fixed, cases, 5)
-
-
-@compiled
-def _link_pair(
-    scratch: wp.array3d(dtype=wp.float64),
-    cases: wp.array2d(dtype=wp.float64),
-    results: wp.array2d(dtype=wp.float64),
-):
-    i = wp.tid()
-    chain = Chain()
-    chain.circle_radius = cases[i, 0]
-    chain.chain_restitution = cases[i, 1]
-    chain.chain_friction = cases[i, 2]
-    chain.tangential_restitution = cases[i, 3]
-    chain.push_rate = cases[i, 8]
-    depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = circles_of_links(
-        chain.circle_radius,
-        cases[i, 4],
-        cases[i, 5],
-        cases[i, 6],
-        cases[i, 7],
-        scratch[i, layout.X, 0],
-        scratch[i, layout.Y, 0],
-        scratch[i, layout.X, 1],
-        scratch[i, layout.Y, 1],
-        scratch[i, layout.INVERSE_MASS, 0] + scratch[i, layout.INVERSE_MASS, 1],
-        scratch[i, layout.INVERSE_INERTIA, 0],
-        scratch[i, layout.INVERSE_INERTIA, 1],
-    )
-    lost = wp.float64(0.0)
-    hits = wp.int64(0)
-    if depth > wp.float64(0.0):
-        lost, hits = collide(
-            scratch[i], chain, 0, 1, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant, depth
-        )
-    results[i, 0] = depth
-    results[i, 1] = lost
-    results[i, 2] = wp.float64(hits)
-
-
-def link_pairs(
-    position: Array, velocity: Array, inverses: Array, cases: Array, push_rate: float = 0.0
-) -> tuple[Array, Array]:
-    """`circles_of_links`, then `collide`, of many pairs A, B.
-
-    Args:
-        position: (N, 2, 2), x, y of the centres of mass.
-        velocity: (N, 2, 3), ẋ, ẏ, ω.
-        inverses: (N, 2, 2), 1/m and 1/I.
-        cases: (N, 8), circle radius, e, μ, e_t, centres of A's and B's circle x, y.
-        push_rate: that of `Chain` [1/s].
-
-    Returns:
-        velocity (N, 2, 3) afterwards, and depth, energy lost and number of impulses (N, 3).
-    """
-    block = np.full((len(cases), layout.INVERSE_INERTIA + 1, 2), np.nan)
-    block[:, [layout.X, layout.Y]] = position.transpose(0, 2, 1)
-    rates = [layout.U, layout.V, layout.OMEGA]
-    block[:, rates] = velocity.transpose(0, 2, 1)
-    block[:, [layout.INVERSE_MASS, layout.INVERSE_INERTIA]] = inverses.transpose(0, 2, 1)
-    scratch = wp.array(block, dtype=wp.float64, device=DEVICE)
-    results = poisoned(len(cases), 3)
-    cases = np.column_stack([cases, np.full(len(cases), push_rate)])
-    inputs = [scratch, wp.array(cases, dtype=wp.float64, device=DEVICE), results]
-    wp.launch(_link_pair, dim=len(cases), inputs=inputs, device=DEVICE)
-    return scratch.numpy()[:, rates].transpose(0, 2, 1), results.numpy()
-
-
-def _map_rows(kernel: wp.Kernel, cases: Array, width: int) -> Array:
-    results = poisoned(len(cases), width)
-    inputs = [wp.array(cases, dtype=wp.float64, device=DEVICE), results]
-    wp.launch(kernel, dim=len(cases), inputs=inputs, device=DEVICE)
-    return results.numpy()
 
 
 # --- the contact pass ---

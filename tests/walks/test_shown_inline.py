@@ -26,18 +26,6 @@ def test_a_walk_is_shown_with_numbers_and_picture() -> None:
     assert walk._repr_png_().startswith(PNG)
 
 
-def test_what_cannot_be_drawn_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A walk is shown whatever the reason for which it has no picture: its numbers stay."""
-    walk = make_walk()
-
-    def fail(self: Any, *arguments: Any) -> Figure:
-        raise RuntimeError("no fonts")
-
-    monkeypatch.setattr(type(walk), "plot", fail)
-    assert walk._repr_png_() is None
-    assert "0.64 m" in walk._repr_html_() and "<img" not in walk._repr_html_()
-
-
 def test_a_sweep_is_shown_with_its_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Name, walks by status and axes, escaped; the main figure if there is one."""
     result = make_sweep(tmp_path, FIGURE_6)

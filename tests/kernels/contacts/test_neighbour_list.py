@@ -17,7 +17,6 @@ from warpchain import Status
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
-from warpchain.kernels import layout
 from warpchain.kernels.contacts.list_layout import list_layout
 
 PAPER = preset("paper")
@@ -192,27 +191,6 @@ def test_torn_chain_never_trusts_its_list():
 
 
 # --- a full list ---
-
-
-def test_overflow_is_noticed_at_the_last_pair():
-    """A list that is just full holds all pairs; one pair too many is reported, not dropped in silence."""
-    position = folded_chain(190, 1, LENGTH)[0]
-    joints = motion_equations.link_ends(position, PAPER)[1]
-    opening = np.linalg.norm(motion_equations.joint_opening(position, PAPER), axis=1).max()
-    gaps = np.linalg.norm(joints[:, None] - joints[None], axis=2)[np.triu_indices(190, 1)]
-    capacity = list_layout(layout.padded_width(190)).capacity
-    last, first_too_many, following = np.sort(gaps)[capacity - 1 : capacity + 2]
-    full, too_full = (
-        (gap - 2 * PAPER.circle_radius - 2 * opening)
-        for gap in ((last + first_too_many) / 2, (first_too_many + following) / 2)
-    )
-    for skin, fits in ((full, True), (too_full, False), (1.0, False)):
-        contact_pass = ContactPass([at_rest(position)], skin=skin)
-        (result,) = contact_pass.run(LIST)
-        assert result["fits"] == fits
-        if fits:
-            assert len(contact_pass.listed_pairs(0)) == capacity
-            assert contact_pass.listed_pairs(0) == pairs_within_reach(position, skin)
 
 
 # --- whole runs ---

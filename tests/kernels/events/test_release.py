@@ -16,7 +16,6 @@ from warpchain.inputs.options import Options
 from warpchain.kernels import layout
 from warpchain.kernels.events.release import (
     LEAST_LOAD,
-    LITTLE_SLIP,
     LOADING_TIME,
     MOST_CROSSINGS,
     MOST_SLIP,
@@ -160,16 +159,6 @@ def test_a_loop_that_keeps_its_shape_is_released_in_time() -> None:
     assert watched.drift == pytest.approx(0, abs=1e-12)
 
 
-def test_own_loads_are_watched_for_as_long_as_slow_waves_need() -> None:
-    """With a factor of 1 there is one watch, of 6 s in this loop; a steady_time that is given overrides that."""
-    watched = Watched(duration=8.0, drive={"load_factor": 1.0}).sample()
-    assert np.all(watched.loads == 1.0)
-    assert 6.0 < crossing(1.0) < 6.2
-    assert watched.release == end_of_watch(0.5, 0.125, crossing(1.0))
-    given = Watched(drive={"load_factor": 1.0, "steady_time": 0.5}).sample()
-    assert given.release == end_of_watch(0.5, 0.125, 0.5)
-
-
 @pytest.mark.parametrize("load_factor", [16.0, 1.0])
 @pytest.mark.parametrize(("name", "size"), SIZES)
 def test_a_loop_that_drifts_is_not_released(name: str, size: float, load_factor: float) -> None:
@@ -194,23 +183,6 @@ def test_a_loop_that_does_not_become_stationary_is_held_under_less() -> None:
     assert math.isnan(watched.release)
 
 
-def test_ripples_shorter_than_a_window_do_not_matter() -> None:
-    """A width that ripples by a tenth as links pass is its mean: the loop is released when a smooth one is."""
-    watched = Watched()
-    ripple = WIDTH * (1 + 0.1 * np.sin(2 * np.pi * watched.time / 2.5e-3))
-    assert watched.sample(width=ripple).release == Watched().sample().release
-
-
-@pytest.mark.parametrize(("name", "size"), SIZES)
-def test_drift_is_the_band_of_means_relative_to_height_or_width(name: str, size: float) -> None:
-    """A step of half the tolerance when the loop becomes free is let pass, and told as what it is."""
-    watched = Watched()
-    moved = watched.time > fall_of(16.0) + 0.1
-    watched.sample(**{name: USUAL[name] + 0.005 * size * moved})
-    assert math.isfinite(watched.release)
-    assert watched.drift == pytest.approx(0.005, rel=0.006)
-
-
 def test_a_loop_that_leaves_its_shape_when_free_is_held_under_the_root() -> None:
     """Whenever its loads have fallen its width jumps by 2 %: held under 16, then 4, then its own, and released."""
     assert 2 < float(LEAST_LOAD) < 4
@@ -233,34 +205,9 @@ def test_a_loop_that_leaves_its_shape_when_free_is_held_under_the_root() -> None
     assert watched.release == moment
 
 
-@pytest.mark.parametrize("slip", [0.9 * float(LITTLE_SLIP), 1.1 * float(LITTLE_SLIP), 0.2])
-def test_a_free_loop_that_slips_is_watched_for_as_long_as_slow_waves_need(slip: float) -> None:
-    """Up to LITTLE_SLIP nothing is different; beyond, it is watched for a crossing under its own loads."""
-    watched = Watched(duration=10.0).sample(speed=SPEED * (1 - slip))
-    fall = fall_of(16.0)
-    watch = first_sample(fall + FALL) + STEP
-    wanted = 0.25 if slip < LITTLE_SLIP else crossing(1.0)
-    assert watched.release == end_of_watch(watch, 0.125, wanted, since=fall + FALL)
-
-
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_loop_that_slips_much_is_not_released(sign: int) -> None:
     """Slower or faster than its sprocket by more than MOST_SLIP it is never stationary."""
     for slip, is_released in ((float(MOST_SLIP) - 0.01, True), (float(MOST_SLIP) + 0.01, False)):
         watched = Watched(duration=10.0).sample(speed=SPEED * (1 - sign * slip))
         assert math.isfinite(watched.release) == is_released
-
-
-def test_a_standing_loop_is_released() -> None:
-    """On a sprocket that stands still the speed may be anything below 2 cm/s."""
-    drive = {"loop_speed": 0.0, "loop_period": 0.25}
-    assert math.isfinite(Watched(drive=drive).sample(speed=0.015).release)
-    assert math.isnan(Watched(drive=drive).sample(speed=0.025).release)
-
-
-def test_what_happens_before_the_hold_does_not_matter() -> None:
-    """However a loop swings while it spins up, the watch begins with the hold."""
-    watched = Watched()
-    early = watched.time < 0.5
-    shape = {"height": HEIGHT * (1 + 0.5 * early), "width": WIDTH * (1 - 0.5 * early), "speed": SPEED * (1 - early)}
-    assert watched.sample(**shape).release == Watched().sample().release

@@ -10,7 +10,6 @@ from warpchain.engine.batch import Batch
 from warpchain.engine.control import SOFTEST, STIFFENING_TIME
 from warpchain.kernels import layout
 from warpchain.run.single_walk import setup_walk
-from warpchain.walks import scheduler
 from warpchain.walks.walk_phases import Phase, WalkRun
 
 PAPER = preset("paper")
@@ -106,16 +105,6 @@ def test_a_drive_on_softer_joints_ends_as_one_on_stiff_joints() -> None:
     assert soft.greatest_penetration["sprocket"] < 1e-3
 
 
-def test_a_soft_drive_alone_never_softens_the_pile() -> None:
-    """Without soften_pile the joints keep their own values to the end, however small the loop's area gets."""
-    settings = {"links": 36, "frequency": 5.0, "start": "spinning", "method": "reference"}
-    walk = warpchain.walk(**settings, soften_drive=True)
-    assert walk.status == Status.AT_REST
-    assert np.isnan(walk.softened_at)
-    assert abs(walk.energy["residual"]) < 1e-4 * walk.energy["kinetic_at_release"]
-    assert walk.energy["softening"] < 0
-
-
 def test_a_whole_walk_from_soft_joints() -> None:
     """Softened on the sprocket and in the pile, a walk ends at rest where it should, and its ledger closes."""
     walk = warpchain.walk(
@@ -126,17 +115,3 @@ def test_a_whole_walk_from_soft_joints() -> None:
     assert 0.3 < walk.softened_at < walk.walk_time
     at_release = walk.energy["kinetic_at_release"] + walk.energy["potential_at_release"]
     assert abs(walk.energy["residual"]) < 1e-5 * at_release
-
-
-def test_cuts_into_launches_do_not_change_a_softened_walk(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A walk softened on sprocket and in the pile is the same to the bit in launches of 20000 and of 777 attempts."""
-    setup = setup_walk(
-        "paper", SPINNING | {"method": "dp5", "soften_drive": True, "soften_pile": True, "soften_area": 0.3}, None
-    )
-    seen = []
-    for attempts in (20_000, 777):
-        monkeypatch.setitem(scheduler.ATTEMPTS, "cpu", attempts)
-        ((_, run),) = scheduler.run_setups([setup])
-        seen.append(run.outcome() | {"drive_time": run.drive_time})
-    assert seen[0] == seen[1]
-    assert seen[0]["softened_at"] > 0

@@ -2,15 +2,12 @@
 
 import numpy as np
 import pytest
-import warp as wp
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 
 import warpchain
 from warpchain import InputError, Status, preset
 from warpchain.engine.control import SOFTEST
 from warpchain.inputs.start_shapes import ellipse, lay_chain
-from warpchain.kernels.physics.softness import softened
-from warpchain.kernels.types import Chain, Control
 from warpchain.run.single_walk import setup_walk
 
 PAPER = preset("paper")
@@ -18,45 +15,6 @@ SERIES = ("time", "center", "center_velocity", "kinetic_energy", "spring_energy"
 
 
 # --- area and joints ---
-
-
-@wp.kernel(module="unique", enable_backward=False)
-def _soften(chains: wp.array(dtype=Chain), control: Control, softness: wp.array(dtype=wp.float64)):
-    i = wp.tid()
-    chains[i] = softened(chains[i], control, softness[i])
-
-
-def joints_of(stiffness: float, damping: float, smoothing: float, softness: float) -> tuple[float, float, float]:
-    """k, b and 1/ω_c of a joint at a softness."""
-    chain = Chain()
-    chain.joint_stiffness, chain.joint_damping, chain.inverse_smoothing = stiffness, damping, 1 / smoothing
-    control = Control()
-    control.soft_stiffness, control.soft_damping, control.soft_smoothing = 1e7, 100.0, 0.1
-    control.softest_stiffness, control.softest_damping = 1e6, 25.0
-    chains = wp.array([chain], dtype=Chain, device="cpu")
-    inputs = [chains, control, wp.array([softness], dtype=wp.float64, device="cpu")]
-    wp.launch(_soften, dim=1, inputs=inputs, device="cpu")
-    after = chains.numpy()[0]
-    return tuple(float(after[name]) for name in ("joint_stiffness", "joint_damping", "inverse_smoothing"))
-
-
-def test_softness_goes_geometrically_from_own_over_soft_to_softest() -> None:
-    """Exactly the own values at 0, soft at 1, softest at 2; geometric means half-way, within bounds beyond."""
-    for softness in (0.0, -0.1):
-        assert joints_of(1e9, 1e3, 1e-3, softness) == (1e9, 1e3, 1 / 1e-3)
-    assert joints_of(1e9, 1e3, 1e-3, 1.0) == (1e7, 100.0, 1 / 0.1)
-    for softness in (2.0, 2.1):
-        assert joints_of(1e9, 1e3, 1e-3, softness) == (1e6, 25.0, 1 / 0.1)
-    assert_allclose(joints_of(1e9, 1e3, 1e-3, 0.5), [1e8, np.sqrt(1e5), 100.0], rtol=1e-14)
-    assert_allclose(joints_of(1e9, 1e3, 1e-3, 1.5), [np.sqrt(1e13), 50.0, 10.0], rtol=1e-14)
-
-
-def test_no_joint_becomes_stiffer() -> None:
-    """What is softer than soft or softest joints stays, undamped joints included; the rest softens."""
-    for softness in (0.0, 0.3, 1.0, 1.7, 2.0):
-        assert joints_of(1e6, 0.0, 2.0, softness) == (1e6, 0.0, 0.5)
-    assert joints_of(1e6, 1e3, 2.0, 1.0) == (1e6, 100.0, 0.5)
-    assert joints_of(3e6, 1e3, 2.0, 2.0) == (1e6, 25.0, 0.5)
 
 
 # --- the pile ---
