@@ -95,7 +95,7 @@ REFUSED = {
     "--device cuda:98": "options.device: there is no cuda:98 on this machine",
     "--device cpu --set device=cpu": "options.device: given twice",
     "--config nowhere.yaml": "nowhere.yaml: No such file",
-    "--frame-interval 0": "--frame-interval: 0 is no positive time in s",
+    "--frame-interval 0": "frame_interval: 0 is no positive time in s",
     "--animate avi": "'--animate'",
     "--frobnicate": "(Possible options: --animate); see warpchain walk --help",
     "extra": "unexpected extra argument(s) (extra); see warpchain walk --help",

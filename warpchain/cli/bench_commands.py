@@ -1,12 +1,11 @@
 """The command `warpchain bench`."""
 
 import json
-import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import typer
 
@@ -66,7 +65,7 @@ def bench(
     from warpchain.bench.flights import step_costs
     from warpchain.bench.machine import machine
     from warpchain.bench.walk_rate import walk_rate
-    from warpchain.cli.terminal import status_line
+    from warpchain.cli.terminal import json_value, status_line
     from warpchain.files import checked_output, write_whole
     from warpchain.inputs.options import Options, on_gpu
     from warpchain.inputs.scene import Scene, check_links_on_gpu
@@ -82,7 +81,11 @@ def bench(
     with status_line() as show:
         steps = step_costs(where, links=lengths, chains=chains or (4000 if many else 1), rounds=rounds, report=show)
         rate = walk_rate(where, walks or (2000 if many else 32), show)
-    record = {"machine": about, "steps": [_plain(asdict(step)) for step in steps], "walks": asdict(rate)}
+    record = {
+        "machine": about,
+        "steps": [{name: json_value(value) for name, value in asdict(step).items()} for step in steps],
+        "walks": asdict(rate),
+    }
     text = json.dumps(record, indent=2, allow_nan=False)
     if output is not None:
         write_whole(output, text + "\n")
@@ -90,11 +93,6 @@ def bench(
         print(text)
         return
     _print(", ".join(f"{name} {value}" for name, value in about.items()), (STEPS, steps), (WALKS, [rate]))
-
-
-def _plain(row: Mapping[str, Any]) -> dict[str, Any]:
-    """The same row as JSON has it: a number that is NaN is null."""
-    return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in row.items()}
 
 
 def _print(heading: str, *tables: tuple[Mapping[str, str], Sequence[object]]) -> None:

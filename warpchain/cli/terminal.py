@@ -85,8 +85,8 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
     if as_json:
         blocks = {
             name: {
-                "axes": {axis: _plain(values) for axis, values in cells.axes.items()},
-                "dx": {key: _plain(getattr(cells, key)) for key in ("mean", "sd", "count", "failed", "missing")},
+                "axes": {axis: json_value(values) for axis, values in cells.axes.items()},
+                "dx": {key: json_value(getattr(cells, key)) for key in ("mean", "sd", "count", "failed", "missing")},
             }
             for name, cells in statistics.items()
         }
@@ -122,11 +122,11 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
         console.print(f"… and {more:,} more cells, which --json lists")
 
 
-def _plain(array: Any) -> Any:
-    """An array as JSON has it; a number that is NaN is null."""
-    values = np.asarray(array).tolist()
+def json_value(given: Any) -> Any:
+    """A value or an array as JSON has it; a number that is NaN is null."""
+    values = np.asarray(given).tolist()
     if isinstance(values, list):
-        return [_plain(part) for part in values]
+        return [json_value(part) for part in values]
     return None if values != values else values
 
 

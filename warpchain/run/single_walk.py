@@ -1,6 +1,5 @@
 """One walk, from a user's few words to its result."""
 
-import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import warn_of_units
 from warpchain.inputs.sections import by_section
 from warpchain.inputs.setup import DEFAULT_PRESET, Setup, check_has_joint_forces, resolve
-from warpchain.inputs.validation import InputError, checked_whole, full_name, plain, shown
+from warpchain.inputs.validation import InputError, checked_positive, checked_whole, full_name, plain, shown
 from warpchain.walks.motion import LONGEST_INTERVAL, Keep
 from warpchain.walks.scheduler import run_setups
 from warpchain.walks.walk_phases import WalkRun
@@ -196,7 +195,7 @@ def run_walk(
         )
 
 
-def _frame_marks(frame_interval: float | None, options: Options) -> tuple[int | None, float]:
+def _frame_marks(frame_interval: object, options: Options) -> tuple[int | None, float]:
     """Whole samples between two kept frames, None for no frames, and their time if it is less than a sample, else 0.
 
     Raises:
@@ -204,22 +203,22 @@ def _frame_marks(frame_interval: float | None, options: Options) -> tuple[int | 
     """
     if frame_interval is None:
         return None, 0.0
-    if not (_is_number(frame_interval) and 0 < frame_interval < math.inf):
-        raise InputError(f"frame_interval: {shown(frame_interval)} is not a positive time in s; give one, or None")
-    if not SHORTEST_INTERVAL <= frame_interval < LONGEST_INTERVAL:
+    interval = checked_positive(frame_interval, "frame_interval", "time in s")
+    if not SHORTEST_INTERVAL <= interval < LONGEST_INTERVAL:
         raise InputError(
-            f"frame_interval: {shown(frame_interval)} is not between {SHORTEST_INTERVAL} s and {LONGEST_INTERVAL} s; "
+            f"frame_interval: {shown(interval)} is not between {SHORTEST_INTERVAL} s and {LONGEST_INTERVAL} s; "
             "give a time between, or None"
         )
-    samples = frame_interval / options.record_interval
-    return (round(samples), 0.0) if samples > 0.999 else (1, float(frame_interval))
+    samples = interval / options.record_interval
+    return (round(samples), 0.0) if samples > 0.999 else (1, float(interval))
 
 
 def _time_before(record_before: float | None, frame_every: int | None) -> float:
     """Time [s] before the release that is kept, or an `InputError`."""
     if record_before is None:
         return RECORD_BEFORE if frame_every is not None else 0.0
-    if not (_is_number(record_before) and 0 <= record_before <= LONGEST_INTERVAL):
+    is_number = isinstance(record_before, int | float) and not isinstance(record_before, bool)
+    if not (is_number and 0 <= record_before <= LONGEST_INTERVAL):
         raise InputError(
             f"record_before: {shown(record_before)} is not a time in s from 0 to {LONGEST_INTERVAL}; give one, or None"
         )
@@ -234,7 +233,3 @@ def _truth(value: object, name: str) -> bool:
     if not isinstance(value, bool):
         raise InputError(f"{name}: {shown(value)} is not a truth value; give True or False")
     return value
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
