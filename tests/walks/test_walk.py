@@ -262,19 +262,6 @@ def test_progress_goes_through_all_phases():
 # --- statuses ---
 
 
-def test_time_limit():
-    """A walk that is cut at its limit ends there exactly, with time_limit, its record and no Δx."""
-    walk = short_walk(walk_limit=0.1)
-    assert walk.status == Status.TIME_LIMIT
-    assert np.isnan(walk.dx)
-    assert walk.walk_time == walk.time[-1] == 0.1
-    assert len(walk.time) == pytest.approx(101, abs=1)
-    assert np.isfinite(list(walk.energy.values())).all()
-    whole = short_walk()
-    shared = len(walk.time) - 1
-    assert_array_equal(walk.center[:shared], whole.center[:shared])
-
-
 def test_not_steady():
     """A sprocket that gets no time to become steady ends in not_steady: no release, no Δx, no series."""
     walk = soft_walk(start="spinning", hold_limit=0.05)
