@@ -113,7 +113,7 @@ def test_what_is_no_number_is_still_refused():
         ({"links": np.float64(30.0)}, r"scene\.links: .*; given 30.0"),
         ({"frequency": np.float64("nan")}, r"scene\.frequency: .*; given nan"),
         ({"seed": np.float64(1.0)}, r"seed: 1.0 is no whole number .*"),
-        ({"frame_interval": np.bool_(True)}, r"frame_interval: True is not a positive time .*"),
+        ({"frame_interval": np.bool_(True)}, r"frame_interval: True is no positive time .*"),
     ):
         with pytest.raises(InputError, match=message):
             warpchain.walk(**settings)
