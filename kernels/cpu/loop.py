@@ -11,16 +11,10 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.codes import LIST_OVERFLOW, NOT_FINITE, RUNNING, STEP_LIMIT, STEP_TOO_SMALL
-from warpchain.kernels.contacts.fixed_body import sprocket_turning
+from warpchain.kernels.contacts.fixed_body import BODIES
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu.contacts.neighbour_list import list_slack, neighbour_list
-from warpchain.kernels.cpu.contacts.proximity import (
-    floor_gap,
-    greatest_opening,
-    resolve_floor,
-    resolve_sprocket,
-    sprocket_gap,
-)
+from warpchain.kernels.cpu.contacts.proximity import fixed_contacts, greatest_opening
 from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
 from warpchain.kernels.cpu.contacts.time_to_contact import FLIGHT_SKIN, LEAST_SLACK, step_bound
 from warpchain.kernels.cpu.explicit import place_ends
@@ -138,10 +132,11 @@ def make_advance(features: Features):
     list_size = list_layout(columns).size
     list_count = list_layout(columns).count
     has_floor = features.fixed_body == "floor"
-    has_sprocket = features.fixed_body == "sprocket"
-    has_fixed = has_floor or has_sprocket
+    has_fixed = features.fixed_body != "none"
     has_self = features.self_contact
-    fixed_gap, resolve_fixed = (sprocket_gap, resolve_sprocket) if has_sprocket else (floor_gap, resolve_floor)
+    if has_fixed:
+        fixed_gap, resolve_fixed = fixed_contacts(features.fixed_body)
+        face_at = BODIES[features.fixed_body].face
     fixed_loss, fixed_depth, fixed_count = of_fixed_body(features.fixed_body)
     reuses_last = method.reuses_last
     is_driven = features.is_driven
@@ -150,7 +145,7 @@ def make_advance(features: Features):
     first_stage, attempt, commit = method.first_stage, method.attempt, method.commit
     growth, shrinkage = method.growth, method.shrinkage
     # on the sprocket the pauses between impulses are too short for a flight
-    flight = None if has_sprocket else rigid_flight(features.method, columns)
+    flight = None if is_driven else rigid_flight(features.method, columns)
     has_flight = flight is not None
     if flight is not None:
         attempt_flight, commit_flight = flight.attempt, flight.commit
@@ -196,7 +191,7 @@ def make_advance(features: Features):
             if wp.static(has_floor and tilts):
                 state.gap[world] = tilting_gap(K, on_plane(chain, P, 0))
             elif wp.static(has_fixed):
-                state.gap[world] = fixed_gap(K, chain)
+                state.gap[world] = fixed_gap(K, chain, face_at(drive, world, state.time[world]))
             if wp.static(has_self):
                 if not build_list(K, L, chain, control.skin, greatest_opening(K, chain)):
                     status = int(LIST_OVERFLOW)
@@ -314,17 +309,17 @@ def make_advance(features: Features):
                     write_plane_sums(K, P, chain)
                     end_plane_step(P, chain.gravity, h)
                 if wp.static(has_fixed):
+                    face = face_at(drive, world, time)
                     if wp.static(tilts):
                         gap = tilting_gap(K, felt)
                     else:
-                        gap = fixed_gap(K, chain)
+                        gap = fixed_gap(K, chain, face)
                     if gap < ZERO:
                         raise_extreme(state, world, fixed_depth, -gap)
                         if wp.static(tilts):
                             impulses = resolve_tilting_floor(K, P, chain)
                         else:
-                            turning = sprocket_turning(drive, world, time)
-                            impulses = resolve_fixed(K, chain, turning, drive.push_rate[world])
+                            impulses = resolve_fixed(K, chain, face)
                         add_count(state, world, fixed_count, impulses)
                         if wp.static(has_floor):
                             if impulses > wp.int64(0):
