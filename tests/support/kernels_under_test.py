@@ -72,7 +72,7 @@ LIST, FLOOR, SPROCKET, SELF = 1, 2, 4, 8
 
 RESULTS = (
     *("opening", "floor_gap", "sprocket_gap", "fits", "displacement", "slack"),
-    *("floor", "sprocket", "self", "self_loss", "self_depth"),
+    *("floor", "sprocket", "self", "self_loss", "self_depth", "strands"),
 )
 
 
@@ -116,10 +116,11 @@ def _contact_pass(columns: int) -> wp.Kernel:
         if (parts & 4) != 0:
             results[world, 7] = wp.float64(resolve_sprocket(block, chain, sprocket_speed, push_rate))
         if (parts & 8) != 0:
-            hits, lost, depth = resolve_self_contacts(block, pairs, chain, opening)
+            hits, strands, lost, depth = resolve_self_contacts(block, pairs, chain, opening)
             results[world, 8] = wp.float64(hits)
             results[world, 9] = lost
             results[world, 10] = depth
+            results[world, 11] = wp.float64(strands)
 
     return contact_pass
 
