@@ -62,11 +62,12 @@ HOLD_LOAD, LOADED_SINCE, UNLOADED_SINCE, DRIFT = range(18, 22)
 REST_SINCE, LAST_FLOOR_IMPULSE = 22, 23
 SOFTENED_AT = 24
 FELL_AT, GREATEST_LEAN = 25, 26
-# The first sample after the first self-contact, and that after which the loop encloses less than half of its area at
-# the release: time, bounces begun, time since the last impulse on the floor.
+# The first sample after the first self-contact, after that between strands of the loop, and that after which the loop
+# encloses less than half of its area at the release: time, bounces begun, time since the last impulse on the floor.
 SELF_CONTACT_AT, SELF_CONTACT_BOUNCES, SELF_CONTACT_FLIGHT = 27, 28, 29
 COLLAPSED_AT, COLLAPSE_BOUNCES, COLLAPSE_FLIGHT = 30, 31, 32
-WATCH_ROWS = 33
+STRANDS_MET_AT, STRANDS_MET_BOUNCES, STRANDS_MET_FLIGHT = 33, 34, 35
+WATCH_ROWS = 36
 
 # State.plane. First the plane itself: lateral speed u [m/s], rates ω1, ω2 [rad/s] about e1 and e2, the components of
 # the room's X and Y axes along e1, e2, e3, and the room's coordinates of the plane's origin [m].
@@ -87,8 +88,12 @@ MOMENTUM, START_XX, RATE_XX, MEAN_RATE_XX = 39, 42, 45, 48
 PLANE_ROWS = 51
 
 # State.counts
-ACCEPTED, REJECTED, FLOOR_IMPULSES, SPROCKET_IMPULSES, SELF_IMPULSES, BOUNCES, LIST_BUILDS = range(7)
-COUNT_ROWS = 7
+ACCEPTED, REJECTED, FLOOR_IMPULSES, SPROCKET_IMPULSES, SELF_IMPULSES, BOUNCES, LIST_BUILDS, STRAND_IMPULSES = range(8)
+COUNT_ROWS = 8
+
+# Links at least so far apart along the chain that touch are strands of the loop, and no crease of one of them: from
+# 12 to 24 the first touch of long chains comes at the same time.
+STRANDS_APART = 16
 
 # State.extremes
 OPENING, FLOOR_DEPTH, SPROCKET_DEPTH, SELF_DEPTH = range(4)

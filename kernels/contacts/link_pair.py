@@ -3,7 +3,20 @@
 import warp as wp
 
 from warpchain.kernels.contacts.impulse import collision_impulse, inverse_masses
-from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, LEFT_X, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, U, V, X, Y
+from warpchain.kernels.layout import (
+    INVERSE_INERTIA,
+    INVERSE_MASS,
+    LEFT_X,
+    LEFT_Y,
+    OMEGA,
+    RIGHT_X,
+    RIGHT_Y,
+    STRANDS_APART,
+    U,
+    V,
+    X,
+    Y,
+)
 from warpchain.kernels.physics.elementary import HALF, TWO, ZERO, quotient
 from warpchain.kernels.types import Chain
 
@@ -21,6 +34,13 @@ def are_neighbours(link_a: int, link_b: int, link_count: int):
     """True for the same link or links that share a joint."""
     apart = wp.abs(link_a - link_b)
     return apart < 2 or apart > link_count - 2
+
+
+@wp.func
+def are_strands(link_a: int, link_b: int, link_count: int):
+    """True for links at least :data:`STRANDS_APART` apart along the chain: strands of the loop, no crease of one."""
+    apart = wp.abs(link_a - link_b)
+    return apart >= STRANDS_APART and apart <= link_count - STRANDS_APART
 
 
 @wp.func

@@ -212,9 +212,10 @@ def make_advance(features: Features):
             if time >= next_mark(state, control, world):
                 softness = state.softness[world]
                 load_factor = state.load_factor[world]
-                self_impulses = state.counts[world, layout.SELF_IMPULSES]
+                touches = state.counts[world, layout.SELF_IMPULSES]
+                meetings = state.counts[world, layout.STRAND_IMPULSES]
                 last_impulse = state.watch[world, layout.LAST_FLOOR_IMPULSE]
-                status = sample(K, chain, drive, state, record, control, world, time, self_impulses, last_impulse)
+                status = sample(K, chain, drive, state, record, control, world, time, touches, meetings, last_impulse)
                 longest = contact_step(state, control, world, wp.static(is_driven))
                 tolerance = spring_tolerance(drive, state, control, world, wp.static(is_driven))
                 if has_changed(state, world, softness, load_factor):
@@ -340,8 +341,9 @@ def make_advance(features: Features):
                             status = int(LIST_OVERFLOW)
                         slack = list_slack(K, chain, skin, opening)
                     if L[wp.static(list_count)] > 0:
-                        hits, lost, depth = resolve_self_contacts(K, L, chain, opening)
+                        hits, strands, lost, depth = resolve_self_contacts(K, L, chain, opening)
                         add_count(state, world, layout.SELF_IMPULSES, hits)
+                        add_count(state, world, layout.STRAND_IMPULSES, strands)
                         raise_extreme(state, world, layout.SELF_DEPTH, depth)
                         book_loss(state, world, layout.LOSS_SELF, lost)
                         impulses += hits

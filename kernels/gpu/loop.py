@@ -218,6 +218,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             write_marks(K, state, control, world)
             T[wp.static(touch.fixed_hits)] = 0
             T[wp.static(touch.self_hits)] = 0
+            T[wp.static(touch.strand_hits)] = 0
             T[wp.static(touch.deepest)] = 0
             T[wp.static(touch.is_late)] = 0
             T[wp.static(touch.votes)] = 0
@@ -426,6 +427,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             add_count(state, world, layout.REJECTED, wp.int64(attempts - accepted))
             add_count(state, world, fixed_count, wp.int64(T[wp.static(touch.fixed_hits)]))
             add_count(state, world, layout.SELF_IMPULSES, wp.int64(T[wp.static(touch.self_hits)]))
+            add_count(state, world, layout.STRAND_IMPULSES, wp.int64(T[wp.static(touch.strand_hits)]))
             state.extremes[world, layout.OPENING] = K[chain_values, layout.VALUE_OPENING]
             deepest = wp.cast(T[wp.static(touch.deepest)], wp.float32)
             raise_extreme(state, world, layout.SELF_DEPTH, wp.float64(deepest))

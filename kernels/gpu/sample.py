@@ -14,6 +14,7 @@ from warpchain.kernels.gpu.threads import clock
 from warpchain.kernels.layout import (
     BOARD_VALUES,
     SELF_IMPULSES,
+    STRAND_IMPULSES,
     VALUE_CONTACT_STEP,
     VALUE_DEADLINE,
     VALUE_LAST_IMPULSE,
@@ -69,10 +70,11 @@ def block_sample(features: Features, touch: TouchLayout):
         softness = state.softness[world]
         load_factor = state.load_factor[world]
         chain = present(model, state, control, world)
-        self_impulses = state.counts[world, SELF_IMPULSES] + wp.int64(T[wp.static(touch.self_hits)])
+        touches = state.counts[world, SELF_IMPULSES] + wp.int64(T[wp.static(touch.self_hits)])
+        meetings = state.counts[world, STRAND_IMPULSES] + wp.int64(T[wp.static(touch.strand_hits)])
         last_impulse = K[BOARD_VALUES, VALUE_LAST_IMPULSE]
         T[wp.static(touch.mailbox)] = sample(
-            K, chain, drive, state, record, control, world, time, self_impulses, last_impulse
+            K, chain, drive, state, record, control, world, time, touches, meetings, last_impulse
         )
         if has_changed(state, world, softness, load_factor):
             after = present(model, state, control, world)

@@ -67,7 +67,7 @@ LIST, FLOOR, SPROCKET, SELF = 1, 2, 4, 8
 
 RESULTS = (
     *("opening", "floor_gap", "sprocket_gap", "fits", "displacement", "slack"),
-    *("floor", "sprocket", "self", "self_loss", "self_depth"),
+    *("floor", "sprocket", "self", "self_loss", "self_depth", "strands"),
 )
 
 
@@ -118,10 +118,11 @@ def _contact_pass(columns: int) -> wp.Kernel:
             results[world, 2] = sprocket_gap(block, chain, face)
             results[world, 7] = wp.float64(resolve_sprocket(block, chain, face))
         if (parts & 8) != 0:
-            hits, lost, depth = resolve_self_contacts(block, pairs, chain, opening)
+            hits, strands, lost, depth = resolve_self_contacts(block, pairs, chain, opening)
             results[world, 8] = wp.float64(hits)
             results[world, 9] = lost
             results[world, 10] = depth
+            results[world, 11] = wp.float64(strands)
 
     return contact_pass
 

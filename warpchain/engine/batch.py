@@ -36,6 +36,7 @@ UNSET_WATCHES = (
     *(layout.REST_SINCE, layout.SOFTENED_AT, layout.FELL_AT),
     *(layout.SELF_CONTACT_AT, layout.SELF_CONTACT_BOUNCES, layout.SELF_CONTACT_FLIGHT),
     *(layout.COLLAPSED_AT, layout.COLLAPSE_BOUNCES, layout.COLLAPSE_FLIGHT),
+    *(layout.STRANDS_MET_AT, layout.STRANDS_MET_BOUNCES, layout.STRANDS_MET_FLIGHT),
 )
 """Entries of :attr:`State.watch` that are −1 until set."""
 

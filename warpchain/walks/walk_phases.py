@@ -241,7 +241,7 @@ class WalkRun:
         }
 
     def _ending(self, moment: str, event: str, first: int) -> dict[str, Any]:
-        """When self-contact or collapse came, after how many bounces and how long after the last floor impulse.
+        """When an event came, after how many bounces begun, and how long after the last impulse on the floor.
 
         Args:
             moment: name of the field that says when.
@@ -279,6 +279,7 @@ class WalkRun:
             "energy": self.energy(),
             **self._fall(is_at_rest),
             **self._ending("self_contact_at", "self_contact", layout.SELF_CONTACT_AT),
+            **self._ending("strands_met_at", "strands_met", layout.STRANDS_MET_AT),
             **self._ending("collapsed_at", "collapse", layout.COLLAPSED_AT),
             "sprocket_height": self.raised if self._has_sprocket else math.nan,
         }

@@ -56,7 +56,7 @@ Array = NDArray[np.float64]
 KIND: Final = "warpchain walk"
 BEFORE: Final = "before_release"
 
-_SINCE_FLOOR: Final = "time since the last impulse on the floor; NaN if there was none before, or never such a sample"
+_SINCE_FLOOR: Final = "time since the last impulse on the floor; NaN if there was none"
 _FIXED: Final = "if the plane is fixed"
 
 ENERGIES: Final = {
@@ -118,20 +118,25 @@ class WalkResult:
         float,
         Stored("s", "from the release to the sample after the first impulse between links; or NaN"),
     ]
-    bounces_before_self_contact: Annotated[
-        int, Stored("1", "bounces begun when links first touched one another; −1 if they never did")
-    ]
+    bounces_before_self_contact: Annotated[int, Stored("1", "bounces begun at self_contact_at; −1 if it never came")]
     flight_before_self_contact: Annotated[
         float,
         Stored("s", f"at self_contact_at, {_SINCE_FLOOR}"),
     ]
+    strands_met_at: Annotated[
+        float,
+        Stored(
+            "s",
+            f"as self_contact_at, of links {layout.STRANDS_APART} or more apart along the chain: strands of the loop",
+        ),
+    ]
+    bounces_before_strands_met: Annotated[int, Stored("1", "bounces begun at strands_met_at; −1 if it never came")]
+    flight_before_strands_met: Annotated[float, Stored("s", f"at strands_met_at, {_SINCE_FLOOR}")]
     collapsed_at: Annotated[
         float,
         Stored("s", "from the release until the loop enclosed less than half of its area; NaN if it never did"),
     ]
-    bounces_before_collapse: Annotated[
-        int, Stored("1", "bounces begun when the loop collapsed, see collapsed_at; −1 if it never did")
-    ]
+    bounces_before_collapse: Annotated[int, Stored("1", "bounces begun at collapsed_at; −1 if it never came")]
     flight_before_collapse: Annotated[float, Stored("s", f"at collapsed_at, {_SINCE_FLOOR}")]
     softened_at: Annotated[float, Stored("s", "from the release to the softening of the joints; NaN if they were not")]
     wall_time: Annotated[float, Stored("s", "that the computer took, without the compilation of kernels")]

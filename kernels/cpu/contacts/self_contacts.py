@@ -15,7 +15,14 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.contacts.link_pair import are_neighbours, circles_of_links, collide, links_of, natural
+from warpchain.kernels.contacts.link_pair import (
+    are_neighbours,
+    are_strands,
+    circles_of_links,
+    collide,
+    links_of,
+    natural,
+)
 from warpchain.kernels.contacts.list_layout import GEOMETRY_COLUMNS, GEOMETRY_ROWS, list_layout
 from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y, X, Y
 from warpchain.kernels.physics.elementary import TWO, ZERO, order_bits
@@ -150,7 +157,11 @@ def self_contacts(columns: int):
     def resolve_self_contacts(
         K: wp.array2d(dtype=wp.float64), L: wp.array(dtype=wp.int32), chain: Chain, opening: wp.float64
     ):
-        """Returns the number of impulses, energy lost [J], greatest depth [m]; ``opening``: greatest |C| [m]."""
+        """Resolves all contacts of a chain whose list is made; ``opening``: greatest |C| [m].
+
+        Returns:
+            Number of impulses, number of those between strands, energy lost [J], greatest depth [m].
+        """
         G = wp.array(
             ptr=L.ptr + wp.uint64(wp.static(4 * lists.geometry)),
             shape=(GEOMETRY_ROWS, GEOMETRY_COLUMNS),
@@ -158,6 +169,7 @@ def self_contacts(columns: int):
         )
         touching = list_touching(K, L, chain, opening)
         impulses = wp.int64(0)
+        strands = wp.int64(0)
         lost = ZERO
         deepest = wp.int64(0)
         half = int(0)
@@ -199,10 +211,12 @@ def self_contacts(columns: int):
                             )
                             lost += energy
                             impulses += hits
+                            if are_strands(link_a, link_b, chain.link_count):
+                                strands += hits
                         second += 1
                     k += 1
                 first += GEOMETRY_COLUMNS
             half += 1
-        return impulses, lost, wp.cast(deepest, wp.float64)
+        return impulses, strands, lost, wp.cast(deepest, wp.float64)
 
     return resolve_self_contacts
