@@ -46,36 +46,33 @@ from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step
 from warpchain.kernels.physics.elementary import ONE, ZERO
 from warpchain.kernels.physics.geometry import whole_lanes
 from warpchain.kernels.physics.plane import begin_plane_step, end_plane_step, on_plane
-from warpchain.kernels.physics.scaled_loads import write_inertias
+from warpchain.kernels.physics.scaled_loads import write_links
 from warpchain.kernels.types import Chain, Control, Drive, Model, Record, State
 
 wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def load_state(K: wp.array2d(dtype=wp.float64), state: State, chain: Chain, world: int):
-    """Fills the rows of the state and of the links' constants; rows of losses start at zero."""
+def load_state(K: wp.array2d(dtype=wp.float64), model: Model, state: State, chain: Chain, world: int):
+    """Fills the rows of the state; rows of losses start at zero, columns behind the links are links without mass."""
     i = int(0)
     while i < chain.link_count:
         row = int(0)
         while row < 6:
             K[row, i] = state.links[world, row, i]
             row += 1
-        mass = wp.where(i % 2 == 0, chain.inner_mass, chain.outer_mass)
-        K[layout.MASS, i] = mass
-        K[layout.INVERSE_MASS, i] = ONE / mass
         K[layout.LOST_FRICTION, i] = ZERO
         K[layout.LOST_DAMPING, i] = ZERO
         K[layout.LOST_FIXED, i] = ZERO
         i += 1
-    # columns up to whole vectors: links without mass, which nothing moves
+    # columns up to whole vectors
     while i < whole_lanes(chain.link_count):
         row = int(0)
         while row < wp.static(layout.STAGES):
             K[row, i] = ZERO
             row += 1
         i += 1
-    write_inertias(K, chain)
+    write_links(K, model, world, state.load_factor[world])
 
 
 @wp.func
@@ -184,7 +181,7 @@ def make_advance(features: Features):
         P = state.plane[world]
         status = int(RUNNING)
         if state.is_fresh[world] != 0:
-            load_state(K, state, chain, world)
+            load_state(K, model, state, chain, world)
             place_ends(K, chain)
             if wp.static(tilts):
                 write_plane_sums(K, P, chain)
@@ -223,7 +220,7 @@ def make_advance(features: Features):
                     book_softening(chain, after, state, world)
                     chain = after
                     if wp.static(is_driven):
-                        write_inertias(K, chain)
+                        write_links(K, model, world, state.load_factor[world])
                     has_first_stage = int(0)
                 if status != RUNNING:
                     break

@@ -12,7 +12,9 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpchain.engine.batch import Batch
 from warpchain.engine.devices import start_device
+from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.fixed_body import Face
@@ -23,7 +25,7 @@ from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
 from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.loop import load_state
 from warpchain.kernels.features import COMPILER_FLAGS
-from warpchain.kernels.types import Model, State, read_chain
+from warpchain.kernels.types import Model, State
 
 Array = NDArray[np.float64]
 
@@ -42,17 +44,16 @@ def poisoned(*shape: int) -> wp.array:
 
 def model_of(chains: Sequence[tuple[int, Parameters]]) -> Model:
     """Constants of chains of so many links each."""
-    model = Model()
-    model.link_count = wp.array([links for links, _ in chains], dtype=wp.int32, device=DEVICE)
-    for name in Parameters.model_fields:
-        values = [getattr(parameters, name) for _, parameters in chains]
-        setattr(model, name, wp.array(values, dtype=wp.float64, device=DEVICE))
-    return model
+    batch = Batch(len(chains), max(links for links, _ in chains), Options())
+    for world, (links, parameters) in enumerate(chains):
+        batch.set_chain(world, parameters, links)
+    return batch.model
 
 
 def chain_on_cpu(position: Array, velocity: Array, parameters: Parameters) -> tuple[Model, State]:
-    """Structs of one chain; of its state only the links are set."""
+    """Structs of one chain; of its state only the links and the factor of its loads are set."""
     state = State()
+    state.load_factor = wp.ones(1, dtype=wp.float64, device=DEVICE)
     state.links = wp.array(np.hstack([position, velocity]).T[None], dtype=wp.float64, device=DEVICE)
     return model_of([(len(position), parameters)]), state
 
@@ -92,12 +93,12 @@ def _contact_pass(columns: int) -> wp.Kernel:
         results: wp.array2d(dtype=wp.float64),
     ):
         world = wp.tid()
-        chain = read_chain(model, world)
+        chain = model.chains[world]
         chain.push_rate = push_rate
         block = scratch[world]
         row = lists[world]
         pairs = wp.array(ptr=row.ptr, shape=(wp.static(size),), dtype=wp.int32)
-        load_state(block, state, chain, world)
+        load_state(block, model, state, chain, world)
         place_ends(block, chain)
         opening = greatest_opening(block, chain)
         results[world, 0] = opening
@@ -149,6 +150,7 @@ class ContactPass:
         self.model = model_of([(len(chain.position), chain.parameters) for chain in chains])
         worlds, rows, size = len(chains), layout.scratch_rows(0), list_layout(self.columns).size
         self.state = State()
+        self.state.load_factor = wp.ones(worlds, dtype=wp.float64, device=DEVICE)
         self.state.links = poisoned(worlds, 6, max(self.links))
         self.scratch = poisoned(worlds, rows, self.columns)
         self.lists = wp.full((worlds, size), POISONED_JOINT, dtype=wp.int32, device=DEVICE)

@@ -17,12 +17,13 @@ from warpchain.engine.kernel_choice import block_threads, features_of, load_kern
 from warpchain.engine.memory import CAPACITY_FRAMES, CAPACITY_SAMPLES, scratch_rows
 from warpchain.engine.mirror import Mirror
 from warpchain.engine.tallies import COUNTS, EXTREMES, LOSSES
+from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.features import Features
-from warpchain.kernels.types import LOADING_TIME, Drive, Model, Record, State
+from warpchain.kernels.types import LOADING_TIME, Chain, Drive, Model, Record, State
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
@@ -85,11 +86,11 @@ class Batch:
         self.columns = layout.padded_width(longest)
         rows = scratch_rows(options, longest, self.device, threads)
 
-        self.model = self._arrays(Model)
+        self.model = self._arrays(Model, links=(layout.LINK_ROWS, longest))
         self.drive = self._arrays(Drive)
         self._constant = set(self._mirrors)
         if self._gpu:
-            self._order = Mirror(np.zeros(worlds, dtype=np.int32), self._gpu, self._stream)
+            self._order = Mirror(np.zeros(worlds, dtype=np.int32), wp.int32, self._gpu, self._stream)
         self.state = self._arrays(
             State,
             links=(6, longest),
@@ -124,15 +125,16 @@ class Batch:
         """A struct of arrays of zeros; ``shapes``: further axes of an array, after that of the worlds."""
         filled = struct()
         for name, field in struct.vars.items():
-            dtype = wp.dtype_to_numpy(field.type.dtype)
-            setattr(filled, name, self._array(np.zeros((len(self.links), *shapes.get(name, ())), dtype=dtype)))
+            shape = (len(self.links), *shapes.get(name, ()))
+            setattr(filled, name, self._array(shape, field.type.dtype))
         return filled
 
-    def _array(self, values: NDArray[np.generic]) -> wp.array:
-        """An array on the device that the host will read or write."""
-        if self._gpu is None or values.size == 0:
-            return wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device=self.device.warp)
-        mirror = Mirror(values, self._gpu, self._stream)
+    def _array(self, shape: tuple[int, ...], dtype: Any) -> wp.array:
+        """An array of zeros on the device that the host will read or write."""
+        if self._gpu is None or math.prod(shape) == 0:
+            return wp.zeros(shape, dtype=dtype, device=self.device.warp)
+        numbers = dtype.numpy_dtype() if dtype is Chain else wp.dtype_to_numpy(dtype)
+        mirror = Mirror(np.zeros(shape, dtype=numbers), dtype, self._gpu, self._stream)
         self._mirrors[mirror.array.ptr] = mirror
         return mirror.array
 
@@ -146,7 +148,14 @@ class Batch:
         values: NDArray[Any] = self._mirrors[array.ptr].edit() if array.ptr in self._mirrors else array.numpy()
         return values
 
-    def set_chain(self, world: int, parameters: Parameters, links: int, sprocket_radius: float | None = None) -> None:
+    def set_chain(
+        self,
+        world: int,
+        parameters: Parameters,
+        links: int,
+        sprocket_radius: float | None = None,
+        own: LinkValues | None = None,
+    ) -> None:
         """Set parameters and length of a world's chain.
 
         Args:
@@ -154,13 +163,26 @@ class Batch:
             parameters: The chain's parameters.
             links: Number of links.
             sprocket_radius: Radius [m] at which circles touch the sprocket; None: the parameter's.
+            own: What each link and joint has of its own; None: inner and outer links alternate.
         """
-        self.links[world] = links
-        self._edit(self.model.link_count)[world] = links
-        for name, value in parameters:
-            self._edit(getattr(self.model, name))[world] = value
+        own = own or alternating(parameters, links)
+        half = parameters.link_length / 2
+        derived = {
+            "link_count": links,
+            "half_length": half,
+            "inverse_square": 1 / (half * half),
+            "mass": own.total_mass,
+            "inverse_smoothing": 1 / parameters.friction_smoothing,
+        }
         if sprocket_radius is not None:
-            self._edit(self.model.sprocket_radius)[world] = sprocket_radius
+            derived["sprocket_radius"] = sprocket_radius
+        self.links[world] = links
+        chain = self._edit(self.model.chains)[world]
+        for name, value in (vars(parameters) | derived).items():
+            if name in chain.dtype.names:
+                chain[name] = value
+        rows = (own.mass, own.inertia, own.viscous_friction, own.coulomb_friction)  # as in layout
+        self._edit(self.model.links)[world, :, :links] = rows
 
     def load(
         self,

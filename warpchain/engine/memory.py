@@ -3,11 +3,11 @@
 from warpchain.engine.devices import Device, Gpu, start_device
 from warpchain.engine.kernel_choice import block_threads, resident_blocks
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu import rows as cpu_rows
 from warpchain.kernels.gpu import functions as gpu_functions
+from warpchain.kernels.types import CHAIN_DOUBLES
 
 WORLDS_OF_BLOCK = 2
 """Chains under way for each block that a GPU holds: while some are with the host, the others fill it.
@@ -49,8 +49,8 @@ def world_bytes(
         tilts: Whether the plane of the chain is kept with samples and frames.
     """
     columns = layout.padded_width(longest)
-    few = len(Parameters.model_fields) + 139 + layout.PLANE_ROWS  # numbers of a world in model, drive and state
-    numbers = columns * scratch_rows(options, longest, device) + 6 * longest + few
+    few = CHAIN_DOUBLES + 138 + layout.PLANE_ROWS  # numbers of a world in model, drive and state
+    numbers = columns * scratch_rows(options, longest, device) + (6 + layout.LINK_ROWS) * longest + few
     numbers += samples * (layout.ALL_COLUMNS if tilts else layout.SAMPLE_COLUMNS)
     numbers += frames * ((2 + 3 * keeps_loads) * longest + layout.PLANE_VALUES * tilts + 1)
     return 8 * numbers + 4 * list_layout(columns).size

@@ -8,8 +8,8 @@ from warpchain.kernels import layout
 from warpchain.kernels.contacts.fixed_body import BODIES, Face, link_and_body
 from warpchain.kernels.contacts.tilting_floor import greatest_across_speed, middle_height, steepness
 from warpchain.kernels.features import Features
-from warpchain.kernels.gpu.board import contact_constants, ends_of
-from warpchain.kernels.gpu.stage import Link, Place, Proximity, felt_plane, read_link, vec5d
+from warpchain.kernels.gpu.board import ends_of
+from warpchain.kernels.gpu.stage import Link, Place, Proximity, constants, felt_plane, read_link, vec5d
 from warpchain.kernels.gpu.threads import block_maxima, vec4i
 from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, OMEGA, U, V
 from warpchain.kernels.methods.controller import quick_quotient, quick_root
@@ -38,7 +38,6 @@ def block_proximity(features: Features, block_dim: int):
         gap_of, meet = link_and_body(features.fixed_body)
         face_at = BODIES[features.fixed_body].face
     tilts = features.tilts
-    chain_values = layout.BOARD_VALUES
     _maximum, write_maxima, read_maxima = block_maxima(block_dim)
 
     @wp.func
@@ -57,29 +56,25 @@ def block_proximity(features: Features, block_dim: int):
             cy = next_end[1] - right_y
             values[0] = order_bits_single(wp.float32(cx * cx + cy * cy))
             if wp.static(tilts):
-                own = Chain()
-                own.circle_radius = K[chain_values, layout.VALUE_CIRCLE_RADIUS]
-                felt = felt_plane(K, own, wp.static(layout.VALUE_PLANE))
+                felt = felt_plane(K, constants(K), wp.static(layout.VALUE_PLANE))
             if wp.static(has_floor and tilts):
                 slope = steepness(felt)
                 lowest = wp.min(
                     middle_height(felt, slope, left_x, left_y), middle_height(felt, slope, right_x, right_y)
                 )
-                gap = lowest - K[chain_values, layout.VALUE_HALF_WIDTH] * wp.abs(felt.up_z)
+                gap = lowest - felt.half_width * wp.abs(felt.up_z)
                 values[1] = order_key_single(wp.float32(-gap))
             elif wp.static(has_fixed):
-                gap = gap_of(contact_constants(K, place.links), Face(), left_x, left_y, right_x, right_y)
+                gap = gap_of(constants(K), Face(), left_x, left_y, right_x, right_y)
                 values[1] = order_key_single(wp.float32(-gap))
             if wp.static(has_self):
                 dx = right_x - K[layout.BOARD_LISTED_X, place.lane]
                 dy = right_y - K[layout.BOARD_LISTED_Y, place.lane]
                 values[2] = order_bits_single(wp.float32(dx * dx + dy * dy))
             if wp.static(has_contacts):
-                turn = K[chain_values, layout.VALUE_HALF_LENGTH] * link.omega
+                turn = constants(K).half_length * link.omega
                 speed = TWO * (link.u * link.u + link.v * link.v + turn * turn)
                 if wp.static(tilts):
-                    felt.half_length = K[chain_values, layout.VALUE_HALF_LENGTH]
-                    felt.half_width = K[chain_values, layout.VALUE_HALF_WIDTH]
                     across = greatest_across_speed(felt, link.x, link.y)
                     speed += across * across
                 values[3] = order_bits_single(wp.float32(speed))
