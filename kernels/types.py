@@ -58,6 +58,9 @@ class Model:
 
     chains: wp.array(dtype=Chain)  # (W,)
     links: wp.array3d(dtype=wp.float64)  # (W, LINK_ROWS, N): what each link and joint has of its own, see layout
+    # the floor, if it is not flat, see contacts.terrain
+    faces: wp.array3d(dtype=wp.float64)  # (W, faces, FACE_VALUES)
+    cells: wp.array3d(dtype=wp.float64)  # (W, GROUND_CELLS + 1, CELL_VALUES)
 
 
 @wp.struct
@@ -79,6 +82,7 @@ class Drive:
     hold_softness: wp.array(dtype=wp.float64)  # of the joints from the hold to the release, 1 to 2; 0: own values
     loaded_softness: wp.array(dtype=wp.float64)  # of the joints under load
     push_rate: wp.array(dtype=wp.float64)  # speed at which the sprocket pushes out sunken circles, per depth [1/s]
+    farthest: wp.array(dtype=wp.float64)  # |x| of the centre of mass at which a walk ends [m]; 0: at none
 
 
 @wp.struct
@@ -159,6 +163,23 @@ class Control:
     pile_push: wp.float64  # push_rate of a chain with soft or softer joints [1/s]
     soften_area: wp.float64  # joints soften when the area falls below this fraction of the first
     stiffening_time: wp.float64  # in which joints return to their own values after the release [s]
+
+
+@wp.struct
+class Ground:
+    """The floor of one world, if it is not flat, see :mod:`contacts.terrain`."""
+
+    faces: wp.array2d(dtype=wp.float64)
+    cells: wp.array2d(dtype=wp.float64)
+
+
+@wp.func
+def read_ground(model: Model, world: int) -> Ground:
+    """The floor of one world."""
+    ground = Ground()
+    ground.faces = model.faces[world]
+    ground.cells = model.cells[world]
+    return ground
 
 
 def make_entry(module: wp.Module, is_block: bool):

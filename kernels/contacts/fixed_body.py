@@ -2,7 +2,8 @@
 
 ``surface(chain, face, circle_x, circle_y)`` gives, for the circle of a link about that place, its gap [m] to the body,
 the unit vector n̂ from the body to the circle, the velocity [m/s] of the body's surface where they touch, and the
-coefficients e and μ. ``Face`` is what it needs to know besides the chain's constants.
+coefficients e and μ. ``Face`` is what it needs to know besides the chain's constants. A new body is a surface and a
+line in ``BODIES``.
 """
 
 import functools
@@ -11,21 +12,22 @@ from typing import Any
 
 import warp as wp
 
+from warpchain.kernels import layout
 from warpchain.kernels.contacts.impulse import fixed_contact
+from warpchain.kernels.contacts.terrain import (
+    SMALLEST,
+    Face,
+    cell_at,
+    corner_and_side,
+    first_face,
+    read_face,
+    slope_surface,
+    terrain_surface,
+)
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, quotient
-from warpchain.kernels.types import Chain, Drive
+from warpchain.kernels.types import Chain, Drive, Ground
 
 wp.set_module_options({"enable_backward": False})
-
-SMALLEST = wp.constant(wp.float64(1e-300))
-
-
-@wp.struct
-class Face:
-    """The body at this moment."""
-
-    turning: wp.float64  # angular velocity of the sprocket [rad/s]
-    push_rate: wp.float64  # speed at which it pushes out sunken circles, per depth [1/s]
 
 
 @wp.func
@@ -55,52 +57,88 @@ def sprocket_surface(chain: Chain, face: Face, circle_x: wp.float64, circle_y: w
 
 
 @wp.func
-def sprocket_face(drive: Drive, world: int, time: wp.float64) -> Face:
+def nowhere(_ground: Ground) -> Face:
+    """A body whose place needs no face."""
+    return Face()
+
+
+@wp.func
+def unmoved(face: Face, _drive: Drive, _world: int, _time: wp.float64) -> Face:
+    """A body that does not move."""
+    return face
+
+
+@wp.func
+def turning_sprocket(still: Face, drive: Drive, world: int, time: wp.float64) -> Face:
     """The sprocket, whose angular velocity is a smooth step 3s² − 2s³ from 0 to its final value."""
     ramp = drive.spin_up_time[world]
     since = time - drive.spin_up_start[world]
     s = ONE
     if ramp > ZERO and since < ramp:
         s = wp.max(since, ZERO) / ramp
-    face = Face()
+    face = still
     face.turning = drive.sprocket_speed[world] * s * s * (wp.float64(3.0) - TWO * s)
     face.push_rate = drive.push_rate[world]
     return face
 
 
-@wp.func
-def still_face(_drive: Drive, _world: int, _time: wp.float64) -> Face:
-    """A body that needs none."""
-    return Face()
-
-
 @dataclass(frozen=True)
 class Body:
-    """A body: its surface, and its face at a time [s]."""
+    """A body.
+
+    Attributes:
+        surface: See above.
+        face: ``face(ground)`` → its Face but for its motion.
+        motion: ``motion(face, drive, world, time)`` → its Face at a time [s].
+        in_cells: Whether it has many faces, found through cells, and corners.
+    """
 
     surface: Any
-    face: Any = still_face
+    face: Any = nowhere
+    motion: Any = unmoved
+    in_cells: bool = False
 
 
-BODIES = {"floor": Body(floor_surface), "sprocket": Body(sprocket_surface, sprocket_face)}
+BODIES = {
+    "floor": Body(floor_surface),
+    "sprocket": Body(sprocket_surface, motion=turning_sprocket),
+    "slope": Body(slope_surface, first_face),
+    "terrain": Body(terrain_surface, in_cells=True),
+}
 """Every body by its name."""
 
 
 @functools.cache
 def link_and_body(name: str):
-    """Warp functions of one link and a body: (gap, meet). Both take the places of the link's circles.
+    """Warp functions of one link and a body: (gap, meet). Both take the body, the link's circles, centre and direction.
 
-    ``gap(chain, face, left_x, left_y, right_x, right_y)``: the lesser of its circles' gaps [m].
-    ``meet(chain, face, left_x, left_y, right_x, right_y, x, y, 1/m, 1/I, u, v, ω, lost)``: an impulse for each circle
-    that overlaps and approaches, the left one first; u, v, ω, the energy lost so far [J], and the number of impulses.
+    ``gap(chain, ground, face, left_x, left_y, right_x, right_y, x, y, cosine, sine)``: the least gap [m] of the link.
+    ``meet(… the same …, 1/m, 1/I, u, v, ω, lost)``: an impulse for each circle that overlaps and approaches, the left
+    one first; then for its sides. u, v, ω, the energy lost so far [J], and the number of impulses.
     """
-    surface = BODIES[name].surface
+    surface, in_cells = BODIES[name].surface, BODIES[name].in_cells
 
     @wp.func
-    def gap(chain: Chain, face: Face, left_x: wp.float64, left_y: wp.float64, right_x: wp.float64, right_y: wp.float64):
+    def gap_to_face(
+        chain: Chain,
+        _ground: Ground,
+        face: Face,
+        left_x: wp.float64,
+        left_y: wp.float64,
+        right_x: wp.float64,
+        right_y: wp.float64,
+        x: wp.float64,
+        y: wp.float64,
+        cosine: wp.float64,
+        sine: wp.float64,
+    ):
         left, _nx, _ny, _u, _v, _e, _mu = surface(chain, face, left_x, left_y)
         right, _nx, _ny, _u, _v, _e, _mu = surface(chain, face, right_x, right_y)
-        return wp.min(left, right)
+        least = wp.min(left, right)
+        if wp.static(in_cells):
+            side, _nx, _ny = corner_and_side(chain, face, x, y, cosine, sine)
+            least = wp.min(least, side)
+        return least
 
     @wp.func
     def meet_circle(
@@ -116,11 +154,11 @@ def link_and_body(name: str):
         v: wp.float64,
         omega: wp.float64,
     ):
-        away, nx, ny, surface_u, surface_v, restitution, friction = surface(chain, face, circle_x, circle_y)
+        gap, nx, ny, surface_u, surface_v, restitution, friction = surface(chain, face, circle_x, circle_y)
         r = chain.circle_radius
         return fixed_contact(
             chain,
-            away,
+            gap,
             nx,
             ny,
             circle_x - x - r * nx,
@@ -137,8 +175,9 @@ def link_and_body(name: str):
         )
 
     @wp.func
-    def meet(
+    def meet_face(
         chain: Chain,
+        _ground: Ground,
         face: Face,
         left_x: wp.float64,
         left_y: wp.float64,
@@ -146,6 +185,8 @@ def link_and_body(name: str):
         right_y: wp.float64,
         x: wp.float64,
         y: wp.float64,
+        cosine: wp.float64,
+        sine: wp.float64,
         inverse_mass: wp.float64,
         inverse_inertia: wp.float64,
         u: wp.float64,
@@ -159,6 +200,112 @@ def link_and_body(name: str):
         u, v, omega, lost_right, hit_right = meet_circle(
             chain, face, right_x, right_y, x, y, inverse_mass, inverse_inertia, u, v, omega
         )
-        return u, v, omega, lost + lost_left + lost_right, hit_left + hit_right
+        lost = lost + lost_left + lost_right
+        hits = hit_left + hit_right
+        if wp.static(in_cells):
+            gap, nx, ny = corner_and_side(chain, face, x, y, cosine, sine)
+            push = chain.push_rate * wp.max(ZERO, -gap)
+            u, v, omega, lost_side, hit_side = fixed_contact(
+                chain,
+                gap,
+                nx,
+                ny,
+                face.x - x,
+                face.y - y,
+                push * nx,
+                push * ny,
+                inverse_mass,
+                inverse_inertia,
+                chain.floor_restitution,
+                chain.floor_friction,
+                u,
+                v,
+                omega,
+            )
+            lost += lost_side
+            hits += hit_side
+        return u, v, omega, lost, hits
+
+    if not in_cells:
+        return gap_to_face, meet_face
+
+    @wp.func
+    def gap(
+        chain: Chain,
+        ground: Ground,
+        _face: Face,
+        left_x: wp.float64,
+        left_y: wp.float64,
+        right_x: wp.float64,
+        right_y: wp.float64,
+        x: wp.float64,
+        y: wp.float64,
+        cosine: wp.float64,
+        sine: wp.float64,
+    ):
+        least = ground.cells[layout.GROUND_CELLS, layout.GROUND_MARGIN]
+        cell = cell_at(ground, x)
+        if wp.min(left_y, right_y) - chain.circle_radius - ground.cells[cell, layout.TOP] < least:
+            last = int(ground.cells[cell, layout.LAST_FACE])
+            k = int(ground.cells[cell, layout.FIRST_FACE])
+            while k <= last:
+                face = read_face(ground, k)
+                to_face = gap_to_face(chain, ground, face, left_x, left_y, right_x, right_y, x, y, cosine, sine)
+                least = wp.min(least, to_face)
+                k += 1
+        return least
+
+    @wp.func
+    def meet(
+        chain: Chain,
+        ground: Ground,
+        _face: Face,
+        left_x: wp.float64,
+        left_y: wp.float64,
+        right_x: wp.float64,
+        right_y: wp.float64,
+        x: wp.float64,
+        y: wp.float64,
+        cosine: wp.float64,
+        sine: wp.float64,
+        inverse_mass: wp.float64,
+        inverse_inertia: wp.float64,
+        first_u: wp.float64,
+        first_v: wp.float64,
+        first_omega: wp.float64,
+        lost_before: wp.float64,
+    ):
+        u = first_u + ZERO
+        v = first_v + ZERO
+        omega = first_omega + ZERO
+        lost = lost_before + ZERO
+        hits = wp.int64(0)
+        cell = cell_at(ground, x)
+        last = int(ground.cells[cell, layout.LAST_FACE])
+        k = int(ground.cells[cell, layout.FIRST_FACE])
+        while k <= last:
+            face = read_face(ground, k)
+            u, v, omega, lost, hits_here = meet_face(
+                chain,
+                ground,
+                face,
+                left_x,
+                left_y,
+                right_x,
+                right_y,
+                x,
+                y,
+                cosine,
+                sine,
+                inverse_mass,
+                inverse_inertia,
+                u,
+                v,
+                omega,
+                lost,
+            )
+            hits += hits_here
+            k += 1
+        return u, v, omega, lost, hits
 
     return gap, meet

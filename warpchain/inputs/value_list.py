@@ -50,7 +50,7 @@ def list_values(preset_name: str) -> dict[str, list[ValueEntry]]:
     parameters = preset(preset_name)
     # A word for the method stands for settings of other options, which are listed as they come out.
     options = Options().model_dump() | {"method": Options.model_fields["method"].default}
-    values = {"parameters": parameters.model_dump(), "scene": Scene().model_dump(), "options": options}
+    values = {"parameters": parameters.model_dump(), "scene": dict(Scene()), "options": options}
     return {section: list(_entries(section, values[section], preset_name)) for section in values}
 
 

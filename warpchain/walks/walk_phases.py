@@ -23,7 +23,8 @@ from warpchain.engine.control import (
     suitable_load,
 )
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
-from warpchain.inputs.scene import contact_radius, joint_radius, loop_speed, settling_time
+from warpchain.inputs.floor import body_of, circles_of, raised_by
+from warpchain.inputs.scene import contact_radius, floor_points, joint_radius, loop_speed, settling_time
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
 from warpchain.inputs.validation import InputError
@@ -85,13 +86,15 @@ class WalkRun:
         self.drive_counts = dict.fromkeys(COUNTS, 0)
         self.drive_extremes = dict.fromkeys(EXTREMES, 0.0)
         self._batch, self._world = batch, world
-        self._hanging_lowest = math.nan
+        self._hanging_raise = math.nan
         self._released = False
         self._hold_softness = 0.0
 
         scene, parameters = setup.scene, setup.parameters
         self._has_sprocket = scene.start != "ellipse"
         self._tilts = scene.plane == "tilting"
+        self._floor = floor_points(scene)
+        self._level = math.cos(math.radians(scene.slope))  # of a distance along the floor
         from_rest = scene.start == "rest"
         speed = 2 * math.pi * scene.frequency * joint_radius(scene, parameters)
         if not self._has_sprocket:
@@ -159,7 +162,7 @@ class WalkRun:
     def features(self) -> Features:
         """What the kernel that carries the world on must be compiled for."""
         if self._released:
-            return self._batch.features(fixed_body="floor", tilts=self._tilts)
+            return self._batch.features(fixed_body=body_of(self._floor), tilts=self._tilts)
         return self._batch.features(fixed_body="sprocket")
 
     @property
@@ -261,10 +264,12 @@ class WalkRun:
         """Results of the walk apart from its motion, by the names of the fields of `WalkResult`."""
         counts, extremes = self.counts, self.extremes
         is_at_rest = self.status == Status.AT_REST
-        # Δx is x of the centre of mass, because the sprocket's centre is at x = 0
+        # Δx is x of the centre of mass, because the sprocket's centre is at x = 0; on a slope, along the floor
         return {
             "status": self.status,
-            "dx": float(self._batch.last_sample(self._world)[layout.CENTER_X]) if is_at_rest else math.nan,
+            "dx": float(self._batch.last_sample(self._world)[layout.CENTER_X]) / self._level
+            if is_at_rest
+            else math.nan,
             "walk_time": self.walk_time,
             "simulated_time": self.simulated_time,
             "hold_time": self.hold_time,
@@ -296,9 +301,8 @@ class WalkRun:
         if self._released or status != Status.FINISHED:
             self.status = status
             return False
-        if self._batch.time(self._world) <= self._settled and math.isnan(self._hanging_lowest):
-            position = self._batch.position(self._world)
-            self._hanging_lowest = lowest_point(position, self.setup.parameters)
+        if self._batch.time(self._world) <= self._settled and math.isnan(self._hanging_raise):
+            self._hanging_raise = self._raise(self._batch.position(self._world))
             self._start_drive()
         else:
             self.drive_time = self._batch.time(self._world)
@@ -313,13 +317,22 @@ class WalkRun:
         limit = self._at_full_speed + self.setup.scene.hold_limit
         self._batch.resume(self._world, limit, Status.NOT_STEADY)
 
+    def _raise(self, position: Array) -> float:
+        """How far a chain at this position must be raised to its clearance [m]."""
+        clearance, parameters = self.setup.scene.clearance, self.setup.parameters
+        if self._floor is None:
+            return clearance - lowest_point(position, parameters)
+        circles = circles_of(position, parameters.link_length)
+        return raised_by(self._floor, circles, parameters.circle_radius, clearance)
+
     def _release(self, position: Array, velocity: Array) -> None:
-        scene = self.setup.scene
-        lowest = lowest_point(position, self.setup.parameters)
-        measured = self._hanging_lowest if scene.clearance_of == "hanging" else lowest
-        self.raised = scene.clearance - measured
+        scene, parameters = self.setup.scene, self.setup.parameters
+        self.raised = self._hanging_raise if scene.clearance_of == "hanging" else self._raise(position)
         position[:, 1] += self.raised
-        self._batch.set_chain(self._world, self.setup.parameters, scene.links)
+        self._batch.set_chain(self._world, parameters, scene.links)
+        self._batch.set_drive(self._world, farthest=(scene.distance_limit or 0.0) * self._level)
+        if self._floor is not None:
+            self._batch.set_floor(self._world, self._floor, parameters)
         self._batch.load(
             self._world,
             position,

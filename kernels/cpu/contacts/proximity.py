@@ -9,8 +9,10 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.contacts.fixed_body import Face, link_and_body
+from warpchain.kernels.contacts.fixed_body import BODIES, link_and_body
+from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.layout import (
+    COSINE,
     ERROR,
     INVERSE_INERTIA,
     INVERSE_MASS,
@@ -20,6 +22,7 @@ from warpchain.kernels.layout import (
     OMEGA,
     RIGHT_X,
     RIGHT_Y,
+    SINE,
     U,
     V,
     X,
@@ -27,7 +30,7 @@ from warpchain.kernels.layout import (
 )
 from warpchain.kernels.physics.elementary import ONE, TWO, ZERO, from_order_key, order_bits, order_key
 from warpchain.kernels.physics.geometry import LANES, whole_lanes
-from warpchain.kernels.types import Chain
+from warpchain.kernels.types import Chain, Ground
 
 wp.set_module_options({"enable_backward": False})
 
@@ -75,25 +78,38 @@ def overlaps(K: wp.array2d(dtype=wp.float64), first: int):
 def fixed_contacts(fixed_body: str):
     """Warp functions of all links and a body: (least gap, resolve).
 
-    ``least_gap(K, chain, face)``: the least gap [m] of the placed links, which are written row by row.
-    ``resolve(K, chain, face)``: applies the impulses, after the gaps, and returns their number. Few links touch at a
-    time: only vectors with a link that overlaps the body go through the impulse law.
+    ``least_gap(K, chain, ground, face)``: the least gap [m] of the placed links, each of which goes to its row.
+    ``resolve(K, chain, ground, face)``: applies the impulses, after the gaps, and returns their number. Few links touch
+    at a time: only vectors with a link that overlaps the body go through the impulse law.
     """
     gap_of, meet = link_and_body(fixed_body)
+    in_cells = BODIES[fixed_body].in_cells
 
     @wp.func
-    def least_gap(K: wp.array2d(dtype=wp.float64), chain: Chain, face: Face):
+    def least_gap(K: wp.array2d(dtype=wp.float64), chain: Chain, ground: Ground, face: Face):
         least = FURTHEST
         i = int(0)
         while i < whole_lanes(chain.link_count):
-            gap = gap_of(chain, face, K[LEFT_X, i], K[LEFT_Y, i], K[RIGHT_X, i], K[RIGHT_Y, i])
+            gap = gap_of(
+                chain,
+                ground,
+                face,
+                K[LEFT_X, i],
+                K[LEFT_Y, i],
+                K[RIGHT_X, i],
+                K[RIGHT_Y, i],
+                K[X, i],
+                K[Y, i],
+                K[COSINE, i],
+                K[SINE, i],
+            )
             K[GAP, i] = wp.where(i < chain.link_count, gap, ONE)
             least = wp.min(least, wp.where(i < chain.link_count, order_key(gap), FURTHEST))
             i += 1
         return from_order_key(least)
 
     @wp.func
-    def resolve(K: wp.array2d(dtype=wp.float64), chain: Chain, face: Face):
+    def resolve(K: wp.array2d(dtype=wp.float64), chain: Chain, ground: Ground, face: Face):
         impulses = wp.int64(0)
         first = int(0)
         while first < whole_lanes(chain.link_count):
@@ -101,8 +117,13 @@ def fixed_contacts(fixed_body: str):
                 lane = int(0)
                 while lane < LANES:
                     i = first + lane
+                    lane += 1
+                    if wp.static(in_cells):
+                        if K[GAP, i] >= ZERO:
+                            continue
                     u, v, w, lost, hits = meet(
                         chain,
+                        ground,
                         face,
                         K[LEFT_X, i],
                         K[LEFT_Y, i],
@@ -110,6 +131,8 @@ def fixed_contacts(fixed_body: str):
                         K[RIGHT_Y, i],
                         K[X, i],
                         K[Y, i],
+                        K[COSINE, i],
+                        K[SINE, i],
                         K[INVERSE_MASS, i],
                         K[INVERSE_INERTIA, i],
                         K[U, i],
@@ -122,7 +145,6 @@ def fixed_contacts(fixed_body: str):
                     K[OMEGA, i] = w
                     K[LOST_FIXED, i] = lost
                     impulses += wp.where(i < chain.link_count, hits, wp.int64(0))
-                    lane += 1
             first += LANES
         return impulses
 

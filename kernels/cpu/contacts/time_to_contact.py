@@ -9,8 +9,9 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.contacts.fixed_body import BODIES, Face
+from warpchain.kernels.contacts.fixed_body import BODIES
 from warpchain.kernels.contacts.list_layout import list_layout
+from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.proximity import greatest_speed
 from warpchain.kernels.cpu.tilting import greatest_tilting_speed
 from warpchain.kernels.features import Features
@@ -94,14 +95,15 @@ def fastest_meeting(columns: int):
 def step_bound(features: Features, has_flight: bool):
     """Warp function: longest step [s] from a placed state that cannot miss a contact; ∞ if there are none.
 
-    ``bound(K, L, chain, control, is_rigid, gap, slack, longest)``; ``longest`` [s] bounds steps near a contact.
+    ``bound(K, L, chain, face, control, is_rigid, gap, slack, longest)``; ``longest`` [s] bounds steps near a contact.
     """
-    has_floor = features.fixed_body == "floor"
     has_fixed = features.fixed_body != "none"
     has_self = features.self_contact
     count = list_layout(features.columns).count
     meeting = fastest_meeting(features.columns)
-    approaching = fastest_approach("floor")
+    has_fixed_approach = has_fixed and not BODIES[features.fixed_body].in_cells
+    if has_fixed_approach:
+        approaching = fastest_approach(features.fixed_body)
     speed_bound = greatest_tilting_speed if features.tilts else greatest_speed
 
     @wp.func
@@ -109,6 +111,7 @@ def step_bound(features: Features, has_flight: bool):
         K: wp.array2d(dtype=wp.float64),
         L: wp.array(dtype=wp.int32),
         chain: Chain,
+        face: Face,
         control: Control,
         is_rigid: bool,
         gap: wp.float64,
@@ -120,8 +123,11 @@ def step_bound(features: Features, has_flight: bool):
         if wp.static(has_flight):
             if is_rigid:
                 approach = ZERO
-                if wp.static(has_floor):
-                    approach = approaching(K, chain, Face())
+                if wp.static(has_fixed_approach):
+                    approach = approaching(K, chain, face)
+                elif wp.static(has_fixed):
+                    # what a circle approaches may be another face than that which is nearest to it
+                    approach = greatest_speed(K, chain) / wp.max(gap, SMALLEST_GAP)
                 if wp.static(has_self):
                     approach = wp.max(approach, meeting(K, L, chain))
                     approach = wp.max(approach, greatest_speed(K, chain) / wp.max(slack, SMALLEST_GAP))

@@ -5,16 +5,16 @@ import functools
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.contacts.fixed_body import BODIES, Face, link_and_body
+from warpchain.kernels.contacts.fixed_body import BODIES, link_and_body
 from warpchain.kernels.contacts.tilting_floor import greatest_across_speed, middle_height, steepness
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import ends_of
 from warpchain.kernels.gpu.stage import Link, Place, Proximity, constants, felt_plane, read_link, vec5d
 from warpchain.kernels.gpu.threads import block_maxima, vec4i
-from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, OMEGA, U, V
+from warpchain.kernels.layout import COSINE, INVERSE_INERTIA, INVERSE_MASS, OMEGA, SINE, U, V
 from warpchain.kernels.methods.controller import quick_quotient, quick_root
 from warpchain.kernels.physics.elementary import TWO, from_order_key_single, order_bits_single, order_key_single
-from warpchain.kernels.types import Chain, Control, Drive
+from warpchain.kernels.types import Chain, Control, Drive, Ground
 
 wp.set_module_options({"enable_backward": False})
 
@@ -36,7 +36,7 @@ def block_proximity(features: Features, block_dim: int):
     has_contacts = has_fixed or has_self
     if has_fixed:
         gap_of, meet = link_and_body(features.fixed_body)
-        face_at = BODIES[features.fixed_body].face
+        face_of, face_at = BODIES[features.fixed_body].face, BODIES[features.fixed_body].motion
     tilts = features.tilts
     _maximum, write_maxima, read_maxima = block_maxima(block_dim)
 
@@ -45,6 +45,7 @@ def block_proximity(features: Features, block_dim: int):
         K: wp.array2d(dtype=wp.float64),
         memory: wp.uint64,
         place: Place,
+        ground: Ground,
         link: Link,
         next_end: vec5d,
     ):
@@ -65,7 +66,20 @@ def block_proximity(features: Features, block_dim: int):
                 gap = lowest - felt.half_width * wp.abs(felt.up_z)
                 values[1] = order_key_single(wp.float32(-gap))
             elif wp.static(has_fixed):
-                gap = gap_of(constants(K), Face(), left_x, left_y, right_x, right_y)
+                own = constants(K)
+                gap = gap_of(
+                    own,
+                    ground,
+                    face_of(ground),
+                    left_x,
+                    left_y,
+                    right_x,
+                    right_y,
+                    link.x,
+                    link.y,
+                    link.arm_x / own.half_length,
+                    link.arm_y / own.half_length,
+                )
                 values[1] = order_key_single(wp.float32(-gap))
             if wp.static(has_self):
                 dx = right_x - K[layout.BOARD_LISTED_X, place.lane]
@@ -107,6 +121,7 @@ def block_proximity(features: Features, block_dim: int):
     def meet_fixed_body(
         K: wp.array2d(dtype=wp.float64),
         place: Place,
+        ground: Ground,
         chain: Chain,
         drive: Drive,
         world: int,
@@ -117,13 +132,16 @@ def block_proximity(features: Features, block_dim: int):
         left_x, left_y, right_x, right_y = ends_of(link)
         u, v, omega, lost, hits = meet(
             chain,
-            face_at(drive, world, time),
+            ground,
+            face_at(face_of(ground), drive, world, time),
             left_x,
             left_y,
             right_x,
             right_y,
             link.x,
             link.y,
+            K[COSINE, place.lane],
+            K[SINE, place.lane],
             K[INVERSE_MASS, place.column],
             K[INVERSE_INERTIA, place.column],
             link.u,
