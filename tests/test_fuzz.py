@@ -15,15 +15,15 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from warpchain.inputs.value_list import list_values
 
+from tests.support.setups import setup_walk
 from warpchain.cli.main import main
 from warpchain.inputs.distributions import DRAWABLE
 from warpchain.inputs.setup import read_setup, resolve
 from warpchain.inputs.validation import FIELDS, LONGEST_LINE, NAME_OF_SYMBOL, SECTION_OF, InputError
-from warpchain.inputs.value_list import list_values
 from warpchain.inputs.yaml_files import parse_yaml
 from warpchain.run import single_walk
-from warpchain.run.single_walk import setup_walk
 from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.plan import load_sweep
 
