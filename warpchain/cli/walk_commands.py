@@ -197,7 +197,7 @@ def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -
 
 
 def _setup(preset: str, own: Mapping[str, Any], given: Sections, seed: int | None, records_loads: bool) -> "Setup":
-    """The setup of a walk: values of the command line over those of a file or a saved walk, and the sample of the seed."""
+    """The setup of a walk: values of the command line over those of a file or a saved walk, and the drawn sample."""
     from warpchain.run.single_walk import complete_setup
 
     sections = {section: own.get(section, {}) for section in given}
