@@ -96,7 +96,7 @@ def test_the_layout_is_that_of_the_sweep(tmp_path: Path) -> None:
                     row[drawn_column(name)] = value
             write(store, shard, rows)
     result = load(tmp_path)
-    for index in range(sweep.walk_count):
+    for index in sweep.indices.tolist():
         walk = sweep.planned(index)
         block = result.blocks[sweep.blocks[walk.block].name]
         place = (*walk.cell, walk.sample)

@@ -144,6 +144,13 @@ class Scene(Section):
         le=HIGHEST,
         exclude_if=lambda limit: limit is None,
     )
+    walk_until: float | None = number_field(
+        None,
+        "s",
+        "time from the release after which a walk that is not at rest is finished, as planned, without Δx; null: none",
+        gt=0,
+        le=LONGEST,
+    )
     plane: Literal["fixed", "tilting"] = Field(
         default="fixed",
         description="whether the chain stays in an upright plane, or walks in one that moves, turns and may fall over",

@@ -1,7 +1,7 @@
 """The motion of any given chain: what tests and analysts use."""
 
 from collections.abc import Sequence
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +10,10 @@ from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.tallies import LOST
 from warpchain.inputs.floor import body_of, checked_profile, circles_of, distances
-from warpchain.inputs.keywords import Method, Number, OtherOptions, Preset, Truth
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import MOST_LINKS, check_links_on_gpu
+from warpchain.inputs.sections import takes_fields
 from warpchain.inputs.validation import InputError, plain, shown, validated
 from warpchain.status import Status
 from warpchain.walks.trajectory import Trajectory
@@ -28,20 +28,21 @@ _UNSOFTENED = {"soften_pile": False, "soften_drive": False}
 """A given chain has no phases in which joints soften."""
 
 
+@takes_fields("options", without=("soften_pile", "soften_drive"))
 def simulate(
-    parameters: Parameters | Preset,
+    parameters: Parameters | str,
     position: Array,
     velocity: Array,
-    duration: Number,
+    duration: float,
     *,
-    times: Sequence[Number] | Array | None = None,
-    floor: Truth | Sequence[Sequence[Number]] | Array = True,
-    gravity: Truth = True,
-    self_contact: Truth = True,
-    method: Method = "rkf78",
-    tolerance: Number | None = None,
+    times: Sequence[float] | Array | None = None,
+    floor: bool | Sequence[Sequence[float]] | Array = True,
+    gravity: bool = True,
+    self_contact: bool = True,
+    method: str = "rkf78",
+    tolerance: float | None = None,
     device: str = "cpu",
-    **settings: Unpack[OtherOptions],
+    **settings: Any,
 ) -> Trajectory:
     """Integrate a given chain, without sprocket.
 
@@ -185,7 +186,7 @@ def _checked_state(name: str, given: Array) -> Array:
     return array
 
 
-def _checked_times(duration: float, times: Sequence[Number] | Array | None) -> Array:
+def _checked_times(duration: float, times: Sequence[float] | Array | None) -> Array:
     """Instants of a trajectory, which rise within the duration, or an `InputError`."""
     if isinstance(duration, bool) or not isinstance(duration, int | float):
         raise InputError(f"duration: {shown(duration)} is not a number; give seconds")

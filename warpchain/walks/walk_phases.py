@@ -299,7 +299,9 @@ class WalkRun:
         if not self._released:
             self.drift = self._batch.watched(self._world, layout.DRIFT)
         if self._released or status != Status.FINISHED:
-            self.status = status
+            until, limit = self.setup.scene.walk_until, self.setup.scene.walk_limit
+            is_planned = status == Status.TIME_LIMIT and until is not None and until <= limit
+            self.status = Status.FINISHED if is_planned else status
             return False
         if self._batch.time(self._world) <= self._settled and math.isnan(self._hanging_raise):
             self._hanging_raise = self._raise(self._batch.position(self._world))
@@ -337,7 +339,7 @@ class WalkRun:
             self._world,
             position,
             velocity,
-            stop_time=scene.walk_limit,
+            stop_time=min(scene.walk_limit, scene.walk_until or math.inf),
             stop_status=Status.TIME_LIMIT,
             attempts_before=self.drive_counts["accepted"] + self.drive_counts["rejected"],
             softness=self._hold_softness,
