@@ -12,6 +12,7 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import warn_of_units
 from warpchain.inputs.sections import by_section
 from warpchain.inputs.setup import DEFAULT_PRESET, Setup, check_has_joint_forces, resolve
+from warpchain.inputs.state import State, continued
 from warpchain.inputs.validation import InputError, checked_positive, checked_whole, full_name, plain, shown
 from warpchain.walks.motion import LONGEST_INTERVAL, Keep
 from warpchain.walks.scheduler import run_setups
@@ -51,7 +52,7 @@ def walk(
     preset: Preset | None = None,
     method: Method | None = None,
     tolerance: Number | None = None,
-    start: Literal["rest", "spinning", "ellipse"] | None = None,
+    start: Literal["rest", "spinning", "ellipse"] | State | None = None,
     setup: Setup | None = None,
     seed: Whole | None = None,
     frame_interval: Number | None = 2e-3,
@@ -73,7 +74,9 @@ def walk(
             ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
         tolerance: Error allowed in a step, absolute (SI units) and relative alike; None: the method's, 1e-6 for an
             integrator, 1e-4 for ``"hybrid"``, and of ``"standard"`` and ``"explicit"`` 3e-3 while joints are soft.
-        start: None or ``"rest"``, ``"spinning"`` or ``"ellipse"``.
+        start: None or ``"rest"``, ``"spinning"`` or ``"ellipse"``; or a :class:`State`, from which the walk goes on to
+            its end, by itself the rest of the same walk to the bit. Beside a state only parameters, options and
+            ``walk_limit`` are taken, and nothing is drawn.
         setup: ``setup`` of another walk, which is repeated to the bit, whatever was drawn for it. It is complete: no
             other setting is taken beside it, nothing is drawn, and ``seed`` is only noted in the result.
         seed: Draw those parameters, phase and clearance that are not given from their distributions; None: Table 1's
@@ -108,7 +111,15 @@ def walk(
     given: dict[str, object] = {name: value for name, value in named.items() if value is not None}
     given.update(settings)
     loads = _truth(record_loads, "record_loads")
-    if setup is None:
+    if isinstance(start, State) and setup is None:
+        for name, value in (("preset", preset), ("seed", seed)):
+            if value is not None:
+                raise InputError(f"{name}: given together with a state, for which nothing is drawn; leave it out")
+        del given["start"]
+        sections = by_section(given)
+        setup = continued(start, sections)
+        warn_of_units((f"parameters.{name}", name, value) for name, value in sections["parameters"].items())
+    elif setup is None:
         sections = by_section(given)
         setup = complete_setup(DEFAULT_PRESET if preset is None else preset, sections, seed, loads)
         parameters = plain(sections["parameters"], "parameters")
@@ -170,7 +181,7 @@ def run_walk(
     """Run a walk whose setup is complete, samples drawn; the seed is only noted. The rest is as of :func:`walk`."""
     started = time.perf_counter()
     frame_every, between = _frame_marks(plain(frame_interval, "frame_interval"), setup.options)
-    before = _time_before(plain(record_before, "record_before"), frame_every) if setup.scene.start != "ellipse" else 0.0
+    before = _time_before(plain(record_before, "record_before"), frame_every) if setup.has_drive else 0.0
 
     if record_loads:
         check_has_joint_forces(setup.options)
