@@ -38,7 +38,7 @@ class Status(IntEnum):
 _SENTENCES: Final[dict[Status, str]] = {
     Status.RUNNING: "The run has not ended yet; let it go on.",
     Status.AT_REST: "The chain came to rest.",
-    Status.FINISHED: "The simulation reached its duration.",
+    Status.FINISHED: "The run reached its planned end.",
     Status.TIME_LIMIT: (
         "The chain was still moving at the time limit of the walk; raise scene.walk_limit, "
         "or give the floor more friction if the chain slides without end."

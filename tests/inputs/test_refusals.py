@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import warpchain
+from tests.support.setups import setup_walk
 from warpchain.inputs.sections import SECTION_OF, SECTIONS
 from warpchain.inputs.setup import read_setup, resolve
 from warpchain.inputs.validation import (
@@ -30,7 +31,6 @@ from warpchain.inputs.validation import (
 )
 from warpchain.inputs.yaml_files import LARGEST_FILE, read_yaml
 from warpchain.kernels.methods.method import find_method, method_names
-from warpchain.run.single_walk import setup_walk
 from warpchain.sweeps.plan import load_sweep
 
 SWEEP = {"version": 1, "name": "x", "seed": 1, "samples": 1, "preset": "soft"}

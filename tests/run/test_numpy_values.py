@@ -5,9 +5,9 @@ import pytest
 
 import warpchain
 from tests.oracle_model.circular_loop import circular_loop
+from tests.support.setups import setup_walk
 from warpchain.inputs.sections import SECTION_OF
 from warpchain.inputs.validation import InputError, plain
-from warpchain.run.single_walk import setup_walk
 from warpchain.sweeps.plan import load_sweep
 
 PLAIN = {"version": 1, "name": "grid", "seed": 3, "preset": "soft", "samples": 2}

@@ -7,11 +7,11 @@ import pytest
 
 import warpchain
 from tests.oracle_model.circular_loop import circular_loop
+from tests.support.setups import setup_walk
 from warpchain import InputError
 from warpchain.engine.batch import Batch
 from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.parameters import preset
-from warpchain.run.single_walk import setup_walk
 
 SOFT = preset("soft")
 SETUP = setup_walk("soft", {}, None)

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.support.setups import setup_walk
 from warpchain.engine.batch import Batch
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import contact_radius, loop_speed
 from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
-from warpchain.run.single_walk import setup_walk
 from warpchain.status import Status
 from warpchain.walks.walk_phases import Phase, WalkRun
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from tests.support.setups import setup_walk
 from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content, drawn
 from warpchain.inputs.distributions import Gaussian, random_generator, sampled
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import check_scene, fewest_links
 from warpchain.inputs.setup import resolve
 from warpchain.inputs.validation import Bounds, InputError
-from warpchain.run.single_walk import setup_walk
 from warpchain.sweeps.designs import design_points, saltelli_outputs, sobol_indices
 from warpchain.sweeps.plan import Sweep, load_sweep
 

@@ -197,20 +197,14 @@ def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -
 
 
 def _setup(preset: str, own: Mapping[str, Any], given: Sections, seed: int | None, records_loads: bool) -> "Setup":
-    """The setup of a walk: the command line's values over those of a file or a saved walk, and the sample of the seed.
-
-    A parameter that looks like one in another unit brings a warning.
-    """
-    from warpchain.inputs.parameters import warn_of_units
+    """The setup of a walk: values of the command line over those of a file or a saved walk, and the drawn sample."""
     from warpchain.run.single_walk import complete_setup
 
     sections = {section: own.get(section, {}) for section in given}
     for section, values in given.items():
         if isinstance(sections[section], Mapping):  # `complete_setup` refuses anything else
             sections[section] = {**sections[section], **values}
-    setup = complete_setup(preset, sections, seed, records_loads)
-    warn_of_units((f"parameters.{name}", name, value) for name, value in sections["parameters"].items())
-    return setup
+    return complete_setup(preset, sections, seed, records_loads)
 
 
 def _saved_values(path: Path, options: Mapping[str, object]) -> tuple[str, dict[str, Any], int | None]:

@@ -118,6 +118,13 @@ class Scene(Section):
     walk_limit: float = number_field(
         20.0, "s", "longest time from the release to rest; then the walk ends as time_limit", gt=0, le=LONGEST
     )
+    walk_until: float | None = number_field(
+        None,
+        "s",
+        "time from the release after which a walk that is not at rest is finished, as planned, without Δx; null: none",
+        gt=0,
+        le=LONGEST,
+    )
     plane: Literal["fixed", "tilting"] = Field(
         default="fixed",
         description="whether the chain stays in an upright plane, or walks in one that moves, turns and may fall over",

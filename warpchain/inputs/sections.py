@@ -1,7 +1,8 @@
-"""Sections of a user's values."""
+"""Sections of a user's values, by name in signatures of functions, and by name or symbol in what a user gives."""
 
-from collections.abc import Mapping
-from typing import Final
+import inspect
+from collections.abc import Callable, Container, Mapping
+from typing import Final, TypeVar
 
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
@@ -18,10 +19,35 @@ from warpchain.inputs.validation import (
     suggested_name,
 )
 
-__all__ = ["NAME_OF_SYMBOL", "SECTIONS", "SECTION_OF", "SYMBOL_OF", "by_section", "dotted_name"]
+__all__ = ["NAME_OF_SYMBOL", "SECTIONS", "SECTION_OF", "SYMBOL_OF", "by_section", "dotted_name", "takes_fields"]
+
+F = TypeVar("F", bound=Callable[..., object])
 
 SECTIONS: Final[Mapping[str, type[Section]]] = {"scene": Scene, "options": Options, "parameters": Parameters}
 """Sections of a user's values, and the models that hold their fields."""
+
+
+def takes_fields(*sections: str, without: Container[str] = ()) -> Callable[[F], F]:
+    """Let the signature of a function name the fields that its ``**settings`` take, for notebooks to complete.
+
+    Args:
+        sections: keys of `SECTIONS`.
+        without: fields that it does not take; its own arguments are named anyhow.
+    """
+
+    def named(function: F) -> F:
+        signature = inspect.signature(function)
+        *own, settings = signature.parameters.values()
+        fields = [
+            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=..., annotation=field.annotation)
+            for section in sections
+            for name, field in SECTIONS[section].model_fields.items()
+            if name not in signature.parameters and name not in without
+        ]
+        function.__signature__ = signature.replace(parameters=[*own, *fields, settings])  # type: ignore[attr-defined]
+        return function
+
+    return named
 
 
 def by_section(settings: Mapping[str, object]) -> dict[str, dict[str, object]]:

@@ -21,7 +21,7 @@ WIDEST_OPENING: Final = 0.1
 """Greatest distance of two joined link ends, in link lengths; a loop whose ends are farther apart is not closed."""
 WIDEST_MISFIT: Final = 0.5
 """Greatest difference of the distance of two given joints from a link length, in link lengths."""
-OF_THE_WALK: Final = ("walk_limit",)
+OF_THE_WALK: Final = ("walk_limit", "walk_until")
 """Fields of the scene that matter after the release."""
 
 
@@ -178,10 +178,9 @@ def continued(state: State, sections: Mapping[str, Mapping[str, object]]) -> Set
     if scene.plane == "tilting":
         check_can_tilt(options)
     check_links_on_gpu(scene.links, options.device, "start")
-    if scene.walk_limit < state.time:
-        raise InputError(
-            f"walk_limit: {scene.walk_limit:g} s is before the state at {state.time:g} s; give a later one"
-        )
+    for name in OF_THE_WALK:
+        if (end := getattr(scene, name)) is not None and end < state.time:
+            raise InputError(f"{name}: {end:g} s is before the state at {state.time:g} s; give a later time")
     setup = Setup(before.preset, parameters, scene, options)
     memory = state.memory
     if (parameters, options) != (before.parameters, before.options):

@@ -14,7 +14,7 @@ import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final, TypeVar, get_args
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -113,6 +113,13 @@ def field_limits(field: FieldInfo) -> dict[str, float]:
     for limit in field.metadata:
         limits |= {name: float(getattr(limit, name)) for name in ("ge", "gt", "le", "lt") if hasattr(limit, name)}
     return limits
+
+
+def field_choices(field: FieldInfo) -> tuple[Any, ...]:
+    """The words or truth values that a field may have; none for numbers and other texts."""
+    extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+    words: Any = extra.get("enum", [word for word in get_args(field.annotation) if isinstance(word, str)])
+    return (True, False) if field.annotation is bool else tuple(words)
 
 
 def field_bounds(field: FieldInfo) -> Bounds:

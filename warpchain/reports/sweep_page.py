@@ -56,8 +56,9 @@ def write_report(
     """
     result = load(directory)
     checked_output(path, REPORTS)
-    if animation_of is not None and not 0 <= animation_of < result.walk_count:
-        raise InputError(f"--walk: there is no walk {animation_of}; give 0 … {result.walk_count - 1}")
+    known = result.origin.sweeps[0].indices
+    if animation_of is not None and animation_of not in known:
+        raise InputError(f"--walk: there is no walk {animation_of}; give 0 … {known.max()}")
     sections = {
         "Figures": _figures(result),
         "Cells": _cells(result),

@@ -1,7 +1,7 @@
 """The motion of any given chain: what tests and analysts use."""
 
 from collections.abc import Sequence
-from typing import Unpack
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.tallies import LOST
-from warpchain.inputs.keywords import Method, Number, OtherOptions, Preset, Truth
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import check_links_on_gpu
+from warpchain.inputs.sections import takes_fields
 from warpchain.inputs.state import State, real_array
 from warpchain.inputs.validation import InputError, plain, shown, validated
 from warpchain.status import Status
@@ -28,20 +28,21 @@ _UNSOFTENED = {"soften_pile": False, "soften_drive": False}
 """A given chain has no phases in which joints soften."""
 
 
+@takes_fields("options", without=("soften_pile", "soften_drive"))
 def simulate(
-    parameters: State | Parameters | Preset,
+    parameters: State | Parameters | str,
     position: Array | None = None,
     velocity: Array | None = None,
-    duration: Number | None = None,
+    duration: float | None = None,
     *,
-    times: Sequence[Number] | Array | None = None,
-    floor: Truth = True,
-    gravity: Truth = True,
-    self_contact: Truth = True,
-    method: Method = "rkf78",
-    tolerance: Number | None = None,
+    times: Sequence[float] | Array | None = None,
+    floor: bool = True,
+    gravity: bool = True,
+    self_contact: bool = True,
+    method: str = "rkf78",
+    tolerance: float | None = None,
     device: str = "cpu",
-    **settings: Unpack[OtherOptions],
+    **settings: Any,
 ) -> Trajectory:
     """Integrate a given chain, without sprocket.
 
@@ -92,7 +93,7 @@ def simulate(
         return _follow(options, chain, state.position, state.velocity, instants, end, bool(floor))
 
 
-def _checked_state(given: State | Parameters | Preset, position: Array | None, velocity: Array | None) -> State:
+def _checked_state(given: State | Parameters | str, position: Array | None, velocity: Array | None) -> State:
     """The state of the chain, or an `InputError`."""
     if not isinstance(given, State):
         return State.of_links(position, velocity, given)
@@ -145,7 +146,7 @@ def _follow(
     )
 
 
-def _checked_times(duration: float, times: Sequence[Number] | Array | None) -> Array:
+def _checked_times(duration: object, times: Sequence[float] | Array | None) -> Array:
     """Instants of a trajectory, which rise within the duration, or an `InputError`."""
     if isinstance(duration, bool) or not isinstance(duration, int | float):
         raise InputError(f"duration: {shown(duration)} is not a number; give seconds")

@@ -3,14 +3,12 @@
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal, Unpack
+from typing import Any, Literal
 
 from warpchain.engine.devices import gpu_turn, versions
 from warpchain.inputs.distributions import LARGEST_SEED, random_generator, sampled
-from warpchain.inputs.keywords import Method, Number, Preset, Truth, WalkSettings, Whole
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import warn_of_units
-from warpchain.inputs.sections import by_section
+from warpchain.inputs.sections import by_section, takes_fields
 from warpchain.inputs.setup import DEFAULT_PRESET, Setup, check_has_joint_forces, resolve
 from warpchain.inputs.state import State, continued
 from warpchain.inputs.validation import InputError, checked_positive, checked_whole, full_name, plain, shown
@@ -45,21 +43,22 @@ class Progress:
 OnProgress = Callable[[Progress], None]
 
 
+@takes_fields("parameters", "scene", "options")
 def walk(
     *,
-    links: Whole | None = None,
-    frequency: Number | None = None,
-    preset: Preset | None = None,
-    method: Method | None = None,
-    tolerance: Number | None = None,
+    links: int | None = None,
+    frequency: float | None = None,
+    preset: str | None = None,
+    method: str | None = None,
+    tolerance: float | None = None,
     start: Literal["rest", "spinning", "ellipse"] | State | None = None,
     setup: Setup | None = None,
-    seed: Whole | None = None,
-    frame_interval: Number | None = 2e-3,
-    record_before: Number | None = None,
-    record_loads: Truth = False,
+    seed: int | None = None,
+    frame_interval: float | None = 2e-3,
+    record_before: float | None = None,
+    record_loads: bool = False,
     on_progress: OnProgress | None = None,
-    **settings: Unpack[WalkSettings],
+    **settings: Any,
 ) -> WalkResult:
     """Simulate one walk: hang a chain on its sprocket, spin it up, release it and follow it to rest.
 
@@ -99,9 +98,6 @@ def walk(
 
     Raises:
         InputError: A value is refused; nothing has been computed. It is a ``ValueError``.
-
-    Warns:
-        InputWarning: A parameter looks like one in another unit.
     """
     named = {"links": links, "frequency": frequency, "method": method, "tolerance": tolerance, "start": start}
     for symbol in settings:
@@ -116,14 +112,9 @@ def walk(
             if value is not None:
                 raise InputError(f"{name}: given together with a state, for which nothing is drawn; leave it out")
         del given["start"]
-        sections = by_section(given)
-        setup = continued(start, sections)
-        warn_of_units((f"parameters.{name}", name, value) for name, value in sections["parameters"].items())
+        setup = continued(start, by_section(given))
     elif setup is None:
-        sections = by_section(given)
-        setup = complete_setup(DEFAULT_PRESET if preset is None else preset, sections, seed, loads)
-        parameters = plain(sections["parameters"], "parameters")
-        warn_of_units((f"parameters.{name}", name, value) for name, value in parameters.items())
+        setup = complete_setup(DEFAULT_PRESET if preset is None else preset, by_section(given), seed, loads)
     else:
         _check_repeated(setup, given if preset is None else {"preset": preset, **given}, seed)
     return run_walk(
@@ -136,7 +127,7 @@ def walk(
     )
 
 
-def _check_repeated(setup: object, others: Mapping[str, object], seed: Whole | None) -> None:
+def _check_repeated(setup: object, others: Mapping[str, object], seed: int | None) -> None:
     """Refuse what is no complete setup, settings beside one, and what is no seed, by an `InputError`."""
     if not isinstance(setup, Setup):
         raise InputError(
@@ -148,13 +139,8 @@ def _check_repeated(setup: object, others: Mapping[str, object], seed: Whole | N
         checked_whole(plain(seed, "seed"), "seed", 0, LARGEST_SEED)
 
 
-def setup_walk(preset: str, settings: Mapping[str, object], seed: Whole | None, records_loads: bool = False) -> Setup:
-    """The setup of settings by name or symbol; arguments and errors as of `complete_setup`."""
-    return complete_setup(preset, by_section(settings), seed, records_loads)
-
-
 def complete_setup(
-    preset: str, sections: Mapping[str, Mapping[str, object]], seed: Whole | None, records_loads: bool = False
+    preset: str, sections: Mapping[str, Mapping[str, object]], seed: int | None, records_loads: bool = False
 ) -> Setup:
     """Check values by section, complete them, and draw the sample of a seed.
 
@@ -172,9 +158,9 @@ def complete_setup(
 def run_walk(
     setup: Setup,
     *,
-    seed: Whole | None = None,
-    frame_interval: Number | None = 2e-3,
-    record_before: Number | None = None,
+    seed: int | None = None,
+    frame_interval: float | None = 2e-3,
+    record_before: float | None = None,
     record_loads: bool = False,
     on_progress: OnProgress | None = None,
 ) -> WalkResult:

@@ -1,8 +1,8 @@
 """One block of a sweep as arrays with named axes."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -13,12 +13,14 @@ from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError, plain, shown, suggestion
 from warpchain.status import Status
 from warpchain.store.cell_statistics import CellStatistics
+from warpchain.sweeps.block import POINT
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks.rows import (
     COLUMNS,
     LENGTHS,
     MISSING,
     Column,
+    drawn_column,
     faults_of_columns,
     field_column,
     numbers_of,
@@ -117,11 +119,30 @@ class BlockResult:
         return self._column(name).meaning
 
     def _column(self, name: str) -> Column:
-        if name == "sample":
-            return Column("<i8", "1", "number of the sample in its cell")
-        if name not in self.columns and name not in self.axes:
+        if name in ("sample", POINT):
+            of = "sample in its cell" if name == "sample" else "parameter set"
+            return Column("<i8", "1", f"number of the {of}")
+        points = self.origin.sweeps[0].blocks[self.number].points
+        if not any(name in known for known in (self.columns, self.axes, points)):
             raise KeyError(f"{shown(name)}: {suggestion(name, (*self.columns, *self.axes))}")
         return COLUMNS[name] if name in COLUMNS else field_column(name)
+
+    @property
+    def is_there(self) -> NDArray[np.bool_]:
+        """Whether a walk has been computed, shape `shape`."""
+        there: NDArray[np.bool_] = self.columns["status"] != MISSING
+        return there
+
+    def filled_from(self, other: "BlockResult") -> "BlockResult":
+        """The same block with the walks that only another result of it has."""
+
+        def kept_motions(places: Iterable[int]) -> "Iterator[tuple[int, h5py.Group]]":
+            wanted, there = np.array(list(places), np.int64), self.is_there.ravel()
+            for block, own in ((self, there[wanted]), (other, ~there[wanted])):
+                yield from block.kept_motions(wanted[own])
+
+        columns = {name: np.where(self.is_there, values, other.columns[name]) for name, values in self.columns.items()}
+        return replace(self, columns=columns, kept_motions=kept_motions)
 
     @cached_property
     def kept(self) -> NDArray[np.bool_]:
@@ -131,7 +152,7 @@ class BlockResult:
             (choice := series[number]) is not None and choice.includes(sample)
             for number, sample in self.origin.samples(self.number)
         ]
-        kept: NDArray[np.bool_] = np.array(chosen) & (self.columns["status"] != MISSING)
+        kept: NDArray[np.bool_] = np.array(chosen) & self.is_there
         return kept
 
     def series(self, *, sample: int = 0, **at: float | str | None) -> WalkResult:
@@ -210,6 +231,23 @@ class BlockResult:
         """
         return CellStatistics.of(self.axes, self.unit(name), self.columns[name], self.columns["status"])
 
+    def design(self) -> "xarray.DataArray":
+        """What differs between the walks beside the axes, as one array with the names along its last axis, `quantity`.
+
+        Values of parameter sets (`points`) and those that samples drew; NaN of a walk that is not there.
+        """
+        import xarray
+
+        points = self.origin.sweeps[0].blocks[self.number].points
+        values = {name: self._along_points(given) for name, given in points.items()}
+        values |= {name: self.columns[drawn_column(name)] for name in self.drawn}
+        whole = np.stack([np.broadcast_to(each, self.shape).astype(float) for each in values.values()], axis=-1)
+        return xarray.DataArray(whole, {**self.axes, "quantity": list(values)}, (*self.dims, "quantity"))
+
+    def _along_points(self, values: Sequence[Any]) -> Array:
+        """Values of the parameter sets as an array that goes with the columns."""
+        return np.reshape(np.array(values), [len(values) if dim == POINT else 1 for dim in self.dims])
+
     def to_xarray(self) -> "xarray.Dataset":
         """The block as a data set with named coordinates, units and meanings."""
         import xarray
@@ -224,6 +262,13 @@ class BlockResult:
     def variables(self) -> tuple[_Variables, _Variables]:
         """Coordinates and variables."""
         coordinates: _Variables = {name: ((name,), values, self.notes(name)) for name, values in self._places().items()}
+        for name, values in self.origin.sweeps[0].blocks[self.number].points.items():
+            numbers = np.array(values)
+            coordinates[name] = (
+                (POINT,),
+                numbers.astype(float) if numbers.dtype.kind == "O" else numbers,
+                self.notes(name),
+            )
         return coordinates, {name: (self.dims, values, self.notes(name)) for name, values in self.columns.items()}
 
     def _places(self) -> dict[str, Array]:

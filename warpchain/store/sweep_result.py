@@ -22,7 +22,7 @@ from warpchain.store.folder import read_rows
 from warpchain.store.manifest import Folder, Manifest, read_manifest, stored_sweep
 from warpchain.store.shards import opened_motions
 from warpchain.sweeps.block import Block
-from warpchain.walks.rows import COLUMNS, MISSING, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
+from warpchain.walks.rows import COLUMNS, MISSING, STORED_COLUMNS, Rows, derived_columns, drawn_column, quantity_of
 
 if TYPE_CHECKING:
     import h5py
@@ -216,33 +216,40 @@ def load(path: Folder) -> SweepResult:
 def _load_folder(directory: Folder) -> SweepResult:
     manifest, folder = read_manifest(directory), Path(directory).absolute()
     present = read_rows(directory, manifest)
-    numbers = manifest.numbers(present)
 
     def columns(block: Block) -> dict[str, Array]:
-        stop = block.first + block.walk_count
-        here = slice(*np.searchsorted(numbers, [block.first, stop]))
-        found = {"index": np.arange(block.first, stop)}
+        rows = present[present["block"] == manifest.sweep.blocks.index(block)]
+        places = _places(rows, block)
+        found = {"index": block.indices}
         for name in ("status", *STORED_COLUMNS, *map(drawn_column, block.drawn)):
             kind = present.dtype[name]
-            found[name] = np.full(stop - block.first, np.nan if kind.kind == "f" else MISSING, kind)
-            found[name][numbers[here] - block.first] = present[name][here]
-        return {name: values.reshape(block.shape) for name, values in found.items()}
+            values = np.full(block.walk_count, np.nan if kind.kind == "f" else MISSING, kind)
+            values[places] = rows[name]
+            found[name] = values.reshape(block.shape)
+        return found
 
     provenance = {name: getattr(manifest, name) for name in ("digest", "numerics_version", "versions")}
     origin = Origin((manifest.sweep,), provenance)
-    return _result(origin, columns, lambda block: partial(_motions_in_folder, folder, manifest, block.first))
+    return _result(origin, columns, lambda block: partial(_motions_in_folder, folder, manifest, block))
+
+
+def _places(keys: Rows, block: Block) -> NDArray[np.int64]:
+    """Places of some walks of a block in a flat column, given their keys."""
+    places: NDArray[np.int64] = keys["cell"].astype(np.int64) * block.samples + keys["sample"]
+    return places
 
 
 def _motions_in_folder(
-    folder: Path, manifest: Manifest, first: int, places: Iterable[int]
+    folder: Path, manifest: Manifest, block: Block, places: Iterable[int]
 ) -> "Iterator[tuple[int, h5py.Group]]":
-    """`BlockResult.kept_motions` of a block of a folder, given the number of its first walk."""
-    wanted = first + np.array(list(places), np.int64)
-    for shard in manifest.shards:
-        rows = np.flatnonzero(np.isin(shard.walks, wanted)) if shard.keeps_motion else ()
+    """`BlockResult.kept_motions` of a block of a folder."""
+    number, wanted = manifest.sweep.blocks.index(block), list(places)
+    for shard in manifest.shards if wanted else ():
+        there = _places(shard.keys, block)
+        rows = np.flatnonzero((shard.keys["block"] == number) & np.isin(there, wanted)) if shard.keeps_motion else ()
         if len(rows):
             with opened_motions(folder, shard) as file:
-                yield from ((int(shard.walks[row]) - first, file[str(row)]) for row in rows)
+                yield from ((int(there[row]), file[str(row)]) for row in rows)
 
 
 def _load_merged(path: Folder) -> SweepResult:

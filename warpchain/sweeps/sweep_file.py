@@ -28,7 +28,7 @@ from pydantic import (
 )
 
 from warpchain.inputs.distributions import DRAWABLE, LARGEST_SEED, TABLE, Distribution, Gaussian, Uniform
-from warpchain.inputs.keywords import Preset, Sampler
+from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.validation import (
     FIELDS,
@@ -47,8 +47,8 @@ from warpchain.inputs.validation import (
     suggestion,
 )
 from warpchain.inputs.yaml_files import read_yaml
-from warpchain.sweeps.block import Block, Value
-from warpchain.sweeps.designs import check_design
+from warpchain.sweeps.block import POINT, Block, Value
+from warpchain.sweeps.designs import SAMPLERS, check_design
 from warpchain.sweeps.recording import Frames, Recording
 from warpchain.sweeps.shipped import sweep_path
 
@@ -64,6 +64,9 @@ WALK_LIMIT: Final = 2**24
 
 A power of two, because numbers of designed samples are.
 """
+
+_Preset = Literal[*PRESETS]  # type: ignore[valid-type]
+_Sampler = Literal[*SAMPLERS]  # type: ignore[valid-type]
 
 # Fields by name or symbol
 
@@ -234,9 +237,9 @@ class BlockKeys(BaseModel):
 
     model_config = STRICT
 
-    preset: Preset | None = Field(None, description="parameters to start from; may also be an axis of the grid")
+    preset: _Preset | None = Field(None, description="parameters to start from; may also be an axis of the grid")
     samples: int | None = Field(None, ge=1, le=2**30, description="samples in each cell of the grid")
-    sampler: Sampler | None = Field(None, description="how samples are drawn, see below; default: random")
+    sampler: _Sampler | None = Field(None, description="how samples are drawn, see below; default: random")
     scene: Annotated[dict[str, Value], _section("scene")] = Field(
         {}, description="fields of the [scene](scene.md) that differ from their defaults"
     )
@@ -251,8 +254,20 @@ class BlockKeys(BaseModel):
     ] = Field({}, description="what samples draw, see below")
     grid: Annotated[
         dict[str, list[Value]],
-        _mapping_of("grid", {"preset": _axis(Preset), **{name: _axis(kind) for name, kind in _TYPES.items()}}),
+        _mapping_of("grid", {"preset": _axis(_Preset), **{name: _axis(kind) for name, kind in _TYPES.items()}}),
     ] = Field({}, description="axes of the grid, see below; not in a file with blocks")
+
+    points: Annotated[
+        dict[str, list[Value]],
+        _mapping_of(
+            "points",
+            {name: Annotated[list[kind], Field(min_length=1, max_length=AXIS_LIMIT)] for name, kind in _TYPES.items()},
+        ),
+    ] = Field(
+        {},
+        description="parameter sets: quantity → its value in each set, lists of one length; one more axis, `point`, "
+        "beside those of the grid; not in a file with blocks",
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -261,10 +276,19 @@ class BlockKeys(BaseModel):
 
     @model_validator(mode="after")
     def _axes_have_no_other_value(self) -> Self:
-        for name in self.grid:
+        for key, name in [("grid", name) for name in self.grid] + [("points", name) for name in self.points]:
             home = SECTION_OF.get(name, name)
             if self.preset is not None if name == "preset" else name in getattr(self, home):
-                raise InputError(f"grid.{name}: also given in {home}; leave one out")
+                raise InputError(f"{key}.{name}: also given in {home}; leave one out")
+            if key == "points" and name in self.grid:
+                raise InputError(f"points.{name}: also given in grid; leave one out")
+        first = next(iter(self.points), "")
+        for name, values in self.points.items():
+            if len(values) != len(self.points[first]):
+                raise InputError(
+                    f"points.{name}: {len(values)} values, but {first} has {len(self.points[first])}; give a value of "
+                    "each for every set"
+                )
         return self
 
 
@@ -297,8 +321,9 @@ class SweepFile(BlockKeys):
     @model_validator(mode="after")
     def _one_grid_or_blocks(self) -> Self:
         names = [block.name for block in self.blocks or ()]
-        if names and self.grid:
-            raise InputError("grid: given together with blocks; move it into a block")
+        for key in ("grid", "points"):
+            if names and getattr(self, key):
+                raise InputError(f"{key}: given together with blocks; move it into a block")
         for number, name in enumerate(names):
             if name in names[:number]:
                 raise InputError(f"blocks[{number}].name: {shown(name)} is given twice; give another name")
@@ -326,9 +351,14 @@ def sweep_schema() -> dict[str, Any]:
 
 
 def read_sweep(
-    source: str | os.PathLike[str] | Mapping[str, object],
+    source: str | os.PathLike[str] | Mapping[str, object], **replaced: object
 ) -> tuple[str, int, tuple[str, ...], tuple[Block, ...], Recording]:
     """Read a sweep file, or one that comes with the package by its bare name, or take its content as a mapping.
+
+    Args:
+        source: the file or its content.
+        replaced: `seed` and `samples` instead of those at the top of the file; blocks with samples of their own keep
+            these.
 
     Returns:
         Name, seed, axes of equal samples, blocks and recording: the fields of `warpchain.sweeps.plan.Sweep`.
@@ -339,6 +369,9 @@ def read_sweep(
     content = plain(source, "sweep") if isinstance(source, Mapping) else read_yaml(sweep_path(source))
     if not isinstance(content, dict):
         raise InputError(f"{source}: no mapping at the top; give the keys {', '.join(SweepFile.model_fields)}")
+    if replaced.get("samples") is not None and content.get("samples") is None:
+        raise InputError("samples: each block of the sweep has its own; change the file")
+    content = content | {key: value for key, value in replaced.items() if value is not None}
     try:
         file = SweepFile.model_validate(content, context={"expanded": 0})
     except ValidationError as error:
@@ -360,20 +393,25 @@ def _block(name: str, path: str, outer: BlockKeys | None, inner: BlockKeys) -> B
     def merged(key: str) -> dict[str, Any]:
         return {**(getattr(outer, key) if outer else {}), **getattr(inner, key)}
 
+    points = {name: tuple(values) for name, values in inner.points.items()}
     axes = {axis: tuple(values) for axis, values in inner.grid.items()}
-    sections = {key: {name: value for name, value in merged(key).items() if name not in axes} for key in SECTIONS}
+    if points:
+        axes = {POINT: tuple(range(len(next(iter(points.values()))))), **axes}
+    varied = {*axes, *points}
+    sections = {key: {name: value for name, value in merged(key).items() if name not in varied} for key in SECTIONS}
     preset, samples, sampler = (either(key) for key in ("preset", "samples", "sampler"))
     if preset is None and "preset" not in axes:
         raise InputError(f"{path}.preset: missing; name the parameters to start from, such as preset: paper")
     if samples is None:
         raise InputError(f"{path}.samples: missing; give the number of samples per cell")
-    drawn = _drawn(merged("distributions"), sections, axes, f"{path}.distributions")
+    drawn = _drawn(merged("distributions"), sections, varied, f"{path}.distributions")
     check_design(sampler or "random", samples, len(drawn), path)
-    return Block(path, name, None if "preset" in axes else preset, sections, axes, drawn, sampler or "random", samples)
+    fixed = None if "preset" in axes else preset
+    return Block(path, name, fixed, sections, axes, points, drawn, sampler or "random", samples)
 
 
 def _drawn(
-    given: Mapping[str, Any], sections: Mapping[str, Mapping[str, Value]], axes: Mapping[str, object], path: str
+    given: Mapping[str, Any], sections: Mapping[str, Mapping[str, Value]], varied: set[str], path: str
 ) -> dict[str, Distribution]:
     """What a block draws, in the order of drawing.
 
@@ -382,7 +420,7 @@ def _drawn(
     """
     drawn: dict[str, Distribution] = {}
     for name in DRAWABLE:
-        home = "grid" if name in axes else SECTION_OF[name] if name in sections[SECTION_OF[name]] else None
+        home = "grid" if name in varied else SECTION_OF[name] if name in sections[SECTION_OF[name]] else None
         usual = TABLE.get(name) if home is None and given.get("all", "table") == "table" else None
         distribution = given.get(name, usual)
         if distribution is None:
@@ -409,15 +447,16 @@ def _numbered(blocks: list[Block], same_samples_along: tuple[str, ...]) -> Itera
     Raises:
         InputError: there are too many cells or walks.
     """
-    first = first_stream = cells = 0
+    walks = first_stream = cells = 0
+    stride = sum(math.prod(block.shape[:-1]) for block in blocks)
     for block in blocks:
-        yield replace(block, first=first, first_stream=first_stream)
+        yield replace(block, first_cell=cells, stride=stride, first_stream=first_stream)
         cells += math.prod(block.shape[:-1])
-        first += block.walk_count
+        walks += block.walk_count
         if cells > CELL_LIMIT:
             raise InputError(f"{block.path}.grid: {cells:.6g} cells; give fewer values, for {CELL_LIMIT} cells at most")
-        if first > WALK_LIMIT:
+        if walks > WALK_LIMIT:
             raise InputError(
-                f"{block.path}.samples: {first:.6g} walks; give fewer samples, for {WALK_LIMIT} walks at most"
+                f"{block.path}.samples: {walks:.6g} walks; give fewer samples, for {WALK_LIMIT} walks at most"
             )
         first_stream += math.prod(len(values) for name, values in block.axes.items() if name not in same_samples_along)

@@ -171,6 +171,12 @@ class WalkRun:
         return self._released and self._first_area is None
 
     @property
+    def _walk_end(self) -> float:
+        """Time [s] since the release at which a walk ends that is not at rest."""
+        scene = self.setup.scene
+        return min(scene.walk_limit, scene.walk_until or math.inf)
+
+    @property
     def features(self) -> Features:
         """What the kernel that carries the world on must be compiled for."""
         if self._released:
@@ -310,10 +316,12 @@ class WalkRun:
         if self._first_area is not None and status == Status.FINISHED:
             set_first_area(self._batch, self._world, self._first_area)
             self._first_area = None
-            self._batch.resume(self._world, self.setup.scene.walk_limit, Status.TIME_LIMIT)
+            self._batch.resume(self._world, self._walk_end, Status.TIME_LIMIT)
             return True
         if self._released or status != Status.FINISHED:
-            self.status = status
+            until, limit = self.setup.scene.walk_until, self.setup.scene.walk_limit
+            is_planned = status == Status.TIME_LIMIT and until is not None and until <= limit
+            self.status = Status.FINISHED if is_planned else status
             return False
         if self._batch.time(self._world) <= self._settled and math.isnan(self._hanging_lowest):
             position = self._batch.position(self._world)
@@ -339,7 +347,7 @@ class WalkRun:
 
     def _go_on(self, start: State) -> None:
         """Place a chain as a state has it; if that was taken from a walk, go on with the walk."""
-        batch, world, limit, memory = self._batch, self._world, self.setup.scene.walk_limit, start.memory
+        batch, world, memory = self._batch, self._world, start.memory
         batch.set_chain(world, self.setup.parameters, start.links)
         self._released = True
         interval = self.recorder.keep.frame_interval
@@ -349,7 +357,7 @@ class WalkRun:
                 world,
                 start.position,
                 start.velocity,
-                stop_time=limit,
+                stop_time=self._walk_end,
                 stop_status=Status.TIME_LIMIT,
                 has_frame_marks=has_marks,
             )
@@ -361,7 +369,7 @@ class WalkRun:
             restore(batch, world, memory)
             set_frame_marks(batch, world, interval)
         if memory and "scratch" in memory and self._is_at(start):
-            batch.resume(world, limit, Status.TIME_LIMIT)
+            batch.resume(world, self._walk_end, Status.TIME_LIMIT)
             return
         if self._tilts:
             batch.set_plane(world, plane_of_state(start))
@@ -395,7 +403,7 @@ class WalkRun:
             self._world,
             position,
             velocity,
-            stop_time=scene.walk_limit,
+            stop_time=self._walk_end,
             stop_status=Status.TIME_LIMIT,
             attempts_before=self.drive_counts["accepted"] + self.drive_counts["rejected"],
             softness=self._hold_softness,

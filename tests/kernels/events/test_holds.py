@@ -8,10 +8,10 @@ import pytest
 
 import warpchain
 from tests.support.driven_loops import Loop, released_loop
+from tests.support.setups import setup_walk
 from warpchain import InputError, Status, preset
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL
 from warpchain.inputs.scene import Scene, fewest_links, greatest_load
-from warpchain.run.single_walk import setup_walk
 from warpchain.walks import scheduler
 
 SOFT = preset("soft")
