@@ -7,8 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpchain.inputs.methods import METHODS_BY_NEED
-from warpchain.inputs.options import Options
+from warpchain.inputs.options import Options, replaced_by
 from warpchain.inputs.parameters import Parameters, preset
 from warpchain.inputs.scene import MOST_LINKS, Scene, check_links_on_gpu
 from warpchain.inputs.setup import DEFAULT_PRESET, Setup, check_can_tilt
@@ -161,18 +160,13 @@ class State:
 def continued(state: State, sections: Mapping[str, Mapping[str, object]]) -> Setup:
     """The setup of a walk from a state, with other parameters, options or limit of the walk.
 
-    A method brings its own settings, and a tolerance also holds where joints are soft, as in a new walk.
-
     Raises:
         InputError: a value is refused, or is one of what comes before the release.
     """
     if early := [name for name in sections["scene"] if name not in OF_THE_WALK]:
         raise InputError(f"{', '.join(early)}: given together with a state, which lies after the release; leave it out")
     before, given = state.setup, sections["options"]
-    replaced = {"soft_tolerance"} if "tolerance" in given else set()
-    if "method" in given:
-        replaced |= {"tolerance", "soft_tolerance"}.union(*METHODS_BY_NEED.values())
-    options = validated(Options, {**before.options.model_dump(exclude=replaced), **given}, "options")
+    options = validated(Options, {**before.options.model_dump(exclude=replaced_by(given)), **given}, "options")
     scene = validated(Scene, {**vars(before.scene), **sections["scene"]}, "scene")
     parameters = before.parameters.with_values(sections["parameters"]) if sections["parameters"] else before.parameters
     if scene.plane == "tilting":
