@@ -57,6 +57,10 @@ class EvenClock:
         self._interval = interval
         self._next = 0
 
+    def go_on(self, last: Array, time: float) -> None:
+        """Begin between two samples, the first of which was `last`, (columns,), with the mark after a time [s]."""
+        self.last, self._next = last[None, : self.last.shape[1]].copy(), self._passed(time)
+
     def rows(self, samples: Array) -> Array:
         """Rows at the marks up to the last of some more samples; the very first sample is a row as it is."""
         if not len(samples):

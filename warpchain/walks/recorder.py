@@ -127,12 +127,17 @@ class Recorder:
             frame_moments=loads[wanted, :, 2],
         )
 
+    def go_on(self, last: Array, time: float) -> None:
+        """Begin within a walk at a time [s], with the sample before, (columns,)."""
+        if last[layout.TIME] >= 0:
+            self._clock.go_on(last, time)
+
     def motion(self) -> dict[str, Any]:
         """The arrays of a `WalkResult` by name, and its `before_release`."""
         names = ("samples", "times", "frames", "loads", "planes")
         samples, frame_time, joints, loads, planes = self._joined(self._pieces, *names)
-        if len(samples) and samples[-1, layout.TIME] != self._clock.last[0, layout.TIME]:
-            samples = np.concatenate([samples, self._clock.last])
+        last = self._clock.last
+        samples = np.concatenate([samples, last[~np.isin(last[:, layout.TIME], samples[-1:, layout.TIME])]])
         tilting = samples if self._tilts else np.empty((0, layout.ALL_COLUMNS))
         tilt, yaw = angles(tilting[:, layout.PLANE_COLUMN :])
         return {

@@ -370,6 +370,7 @@ class WalkRun:
             set_frame_marks(batch, world, interval)
         if memory and "scratch" in memory and self._is_at(start):
             batch.resume(world, self._walk_end, Status.TIME_LIMIT)
+            self.recorder.go_on(memory["state/last_sample"], start.time)
             return
         if self._tilts:
             batch.set_plane(world, plane_of_state(start))
