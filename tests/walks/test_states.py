@@ -131,7 +131,7 @@ def test_a_state_goes_on_with_other_values(fall: WalkResult) -> None:
         for given in ({}, {"floor_friction": 0.01}, {"tolerance": 1e-8}, {"method": "os32"})
     )
     assert planned.status.label == "finished" and planned.walk_time == 0.4
-    assert slippery.center[-1, 0] > planned.center[-1, 0] + 1e-3
+    assert slippery.center[-1, 0] < planned.center[-1, 0] - 1e-3  # friction drives it
     assert finer.setup.options.method == "dp5" and finer.steps_accepted > planned.steps_accepted
     assert other.setup.options.method == "os32" and other.setup.options.tolerance == 1e-6
 
