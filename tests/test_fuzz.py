@@ -25,9 +25,9 @@ from warpchain.inputs.scene import Scene
 from warpchain.inputs.setup import read_setup, resolve
 from warpchain.inputs.validation import FIELDS, LONGEST_LINE, NAME_OF_SYMBOL, SECTION_OF, InputError, field_choices
 from warpchain.inputs.yaml_files import parse_yaml
-from warpchain.run import single_walk
 from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.plan import load_sweep
+from warpchain.walks import one_walk
 
 SECONDS = 5.0
 """Most processor time of an input."""
@@ -216,7 +216,7 @@ def test_command_lines(monkeypatch: pytest.MonkeyPatch, words: list[tuple[str, s
     def begin(setups: Any, **_: object) -> Any:
         raise SystemExit(0)
 
-    monkeypatch.setattr(single_walk, "run_setups", begin)
+    monkeypatch.setattr(one_walk, "run_setups", begin)
     sets = [word for name, value in words for word in ("--set", f"{name}={value}")]
     err = io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True)
     with contextlib.redirect_stderr(err), pytest.raises(SystemExit) as end:

@@ -22,6 +22,7 @@ What they return, take and raise:
 
     WalkResult       one walk: status, distance, energies, time series, frames; `plot`, `animate`, `save`
     SweepResult      a sweep: arrays with named axes and units
+    State            a chain at one instant, from which a walk goes on: `WalkResult.state`, `State.of_joints`
     Trajectory       the motion of a given chain
     Parameters       physical parameters of a chain, its sprocket and the floor
     Status           how a walk ended, with a sentence that says what to try
@@ -37,6 +38,7 @@ from warpchain import version as _version
 if TYPE_CHECKING:
     from warpchain.inputs.parameters import Parameters
     from warpchain.inputs.parameters import preset as preset
+    from warpchain.inputs.state import State
     from warpchain.inputs.validation import InputError
     from warpchain.run.simulation import simulate
     from warpchain.run.single_walk import walk
@@ -51,6 +53,7 @@ __version__ = _version.VERSION
 _HOMES = {
     "InputError": "inputs.validation",
     "Parameters": "inputs.parameters",
+    "State": "inputs.state",
     "Status": "status",
     "SweepResult": "store.sweep_result",
     "Trajectory": "walks.trajectory",
@@ -66,6 +69,7 @@ _HOMES = {
 __all__ = [
     "InputError",
     "Parameters",
+    "State",
     "Status",
     "SweepResult",
     "Trajectory",

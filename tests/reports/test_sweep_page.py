@@ -121,7 +121,7 @@ def with_walk(monkeypatch: pytest.MonkeyPatch, made: Callable[..., WalkResult], 
         asked.append(setup)
         return made(**changes)
 
-    monkeypatch.setattr("warpchain.run.single_walk.run_walk", run_walk)
+    monkeypatch.setattr("warpchain.walks.one_walk.run_walk", run_walk)
     return asked
 
 

@@ -259,7 +259,7 @@ def test_report_and_pictures_use_kept_frames(kept: Path, tmp_path: Path, monkeyp
     def refuse(*arguments: object, **settings: object) -> None:
         raise AssertionError("run again")
 
-    monkeypatch.setattr("warpchain.run.single_walk.run_walk", refuse)
+    monkeypatch.setattr("warpchain.walks.one_walk.run_walk", refuse)
     write_report(kept, tmp_path / "page.html", animation_of=3)
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "Its frames were kept by the sweep" in page and "run again" not in page

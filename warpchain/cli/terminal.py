@@ -19,8 +19,8 @@ from warpchain.walks.rows import fault_remedies
 from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
-    from warpchain.run.single_walk import Progress
     from warpchain.store.sweep_result import SweepResult
+    from warpchain.walks.one_walk import Progress
 
 _MOST_CELLS: Final = 1000
 """Most cells of a sweep that a table lists; one of 100,000 would take minutes to lay out."""

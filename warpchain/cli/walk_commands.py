@@ -36,9 +36,10 @@ _SET: Final = (
 _SEED: Final = "Draw what is not given at random, one sample for each whole number. Without it: means, phase 0."
 _CONFIG: Final = "Read preset, scene, options and parameters from a file; what the command line gives counts more."
 _LIKE: Final = (
-    "Take setup and seed of a saved walk, which repeats it to the bit; other options change single values. Not with "
-    "--config, --preset or --seed."
+    "Take setup and seed of a saved walk or, with --index, of a walk of a sweep: its folder or a merged file. That "
+    "repeats it to the bit; other options change single values. Not with --config, --preset or --seed."
 )
+_INDEX: Final = "Number of the walk in the sweep that --like names, as in the column index of its results."
 _OUTPUT: Final = (
     "Write walk.h5, figure5.png, film_strip.png, of a chain on a sprocket loop.png, and if its plane tilts tilt.png to "
     "this folder; files of these names are replaced."
@@ -67,7 +68,8 @@ def walk(
     assignments: Annotated[list[str] | None, option("NAME=VALUE", _SET, "--set")] = None,
     seed: Annotated[_Text, option("S", _SEED)] = None,
     config: Annotated[Path | None, option("FILE.yaml", _CONFIG)] = None,
-    like: Annotated[Path | None, option("WALK.h5", _LIKE)] = None,
+    like: Annotated[Path | None, option("WALK.h5|DIR", _LIKE)] = None,
+    index: Annotated[_Text, option("I", _INDEX)] = None,
     folder: Annotated[Path | None, output("DIR", _OUTPUT)] = None,
     animation: Annotated[
         Literal["gif", "mp4", "html"] | None,
@@ -82,9 +84,10 @@ def walk(
     from warpchain.cli.walk_files import try_walk_folder, write_walk
     from warpchain.inputs.distributions import LARGEST_SEED
     from warpchain.inputs.setup import DEFAULT_PRESET, read_setup
+    from warpchain.inputs.state import continued
     from warpchain.inputs.validation import InputError, checked_whole, printable
     from warpchain.inputs.yaml_files import parse_yaml
-    from warpchain.run.single_walk import run_walk
+    from warpchain.walks.one_walk import run_walk
 
     named = {"links": links, "frequency": frequency, "start": start}
     given = _given_values(named | {"method": method, "tolerance": tolerance, "device": device}, assignments or [])
@@ -94,13 +97,19 @@ def walk(
         for name, value in (("--config", config), ("--preset", preset), ("--seed", seed)):
             if value is not None:
                 raise InputError(f"{name}: given together with --like, and a saved walk has its own; leave one out")
-        preset, own, number = _saved_values(like, given["options"])
+        saved, number = _saved(like, index)
+        preset, own = saved.preset, _without_replaced(saved, given["options"])
     elif config is not None:
         file_preset, own = read_setup(config)
         preset = preset or file_preset
         if preset is None:
             raise InputError("preset: missing; name the parameters to start from, such as preset: paper")
-    setup = _setup(preset or DEFAULT_PRESET, own, given, number, record_loads)
+    elif index is not None:
+        raise InputError("--index: names a walk of a sweep, but --like is missing; give --like DIR, the sweep")
+    if like is not None and saved.start is not None:
+        setup = continued(saved.start, given)
+    else:
+        setup = _setup(preset or DEFAULT_PRESET, own, given, number, record_loads)
     interval = _frame_interval(folder, animation, frame_interval, record_loads)
     if folder is not None:
         try_walk_folder(folder, animation)
@@ -207,21 +216,37 @@ def _setup(preset: str, own: Mapping[str, Any], given: Sections, seed: int | Non
     return complete_setup(preset, sections, seed, records_loads)
 
 
-def _saved_values(path: Path, options: Mapping[str, object]) -> tuple[str, dict[str, Any], int | None]:
-    """Preset, values by section, and seed of a saved walk, without those that some given options bring anew.
+def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
+    """Setup and seed of a saved walk, or of the walk with a number of a sweep.
 
-    A method brings its own settings, and a tolerance also holds where joints are soft, as in a new walk.
+    Raises:
+        InputError: there is no such walk, or the number is missing.
+        OSError: the file or folder cannot be read.
     """
-    from warpchain.inputs.methods import METHODS_BY_NEED
-    from warpchain.inputs.sections import SECTIONS
+    from warpchain.hdf5_files import kind_of_hdf5
+    from warpchain.inputs.validation import InputError
+    from warpchain.inputs.yaml_files import parse_yaml
+    from warpchain.store.repeated import place_of_index
+    from warpchain.store.sweep_result import KIND, load
     from warpchain.walks.walk_result import load_walk
 
-    saved = load_walk(path)
-    replaced = {"soft_tolerance"} if "tolerance" in options else set()
-    if "method" in options:
-        replaced |= {"tolerance", "soft_tolerance"}.union(*METHODS_BY_NEED.values())
-    sections = {section: getattr(saved.setup, section).model_dump(exclude=replaced) for section in SECTIONS}
-    return saved.setup.preset, sections, saved.seed
+    wanted = "give a saved walk, or the folder or merged file of a sweep and --index"
+    if index is None and not path.is_dir() and kind_of_hdf5(path, wanted) != KIND:
+        walk = load_walk(path)
+        return walk.setup, walk.seed
+    if index is None:
+        raise InputError(f"--like: {path} has many walks; give --index, the number of one, as well")
+    block, place = place_of_index(list(load(path).blocks.values()), parse_yaml(index, "--index"))
+    return block.setup_at(place), block.sweep_at(place).seed
+
+
+def _without_replaced(setup: "Setup", options: Mapping[str, object]) -> dict[str, Any]:
+    """Values of a setup by section, without those that some given options bring anew."""
+    from warpchain.inputs.options import replaced_by
+    from warpchain.inputs.sections import SECTIONS
+
+    replaced = replaced_by(options)
+    return {section: getattr(setup, section).model_dump(exclude=replaced) for section in SECTIONS}
 
 
 def _frame_interval(folder: Path | None, animation: str | None, text: str | None, records_loads: bool) -> Any:

@@ -25,6 +25,17 @@ def on_gpu(device: str) -> bool:
     return device != "cpu"
 
 
+def replaced_by(options: Mapping[str, object]) -> set[str]:
+    """Options of a walk that some given ones bring anew.
+
+    A method brings its own settings, and a tolerance also holds where joints are soft, as in a new walk.
+    """
+    replaced = {"soft_tolerance"} if "tolerance" in options else set()
+    if "method" in options:
+        replaced |= {"tolerance", "soft_tolerance"}.union(*METHODS_BY_NEED.values())
+    return replaced
+
+
 def _known_method(method: str) -> str:
     """The word or integrator, if there is one of this name."""
     if method in FORMER_METHODS:

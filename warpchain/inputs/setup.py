@@ -6,8 +6,8 @@ Keyword arguments, the command line and YAML files (`read_setup`) all go through
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Final
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
 
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options
 from warpchain.inputs.parameters import Parameters
@@ -17,6 +17,9 @@ from warpchain.inputs.sections import SECTION_OF, SECTIONS
 from warpchain.inputs.validation import InputError, by_name, path_of, shown, suggestion, validated
 from warpchain.inputs.yaml_files import read_yaml
 from warpchain.kernels.methods.method import find_method
+
+if TYPE_CHECKING:
+    from warpchain.inputs.state import State
 
 DEFAULT_PRESET: Final = "paper"
 """Preset of a walk or a sweep that names none."""
@@ -31,12 +34,29 @@ class Setup:
         parameters: of the chain, its sprocket and the floor.
         scene: what happens.
         options: how it is computed.
+        start: state that the walk begins from; None: it begins as the scene says. With a state, those values of the
+            scene that matter before the release are those of the walk that the state was taken from.
     """
 
     preset: str
     parameters: Parameters
     scene: Scene
     options: Options
+    start: "State | None" = None
+
+    @property
+    def has_drive(self) -> bool:
+        """Whether the walk begins on a sprocket."""
+        return self.start is None and self.scene.start != "ellipse"
+
+    @property
+    def described(self) -> str:
+        """The chain and how it was spun, in a few words."""
+        links, start = f"{self.scene.links} links", self.start
+        if start is not None and not start.memory:
+            return f"{links} from a given state"
+        spun = f"{links} at {self.scene.frequency:g} Hz"
+        return spun if start is None else f"{spun}, from its state at {start.time:.4g} s"
 
     def with_drawn(self, drawn: Mapping[str, float]) -> "Setup":
         """A copy with drawn values in place of its own.
@@ -53,7 +73,7 @@ class Setup:
         parameters = validated(Parameters, {**vars(self.parameters), **sections["parameters"]}, "parameters")
         scene = validated(Scene, {**vars(self.scene), **sections["scene"]}, "scene")
         check_scene(scene, parameters)
-        return Setup(self.preset, parameters, scene, self.options)
+        return replace(self, parameters=parameters, scene=scene)
 
 
 def resolve(

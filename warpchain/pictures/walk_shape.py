@@ -108,4 +108,4 @@ def center_in_room(walk: Walk) -> Array:
 
 def setting(walk: Walk) -> str:
     """Links and frequency, as a title."""
-    return f"{walk.setup.scene.links} links, {walk.setup.scene.frequency:g} Hz"
+    return walk.setup.described.replace(" at ", ", ", 1)

@@ -173,8 +173,8 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
     """One walk, as kept or else run again: its numbers, a player, and its pictures."""
     from warpchain.pictures.film_strip import film_strip
     from warpchain.pictures.walk_figures import figure5
-    from warpchain.run.single_walk import run_walk
     from warpchain.run.sweep_run import on_device
+    from warpchain.walks.one_walk import run_walk
 
     sweep = load_sweep(result.sweep)
     planned = (sweep if device is None else on_device(sweep, device)).planned(index)

@@ -11,9 +11,10 @@ from warpchain.engine.devices import gpu_turn
 from warpchain.engine.tallies import LOST
 from warpchain.inputs.floor import body_of, checked_profile, circles_of, distances
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import Parameters, preset
-from warpchain.inputs.scene import MOST_LINKS, check_links_on_gpu
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.scene import check_links_on_gpu
 from warpchain.inputs.sections import takes_fields
+from warpchain.inputs.state import State, real_array
 from warpchain.inputs.validation import InputError, plain, shown, validated
 from warpchain.status import Status
 from warpchain.walks.trajectory import Trajectory
@@ -30,10 +31,10 @@ _UNSOFTENED = {"soften_pile": False, "soften_drive": False}
 
 @takes_fields("options", without=("soften_pile", "soften_drive"))
 def simulate(
-    parameters: Parameters | str,
-    position: Array,
-    velocity: Array,
-    duration: float,
+    parameters: State | Parameters | str,
+    position: Array | None = None,
+    velocity: Array | None = None,
+    duration: float | None = None,
     *,
     times: Sequence[float] | Array | None = None,
     floor: bool | Sequence[Sequence[float]] | Array = True,
@@ -47,11 +48,11 @@ def simulate(
     """Integrate a given chain, without sprocket.
 
     Args:
-        parameters: Of the chain, or the name of a preset.
+        parameters: Of the chain, or the name of a preset; or a :class:`State`, which has positions and velocities, too.
         position: (n, 3): x, y [m] and θ [rad] of each link's centre; n even, at least 4. Link i's right end meets
             link i + 1's left end, the last link's the first one's. Links 0, 2, … are inner ones.
         velocity: (n, 3): their rates [m/s, m/s, rad/s].
-        duration: Simulated time [s], from time 0.
+        duration: Simulated time [s], from time 0, which is that of the state.
         times: Instants of the trajectory [s], rising, in [0, duration]; steps land on them exactly. Default: 101
             instants evenly spread.
         floor: Whether there is a floor at y = 0, or the points [[x, y], …] [m] of one that is not flat, as ``floor`` of
@@ -81,28 +82,37 @@ def simulate(
     if not isinstance(gravity, bool):
         raise InputError(f"gravity: {shown(gravity)} is not a truth value; give True or False")
     points = _checked_floor(floor)
-    chain = parameters if isinstance(parameters, Parameters) else preset(parameters)
-    if not gravity:
-        chain = chain.with_values({"gravity": 0.0})
-    start, rates = _checked_state("position", position), _checked_state("velocity", velocity)
-    if len(rates) != len(start):
-        raise InputError(f"velocity: {len(rates)} rows, but position has {len(start)}; give one row per link each")
-    if len(start) < 4 or len(start) % 2:
-        raise InputError(f"position: {len(start)} links; a closed chain has an even number of at least 4")
-    if len(start) > MOST_LINKS:
-        raise InputError(f"position: {len(start)} links; give at most {MOST_LINKS}")
-    check_links_on_gpu(len(start), options.device, "position")
+    state = _checked_state(parameters, position, velocity)
+    chain = state.parameters if gravity else state.parameters.with_values({"gravity": 0.0})
+    check_links_on_gpu(state.links, options.device, "position")
     instants = _checked_times(end, times)
-    if len(instants) * len(start) > MOST_PLACES:
+    if len(instants) * state.links > MOST_PLACES:
         raise InputError(
-            f"times: {len(instants)} instants of {len(start)} links are too many; "
-            f"give at most {MOST_PLACES // len(start)}"
+            f"times: {len(instants)} instants of {state.links} links are too many; "
+            f"give at most {MOST_PLACES // state.links}"
         )
     if points is not None:
-        _check_above(points, start, chain)
+        _check_above(points, state.position, chain)
     with gpu_turn([options.device]):
         body = "none" if floor is False else body_of(points)
-        return _follow(options, chain, start, rates, instants, end, body, points)
+        return _follow(options, chain, state.position, state.velocity, instants, end, body, points)
+
+
+def _checked_state(given: State | Parameters | str, position: Array | None, velocity: Array | None) -> State:
+    """The state of the chain, or an `InputError`."""
+    if not isinstance(given, State):
+        return State.of_links(position, velocity, given)
+    if position is not None or velocity is not None:
+        raise InputError("position: given together with a state, which has positions and velocities; leave them out")
+    if given.axes is not None:
+        raise InputError(
+            "parameters: the plane of this state tilts, and simulate keeps it fixed; give walk(start=…) it"
+        )
+    if given.memory and given.memory["state/softness"] > 0:
+        raise InputError(
+            "parameters: joints of this state are softened, which only a walk goes on with; give walk(start=…) it"
+        )
+    return given
 
 
 def _follow(
@@ -176,17 +186,7 @@ def _check_above(points: Array, start: Array, chain: Parameters) -> None:
         )
 
 
-def _checked_state(name: str, given: Array) -> Array:
-    """Positions or velocities as a float64 array of shape (n, 3), or an `InputError`."""
-    array = _real_array(name, given, "shape (n, 3)")
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise InputError(f"{name}: its shape is {array.shape}; give (n, 3), one row x, y, θ per link")
-    if not np.all(np.isfinite(array)):
-        raise InputError(f"{name}: holds a number that is not finite; give finite numbers")
-    return array
-
-
-def _checked_times(duration: float, times: Sequence[float] | Array | None) -> Array:
+def _checked_times(duration: object, times: Sequence[float] | Array | None) -> Array:
     """Instants of a trajectory, which rise within the duration, or an `InputError`."""
     if isinstance(duration, bool) or not isinstance(duration, int | float):
         raise InputError(f"duration: {shown(duration)} is not a number; give seconds")
@@ -194,19 +194,9 @@ def _checked_times(duration: float, times: Sequence[float] | Array | None) -> Ar
         raise InputError(f"duration: {shown(duration)} is not a time; give a number of seconds, at least 0")
     if times is None:
         return np.linspace(0.0, float(duration), 101)
-    instants = _real_array("times", times, "rising instants in s")
+    instants = real_array("times", times, "rising instants in s")
     if instants.ndim != 1 or len(instants) == 0:
         raise InputError(f"times: its shape is {instants.shape}; give a row of at least one instant")
     if not np.all((instants >= 0) & (instants <= duration)) or np.any(np.diff(instants) <= 0):
         raise InputError(f"times: give rising instants between 0 and the duration of {duration} s")
     return instants
-
-
-def _real_array(name: str, given: object, remedy: str) -> Array:
-    """Anything like an array of real numbers as a new float64 array, or an `InputError`."""
-    try:
-        if np.array(given).dtype.kind in "cSU":  # complex numbers and text would be converted without a word
-            raise TypeError
-        return np.array(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: not an array of numbers; give {remedy}") from None

@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, plain, shown, suggestion
 from warpchain.status import Status
 from warpchain.store.cell_statistics import CellStatistics
+from warpchain.store.repeated import place_of_index, repeat
 from warpchain.sweeps.block import POINT
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks.rows import (
@@ -166,6 +168,10 @@ class BlockResult:
             InputError: there is no such walk, or its motion was not kept or is not there yet.
             OSError: its file cannot be read.
         """
+        return self.walk_motion(self.place(sample, at))
+
+    def place(self, sample: int, at: Mapping[str, float | str | None]) -> tuple[int, ...]:
+        """Place along the axes and samples of a walk, see `series`."""
         if unknown := [name for name in at if name not in self.axes]:
             known = suggestion(unknown[0], tuple(self.axes)) if self.axes else "there are no axes"
             raise InputError(f"{unknown[0]}: no axis of block {self.name}; {known}")
@@ -178,7 +184,55 @@ class BlockResult:
             place.append(int(found[0]))
         if type(plain(sample)) is not int or not 0 <= sample < self.shape[-1]:
             raise InputError(f"sample: there is no sample {shown(sample)}; give 0 to {self.shape[-1] - 1}")
-        return self.walk_motion((*place, sample))
+        return (*place, sample)
+
+    def sweep_at(self, place: tuple[int, ...]) -> Sweep:
+        """The sweep that has the walk at a place along the axes and samples."""
+        return self.origin.sweeps[self.origin.samples(self.number)[place[-1]][0]]
+
+    def setup_at(self, place: tuple[int, ...]) -> Setup:
+        """Everything that says what the walk at a place is, its draws included."""
+        return self.sweep_at(place).planned(int(self.columns["index"][place])).setup
+
+    def walk(
+        self,
+        index: int | None = None,
+        *,
+        sample: int = 0,
+        frame_interval: float | None = 2e-3,
+        record_before: float | None = None,
+        record_loads: bool = False,
+        **at: Any,
+    ) -> WalkResult:
+        """Run one walk again, with series and frames: `walk(17)`, or `walk(links=60, frequency=15, sample=2)`.
+
+        The same version on the same kind of processor repeats it to the bit.
+
+        Args:
+            index: number of the walk, as in the column `index`; more samples change no number. None: the walk is that
+                of the other values.
+            sample: number of the sample.
+            frame_interval: as of `warpchain.walk`, like the next two.
+            record_before: see there.
+            record_loads: see there.
+            at: value of each axis; of an axis with just one value it may be left out.
+
+        Raises:
+            InputError: there is no such walk, several have this number (of merged sweeps with other seeds), or a value
+                is refused.
+
+        Warns:
+            InputWarning: the sweep has another Δx or status of this walk.
+        """
+        if index is None:
+            place = self.place(sample, at)
+        elif at:
+            raise InputError(f"{', '.join(at)}: given together with index; leave one out")
+        else:
+            _, place = place_of_index([self], index)
+        return repeat(
+            self, place, frame_interval=frame_interval, record_before=record_before, record_loads=record_loads
+        )
 
     def walk_motion(self, place: tuple[int, ...]) -> WalkResult:
         """The walk at a place along the axes and samples, if its motion was kept; errors as of `series`."""
@@ -188,8 +242,7 @@ class BlockResult:
             remedy = f"give one of the samples {samples}" if samples else "a sweep with record: {series: true} keeps it"
             raise InputError(f"the motion of walk {self.columns['index'][place]} is not there; {remedy}")
         values = {name: column[place] for name, column in self.columns.items()}
-        sweep = self.origin.sweeps[self.origin.samples(self.number)[place[-1]][0]]
-        setup = sweep.planned(int(values["index"])).setup
+        setup = self.setup_at(place)
         ((_, motion),) = (
             (at, read_motion(group, setup.scene.links))
             for at, group in self.kept_motions([int(np.ravel_multi_index(place, self.shape))])
@@ -200,7 +253,7 @@ class BlockResult:
             **motion,
             wall_time=math.nan,
             setup=setup,
-            seed=sweep.seed,
+            seed=self.sweep_at(place).seed,
             versions=self.origin.provenance["versions"],
         )
 

@@ -20,9 +20,11 @@ from warpchain.store.block_result import BlockResult, KeptMotions, Origin, count
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.folder import read_rows
 from warpchain.store.manifest import Folder, Manifest, read_manifest, stored_sweep
+from warpchain.store.repeated import place_of_index
 from warpchain.store.shards import opened_motions
 from warpchain.sweeps.block import Block
 from warpchain.walks.rows import COLUMNS, MISSING, STORED_COLUMNS, Rows, derived_columns, drawn_column, quantity_of
+from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
     import h5py
@@ -143,6 +145,17 @@ class SweepResult:
             raise InputError(f"quantity: {shown(quantity)} is no column of numbers; {suggestion(quantity, columns)}")
         blocks = self.blocks.items()
         return {name: block.statistics(quantity) for name, block in blocks if quantity in block.columns}
+
+    def walk(self, index: int | None = None, **words: Any) -> WalkResult:
+        """Run one walk of any block again by its number; arguments and errors are those of `BlockResult.walk`.
+
+        Its other arguments, without a number, say which walk of the only block it is.
+        """
+        if index is None:
+            walk: WalkResult = self.__getattr__("walk")(**words)
+            return walk
+        block, _ = place_of_index(list(self.blocks.values()), index)
+        return block.walk(index, **words)
 
     def plot(
         self,

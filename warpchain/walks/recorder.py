@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from warpchain.engine.batch import Batch
 from warpchain.kernels import layout
 from warpchain.loop.before_release import BeforeRelease
+from warpchain.walks.even_clock import EvenClock
 from warpchain.walks.motion import Keep
 from warpchain.walks.moving_plane import angles, frame_axes
 from warpchain.walks.walk_result import BEFORE, MOTION
@@ -55,9 +56,8 @@ class Recorder:
         self.before: BeforeRelease | None = None
         self._batch, self._world, self.keep = batch, world, keep
         self._has_samples, self._has_frames = batch.record.samples.size > 0, batch.record.frames.size > 0
-        self._place = -1.0
         self._width = batch.record.samples.shape[2]
-        self._last: Array = np.empty((0, self._width))
+        self._clock = EvenClock((keep.series_every or 1) * batch.options.record_interval, self._width)
         self._tilts = tilts
         self._drive: list[_Piece] = []
         self._pieces: list[_Piece] = []
@@ -80,8 +80,8 @@ class Recorder:
             samples = batch.drain_samples(world)
             if not released:
                 piece.samples = samples
-            elif keep.series_every is not None and len(samples):
-                piece.samples, self._last = self._thinned(samples, keep.series_every), samples[-1:]
+            elif keep.series_every is not None:
+                piece.samples = self._clock.rows(samples)
         if self._has_frames:
             if self._tilts and released:
                 piece.planes = batch.frame_planes(world)
@@ -127,21 +127,17 @@ class Recorder:
             frame_moments=loads[wanted, :, 2],
         )
 
-    def _thinned(self, samples: Array, every: int) -> Array:
-        """The first of the samples in each interval; a step may be longer than the time between two sample marks."""
-        if every == 1:
-            return samples
-        places = np.floor(samples[:, layout.TIME] / (every * self._batch.options.record_interval))
-        is_first = np.diff(places, prepend=self._place) > 0
-        self._place = places[-1]
-        return samples[is_first]
+    def go_on(self, last: Array, time: float) -> None:
+        """Begin within a walk at a time [s], with the sample before, (columns,)."""
+        if last[layout.TIME] >= 0:
+            self._clock.go_on(last, time)
 
     def motion(self) -> dict[str, Any]:
         """The arrays of a `WalkResult` by name, and its `before_release`."""
         names = ("samples", "times", "frames", "loads", "planes")
         samples, frame_time, joints, loads, planes = self._joined(self._pieces, *names)
-        if len(samples) and samples[-1, layout.TIME] != self._last[0, layout.TIME]:
-            samples = np.concatenate([samples, self._last])
+        last = self._clock.last
+        samples = np.concatenate([samples, last[~np.isin(last[:, layout.TIME], samples[-1:, layout.TIME])]])
         tilting = samples if self._tilts else np.empty((0, layout.ALL_COLUMNS))
         tilt, yaw = angles(tilting[:, layout.PLANE_COLUMN :])
         return {

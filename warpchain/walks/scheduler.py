@@ -147,7 +147,7 @@ def compile_kernels(setups: Iterable[Setup], threads: int | None = None) -> None
     for setup in setups:
         columns = layout.padded_width(setup.scene.links)
         floor = body_of(floor_points(setup.scene))
-        for fixed_body in [floor] + ["sprocket"] * (setup.scene.start != "ellipse"):
+        for fixed_body in [floor] + ["sprocket"] * setup.has_drive:
             tilts = fixed_body == floor and setup.scene.plane == "tilting"
             features = features_of(setup.options, columns, fixed_body=fixed_body, tilts=tilts)
             size = (threads or block_threads(setup.scene.links)) if on_gpu(setup.options.device) else 1

@@ -22,17 +22,19 @@ from warpchain.engine.control import (
     push_rate,
     suitable_load,
 )
+from warpchain.engine.snapshot import change, restore, set_first_area, set_frame_marks, take_snapshot
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
 from warpchain.inputs.floor import body_of, circles_of, raised_by
 from warpchain.inputs.scene import contact_radius, floor_points, joint_radius, loop_speed, settling_time
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
+from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
 from warpchain.walks.motion import NOTHING, Keep
-from warpchain.walks.moving_plane import angles, lowest_point, released_plane
+from warpchain.walks.moving_plane import angles, lowest_point, plane_of_state, released_plane, state_of_plane
 from warpchain.walks.recorder import Recorder
 
 Array = NDArray[np.float64]
@@ -44,6 +46,9 @@ SHORTEST_WINDOW, LONGEST_WINDOW = 0.05, 0.25
 BY_ITSELF = -1.0
 """As `steady_time` means: the kernel chooses how long to watch, see :mod:`warpchain.kernels.events.release`."""
 
+
+_OF_THE_RUN = ("raised", "drive_time", "drift", "_at_full_speed", "_has_sprocket")
+"""What a run knows of the time before its release."""
 
 PLANE_OUTCOME = ("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at")
 """Numbers of a walk's outcome that only a plane that tilts has."""
@@ -89,12 +94,17 @@ class WalkRun:
         self._hanging_raise = math.nan
         self._released = False
         self._hold_softness = 0.0
+        self._at_full_speed = math.nan
+        self._first_area: float | None = None
 
         scene, parameters = setup.scene, setup.parameters
-        self._has_sprocket = scene.start != "ellipse"
+        self._has_sprocket = setup.has_drive
         self._tilts = scene.plane == "tilting"
         self._floor = floor_points(scene)
         self._level = math.cos(math.radians(scene.slope))  # of a distance along the floor
+        if setup.start is not None:
+            self._go_on(setup.start)
+            return
         from_rest = scene.start == "rest"
         speed = 2 * math.pi * scene.frequency * joint_radius(scene, parameters)
         if not self._has_sprocket:
@@ -157,6 +167,17 @@ class WalkRun:
         if now < self._settled:
             return Phase.SETTLE
         return Phase.SPIN_UP if now < self._at_full_speed else Phase.HOLD
+
+    @property
+    def is_released(self) -> bool:
+        """Whether the chain walks, and all that its start brings has been done."""
+        return self._released and self._first_area is None
+
+    @property
+    def _walk_end(self) -> float:
+        """Time [s] since the release at which a walk ends that is not at rest."""
+        scene = self.setup.scene
+        return min(scene.walk_limit, scene.walk_until or math.inf)
 
     @property
     def features(self) -> Features:
@@ -298,6 +319,11 @@ class WalkRun:
         status = self._batch.status(self._world)
         if not self._released:
             self.drift = self._batch.watched(self._world, layout.DRIFT)
+        if self._first_area is not None and status == Status.FINISHED:
+            set_first_area(self._batch, self._world, self._first_area)
+            self._first_area = None
+            self._batch.resume(self._world, self._walk_end, Status.TIME_LIMIT)
+            return True
         if self._released or status != Status.FINISHED:
             until, limit = self.setup.scene.walk_until, self.setup.scene.walk_limit
             is_planned = status == Status.TIME_LIMIT and until is not None and until <= limit
@@ -315,6 +341,59 @@ class WalkRun:
             self.recorder.release(self.drive_time, self.raised, free_since)
         return True
 
+    def memory(self) -> dict[str, NDArray[Any]]:
+        """All that the rest of a walk, or of its outcome, depends on: a `State.memory`."""
+        return {
+            **take_snapshot(self._batch, self._world),
+            **{f"run/{name}": np.array(getattr(self, name)) for name in _OF_THE_RUN},
+            "run/counts": np.array([self.drive_counts[name] for name in COUNTS]),
+            "run/extremes": np.array([self.drive_extremes[name] for name in EXTREMES]),
+        }
+
+    def _go_on(self, start: State) -> None:
+        """Place a chain as a state has it; if that was taken from a walk, go on with the walk."""
+        batch, world, memory = self._batch, self._world, start.memory
+        self._set_chain_and_floor()
+        self._released = True
+        interval = self.recorder.keep.frame_interval
+        if not memory:
+            has_marks = interval > 0
+            batch.load(
+                world,
+                start.position,
+                start.velocity,
+                stop_time=self._walk_end,
+                stop_status=Status.TIME_LIMIT,
+                has_frame_marks=has_marks,
+            )
+        else:
+            for name in _OF_THE_RUN:
+                setattr(self, name, memory[f"run/{name}"].item())
+            self.drive_counts = dict(zip(COUNTS, memory["run/counts"].tolist(), strict=True))
+            self.drive_extremes = dict(zip(EXTREMES, memory["run/extremes"].tolist(), strict=True))
+            restore(batch, world, memory)
+            set_frame_marks(batch, world, interval)
+        if memory and "scratch" in memory and self._is_at(start):
+            batch.resume(world, self._walk_end, Status.TIME_LIMIT)
+            self.recorder.go_on(memory["state/last_sample"], start.time)
+            return
+        if self._tilts:
+            batch.set_plane(world, plane_of_state(start))
+        if memory:
+            # it stops at once, and so makes the sample with which its new ledger begins
+            change(batch, world, start.position, start.velocity)
+            batch.resume(world, batch.time(world), Status.FINISHED)
+            self._first_area = float(memory["state/first_area"])
+
+    def _is_at(self, start: State) -> bool:
+        """Whether the world has the places and velocities of a state, to the bit."""
+        batch, world = self._batch, self._world
+        pairs = [(batch.position(world), start.position), (batch.velocity(world), start.velocity)]
+        if self._tilts:
+            ours = state_of_plane(batch.plane(world))
+            pairs += [(values, getattr(start, name)) for name, values in ours.items()]
+        return all(here.tobytes() == there.tobytes() for here, there in pairs)
+
     def _start_drive(self) -> None:
         limit = self._at_full_speed + self.setup.scene.hold_limit
         self._batch.resume(self._world, limit, Status.NOT_STEADY)
@@ -327,19 +406,24 @@ class WalkRun:
         circles = circles_of(position, parameters.link_length)
         return raised_by(self._floor, circles, parameters.circle_radius, clearance)
 
-    def _release(self, position: Array, velocity: Array) -> None:
+    def _set_chain_and_floor(self) -> None:
+        """Let the world have the constants of the walk after its release."""
         scene, parameters = self.setup.scene, self.setup.parameters
-        self.raised = self._hanging_raise if scene.clearance_of == "hanging" else self._raise(position)
-        position[:, 1] += self.raised
         self._batch.set_chain(self._world, parameters, scene.links)
         self._batch.set_drive(self._world, farthest=(scene.distance_limit or 0.0) * self._level)
         if self._floor is not None:
             self._batch.set_floor(self._world, self._floor, parameters)
+
+    def _release(self, position: Array, velocity: Array) -> None:
+        scene = self.setup.scene
+        self.raised = self._hanging_raise if scene.clearance_of == "hanging" else self._raise(position)
+        position[:, 1] += self.raised
+        self._set_chain_and_floor()
         self._batch.load(
             self._world,
             position,
             velocity,
-            stop_time=min(scene.walk_limit, scene.walk_until or math.inf),
+            stop_time=self._walk_end,
             stop_status=Status.TIME_LIMIT,
             attempts_before=self.drive_counts["accepted"] + self.drive_counts["rejected"],
             softness=self._hold_softness,

@@ -12,7 +12,7 @@ reference derive from them.
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -36,6 +36,7 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, contact_radius
 from warpchain.inputs.setup import Setup
+from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, validated
 from warpchain.kernels import layout
 from warpchain.loop.before_release import FIELDS, BeforeRelease
@@ -43,6 +44,7 @@ from warpchain.pictures.walk_shape import Kind
 from warpchain.status import Status
 from warpchain.walks.faults import FAULTS, MOST_ENERGY_ERROR, energy_error, faults
 from warpchain.walks.moving_plane import in_room
+from warpchain.walks.stored_state import read_state, write_state
 
 if TYPE_CHECKING:
     import h5py
@@ -199,8 +201,8 @@ class WalkResult:
     @property
     def sprocket_radius(self) -> float:
         """Radius of the sprocket that links touch [m]; NaN without one."""
-        scene = self.setup.scene
-        return np.nan if scene.start == "ellipse" else contact_radius(scene, self.setup.parameters)
+        scene, had_none = self.setup.scene, self.setup.start is not None and np.isnan(self.sprocket_height)
+        return np.nan if had_none or scene.start == "ellipse" else contact_radius(scene, self.setup.parameters)
 
     @property
     def joints_in_room(self) -> Array | None:
@@ -223,11 +225,11 @@ class WalkResult:
 
     def __repr__(self) -> str:
         """One line with the most important numbers."""
-        scene, error = self.setup.scene, self.energy_error
+        error = self.energy_error
         warning = f", energy error {error:.1e}" if error > MOST_ENERGY_ERROR else ", inaccurate" * bool(self.warnings())
         return (
             f"<WalkResult {self.status.label}: dx {self.dx:.4g} m in {self.walk_time:.4g} s, "
-            f"{self.bounces} bounces, {scene.links} links at {scene.frequency:g} Hz, {self.setup.preset}{warning}>"
+            f"{self.bounces} bounces, {self.setup.described}, {self.setup.preset}{warning}>"
         )
 
     @property
@@ -244,11 +246,10 @@ class WalkResult:
 
     def facts(self) -> list[tuple[str, str]]:
         """Names and values that a notebook shows beside the picture."""
-        scene = self.setup.scene
         return [
             ("status", self.status.label if self.status.ok else f"{self.status.label}: {self.status.sentence}"),
             ("distance Δx", f"{self.dx:.4g} m"),
-            ("chain", f"{scene.links} links at {scene.frequency:g} Hz, preset {self.setup.preset}"),
+            ("chain", f"{self.setup.described}, preset {self.setup.preset}"),
             ("walk time", f"{self.walk_time:.4g} s"),
             ("seed", "none, nothing was drawn" if self.seed is None else str(self.seed)),
             ("bounces", str(self.bounces)),
@@ -257,6 +258,22 @@ class WalkResult:
             *(("warning", remedy) for remedy in self.warnings()),
             *([] if np.isnan(self.wall_time) else [("computed in", f"{self.wall_time:.1f} s")]),
         ]
+
+    def state(self, t: float) -> State:
+        """The chain at the end of its first step at or after a time, as samples and frames are taken.
+
+        The walk is run again until then, which takes as long as it took the first time. `warpchain.walk(start=state)`
+        goes on with it, `dataclasses.replace` perturbs it.
+
+        Args:
+            t: time since the release [s], at most `walk_time`.
+
+        Raises:
+            InputError: `t` is no such time, the chain was never released, or the device of the walk is not here.
+        """
+        from warpchain.walks.revisit import state_at
+
+        return state_at(self, t)
 
     def plot(
         self,
@@ -364,6 +381,8 @@ class WalkResult:
         file.attrs["seed"], file.attrs["versions"] = json.dumps(self.seed), json.dumps(self.versions)
         write_fields(file, vars(self), NUMBERS)
         write_motion(file, vars(self))
+        if self.setup.start is not None:
+            write_state(file, self.setup.start)
         for name, quantity in Parameters.quantities().items():
             value = getattr(self.setup.parameters, name)
             put(file, f"parameters/{name}", value, quantity.unit, quantity.meaning).attrs["symbol"] = quantity.symbol
@@ -414,6 +433,7 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
                 scene=validated(Scene, given["scene"], "scene"),
                 options=validated(Options, given["options"], "options"),
             )
+            setup = replace(setup, start=read_state(file, setup))
         except InputError as error:
             raise InputError(f"{path}: {error}; read it with the version that wrote it") from None
         return WalkResult(
