@@ -1,13 +1,12 @@
-"""Figures of sweeps: the paper's Figures 6 and 5, maps, tolerances compared, sensitivity, how walks ended.
+"""Figures of sweeps: the paper's Figure 6, maps, tolerances compared, sensitivity, how walks ended.
 
 Means and standard deviations are those of the walks that came to rest. The number of walks that failed, or have not
 been run yet, is on the figure.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -40,8 +39,7 @@ from warpchain.pictures.style import (
     panel_grid,
     tidy,
 )
-from warpchain.reports.figure5 import sweep_figure5
-from warpchain.reports.grids import grid_pictures, has_series, heat_map
+from warpchain.reports.grids import grid_pictures, has_series
 from warpchain.reports.statistics import CONFIDENCE, sensitivities, tolerance_agreement
 from warpchain.status import Status
 from warpchain.store.cell_statistics import CellStatistics
@@ -64,24 +62,22 @@ _OTHER_MARKERS: Final = "s^vP*X"
 
 
 def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
-    """Every figure that the sweep has the walks for, the paper's Figures 6 and 5 first.
+    """Every figure that the sweep has the walks for, the paper's Figure 6 first.
 
     Args:
         result: a sweep.
-        quantity: a column of numbers; for any other than ``dx`` there are just its maps and its figures over grids.
+        quantity: a column of numbers; for any other than ``dx`` there are just its figures over grids.
 
     Raises:
         InputError: there is no such column.
     """
     result.cell_statistics(quantity)
-    draws: list[Callable[[SweepResult], Picture]] = [partial(heat_map, quantity=quantity)]
-    last: list[Callable[[SweepResult], Picture]] = []
-    if quantity == "dx":
-        draws = [figure6, sweep_figure5, *draws, tolerance, sensitivity]
-        last = [status_counts]
-    for draw in (*draws, *grid_pictures(result, quantity), *last):
+    for draw in (figure6, tolerance, sensitivity) if quantity == "dx" else ():
         with suppress(NothingToShow):
             yield draw(result)
+    yield from grid_pictures(result, quantity)
+    if quantity == "dx" and len([count for count in result.summary().values() if count]) > 1:
+        yield status_counts(result)
 
 
 def figure6(result: SweepResult) -> Picture:
@@ -127,7 +123,7 @@ def figure6(result: SweepResult) -> Picture:
     figure.supylabel(DISTANCE, fontsize="medium")
     _draw_legend(figure, empty[-1] if empty else None, series)
     caption = "Distance walked against the frequency of the sprocket, as in the paper's Figure 6: mean, box of one and "
-    return Picture("figure6", caption + "bar of two standard deviations.", figure)
+    return Picture("distance", caption + "bar of two standard deviations.", figure)
 
 
 def tolerance(result: SweepResult) -> Picture:
