@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
-from warpchain.cli.words import JSON, argument, option, output, output_path
+from warpchain.cli.words import JSON, argument, option, output
 from warpchain.inputs.methods import METHODS
 
 if TYPE_CHECKING:
@@ -36,13 +36,15 @@ _SET: Final = (
 _SEED: Final = "Draw what is not given at random, one sample for each whole number. Without it: means, phase 0."
 _CONFIG: Final = "Read preset, scene, options and parameters from a file; what the command line gives counts more."
 _LIKE: Final = (
-    "Take setup and seed of a saved walk, which repeats it to the bit; other options change single values. Not with "
+    "Take setup and seed of a saved walk, its file or folder, which repeats it to the bit; other options change single "
+    "values. Not with "
     "--config, --preset or --seed."
 )
 _OUTPUT: Final = (
-    "Write walk.h5, figure5.png, film_strip.png, of a chain on a sprocket loop.png, and if its plane tilts tilt.png to "
-    "this folder; files of these names are replaced."
+    "Write walk.h5 and film_strip.png to this folder; figures of an earlier walk there are deleted. `warpchain plot` "
+    "draws the others, `warpchain animate` a film."
 )
+_FILM: Final = "The file to write; its name ends in .gif, .mp4 or .html. Default: walk.gif beside the walk."
 _FRAMES: Final = "Simulated time between two pictures of the chain, in s; needs a folder. Default: 0.002."
 _LOADS: Final = (
     "Record forces and moments of the joints with each picture, by default every 0.0001 s; needs a folder. standard "
@@ -67,7 +69,7 @@ def walk(
     assignments: Annotated[list[str] | None, option("NAME=VALUE", _SET, "--set")] = None,
     seed: Annotated[_Text, option("S", _SEED)] = None,
     config: Annotated[Path | None, option("FILE.yaml", _CONFIG)] = None,
-    like: Annotated[Path | None, option("WALK.h5", _LIKE)] = None,
+    like: Annotated[Path | None, option("PATH", _LIKE)] = None,
     folder: Annotated[Path | None, output("DIR", _OUTPUT)] = None,
     animation: Annotated[
         Literal["gif", "mp4", "html"] | None,
@@ -126,18 +128,18 @@ def walk(
 
 
 def animate(
-    walk: Annotated[Path, argument("WALK.h5", "A walk that `warpchain walk -o DIR` wrote.")],
-    path: Annotated[
-        Path, argument("FILE", "The file to write; its name ends in .gif, .mp4 or .html.", parser=output_path)
-    ],
+    walk: Annotated[Path, argument("PATH", "Folder or file of a saved walk.")],
+    path: Annotated[Path | None, output("FILE", _FILM)] = None,
     fps: Annotated[float, option("NUMBER", "Pictures per second; in HTML the browser decides. Default: 30.")] = 30.0,
     slow: Annotated[float, option("NUMBER", "Playing time per simulated time. Default: 4.")] = 4.0,
 ) -> None:
-    """Write a moving picture of a saved walk: GIF, MP4 or a page with a player."""
+    """Write a film of a saved walk: GIF, MP4 or a page with a player."""
+    from warpchain.cli.walk_files import record_of
     from warpchain.inputs.validation import InputError, printable
     from warpchain.walks.walk_result import load_walk
 
-    result = load_walk(walk)
+    record = record_of(walk)
+    result, path = load_walk(record), path or record.with_suffix(".gif")
     try:
         result.animate(path, fps=fps, slow=slow)
     except (ValueError, ImportError) as error:
@@ -218,11 +220,12 @@ def _saved_values(path: Path, options: Mapping[str, object]) -> tuple[str, dict[
 
     A method brings its own settings, and a tolerance also holds where joints are soft, as in a new walk.
     """
+    from warpchain.cli.walk_files import record_of
     from warpchain.inputs.methods import METHODS_BY_NEED
     from warpchain.inputs.sections import SECTIONS
     from warpchain.walks.walk_result import load_walk
 
-    saved = load_walk(path)
+    saved = load_walk(record_of(path))
     replaced = {"soft_tolerance"} if "tolerance" in options else set()
     if "method" in options:
         replaced |= {"tolerance", "soft_tolerance"}.union(*METHODS_BY_NEED.values())

@@ -1,6 +1,7 @@
 """A film strip: the chain at instants along its walk, drawn to scale.
 
-Sizes on paper are in inches: constrained layout clips labels of axes with a fixed aspect.
+Sizes on paper are in inches: constrained layout clips labels of axes with a fixed aspect. Texts are plain: formulas
+would take a third of the time that this figure takes, and every walk has one.
 """
 
 from dataclasses import dataclass, replace
@@ -12,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from warpchain.pictures.chain import ABOVE, FRONT, SIDE, draw_chain, draw_ground, sprocket_circle, walk_box
@@ -29,8 +31,8 @@ _WIDTH: Final = 10.0
 _HIGHEST: Final = 4.6
 _DEEPEST: Final = 8.0
 """Width of the paper, greatest height of the side view, and of it and the view from above together."""
-_LEFT, _BETWEEN, _RIGHT, _TOP, _BELOW, _FOOT = 0.9, 0.85, 0.25, 0.35, 0.85, 0.1
-"""Room for labels: beside, between and above the views, below each row, and at the foot."""
+_LEFT, _BETWEEN, _RIGHT, _TOP, _BELOW, _FOOT = 0.9, 0.85, 0.25, 0.6, 0.85, 0.1
+"""Room for labels: beside and between the views, for legend and titles above them, below each row, at the foot."""
 _CLOCK: Final = 0.2
 """Room for the times above the chains."""
 _NARROWEST: Final = 1.3
@@ -86,16 +88,17 @@ def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure |
     left = _LEFT + (across - scale * (size[0] + broad)) / 2
     bottom = _FOOT + lower + _BELOW
     side = panel(left, bottom, width, height)
-    side.set(xlim=(low[0], high[0]), ylim=(-depth, high[1] + top), xlabel="$x$ / m", ylabel="$y$ / m")
-    views = [("from the side", side, SIDE)]
+    side.set(xlim=(low[0], high[0]), ylim=(-depth, high[1] + top), xlabel="x / m", ylabel="y / m")
+    views = [(f"{setting(walk)}{', from the side' * tilts}", side, SIDE)]
     draw_ground(side, low[0], high[0], -depth)
     _draw_distance(side, walk, -0.5 * depth)
     if tilts:
         z = (low[2] + high[2]) / 2 + np.array([0.5, -0.5]) * broad
         front = panel(left + width + _BETWEEN, bottom, scale * broad, height)
-        front.set(xlim=z, ylim=(-depth, high[1] + top), xlabel="$z$ / m", ylabel="$y$ / m")
+        front.set(xlim=z, ylim=(-depth, high[1] + top), xlabel="z / m", ylabel="y / m")
+        front.xaxis.set_major_locator(MaxNLocator(4))
         above = panel(left, _FOOT + 0.5, width, scale * broad)
-        above.set(xlim=(low[0], high[0]), ylim=z, xlabel="$x$ / m", ylabel="$z$ / m", facecolor=GROUND)
+        above.set(xlim=(low[0], high[0]), ylim=z, xlabel="x / m", ylabel="z / m", facecolor=GROUND)
         draw_ground(front, z[0], z[1], -depth)
         views += [("from the front", front, FRONT), ("from above", above, ABOVE)]
     # viridis without its palest end, which can hardly be seen on white paper
@@ -109,17 +112,14 @@ def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure |
             draw_chain(axes, joints[frame], radius, view, _link_colors(colors[frame]), edge=0.25)
         _draw_way(axes, walk, center, view)
         tidy(axes)
-        if tilts:
-            axes.set_title(title, fontsize="medium", loc="left")
+        axes.set_title(title, fontsize="medium", loc="left")
     _write_times(side, walk.frame_time[shown], joints[shown, :, :2], colors[shown], 1.2 * radius, 1 / scale)
     for number, close_up in enumerate(close_ups):
         axes = panel(_LEFT + number * close_up_width, _FOOT, close_up_width - 0.1, lower)
         draw_chain(axes, joints[close_up.frame], radius, SIDE, _link_colors(colors[close_up.frame]), edge=0.6)
-        _frame_close_up(axes, side, close_up, f"$\\mathbf{{{'abcd'[number]}}}$", walk.frame_time[close_up.frame])
-    if not tilts:
-        side.set_title(setting(walk), fontsize="medium", loc="left")
+        _frame_close_up(axes, side, close_up, "abcd"[number], walk.frame_time[close_up.frame])
     style: dict[str, Any] = {"frameon": False, "ncols": 2, "borderaxespad": 0.0, "fontsize": "small"}
-    place = ((left + width) / paper[0], 1 - 0.08 / paper[1])
+    place = (1 - _RIGHT / paper[0], 1 - 0.08 / paper[1])
     figure.legend(*side.get_legend_handles_labels(), loc="upper right", bbox_to_anchor=place, **style)
     return figure
 
@@ -190,7 +190,7 @@ def _draw_distance(axes: Axes, walk: "WalkResult", depth: float) -> None:
     for x in (start, end):
         axes.plot([x, x], [0.0, 1.6 * depth], color=INK, linewidth=0.8, zorder=4)
     box = {"facecolor": GROUND, "edgecolor": "none", "pad": 2.0}
-    text = f"$\\Delta x$ = {walk.dx:.3f} m"
+    text = f"Δx = {walk.dx:.3f} m"
     axes.text((start + end) / 2, depth, text, ha="center", va="center", bbox=box, zorder=4)
 
 
@@ -209,9 +209,12 @@ def _frame_close_up(axes: Axes, strip: Axes, close_up: _CloseUp, letter: str, mo
     (x, y), (right, top) = close_up.low, close_up.high
     draw_ground(axes, x, right, min(y, 0.0))
     axes.set(xlim=(x, right), ylim=(y, top), xticks=[], yticks=[])
-    axes.set_title(f"{letter}  {close_up.title}, {moment:.3f} s", fontsize="medium", loc="left")
+    axes.set_title(f"{close_up.title}, {moment:.3f} s", fontsize="medium", loc="left", x=0.07)
+    axes.annotate(
+        letter, (0.0, 1.0), xycoords="axes fraction", xytext=(0, 6), textcoords="offset points", weight="bold"
+    )
     strip.add_patch(Rectangle((x, y), right - x, top - y, fill=False, edgecolor=INK, linewidth=0.8, zorder=5))
-    strip.text(x, top, f" {letter}", ha="left", va="top", zorder=6, path_effects=_HALO)
+    strip.text(x, top, f" {letter}", ha="left", va="top", weight="bold", zorder=6, path_effects=_HALO)
 
 
 def _close_ups(walk: "WalkResult") -> list[_CloseUp]:

@@ -39,10 +39,8 @@ def grid_pictures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture
             groups.setdefault(frozenset(varied) if len(varied) > 1 else frozenset(), []).append(name)
     with suppress(NothingToShow):
         if maps:
-            statistics = {name: result.blocks[name].statistics("dx") for name in maps}
-            yield _picture(
-                "distance_map", "Distance walked over links and frequency", draw_grid(statistics, kind="map")
-            )
+            figure = draw_grid({name: result.blocks[name].statistics("dx") for name in maps}, kind="map")
+            yield _picture("distance_map", "Distance walked over links and frequency", figure)
     for names in groups.values():
         with suppress(NothingToShow):
             yield grid_picture(result, quantity, names)
@@ -57,23 +55,19 @@ def grid_picture(result: SweepResult, quantity: str, blocks: list[str]) -> Pictu
     """
     statistics = result.cell_statistics(quantity)
     figure = draw_grid({name: statistics[name] for name in blocks}, quantity_of(quantity))
-    axes = {
-        name: None for block in blocks for name in result.blocks[block].axes if name in several(result.blocks[block])
-    }
-    over = f"against_{'_and_'.join(axes)}"
+    axes = {name: None for block in blocks for name, values in result.blocks[block].axes.items() if len(values) > 1}
+    over, words = f"against_{'_and_'.join(axes)}", " and ".join(map(quantity_name, axes))
     if axes.keys() != several(result.blocks[blocks[0]]):
-        over = "responses"
+        over, words = "responses", "the one quantity that a block varies"
     text = quantity_name(quantity_of(quantity))
-    words = f"{text[:1].upper()}{text[1:]} against {' and '.join(map(quantity_name, axes))}"
-    if over == "responses":
-        words = f"{text[:1].upper()}{text[1:]} against the one quantity that a block varies"
-    return _picture(f"{'distance' if quantity == 'dx' else quantity}_{over}", words, figure)
+    name = f"{'distance' if quantity == 'dx' else quantity}_{over}"
+    return _picture(name, f"{text[:1].upper()}{text[1:]} against {words}", figure)
 
 
 def _picture(name: str, words: str, figure: object) -> Picture:
     """A figure of means."""
     assert isinstance(figure, Figure)
-    return Picture(name, f"{words}: means of the walks at rest that have it.", figure)
+    return Picture(name, f"{words}: means of the walks at rest.", figure)
 
 
 def several(block: BlockResult) -> set[str]:
