@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 
@@ -71,12 +70,6 @@ def test_help_tells_the_defaults(command: Command) -> None:
     assert options == Options(method="standard") and options.tolerance == 3e-3
     assert f"standard: {options.method} at 3e-3" in words
     assert all(f"{name}: {title}" in words for name, title in METHODS.items())
-
-
-def test_alone_it_prints_help_and_its_version(command: Command) -> None:
-    """Without arguments the command lists its sub-commands; --version prints name and number."""
-    assert "walk" in command().out
-    assert re.fullmatch(r"warpchain \d+\.\d+\.\d+\S*\n", command("--version").out)
 
 
 REFUSED = {
@@ -159,14 +152,6 @@ def test_a_folder_that_cannot_be_is_found_before_the_walk(
     assert [path.name for path in Path().iterdir()] == ["file"]
 
 
-@pytest.mark.parametrize("arguments", [["--animate", "gif"], ["--frame-interval", "0.001"]])
-def test_pictures_need_a_folder(command: Command, arguments: Sequence[str]) -> None:
-    """An option about files without a folder to put them is refused."""
-    answer = command("walk", *arguments)
-    assert (answer.status, answer.out) == (2, "")
-    assert answer.err == f"error: {arguments[0]}: there is no folder to write to; add -o DIR\n"
-
-
 def test_mp4_without_its_extra_is_found_before_the_walk(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without imageio-ffmpeg an MP4 is refused at once, with the command that installs it."""
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
@@ -195,12 +180,12 @@ def test_json_is_one_object_with_everything(quick_walk: tuple[Answer, Path]) -> 
 
 
 def test_output_holds_record_and_pictures(quick_walk: tuple[Answer, Path]) -> None:
-    """The folder holds exactly the record, the two figures and the animation, and the record is that walk."""
+    """The folder holds exactly the record, the film strip and the film, and the record is that walk."""
     answer, folder = quick_walk
     assert [path.name for path in folder.iterdir()] == ["new"]
     files = {path.name: path.read_bytes() for path in (folder / "new/deep").iterdir()}
-    assert set(files) == {"walk.h5", "figure5.png", "film_strip.png", "walk.gif"}
-    assert files["figure5.png"].startswith(b"\x89PNG") and files["film_strip.png"].startswith(b"\x89PNG")
+    assert set(files) == {"walk.h5", "film_strip.png", "walk.gif"}
+    assert files["film_strip.png"].startswith(b"\x89PNG")
     assert files["walk.gif"].startswith(b"GIF89a")
     walk = load_walk(folder / "new/deep/walk.h5")
     assert walk.to_dict() == json.loads(answer.out)
@@ -219,7 +204,7 @@ def test_table_and_paths(command: Command) -> None:
         r"energy at release 0\.\d{5} J.*lost to floor 0\.\d{5} J.*unaccounted for -?[\d.]+e-\d+ J",
     ):
         assert re.search(part, words), part
-    assert answer.out.splitlines()[-3:] == ["new/walk.h5", "new/figure5.png", "new/film_strip.png"]
+    assert answer.out.splitlines()[-2:] == ["new/walk.h5", "new/film_strip.png"]
     frame_time = load_walk("new/walk.h5").frame_time
     np.testing.assert_allclose(np.diff(frame_time[:-1]), 1e-2, atol=5e-5)
 
@@ -261,13 +246,13 @@ def test_a_failed_walk_is_reported_and_kept(command: Command) -> None:
 def test_a_chain_that_was_never_released_leaves_no_pictures(command: Command) -> None:
     """A walk without time series leaves its record, and takes an earlier walk's pictures out of the folder."""
     Path("new").mkdir()
-    Path("new/figure5.png").write_bytes(b"of an earlier walk")
+    Path("new/energy.png").write_bytes(b"of an earlier walk")
     options = "--links 32 --preset soft --method dp5 --start spinning --set hold_limit=0.001 -o new"
     answer = command("walk", *options.split())
     assert answer.status == 1 and "not_steady" in answer.out
     assert [path.name for path in Path("new").iterdir()] == ["walk.h5"]
     lines = answer.err.splitlines()
-    assert [line.partition(":")[0] for line in lines] == ["new/figure5.png", "new/film_strip.png", "not_steady"]
+    assert [line.partition(":")[0] for line in lines] == ["new/film_strip.png", "not_steady"]
 
 
 @pytest.mark.parametrize("name", ["walk.h5", "loop.png", "walk.gif"])

@@ -32,8 +32,8 @@ grid: {frequency: [5, 6]}
 OUTPUTS = {
     "report swept -o {}": "page.html",
     "merge swept {}": "merged.h5",
-    "animate walk.h5 {}": "walk.gif",
-    "animate walk.h5 --slow 4 {}": "walk.html",
+    "animate walk.h5 -o {}": "walk.gif",
+    "animate walk.h5 --slow 4 -o {}": "walk.html",
     "plot walk.h5 -o {}": "folder",
     "plot swept -o {}": "folder",
     "schema -o {}": "schema.json",

@@ -102,7 +102,7 @@ def test_html_is_complete_in_itself(make: Any, tmp_path: Path) -> None:
 
 def test_titles_are_escaped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What a title says is text of the page, never a part of it."""
-    monkeypatch.setattr(animation, "setting", lambda walk: "</title><script>&")
+    monkeypatch.setattr(animation, "headline", lambda walk: "</title><script>&")
     animate(make_walk(), tmp_path / "walk.html")
     page = (tmp_path / "walk.html").read_text(encoding="utf-8")
     assert page.count("&lt;/title&gt;&lt;script&gt;&amp;") == 2 and page.count("<script>") == 1

@@ -15,8 +15,6 @@ from tests.run.test_sweep_run import BRIEF, TINY, brief_setup, data_of
 from tests.support.made_walks import assert_same
 from warpchain.engine.memory import CAPACITY_SAMPLES
 from warpchain.inputs.validation import InputError, InputWarning
-from warpchain.pictures.style import NothingToShow
-from warpchain.reports.figure5 import sweep_figure5
 from warpchain.reports.sweep_page import write_report
 from warpchain.run.sweep_run import sweep
 from warpchain.store.merged_file import merge
@@ -168,8 +166,6 @@ def test_a_walk_that_was_never_released_has_no_motion(tmp_path: Path) -> None:
     walk = result.series(sample=1)
     assert (walk.time.shape, walk.center.shape, walk.frame_joints.shape[0]) == ((0,), (0, 2), 0)
     assert walk.sprocket_center is None and np.isnan(walk.dx)
-    with pytest.raises(NothingToShow, match="series were kept"):
-        sweep_figure5(result)
     with pytest.raises(ValueError, match="no time series"):
         walk.plot()
     merge(tmp_path, tmp_path / "merged.h5")
@@ -226,31 +222,6 @@ def test_the_merged_file_of_blocks_and_of_a_part(tmp_path: Path) -> None:
         assert len(block.series(frequency=15, sample=1).time) > 9
         with pytest.raises(InputError, match="the motion of walk 7 is not there"):
             block.series(frequency=5, sample=2)
-
-
-def test_figure5_of_a_sweep_shows_the_kept_series(kept: Path) -> None:
-    """Both panels have a line for each shown walk, with its numbers; a colour is a cell."""
-    result = load(kept)
-    picture = sweep_figure5(result)
-    height, speed = picture.figure.axes
-    walks = [
-        result.series(links=links, frequency=frequency, sample=sample)
-        for links in (30, 44)
-        for frequency in (5, 15)
-        for sample in (0, 3)
-    ]
-    for axes, values in (
-        (height, [walk.center[:, 1] for walk in walks]),
-        (speed, [walk.center_velocity[:, 0] for walk in walks]),
-    ):
-        assert len(axes.lines) == len(walks)
-        for line, walk, numbers in zip(axes.lines, walks, values, strict=True):
-            np.testing.assert_array_equal(line.get_xdata(), walk.time)
-            np.testing.assert_array_equal(line.get_ydata(), numbers)
-    assert len({line.get_color() for line in speed.lines}) == 4
-    assert "8 walks in 4 of 4 cells" in picture.caption
-    names = [entry.get_text() for entry in height.get_legend().get_texts()]
-    assert names[0] == "n = 30, ν = 5 Hz" and len(names) == 4
 
 
 def test_report_and_pictures_use_kept_frames(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -41,7 +41,7 @@ def test_a_sweep_is_shown_with_its_counts(tmp_path: Path, monkeypatch: pytest.Mo
     assert result._repr_png_() is None and "<img" not in result._repr_html_()
 
 
-@pytest.mark.parametrize("kind", ["figure5", "film_strip", "energy"])
+@pytest.mark.parametrize("kind", ["height_and_speed", "film_strip", "energy"])
 def test_figures_show_themselves_without_pyplot(kind: str) -> None:
     """The figure that `plot` returns has a picture for a notebook, in a process that never loads pyplot."""
     program = (

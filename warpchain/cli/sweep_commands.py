@@ -107,26 +107,29 @@ def info(
 
 
 def plot(
-    path: Annotated[Path, argument("PATH", "Folder of a sweep, a merged file, or the file of a saved walk.")],
+    path: Annotated[Path, argument("PATH", "Folder of a sweep or of a saved walk, or the file of either.")],
     folder: Annotated[Path | None, output("DIR", "Folder of the figures. Default: that of PATH.")] = None,
     quantity: Annotated[
         str | None,
         option("NAME", "Column of a sweep to draw: dx, walk_time, bounces, hold_time ... Default: dx."),
     ] = None,
     kind: Annotated[
-        Literal["figure5", "film_strip", "loop", "energy", "tilt"] | None,
+        Literal["film_strip", "height_and_speed", "loop", "energy", "tilt"] | None,
         typer.Option(help="Only figure of a walk to draw. Default: all that it has something for."),
     ] = None,
 ) -> None:
     """Draw every figure that a sweep or a saved walk has something for.
 
-    Of a sweep: Figures 6 and 5, grids, tolerance, sensitivity, statuses. Of a walk: figure5.png, film_strip.png,
-    loop.png, energy.png and, if the plane tilts, tilt.png; a line says what is left out and why.
+    Of a sweep: the distance as in the paper's Figure 6, maps, lines over any axes, tolerance, sensitivity, statuses. Of
+    a walk: film_strip.png, height_and_speed.png, loop.png, energy.png and, if the plane tilts, tilt.png; a line says
+    what is left out and why.
     """
+    from warpchain.cli.walk_files import record_of
     from warpchain.hdf5_files import kind_of_hdf5
     from warpchain.inputs.validation import InputError, printable
     from warpchain.store.sweep_result import KIND
 
+    path = record_of(path)
     is_file = os.path.isfile(path)
     if (
         is_file and kind_of_hdf5(path, "give the folder of a sweep, a merged file, or the file of a saved walk") != KIND

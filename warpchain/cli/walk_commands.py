@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
-from warpchain.cli.words import JSON, argument, option, output, output_path
+from warpchain.cli.words import JSON, argument, option, output
 from warpchain.inputs.methods import METHODS
 
 if TYPE_CHECKING:
@@ -36,14 +36,15 @@ _SET: Final = (
 _SEED: Final = "Draw what is not given at random, one sample for each whole number. Without it: means, phase 0."
 _CONFIG: Final = "Read preset, scene, options and parameters from a file; what the command line gives counts more."
 _LIKE: Final = (
-    "Take setup and seed of a saved walk or, with --index, of a walk of a sweep: its folder or a merged file. That "
-    "repeats it to the bit; other options change single values. Not with --config, --preset or --seed."
+    "Take setup and seed of a saved walk, its file or folder, or with --index of a walk of a sweep: its folder or a "
+    "merged file. That repeats it to the bit; other options change single values. Not with --config, --preset or --seed."
 )
 _INDEX: Final = "Number of the walk in the sweep that --like names, as in the column index of its results."
 _OUTPUT: Final = (
-    "Write walk.h5, figure5.png, film_strip.png, of a chain on a sprocket loop.png, and if its plane tilts tilt.png to "
-    "this folder; files of these names are replaced."
+    "Write walk.h5 and film_strip.png to this folder; figures of an earlier walk there are deleted. `warpchain plot` "
+    "draws the others, `warpchain animate` a film."
 )
+_FILM: Final = "The file to write; its name ends in .gif, .mp4 or .html. Default: walk.gif beside the walk."
 _FRAMES: Final = "Simulated time between two pictures of the chain, in s; needs a folder. Default: 0.002."
 _LOADS: Final = (
     "Record forces and moments of the joints with each picture, by default every 0.0001 s; needs a folder. standard "
@@ -68,7 +69,7 @@ def walk(
     assignments: Annotated[list[str] | None, option("NAME=VALUE", _SET, "--set")] = None,
     seed: Annotated[_Text, option("S", _SEED)] = None,
     config: Annotated[Path | None, option("FILE.yaml", _CONFIG)] = None,
-    like: Annotated[Path | None, option("WALK.h5|DIR", _LIKE)] = None,
+    like: Annotated[Path | None, option("PATH", _LIKE)] = None,
     index: Annotated[_Text, option("I", _INDEX)] = None,
     folder: Annotated[Path | None, output("DIR", _OUTPUT)] = None,
     animation: Annotated[
@@ -135,18 +136,18 @@ def walk(
 
 
 def animate(
-    walk: Annotated[Path, argument("WALK.h5", "A walk that `warpchain walk -o DIR` wrote.")],
-    path: Annotated[
-        Path, argument("FILE", "The file to write; its name ends in .gif, .mp4 or .html.", parser=output_path)
-    ],
+    walk: Annotated[Path, argument("PATH", "Folder or file of a saved walk.")],
+    path: Annotated[Path | None, output("FILE", _FILM)] = None,
     fps: Annotated[float, option("NUMBER", "Pictures per second; in HTML the browser decides. Default: 30.")] = 30.0,
     slow: Annotated[float, option("NUMBER", "Playing time per simulated time. Default: 4.")] = 4.0,
 ) -> None:
-    """Write a moving picture of a saved walk: GIF, MP4 or a page with a player."""
+    """Write a film of a saved walk: GIF, MP4 or a page with a player."""
+    from warpchain.cli.walk_files import record_of
     from warpchain.inputs.validation import InputError, printable
     from warpchain.walks.walk_result import load_walk
 
-    result = load_walk(walk)
+    record = record_of(walk)
+    result, path = load_walk(record), path or record.with_suffix(".gif")
     try:
         result.animate(path, fps=fps, slow=slow)
     except (ValueError, ImportError) as error:
@@ -223,6 +224,7 @@ def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
         InputError: there is no such walk, or the number is missing.
         OSError: the file or folder cannot be read.
     """
+    from warpchain.cli.walk_files import record_of
     from warpchain.hdf5_files import kind_of_hdf5
     from warpchain.inputs.validation import InputError
     from warpchain.inputs.yaml_files import parse_yaml
@@ -231,8 +233,9 @@ def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
     from warpchain.walks.walk_result import load_walk
 
     wanted = "give a saved walk, or the folder or merged file of a sweep and --index"
-    if index is None and not path.is_dir() and kind_of_hdf5(path, wanted) != KIND:
-        walk = load_walk(path)
+    record = record_of(path)
+    if index is None and not record.is_dir() and kind_of_hdf5(record, wanted) != KIND:
+        walk = load_walk(record)
         return walk.setup, walk.seed
     if index is None:
         raise InputError(f"--like: {path} has many walks; give --index, the number of one, as well")

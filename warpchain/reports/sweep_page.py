@@ -18,7 +18,6 @@ from warpchain.files import checked_output, write_whole
 from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.validation import InputError
 from warpchain.pictures.labels import axis_symbol, cell_text, cell_values, number_text, unit_text, with_unit
-from warpchain.pictures.walk_shape import Walk
 from warpchain.reports.html_page import REPORTS, page, picture, table
 from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
@@ -28,6 +27,7 @@ from warpchain.sweeps.plan import load_sweep
 from warpchain.sweeps.recording import Recording
 from warpchain.version import VERSION
 from warpchain.walks.rows import MISSING, fault_remedies, field_column
+from warpchain.walks.walk_result import WalkResult
 
 Array = NDArray[Any]
 
@@ -171,8 +171,6 @@ def _walk_table(
 
 def _walk(result: SweepResult, index: int, device: str | None) -> str:
     """One walk, as kept or else run again: its numbers, a player, and its pictures."""
-    from warpchain.pictures.film_strip import film_strip
-    from warpchain.pictures.walk_figures import figure5
     from warpchain.run.sweep_run import on_device
     from warpchain.walks.one_walk import run_walk
 
@@ -195,14 +193,15 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
     parts = [f"<p>{escape(text)}</p>", _player(walk)]
     if len(walk.frame_time) and np.isfinite(walk.frame_joints).all():
         caption = "Height and speed of the centre of mass, as in the paper's Figure 5."
-        parts += [picture(film_strip(walk), "The walk, drawn to scale."), picture(figure5([walk]), caption)]
+        parts += [picture(walk.plot("film_strip"), "The walk, drawn to scale.")]
+        parts += [picture(walk.plot("height_and_speed"), caption)]
     if planned.drawn:
         rows = [[name, number_text(value), unit_text(name)] for name, value in planned.drawn.items()]
         parts.append("<h3>Drawn for this walk</h3>" + table(["name", "value", "unit"], rows))
     return "\n".join(parts)
 
 
-def _player(walk: Walk) -> str:
+def _player(walk: WalkResult) -> str:
     """A frame with the page of the moving picture, or the reason why there is none."""
     from warpchain.pictures.animation import player
 
@@ -218,7 +217,7 @@ def _player(walk: Walk) -> str:
     return f'<iframe title="the walk in motion" {style} srcdoc="{content}"></iframe>'
 
 
-def _compared(walk: Walk, block: BlockResult, place: tuple[int, ...]) -> str:
+def _compared(walk: WalkResult, block: BlockResult, place: tuple[int, ...]) -> str:
     """Whether a walk that was run again has the same result as in the sweep."""
     status, dx = int(block.columns["status"][place]), float(block.columns["dx"][place])
     if status == MISSING:

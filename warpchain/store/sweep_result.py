@@ -161,6 +161,7 @@ class SweepResult:
         self,
         kind: Literal["lines", "map"] | None = None,
         quantity: str = "dx",
+        x: str | None = None,
         ax: "Axes | None" = None,
         figure: "Figure | SubFigure | None" = None,
     ) -> "Figure | SubFigure":
@@ -169,6 +170,8 @@ class SweepResult:
         Args:
             kind: `lines` or `map`; None for lines, unless two axes have many values.
             quantity: a column of numbers, such as `dx`, `walk_time`, `bounces` or a drawn quantity.
+            x: the axis along x, such as `frequency`; by default the frequency if it has three values or more, else the
+                longest axis of numbers.
             ax: where to draw a figure of one panel.
             figure: an empty figure to draw into; by default a new one.
 
@@ -176,13 +179,13 @@ class SweepResult:
             The figure, that of `ax` if it is given.
 
         Raises:
-            InputError: no block has such a column.
+            InputError: no block has such a column or axis.
             ValueError: the kind is unknown, `ax` is given together with `figure` or for several panels, or there is
                 nothing to show: no axis of several values, or no walk at rest.
         """
         from warpchain.pictures.grid_figure import draw_grid
 
-        return draw_grid(self.cell_statistics(quantity), quantity_of(quantity), kind, ax=ax, figure=figure)
+        return draw_grid(self.cell_statistics(quantity), quantity_of(quantity), kind, x=x, ax=ax, figure=figure)
 
     def to_xarray(self) -> "xarray.Dataset | xarray.DataTree":
         """The only block as a data set, or several as a tree with one child each."""

@@ -277,7 +277,7 @@ class WalkResult:
 
     def plot(
         self,
-        kind: Kind = "figure5",
+        kind: Kind = "height_and_speed",
         *,
         figure: "Figure | None" = None,
         ax: "Axes | None" = None,
@@ -285,9 +285,9 @@ class WalkResult:
         """Draw the walk.
 
         Args:
-            kind: `figure5` for height and speed of the centre of mass, `film_strip` for the chain itself, `loop` for
-                its loop on the sprocket just before the release, `energy` for its energies, `tilt` for tilt, yaw and
-                lateral drift of a plane that tilts.
+            kind: `height_and_speed` of the centre of mass, `film_strip` for the chain itself, `loop` for its loop on
+                the sprocket just before the release, `energy` for its energies, `tilt` for tilt, yaw and lateral drift
+                of a plane that tilts.
             figure: an empty matplotlib figure to draw into; by default a new one, which a notebook shows.
             ax: where to draw `energy`, the only figure with one pair of axes.
 
@@ -331,10 +331,10 @@ class WalkResult:
         animate(self, path, fps=fps, slow=slow)
 
     def _repr_png_(self) -> bytes | None:
-        """The film strip, or Figure 5 if there are no frames; None if there is nothing to draw."""
+        """The film strip, or height and speed if there are no frames; None if there is nothing to draw."""
         from warpchain.pictures.inline import first_png
 
-        return first_png(partial(self.plot, kind) for kind in ("film_strip", "figure5"))
+        return first_png(partial(self.plot, kind) for kind in ("film_strip", "height_and_speed"))
 
     def _repr_html_(self) -> str:
         """The most important numbers, and the picture."""
