@@ -37,7 +37,7 @@ _SEED: Final = "Draw what is not given at random, one sample for each whole numb
 _CONFIG: Final = "Read preset, scene, options and parameters from a file; what the command line gives counts more."
 _LIKE: Final = (
     "Take setup and seed of a saved walk, its file or folder, or with --index of a walk of a sweep: its folder or a "
-    "merged file. That repeats it to the bit; other options change single values. Not with --config, --preset or --seed."
+    "merged file. That repeats it to the bit; other options change single values. Not with --config, --preset, --seed."
 )
 _INDEX: Final = "Number of the walk in the sweep that --like names, as in the column index of its results."
 _OUTPUT: Final = (
