@@ -197,10 +197,10 @@ class Bank:
         if np.any(columns["status"] == MISSING):
             raise InputError("bank: walks are missing; let the sweep end")
         links, frequencies, samples = result.axes["links"], result.axes["frequency"], result.shape[-1]
-        found = [
-            (group["series/time"][()], group["series/center"][()], group["frames/joints"][0], group["series/rms_speed"][0])
-            for _, group in result.kept_motions(range(columns["index"].size))
-        ]
+        found: list[Any] = [None] * columns["index"].size
+        for place, group in result.kept_motions(range(len(found))):  # in the order of the files
+            series, joints = group["series"], group["frames/joints"][0].astype(float)
+            found[place] = series["time"][()], series["center"][()], joints, series["rms_speed"][0]
         step = round(float(np.median(np.diff(found[0][0]))), 4)
         time = np.arange(0.0, CLOCK[-1] + 0.03, step)
         ok = np.array([each[0][-1] >= time[-1] for each in found]).reshape(-1, samples).all(axis=0)
