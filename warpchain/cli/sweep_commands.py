@@ -60,6 +60,10 @@ def sweep(
         raise InputError("FILE.yaml: missing; give a sweep file, or --new FILE.yaml to have one written")
     if folder is None:
         raise InputError("--output: missing; give a folder for the results with -o DIR")
+    if device is not None and gpus is None and scheduler is None:
+        from warpchain.engine.devices import start_early
+
+        start_early(device)
     from warpchain.cli.terminal import print_sweep, status_line, sweep_progress_text
     from warpchain.run.sweep_run import sweep as run
 
