@@ -3,9 +3,10 @@
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import pytest
+from pydantic import Field
 
 from warpchain.inputs import keywords
 from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
@@ -20,6 +21,7 @@ TYPES: dict[Any, Any] = {
     float | None: keywords.Number | None,
     bool: keywords.Truth,
     str: str,
+    tuple[Annotated[float, Field(ge=0, le=1e12)], ...] | None: keywords.Numbers | None,
 }
 """Type of a field → that of the keyword."""
 

@@ -3,14 +3,18 @@
 Type checkers cannot read pydantic's models for this. A test compares the two, name by name and type by type.
 """
 
+from collections.abc import Sequence
 from typing import Any, Literal, TypedDict
 
 import numpy as np
+from numpy.typing import NDArray
 
 Whole = int | np.integer[Any]
 """A whole number."""
 Number = float | np.floating[Any] | np.integer[Any]
 """A number."""
+Numbers = Sequence[Number] | NDArray[np.floating[Any] | np.integer[Any]]
+"""Numbers, one for each link or joint."""
 Truth = bool | np.bool_
 """A truth value."""
 
@@ -95,6 +99,16 @@ class OtherScene(TypedDict, total=False):
     tilt: Number
     tilt_rate: Number
     yaw_rate: Number
+    charm_link: Whole
+    charm_mass: Number
+    charm_inertia: Number
+    stiff_joint: Whole
+    stiff_joint_factor: Number
+    mass_gradient: Number
+    link_masses: Numbers | None
+    link_inertias: Numbers | None
+    viscous_frictions: Numbers | None
+    coulomb_frictions: Numbers | None
 
 
 class SceneSettings(OtherScene, total=False):

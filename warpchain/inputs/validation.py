@@ -96,6 +96,8 @@ def number_field(default: Any, unit: str, description: str, **more: Any) -> Any:
         unit: SI unit, `DIMENSIONLESS` for pure numbers.
         description: its meaning, in one line.
         more: limits `ge`, `gt`, `le`, `lt` in `unit`, as of `pydantic.Field`; anything else stands beside the unit.
+            `tacit`: a resolved sweep leaves the field out where it has its default, so that sweeps older than the field
+            keep their digests.
     """
     limits = {name: more.pop(name) for name in ("ge", "gt", "le", "lt") if name in more}
     return Field(default, description=description, json_schema_extra={"unit": unit, **more}, **limits)
@@ -105,6 +107,11 @@ def field_unit(field: FieldInfo) -> str:
     """Unit of a field that `number_field` made; `DIMENSIONLESS` for any other."""
     extra = field.json_schema_extra
     return str(extra.get("unit", DIMENSIONLESS)) if isinstance(extra, dict) else DIMENSIONLESS
+
+
+def is_tacit(field: FieldInfo) -> bool:
+    """Whether a field is left out where it has its default, see `number_field`."""
+    return isinstance(field.json_schema_extra, dict) and bool(field.json_schema_extra.get("tacit"))
 
 
 def field_limits(field: FieldInfo) -> dict[str, float]:

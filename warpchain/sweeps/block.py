@@ -16,10 +16,10 @@ from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.sections import SECTION_OF, SECTIONS
 from warpchain.inputs.setup import Setup, combined, options_beside
-from warpchain.inputs.validation import InputError, validated
+from warpchain.inputs.validation import InputError, is_tacit, validated
 from warpchain.sweeps.designs import walks_per_sample
 
-Value = float | int | str | None
+Value = float | int | str | tuple[float, ...] | None
 """A value of a field; truth values are integers to Python, and None is null."""
 _Place = tuple[tuple[str, Value], ...]
 """Names and values of the axes of one section in a cell."""
@@ -151,7 +151,7 @@ class Block:
             elif distribution.mean is not None:
                 given.append((f"distributions.{name}.gaussian.mean", name, distribution.mean))
         for where, name, value in given:
-            if name in Parameters.model_fields and value is not None:
+            if name in Parameters.model_fields and isinstance(value, int | float):
                 yield f"{self.path}.{where}", name, float(value)
 
     def placed(self, fixed: Setup) -> dict[str, Distribution]:
@@ -170,6 +170,11 @@ class Block:
             for name, distribution in self.distributions.items()
             if not (isinstance(distribution, Gaussian) and distribution.mean is None)
         } | self.axes.keys()
+        replaced |= {
+            name
+            for name, field in Scene.model_fields.items()
+            if is_tacit(field) and getattr(first.scene, name) == field.default
+        }
         if self.preset is None:
             replaced |= first.parameters.model_dump().keys() - self.sections["parameters"].keys()
         return {
