@@ -49,7 +49,7 @@ def world_bytes(
         tilts: Whether the plane of the chain is kept with samples and frames.
     """
     columns = layout.padded_width(longest)
-    few = CHAIN_DOUBLES + 138 + layout.PLANE_ROWS  # numbers of a world in model, drive and state
+    few = CHAIN_DOUBLES + 139 + layout.PLANE_ROWS  # numbers of a world in model, drive and state
     numbers = columns * scratch_rows(options, longest, device) + (6 + layout.LINK_ROWS) * longest + few
     numbers += samples * (layout.ALL_COLUMNS if tilts else layout.SAMPLE_COLUMNS)
     numbers += frames * ((2 + 3 * keeps_loads) * longest + layout.PLANE_VALUES * tilts + 1)
