@@ -3,6 +3,8 @@
 World (one chain instance) is always axis 0. W: number of worlds; n: links of a world (``link_count``); N: greatest n.
 """
 
+from typing import Any
+
 import warp as wp
 
 wp.set_module_options({"enable_backward": False})
@@ -15,8 +17,7 @@ LOADING_TIME = wp.constant(wp.float64(0.25))
 class Chain:
     """One world's constants; in a kernel also under its present loads and with its present softness.
 
-    The host fills a field from the parameter of the same name, others in ``Batch.set_chain``; those of none it leaves
-    at 0.
+    The host fills a field from the parameter of its name, or as ``engine/constants.py`` says, or else with 0.
     """
 
     link_count: wp.int32  # n
@@ -48,8 +49,10 @@ class Chain:
     origin_height: wp.float64
 
 
-CHAIN_DOUBLES = Chain.numpy_dtype()["itemsize"] // 8
-"""Size of a world's constants, in doubles."""
+CHAIN_NUMBERS: Any = Chain.numpy_dtype()  # type: ignore[attr-defined]
+"""Type of a world's constants in structured NumPy arrays."""
+CHAIN_DOUBLES: int = CHAIN_NUMBERS["itemsize"] // 8
+"""Their size, in doubles."""
 
 
 @wp.struct

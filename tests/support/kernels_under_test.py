@@ -12,6 +12,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from tests.support.unlike_links import UnlikeLinks
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import start_device
 from warpchain.inputs.options import Options
@@ -42,15 +43,18 @@ def poisoned(*shape: int) -> wp.array:
     return wp.full(shape, np.nan, dtype=wp.float64, device=DEVICE)
 
 
-def model_of(chains: Sequence[tuple[int, Parameters]]) -> Model:
+def model_of(chains: Sequence[tuple[int, Parameters | UnlikeLinks]]) -> Model:
     """Constants of chains of so many links each."""
     batch = Batch(len(chains), max(links for links, _ in chains), Options())
-    for world, (links, parameters) in enumerate(chains):
-        batch.set_chain(world, parameters, links)
+    for world, (links, chain) in enumerate(chains):
+        if isinstance(chain, UnlikeLinks):
+            batch.set_chain(world, chain.parameters, links, own=chain.own)
+        else:
+            batch.set_chain(world, chain, links)
     return batch.model
 
 
-def chain_on_cpu(position: Array, velocity: Array, parameters: Parameters) -> tuple[Model, State]:
+def chain_on_cpu(position: Array, velocity: Array, parameters: Parameters | UnlikeLinks) -> tuple[Model, State]:
     """Structs of one chain; of its state only the links and the factor of its loads are set."""
     state = State()
     state.load_factor = wp.ones(1, dtype=wp.float64, device=DEVICE)
@@ -135,7 +139,7 @@ class Placed:
 
     position: Array
     velocity: Array
-    parameters: Parameters
+    parameters: Parameters | UnlikeLinks
 
 
 class ContactPass:

@@ -11,6 +11,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpchain.engine.constants import constants_of, rows_of
 from warpchain.engine.control import control_of
 from warpchain.engine.devices import Gpu, start_device
 from warpchain.engine.ground import cells_of, faces_of
@@ -24,7 +25,7 @@ from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.features import Features
-from warpchain.kernels.types import LOADING_TIME, Chain, Drive, Model, Record, State
+from warpchain.kernels.types import LOADING_TIME, Drive, Model, Record, State
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
@@ -95,7 +96,7 @@ class Batch:
         self.drive = self._arrays(Drive)
         self._constant = set(self._mirrors)
         if self._gpu:
-            self._order = Mirror(np.zeros(worlds, dtype=np.int32), wp.int32, self._gpu, self._stream)
+            self._order = Mirror((worlds,), wp.int32, self._gpu, self._stream)
         self.state = self._arrays(
             State,
             links=(6, longest),
@@ -130,16 +131,14 @@ class Batch:
         """A struct of arrays of zeros; ``shapes``: further axes of an array, after that of the worlds."""
         filled = struct()
         for name, field in struct.vars.items():
-            shape = (len(self.links), *shapes.get(name, ()))
-            setattr(filled, name, self._array(shape, field.type.dtype))
+            setattr(filled, name, self._array((len(self.links), *shapes.get(name, ())), field.type.dtype))
         return filled
 
     def _array(self, shape: tuple[int, ...], dtype: Any) -> wp.array:
         """An array of zeros on the device that the host will read or write."""
         if self._gpu is None or math.prod(shape) == 0:
             return wp.zeros(shape, dtype=dtype, device=self.device.warp)
-        numbers = dtype.numpy_dtype() if dtype is Chain else wp.dtype_to_numpy(dtype)
-        mirror = Mirror(np.zeros(shape, dtype=numbers), dtype, self._gpu, self._stream)
+        mirror = Mirror(shape, dtype, self._gpu, self._stream)
         self._mirrors[mirror.array.ptr] = mirror
         return mirror.array
 
@@ -154,40 +153,21 @@ class Batch:
         return values
 
     def set_chain(
-        self,
-        world: int,
-        parameters: Parameters,
-        links: int,
-        sprocket_radius: float | None = None,
-        own: LinkValues | None = None,
+        self, world: int, parameters: Parameters, links: int, radius: float | None = None, own: LinkValues | None = None
     ) -> None:
-        """Set parameters and length of a world's chain.
+        """Set parameters and number of links of a world's chain.
 
         Args:
             world: Index.
             parameters: The chain's parameters.
             links: Number of links.
-            sprocket_radius: Radius [m] at which circles touch the sprocket; None: the parameter's.
+            radius: Radius [m] at which circles touch the sprocket; None: the parameter's.
             own: What each link and joint has of its own; None: inner and outer links alternate.
         """
         own = own or alternating(parameters, links)
-        half = parameters.link_length / 2
-        derived = {
-            "link_count": links,
-            "half_length": half,
-            "inverse_square": 1 / (half * half),
-            "mass": own.total_mass,
-            "inverse_smoothing": 1 / parameters.friction_smoothing,
-        }
-        if sprocket_radius is not None:
-            derived["sprocket_radius"] = sprocket_radius
         self.links[world] = links
-        chain = self._edit(self.model.chains)[world]
-        for name, value in (vars(parameters) | derived).items():
-            if name in chain.dtype.names:
-                chain[name] = value
-        rows = (own.mass, own.inertia, own.viscous_friction, own.coulomb_friction)  # as in layout
-        self._edit(self.model.links)[world, :, :links] = rows
+        self._edit(self.model.chains)[world] = constants_of(parameters, own, radius)
+        self._edit(self.model.links)[world, :, :links] = rows_of(own)
 
     def set_floor(self, world: int, points: Array, parameters: Parameters) -> None:
         """Set the floor of a world's chain, by the points of its profile (p, 2), if it is not flat."""

@@ -1,15 +1,16 @@
 """What happens in a walk: how long the chain is, how fast it is spun, from which height it is released."""
 
 import math
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from warpchain.inputs.floor import Array, Points, checked_profile, slope_points
+from warpchain.inputs.link_values import check_parity, link_values
 from warpchain.inputs.options import on_gpu
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.validation import InputError, Section, number_field
+from warpchain.inputs.validation import InputError, Section, number_field, shown
 
 MOST_LINKS: Final = 100_000
 """A chain of so many links takes 0.4 GB, and kernels of its own."""
@@ -23,8 +24,6 @@ HIGHEST: Final = 1e6
 """Greatest height, where numbers still tell a nanometre [m]."""
 HIGHEST_LOAD: Final = 1e4
 """Greatest factor by which loads are multiplied; more than some hundred make joints stretch and steps short."""
-LEAST_INERTIA: Final = 0.5
-"""Part of its rotary inertia that a link must keep under multiplied loads."""
 FASTEST_TAP: Final = 1e3
 """Greatest speed [m/s] and rate [rad/s] of the plane at the release, far beyond that of any loop."""
 LONGEST: Final = 1e6
@@ -34,30 +33,39 @@ LONGEST: Final = 1e6
 STEEPEST: Final = 80.0
 """Greatest angle of a slope [°]."""
 RIGHT_ANGLE: Final = math.pi / 2
+OF_LINKS: Final = ("link_masses", "link_inertias", "viscous_frictions", "coulomb_frictions")
+"""Fields with a number for each link or joint."""
 TAP: Final = ("lateral_speed", "tilt", "tilt_rate", "yaw_rate")
 """What a release may give to a plane that tilts. Each is 0 by default: an upright plane that nothing disturbs stays
 upright, so that a scene with a tilting plane alone is the paper's."""
 
 
-def _even(links: int) -> int:
-    if links % 2:
-        raise ValueError(f"{links} is odd; a chain alternates inner and outer links, so give an even number")
-    return links
+def _as_tuple(given: Any) -> Any:
+    if given is not None and not isinstance(given, list | tuple):
+        raise ValueError(f"{shown(given)} is no list; give a number for each link, or null")
+    return None if given is None else tuple(given)
+
+
+_Numbers = Annotated[
+    tuple[Annotated[float, Field(ge=0, le=1e12)], ...] | None,
+    BeforeValidator(_as_tuple),
+]
+"""A number for each link or joint; null: what the parameters say."""
 
 
 class Scene(Section):
     """What happens in one walk, from hanging on the sprocket to the end.
 
     Raises:
-        pydantic.ValidationError: a value is unknown or out of bounds, `links` is odd, the clearance is that of a
-            hanging chain although the chain never hangs, the release disturbs a plane that is fixed, or a plane that
-            tilts has no flat floor.
+        pydantic.ValidationError: a value is unknown or out of bounds, the clearance is that of a hanging chain although
+            the chain never hangs, the release disturbs a plane that is fixed, a plane that tilts has no flat floor, or
+            a link or joint is none of the chain.
     """
 
-    links: Annotated[int, AfterValidator(_even)] = number_field(
+    links: int = number_field(
         60,
         "1",
-        "number of links around the loop, even: inner and outer links alternate",
+        "number of links around the loop, even where inner and outer links alternate",
         symbol="n",
         ge=4,
         le=MOST_LINKS,
@@ -125,7 +133,6 @@ class Scene(Section):
     )
     floor: Annotated[Literal["flat"] | Points, BeforeValidator(checked_profile)] = Field(
         default="flat",
-        exclude_if=lambda floor: floor == "flat",
         description="flat, or a profile of points [[x, y], …] in m; its first and last face go on without end",
     )
     slope: float = number_field(
@@ -134,7 +141,6 @@ class Scene(Section):
         "of a flat floor; positive: it falls the way the chain walks",
         ge=-STEEPEST,
         le=STEEPEST,
-        exclude_if=lambda slope: slope == 0,
     )
     distance_limit: float | None = number_field(
         None,
@@ -142,7 +148,6 @@ class Scene(Section):
         "distance along the floor from the release at which a walk ends as distance_limit; null: none",
         gt=0,
         le=HIGHEST,
-        exclude_if=lambda limit: limit is None,
     )
     walk_until: float | None = number_field(
         None,
@@ -179,6 +184,51 @@ class Scene(Section):
         ge=-FASTEST_TAP,
         le=FASTEST_TAP,
     )
+    charm_link: int = number_field(0, "1", "link that carries a charm", ge=0, lt=MOST_LINKS)
+    charm_mass: float = number_field(
+        0.0, "kg", "mass at the centre of charm_link, added to its own", ge=0, le=1e6
+    )
+    charm_inertia: float = number_field(
+        0.0, "kg m²", "moment of inertia of the charm about that centre, added likewise", ge=0, le=1e12
+    )
+    stiff_joint: int = number_field(
+        0, "1", "joint at the end of this link, between it and the next, that is stiff", ge=0, lt=MOST_LINKS
+    )
+    stiff_joint_factor: float = number_field(
+        1.0, "1", "by which viscous and Coulomb friction of stiff_joint are multiplied", ge=0, le=1e6
+    )
+    mass_gradient: float = number_field(
+        0.0,
+        "1",
+        "mass and inertia of links grow evenly along the chain, from 1 − this times their own to 1 + this times",
+        gt=-1,
+        lt=1,
+    )
+    link_masses: _Numbers = number_field(None, "kg", "mass of each link; null: of its kind")
+    link_inertias: _Numbers = number_field(
+        None, "kg m²", "moment of inertia of each link; null: of its kind"
+    )
+    viscous_frictions: _Numbers = number_field(
+        None, "N m s", "viscous_friction of each joint; null: the same for all"
+    )
+    coulomb_frictions: _Numbers = number_field(
+        None, "N m", "coulomb_friction of each joint; null: the same for all"
+    )
+
+    @model_validator(mode="after")
+    def _links_are_there(self) -> Self:
+        for name in ("charm_link", "stiff_joint"):
+            if getattr(self, name) >= self.links:
+                raise InputError(
+                    f"{name}: {getattr(self, name)} is not among {self.links} links; give 0 to {self.links - 1}"
+                )
+        for name in OF_LINKS:
+            values = getattr(self, name)
+            if values is not None and len(values) != self.links:
+                raise InputError(f"{name}: {len(values)} numbers for {self.links} links; give one for each")
+            if values is not None and name.startswith("link") and min(values) == 0:
+                raise InputError(f"{name}[{values.index(0)}]: 0 is no {name[5:-2]}; give more")
+        return self
 
     @model_validator(mode="after")
     def _one_floor(self) -> Self:
@@ -239,22 +289,6 @@ def loop_speed(scene: Scene, parameters: Parameters) -> float:
     return math.pi * scene.frequency * parameters.link_length / half
 
 
-def greatest_load(parameters: Parameters) -> float:
-    """Greatest `Scene.load_factor` that leaves every link `LEAST_INERTIA` of its rotary inertia.
-
-    It is I − mℓ²/6 that is multiplied: point-like links lose inertia. Infinite where I ≥ mℓ²/6.
-    """
-    limit = math.inf
-    for mass, inertia in (
-        (parameters.inner_mass, parameters.inner_inertia),
-        (parameters.outer_mass, parameters.outer_inertia),
-    ):
-        missing = mass * parameters.link_length**2 / 6 - inertia
-        if missing > 0:
-            limit = min(limit, 1 + (1 - LEAST_INERTIA) * inertia / missing)
-    return limit
-
-
 def contact_radius(scene: Scene, parameters: Parameters) -> float:
     """Radius of the sprocket that the circles of the links touch, in m.
 
@@ -299,12 +333,13 @@ def check_links_on_gpu(links: int, device: str, field: str) -> None:
 def check_scene(scene: Scene, parameters: Parameters) -> None:
     """Check what a scene and its parameters must fulfil together.
 
-    A scene that starts as an ellipse has no sprocket, so nothing is asked of it.
+    A scene that starts as an ellipse has no sprocket, so nothing is asked of that.
 
     Raises:
-        InputError: the chain is too short for its sprocket, or the sprocket too small, or `contact_radius` finds none,
-            or the links are too point-like for the load factor that is given.
+        InputError: links of two kinds are odd in number, the chain is too short for its sprocket, or the sprocket too
+            small, or `contact_radius` finds none, or the links are too point-like for the load factor that is given.
     """
+    check_parity(scene, parameters)
     if scene.start == "ellipse":
         return
     contact_radius(scene, parameters)
@@ -313,11 +348,13 @@ def check_scene(scene: Scene, parameters: Parameters) -> None:
             f"parameters.sprocket_radius: {parameters.sprocket_radius} m is nothing beside links of "
             f"{parameters.link_length} m; give a larger radius, or start: ellipse, which needs none"
         )
-    if scene.load_factor is not None and scene.load_factor > greatest_load(parameters):
-        raise InputError(
-            f"scene.load_factor: {scene.load_factor:g} is too much for links of so little rotary inertia; "
-            f"give at most {greatest_load(parameters):.6g}, or null"
-        )
+    if scene.load_factor is not None:
+        greatest = link_values(scene, parameters).greatest_load(parameters.link_length)
+        if scene.load_factor > greatest:
+            raise InputError(
+                f"scene.load_factor: {scene.load_factor:g} is too much for links of so little rotary inertia; "
+                f"give at most {greatest:.6g}, or null"
+            )
     fewest = fewest_links(scene, parameters)
     if scene.links < fewest:
         raise InputError(

@@ -251,7 +251,8 @@ def _value(block: Mapping[str, Any], section: str, name: str) -> str:
         values = [_plain(value) for value in block["grid"][name]]
         return ", ".join(values) if len(values) <= 12 else f"{values[0]} … {values[-1]} ({len(values)} values)"
     own = block if name == "preset" else block[section]
-    plain = _plain(own[name]) if name in own else "of the preset"
+    default = SECTIONS["scene"].model_fields[name].default if section == "scene" else "of the preset"
+    plain = _plain(own.get(name, default))
     distribution = block["distributions"].get(name, {})
     if "gaussian" in distribution:
         gaussian = distribution["gaussian"]

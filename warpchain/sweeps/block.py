@@ -19,7 +19,7 @@ from warpchain.inputs.setup import Setup, combined, options_beside
 from warpchain.inputs.validation import InputError, validated
 from warpchain.sweeps.designs import walks_per_sample
 
-Value = float | int | str | None
+Value = float | int | str | tuple[float, ...] | None
 """A value of a field; truth values are integers to Python, and None is null."""
 POINT: Final = "point"
 """Name of the axis of parameter sets."""

@@ -29,6 +29,7 @@ from pydantic import (
 
 from warpchain.inputs.distributions import DRAWABLE, LARGEST_SEED, TABLE, Distribution, Gaussian, Uniform
 from warpchain.inputs.parameters import PRESETS
+from warpchain.inputs.scene import OF_LINKS
 from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.validation import (
     FIELDS,
@@ -102,6 +103,9 @@ _TYPES: Final[Mapping[str, Any]] = {
     ]
     for name, field in FIELDS.items()
 }
+
+
+_AXES: Final = {name: kind for name, kind in _TYPES.items() if name not in OF_LINKS}
 
 
 def _mapping_of(title: str, types: Mapping[str, Any]) -> Any:
@@ -254,7 +258,7 @@ class BlockKeys(BaseModel):
     ] = Field({}, description="what samples draw, see below")
     grid: Annotated[
         dict[str, list[Value]],
-        _mapping_of("grid", {"preset": _axis(_Preset), **{name: _axis(kind) for name, kind in _TYPES.items()}}),
+        _mapping_of("grid", {"preset": _axis(_Preset), **{name: _axis(kind) for name, kind in _AXES.items()}}),
     ] = Field({}, description="axes of the grid, see below; not in a file with blocks")
 
     points: Annotated[

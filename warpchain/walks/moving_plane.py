@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.inputs.link_values import link_values
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.state import State
@@ -34,7 +35,7 @@ def released_plane(setup: Setup, position: Array) -> Array:
         position: x, y [m], θ [rad] of the links in the upright plane, shape (n, 3).
     """
     scene, parameters = setup.scene, setup.parameters
-    masses = np.resize([parameters.inner_mass, parameters.outer_mass], len(position))
+    masses = link_values(scene, parameters).mass
     center_x, center_y, _ = masses @ position / masses.sum()
     lowest = lowest_point(position, parameters)
     sine, cosine = math.sin(scene.tilt), math.cos(scene.tilt)

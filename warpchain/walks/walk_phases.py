@@ -17,7 +17,6 @@ from warpchain.engine.control import (
     HOLD_STRAIN,
     LOADED_STRAIN,
     hold_softness,
-    line_density,
     mean_weight,
     push_rate,
     suitable_load,
@@ -25,6 +24,7 @@ from warpchain.engine.control import (
 from warpchain.engine.snapshot import change, restore, set_first_area, set_frame_marks, take_snapshot
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
 from warpchain.inputs.floor import body_of, circles_of, raised_by
+from warpchain.inputs.link_values import link_values, mean_value
 from warpchain.inputs.scene import contact_radius, floor_points, joint_radius, loop_speed, settling_time
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
@@ -42,7 +42,9 @@ Array = NDArray[np.float64]
 STILL_PERIOD = 0.25
 """Loop period [s] that is assumed when the sprocket stands still."""
 SHORTEST_WINDOW, LONGEST_WINDOW = 0.05, 0.25
-"""Bounds of the time [s] over which a loop under its own loads is averaged; between them half a loop period."""
+"""Bounds of the time [s] over which a loop under its own loads is averaged; between them half a loop period.
+
+Loops whose links do not alternate are averaged over whole periods, no more than the lower bound needs."""
 BY_ITSELF = -1.0
 """As `steady_time` means: the kernel chooses how long to watch, see :mod:`warpchain.kernels.events.release`."""
 
@@ -98,6 +100,7 @@ class WalkRun:
         self._first_area: float | None = None
 
         scene, parameters = setup.scene, setup.parameters
+        self._links = link_values(scene, parameters)
         self._has_sprocket = setup.has_drive
         self._tilts = scene.plane == "tilting"
         self._floor = floor_points(scene)
@@ -108,7 +111,7 @@ class WalkRun:
         from_rest = scene.start == "rest"
         speed = 2 * math.pi * scene.frequency * joint_radius(scene, parameters)
         if not self._has_sprocket:
-            batch.set_chain(world, parameters, scene.links)
+            batch.set_chain(world, parameters, scene.links, own=self._links)
             try:
                 position, velocity = lay_chain(
                     ellipse(scene.ellipse_aspect), scene.links, parameters.link_length, speed, scene.phase
@@ -121,15 +124,19 @@ class WalkRun:
             self._release(position, velocity)
             return
         radius = joint_radius(scene, parameters)
-        tension = line_density(parameters) * speed**2
-        weight = mean_weight(parameters, scene.links, radius)
-        load_factor = scene.load_factor or suitable_load(parameters, setup.options, weight)
+        density = mean_value(self._links.mass) / parameters.link_length
+        tension = density * speed**2
+        weight = mean_weight(parameters, density, scene.links, radius)
+        load_factor = scene.load_factor or suitable_load(parameters, self._links, setup.options, weight)
         loaded_softness = 0.0
         if setup.options.soften_drive:
             self._hold_softness = hold_softness(parameters, tension, HOLD_STRAIN)
             loaded_softness = hold_softness(parameters, tension + load_factor * weight, LOADED_STRAIN)
         period = scene.links * parameters.link_length / speed if speed > 0 else STILL_PERIOD
-        batch.set_chain(world, parameters, scene.links, contact_radius(scene, parameters))
+        window = min(max(period / 2, SHORTEST_WINDOW), LONGEST_WINDOW)
+        if not self._links.alternates:  # the loop swings as it turns: only over whole turns does its mean stay
+            window = period * math.ceil(SHORTEST_WINDOW / period)
+        batch.set_chain(world, parameters, scene.links, contact_radius(scene, parameters), self._links)
         self._settled = settling_time(scene)
         spin_up = scene.spin_up_time if from_rest and speed > 0 else 0.0
         self._at_full_speed = self._settled + spin_up
@@ -146,7 +153,7 @@ class WalkRun:
             loop_speed=loop_speed(scene, parameters),
             loop_period=period,
             load_factor=load_factor,
-            steady_window=min(max(period / 2, SHORTEST_WINDOW), LONGEST_WINDOW),
+            steady_window=window,
             steady_time=BY_ITSELF if scene.steady_time is None else scene.steady_time,
             steady_tolerance=scene.steady_tolerance,
             further_hold=scene.further_hold,
@@ -409,7 +416,7 @@ class WalkRun:
     def _set_chain_and_floor(self) -> None:
         """Let the world have the constants of the walk after its release."""
         scene, parameters = self.setup.scene, self.setup.parameters
-        self._batch.set_chain(self._world, parameters, scene.links)
+        self._batch.set_chain(self._world, parameters, scene.links, own=self._links)
         self._batch.set_drive(self._world, farthest=(scene.distance_limit or 0.0) * self._level)
         if self._floor is not None:
             self._batch.set_floor(self._world, self._floor, parameters)
