@@ -120,7 +120,7 @@ def parameters_page() -> str:
     }
     return (
         "# Parameters\n\n"
-        "The quantities of Table 1 of the paper, in SI units, by their source; *assumed* ones are not in the paper. "
+        "The quantities of Table 1 of the paper, in SI units, by source; those *chosen here* are not in the paper. "
         "After ± stands the standard deviation of the Gaussian that samples draw from; a draw outside the bounds is "
         "drawn again. `circle_radius` is smaller than half of `link_length`. A symbol, also in ASCII, stands for its "
         "name: `mu_fc=0.3` for `floor_friction=0.3`.\n\n"

@@ -123,7 +123,7 @@ def test_only_chosen_samples_are_kept(kept: Path) -> None:
     assert len(last.frame_time) == pytest.approx(20, abs=1) and first.sprocket_center is None
     assert last.setup.scene.links == 44
     for message, at in (
-        (r"walk 11 is not there; give one of the samples 0, 3", {"links": 44, "frequency": 5, "sample": 1}),
+        (r"walk 6 is not there; give one of the samples 0, 3", {"links": 44, "frequency": 5, "sample": 1}),
         (r"frequency: 6 is not on the axis; give one of 5\.0, 15\.0", {"links": 44, "frequency": 6}),
         (r"frequency: missing; give one of 5\.0, 15\.0", {"links": 44}),
         (r"link: no axis of block main; did you mean links", {"link": 44}),
@@ -260,7 +260,7 @@ def test_report_and_pictures_use_kept_frames(kept: Path, tmp_path: Path, monkeyp
         raise AssertionError("run again")
 
     monkeypatch.setattr("warpchain.walks.one_walk.run_walk", refuse)
-    write_report(kept, tmp_path / "page.html", animation_of=3)
+    write_report(kept, tmp_path / "page.html", animation_of=12)
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "Its frames were kept by the sweep" in page and "run again" not in page
     assert page.count("<iframe") == 1 and "as in the paper&#x27;s Figure 5" in page

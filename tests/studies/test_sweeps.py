@@ -64,7 +64,7 @@ def test_sweeps_of_studies(name: str, shapes: dict[str, tuple[int, ...]]) -> Non
     for block in sweep.blocks:
         preset = "paper" if block.name in stiff.get(name, []) else "soft"
         for index in {0, math.prod(block.shape) // 2, math.prod(block.shape) - 1}:
-            assert sweep.planned(block.first + index).setup.preset == preset
+            assert sweep.planned(block.indices.flat[index]).setup.preset == preset
 
 
 @pytest.mark.parametrize("name", ["paper_claims", "paper_joints", "paper_tolerance"])
@@ -76,10 +76,11 @@ def test_sweeps_of_the_paper_vary_one_quantity_at_a_time(name: str) -> None:
         assert (links, frequency) == ("links", "frequency")
         assert block.axes["links"] == (60, 90, 120, 150, 180) and block.axes["frequency"] == (5, 10, 15, 20, 25, 30)
         for other in others:
-            values, samples = block.axes[other], block.samples
+            values = block.axes[other]
             assert other not in block.drawn and other in sweep.same_samples_along
-            first = block.first + 17 * len(values) * samples + 3
-            setups = [sweep.planned(first + place * samples).setup for place in range(len(values))]
+            first = 17 * len(values)
+            cells = block.indices[..., 3].ravel()[first : first + len(values)]
+            setups = [sweep.planned(index).setup for index in cells]
             flat = [
                 {**setup.scene.model_dump(), **setup.options.model_dump(), **setup.parameters.model_dump()}
                 for setup in setups

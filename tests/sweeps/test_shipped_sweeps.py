@@ -47,7 +47,7 @@ def test_shipped_sweeps(name: str, shapes: dict[str, tuple[int, ...]]) -> None:
         preset = "paper" if name in ("figure6", "quickstart", "tilt") else "soft"
         walks = math.prod(block.shape)
         for index in {0, walks // 2, walks - 1}:
-            assert sweep.planned(block.first + index).setup.preset == preset
+            assert sweep.planned(block.indices.flat[index]).setup.preset == preset
 
 
 def test_shipped_sweeps_have_bare_names() -> None:
@@ -84,7 +84,7 @@ def test_figure6_follows_the_paper() -> None:
     assert rest.axes == {"links": (60, 90, 120, 150, 180), "frequency": (5.0, 10.0, 15.0, 20.0, 25.0, 30.0)}
     assert ellipse.axes == {"links": (150, 180), "frequency": rest.axes["frequency"]}
     for block, start in ((rest, "rest"), (ellipse, "ellipse")):
-        assert load_sweep(SWEEPS / "figure6.yaml").planned(block.first).setup.scene.start == start
+        assert load_sweep(SWEEPS / "figure6.yaml").planned(block.first_cell).setup.scene.start == start
         assert block.drawn == (*TABLE_1, "phase", "clearance")
 
 
@@ -93,7 +93,7 @@ def test_tolerance_repeats_the_same_samples() -> None:
     sweep = load_sweep(SWEEPS / "tolerance.yaml")
     for cell in range(4):
         for sample in (0, 11):
-            loose, tight = (sweep.planned(24 * cell + 12 * place + sample).setup for place in (0, 1))
+            loose, tight = (sweep.planned(sweep.indices[24 * cell + 12 * place + sample]).setup for place in (0, 1))
             assert (loose.options.tolerance, tight.options.tolerance) == (1e-6, 1e-9)
             assert (loose.scene, loose.parameters) == (tight.scene, tight.parameters)
 
@@ -111,7 +111,7 @@ def test_sensitivity_varies_every_quantity() -> None:
         block = by_name[name]
         assert block.axes.keys() == {name} and block.drawn == ("phase", "clearance")
         assert getattr(preset("soft"), name) in block.axes[name]
-        walks = [sweep.planned(block.first + 8 * place) for place in range(3)]
+        walks = [sweep.planned(block.first_cell + place) for place in range(3)]
         assert len({walk.setup.scene for walk in walks}) == 1
         assert [getattr(walk.setup.parameters, name) for walk in walks] == list(block.axes[name])
         if name in by_name["ranges"].drawn:

@@ -255,8 +255,9 @@ def refusals(error: ValidationError, path: str, keys: Iterable[str] = ()) -> lis
 def plain(value: object, path: str = "value") -> Any:
     """A user's value in Python's own types, as a YAML file gives it; what is none of these is left as it is.
 
-    NumPy's numbers, truth values and texts become Python's; arrays, ranges and tuples become lists, also inside of
-    lists and mappings. NumPy's times become texts, which no number can be.
+    NumPy's numbers, truth values and texts become Python's; arrays, ranges, tuples and what pandas and xarray have for
+    them become lists, tables mappings of lists, also inside of lists and mappings. NumPy's times become texts, which no
+    number can be.
 
     Raises:
         InputError: there are more than `MOST_VALUES` of them, or deeper than `DEEPEST`; the message begins with `path`.
@@ -270,6 +271,10 @@ def plain(value: object, path: str = "value") -> Any:
             raise InputError(f"{path}: more than {MOST_VALUES} values; give fewer")
         if type(value) in _OWN:
             return value
+        if hasattr(value, "to_dict") and hasattr(value, "columns"):
+            value = value.to_dict("list")
+        elif hasattr(value, "to_numpy"):
+            value = value.to_numpy()
         if isinstance(value, np.ndarray) and value.ndim == 0:
             value = value[()]
         if isinstance(value, np.generic):

@@ -132,7 +132,7 @@ class Sweep:
             IndexError: there is no such walk.
         """
         before: tuple[int, tuple[int, ...]] | None = None
-        for index in indices:
+        for index in map(int, indices):
             number, cell, sample = self._located(index)
             if (number, cell) != before:
                 before, fixed = (number, cell), self.blocks[number].fixed(cell)
