@@ -226,7 +226,6 @@ def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
     from warpchain.hdf5_files import kind_of_hdf5
     from warpchain.inputs.validation import InputError
     from warpchain.inputs.yaml_files import parse_yaml
-    from warpchain.store.repeated import place_of_index
     from warpchain.store.sweep_result import KIND, load
     from warpchain.walks.walk_result import load_walk
 
@@ -236,7 +235,7 @@ def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
         return walk.setup, walk.seed
     if index is None:
         raise InputError(f"--like: {path} has many walks; give --index, the number of one, as well")
-    block, place = place_of_index(list(load(path).blocks.values()), parse_yaml(index, "--index"))
+    block, place = load(path).located(parse_yaml(index, "--index"))
     return block.setup_at(place), block.sweep_at(place).seed
 
 
