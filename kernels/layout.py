@@ -108,6 +108,17 @@ PLANE_COLUMN = 13
 CENTER_Z, CENTER_W = 25, 26
 ALL_COLUMNS = 27
 
+# Model.faces: where a face begins, the unit vector along it, that along the face before it if the corner between them
+# is convex and 0 otherwise, and where along it it begins and ends: infinite for the first and the last face.
+FACE_X, FACE_Y, ALONG_X, ALONG_Y, BEFORE_X, BEFORE_Y, FACE_BEGIN, FACE_END = range(8)
+FACE_VALUES = 8
+# Model.cells: the first and the last face near a cell, and the height that they stay below. The last row: x of the
+# first cell, cells per metre, and how far beyond a link faces are near.
+FIRST_FACE, LAST_FACE, TOP = range(3)
+CELLS_LEFT, CELLS_PER_LENGTH, GROUND_MARGIN = range(3)
+CELL_VALUES = 3
+GROUND_CELLS = 128
+
 # Capacity of the neighbour list, in pairs of joints per column.
 PAIRS_PER_LINK = 8
 

@@ -13,7 +13,7 @@ LOADING_TIME = wp.constant(wp.float64(0.25))
 
 @wp.struct
 class Model:
-    """Constants of the chains, which no run changes. Every array has shape (W,)."""
+    """Constants of the chains, which no run changes. Every array has shape (W,) unless given."""
 
     link_count: wp.array(dtype=wp.int32)  # n
     link_length: wp.array(dtype=wp.float64)  # ℓ [m], joint to joint
@@ -37,6 +37,9 @@ class Model:
     sprocket_restitution: wp.array(dtype=wp.float64)  # e_sc
     sprocket_friction: wp.array(dtype=wp.float64)  # μ_sc
     sprocket_radius: wp.array(dtype=wp.float64)  # [m], the radius that link circles touch; centre at the origin
+    # the floor, if it is not flat, see contacts.terrain
+    faces: wp.array3d(dtype=wp.float64)  # (W, faces, FACE_VALUES)
+    cells: wp.array3d(dtype=wp.float64)  # (W, GROUND_CELLS + 1, CELL_VALUES)
 
 
 @wp.struct
@@ -58,6 +61,7 @@ class Drive:
     hold_softness: wp.array(dtype=wp.float64)  # of the joints from the hold to the release, 1 to 2; 0: own values
     loaded_softness: wp.array(dtype=wp.float64)  # of the joints under load
     push_rate: wp.array(dtype=wp.float64)  # speed at which the sprocket pushes out sunken circles, per depth [1/s]
+    farthest: wp.array(dtype=wp.float64)  # |x| of the centre of mass at which a walk ends [m]; 0: at none
 
 
 @wp.struct
@@ -138,6 +142,23 @@ class Control:
     pile_push: wp.float64  # push_rate of a chain with soft or softer joints [1/s]
     soften_area: wp.float64  # joints soften when the area falls below this fraction of the first
     stiffening_time: wp.float64  # in which joints return to their own values after the release [s]
+
+
+@wp.struct
+class Ground:
+    """The floor of one world, if it is not flat, see :mod:`contacts.terrain`."""
+
+    faces: wp.array2d(dtype=wp.float64)
+    cells: wp.array2d(dtype=wp.float64)
+
+
+@wp.func
+def read_ground(model: Model, world: int) -> Ground:
+    """The floor of one world."""
+    ground = Ground()
+    ground.faces = model.faces[world]
+    ground.cells = model.cells[world]
+    return ground
 
 
 @wp.struct

@@ -56,6 +56,7 @@ def contact_constants(K: wp.array2d(dtype=wp.float64), n: int) -> Chain:
     """Constants of contacts, from the board; other fields are 0."""
     chain = Chain()
     chain.link_count = n
+    chain.half_length = K[layout.BOARD_VALUES, layout.VALUE_HALF_LENGTH]
     chain.circle_radius = K[layout.BOARD_VALUES, layout.VALUE_CIRCLE_RADIUS]
     chain.half_width = K[layout.BOARD_VALUES, layout.VALUE_HALF_WIDTH]
     chain.sprocket_radius = K[layout.BOARD_VALUES, layout.VALUE_SPROCKET_RADIUS]

@@ -47,7 +47,7 @@ from warpchain.kernels.physics.elementary import ONE, ZERO
 from warpchain.kernels.physics.plane import end_plane_step, mass_of
 from warpchain.kernels.physics.scaled_loads import under_load
 from warpchain.kernels.physics.softness import softened
-from warpchain.kernels.types import Control, Drive, Model, Record, State, read_chain
+from warpchain.kernels.types import Control, Drive, Ground, Model, Record, State, read_chain, read_ground
 
 wp.set_module_options({"enable_backward": False})
 
@@ -74,7 +74,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     method = find_method(features.method)
     columns = features.columns
     lists = list_layout(columns)
-    has_floor = features.fixed_body == "floor"
+    has_floor = features.has_floor
     has_fixed = features.fixed_body != "none"
     has_self = features.self_contact
     tilts = features.tilts
@@ -126,12 +126,16 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
 
     @wp.func
     def measure_proximity(
-        ends: wp.tile[vec5d, block_dim], K: wp.array2d(dtype=wp.float64), maxima: wp.uint64, place: Place
+        ends: wp.tile[vec5d, block_dim],
+        K: wp.array2d(dtype=wp.float64),
+        maxima: wp.uint64,
+        place: Place,
+        ground: Ground,
     ):
         """Left end of the next link, and the proximity of the whole chain, in the state on the board."""
         link = read_link(K, place.lane)
         next_end = exchange_ends(ends, place, link)
-        write_proximity(K, maxima, place, link, next_end)
+        write_proximity(K, maxima, place, ground, link, next_end)
         barrier()
         return next_end, read_proximity(maxima)
 
@@ -192,6 +196,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             chain = under_load(chain, state.load_factor[world])
         n = chain.link_count
         place = place_of(chain, lane)
+        ground = read_ground(model, world)
         load_link(K, state, world, lane, n)
         is_fresh = state.is_fresh[world] != 0
         if lane < n:
@@ -225,7 +230,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         barrier()  # the chain's constants are on the board
         publish(K, place)
         barrier()
-        next_end, proximity = measure_proximity(ends, K, maxima_start, place)
+        next_end, proximity = measure_proximity(ends, K, maxima_start, place, ground)
         opening = proximity.opening
         status = int(RUNNING)
         pairs = int(0)
@@ -292,7 +297,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if wp.static(tilts):
                 begin_step(K, P, place, h)
             tolerance = K[chain_values, layout.VALUE_TOLERANCE]
-            result = attempt(ends, forces, maxima_start, K, place, h)
+            result = attempt(ends, forces, maxima_start, K, place, ground, h)
             own_error = int(0)
             if lane < n:
                 own_error = error_of(result, tolerance)
@@ -330,7 +335,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 last_error = wp.max(error, wp.float32(1e-4))
                 proximity = result.proximity
                 if wp.static(not reuses_last):
-                    next_end, proximity = measure_proximity(ends, K, maxima_start, place)
+                    next_end, proximity = measure_proximity(ends, K, maxima_start, place, ground)
                 opening = proximity.opening
                 gap = proximity.gap
                 if lane == 0:
@@ -351,7 +356,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                         if wp.static(tilts):
                             hits = meet_tilting_floor(K, P, M, contact_constants(K, n), place)
                         elif lane < n:
-                            hits = meet_fixed_body(K, place, contact_constants(K, n), drive, world, time)
+                            hits = meet_fixed_body(K, place, ground, contact_constants(K, n), drive, world, time)
                         if hits > 0:
                             wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
                 if wp.static(has_self):

@@ -16,19 +16,14 @@ from warpchain.engine.devices import start_device
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.list_layout import list_layout
+from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.neighbour_list import greatest_displacement, list_slack, neighbour_list
-from warpchain.kernels.cpu.contacts.proximity import (
-    floor_gap,
-    greatest_opening,
-    resolve_floor,
-    resolve_sprocket,
-    sprocket_gap,
-)
+from warpchain.kernels.cpu.contacts.proximity import fixed_contacts, greatest_opening
 from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
 from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.loop import load_state
 from warpchain.kernels.features import COMPILER_FLAGS
-from warpchain.kernels.types import Model, State, read_chain
+from warpchain.kernels.types import Model, State, read_chain, read_ground
 
 Array = NDArray[np.float64]
 
@@ -80,6 +75,8 @@ RESULTS = (
 def _contact_pass(columns: int) -> wp.Kernel:
     build_list = neighbour_list(columns)
     resolve_self_contacts = self_contacts(columns)
+    floor_gap, resolve_floor = fixed_contacts("floor")
+    sprocket_gap, resolve_sprocket = fixed_contacts("sprocket")
     size = list_layout(columns).size
 
     @compiled
@@ -104,17 +101,23 @@ def _contact_pass(columns: int) -> wp.Kernel:
         place_ends(block, chain)
         opening = greatest_opening(block, chain)
         results[world, 0] = opening
-        results[world, 1] = floor_gap(block, chain)
-        results[world, 2] = sprocket_gap(block, chain)
+        face = Face()
+        ground = read_ground(model, world)
+        face.turning = sprocket_speed
+        face.push_rate = push_rate
+        results[world, 1] = floor_gap(block, chain, ground, face)
+        results[world, 2] = sprocket_gap(block, chain, ground, face)
         if (parts & 1) != 0:
             fits = build_list(block, pairs, chain, skin, opening)
             results[world, 3] = wp.where(fits, wp.float64(1.0), wp.float64(0.0))
         results[world, 4] = greatest_displacement(block, chain)
         results[world, 5] = list_slack(block, chain, skin, opening)
         if (parts & 2) != 0:
-            results[world, 6] = wp.float64(resolve_floor(block, chain, sprocket_speed, push_rate))
+            results[world, 1] = floor_gap(block, chain, ground, face)
+            results[world, 6] = wp.float64(resolve_floor(block, chain, ground, face))
         if (parts & 4) != 0:
-            results[world, 7] = wp.float64(resolve_sprocket(block, chain, sprocket_speed, push_rate))
+            results[world, 2] = sprocket_gap(block, chain, ground, face)
+            results[world, 7] = wp.float64(resolve_sprocket(block, chain, ground, face))
         if (parts & 8) != 0:
             hits, lost, depth = resolve_self_contacts(block, pairs, chain, opening)
             results[world, 8] = wp.float64(hits)

@@ -83,8 +83,7 @@ def walk(
     from warpchain.cli.terminal import print_walk, progress_text, status_line
     from warpchain.cli.walk_files import try_walk_folder, write_walk
     from warpchain.inputs.distributions import LARGEST_SEED
-    from warpchain.inputs.setup import DEFAULT_PRESET, read_setup
-    from warpchain.inputs.state import continued
+    from warpchain.inputs.setup import DEFAULT_PRESET, continued, read_setup
     from warpchain.inputs.validation import InputError, checked_whole, printable
     from warpchain.inputs.yaml_files import parse_yaml
     from warpchain.walks.one_walk import run_walk

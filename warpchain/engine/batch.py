@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from warpchain.engine.control import control_of
 from warpchain.engine.devices import Gpu, start_device
+from warpchain.engine.ground import cells_of, faces_of
 from warpchain.engine.kernel_choice import block_threads, features_of, load_kernels, step_kernel
 from warpchain.engine.memory import CAPACITY_FRAMES, CAPACITY_SAMPLES, scratch_rows
 from warpchain.engine.mirror import Mirror
@@ -57,6 +58,7 @@ class Batch:
         frame_interval: float = 0.0,
         keeps_loads: bool = False,
         tilts: bool = False,
+        faces: int = 1,
         threads: int | None = None,
     ) -> None:
         """Allocate a batch. All worlds are idle (status FINISHED) until a chain is loaded.
@@ -70,6 +72,7 @@ class Batch:
             frame_interval: Time [s] between the frames of chains that are loaded with frame marks of their own.
             keeps_loads: Keep force and moment of every joint with each frame.
             tilts: Keep the plane of the chain with samples and frames.
+            faces: Most faces of a floor that is not flat.
             threads: Threads of every block on a GPU, at least as many as links; None: as many as each chain needs.
         """
         self.options = options
@@ -84,7 +87,8 @@ class Batch:
         self.columns = layout.padded_width(longest)
         rows = scratch_rows(options, longest, self.device, threads)
 
-        self.model = self._arrays(Model)
+        cells = (layout.GROUND_CELLS + 1) * (faces > 1)
+        self.model = self._arrays(Model, faces=(faces, layout.FACE_VALUES), cells=(cells, layout.CELL_VALUES))
         self.drive = self._arrays(Drive)
         self._constant = set(self._mirrors)
         if self._gpu:
@@ -160,6 +164,13 @@ class Batch:
             self._edit(getattr(self.model, name))[world] = value
         if sprocket_radius is not None:
             self._edit(self.model.sprocket_radius)[world] = sprocket_radius
+
+    def set_floor(self, world: int, points: Array, parameters: Parameters) -> None:
+        """Set the floor of a world's chain, by the points of its profile (p, 2), if it is not flat."""
+        faces = faces_of(points)
+        self._edit(self.model.faces)[world, : len(faces)] = faces
+        if len(faces) > 1:
+            self._edit(self.model.cells)[world] = cells_of(points, parameters.link_length, parameters.circle_radius)
 
     def load(
         self,

@@ -3,8 +3,10 @@
 import math
 from typing import Annotated, Final, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
+from warpchain.inputs.floor import Array, Points, checked_profile, slope_points
 from warpchain.inputs.options import on_gpu
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError, Section, number_field
@@ -29,6 +31,8 @@ LONGEST: Final = 1e6
 """Greatest time, in which numbers still tell a nanosecond, a short step [s]."""
 
 
+STEEPEST: Final = 80.0
+"""Greatest angle of a slope [°]."""
 RIGHT_ANGLE: Final = math.pi / 2
 TAP: Final = ("lateral_speed", "tilt", "tilt_rate", "yaw_rate")
 """What a release may give to a plane that tilts. Each is 0 by default: an upright plane that nothing disturbs stays
@@ -46,7 +50,8 @@ class Scene(Section):
 
     Raises:
         pydantic.ValidationError: a value is unknown or out of bounds, `links` is odd, the clearance is that of a
-            hanging chain although the chain never hangs, or the release disturbs a plane that is fixed.
+            hanging chain although the chain never hangs, the release disturbs a plane that is fixed, or a plane that
+            tilts has no flat floor.
     """
 
     links: Annotated[int, AfterValidator(_even)] = number_field(
@@ -125,6 +130,27 @@ class Scene(Section):
         gt=0,
         le=LONGEST,
     )
+    floor: Annotated[Literal["flat"] | Points, BeforeValidator(checked_profile)] = Field(
+        default="flat",
+        exclude_if=lambda floor: floor == "flat",
+        description="flat, or a profile of points [[x, y], …] in m; its first and last face go on without end",
+    )
+    slope: float = number_field(
+        0.0,
+        "°",
+        "of a flat floor; positive: it falls the way the chain walks",
+        ge=-STEEPEST,
+        le=STEEPEST,
+        exclude_if=lambda slope: slope == 0,
+    )
+    distance_limit: float | None = number_field(
+        None,
+        "m",
+        "distance along the floor from the release at which a walk ends as distance_limit; null: none",
+        gt=0,
+        le=HIGHEST,
+        exclude_if=lambda limit: limit is None,
+    )
     plane: Literal["fixed", "tilting"] = Field(
         default="fixed",
         description="whether the chain stays in an upright plane, or walks in one that moves, turns and may fall over",
@@ -155,6 +181,14 @@ class Scene(Section):
     )
 
     @model_validator(mode="after")
+    def _one_floor(self) -> Self:
+        if self.slope != 0 and self.floor != "flat":
+            raise InputError(f"slope: {self.slope} of a floor that is a profile; give slope: 0, or floor: flat")
+        if self.plane == "tilting" and floor_points(self) is not None:
+            raise InputError("plane: 'tilting' needs a flat floor; give plane: fixed, or floor: flat and slope: 0")
+        return self
+
+    @model_validator(mode="after")
     def _tap_needs_tilting_plane(self) -> Self:
         for name in TAP:
             if getattr(self, name) != 0 and self.plane == "fixed":
@@ -171,6 +205,13 @@ class Scene(Section):
                 "give 'spinning' here, or start: rest"
             )
         return self
+
+
+def floor_points(scene: Scene) -> Array | None:
+    """Points of the floor's profile [m], shape (p, 2); None if it is flat."""
+    if scene.floor != "flat":
+        return np.array(scene.floor)
+    return slope_points(scene.slope) if scene.slope != 0 else None
 
 
 def settling_time(scene: Scene) -> float:

@@ -21,7 +21,7 @@ from warpchain.kernels.methods.method import find_method
 
 __all__ = ["DEFAULT_PRESET", "Setup", "combined", "continued", "options_beside", "read_setup", "resolve"]
 
-OF_THE_WALK: Final = ("walk_limit", "walk_until")
+OF_THE_WALK: Final = ("walk_limit", "walk_until", "distance_limit", "floor", "slope")
 """Fields of the scene that matter after the release."""
 
 
@@ -153,11 +153,12 @@ def continued(state: State, sections: Mapping[str, Mapping[str, object]]) -> Set
     if scene.plane == "tilting":
         check_can_tilt(options)
     check_links_on_gpu(scene.links, options.device, "start")
-    for name in OF_THE_WALK:
+    for name in OF_THE_WALK[:2]:
         if (end := getattr(scene, name)) is not None and end < state.time:
             raise InputError(f"{name}: {end:g} s is before the state at {state.time:g} s; give a later time")
     setup = Setup(before.preset, parameters, scene, options)
     memory = state.memory
-    if (parameters, options) != (before.parameters, before.options):
+    floors = [(each.floor, each.slope) for each in (scene, before.scene)]
+    if (parameters, options, floors[0]) != (before.parameters, before.options, floors[1]):
         memory = {name: values for name, values in memory.items() if "/" in name}  # caches are of the former ones
     return replace(setup, start=replace(state, setup=setup, memory=memory))

@@ -97,7 +97,7 @@ def number_field(default: Any, unit: str, description: str, **more: Any) -> Any:
         description: its meaning, in one line.
         more: limits `ge`, `gt`, `le`, `lt` in `unit`, as of `pydantic.Field`; anything else stands beside the unit.
     """
-    limits = {name: more.pop(name) for name in ("ge", "gt", "le", "lt") if name in more}
+    limits = {name: more.pop(name) for name in ("ge", "gt", "le", "lt", "exclude_if") if name in more}
     return Field(default, description=description, json_schema_extra={"unit": unit, **more}, **limits)
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.tallies import LOST
+from warpchain.inputs.floor import body_of, checked_profile, circles_of, distances
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import check_links_on_gpu
@@ -36,7 +37,7 @@ def simulate(
     duration: float | None = None,
     *,
     times: Sequence[float] | Array | None = None,
-    floor: bool = True,
+    floor: bool | Sequence[Sequence[float]] | Array = True,
     gravity: bool = True,
     self_contact: bool = True,
     method: str = "rkf78",
@@ -54,7 +55,8 @@ def simulate(
         duration: Simulated time [s], from time 0, which is that of the state.
         times: Instants of the trajectory [s], rising, in [0, duration]; steps land on them exactly. Default: 101
             instants evenly spread.
-        floor: Whether there is a floor at y = 0.
+        floor: Whether there is a floor at y = 0, or the points [[x, y], …] [m] of one that is not flat, as ``floor`` of
+            a scene.
         gravity: Whether gravity acts.
         self_contact: Whether links touch one another.
         method: A key of ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
@@ -77,9 +79,9 @@ def simulate(
     for name in _UNSOFTENED:
         if getattr(options, name):
             raise InputError(f"options.{name}: only a walk has phases in which joints soften; leave it out")
-    for name, switch in (("floor", floor), ("gravity", gravity)):
-        if not isinstance(switch, bool):
-            raise InputError(f"{name}: {shown(switch)} is not a truth value; give True or False")
+    if not isinstance(gravity, bool):
+        raise InputError(f"gravity: {shown(gravity)} is not a truth value; give True or False")
+    points = _checked_floor(floor)
     state = _checked_state(parameters, position, velocity)
     chain = state.parameters if gravity else state.parameters.with_values({"gravity": 0.0})
     check_links_on_gpu(state.links, options.device, "position")
@@ -89,8 +91,11 @@ def simulate(
             f"times: {len(instants)} instants of {state.links} links are too many; "
             f"give at most {MOST_PLACES // state.links}"
         )
+    if points is not None:
+        _check_above(points, state.position, chain)
     with gpu_turn([options.device]):
-        return _follow(options, chain, state.position, state.velocity, instants, end, bool(floor))
+        body = "none" if floor is False else body_of(points)
+        return _follow(options, chain, state.position, state.velocity, instants, end, body, points)
 
 
 def _checked_state(given: State | Parameters | str, position: Array | None, velocity: Array | None) -> State:
@@ -111,13 +116,22 @@ def _checked_state(given: State | Parameters | str, position: Array | None, velo
 
 
 def _follow(
-    options: Options, chain: Parameters, start: Array, rates: Array, instants: Array, end: float, floor: bool
+    options: Options,
+    chain: Parameters,
+    start: Array,
+    rates: Array,
+    instants: Array,
+    end: float,
+    body: str,
+    points: Array | None,
 ) -> Trajectory:
     """Integrate a chain whose values are checked, see `simulate`."""
-    batch = Batch(1, len(start), options)
+    batch = Batch(1, len(start), options, faces=1 if points is None else len(points) - 1)
     batch.set_chain(0, chain, len(start))
+    if points is not None:
+        batch.set_floor(0, points, chain)
     batch.load(0, start, rates, stop_time=instants[0], stop_status=Status.FINISHED)
-    features = batch.features(fixed_body="floor" if floor else "none")
+    features = batch.features(fixed_body=body)
     reached, positions, velocities = [], [], []
     for instant in instants:
         batch.resume(0, instant, Status.FINISHED)
@@ -144,6 +158,32 @@ def _follow(
         greatest_opening=extremes["opening"],
         greatest_penetration={kind: extremes[kind] for kind in kinds},
     )
+
+
+def _checked_floor(floor: Any) -> Array | None:
+    """Points of the floor [m], None if it is flat or there is none, or an `InputError`."""
+    if isinstance(floor, bool):
+        return None
+    if not isinstance(floor, list):
+        raise InputError(f"floor: {shown(floor)} is no floor; give True, False, or points [[x, y], …] in m")
+    try:
+        return np.array(checked_profile(floor))
+    except ValueError as problem:
+        raise InputError(f"floor: {problem}") from None
+
+
+def _check_above(points: Array, start: Array, chain: Parameters) -> None:
+    """Check that the middle of no circle is below the floor, where it would never come out.
+
+    Raises:
+        InputError: one is.
+    """
+    depth = -distances(points, circles_of(start, chain.link_length))
+    if depth.max() > 0:
+        raise InputError(
+            f"position: link {int(depth.argmax()) % len(start)} starts {depth.max():.3g} m inside the floor; "
+            "raise the chain, or lower the floor"
+        )
 
 
 def _checked_times(duration: object, times: Sequence[float] | Array | None) -> Array:

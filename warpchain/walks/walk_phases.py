@@ -24,7 +24,8 @@ from warpchain.engine.control import (
 )
 from warpchain.engine.snapshot import change, restore, set_first_area, set_frame_marks, take_snapshot
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
-from warpchain.inputs.scene import contact_radius, joint_radius, loop_speed, settling_time
+from warpchain.inputs.floor import body_of, circles_of, raised_by
+from warpchain.inputs.scene import contact_radius, floor_points, joint_radius, loop_speed, settling_time
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
 from warpchain.inputs.state import State
@@ -90,7 +91,7 @@ class WalkRun:
         self.drive_counts = dict.fromkeys(COUNTS, 0)
         self.drive_extremes = dict.fromkeys(EXTREMES, 0.0)
         self._batch, self._world = batch, world
-        self._hanging_lowest = math.nan
+        self._hanging_raise = math.nan
         self._released = False
         self._hold_softness = 0.0
         self._at_full_speed = math.nan
@@ -99,6 +100,8 @@ class WalkRun:
         scene, parameters = setup.scene, setup.parameters
         self._has_sprocket = setup.has_drive
         self._tilts = scene.plane == "tilting"
+        self._floor = floor_points(scene)
+        self._level = math.cos(math.radians(scene.slope))  # of a distance along the floor
         if setup.start is not None:
             self._go_on(setup.start)
             return
@@ -180,7 +183,7 @@ class WalkRun:
     def features(self) -> Features:
         """What the kernel that carries the world on must be compiled for."""
         if self._released:
-            return self._batch.features(fixed_body="floor", tilts=self._tilts)
+            return self._batch.features(fixed_body=body_of(self._floor), tilts=self._tilts)
         return self._batch.features(fixed_body="sprocket")
 
     @property
@@ -282,10 +285,12 @@ class WalkRun:
         """Results of the walk apart from its motion, by the names of the fields of `WalkResult`."""
         counts, extremes = self.counts, self.extremes
         is_at_rest = self.status == Status.AT_REST
-        # Δx is x of the centre of mass, because the sprocket's centre is at x = 0
+        # Δx is x of the centre of mass, because the sprocket's centre is at x = 0; on a slope, along the floor
         return {
             "status": self.status,
-            "dx": float(self._batch.last_sample(self._world)[layout.CENTER_X]) if is_at_rest else math.nan,
+            "dx": float(self._batch.last_sample(self._world)[layout.CENTER_X]) / self._level
+            if is_at_rest
+            else math.nan,
             "walk_time": self.walk_time,
             "simulated_time": self.simulated_time,
             "hold_time": self.hold_time,
@@ -323,9 +328,8 @@ class WalkRun:
             is_planned = status == Status.TIME_LIMIT and until is not None and until <= limit
             self.status = Status.FINISHED if is_planned else status
             return False
-        if self._batch.time(self._world) <= self._settled and math.isnan(self._hanging_lowest):
-            position = self._batch.position(self._world)
-            self._hanging_lowest = lowest_point(position, self.setup.parameters)
+        if self._batch.time(self._world) <= self._settled and math.isnan(self._hanging_raise):
+            self._hanging_raise = self._raise(self._batch.position(self._world))
             self._start_drive()
         else:
             self.drive_time = self._batch.time(self._world)
@@ -347,38 +351,29 @@ class WalkRun:
 
     def _go_on(self, start: State) -> None:
         """Place a chain as a state has it; if that was taken from a walk, go on with the walk."""
-        batch, world, memory = self._batch, self._world, start.memory
+        batch, world, memory, interval = self._batch, self._world, start.memory, self.recorder.keep.frame_interval
         batch.set_chain(world, self.setup.parameters, start.links)
         self._released = True
-        interval = self.recorder.keep.frame_interval
         if not memory:
-            has_marks = interval > 0
-            batch.load(
-                world,
-                start.position,
-                start.velocity,
-                stop_time=self._walk_end,
-                stop_status=Status.TIME_LIMIT,
-                has_frame_marks=has_marks,
-            )
-        else:
-            for name in _OF_THE_RUN:
-                setattr(self, name, memory[f"run/{name}"].item())
-            self.drive_counts = dict(zip(COUNTS, memory["run/counts"].tolist(), strict=True))
-            self.drive_extremes = dict(zip(EXTREMES, memory["run/extremes"].tolist(), strict=True))
-            restore(batch, world, memory)
-            set_frame_marks(batch, world, interval)
-        if memory and "scratch" in memory and self._is_at(start):
+            self._load(start.position, start.velocity)
+            return
+        for name in _OF_THE_RUN:
+            setattr(self, name, memory[f"run/{name}"].item())
+        self.drive_counts = dict(zip(COUNTS, memory["run/counts"].tolist(), strict=True))
+        self.drive_extremes = dict(zip(EXTREMES, memory["run/extremes"].tolist(), strict=True))
+        restore(batch, world, memory)
+        self._set_floor()
+        set_frame_marks(batch, world, interval)
+        if "scratch" in memory and self._is_at(start):
             batch.resume(world, self._walk_end, Status.TIME_LIMIT)
             self.recorder.go_on(memory["state/last_sample"], start.time)
             return
         if self._tilts:
             batch.set_plane(world, plane_of_state(start))
-        if memory:
-            # it stops at once, and so makes the sample with which its new ledger begins
-            change(batch, world, start.position, start.velocity)
-            batch.resume(world, batch.time(world), Status.FINISHED)
-            self._first_area = float(memory["state/first_area"])
+        # it stops at once, and so makes the sample with which its new ledger begins
+        change(batch, world, start.position, start.velocity)
+        batch.resume(world, batch.time(world), Status.FINISHED)
+        self._first_area = float(memory["state/first_area"])
 
     def _is_at(self, start: State) -> bool:
         """Whether the world has the places and velocities of a state, to the bit."""
@@ -393,13 +388,34 @@ class WalkRun:
         limit = self._at_full_speed + self.setup.scene.hold_limit
         self._batch.resume(self._world, limit, Status.NOT_STEADY)
 
+    def _raise(self, position: Array) -> float:
+        """How far a chain at this position must be raised to its clearance [m]."""
+        clearance, parameters = self.setup.scene.clearance, self.setup.parameters
+        if self._floor is None:
+            return clearance - lowest_point(position, parameters)
+        circles = circles_of(position, parameters.link_length)
+        return raised_by(self._floor, circles, parameters.circle_radius, clearance)
+
+    def _set_floor(self) -> None:
+        """Set the floor, and how far the chain may walk on it."""
+        scene = self.setup.scene
+        self._batch.set_drive(self._world, farthest=(scene.distance_limit or 0.0) * self._level)
+        if self._floor is not None:
+            self._batch.set_floor(self._world, self._floor, self.setup.parameters)
+
     def _release(self, position: Array, velocity: Array) -> None:
         scene = self.setup.scene
-        lowest = lowest_point(position, self.setup.parameters)
-        measured = self._hanging_lowest if scene.clearance_of == "hanging" else lowest
-        self.raised = scene.clearance - measured
+        self.raised = self._hanging_raise if scene.clearance_of == "hanging" else self._raise(position)
         position[:, 1] += self.raised
         self._batch.set_chain(self._world, self.setup.parameters, scene.links)
+        self._load(position, velocity)
+        if self._tilts:
+            self._batch.set_plane(self._world, released_plane(self.setup, position))
+        self._released = True
+
+    def _load(self, position: Array, velocity: Array) -> None:
+        """Begin the walk of a chain whose parameters are set."""
+        self._set_floor()
         self._batch.load(
             self._world,
             position,
@@ -410,6 +426,3 @@ class WalkRun:
             softness=self._hold_softness,
             has_frame_marks=self.recorder.keep.frame_interval > 0,
         )
-        if self._tilts:
-            self._batch.set_plane(self._world, released_plane(self.setup, position))
-        self._released = True

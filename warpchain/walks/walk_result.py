@@ -85,7 +85,10 @@ class WalkResult:
     """
 
     status: Status
-    dx: Annotated[float, Stored("m", "x of the centre of mass less x of the sprocket; NaN unless at rest")]
+    dx: Annotated[
+        float,
+        Stored("m", "x of the centre of mass less x of the sprocket, on a slope along the floor; NaN unless at rest"),
+    ]
     walk_time: Annotated[float, Stored("s", "from the release to the end")]
     simulated_time: Annotated[float, Stored("s", "simulated, the phases before the release included")]
     hold_time: Annotated[float, Stored("s", "for which the loop was held at full frequency; NaN without a sprocket")]
