@@ -60,7 +60,12 @@ def with_value(array, value):
 
 def test_good_input_is_computed():
     """Arrays, lists and numbers of NumPy are accepted: the tests below fail for no other reason."""
-    for position in (POSITION, POSITION.tolist(), POSITION.astype(np.float32), np.zeros((4, 3), dtype=int)):
+    for position in (
+        POSITION,
+        POSITION.tolist(),
+        POSITION.astype(np.float32),
+        [[0, 0, angle] for angle in (0, 3, 0, 3)],
+    ):
         velocity = np.zeros_like(position, dtype=float)
         for duration in (0, 0.0, 1, 1.5, np.float32(1), np.int64(1)):
             with pytest.raises(ComputedError):

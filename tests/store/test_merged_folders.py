@@ -55,7 +55,7 @@ def test_samples_of_several_folders_are_put_together(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (content(samples=5), "has seed 7, as "),
+        (content(samples=5), "has walks that a has, of seed 7"),
         (content(seed=8, grid={"links": [60, 90], "frequency": [5, 12]}), "is not the sweep of"),
         (content(seed=8, options={"tolerance": 1e-5}), "is not the sweep of"),
         (blocks({"grid": {"links": [60, 90]}}, {"grid": {"frequency": [5, 10]}}, seed=8), "is not the sweep of"),

@@ -27,7 +27,7 @@ def parameters(
 
     wanted = {name if name in SECTIONS else dotted_name(name, shown(name)) for name in names or SECTIONS}
     models = (parameter_preset(preset), Scene(), Options())
-    values = {name: value for model in models for name, value in model.model_dump().items()} | {"method": "standard"}
+    values = {name: value for model in models for name, value in vars(model).items()} | {"method": "standard"}
     console = Console(highlight=False, markup=False)
     if not console.is_terminal:
         console.width = WIDE

@@ -84,8 +84,7 @@ def walk(
     from warpchain.cli.terminal import print_walk, progress_text, status_line
     from warpchain.cli.walk_files import try_walk_folder, write_walk
     from warpchain.inputs.distributions import LARGEST_SEED
-    from warpchain.inputs.setup import DEFAULT_PRESET, read_setup
-    from warpchain.inputs.state import continued
+    from warpchain.inputs.setup import DEFAULT_PRESET, continued, read_setup
     from warpchain.inputs.validation import InputError, checked_whole, printable
     from warpchain.inputs.yaml_files import parse_yaml
     from warpchain.walks.one_walk import run_walk
@@ -228,7 +227,6 @@ def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
     from warpchain.hdf5_files import kind_of_hdf5
     from warpchain.inputs.validation import InputError
     from warpchain.inputs.yaml_files import parse_yaml
-    from warpchain.store.repeated import place_of_index
     from warpchain.store.sweep_result import KIND, load
     from warpchain.walks.walk_result import load_walk
 
@@ -239,7 +237,7 @@ def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
         return walk.setup, walk.seed
     if index is None:
         raise InputError(f"--like: {path} has many walks; give --index, the number of one, as well")
-    block, place = place_of_index(list(load(path).blocks.values()), parse_yaml(index, "--index"))
+    block, place = load(path).located(parse_yaml(index, "--index"))
     return block.setup_at(place), block.sweep_at(place).seed
 
 

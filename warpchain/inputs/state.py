@@ -1,4 +1,4 @@
-"""A chain at one instant: from a walk, or given; and the setup of the walk that begins from it."""
+"""What one walk is: its `Setup`, and the `State` of a chain that it may begin from."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -7,21 +7,72 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpchain.inputs.options import Options, replaced_by
+from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
-from warpchain.inputs.scene import MOST_LINKS, Scene, check_links_on_gpu
-from warpchain.inputs.setup import DEFAULT_PRESET, Setup, check_can_tilt
+from warpchain.inputs.scene import MOST_LINKS, Scene, check_scene
+from warpchain.inputs.sections import SECTION_OF
 from warpchain.inputs.start_shapes import links_between
 from warpchain.inputs.validation import InputError, validated
 
 Array = NDArray[np.float64]
 
+DEFAULT_PRESET: Final = "paper"
+"""Preset of a walk or a sweep that names none."""
 WIDEST_OPENING: Final = 0.1
 """Greatest distance of two joined link ends, in link lengths; a loop whose ends are farther apart is not closed."""
 WIDEST_MISFIT: Final = 0.5
 """Greatest difference of the distance of two given joints from a link length, in link lengths."""
-OF_THE_WALK: Final = ("walk_limit", "walk_until")
-"""Fields of the scene that matter after the release."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Everything that says what one walk is, checked and complete.
+
+    Attributes:
+        preset: name of the parameter preset that it started from.
+        parameters: of the chain, its sprocket and the floor.
+        scene: what happens.
+        options: how it is computed.
+        start: state that the walk begins from; None: it begins as the scene says. With a state, those values of the
+            scene that matter before the release are those of the walk that the state was taken from.
+    """
+
+    preset: str
+    parameters: Parameters
+    scene: Scene
+    options: Options
+    start: "State | None" = None
+
+    @property
+    def has_drive(self) -> bool:
+        """Whether the walk begins on a sprocket."""
+        return self.start is None and self.scene.start != "ellipse"
+
+    @property
+    def described(self) -> str:
+        """The chain and how it was spun, in a few words."""
+        links, start = f"{self.scene.links} links", self.start
+        if start is not None and not start.memory:
+            return f"{links} from a given state"
+        spun = f"{links} at {self.scene.frequency:g} Hz"
+        return spun if start is None else f"{spun}, from its state at {start.time:.4g} s"
+
+    def with_drawn(self, drawn: Mapping[str, float]) -> "Setup":
+        """A copy with drawn values in place of its own.
+
+        Args:
+            drawn: fields of `Parameters` or `Scene` → value.
+
+        Raises:
+            InputError: the values together make no possible walk.
+        """
+        sections: dict[str, dict[str, float]] = {"parameters": {}, "scene": {}}
+        for name, value in drawn.items():
+            sections[SECTION_OF[name]][name] = value
+        parameters = validated(Parameters, {**vars(self.parameters), **sections["parameters"]}, "parameters")
+        scene = validated(Scene, {**vars(self.scene), **sections["scene"]}, "scene")
+        check_scene(scene, parameters)
+        return replace(self, parameters=parameters, scene=scene)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -155,31 +206,6 @@ class State:
                 f"position: the loop is not closed: the ends of links {link} and {(link + 1) % self.links} are "
                 f"{widest:.3g} m apart, and links are {self.parameters.link_length:g} m long; give links that join"
             )
-
-
-def continued(state: State, sections: Mapping[str, Mapping[str, object]]) -> Setup:
-    """The setup of a walk from a state, with other parameters, options or limit of the walk.
-
-    Raises:
-        InputError: a value is refused, or is one of what comes before the release.
-    """
-    if early := [name for name in sections["scene"] if name not in OF_THE_WALK]:
-        raise InputError(f"{', '.join(early)}: given together with a state, which lies after the release; leave it out")
-    before, given = state.setup, sections["options"]
-    options = validated(Options, {**before.options.model_dump(exclude=replaced_by(given)), **given}, "options")
-    scene = validated(Scene, {**vars(before.scene), **sections["scene"]}, "scene")
-    parameters = before.parameters.with_values(sections["parameters"]) if sections["parameters"] else before.parameters
-    if scene.plane == "tilting":
-        check_can_tilt(options)
-    check_links_on_gpu(scene.links, options.device, "start")
-    for name in OF_THE_WALK:
-        if (end := getattr(scene, name)) is not None and end < state.time:
-            raise InputError(f"{name}: {end:g} s is before the state at {state.time:g} s; give a later time")
-    setup = Setup(before.preset, parameters, scene, options)
-    memory = state.memory
-    if (parameters, options) != (before.parameters, before.options):
-        memory = {name: values for name, values in memory.items() if "/" in name}  # caches are of the former ones
-    return replace(setup, start=replace(state, setup=setup, memory=memory))
 
 
 def rows_of_links(name: str, given: object) -> Array:

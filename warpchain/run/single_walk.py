@@ -5,8 +5,8 @@ from typing import Any, Literal
 
 from warpchain.inputs.distributions import LARGEST_SEED, random_generator, sampled
 from warpchain.inputs.sections import by_section, takes_fields
-from warpchain.inputs.setup import DEFAULT_PRESET, Setup, resolve
-from warpchain.inputs.state import State, continued
+from warpchain.inputs.setup import DEFAULT_PRESET, Setup, continued, resolve
+from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, checked_whole, full_name, plain, shown
 from warpchain.walks.one_walk import OnProgress, run_walk
 from warpchain.walks.walk_result import WalkResult

@@ -229,10 +229,10 @@ class BlockResult:
         elif at:
             raise InputError(f"{', '.join(at)}: given together with index; leave one out")
         else:
-            _, place = place_of_index([self], index)
-        return repeat(
-            self, place, frame_interval=frame_interval, record_before=record_before, record_loads=record_loads
-        )
+            _, place = place_of_index([self.columns["index"]], index)
+        recording = {"frame_interval": frame_interval, "record_before": record_before, "record_loads": record_loads}
+        row = {name: values[place] for name, values in self.columns.items()}
+        return repeat(self.setup_at(place), self.sweep_at(place).seed, row, **recording)
 
     def walk_motion(self, place: tuple[int, ...]) -> WalkResult:
         """The walk at a place along the axes and samples, if its motion was kept; errors as of `series`."""

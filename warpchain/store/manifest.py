@@ -32,6 +32,9 @@ OWN: Final = ("sweep.json", "sweep.yaml", "shards", "log.txt")
 MOST_BYTES: Final = 2**24
 """Size of the largest sweep.json that is read; 12 axes of 10,000 values take 3 MB."""
 
+FIRST_SHARDS: Final = 32
+"""Most walks in each of the first four shards."""
+
 _HEAD: Final = re.compile(rb'\{\s*"format": "warpchain sweep",\s*"format_version": (\d{1,9}),')
 _CHECKED: Final = re.compile(rb'(.*),\n "sha256": "([0-9a-f]{64})"\n\}\n', re.DOTALL)
 
@@ -179,12 +182,12 @@ class Manifest:
 def _bounds(walks: int, most: int) -> list[int]:
     """Where the shards of some walks begin, and their end.
 
-    Every four shards have twice as many walks as those before, up to the most: a sweep that is stopped in its first
-    minute has lost seconds.
+    The first four have `FIRST_SHARDS` at most, and every four twice as many as those before: a sweep that is stopped in
+    its first minute has lost seconds.
     """
     bounds = [0]
     while bounds[-1] < walks:
-        bounds.append(min(walks, bounds[-1] + min(most, 1 << (len(bounds) + 7) // 4)))
+        bounds.append(min(walks, bounds[-1] + min(most, FIRST_SHARDS << (len(bounds) - 1) // 4)))
     return bounds
 
 

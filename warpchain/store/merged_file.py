@@ -72,6 +72,8 @@ def _overlaid(folders: Sequence[Folder], results: Sequence[SweepResult]) -> dict
         first = whole[other]
         digests = [[sweep.digest() for sweep in each.origin.sweeps] for each in (first, result)]
         pairs = list(zip(first.blocks.values(), result.blocks.values(), strict=False))
+        if os.path.samefile(other, folder):
+            raise InputError(f"{folder}: given twice; give each folder once")
         if digests[0] != digests[1] or any((a.is_there & b.is_there).any() for a, b in pairs):
             raise InputError(
                 f"{folder}: has walks that {other} has, of seed {result.seed}; give each folder once, parts of one "

@@ -154,8 +154,14 @@ class SweepResult:
         if index is None:
             walk: WalkResult = self.__getattr__("walk")(**words)
             return walk
-        block, _ = place_of_index(list(self.blocks.values()), index)
+        block, _ = self.located(index)
         return block.walk(index, **words)
+
+    def located(self, index: object) -> tuple[BlockResult, tuple[int, ...]]:
+        """Block and place of the walk with a number; an `InputError` if there is none."""
+        blocks = list(self.blocks.values())
+        number, place = place_of_index([block.columns["index"] for block in blocks], index)
+        return blocks[number], place
 
     def plot(
         self,

@@ -1,20 +1,31 @@
 """Takes the time series and frames of a walk out of its world, between launches."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.engine.batch import Batch
 from warpchain.kernels import layout
-from warpchain.loop.before_release import BeforeRelease
+from warpchain.loop.before_release import BEFORE, BeforeRelease
 from warpchain.walks.even_clock import EvenClock
 from warpchain.walks.motion import Keep
 from warpchain.walks.moving_plane import angles, frame_axes
-from warpchain.walks.walk_result import BEFORE, MOTION
 
 Array = NDArray[np.float64]
+
+SERIES: Final[dict[str, int | list[int]]] = {
+    "time": layout.TIME,
+    "center": [layout.CENTER_X, layout.CENTER_Y],
+    "center_velocity": [layout.CENTER_U, layout.CENTER_V],
+    "kinetic_energy": layout.KINETIC,
+    "gravitational_energy": layout.GRAVITATIONAL,
+    "spring_energy": layout.SPRING,
+    "lowest": layout.LOWEST,
+    "rms_speed": layout.RMS_SPEED,
+}
+"""Arrays of a `WalkResult` that are columns of the samples."""
 
 
 @dataclass(kw_only=True)
@@ -141,7 +152,7 @@ class Recorder:
         tilting = samples if self._tilts else np.empty((0, layout.ALL_COLUMNS))
         tilt, yaw = angles(tilting[:, layout.PLANE_COLUMN :])
         return {
-            **{name: samples[:, stored.sample] for name, stored in MOTION.items() if stored.sample is not None},
+            **{name: samples[:, columns] for name, columns in SERIES.items()},
             "center_z": tilting[:, layout.CENTER_Z],
             "tilt": tilt,
             "yaw": np.unwrap(yaw),

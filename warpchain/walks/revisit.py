@@ -8,35 +8,40 @@ from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.snapshot import restore, take_snapshot
 from warpchain.inputs.options import on_gpu
+from warpchain.inputs.setup import Setup
 from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, plain, shown
 from warpchain.status import Status
 from warpchain.walks.moving_plane import state_of_plane
 from warpchain.walks.scheduler import ATTEMPTS
 from warpchain.walks.walk_phases import WalkRun
-from warpchain.walks.walk_result import WalkResult
 
 FINER = 8
 """By how much launches become shorter each time that one has gone too far."""
 
 
-def state_at(walk: WalkResult, t: object) -> State:
+def state_at(setup: Setup, t: object, end: float) -> State:
     """The state of a walk at the end of its first step at or after a time, see `WalkResult.state`.
 
     Launches that go past that step are undone and shortened, down to one attempt: so the walk makes the steps that it
     always makes, and none for this time.
 
+    Args:
+        setup: of the walk.
+        t: time since the release [s].
+        end: when it ended [s]; NaN if it did before its release.
+
     Raises:
         InputError: there is no such time, or the walk, run again, ends before.
     """
-    time, setup = plain(t, "t"), walk.setup
+    time = plain(t, "t")
     if isinstance(time, bool) or not isinstance(time, int | float):
         raise InputError(f"t: {shown(time)} is not a time; give a number of seconds")
     first = 0.0 if setup.start is None else setup.start.time
-    if np.isnan(walk.energy["kinetic_at_release"]):
-        raise InputError(f"t: the walk ended as {walk.status.label} before its release, and has no such time")
-    if not first <= time <= walk.walk_time:
-        raise InputError(f"t: {time:g} s is not in the walk; give a time from {first:g} to {walk.walk_time:.6g}")
+    if np.isnan(end):
+        raise InputError("t: the walk ended before its release, and has no such time; see its status")
+    if not first <= time <= end:
+        raise InputError(f"t: {time:g} s is not in the walk; give a time from {first:g} to {end:.6g}")
     with gpu_turn([setup.options.device]):
         batch = Batch(1, setup.scene.links, setup.options)
         run = WalkRun(batch, 0, setup)

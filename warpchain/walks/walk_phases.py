@@ -359,38 +359,29 @@ class WalkRun:
 
     def _go_on(self, start: State) -> None:
         """Place a chain as a state has it; if that was taken from a walk, go on with the walk."""
-        batch, world, memory = self._batch, self._world, start.memory
-        self._set_chain_and_floor()
+        batch, world, memory, interval = self._batch, self._world, start.memory, self.recorder.keep.frame_interval
+        batch.set_chain(world, self.setup.parameters, start.links, own=self._links)
         self._released = True
-        interval = self.recorder.keep.frame_interval
         if not memory:
-            has_marks = interval > 0
-            batch.load(
-                world,
-                start.position,
-                start.velocity,
-                stop_time=self._walk_end,
-                stop_status=Status.TIME_LIMIT,
-                has_frame_marks=has_marks,
-            )
-        else:
-            for name in _OF_THE_RUN:
-                setattr(self, name, memory[f"run/{name}"].item())
-            self.drive_counts = dict(zip(COUNTS, memory["run/counts"].tolist(), strict=True))
-            self.drive_extremes = dict(zip(EXTREMES, memory["run/extremes"].tolist(), strict=True))
-            restore(batch, world, memory)
-            set_frame_marks(batch, world, interval)
-        if memory and "scratch" in memory and self._is_at(start):
+            self._load(start.position, start.velocity)
+            return
+        for name in _OF_THE_RUN:
+            setattr(self, name, memory[f"run/{name}"].item())
+        self.drive_counts = dict(zip(COUNTS, memory["run/counts"].tolist(), strict=True))
+        self.drive_extremes = dict(zip(EXTREMES, memory["run/extremes"].tolist(), strict=True))
+        restore(batch, world, memory)
+        self._set_floor()
+        set_frame_marks(batch, world, interval)
+        if "scratch" in memory and self._is_at(start):
             batch.resume(world, self._walk_end, Status.TIME_LIMIT)
             self.recorder.go_on(memory["state/last_sample"], start.time)
             return
         if self._tilts:
             batch.set_plane(world, plane_of_state(start))
-        if memory:
-            # it stops at once, and so makes the sample with which its new ledger begins
-            change(batch, world, start.position, start.velocity)
-            batch.resume(world, batch.time(world), Status.FINISHED)
-            self._first_area = float(memory["state/first_area"])
+        # it stops at once, and so makes the sample with which its new ledger begins
+        change(batch, world, start.position, start.velocity)
+        batch.resume(world, batch.time(world), Status.FINISHED)
+        self._first_area = float(memory["state/first_area"])
 
     def _is_at(self, start: State) -> bool:
         """Whether the world has the places and velocities of a state, to the bit."""
@@ -413,19 +404,26 @@ class WalkRun:
         circles = circles_of(position, parameters.link_length)
         return raised_by(self._floor, circles, parameters.circle_radius, clearance)
 
-    def _set_chain_and_floor(self) -> None:
-        """Let the world have the constants of the walk after its release."""
-        scene, parameters = self.setup.scene, self.setup.parameters
-        self._batch.set_chain(self._world, parameters, scene.links, own=self._links)
+    def _set_floor(self) -> None:
+        """Set the floor, and how far the chain may walk on it."""
+        scene = self.setup.scene
         self._batch.set_drive(self._world, farthest=(scene.distance_limit or 0.0) * self._level)
         if self._floor is not None:
-            self._batch.set_floor(self._world, self._floor, parameters)
+            self._batch.set_floor(self._world, self._floor, self.setup.parameters)
 
     def _release(self, position: Array, velocity: Array) -> None:
         scene = self.setup.scene
         self.raised = self._hanging_raise if scene.clearance_of == "hanging" else self._raise(position)
         position[:, 1] += self.raised
-        self._set_chain_and_floor()
+        self._batch.set_chain(self._world, self.setup.parameters, scene.links, own=self._links)
+        self._load(position, velocity)
+        if self._tilts:
+            self._batch.set_plane(self._world, released_plane(self.setup, position))
+        self._released = True
+
+    def _load(self, position: Array, velocity: Array) -> None:
+        """Begin the walk of a chain whose parameters are set."""
+        self._set_floor()
         self._batch.load(
             self._world,
             position,
@@ -436,6 +434,3 @@ class WalkRun:
             softness=self._hold_softness,
             has_frame_marks=self.recorder.keep.frame_interval > 0,
         )
-        if self._tilts:
-            self._batch.set_plane(self._world, released_plane(self.setup, position))
-        self._released = True

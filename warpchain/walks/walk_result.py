@@ -38,9 +38,9 @@ from warpchain.inputs.scene import Scene, contact_radius
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, validated
-from warpchain.kernels import layout
-from warpchain.loop.before_release import FIELDS, BeforeRelease
+from warpchain.loop.before_release import BEFORE, FIELDS, BeforeRelease
 from warpchain.pictures.walk_shape import Kind
+from warpchain.kernels import layout
 from warpchain.status import Status
 from warpchain.walks.faults import FAULTS, MOST_ENERGY_ERROR, energy_error, faults
 from warpchain.walks.moving_plane import in_room
@@ -56,7 +56,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 KIND: Final = "warpchain walk"
-BEFORE: Final = "before_release"
 
 _SINCE_FLOOR: Final = "time since the last impulse on the floor; NaN if there was none"
 _FIXED: Final = "if the plane is fixed"
@@ -158,18 +157,14 @@ class WalkResult:
     setup: Setup
     seed: int | None
     versions: dict[str, str]
-    time: Annotated[Array, Stored("s", "time since the release", "t", sample=layout.TIME)]
-    center: Annotated[Array, Stored("m", "centre of mass x, y", "t 2", sample=[layout.CENTER_X, layout.CENTER_Y])]
-    center_velocity: Annotated[
-        Array, Stored("m/s", "velocity of the centre of mass x, y", "t 2", sample=[layout.CENTER_U, layout.CENTER_V])
-    ]
-    kinetic_energy: Annotated[Array, Stored("J", "kinetic energy", "t", sample=layout.KINETIC)]
-    gravitational_energy: Annotated[
-        Array, Stored("J", "energy in the field of gravity", "t", sample=layout.GRAVITATIONAL)
-    ]
-    spring_energy: Annotated[Array, Stored("J", "energy of the joint springs", "t", sample=layout.SPRING)]
-    lowest: Annotated[Array, Stored("m", "height of the lowest point of all circles", "t", sample=layout.LOWEST)]
-    rms_speed: Annotated[Array, Stored("m/s", "root mean square speed of the links", "t", sample=layout.RMS_SPEED)]
+    time: Annotated[Array, Stored("s", "time since the release", "t")]
+    center: Annotated[Array, Stored("m", "centre of mass x, y", "t 2")]
+    center_velocity: Annotated[Array, Stored("m/s", "velocity of the centre of mass x, y", "t 2")]
+    kinetic_energy: Annotated[Array, Stored("J", "kinetic energy", "t")]
+    gravitational_energy: Annotated[Array, Stored("J", "energy in the field of gravity", "t")]
+    spring_energy: Annotated[Array, Stored("J", "energy of the joint springs", "t")]
+    lowest: Annotated[Array, Stored("m", "height of the lowest point of all circles", "t")]
+    rms_speed: Annotated[Array, Stored("m/s", "root mean square speed of the links", "t")]
     frame_time: Annotated[Array, Stored("s", "time since the release", "f")]
     frame_joints: Annotated[Array, Stored("m", "joints x, y; joint i ends link i, even links inner", "f n 2")]
     frame_forces: Annotated[
@@ -273,7 +268,8 @@ class WalkResult:
         """
         from warpchain.walks.revisit import state_at
 
-        return state_at(self, t)
+        is_released = not np.isnan(self.energy["kinetic_at_release"])
+        return state_at(self.setup, t, self.walk_time if is_released else np.nan)
 
     def plot(
         self,
