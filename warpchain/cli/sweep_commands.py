@@ -14,7 +14,7 @@ from warpchain.cli.walk_commands import FAILED, plot_walk
 from warpchain.cli.words import JSON, argument, option, output, output_path
 
 if TYPE_CHECKING:
-    from warpchain.run.sweep_run import DaskClient, Executor
+    from warpchain.run.workers import DaskClient, Executor
     from warpchain.store.sweep_result import SweepResult
 
 _FILE: Final = "The sweep, or the bare name of one that comes with warpchain, such as figure6."
@@ -107,7 +107,9 @@ def info(
 
 
 def plot(
-    path: Annotated[Path, argument("PATH", "Folder of a sweep, a merged file, or the file of a saved walk.")],
+    path: Annotated[
+        Path, argument("PATH", "Folder of a sweep or of a walk, a merged file, or the file of a saved walk.")
+    ],
     folder: Annotated[Path | None, output("DIR", "Folder of the figures. Default: that of PATH.")] = None,
     quantity: Annotated[
         str | None,
@@ -128,6 +130,8 @@ def plot(
     from warpchain.store.sweep_result import KIND
 
     is_file = os.path.isfile(path)
+    if (path / "walk.h5").exists() and not (path / "sweep.json").exists():
+        path, is_file = path / "walk.h5", True
     if (
         is_file and kind_of_hdf5(path, "give the folder of a sweep, a merged file, or the file of a saved walk") != KIND
     ) or (path.suffix == ".h5" and not os.path.exists(path)):

@@ -8,11 +8,10 @@ import concurrent.futures
 import contextlib
 import os
 import re
-import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 
@@ -23,9 +22,9 @@ from warpchain.inputs.options import Options, on_gpu
 from warpchain.inputs.sections import takes_fields
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, checked_path, plain, shown, validated
-from warpchain.run.lost_workers import losses_named
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text, progress_bar
 from warpchain.run.sweep_keywords import sweep_of_keywords
+from warpchain.run.workers import DaskClient, Executor, Pulse, losses_named, pulsing_threads
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.manifest import Shard
@@ -43,27 +42,6 @@ POLL = 1.0
 """Time [s] between two checks for shards that tasks under way have written."""
 SHARDS = 128
 """Least number of shards of a sweep, about, if it has as many walks: the grain of progress and of a restart."""
-
-
-class Executor(Protocol):
-    """An executor such as those of ``concurrent.futures``, ``mpi4py.futures`` and Dask's ``get_executor()``."""
-
-    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> "concurrent.futures.Future[Any]":
-        """Run ``function(*arguments)`` somewhere."""
-        ...
-
-
-@runtime_checkable
-class DaskClient(Protocol):
-    """What is used of ``distributed.Client``, which has no such method ``submit`` as executors have."""
-
-    def get_executor(self, *, pure: bool) -> Executor:
-        """An executor on the workers."""
-        ...
-
-    def nthreads(self) -> Mapping[str, int]:
-        """Number of threads of each worker."""
-        ...
 
 
 @takes_fields("scene", "parameters", "options")
@@ -244,7 +222,7 @@ def _run_in_folder(
                 report(progress)
                 prepare(planned)
                 progress.compiling = False
-                with _threads(at_once) as (threads, pulse):
+                with pulsing_threads(at_once) as (threads, pulse):
                     _run(threads, pulse, planned, store, missing, at_once, progress, report)
         counts = counts_text(progress) or "nothing to do"
         store.log(f"complete after {progress.seconds:.1f} s: {counts}")
@@ -292,7 +270,7 @@ def run_shards(
     stamp: str,
     shards: Sequence[Shard],
     threads: int | None = None,
-    pulse: "Pulse | None" = None,
+    pulse: Pulse | None = None,
 ) -> None:
     """Run the walks of some shards and write each shard as soon as its walks are over; what a worker does.
 
@@ -328,36 +306,6 @@ def run_shards(
                 motions[shard][row] = run.recorder.motion()
             if (rows[shard]["status"] != MISSING).all():
                 write_shard(directory, stamp, shard, rows.pop(shard), motions.pop(shard))
-
-
-class Pulse:
-    """What tasks in threads of this process and their sweep tell one another.
-
-    Attributes:
-        stop: Set when the work is to be abandoned.
-        over: Number of walks that are over.
-    """
-
-    def __init__(self) -> None:
-        """Begin to count."""
-        self.stop, self.over, self._lock = threading.Event(), 0, threading.Lock()
-
-    def beat(self) -> None:
-        """Count a walk."""
-        with self._lock:
-            self.over += 1
-
-
-@contextlib.contextmanager
-def _threads(count: int) -> Iterator[tuple[Executor, Pulse]]:
-    """Threads of this process, and their pulse; launches run outside of Python's lock."""
-    pulse = Pulse()
-    with concurrent.futures.ThreadPoolExecutor(count) as threads:
-        try:
-            yield threads, pulse
-        except BaseException:
-            pulse.stop.set()
-            raise
 
 
 def prepare(planned: Sweep) -> None:
