@@ -183,18 +183,6 @@ def test_a_second_process_is_refused(tmp_path: Path) -> None:
             os.kill(worker, signal.SIGKILL)
 
 
-def test_a_second_store_of_one_process_is_refused(tmp_path: Path) -> None:
-    """The lock counts within a process, too; closing twice does no harm, and an error lets go of the lock."""
-    first = open_folder(tmp_path)
-    with refused(InputError, tmp_path, "in use by process"):
-        open_folder(tmp_path)
-    first.close()
-    first.close()
-    with refused(InputError, tmp_path, "another sweep"):
-        open_folder(tmp_path, CHANGED)
-    open_folder(tmp_path).close()
-
-
 def test_workers_may_write_the_same_shard(tmp_path: Path) -> None:
     """Processes, and threads, that write one shard at the same time leave it whole, with the same bytes."""
     assert play("race", tmp_path / "race") == [0, 0, 0, 0]

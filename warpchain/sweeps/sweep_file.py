@@ -177,7 +177,9 @@ class BlockKeys(BaseModel):
     model_config = STRICT
 
     preset: _Preset | None = Field(None, description="parameters to start from; may also be an axis of the grid")
-    samples: Whole | None = Field(None, ge=1, le=2**30, description="samples in each cell of the grid")
+    samples: Annotated[Whole, Field(ge=1, le=2**30)] | None = Field(
+        None, description="samples in each cell of the grid"
+    )
     sampler: _Sampler | None = Field(None, description="how samples are drawn, see below; default: random")
     scene: Annotated[dict[str, Value], _section("scene")] = Field(
         {}, description="fields of the [scene](scene.md) that differ from their defaults"
