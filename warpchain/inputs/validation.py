@@ -101,10 +101,9 @@ def number_field(default: Any, unit: str, description: str, **more: Any) -> Any:
     return Field(default, description=description, json_schema_extra={"unit": unit, **more}, **limits)
 
 
-Whole = Annotated[
-    int, BeforeValidator(lambda given: int(given) if isinstance(given, float) and given.is_integer() else given)
-]
-"""A whole number; 60.0 is sixty."""
+WHOLE: Final = BeforeValidator(lambda given: int(given) if isinstance(given, float) and given.is_integer() else given)
+"""Of whole numbers: 60.0 is sixty."""
+Whole = Annotated[int, WHOLE]
 
 
 def field_unit(field: FieldInfo) -> str:

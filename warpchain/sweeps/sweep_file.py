@@ -33,6 +33,7 @@ from warpchain.inputs.validation import (
     SECTION_OF,
     STRICT,
     SYMBOL_OF,
+    WHOLE,
     InputError,
     Whole,
     by_name,
@@ -177,7 +178,7 @@ class BlockKeys(BaseModel):
     model_config = STRICT
 
     preset: _Preset | None = Field(None, description="parameters to start from; may also be an axis of the grid")
-    samples: Annotated[Whole, Field(ge=1, le=2**30)] | None = Field(
+    samples: Annotated[int, Field(ge=1, le=2**30), WHOLE] | None = Field(
         None, description="samples in each cell of the grid"
     )
     sampler: _Sampler | None = Field(None, description="how samples are drawn, see below; default: random")
