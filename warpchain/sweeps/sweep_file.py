@@ -207,8 +207,7 @@ class BlockKeys(BaseModel):
         ),
     ] = Field(
         {},
-        description="parameter sets: quantity → its value in each set, lists of one length; one more axis, `point`, "
-        "beside those of the grid; not in a file with blocks",
+        description="parameter sets: quantity → its value in each set; one more axis, `point`; not in a file with blocks",
     )
 
     @model_validator(mode="before")
