@@ -23,7 +23,7 @@ from warpchain.inputs.sections import takes_fields
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, checked_path, plain, shown, validated
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text, progress_bar
-from warpchain.run.sweep_keywords import sweep_of_keywords
+from warpchain.run.sweep_keywords import KEYS, sweep_of_keywords
 from warpchain.run.workers import DaskClient, Executor, Pulse, losses_named, pulsing_threads
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
@@ -44,24 +44,11 @@ SHARDS = 128
 """Least number of shards of a sweep, about, if it has as many walks: the grain of progress and of a restart."""
 
 
-@takes_fields("scene", "parameters", "options")
+@takes_fields("scene", "parameters", "options", beside=KEYS)
 def sweep(
     source: str | os.PathLike[str] | Mapping[str, Any] | Sweep | None = None,
     out: str | os.PathLike[str] | None = None,
     *,
-    grid: Mapping[str, Any] | None = None,
-    points: Mapping[str, Any] | None = None,
-    samples: int | None = None,
-    sampler: str | None = None,
-    preset: str | Sequence[str] | None = None,
-    scene: Mapping[str, Any] | None = None,
-    parameters: Mapping[str, Any] | None = None,
-    options: Mapping[str, Any] | None = None,
-    distributions: Mapping[str, Any] | None = None,
-    same_samples_along: Sequence[str] | None = None,
-    record: Mapping[str, Any] | None = None,
-    name: str | None = None,
-    seed: int | None = None,
     part: str | None = None,
     device: str | None = None,
     executor: "Executor | DaskClient | None" = None,
@@ -81,7 +68,7 @@ def sweep(
         out: Folder of the results. A sweep that was killed goes on where it was, and leaves the same bytes. A sweep
             with more samples than the folder, and else the same, adds them; latin hypercubes do not grow.
         settings: Whatever :func:`walk` takes; a list, an array or a range ``{"from":, "to":, "step":}`` is an axis of
-            the grid. The last axis varies fastest.
+            the grid. The last axis varies fastest. Beside these the keys of a sweep file:
         grid: Further axes, which come before those of the settings.
         points: Parameter sets, as a table or a mapping: quantity → its value in each set. They are one more axis,
             ``point``, beside the grid.
@@ -114,23 +101,7 @@ def sweep(
         OSError: The folder cannot be read or written.
         LostWorkersError: Worker processes were killed, or the scheduler of a Dask client was closed.
     """
-    keys = {
-        "grid": grid,
-        "points": points,
-        "samples": samples,
-        "sampler": sampler,
-        "preset": preset,
-        "scene": scene,
-        "parameters": parameters,
-        "options": options,
-        "distributions": distributions,
-        "same_samples_along": same_samples_along,
-        "record": record,
-        "name": name,
-        "seed": seed,
-    }
-    given = {key: value for key, value in keys.items() if value is not None}
-    planned, folder, own = _checked_call(source, out, given, settings, device, workers, part)
+    planned, folder, own = _checked_call(source, out, settings, device, workers, part)
     count = plain(workers, "workers")
     if isinstance(executor, DaskClient):
         count = count or sum(executor.nthreads().values())
@@ -145,7 +116,6 @@ def sweep(
 def _checked_call(
     source: str | os.PathLike[str] | Mapping[str, Any] | Sweep | None,
     out: str | os.PathLike[str] | None,
-    keys: Mapping[str, object],
     settings: Mapping[str, object],
     device: str | None,
     workers: int | None,
@@ -157,9 +127,10 @@ def _checked_call(
         InputError: Something is refused; one line for each value.
     """
     problems, planned, own = [], None, (1, 1)
-    replaced = {key: plain(keys[key], key) for key in ("seed", "samples") if key in keys}
-    if source is not None and (others := {**keys, **settings}.keys() - replaced.keys()):
-        names = ", ".join(name for name in (*keys, *settings) if name in others)
+    settings = {name: value for name, value in settings.items() if value is not None or name not in KEYS}
+    replaced = {name: plain(settings[name], name) for name in ("seed", "samples") if name in settings}
+    if source is not None and (others := [name for name in settings if name not in replaced]):
+        names = ", ".join(others)
         problems.append(f"{names}: given together with a source; leave one out, or write it into the source")
     if out is None:
         problems.append("out: missing; give the folder of the results")
@@ -170,7 +141,7 @@ def _checked_call(
         problems.append(f"workers: {shown(count)} is not a number of workers; give a whole number from 1")
     try:
         own = own if part is None else _part(part)
-        planned = sweep_of_keywords(keys, settings, out) if source is None else load_sweep(source, **replaced)
+        planned = sweep_of_keywords(settings, out) if source is None else load_sweep(source, **replaced)
         if device is not None:
             planned = on_device(planned, device)
     except InputError as error:

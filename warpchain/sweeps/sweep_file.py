@@ -207,7 +207,7 @@ class BlockKeys(BaseModel):
         ),
     ] = Field(
         {},
-        description="parameter sets: quantity → its value in each set; one more axis, `point`; not in a file with blocks",
+        description="parameter sets: quantity → its value in each; one more axis, `point`; not in a file with blocks",
     )
 
     @model_validator(mode="before")
