@@ -186,7 +186,8 @@ def running_rate(directory: Folder) -> float | None:
     except BlockingIOError:
         folder = Path(directory) / "shards"
         done = sum(len(shard) for shard in present if (folder / shard.name).stat().st_mtime >= began)
-        return done / max(time.time() - began, 1e-3)
+        seconds = time.time() - began  # negative if the clock was set back
+        return done / seconds if seconds > 0 else 0.0
     except FileNotFoundError:
         pass
     return None
@@ -224,7 +225,7 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
     if found.numerics_version != NUMERICS_VERSION:
         raise InputError(
             f"{folder}: its walks are of numerics {found.numerics_version}, but this warpchain has "
-            f"{NUMERICS_VERSION}; use the version that began it, give another folder, or start anew with --fresh"
+            f"{NUMERICS_VERSION}; use the version that began it, give another folder, or start anew with fresh"
         )
     if found.part != manifest.part:
         raise InputError(
@@ -238,7 +239,7 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
     if len(there) != len(sweep.blocks) or sweep.digest(there) != digest:
         raise InputError(
             f"{folder}: holds another sweep ({found.sweep.name}), or this one before it was changed; "
-            "give another folder, or start anew with --fresh, which deletes what is there"
+            "give another folder, or start anew with fresh, which deletes what is there"
         )
     for count, block in zip(there, sweep.blocks, strict=True):
         name, asked, sampler = block.name, block.samples_given, block.sampler

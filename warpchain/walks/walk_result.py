@@ -38,9 +38,9 @@ from warpchain.inputs.scene import Scene, contact_radius
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, validated
+from warpchain.kernels import layout
 from warpchain.loop.before_release import BEFORE, FIELDS, BeforeRelease
 from warpchain.pictures.walk_shape import Kind
-from warpchain.kernels import layout
 from warpchain.status import Status
 from warpchain.walks.faults import FAULTS, MOST_ENERGY_ERROR, energy_error, faults
 from warpchain.walks.moving_plane import in_room
@@ -412,13 +412,15 @@ def read_motion(group: "h5py.Group", links: int) -> dict[str, Any]:
 
 
 def load_walk(path: str | os.PathLike[str]) -> WalkResult:
-    """Read a walk that `WalkResult.save` wrote; every number comes back to the bit.
+    """Read a walk that `WalkResult.save` wrote, or the `walk.h5` of a folder; every number comes back to the bit.
 
     Raises:
         OSError: the file cannot be read.
         InputError: the file is no walk, or belongs to another version of warpchain. It is a `ValueError`.
         DamagedFileError: the file is damaged or cut short. It is an `InputError`.
     """
+    if os.path.isdir(path):
+        path = os.path.join(path, "walk.h5")
     remedy = "run the walk again, or fetch another copy of the file"
     with reading_hdf5(path, KIND, remedy, "give a file written by WalkResult.save") as file:
         given = json.loads(file.attrs["setup"])
