@@ -4,19 +4,18 @@ if (location.protocol === "file:") {
     constructor(url) {
       super();
       const frame = document.body.appendChild(Object.assign(document.createElement("iframe"), { hidden: true }));
-      this.window = frame.contentWindow;
-      window.addEventListener("message", event => {
-        if (event.source !== this.window) return;
-        const message = new MessageEvent("message", { data: event.data });
-        this.dispatchEvent(message);
-        if (this.onmessage) this.onmessage(message);
+      const inside = frame.contentWindow, script = { src: url };
+      inside.document.open();
+      inside.document.close();
+      inside.postMessage = data => this.dispatchEvent(new MessageEvent("message", { data }));
+      this.inside = new Promise(done => {
+        script.onload = () => done(inside);
+        inside.document.documentElement.append(Object.assign(inside.document.createElement("script"), script));
       });
-      const script = "postMessage = parent.postMessage.bind(parent); importScripts = () => {}";
-      this.window.document.open();
-      this.window.document.write(`<script>${script}</${""}script><script src="${url}"></${""}script>`);
-      this.window.document.close();
     }
-    postMessage(data) { this.window.postMessage(data, "*"); }
+    postMessage(data) {
+      this.inside.then(inside => inside.dispatchEvent(new MessageEvent("message", { data })));
+    }
     terminate() {}
   };
 }

@@ -21,7 +21,7 @@ WHOLE = re.compile(
     r"(<(?:code|pre|math|script|style|svg|title)\b.*?</(?:code|pre|math|script|style|svg|title)>|<[^>]+>)", re.S
 )
 """What has no subscripts: code, formulas, tags."""
-SUBSCRIPT = re.compile(r"(?<![\w.])([^\W\d_][\u0302-\u0308]?)_(?:\{([^}]+)\}|([a-zA-Z]+|\d)(?![\w.]))")
+SUBSCRIPT = re.compile(r"(?<![\w.])([^\W\d_][\u0302-\u0308]?)_(?:\{([^}]+)\}|([a-zA-Z]+|\d)(?![a-zA-Z0-9_(]|\.\w))")
 
 
 def in_site(path: str) -> str:
@@ -76,7 +76,6 @@ def on_files(files: Files, config: Any) -> Files:
     """Add the notebooks, the pages of the studies, and all that pages link to."""
     for path in sorted((ROOT / "docs/notebooks").glob("*.ipynb")):
         files.append(File.generated(config, f"notebooks/{path.stem}.md", content=notebook_page(path)))
-        files.append(File.generated(config, f"notebooks/{path.name}", abs_src_path=str(path)))
     waiting = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob("studies/**/README.md"))
     waiting += [
         linked(in_repository(page.src_uri), match[1])
@@ -101,9 +100,9 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
     def moved(match: re.Match[str]) -> str:
         path = linked(source, match[1])
-        own = os.path.basename(path) == match[1] and page.file.src_uri.startswith("notebooks/")
-        is_file = (ROOT / path).is_file() and not own  # a notebook's page links to the notebook itself
-        return f"]({os.path.relpath(in_site(path), folder)}" if is_file else match[0]
+        # The page of a notebook links to the notebook itself.
+        stays = not (ROOT / path).is_file() or path == source.removesuffix(".md") + ".ipynb"
+        return match[0] if stays else f"]({os.path.relpath(in_site(path), folder)}"
 
     return LINK.sub(moved, markdown)
 
@@ -114,8 +113,11 @@ def on_page_content(html: str, **_: Any) -> str:
     def set_below(match: re.Match[str]) -> str:
         return f"{match[1]}<sub>{match[2] or match[3]}</sub>"
 
-    parts = WHOLE.split(ROLE.sub("", html))
-    return "".join(part if part.startswith("<") else SUBSCRIPT.sub(set_below, part) for part in parts)
+    html, texts, end = ROLE.sub("", html), [], 0
+    for whole in WHOLE.finditer(html):
+        texts += [SUBSCRIPT.sub(set_below, html[end : whole.start()]), whole[0]]
+        end = whole.end()
+    return "".join([*texts, SUBSCRIPT.sub(set_below, html[end:])])
 
 
 def on_post_build(config: Any) -> None:
@@ -124,11 +126,12 @@ def on_post_build(config: Any) -> None:
     Raises:
         PluginError: there are such links.
     """
-    pages = {path: path.read_text(encoding="utf-8") for path in Path(config.site_dir).rglob("*.html")}
+    site = [path for path in Path(config.site_dir).rglob("*.html") if path.name != "404.html"]
+    pages = {path: path.read_text(encoding="utf-8") for path in site}
     anchors = {path: set(re.findall(r'\bid="([^"]+)"', text)) for path, text in pages.items()}
     dead = []
     for page, text in pages.items():
-        for target in set(re.findall(r'<a\b[^>]*?\bhref="([^"]*)"', text)) if page.name != "404.html" else ():
+        for target in set(re.findall(r'<(?:a|img)\b[^>]*?\b(?:href|src)="([^"]*)"', text)):
             path, _, anchor = target.partition("#")
             file = Path(os.path.normpath(page.parent / path)) if path else page
             if re.match(r"\w+:", target) or (file.is_dir() and not anchor):

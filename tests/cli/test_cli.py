@@ -18,10 +18,7 @@ from tests.support import command_line
 from tests.support.command_line import Answer, Command, process
 from warpchain import load_walk
 from warpchain.cli.main import main
-from warpchain.inputs.methods import METHODS
-from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
-from warpchain.inputs.scene import Scene
 
 command = command_line.command
 
@@ -57,19 +54,6 @@ def test_help_is_quick_and_complete(tmp_path: Path) -> None:
     for option in options.split():
         assert f"--{option} " in answer.out
     assert min(computed) < 4.5 * min(libraries)
-
-
-def test_help_tells_the_defaults(command: Command) -> None:
-    """The defaults that help names are those of the models."""
-    words = " ".join(re.sub("[│╭╮╰╯─]", " ", command("walk", "--help").out).split())
-    scene, options = Scene(), Options()
-    named = {"links": scene.links, "frequency": scene.frequency, "start": scene.start, "device": options.device}
-    for name, default in (named | {"preset": "paper", "frame-interval": 2e-3, "method": "standard"}).items():
-        match = re.search(rf"--{name} .*?Default: (\S+)\.(?: |$)", words)
-        assert match is not None and type(default)(match[1]) == default, name
-    assert options == Options(method="standard") and options.tolerance == 3e-3
-    assert f"standard: {options.method} at 3e-3" in words
-    assert all(f"{name}: {title}" in words for name, title in METHODS.items())
 
 
 REFUSED = {
@@ -119,24 +103,6 @@ def test_what_is_no_command_names_the_help(command: Command, arguments: str, lin
     answer = command(*arguments.split())
     assert (answer.status, answer.out) == (2, "")
     assert answer.err == f"error: {line}\n"
-
-
-@pytest.mark.parametrize(
-    ("content", "problem"),
-    [
-        ("preset: soft\nscene: {links: 61}", "scene.links: 61 is odd"),
-        ("preset: soft\nscene: {gravity: 1.0}", "scene.gravity: unknown name; did you mean parameters.gravity?"),
-        ("scene: {links: 60}", "preset: missing"),
-        ("scene: {", "file.yaml, line 1"),
-    ],
-)
-def test_a_bad_file_is_refused_in_one_line(command: Command, tmp_path: Path, content: str, problem: str) -> None:
-    """What is wrong in a file is refused like what is wrong in an option."""
-    Path("file.yaml").write_text(content, encoding="utf-8")
-    answer = command("walk", "--config", "file.yaml", "-o", "new")
-    assert (answer.status, answer.out) == (2, "")
-    assert answer.err.startswith(f"error: {problem}") and answer.err.count("\n") == 1
-    assert not (tmp_path / "new").exists()
 
 
 @pytest.mark.parametrize("folder", ["file", "file/below", "/dev/null/below", "x" * 300])

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from tests.support.made_tilting_walks import make_tilting_walk
 from tests.support.made_walks import make_unreleased, make_walk
-from warpchain.pictures.chain import ABOVE, FRONT, SIDE, draw_chain, link_outlines, view_from
+from warpchain.pictures.chain import link_outlines
 from warpchain.pictures.film_strip import film_strip
 from warpchain.pictures.walk_shape import kinds_of
 from warpchain.status import Status
@@ -183,40 +183,6 @@ def test_film_strips_of_short_and_long_walks_fit(stretch: float, tmp_path: Path)
 
 
 # A chain in the room
-
-
-def test_views_show_the_axes_of_the_room() -> None:
-    """A view from a corner is a rotation that keeps the vertical upright, and looks down."""
-    view = view_from(0.6, 0.4)
-    np.testing.assert_allclose(view @ view.T, np.eye(3), atol=1e-15)
-    assert np.linalg.det(view) == pytest.approx(1) and min(view[2]) > 0 and view[0, 1] == 0
-    np.testing.assert_allclose(view_from(0.0, 0.0), SIDE, atol=1e-15)
-    for azimuth, elevation, inverted, mirror in (
-        (np.pi / 2, 0.0, FRONT, (-1, 1, 1)),
-        (0.0, np.pi / 2, ABOVE, (1, -1, 1)),
-    ):
-        np.testing.assert_allclose(view_from(azimuth, elevation), inverted * np.array(mirror)[:, None], atol=1e-15)
-
-
-def test_nearer_links_are_drawn_later() -> None:
-    """From above, links of a kind are drawn in the order of their heights; outer links cover their neighbours."""
-    in_room = make_tilting_walk().joints_in_room
-    assert in_room is not None
-    joints = in_room[20]
-    axes = Figure().subplots()
-    chain = draw_chain(axes, joints, RADIUS, ABOVE, ("white", "black", "black"), edge=1.0)
-    outer = np.asarray(chain.get_facecolor())[:, 0] == 0
-    drawn = [np.asarray(path.vertices)[:-1] for path in chain.get_paths()]
-    numbers = [
-        int(np.argmin([np.abs(one - other).max() for other in link_outlines(joints[:, [0, 2]], RADIUS)]))
-        for one in drawn
-    ]
-    assert np.array_equal(np.array(numbers) % 2 == 1, outer)
-    height = (joints + np.roll(joints, 1, axis=0))[numbers, 1] / 2
-    for kind in (outer, ~outer):
-        assert np.all(np.diff(height[kind]) >= -1e-12)
-    for number in range(1, 30, 2):
-        assert all(numbers.index(number) > numbers.index(other % 30) for other in (number - 1, number + 1))
 
 
 def test_link_outlines_are_two_circles() -> None:

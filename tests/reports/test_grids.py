@@ -227,27 +227,6 @@ def test_a_figure_or_axes_may_be_given(tmp_path: Path) -> None:
     assert result.plot(figure=other) is other and other.axes
 
 
-def test_what_cannot_be_drawn_is_refused(tmp_path: Path) -> None:
-    """The reason is one line."""
-    one_axis = make_sweep(tmp_path / "a", sweep({"gravity": GRAVITY}))
-    one_cell = make_sweep(tmp_path / "b", sweep({"gravity": [9.8]}))
-    failed = make_sweep(tmp_path / "c", sweep({"gravity": GRAVITY}), lambda walk: Status.NOT_FINITE)
-    several = make_sweep(tmp_path / "d", sweep({"links": [60, 90], "gravity": GRAVITY, "floor_friction": FRICTION}))
-    for result, settings, reason in (
-        (one_axis, {"kind": "bars"}, "kind: 'bars' is unknown; give 'lines', 'map' or None"),
-        (one_axis, {"kind": "map"}, "a figure of a grid takes a block with two axes of several values"),
-        (one_cell, {}, "a figure of a grid takes a block with an axis of several values"),
-        (failed, {}, "no walk has come to rest"),
-        (several, {"ax": Figure().subplots()}, "ax: this figure has 2 panels; leave ax out, or give figure"),
-        (one_axis, {"ax": Figure().subplots(), "figure": Figure()}, "ax: given together with figure; leave one out"),
-    ):
-        with pytest.raises(ValueError) as problem:
-            result.plot(**settings)
-        assert str(problem.value) == reason
-    with pytest.raises(NothingToShow):
-        one_cell.plot()
-
-
 def test_what_a_walk_does_not_have_is_in_no_mean(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """−1 and NaN of walks without a quantity are not averaged; figures say how many have none."""
 

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from tests.support.made_sweeps import FIGURE_6, SENSITIVITY, TOLERANCE, distance, make_sweep
@@ -109,30 +108,6 @@ def test_figure6_counts_what_is_not_in_the_means(flawed6: SweepResult) -> None:
     assert list(dots) == [10.0]
     np.testing.assert_allclose(dots[10.0][0], flawed6.blocks["rest"].dx[0, 0, 1:].mean())
     assert len(means(second, GREEN)) == 1
-
-
-def test_figure6_tells_blocks_of_one_start_apart(tmp_path: Path) -> None:
-    """Starts may be an axis; another block of the same start gets its name, a colour and a marker of its own."""
-    blocks = [
-        {"name": "all", "grid": {"start": ["rest", "ellipse"], "frequency": [10, 20]}},
-        {"name": "paper", "preset": "paper", "grid": {"frequency": [10, 20]}},
-        {"name": "other", "grid": {"frequency": [10, 20], "floor_friction": [0.2, 0.3]}},
-    ]
-    figure = figure6(make_sweep(tmp_path, one_block(blocks=blocks, samples=2))).figure
-    texts = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert texts[:3] == ["started at rest", "started as an ellipse", "paper, started at rest"] and len(texts) == 5
-    handles = [handle for handle in figure.legends[0].legend_handles if isinstance(handle, Line2D)][:3]
-    assert len({handle.get_color() for handle in handles}) == len({handle.get_marker() for handle in handles}) == 3
-
-
-def test_figure6_needs_walks(tmp_path: Path) -> None:
-    """Without walks at rest, or without a fitting block, there is no figure; the reason is one line."""
-    result = make_sweep(tmp_path, one_block(grid={"frequency": [10, 20]}), lambda walk: Status.NOT_STEADY)
-    with pytest.raises(NothingToShow, match=r"^[^\n]+$"):
-        figure6(result)
-    result = make_sweep(tmp_path / "other", one_block(grid={"frequency": [10], "gravity": [1.6, 9.8]}))
-    with pytest.raises(NothingToShow, match="links and frequency"):
-        figure6(result)
 
 
 # Maps

@@ -50,7 +50,7 @@ def parameters(
 def schema(
     path: Annotated[Path | None, output("FILE", "Write it to this file instead of standard output.")] = None,
 ) -> None:
-    """Print a JSON schema of sweep files, with which editors check and complete them.
+    """Print a JSON schema of sweep files, for editors.
 
     An editor with a YAML language server finds it by the first line of a sweep file:
     # yaml-language-server: $schema=FILE

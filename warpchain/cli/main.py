@@ -27,7 +27,7 @@ from warpchain.version import VERSION
 REFUSED: Final = 2
 """Exit status beside `FAILED` and `INTERRUPTED`."""
 
-app = typer.Typer(pretty_exceptions_enable=False)
+app = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode=None)  # boxes of rich would double the time of help
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

@@ -52,7 +52,7 @@ def sweep(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Run a sweep, or what is left of it: many walks over a grid, with random samples in each cell."""
+    """Run a sweep, or what is left of it: many walks over a grid."""
     from warpchain.inputs.validation import InputError, printable
     from warpchain.sweeps.shipped import write_new_sweep
 
@@ -102,7 +102,10 @@ def sweep(
 def info(
     directory: Annotated[Path, argument("DIR", "Folder of a sweep, or a merged file.")], as_json: AsJson = False
 ) -> None:
-    """Show how far a sweep is and what it has found so far; of a merged file, after its checksum is compared."""
+    """Show how far a sweep is and what it has found so far.
+
+    Of a merged file the checksum is compared first.
+    """
     from warpchain.cli.terminal import print_sweep
     from warpchain.store.folder import running_rate
     from warpchain.store.sweep_result import load
@@ -122,7 +125,7 @@ def plot(
         typer.Option(help="Only figure of a walk to draw. Default: all that it has something for."),
     ] = None,
 ) -> None:
-    """Draw every figure that a sweep or a saved walk has something for.
+    """Draw all figures of a sweep or of a saved walk.
 
     Of a sweep: the distance as in the paper's Figure 6, maps, lines over any axes, tolerance, sensitivity, statuses. Of
     a walk: film_strip.png, height_and_speed.png, loop.png, energy.png and, if the plane tilts, tilt.png; a line says
@@ -174,7 +177,10 @@ def report(
     ] = None,
     device: Annotated[str | None, option("NAME", f"Where the walk is run again: {_DEVICE}")] = None,
 ) -> None:
-    """Write one self-contained HTML page: figures, table, parameters, provenance, failed walks, a walk in motion."""
+    """Write one HTML page with all of a sweep, and a walk in motion.
+
+    It has figures, tables, parameters, provenance and failed walks, and loads nothing else.
+    """
     from warpchain.inputs.validation import InputError, printable
     from warpchain.reports.sweep_page import write_report
 
@@ -189,7 +195,7 @@ def merge(
     directories: Annotated[list[Path], argument("DIR...", "Folder of a sweep, or several; merged files, too.")],
     path: Annotated[Path, argument("FILE.h5", "The file to write.", parser=output_path)],
 ) -> None:
-    """Put all results into one HDF5 file with named axes and units, which xarray opens.
+    """Put the results of folders into one file, which xarray opens.
 
     Folders of the same sweep with different seeds are put together: their samples stand one behind the other.
     """

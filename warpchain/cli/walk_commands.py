@@ -80,7 +80,7 @@ def walk(
     record_loads: Annotated[bool, typer.Option("--record-loads", help=_LOADS)] = False,
     as_json: Annotated[bool, JSON] = False,
 ) -> None:
-    """Let one chain walk: hang it on its sprocket, spin it up, drop it and follow it until it rests."""
+    """Spin up one chain, drop it, and follow it until it rests."""
     from warpchain.cli.terminal import print_walk, progress_text, status_line
     from warpchain.cli.walk_files import try_walk_folder, write_walk
     from warpchain.inputs.distributions import LARGEST_SEED
@@ -140,7 +140,7 @@ def animate(
     fps: Annotated[float, option("NUMBER", "Pictures per second; in HTML the browser decides. Default: 30.")] = 30.0,
     slow: Annotated[float, option("NUMBER", "Playing time per simulated time. Default: 4.")] = 4.0,
 ) -> None:
-    """Write a film of a saved walk: GIF, MP4 or a page with a player."""
+    """Write a film of a saved walk: GIF, MP4 or HTML with a player."""
     from warpchain.cli.walk_files import record_of
     from warpchain.inputs.validation import InputError, printable
     from warpchain.walks.walk_result import load_walk

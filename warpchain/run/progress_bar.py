@@ -106,6 +106,24 @@ def _in_notebook() -> bool:
     return "IPKernelApp" in getattr(importlib.import_module("IPython").get_ipython(), "config", {})
 
 
+def walk_in_notebook() -> Callable[[Any], None] | None:
+    """What shows the progress of a walk as a line in the output of a cell; None where there is no notebook."""
+    if not _in_notebook():
+        return None
+    handle: Any = None
+
+    def show(progress: Any) -> None:
+        nonlocal handle
+        text = f"{progress.phase}: {progress.time:.2f} s, {progress.attempts:,} steps"
+        content = {"text/plain": "compiling kernels" if progress.phase == "compile" else text}
+        if handle is None:
+            handle = importlib.import_module("IPython.display").display(content, raw=True, display_id=True)
+        else:
+            handle.update(content, raw=True)
+
+    return show
+
+
 @contextlib.contextmanager
 def _terminal_bar() -> Iterator[OnProgress]:
     """A bar on standard error."""

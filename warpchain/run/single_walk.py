@@ -8,6 +8,7 @@ from warpchain.inputs.sections import by_section, takes_fields
 from warpchain.inputs.setup import DEFAULT_PRESET, Setup, continued, resolve
 from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, checked_whole, full_name, plain, shown
+from warpchain.run.progress_bar import walk_in_notebook
 from warpchain.walks.one_walk import OnProgress, run_walk
 from warpchain.walks.walk_result import WalkResult
 
@@ -58,7 +59,8 @@ def walk(
         record_loads: Whether ``frame_forces`` and ``frame_moments``, the loads of the joints, are kept with each frame
             after the release. No method with rigid joints has them: ``"standard"`` then is ``"explicit"``. The picture
             of waves needs frames some 1e-4 s apart; with 60 links they take 24 MB for each second of the walk.
-        on_progress: Called before kernels are compiled and after each launch, several times a second.
+        on_progress: Called before kernels are compiled and after each launch, several times a second; by default a
+            notebook shows a line of progress.
         settings: Any other field of :class:`Parameters`, :class:`Scene` or :class:`Options`, by its name or the
             paper's symbol, such as ``mu_fc``; ``warpchain parameters`` lists them.
 
@@ -92,7 +94,7 @@ def walk(
         frame_interval=frame_interval,
         record_before=record_before,
         record_loads=loads,
-        on_progress=on_progress,
+        on_progress=on_progress or walk_in_notebook(),
     )
 
 
