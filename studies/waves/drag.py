@@ -1,7 +1,7 @@
 """Dose and response of a drag on short waves: the same releases walk on with and without it.
 
     python -m studies.waves.drag release releases.npz            # six minutes of one core: the loops at their release
-    python -m studies.waves.drag walk releases.npz drag.npz --device cuda    # two minutes of a GPU: how far they walk
+    python -m studies.waves.drag walk releases.npz drag.npz cuda    # five minutes of a GPU: how far they walk
 
 `studies.waves.doses` makes the tables of the page from drag.npz.
 """
@@ -138,25 +138,27 @@ class Loops:
         """
         chains = self.chains
         looping = np.arange(len(self._variant))
-        area = areas(chains.position)
+        position, velocity = chains.motions()
+        area = areas(position)
         lost_at = np.full(len(looping), np.nan)
         dragged_for = np.zeros(len(looping))
         while len(looping) and chains.time < LATEST:
-            dragged_for[looping] += self._drag(looping) * STEP
+            dragged_for[looping] += self._drag(looping, position, velocity) * STEP
             chains.run(chains.time + STEP, looping)
-            keeps = areas(chains.position[looping]) > 0.9 * area[looping]
+            position, velocity = chains.motions(looping)
+            keeps = areas(position) > 0.9 * area[looping]
             lost_at[looping[~keeps]] = chains.time
-            looping = looping[keeps & (chains.status[looping] == warpchain.Status.FINISHED)]
+            keeps &= chains.status[looping] == warpchain.Status.FINISHED
+            looping, position, velocity = looping[keeps], position[keeps], velocity[keeps]
         chains.run(END, to_rest=True)
         mass = self._inertia[..., 0]
-        dx = np.sum(mass * chains.position[..., 0], axis=1) / mass.sum(axis=1)
+        dx = np.sum(mass * chains.motions()[0][..., 0], axis=1) / mass.sum(axis=1)
         dx[chains.status != warpchain.Status.AT_REST] = np.nan
         found = {"dx": dx, "lost_at": lost_at, "dragged_for": dragged_for}
         return {name: values.reshape(len(VARIANTS), -1) for name, values in found.items()}
 
-    def _drag(self, looping: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def _drag(self, looping: NDArray[np.int64], position: Array, velocity: Array) -> NDArray[np.bool_]:
         """Apply the drag to these chains, where it acts now; returns where it does."""
-        position, velocity = self.chains.position[looping], self.chains.velocity[looping]
         half = 0.5 * self._length[looping, None] * np.abs(np.sin(position[..., 2]))
         gap = np.min(position[..., 1] - half, axis=1) - self._radius[looping]
         acts = np.where(gap < NEAR, self._acts[looping, 1], self._acts[looping, 0]) & (self._rate[looping] > 0)
@@ -175,21 +177,17 @@ def areas(position: Array) -> Array:
     return np.abs(0.5 * np.sum(x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1), axis=1))
 
 
-def walk(releases: Path, out: Path, device: str) -> None:
-    """Walk on from all releases with every variant; a file of Δx, shape (cells, variants, releases)."""
+def walk(releases: Path, out: Path, device: str = "cpu", only: int | None = None) -> None:
+    """Walk on from all releases with every variant, or those of so many links; arrays (variants, releases) by cell."""
     states = np.load(releases)
     found: dict[str, Any] = {}
-    for links in sorted({links for links, _ in CELLS}):
-        begun = time.perf_counter()
-        cells = [cell for cell, (each, _) in enumerate(CELLS) if each == links and f"position{cell}" in states]
-        stacked = [np.concatenate([states[f"{name}{cell}"] for cell in cells]) for name in NAMES]
-        result = Loops(*stacked, device).walk()
-        for number, cell in enumerate(cells):
-            count = len(states[f"position{cell}"])
-            for name, values in result.items():
-                found[f"{name}{cell}"] = values[:, number * count : (number + 1) * count]
-        np.savez_compressed(out, **found)
-        print(f"{links} links: {time.perf_counter() - begun:.0f} s", flush=True)
+    for cell, (links, frequency) in enumerate(CELLS):
+        if only in (None, links) and f"position{cell}" in states:
+            begun = time.perf_counter()
+            result = Loops(*(states[f"{name}{cell}"] for name in NAMES), device).walk()
+            found |= {f"{name}{cell}": values for name, values in result.items()}
+            np.savez_compressed(out, **found)
+            print(f"{links} links at {frequency:g} Hz: {time.perf_counter() - begun:.0f} s", flush=True)
 
 
 def main(arguments: list[str]) -> None:
@@ -197,12 +195,10 @@ def main(arguments: list[str]) -> None:
     match arguments:
         case ["release", path]:
             release(Path(path))
-        case ["walk", releases, out]:
-            walk(Path(releases), Path(out), "cpu")
-        case ["walk", releases, out, "--device", device]:
-            walk(Path(releases), Path(out), device)
+        case ["walk", releases, out, *device]:
+            walk(Path(releases), Path(out), *device[:1], *map(int, device[1:]))
         case _:
-            sys.exit("give release FILE.npz, or walk RELEASES.npz FILE.npz [--device cuda]")
+            sys.exit("give release FILE.npz, or walk RELEASES.npz FILE.npz [cpu|cuda [LINKS]]")
 
 
 if __name__ == "__main__":

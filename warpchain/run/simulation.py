@@ -146,12 +146,12 @@ class Chains:
             raise InputError(f"position: {worlds} chains of {links} links; give chains of an even number of at least 4")
         check_links_on_gpu(links, options.device, "position")
         self.time, self._links = 0.0, links
-        self._batch = Batch(worlds, links, options)
-        for world, chain in enumerate(parameters):
-            self._batch.set_chain(world, chain, links)
-            self._batch.load(world, position[world], velocity[world], stop_time=0.0, stop_status=Status.FINISHED)
-        self._features = self._batch.features(fixed_body="floor" if floor else "none")
         with gpu_turn([options.device]):
+            self._batch = Batch(worlds, links, options)
+            for world, chain in enumerate(parameters):
+                self._batch.set_chain(world, chain, links)
+                self._batch.load(world, position[world], velocity[world], stop_time=0.0, stop_status=Status.FINISHED)
+            self._features = self._batch.features(fixed_body="floor" if floor else "none")
             self._batch.run(range(worlds), self._features)
 
     @property
@@ -159,15 +159,9 @@ class Chains:
         """Codes of `Status`, (W,): FINISHED of a chain that can go on."""
         return self._batch.statuses().copy()
 
-    @property
-    def position(self) -> Array:
-        """x, y [m], θ [rad] of each link's centre, (W, n, 3)."""
-        return self._batch.motions(range(len(self.status)), self._links)[0]
-
-    @property
-    def velocity(self) -> Array:
-        """Their rates, (W, n, 3)."""
-        return self._batch.motions(range(len(self.status)), self._links)[1]
+    def motions(self, chains: Sequence[int] | NDArray[np.integer[Any]] | None = None) -> tuple[Array, Array]:
+        """Place and angle of the links of all chains, or of some numbers, (W, n, 3); and their rates."""
+        return self._batch.motions(range(len(self.status)) if chains is None else list(chains), self._links)
 
     def set_velocity(self, chains: Sequence[int] | NDArray[np.integer[Any]], velocity: Array) -> None:
         """Give some chains, by their numbers, other velocities, (chains, n, 3)."""
