@@ -1,4 +1,4 @@
-"""Candidates for the law of Δx, judged by what they predict: cells of a number of links, or frequency, that was left out.
+"""Candidates for the law of Δx, judged by what they predict of numbers of links, or frequencies, left out.
 
 Errors come from blocks: all cells of a number of links, or of a frequency, are drawn together, because neighbours in
 the diagram share their deviations. Everything is of ln Δx, every cell counts alike, and per cent are root mean squares.
@@ -156,7 +156,9 @@ def errors(known: Mapping[str, Points]) -> list[str]:
         for name, points in known.items():
             numbers = candidate.fit(points)[0]
             of_blocks = [block_errors(points, candidate, block) for block in BLOCKS]
-            texts = [f"{value:.2f} ± {one:.2f} ± {two:.2f}" for value, one, two in zip(numbers, *of_blocks, strict=True)]
+            texts = [
+                f"{value:.2f} ± {one:.2f} ± {two:.2f}" for value, one, two in zip(numbers, *of_blocks, strict=True)
+            ]
             if candidate is CANDIDATES[0]:
                 texts[2] = "2"
             rows.append((candidate.name, name, ", ".join(texts)))
