@@ -11,6 +11,7 @@ To run:
     walk(...)        one walk: hang a chain on its sprocket, spin it up, release it and follow it to rest
     sweep(...)       many walks: a grid of values with random samples, kept in a folder
     simulate(...)    the motion of any given chain, without sprocket
+    Chains(...)      many given chains, whose velocities may be changed between runs
 
 To read:
 
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from warpchain.inputs.parameters import preset as preset
     from warpchain.inputs.state import State
     from warpchain.inputs.validation import InputError
+    from warpchain.run.simulation import Chains as Chains
     from warpchain.run.simulation import simulate
     from warpchain.run.single_walk import walk
     from warpchain.run.sweep_run import sweep
@@ -51,6 +53,7 @@ if TYPE_CHECKING:
 __version__ = _version.VERSION
 
 _HOMES = {
+    "Chains": "run.simulation",
     "InputError": "inputs.validation",
     "Parameters": "inputs.parameters",
     "State": "inputs.state",
@@ -67,6 +70,7 @@ _HOMES = {
 }
 
 __all__ = [
+    "Chains",
     "InputError",
     "Parameters",
     "State",

@@ -115,6 +115,98 @@ def _checked_state(given: State | Parameters | str, position: Array | None, velo
     return given
 
 
+class Chains:
+    """Many given chains of n links, side by side on a device, whose velocities may be changed between runs.
+
+    For experiments, such as a drag or a push at any time. There is no sprocket; loops that collapse soften as those of
+    walks do.
+
+    Attributes:
+        time: To which the chains were last carried on [s], from 0.
+    """
+
+    def __init__(
+        self,
+        parameters: Sequence[Parameters],
+        position: Array,
+        velocity: Array,
+        *,
+        floor: bool = True,
+        method: str = "explicit",
+        device: str = "cpu",
+        **settings: Any,
+    ) -> None:
+        """Place the chains.
+
+        Args:
+            parameters: Of each of the W chains.
+            position: (W, n, 3), as those of :func:`simulate`.
+            velocity: (W, n, 3): their rates.
+            floor: Whether there is a floor at y = 0.
+            method: See :func:`simulate`.
+            device: See :func:`simulate`.
+            settings: Any other field of :class:`Options` by its name.
+
+        Raises:
+            InputError: A value is refused.
+        """
+        options = validated(Options, {"soften_drive": False, **settings, "method": method, "device": device}, "options")
+        if options.soften_drive:
+            raise InputError("options.soften_drive: there is no sprocket; leave it out")
+        shape = (len(parameters), *np.shape(position)[1:2], 3)
+        for name, given in (("position", position), ("velocity", velocity)):
+            if np.shape(given) != shape or len(shape) != 3 or not np.all(np.isfinite(given)):
+                raise InputError(f"{name}: its shape is {np.shape(given)}; give finite numbers of shape (W, n, 3)")
+        worlds, links, _ = shape
+        if worlds < 1 or links < 4 or links % 2:
+            raise InputError(f"position: {worlds} chains of {links} links; give chains of an even number of at least 4")
+        check_links_on_gpu(links, options.device, "position")
+        self.time, self._links = 0.0, links
+        with gpu_turn([options.device]):
+            self._batch = Batch(worlds, links, options)
+            for world, chain in enumerate(parameters):
+                self._batch.set_chain(world, chain, links)
+                self._batch.load(world, position[world], velocity[world], stop_time=0.0, stop_status=Status.FINISHED)
+            self._features = self._batch.features(fixed_body="floor" if floor else "none")
+            self._batch.run(range(worlds), self._features)
+
+    @property
+    def status(self) -> NDArray[np.int32]:
+        """Codes of `Status`, (W,): FINISHED of a chain that can go on."""
+        return self._batch.statuses().copy()
+
+    def motions(self, chains: Sequence[int] | NDArray[np.integer[Any]] | None = None) -> tuple[Array, Array]:
+        """Place and angle of the links of all chains, or of some numbers, (W, n, 3); and their rates."""
+        return self._batch.motions(range(len(self.status)) if chains is None else list(chains), self._links)
+
+    def set_velocity(self, chains: Sequence[int] | NDArray[np.integer[Any]], velocity: Array) -> None:
+        """Give some chains, by their numbers, other velocities, (chains, n, 3)."""
+        if len(chains):
+            self._batch.set_velocities(list(chains), velocity)
+
+    def run(
+        self,
+        until: float,
+        chains: Sequence[int] | NDArray[np.integer[Any]] | None = None,
+        *,
+        to_rest: bool = False,
+    ) -> None:
+        """Carry on all chains that can go on, or those of some numbers.
+
+        Args:
+            until: Time [s].
+            chains: Numbers of the chains; None: all.
+            to_rest: Whether a chain that comes to rest on the floor stays there, AT_REST; others end with TIME_LIMIT.
+        """
+        status, wanted = self.status, range(len(self.status)) if chains is None else chains
+        going = [int(world) for world in wanted if status[world] == Status.FINISHED]
+        if going:
+            with gpu_turn([self._batch.options.device]):
+                self._batch.resume(going, until, Status.TIME_LIMIT if to_rest else Status.FINISHED)
+                self._batch.run(going, self._features)
+        self.time = until
+
+
 def _follow(
     options: Options,
     chain: Parameters,
