@@ -1,0 +1,262 @@
+"""Which chain is in the films? Simulated chains that were filmed likewise say it, and how far to trust the answer.
+
+A bank is a sweep of chains whose parameters are drawn from a prior; each chain walks every experiment a few times.
+A camera with errors films them, as many walks of each experiment as there are films of the chain that is asked for.
+One ridge regression gives the parameters from all films of a chain together, and its residuals on chains that it was
+not fitted to are the errors. So what films have in common, errors of the camera and of the regression among them,
+counts as common: more films do not make it smaller.
+"""
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.films.film import CLOCK, Array, Camera, Film, edges, summary
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.validation import InputError
+from warpchain.store.block_result import BlockResult
+from warpchain.store.sweep_result import SweepResult
+from warpchain.walks.rows import MISSING
+
+FOUND: Final = (
+    "floor_friction",
+    "viscous_friction",
+    "coulomb_friction",
+    "sprocket_radius",
+    "circle_radius",
+    "floor_restitution",
+)
+"""Parameters that a posterior has, as far as its bank draws them."""
+PENALTIES: Final = 10.0 ** np.arange(-6, 1.5, 0.5)
+"""Of the ridge regression; the one with the smallest residuals on held-out chains is taken, for each parameter."""
+FOLDS: Final = 8
+"""Parts of a bank; each is held out once."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Bank:
+    """Chains whose parameters are known, and their walks: chain c, experiment e, repetition r.
+
+    Attributes:
+        names: of the parameters.
+        values: of each chain, (c, p).
+        experiments: links and frequency [Hz] of each, (e, 2).
+        time: of the motions [s], (t,).
+        center: centre of mass [m], (c, e, r, t, 2).
+        outline: at the release [m], (c, e, r, 4).
+        speed: of the loop [m/s], (c, e, r).
+    """
+
+    names: NDArray[np.str_]
+    values: Array
+    experiments: Array
+    time: Array
+    center: Array
+    outline: Array
+    speed: Array
+
+    @classmethod
+    def of(cls, result: SweepResult | BlockResult) -> Self:
+        """The bank of a sweep, or a block, over links, frequency and repetitions, such as `phase`.
+
+        Its samples are the chains; those of which a walk failed are left out.
+
+        Raises:
+            InputError: walks are missing, axes are others, or the chains differ along them.
+        """
+        axes, columns, shape = list(result.axes), result.columns, result.shape
+        if axes[:2] != ["links", "frequency"]:
+            raise InputError(f"grid: its axes are {', '.join(axes)}; give links, frequency and then repetitions")
+        names = [name for name in FOUND if name in result.drawn]
+        drawn = np.stack([columns[f"{name}_drawn"] for name in names], axis=-1)
+        if np.any(columns["status"] == MISSING) or not np.array_equal(drawn, np.broadcast_to(drawn[0, 0], drawn.shape)):
+            raise InputError(f"bank: walks are missing, or chains differ; give same_samples_along: [{', '.join(axes)}]")
+        found: list[Any] = [None] * columns["index"].size
+        for place, group in result.kept_motions(range(len(found))):  # in the order of the files
+            series, joints = group["series"], group["frames/joints"][0].astype(float)
+            found[place] = series["time"][()], series["center"][()], edges(joints), series["rms_speed"][0]
+        time = np.arange(0.0, CLOCK[-1] + 0.03, round(float(np.median(np.diff(found[0][0]))), 4))
+        whole = np.array([each[0][-1] >= time[-1] for each in found]).reshape(shape).all(axis=tuple(range(len(axes))))
+        center = [np.column_stack([np.interp(time, each[0], each[1][:, k]) for k in (0, 1)]) for each in found]
+
+        def by_chain(values: Any, *more: int) -> Array:
+            cells = np.reshape(values, (shape[0] * shape[1], -1, shape[-1], *more))
+            return np.moveaxis(cells, 2, 0)[whole]
+
+        return cls(
+            names=np.array(names),
+            values=drawn.reshape(-1, shape[-1], len(names))[0][whole],
+            experiments=np.array([(n, f) for n in result.axes["links"] for f in result.axes["frequency"]], float),
+            time=time,
+            center=by_chain(center, len(time), 2),
+            outline=by_chain([each[2] for each in found], 4),
+            speed=by_chain([each[3] for each in found]),
+        )
+
+    def film(self, chain: int, experiment: int, repetition: int) -> Film:
+        """A walk as a film without errors."""
+        at, (links, frequency) = (chain, experiment, repetition), self.experiments[experiment]
+        return Film(
+            time=self.time,
+            center=self.center[at],
+            links=int(links),
+            frequency=float(frequency),
+            outline=self.outline[at],
+            speed=float(self.speed[at]),
+        )
+
+    def posterior(self, films: Sequence[Film], camera: Camera | None = None, draws: int = 4) -> "Posterior":
+        """The parameters of the chain in some films, and how well they would be known of chains of the bank.
+
+        Args:
+            films: one or more, of any experiments of the bank, at most as many of each as the bank has repetitions.
+            camera: of all films.
+            draws: number of times each chain of the bank is filmed, with other errors.
+
+        Raises:
+            InputError: a film is of no experiment of the bank, or not as the camera says, or lies outside of the bank.
+        """
+        camera, random = camera or Camera(), np.random.default_rng(0)
+        groups: dict[int, list[Film]] = {}
+        for film in films:
+            film.check(camera)
+            at = np.flatnonzero((self.experiments == [film.links, film.frequency]).all(axis=1))
+            known = ", ".join(f"{n:g} links at {f:g} Hz" for n, f in self.experiments)
+            if not len(at) or len(groups.setdefault(int(at[0]), [])) == self.speed.shape[2]:
+                repetitions = f"{self.speed.shape[2]} films of each of {known}"
+                raise InputError(f"films: {film.links} links at {film.frequency:g} Hz; the bank has {repetitions}")
+            groups[int(at[0])].append(film)
+        if not groups:
+            raise InputError("films: none; give at least one")
+
+        def features(film_at: Callable[[int, int], Film]) -> Array:
+            parts = []
+            for experiment, group in groups.items():
+                known = all(film.outline is not None for film in group), all(film.speed is not None for film in group)
+                each = [summary(film_at(experiment, number), *known) for number in range(len(group))]
+                parts.append(np.mean(each, axis=0))
+            return np.concatenate(parts)
+
+        def row(draw: int, chain: int) -> Array:
+            errors, repetitions = camera.errors(random), self.speed.shape[2]
+            return features(
+                lambda experiment, number: self.film(chain, experiment, (draw + number) % repetitions).seen(
+                    camera, errors, random
+                )
+            )
+
+        rows = np.array([row(draw, chain) for draw in range(draws) for chain in range(len(self.values))])
+        chains = np.tile(np.arange(len(self.values)), draws)
+        asked = features(lambda experiment, number: groups[experiment][number])
+        mean, residuals, distance = _regression(rows, self.values[chains], chains, asked)
+        lower, upper = self.values.min(axis=0), self.values.max(axis=0)
+        if distance > 1 or np.any((mean < lower) | (mean > upper)):
+            far = f"{distance:.2f} times as far from its middle as its furthest chain"
+            raise InputError(f"films: outside of the bank, {far}; check unit, floor, release, or give a wider bank")
+        sizes = np.abs(residuals) / np.sqrt((residuals**2).mean(axis=0))
+        return Posterior(
+            names=tuple(self.names),
+            mean=mean,
+            covariance=residuals.T @ residuals / len(residuals),
+            prior_sigma=self.values.std(axis=0),
+            coverage=np.array([(sizes < 1).mean(axis=0), (sizes < 1.96).mean(axis=0)]),
+            films=len(films),
+            chains=len(self.values),
+        )
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the bank to a .npz file, motions in single precision."""
+        np.savez_compressed(path, **{k: v.astype("f4") if v.ndim > 2 else v for k, v in vars(self).items()})
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read what `save` wrote."""
+        with np.load(path) as file:
+            return cls(**{name: file[name] if name == "names" else file[name].astype(float) for name in file.files})
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Posterior:
+    """Parameters of a chain: a Gaussian, whose width is that of the errors on chains of the bank that were held out.
+
+    Attributes:
+        names: of the parameters.
+        mean: of each, in SI units.
+        covariance: (p, p).
+        prior_sigma: standard deviation of the bank.
+        coverage: share of held-out chains within 1 and 1.96 standard deviations, (2, p).
+        films: number of films.
+        chains: number of chains of the bank.
+    """
+
+    names: tuple[str, ...]
+    mean: Array
+    covariance: Array
+    prior_sigma: Array
+    coverage: Array
+    films: int
+    chains: int
+
+    @property
+    def sigma(self) -> Array:
+        """Standard deviations."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def given(self, **measured: tuple[float, float]) -> Self:
+        """The posterior after other measurements: name=(value, standard error)."""
+        mean, covariance = self.mean, self.covariance
+        for name, (value, error) in measured.items():
+            if name not in self.names:
+                raise InputError(f"{name}: not in the posterior; give one of {', '.join(self.names)}")
+            k = self.names.index(name)
+            gain = covariance[k] / (covariance[k, k] + error**2)
+            mean, covariance = mean + gain * (value - mean[k]), covariance - np.outer(gain, covariance[k])
+        return replace(self, mean=mean, covariance=covariance)
+
+    def __str__(self) -> str:
+        """A line for each parameter, and how often the intervals hold."""
+        units = Parameters.quantities()
+        lines = [f"{self.films} films, a bank of {self.chains} chains; coverage of 68 and 95 % intervals when held out"]
+        for k, name in enumerate(self.names):
+            learned = "" if self.sigma[k] < 0.8 * self.prior_sigma[k] else ", as before the film"
+            covers = " and ".join(f"{100 * share:.0f} %" for share in self.coverage[:, k])
+            value = f"{self.mean[k]:.4g} ± {self.sigma[k]:.2g} {units[name].unit}"
+            lines.append(f"{name:18} {value:32} ({100 * self.sigma[k] / self.mean[k]:.1f} %){learned}; {covers}")
+        return "\n".join(lines)
+
+
+def _regression(rows: Array, values: Array, groups: NDArray[np.int_], asked: Array) -> tuple[Array, Array, float]:
+    """Ridge regression of values on rows.
+
+    Returns:
+        What it says of the row that is asked for; residuals of each row, fitted without its group; and the distance of
+        the row from the middle relative to the greatest of these rows, likewise.
+    """
+
+    def fitted(train: NDArray[np.bool_]) -> Callable[[Array], tuple[Array, Array]]:
+        middle, spread, level = rows[train].mean(axis=0), rows[train].std(axis=0), values[train].mean(axis=0)
+        scaled = (rows[train] - middle) / spread
+        power, axes = np.linalg.eigh(scaled.T @ scaled / len(scaled))
+        slopes = axes.T @ (scaled.T @ (values[train] - level)) / len(scaled)
+
+        def applied(to: Array) -> tuple[Array, Array]:
+            turned = (to - middle) / spread @ axes
+            shrunk = turned / (np.maximum(power, 0) + PENALTIES[:, None, None])
+            return level + shrunk @ slopes, (shrunk * turned).sum(axis=-1)
+
+        return applied
+
+    residuals, distances = np.empty((len(PENALTIES), *values.shape)), np.empty((len(PENALTIES), len(rows)))
+    for fold in range(FOLDS):
+        out = groups % FOLDS == fold
+        found, distances[:, out] = fitted(~out)(rows[out])
+        residuals[:, out] = values[out] - found
+    best = (residuals**2).mean(axis=1).argmin(axis=0)
+    found, distance = fitted(np.ones(len(rows), bool))(asked[None])
+    place = np.arange(values.shape[1])
+    nearest = best.min()
+    return found[best, 0, place], residuals[best, :, place].T, float(distance[nearest, 0] / distances[nearest].max())
