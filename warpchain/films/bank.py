@@ -10,6 +10,7 @@ counts as common: more films do not make it smaller.
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, Final, Self
 
 import numpy as np
@@ -120,47 +121,32 @@ class Bank:
         Raises:
             InputError: a film is of no experiment of the bank, or not as the camera says, or lies outside of the bank.
         """
-        camera, random = camera or Camera(), np.random.default_rng(0)
-        groups: dict[int, list[Film]] = {}
+        camera, groups = camera or Camera(), dict[int, list[Film]]()
         for film in films:
             film.check(camera)
             at = np.flatnonzero((self.experiments == [film.links, film.frequency]).all(axis=1))
-            known = ", ".join(f"{n:g} links at {f:g} Hz" for n, f in self.experiments)
-            if not len(at) or len(groups.setdefault(int(at[0]), [])) == self.speed.shape[2]:
-                repetitions = f"{self.speed.shape[2]} films of each of {known}"
-                raise InputError(f"films: {film.links} links at {film.frequency:g} Hz; the bank has {repetitions}")
+            most = self.speed.shape[2]
+            if not len(at) or len(groups.setdefault(int(at[0]), [])) == most:
+                known = ", ".join(f"{n:g} links at {f:g} Hz" for n, f in self.experiments)
+                wrong = f"{film.links} links at {film.frequency:g} Hz"
+                raise InputError(f"films: {wrong}, but the bank has {most} of each of {known}; give these, or a bank")
             groups[int(at[0])].append(film)
         if not groups:
             raise InputError("films: none; give at least one")
-
-        def features(film_at: Callable[[int, int], Film]) -> Array:
-            parts = []
-            for experiment, group in groups.items():
-                known = all(film.outline is not None for film in group), all(film.speed is not None for film in group)
-                each = [summary(film_at(experiment, number), *known) for number in range(len(group))]
-                parts.append(np.mean(each, axis=0))
-            return np.concatenate(parts)
-
-        def row(draw: int, chain: int) -> Array:
-            errors, repetitions = camera.errors(random), self.speed.shape[2]
-            return features(
-                lambda experiment, number: self.film(chain, experiment, (draw + number) % repetitions).seen(
-                    camera, errors, random
-                )
-            )
-
-        rows = np.array([row(draw, chain) for draw in range(draws) for chain in range(len(self.values))])
-        chains = np.tile(np.arange(len(self.values)), draws)
-        asked = features(lambda experiment, number: groups[experiment][number])
-        mean, residuals, distance = _regression(rows, self.values[chains], chains, asked)
+        design = tuple(
+            (at, len(group), all(film.outline is not None for film in group), all(film.speed for film in group))
+            for at, group in groups.items()
+        )
+        fitted, residuals, furthest = _regression(self, design, camera, draws)
+        mean, distance = fitted(_features(design, lambda at, number: groups[at][number])[None])
         lower, upper = self.values.min(axis=0), self.values.max(axis=0)
-        if distance > 1 or np.any((mean < lower) | (mean > upper)):
-            far = f"{distance:.2f} times as far from its middle as its furthest chain"
+        if distance[0] > furthest or np.any((mean[0] < lower) | (mean[0] > upper)):
+            far = f"{distance[0] / furthest:.2g} times as far from its middle as its furthest chain"
             raise InputError(f"films: outside of the bank, {far}; check unit, floor, release, or give a wider bank")
         sizes = np.abs(residuals) / np.sqrt((residuals**2).mean(axis=0))
         return Posterior(
             names=tuple(self.names),
-            mean=mean,
+            mean=mean[0],
             covariance=residuals.T @ residuals / len(residuals),
             prior_sigma=self.values.std(axis=0),
             coverage=np.array([(sizes < 1).mean(axis=0), (sizes < 1.96).mean(axis=0)]),
@@ -229,34 +215,61 @@ class Posterior:
         return "\n".join(lines)
 
 
-def _regression(rows: Array, values: Array, groups: NDArray[np.int_], asked: Array) -> tuple[Array, Array, float]:
-    """Ridge regression of values on rows.
+_Design = tuple[tuple[int, int, bool, bool], ...]
+"""Of each experiment that was filmed its number in the bank, how many films there are, and what all of them have."""
+_Fitted = Callable[[Array], tuple[Array, Array]]
+"""Features of some sets of films → values, and squared distances from the middle of the bank."""
+
+
+def _features(design: _Design, film_at: Callable[[int, int], Film]) -> Array:
+    """What a set of films says: of each experiment the mean of the summaries."""
+    means = [np.mean([summary(film_at(at, k), *has) for k in range(count)], axis=0) for at, count, *has in design]
+    return np.concatenate(means)
+
+
+@lru_cache(16)
+def _regression(bank: Bank, design: _Design, camera: Camera, draws: int) -> tuple[_Fitted, Array, float]:
+    """Ridge regression of the parameters on the films of a chain.
 
     Returns:
-        What it says of the row that is asked for; residuals of each row, fitted without its group; and the distance of
-        the row from the middle relative to the greatest of these rows, likewise.
+        What was fitted; residuals of each chain in each draw, fitted without that chain; and the greatest distance.
     """
+    random, repetitions = np.random.default_rng(0), bank.speed.shape[2]
 
-    def fitted(train: NDArray[np.bool_]) -> Callable[[Array], tuple[Array, Array]]:
+    def row(draw: int, chain: int) -> Array:
+        errors = camera.errors(random)
+        return _features(
+            design, lambda at, k: bank.film(chain, at, (draw + k) % repetitions).seen(camera, errors, random)
+        )
+
+    rows = np.array([row(draw, chain) for draw in range(draws) for chain in range(len(bank.values))])
+    chains = np.tile(np.arange(len(bank.values)), draws)
+    values = bank.values[chains]
+
+    def fit(train: NDArray[np.bool_]) -> Callable[[Array, Array], tuple[Array, Array]]:
+        """What gives values and distances of features, given a penalty for each parameter."""
         middle, spread, level = rows[train].mean(axis=0), rows[train].std(axis=0), values[train].mean(axis=0)
         scaled = (rows[train] - middle) / spread
         power, axes = np.linalg.eigh(scaled.T @ scaled / len(scaled))
         slopes = axes.T @ (scaled.T @ (values[train] - level)) / len(scaled)
 
-        def applied(to: Array) -> tuple[Array, Array]:
-            turned = (to - middle) / spread @ axes
-            shrunk = turned / (np.maximum(power, 0) + PENALTIES[:, None, None])
-            return level + shrunk @ slopes, (shrunk * turned).sum(axis=-1)
+        def fitted(to: Array, penalties: Array) -> tuple[Array, Array]:
+            turned, sizes = (to - middle) / spread @ axes, np.maximum(power, 0)[:, None] + penalties
+            return level + turned @ (slopes / sizes), (turned**2 / sizes.min(axis=1)).sum(axis=-1)
 
-        return applied
+        return fitted
 
-    residuals, distances = np.empty((len(PENALTIES), *values.shape)), np.empty((len(PENALTIES), len(rows)))
-    for fold in range(FOLDS):
-        out = groups % FOLDS == fold
-        found, distances[:, out] = fitted(~out)(rows[out])
-        residuals[:, out] = values[out] - found
-    best = (residuals**2).mean(axis=1).argmin(axis=0)
-    found, distance = fitted(np.ones(len(rows), bool))(asked[None])
-    place = np.arange(values.shape[1])
-    nearest = best.min()
-    return found[best, 0, place], residuals[best, :, place].T, float(distance[nearest, 0] / distances[nearest].max())
+    folds = [(chains % FOLDS == fold, fit(chains % FOLDS != fold)) for fold in range(FOLDS)]
+
+    def held_out(penalties: Array) -> tuple[Array, Array]:
+        """Residuals and distances."""
+        found, distances = np.empty_like(values), np.empty(len(rows))
+        for out, fitted in folds:
+            found[out], distances[out] = fitted(rows[out], penalties)
+        return values - found, distances
+
+    width, whole = np.ones(values.shape[1]), fit(np.ones(len(rows), bool))
+    squares = [(held_out(penalty * width)[0] ** 2).mean(axis=0) for penalty in PENALTIES]
+    best = PENALTIES[np.argmin(squares, axis=0)]
+    residuals, distances = held_out(best)
+    return lambda features: whole(features, best), residuals, float(distances.max())
