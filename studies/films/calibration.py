@@ -82,6 +82,7 @@ def calibrate(
         shared: errors of the camera in all films, in place of random ones.
         delay: by which the release was set too late in all films [s].
         measured: standard error of parameters that were measured by other means.
+        seed: of the errors.
     """
     random, found, refused = np.random.default_rng(seed), [], 0
     for chain, values in enumerate(truths.values):
