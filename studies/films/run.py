@@ -16,18 +16,10 @@ from numpy.typing import NDArray
 
 from studies.common import run_study, save_figure, table, write_tables
 from studies.films.calibration import CAMERA, Calibration, Wanted, calibrate, set_of_films
-from studies.films.drawing import corner, coverage_figure
+from studies.films.drawing import SYMBOLS, corner, coverage_figure
 from warpchain import films
 
 FOLDER: Final = Path(__file__).parent
-SYMBOLS: Final = {
-    "floor_friction": "μ",
-    "viscous_friction": "β",
-    "coulomb_friction": "τ_c",
-    "sprocket_radius": "R",
-    "circle_radius": "r",
-    "floor_restitution": "e_fc",
-}
 FIVE, TWENTY = (60, 5.0), (60, 20.0)
 SETS: Final[dict[str, Wanted]] = {
     "1 film: 20 Hz": {TWENTY: 1},
@@ -164,7 +156,9 @@ def main(banks: Path) -> None:
     }
     write_tables(FOLDER / "README.md", tables)
     save_figure(
-        coverage_figure({name: found["same", name] for name in SETS}, SYMBOLS), FOLDER / "figures" / "coverage.png"
+        coverage_figure({name: found["same", name] for name in SETS}),
+        FOLDER / "figures" / "coverage.png",
+        dpi=130,
     )
     hidden = [
         films.read(
@@ -183,7 +177,7 @@ def main(banks: Path) -> None:
     answer = bank.posterior(hidden)
     print(f"\nthe hidden chain\n{answer}\n{films.friction_line(hidden[1])}")
     print(f"with r by calipers\n{answer.given(circle_radius=(4.05e-3, 5e-5))}")
-    save_figure(corner(answer, SYMBOLS), FOLDER / "figures" / "corner.png")
+    save_figure(corner(answer), FOLDER / "figures" / "corner.png", dpi=110)
     save_figure(films.friction_line(hidden[1]).plot(), FOLDER / "figures" / "line.png")
 
 

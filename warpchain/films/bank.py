@@ -193,7 +193,7 @@ class Posterior:
         return np.sqrt(np.diag(self.covariance))
 
     def given(self, **measured: tuple[float, float]) -> Self:
-        """The posterior after other measurements: name=(value, standard error)."""
+        """The posterior after other measurements, name=(value, standard error); `coverage` stays that of the films."""
         mean, covariance = self.mean, self.covariance
         for name, (value, error) in measured.items():
             if name not in self.names:
@@ -204,14 +204,16 @@ class Posterior:
         return replace(self, mean=mean, covariance=covariance)
 
     def __str__(self) -> str:
-        """A line for each parameter, and how often the intervals hold."""
-        units = Parameters.quantities()
-        lines = [f"{self.films} films, a bank of {self.chains} chains; coverage of 68 and 95 % intervals when held out"]
+        """A line for each parameter, with the share of held-out chains of the bank that lay inside of such intervals."""
+        count = "1 film" if self.films == 1 else f"{self.films} films"
+        lines = [f"{count}, a bank of {self.chains} chains; last, how often 68 and 95 % intervals held of others"]
         for k, name in enumerate(self.names):
-            learned = "" if self.sigma[k] < 0.8 * self.prior_sigma[k] else ", as before the film"
-            covers = " and ".join(f"{100 * share:.0f} %" for share in self.coverage[:, k])
-            value = f"{self.mean[k]:.4g} ± {self.sigma[k]:.2g} {units[name].unit}"
-            lines.append(f"{name:18} {value:32} ({100 * self.sigma[k] / self.mean[k]:.1f} %){learned}; {covers}")
+            unit = "" if (unit := Parameters.quantities()[name].unit) == "1" else f" {unit}"
+            value = f"{self.mean[k]:.4g} ± {self.sigma[k]:.2g}{unit}"
+            share = f"{100 * self.sigma[k] / self.mean[k]:.1f} %"
+            covers = " and ".join(f"{100 * inside:.0f} %" for inside in self.coverage[:, k])
+            known = ", as before the film" if self.sigma[k] > 0.8 * self.prior_sigma[k] else ""
+            lines.append(f"{name:18} {value:30} {share:>7}; {covers}{known}")
         return "\n".join(lines)
 
 
