@@ -27,7 +27,7 @@ SETS: Final[dict[str, Wanted]] = {
     "8 films: 4 of each": {FIVE: 4, TWENTY: 4},
 }
 PAIR: Final = SETS["2 films: 5, 20 Hz"]
-CALIPERS: Final = {"circle_radius": 5e-5}
+CALIPERS: Final = 5e-5
 """Standard error of a roller's radius that was measured with calipers [m]."""
 EXACT: Final = replace(CAMERA, scale=1e-6, floor=1e-6, origin=1e-6, roll=1e-6, outline=1e-6, release=1e-6)
 """A camera without errors other than noise, and those of the loop's speed."""
@@ -65,9 +65,8 @@ def experiments_table(bank: films.Bank) -> str:
 
     def widths(wanted: Wanted) -> list[float]:
         alone = answer_for(bank, wanted)
-        measured = alone.given(circle_radius=(middle[alone.names.index("circle_radius")], CALIPERS["circle_radius"]))
-        pick = [alone.names.index(name) for name in SYMBOLS]
-        return [*(alone.sigma / middle)[pick], (measured.sigma / middle)[alone.names.index("sprocket_radius")]]
+        measured = alone.given(circle_radius=(middle[alone.names.index("circle_radius")], CALIPERS))
+        return [*(alone.sigma / middle), (measured.sigma / middle)[alone.names.index("sprocket_radius")]]
 
     found = [(wanted, widths(wanted)) for wanted in sets]
     singles, pairs = found[: len(every)], sorted(found[len(every) :], key=lambda each: each[1][1])

@@ -15,7 +15,7 @@ CAMERA = films.Camera()
 
 @pytest.mark.parametrize("count", [1, 4])
 def test_intervals_hold_of_chains_that_the_bank_does_not_have(count: int) -> None:
-    """Of 150 hidden chains 68 and 95 % lie inside, within three standard deviations of two such counts."""
+    """Of 150 hidden chains 68 and 95 % lie inside, within three standard deviations of such a count."""
     bank, hidden = made_bank(160, seed=1), made_bank(150, seed=2)
     inside = np.zeros((2, 3))
     refused = 0
@@ -28,7 +28,7 @@ def test_intervals_hold_of_chains_that_the_bank_does_not_have(count: int) -> Non
         inside += np.abs(answer.mean - truth) < np.outer([1, 1.96], answer.sigma)
     assert refused < 12
     share = inside / (150 - refused)
-    assert (share[0] > 0.54).all() and (share[0] < 0.82).all()
+    assert (share[0] > 0.56).all() and (share[0] < 0.8).all()
     assert (share[1] > 0.89).all()
     assert ((answer.coverage[1] > 0.9) & (answer.coverage[0] > 0.6)).all()
 

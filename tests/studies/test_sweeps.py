@@ -32,6 +32,10 @@ def path_of(name: str) -> Path:
         ),
         ("unsoftened_hold", {"softened": (400,), "own_joints": (400,)}),
         ("softened_drive", {"main": (4, 3, 2, 200)}),
+        ("film_bank", {"main": (1, 4, 4, 512)}),
+        ("film_bank_90", {"main": (1, 3, 4, 512)}),
+        ("film_truths", dict.fromkeys(("same", "tangential", "heavier"), (1, 2, 4, 128))),
+        ("film_truths_paper", {"main": (1, 2, 4, 128)}),
         ("floor_friction", {"spinning": (5, 3, 7, 100), "rest": (5, 3, 7, 100)}),
         (
             "paper_claims",
@@ -60,7 +64,10 @@ def test_sweeps_of_studies(name: str, shapes: dict[str, tuple[int, ...]]) -> Non
     assert sweep.walk_count == sum(math.prod(shape) for shape in shapes.values())
     stiff = {"steadiness": ["paper", "paper_undamped"], "unsoftened_hold": list(shapes)}
     stiff |= {"paper_claims": ["start"]}
-    stiff |= {every: list(shapes) for every in ("paper_joints", "defaults", "finer", "reference", "reference_rest")}
+    stiff |= {
+        every: list(shapes)
+        for every in ("film_truths_paper", "paper_joints", "defaults", "finer", "reference", "reference_rest")
+    }
     for block in sweep.blocks:
         preset = "paper" if block.name in stiff.get(name, []) else "soft"
         for index in {0, math.prod(block.shape) // 2, math.prod(block.shape) - 1}:

@@ -1,5 +1,7 @@
 """Motions of chains by formula, and banks of them: nothing is simulated."""
 
+from statistics import NormalDist
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,27 +27,30 @@ def motion(friction: float, clearance: float = 0.01, stiffness: float = 1.0, fre
     )
 
 
-def made_bank(chains: int, seed: int, repetitions: int = 4) -> films.Bank:
+def made_bank(
+    chains: int, seed: int, repetitions: int = 4, experiments: tuple[tuple[int, float], ...] = ((60, 20.0),)
+) -> films.Bank:
     """Chains with drawn friction, radius (which outline and speed show) and restitution (which nothing shows)."""
     random = np.random.default_rng(seed)
-    values = np.column_stack(
-        [
-            random.normal(0.27, 0.05, chains),
-            random.normal(0.056, 0.0015, chains),
-            random.normal(0.05, 0.01, chains),
-        ]
-    )
-    walks = [[motion(friction, random.uniform(0.006, 0.014)) for _ in range(repetitions)] for friction, *_ in values]
-    wider = values[:, None, 1] - 0.056 + random.normal(size=(chains, repetitions)) * 1e-4
-    edges = np.array([[film.outline for film in row] for row in walks], float)
+    normal = [NormalDist().inv_cdf((number + 0.5) / chains) for number in range(chains)]  # so that few are enough
+    drawn = np.column_stack([random.permutation(normal) for _ in range(3)])
+    values = np.array([0.27, 0.056, 0.05]) + np.array([0.05, 0.0015, 0.01]) * drawn
+    shape = (chains, len(experiments), repetitions)
+    center, outline, speed = np.empty((*shape, len(TIME), 2)), np.empty((*shape, 4)), np.empty(shape)
+    for chain, at, number in np.ndindex(shape):
+        film = motion(values[chain, 0], random.uniform(0.006, 0.014), frequency=experiments[at][1])
+        wider = values[chain, 1] - 0.056 + random.normal() * 1e-4
+        center[chain, at, number] = film.center
+        outline[chain, at, number] = film.outline + wider * np.array([-1, 1, 0, 2])
+        speed[chain, at, number] = 2 * np.pi * experiments[at][1] * (values[chain, 1] + 0.004)
     return films.Bank(
         names=np.array(["floor_friction", "sprocket_radius", "floor_restitution"]),
         values=values,
-        experiments=np.array([[60.0, 20.0]]),
+        experiments=np.array(experiments, float),
         time=TIME,
-        center=np.array([[film.center for film in row] for row in walks])[:, None],
-        outline=(edges + wider[..., None] * np.array([-1, 1, 0, 2]))[:, None],
-        speed=np.repeat(40 * np.pi * (values[:, 1] + 0.004)[:, None], repetitions, axis=1)[:, None],
+        center=center,
+        outline=outline,
+        speed=speed,
     )
 
 

@@ -204,9 +204,9 @@ class Posterior:
         return replace(self, mean=mean, covariance=covariance)
 
     def __str__(self) -> str:
-        """A line for each parameter, with the share of held-out chains of the bank that lay inside of such intervals."""
+        """A line for each parameter, and the share of held-out chains of the bank inside of their intervals."""
         count = "1 film" if self.films == 1 else f"{self.films} films"
-        lines = [f"{count}, a bank of {self.chains} chains; last, how often 68 and 95 % intervals held of others"]
+        lines = [f"{count}, a bank of {self.chains} chains; last: of held-out chains, inside of 68 and 95 % intervals"]
         for k, name in enumerate(self.names):
             unit = "" if (unit := Parameters.quantities()[name].unit) == "1" else f" {unit}"
             value = f"{self.mean[k]:.4g} ± {self.sigma[k]:.2g}{unit}"
