@@ -18,6 +18,7 @@ To read:
     load(folder)     results of a sweep, as far as it has run
     load_walk(path)  a walk that `WalkResult.save` wrote
     preset(name)     the parameters of a named preset, "paper" or "soft"
+    films            a module: friction of the floor and parameters of a chain from films of walks
 
 What they return, take and raise:
 
@@ -37,6 +38,7 @@ from typing import TYPE_CHECKING, Any
 from warpchain import version as _version
 
 if TYPE_CHECKING:
+    from warpchain import films as films
     from warpchain.inputs.parameters import Parameters
     from warpchain.inputs.parameters import preset as preset
     from warpchain.inputs.state import State
@@ -61,6 +63,7 @@ _HOMES = {
     "SweepResult": "store.sweep_result",
     "Trajectory": "walks.trajectory",
     "WalkResult": "walks.walk_result",
+    "films": "films",
     "load": "store.sweep_result",
     "load_walk": "walks.walk_result",
     "preset": "inputs.parameters",
@@ -78,6 +81,7 @@ __all__ = [
     "SweepResult",
     "Trajectory",
     "WalkResult",
+    "films",
     "load",
     "load_walk",
     "preset",
@@ -93,7 +97,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'warpchain' has no attribute {name!r}")
     from importlib import import_module
 
-    value = getattr(import_module(f"warpchain.{_HOMES[name]}"), name)
+    home = import_module(f"warpchain.{_HOMES[name]}")
+    value = home if _HOMES[name] == name else getattr(home, name)
     globals()[name] = value
     return value
 
