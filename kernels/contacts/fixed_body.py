@@ -57,9 +57,7 @@ def sprocket_surface(chain: Chain, face: Face, circle_x: wp.float64, circle_y: w
 
 
 @wp.func
-def lesser_sprocket_gap(
-    chain: Chain, left_x: wp.float64, left_y: wp.float64, right_x: wp.float64, right_y: wp.float64
-):
+def lesser_sprocket_gap(chain: Chain, left_x: wp.float64, left_y: wp.float64, right_x: wp.float64, right_y: wp.float64):
     """The lesser gap of two circles by one square root; with two a driven step on a GPU takes 7 % longer."""
     square = wp.min(left_x * left_x + left_y * left_y, right_x * right_x + right_y * right_y)
     return wp.sqrt(square) - chain.circle_radius - chain.sprocket_radius
