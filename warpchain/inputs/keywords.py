@@ -3,6 +3,7 @@
 Type checkers cannot read pydantic's models for this. A test compares the two, name by name and type by type.
 """
 
+from collections.abc import Sequence
 from typing import Any, Literal, TypedDict
 
 import numpy as np
@@ -90,6 +91,9 @@ class OtherScene(TypedDict, total=False):
     further_hold: Number
     hold_limit: Number
     walk_limit: Number
+    floor: Literal["flat"] | Sequence[Sequence[Number]]
+    slope: Number
+    distance_limit: Number | None
     plane: Literal["fixed", "tilting"]
     lateral_speed: Number
     tilt: Number
