@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import pytest
 
 from warpchain.inputs import keywords
+from warpchain.inputs.floor import Points
 from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.parameters import PRESETS
 from warpchain.inputs.sections import SECTIONS, SYMBOL_OF
@@ -20,6 +21,7 @@ TYPES: dict[Any, Any] = {
     float | None: keywords.Number | None,
     bool: keywords.Truth,
     str: str,
+    Literal["flat"] | Points: keywords.Floor,
 }
 """Type of a field → that of the keyword."""
 

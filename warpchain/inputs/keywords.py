@@ -15,6 +15,9 @@ Number = float | np.floating[Any] | np.integer[Any]
 Truth = bool | np.bool_
 """A truth value."""
 
+Floor = Literal["flat"] | Sequence[Sequence[Number]]
+"""A floor: flat, or points x, y."""
+
 Preset = Literal["paper", "soft"]
 """A key of `warpchain.inputs.parameters.PRESETS`."""
 Method = Literal["standard", "explicit", "reference", "rkf78", "dp5", "bs32", "os32", "hybrid"]
@@ -91,7 +94,7 @@ class OtherScene(TypedDict, total=False):
     further_hold: Number
     hold_limit: Number
     walk_limit: Number
-    floor: Literal["flat"] | Sequence[Sequence[Number]]
+    floor: Floor
     slope: Number
     distance_limit: Number | None
     plane: Literal["fixed", "tilting"]
