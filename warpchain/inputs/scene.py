@@ -135,19 +135,19 @@ class Scene(Section):
     )
     floor: Annotated[Literal["flat"] | Points, BeforeValidator(checked_profile)] = Field(
         default="flat",
-        description="flat, or a profile of points [[x, y], …] in m; its first and last face go on without end",
+        description="flat, or a profile [[x, y], …] in m, whose ends go on straight",
     )
     slope: float = number_field(
         0.0,
         "°",
-        "of a flat floor; positive: it falls the way the chain walks",
+        "of an endless floor; positive: it falls the way the chain walks",
         ge=-STEEPEST,
         le=STEEPEST,
     )
     distance_limit: float | None = number_field(
         None,
         "m",
-        "distance along the floor from the release at which a walk ends as distance_limit; null: none",
+        "distance along the floor at which a walk ends as distance_limit; null: none",
         gt=0,
         le=HIGHEST,
     )
@@ -187,9 +187,7 @@ class Scene(Section):
         le=FASTEST_TAP,
     )
     charm_link: int = number_field(0, "1", "link that carries a charm", ge=0, lt=MOST_LINKS)
-    charm_mass: float = number_field(
-        0.0, "kg", "mass at the centre of charm_link, added to its own", ge=0, le=1e6
-    )
+    charm_mass: float = number_field(0.0, "kg", "mass at the centre of charm_link, added to its own", ge=0, le=1e6)
     charm_inertia: float = number_field(
         0.0, "kg m²", "moment of inertia of the charm about that centre, added likewise", ge=0, le=1e12
     )
@@ -207,15 +205,9 @@ class Scene(Section):
         lt=1,
     )
     link_masses: _Numbers = number_field(None, "kg", "mass of each link; null: of its kind")
-    link_inertias: _Numbers = number_field(
-        None, "kg m²", "moment of inertia of each link; null: of its kind"
-    )
-    viscous_frictions: _Numbers = number_field(
-        None, "N m s", "viscous_friction of each joint; null: the same for all"
-    )
-    coulomb_frictions: _Numbers = number_field(
-        None, "N m", "coulomb_friction of each joint; null: the same for all"
-    )
+    link_inertias: _Numbers = number_field(None, "kg m²", "moment of inertia of each link; null: of its kind")
+    viscous_frictions: _Numbers = number_field(None, "N m s", "viscous_friction of each joint; null: the same for all")
+    coulomb_frictions: _Numbers = number_field(None, "N m", "coulomb_friction of each joint; null: the same for all")
 
     @model_validator(mode="after")
     def _links_are_there(self) -> Self:
