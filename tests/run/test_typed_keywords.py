@@ -3,14 +3,14 @@
 import subprocess
 import sys
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import pytest
-from pydantic import Field
 
 from warpchain.inputs import keywords
 from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.parameters import PRESETS
+from warpchain.inputs.scene import Scene
 from warpchain.inputs.sections import SECTIONS, SYMBOL_OF
 from warpchain.sweeps.designs import SAMPLERS
 
@@ -21,7 +21,7 @@ TYPES: dict[Any, Any] = {
     float | None: keywords.Number | None,
     bool: keywords.Truth,
     str: str,
-    tuple[Annotated[float, Field(ge=0, le=1e12)], ...] | None: keywords.Numbers | None,
+    Scene.model_fields["link_masses"].annotation: keywords.Numbers | None,
 }
 """Type of a field → that of the keyword."""
 

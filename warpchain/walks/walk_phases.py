@@ -22,8 +22,8 @@ from warpchain.engine.control import (
     suitable_load,
 )
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
-from warpchain.inputs.link_values import link_values, mean_value
-from warpchain.inputs.scene import contact_radius, joint_radius, loop_speed, settling_time
+from warpchain.inputs.link_values import mean_value
+from warpchain.inputs.scene import contact_radius, joint_radius, link_values, loop_speed, settling_time
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
 from warpchain.inputs.validation import InputError
