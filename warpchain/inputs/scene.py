@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from warpchain.inputs.floor import Array, Points, checked_profile, slope_points
-from warpchain.inputs.link_values import check_parity, link_values
+from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import on_gpu
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError, Section, Whole, number_field, shown
@@ -186,13 +186,17 @@ class Scene(Section):
         ge=-FASTEST_TAP,
         le=FASTEST_TAP,
     )
-    charm_link: int = number_field(0, "1", "link that carries a charm", ge=0, lt=MOST_LINKS)
+    charm_link: int = number_field(0, "1", "link that carries a charm", ge=0, le=MOST_LINKS - 1)
     charm_mass: float = number_field(0.0, "kg", "mass at the centre of charm_link, added to its own", ge=0, le=1e6)
     charm_inertia: float = number_field(
         0.0, "kg m²", "moment of inertia of the charm about that centre, added likewise", ge=0, le=1e12
     )
     stiff_joint: int = number_field(
-        0, "1", "joint at the end of this link, between it and the next, that is stiff", ge=0, lt=MOST_LINKS
+        0,
+        "1",
+        "joint that is stiff: the one at the end of this link",
+        ge=0,
+        le=MOST_LINKS - 1,
     )
     stiff_joint_factor: float = number_field(
         1.0, "1", "by which viscous and Coulomb friction of stiff_joint are multiplied", ge=0, le=1e6
@@ -256,6 +260,39 @@ def floor_points(scene: Scene) -> Array | None:
     if scene.floor != "flat":
         return np.array(scene.floor)
     return slope_points(scene.slope) if scene.slope != 0 else None
+
+
+def link_values(scene: Scene, parameters: Parameters) -> LinkValues:
+    """What each link and joint of the chain of a walk has of its own."""
+    values = alternating(parameters, scene.links)
+    given = (scene.link_masses, scene.link_inertias, scene.viscous_frictions, scene.coulomb_frictions)
+    rows = (values.mass, values.inertia, values.viscous_friction, values.coulomb_friction)
+    for row, own in zip(rows, given, strict=True):
+        if own is not None:
+            row[:] = own
+    if scene.mass_gradient:
+        growth = 1 + scene.mass_gradient * np.linspace(-1.0, 1.0, scene.links)
+        values.mass[:] *= growth
+        values.inertia[:] *= growth
+    values.mass[scene.charm_link] += scene.charm_mass
+    values.inertia[scene.charm_link] += scene.charm_inertia
+    values.viscous_friction[scene.stiff_joint] *= scene.stiff_joint_factor
+    values.coulomb_friction[scene.stiff_joint] *= scene.stiff_joint_factor
+    return values
+
+
+def check_parity(scene: Scene, parameters: Parameters) -> None:
+    """Check that the links of a chain can alternate between two kinds, if they do.
+
+    Raises:
+        InputError: their number is odd.
+    """
+    is_one_kind = (parameters.inner_mass, parameters.inner_inertia) == (parameters.outer_mass, parameters.outer_inertia)
+    if scene.links % 2 and not is_one_kind and (scene.link_masses is None or scene.link_inertias is None):
+        raise InputError(
+            f"scene.links: {scene.links} is odd; inner and outer links alternate: give an even number, "
+            "link_masses and link_inertias, or equal inner and outer links"
+        )
 
 
 def settling_time(scene: Scene) -> float:

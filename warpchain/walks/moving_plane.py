@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.inputs.link_values import link_values
 from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.scene import link_values
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.state import State
 from warpchain.kernels import layout

@@ -24,8 +24,8 @@ from warpchain.engine.control import (
 from warpchain.engine.snapshot import change, restore, set_first_area, set_frame_marks, take_snapshot
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
 from warpchain.inputs.floor import body_of, circles_of, raised_by
-from warpchain.inputs.link_values import link_values, mean_value
-from warpchain.inputs.scene import contact_radius, floor_points, joint_radius, loop_speed, settling_time
+from warpchain.inputs.link_values import mean_value
+from warpchain.inputs.scene import contact_radius, floor_points, joint_radius, link_values, loop_speed, settling_time
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
 from warpchain.inputs.state import State
