@@ -89,7 +89,7 @@ class Batch:
 
         cells = (layout.GROUND_CELLS + 1) * (faces > 1)
         self.model = self._arrays(Model, faces=(faces, layout.FACE_VALUES), cells=(cells, layout.CELL_VALUES))
-        self.drive = self._arrays(Drive)
+        self.drive = self._arrays(Drive, motion=(layout.MOTION_ROWS, layout.MOTION_VALUES))
         self._constant = set(self._mirrors)
         if self._gpu:
             self._order = Mirror(np.zeros(worlds, dtype=np.int32), self._gpu, self._stream)
@@ -248,14 +248,14 @@ class Batch:
         """The plane of a world's chain, if it tilts: (PLANE_VALUES,), see :mod:`warpchain.kernels.layout`."""
         return np.array(self._view(self.state.plane)[world, : layout.PLANE_VALUES])
 
-    def set_drive(self, world: int, **values: float) -> None:
+    def set_drive(self, world: int, **values: float | Array) -> None:
         """Set fields of :class:`Drive` of a world."""
         for name, value in values.items():
             self._edit(getattr(self.drive, name))[world] = value
 
-    def features(self, *, fixed_body: str, tilts: bool = False) -> Features:
-        """Kernel features for these worlds."""
-        return features_of(self.options, self.columns, fixed_body=fixed_body, tilts=tilts)
+    def features(self, **wanted: Any) -> Features:
+        """Kernel features for these worlds, see `features_of`."""
+        return features_of(self.options, self.columns, **wanted)
 
     def run(self, worlds: Sequence[int], features: Features, after_launch: Callable[[], None] | None = None) -> None:
         """Carry worlds on until none of them is running. Results do not depend on how a run is cut into launches.

@@ -35,8 +35,8 @@ def block_proximity(features: Features, block_dim: int):
     has_self = features.self_contact
     has_contacts = has_fixed or has_self
     if has_fixed:
-        gap_of, meet = link_and_body(features.fixed_body)
-        face_of, face_at = BODIES[features.fixed_body].face, BODIES[features.fixed_body].motion
+        gap_of, _meet = link_and_body(features.fixed_body)
+        face_of = BODIES[features.fixed_body].face
     tilts = features.tilts
     chain_values = layout.BOARD_VALUES
     _maximum, write_maxima, read_maxima = block_maxima(block_dim)
@@ -122,8 +122,18 @@ def block_proximity(features: Features, block_dim: int):
             distance = wp.min(distance, slack)
         return wp.where(is_near, wp.float32(0.0), quick_quotient(distance, speed))
 
+    meet_fixed_body = block_contact(features.fixed_body) if has_fixed else None
+    return write_proximity, read_proximity, time_to_contact, meet_fixed_body
+
+
+@functools.cache
+def block_contact(fixed_body: str):
+    """Warp function: applies the impulses between a body and this link on the board; returns their number."""
+    _gap_of, meet = link_and_body(fixed_body)
+    face_of, face_at = BODIES[fixed_body].face, BODIES[fixed_body].motion
+
     @wp.func
-    def meet_fixed_body(
+    def meet_body(
         K: wp.array2d(dtype=wp.float64),
         place: Place,
         ground: Ground,
@@ -132,7 +142,6 @@ def block_proximity(features: Features, block_dim: int):
         world: int,
         time: wp.float64,
     ):
-        """Applies the impulses between the body and this link on the board; returns their number."""
         link = read_link(K, place.lane)
         left_x, left_y, right_x, right_y = ends_of(link)
         u, v, omega, lost, hits = meet(
@@ -160,4 +169,4 @@ def block_proximity(features: Features, block_dim: int):
         K[layout.BOARD_LOST_FIXED, place.lane] = lost
         return int(hits)
 
-    return write_proximity, read_proximity, time_to_contact, meet_fixed_body
+    return meet_body
