@@ -32,7 +32,7 @@ from warpchain.kernels.gpu.board import (
     write_constants,
 )
 from warpchain.kernels.gpu.contacts.neighbour_list import block_list
-from warpchain.kernels.gpu.contacts.proximity import block_contact, block_proximity, upper_bound
+from warpchain.kernels.gpu.contacts.proximity import block_proximity, moving_sprocket_contact, upper_bound
 from warpchain.kernels.gpu.contacts.self_contacts import block_self_contacts, touch_layout
 from warpchain.kernels.gpu.explicit import explicit_attempt
 from warpchain.kernels.gpu.functions import shares_board
@@ -79,9 +79,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     has_self = features.self_contact
     tilts = features.tilts
     has_contacts = has_fixed or has_self
-    moves = features.moving_sprocket
-    if moves:
-        meet_sprocket = block_contact("moving sprocket")
+    meet_sprocket = moving_sprocket_contact()
     fixed_loss, fixed_depth, fixed_count = of_fixed_body(features.fixed_body)
     reuses_last = method.reuses_last
     needs_first_power = TABLEAUS[method.tableau].velocity_weights[0] != 0.0
@@ -362,13 +360,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                             hits = meet_fixed_body(K, place, ground, contact_constants(K, n), drive, world, time)
                         if hits > 0:
                             wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
-                if wp.static(moves):
+                if wp.static(features.moving_sprocket):
                     is_near = bool(True)
                     if lane < n:
-                        on_sprocket = meet_sprocket(K, place, ground, contact_constants(K, n), drive, world, time)
-                        if on_sprocket > 0:
-                            wp.atomic_add(state.counts, world, layout.SPROCKET_IMPULSES, wp.int64(on_sprocket))
-                            hits += on_sprocket
+                        hits += meet_sprocket(K, place, ground, contact_constants(K, n), drive, state, world, time)
                 if wp.static(has_self):
                     slack = wp.float32(0.5) * wp.float32(control.skin) - opening - proximity.displacement
                     is_stale = not slack > wp.float32(0.0)
@@ -406,8 +401,6 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                             if not is_hit:
                                 is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
                 reach = time_to_contact(control, pairs, gap, slack, proximity.speed)
-                if wp.static(moves):
-                    reach = wp.float32(0.0)  # the sprocket may come nearer by itself
                 if is_hit or wp.static(not reuses_last):
                     if is_hit:
                         next_end = exchange_ends(ends, place, read_link(K, lane))

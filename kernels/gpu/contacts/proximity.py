@@ -14,7 +14,7 @@ from warpchain.kernels.gpu.threads import block_maxima, vec4i
 from warpchain.kernels.layout import COSINE, INVERSE_INERTIA, INVERSE_MASS, OMEGA, SINE, U, V
 from warpchain.kernels.methods.controller import quick_quotient, quick_root
 from warpchain.kernels.physics.elementary import TWO, from_order_key_single, order_bits_single, order_key_single
-from warpchain.kernels.types import Chain, Control, Drive, Ground
+from warpchain.kernels.types import Chain, Control, Drive, Ground, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -113,7 +113,7 @@ def block_proximity(features: Features, block_dim: int):
     @wp.func
     def time_to_contact(control: Control, pairs: int, gap: wp.float32, slack: wp.float32, speed: wp.float32):
         """Longest step [s] that cannot miss a contact; 0 near contacts, where the contact step is the bound."""
-        is_near = pairs > 0
+        is_near = pairs > 0 or wp.static(features.moving_sprocket)  # which may come nearer by itself
         distance = wp.float32(control.skin)
         if wp.static(has_fixed):
             is_near = is_near or gap < distance
@@ -170,3 +170,27 @@ def block_contact(fixed_body: str):
         return int(hits)
 
     return meet_body
+
+
+@functools.cache
+def moving_sprocket_contact():
+    """Warp function: as that of `block_contact` for the moving sprocket; it counts the impulses itself."""
+    meet_sprocket = block_contact("moving sprocket")
+
+    @wp.func
+    def meet_and_count(
+        K: wp.array2d(dtype=wp.float64),
+        place: Place,
+        ground: Ground,
+        chain: Chain,
+        drive: Drive,
+        state: State,
+        world: int,
+        time: wp.float64,
+    ):
+        hits = meet_sprocket(K, place, ground, chain, drive, world, time)
+        if hits > 0:
+            wp.atomic_add(state.counts, world, wp.static(layout.SPROCKET_IMPULSES), wp.int64(hits))
+        return hits
+
+    return meet_and_count
