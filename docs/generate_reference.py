@@ -70,7 +70,8 @@ def values_of(field: FieldInfo) -> str:
     kinds = [field.annotation, *get_args(field.annotation)]
     names = next((get_args(kind) for kind in kinds if get_origin(kind) is Literal), (True, False) * (bool in kinds))
     if names:
-        return ", or " + ", ".join(f"`{shown(name)}`" for name in names if name != field.default)
+        others = ", ".join(f"`{shown(name)}`" for name in names if name != field.default)
+        return f", or {others}" if others else ""
     if str in kinds:
         return ""
     limits = {

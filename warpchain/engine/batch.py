@@ -167,9 +167,8 @@ class Batch:
 
     def set_floor(self, world: int, points: Array, parameters: Parameters) -> None:
         """Set the floor of a world's chain, by the points of its profile (p, 2), if it is not flat."""
-        faces = faces_of(points)
-        self._edit(self.model.faces)[world, : len(faces)] = faces
-        if len(faces) > 1:
+        self._edit(self.model.faces)[world, : len(points) - 1] = faces_of(points)
+        if len(points) > 2:
             self._edit(self.model.cells)[world] = cells_of(points, parameters.link_length, parameters.circle_radius)
 
     def load(
@@ -313,13 +312,9 @@ class Batch:
         arrays = [self.model, self.drive, self.state, self.record, self.scratch, self.lists, self.control]
         if self._gpu is None:
             for features, worlds in groups.items():
-                inputs = [
-                    wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device.warp),
-                    *arrays,
-                ]
-                wp.launch(
-                    step_kernel(self.device, features, 1), dim=len(worlds), inputs=inputs, device=self.device.warp
-                )
+                numbers = wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device.warp)
+                kernel = step_kernel(self.device, features, 1)
+                wp.launch(kernel, dim=len(worlds), inputs=[numbers, *arrays], device=self.device.warp)
             return
         blocks: dict[tuple[Features, int], list[int]] = defaultdict(list)
         for features, worlds in groups.items():
@@ -439,8 +434,7 @@ class Batch:
 
     def frame_planes(self, world: int) -> Array:
         """The plane in the frames kept so far: (f, PLANE_VALUES); (f, 0) if the batch does not keep planes."""
-        count = int(self._view(self.record.frame_count)[world])
-        first = 2 * self.state.links.shape[2]
+        count, first = int(self._view(self.record.frame_count)[world]), 2 * self.state.links.shape[2]
         return self._view(self.record.frames)[world, :count, first:].copy()
 
     def greatest_tilt(self, world: int) -> float:

@@ -140,12 +140,12 @@ class Scene(Section):
     floor: Annotated[Literal["flat"] | Points, BeforeValidator(checked_profile)] = Field(
         default="flat",
         exclude_if=lambda floor: floor == "flat",
-        description="flat, or a profile of points [[x, y], …] in m; its first and last face go on without end",
+        description="flat, or a profile [[x, y], …] in m, whose ends go on straight",
     )
     slope: float = number_field(
         0.0,
         "°",
-        "of a flat floor; positive: it falls the way the chain walks",
+        "of an endless floor; positive: it falls the way the chain walks",
         ge=-STEEPEST,
         le=STEEPEST,
         exclude_if=lambda slope: slope == 0,
@@ -153,7 +153,7 @@ class Scene(Section):
     distance_limit: float | None = number_field(
         None,
         "m",
-        "distance along the floor from the release at which a walk ends as distance_limit; null: none",
+        "distance along the floor at which a walk ends as distance_limit; null: none",
         gt=0,
         le=HIGHEST,
         exclude_if=lambda limit: limit is None,

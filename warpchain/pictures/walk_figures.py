@@ -10,6 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
+from warpchain.inputs.scene import floor_points
+from warpchain.pictures.chain import floor_height
 from warpchain.pictures.film_strip import film_strip
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.loop_figure import loop_figure
@@ -36,6 +38,8 @@ def draw(walk: Walk, kind: Kind, *, figure: Figure | None = None, ax: Axes | Non
 def figure5(walks: Sequence[Walk], *, labels: Sequence[str] | None = None, figure: Figure | None = None) -> Figure:
     """Height and horizontal speed of the centre of mass against time since the release, as in Figure 5.
 
+    A thin line is the height of a floor that is not flat, below the centre of mass.
+
     Args:
         walks: the walks, one line for each in both panels.
         labels: legend entries, one for each walk; walks of one label have the same colour. By default links and
@@ -60,10 +64,13 @@ def figure5(walks: Sequence[Walk], *, labels: Sequence[str] | None = None, figur
         order = index if len(groups) == 1 else groups.index(name)
         style = {"color": LINE_COLORS[order % len(LINE_COLORS)], "linewidth": 1.4}
         height.plot(walk.time, walk.center[:, 1], label="_" if name in names[:index] else name, **style)
+        if floor_points(walk.setup.scene) is not None:
+            height.plot(walk.time, floor_height(walk, walk.center[:, 0]), color=FAINT, linewidth=0.8)
         speed.plot(walk.time, walk.center_velocity[:, 0], **style)
     height.set_ylabel("height $y^\\mathrm{cm}$ / m")
     speed.set_ylabel("speed $v_x^\\mathrm{cm}$ / (m/s)")
-    height.set_ylim(bottom=0.0)
+    if all(floor_points(walk.setup.scene) is None for walk in walks):
+        height.set_ylim(bottom=0.0)
     _finish(height, speed, end=max(float(walk.time[-1]) for walk in walks))
     if len(groups) > 1 or labels is not None:
         height.legend(frameon=False)
