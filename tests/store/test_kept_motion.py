@@ -212,31 +212,6 @@ def test_a_merged_file_has_the_motions(kept: Path, tmp_path: Path) -> None:
         assert data.dx.shape == (2, 2, 5)
 
 
-def test_figure5_of_a_sweep_shows_the_kept_series(kept: Path) -> None:
-    """Both panels have a line for each shown walk, with its numbers; a colour is a cell."""
-    result = load(kept)
-    picture = sweep_figure5(result)
-    height, speed = picture.figure.axes
-    walks = [
-        result.series(links=links, frequency=frequency, sample=sample)
-        for links in (30, 44)
-        for frequency in (5, 15)
-        for sample in (0, 3)
-    ]
-    for axes, values in (
-        (height, [walk.center[:, 1] for walk in walks]),
-        (speed, [walk.center_velocity[:, 0] for walk in walks]),
-    ):
-        assert len(axes.lines) == len(walks)
-        for line, walk, numbers in zip(axes.lines, walks, values, strict=True):
-            np.testing.assert_array_equal(line.get_xdata(), walk.time)
-            np.testing.assert_array_equal(line.get_ydata(), numbers)
-    assert len({line.get_color() for line in speed.lines}) == 4
-    assert "8 walks in 4 of 4 cells" in picture.caption
-    names = [entry.get_text() for entry in height.get_legend().get_texts()]
-    assert names[0] == "n = 30, ν = 5 Hz" and len(names) == 4
-
-
 def test_report_and_pictures_use_kept_frames(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A walk with frames is shown without running it again; one without is run again, as ever."""
 
