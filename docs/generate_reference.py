@@ -80,6 +80,8 @@ def values_of(field: FieldInfo) -> str:
         for name in ("ge", "gt", "le", "lt")
         if (limit := getattr(item, name, None)) is not None
     }
+    if not limits:
+        return ""
     lower = "[" + limits["ge"] if "ge" in limits else "(" + limits["gt"]
     upper = limits["le"] + "]" if "le" in limits else limits.get("lt", "∞") + ")"
     extra = field.json_schema_extra

@@ -61,12 +61,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     Args:
         features: What the kernel is compiled for.
         block_dim: Threads in a block, at least the number of links of every chain; on a GPU a multiple of 32.
-        registers: Greatest number of registers a thread may take on a GPU; None: as many as a block of this size can
-            have.
+        registers: Most registers of a thread on a GPU; None: as many as a block of this size can have.
 
     Arrays of the kernel:
-        scratch: (W, ≥ :func:`gpu.functions.board_rows`, columns) float64.
-        lists: As on a CPU.
+        scratch: (W, ≥ :func:`gpu.functions.board_rows`, columns) float64; lists are as on a CPU.
     """
     available = REGISTERS_OF_MULTIPROCESSOR // block_dim // 8 * 8
     if available < 255:

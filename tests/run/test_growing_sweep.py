@@ -80,15 +80,3 @@ def test_killed_while_it_grows_a_sweep_loses_nothing(tmp_path: Path) -> None:
         and (folder / "sweep.json").read_bytes() == (tmp_path / "whole/sweep.json").read_bytes()
     )
     assert rows_of(load(folder)) == rows_of(sweep(large, tmp_path / "fresh", workers=1))
-
-
-def test_a_grown_sweep_does_not_shrink(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The file with fewer samples is refused in one line afterwards, and computes nothing."""
-    sweep(TINY | {"samples": 2}, tmp_path / "sweep", workers=1)
-    before = data_of(tmp_path / "sweep")
-    (tmp_path / "small.yaml").write_text(yaml.safe_dump(TINY | {"samples": 1}, sort_keys=False))
-    with pytest.raises(SystemExit):
-        main(["sweep", str(tmp_path / "small.yaml"), "-o", str(tmp_path / "sweep")])
-    error = capsys.readouterr().err.strip()
-    assert "holds 2 samples of each cell of block main, but 1 are asked for" in error and "\n" not in error
-    assert data_of(tmp_path / "sweep") == before

@@ -65,9 +65,9 @@ def test_keywords_say_what_a_file_says(tmp_path):
     """Name from the folder, seed 0, the preset of a walk: content and digest are those of the file."""
     path = tmp_path / "speeds.yaml"
     path.write_text(FILE, encoding="utf-8")
-    of_file, of_keywords = load_sweep(path), sweep_of_keywords(KEYWORDS, {}, tmp_path / "speeds")
+    of_file, of_keywords = load_sweep(path), sweep_of_keywords(KEYWORDS, tmp_path / "speeds")
     assert of_keywords.canonical() == of_file.canonical() and of_keywords.digest() == of_file.digest()
-    named = sweep_of_keywords({**KEYWORDS, "name": "other", "seed": np.int64(3), "preset": "soft"}, {}, "speeds")
+    named = sweep_of_keywords({**KEYWORDS, "name": "other", "seed": np.int64(3), "preset": "soft"}, "speeds")
     assert (named.name, named.seed, named.blocks[0].preset) == ("other", 3, "soft")
 
 
@@ -76,8 +76,8 @@ def test_settings_of_a_walk_are_those_of_a_sweep(tmp_path):
     words = {"n": pandas.Series([30, 40]), "frequency": {"from": 5, "to": 15, "step": 5}}
     others = {key: KEYWORDS[key] for key in ("samples", "sampler", "distributions", "record", "same_samples_along")}
     settings = {**words, **SHORT, "tolerance": np.float64(1e-3), "g": 9.8}
-    assert sweep_of_keywords(others, settings, "speeds").digest() == sweep_of_keywords(KEYWORDS, {}, "speeds").digest()
-    presets = sweep_of_keywords({"samples": 1, "preset": ["soft", "paper"]}, {}, "presets")
+    assert sweep_of_keywords(others | settings, "speeds").digest() == sweep_of_keywords(KEYWORDS, "speeds").digest()
+    presets = sweep_of_keywords({"samples": 1, "preset": ["soft", "paper"]}, "presets")
     assert presets.blocks[0].axes == {"preset": ("soft", "paper")}
     assert refused(samples=1, links=[60], grid={"links": [60]}, out=tmp_path) == [
         "links: given twice, also in grid; leave one out"

@@ -11,7 +11,7 @@ import pytest
 import xarray
 
 import warpchain
-from tests.run.test_sweep_run import BRIEF, TINY, brief_setup, data_of
+from tests.run.test_sweep_run import TINY, brief_setup, data_of
 from tests.support.made_walks import assert_same
 from warpchain.engine.memory import CAPACITY_SAMPLES
 from warpchain.inputs.validation import InputError, InputWarning
@@ -208,47 +208,6 @@ def test_a_merged_file_has_the_motions(kept: Path, tmp_path: Path) -> None:
         assert file["motion/0/series/center_velocity"].attrs["unit"] == "m/s"
     with xarray.open_dataset(tmp_path / "one.h5", engine="h5netcdf") as data:
         assert data.dx.shape == (2, 2, 5)
-
-
-def test_the_merged_file_of_blocks_and_of_a_part(tmp_path: Path) -> None:
-    """Several blocks are in groups, with the motions of the walks that are there; shards may span blocks."""
-    blocks = [{"name": "a", "grid": {"links": [30]}}, {"name": "b", "samples": 3, "grid": {"frequency": [5, 15]}}]
-    content = KEPT | {"blocks": blocks, "scene": BRIEF | {"links": 44}, "record": {"series": {"interval": 1e-3}}}
-    del content["grid"]
-    sweep(content, tmp_path / "sweep", workers=1)
-    (tmp_path / "sweep/shards/0-000007.h5").unlink()
-    merge(tmp_path / "sweep", tmp_path / "merged.h5")
-    for result in (load(tmp_path / "sweep"), load(tmp_path / "merged.h5")):
-        block = result.blocks["b"]
-        assert block.kept.tolist() == [[True, True, False], [True, True, True]]
-        assert len(block.series(frequency=15, sample=1).time) > 9
-        with pytest.raises(InputError, match="the motion of walk 7 is not there"):
-            block.series(frequency=5, sample=2)
-
-
-def test_figure5_of_a_sweep_shows_the_kept_series(kept: Path) -> None:
-    """Both panels have a line for each shown walk, with its numbers; a colour is a cell."""
-    result = load(kept)
-    picture = sweep_figure5(result)
-    height, speed = picture.figure.axes
-    walks = [
-        result.series(links=links, frequency=frequency, sample=sample)
-        for links in (30, 44)
-        for frequency in (5, 15)
-        for sample in (0, 3)
-    ]
-    for axes, values in (
-        (height, [walk.center[:, 1] for walk in walks]),
-        (speed, [walk.center_velocity[:, 0] for walk in walks]),
-    ):
-        assert len(axes.lines) == len(walks)
-        for line, walk, numbers in zip(axes.lines, walks, values, strict=True):
-            np.testing.assert_array_equal(line.get_xdata(), walk.time)
-            np.testing.assert_array_equal(line.get_ydata(), numbers)
-    assert len({line.get_color() for line in speed.lines}) == 4
-    assert "8 walks in 4 of 4 cells" in picture.caption
-    names = [entry.get_text() for entry in height.get_legend().get_texts()]
-    assert names[0] == "n = 30, ν = 5 Hz" and len(names) == 4
 
 
 def test_report_and_pictures_use_kept_frames(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -115,18 +115,6 @@ def test_the_layout_is_that_of_the_sweep(tmp_path: Path) -> None:
         assert data.preset.values.tolist() == ["soft", "paper"]
 
 
-def test_units_and_meanings(folder: Path) -> None:
-    """Columns, drawn quantities and axes of any block have units; an unknown name gets a suggestion."""
-    result = load(folder)
-    assert [
-        result.unit(name) for name in ("dx", "links", "frequency", "phase_drawn", "link_length_drawn", "gravity")
-    ] == [*("m", "1", "Hz", "1", "m", "m/s²")]
-    assert result.unit("sample") == "1" and result.unit("loss_floor") == "J"
-    assert result.blocks["ellipse"].meaning("gravity") == "gravitational acceleration, along −y"
-    with pytest.raises(KeyError, match="did you mean walk_time"):
-        result.unit("walktime")
-
-
 def test_missing_walks_are_counted(single: Path) -> None:
     """Walks that are not there have status −1 and NaN; the attributes of an only block are those of the result."""
     result = load(single)
@@ -193,16 +181,6 @@ def test_no_sweep_no_result(tmp_path: Path, single: Path) -> None:
         load(tmp_path)
 
 
-def test_loading_is_light() -> None:
-    """The module brings neither Warp nor HDF5, xarray or pandas."""
-    program = (
-        "import sys, warpchain.store.sweep_result\n"
-        "print(sorted({'warp', 'h5py', 'xarray', 'pandas', 'scipy', 'matplotlib'} & set(sys.modules)))"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, encoding="utf-8")
-    assert (done.stdout, done.stderr) == ("[]\n", "")
-
-
 def test_one_block_as_a_data_set(single: Path) -> None:
     """xarray gets names, coordinates, units, and what says how to make it again."""
     result = load(single)
@@ -214,15 +192,6 @@ def test_one_block_as_a_data_set(single: Path) -> None:
     assert data.frequency.attrs["units"] == "Hz" and data.dx.attrs["units"] == "m"
     assert data.attrs["walks_missing"] == 20 and data.attrs["digest"] == SINGLE.digest()
     assert json.loads(data.attrs["sweep"]) == SINGLE.canonical() and int(data.attrs["seed"]) == SINGLE.seed
-
-
-def test_several_blocks_as_a_tree(folder: Path) -> None:
-    """Each block is a child of its name."""
-    result = load(folder)
-    tree = result.to_xarray()
-    assert set(tree.children) == {"rest", "ellipse"} and tree.attrs["title"] == "synthetic"
-    assert tree["ellipse"].to_dataset().identical(result.blocks["ellipse"].to_xarray())
-    assert tree["rest"]["floor_friction_drawn"].attrs["symbol"] == "μ_fc"
 
 
 def test_walks_as_a_table(folder: Path) -> None:
@@ -274,17 +243,6 @@ def test_merged_file_of_one_block(single: Path, tmp_path: Path) -> None:
             assert notes == {key: np.array(value).tolist() for key, value in expected[name].attrs.items()}, name
         mean = data.dx.where(data.status == 1).mean("sample")
         np.testing.assert_allclose(mean, load(single).statistics().mean)
-
-
-def test_merged_file_of_several_blocks(folder: Path, tmp_path: Path) -> None:
-    """Each block is a group of its name."""
-    path = tmp_path / "merged.h5"
-    merge(folder, path)
-    for name, block in load(folder).blocks.items():
-        with xarray.open_dataset(path, engine="h5netcdf", group=name) as data:
-            xarray.testing.assert_equal(data, block.to_xarray())
-    with xarray.open_datatree(path, engine="h5netcdf") as tree:
-        assert set(tree.children) == {"rest", "ellipse"} and tree.attrs["walks"] == 160
 
 
 def test_a_merge_that_fails_leaves_the_older_file(folder: Path, single: Path, tmp_path: Path) -> None:

@@ -56,15 +56,6 @@ def test_a_method_by_need_is_that_of_the_device(options: dict[str, Any], expecte
     assert again.planned(0).setup.options == there
 
 
-def test_a_device_changes_nothing_else_of_methods_on_an_axis() -> None:
-    """Methods named along an axis keep the settings they have without a device, and so do tolerances along one."""
-    for grid in ({"method": ["dp5", "bs32"]}, {"tolerance": [1e-4, 1e-5]}):
-        planned = load_sweep(content(grid=grid, options={}))
-        there = on_device(planned, "cpu")
-        indices = planned.indices.tolist()
-        assert [there.planned(i).setup.options for i in indices] == [planned.planned(i).setup.options for i in indices]
-
-
 def test_a_device_is_refused_beside_devices_on_an_axis() -> None:
     """One of them would be passed over."""
     planned = load_sweep(content(grid={"device": ["cuda:0", "cuda:1"]}, options={}))

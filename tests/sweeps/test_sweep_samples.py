@@ -1,6 +1,5 @@
 """What the walks of a sweep draw: random numbers, distributions, designed samples."""
 
-import itertools
 import math
 import time
 import tracemalloc
@@ -58,24 +57,6 @@ def test_more_blocks_change_nothing_before() -> None:
     assert (drawn(few, 3) == drawn(many, 3)).all()
 
 
-def test_undrawn_walks_are_those_drawn_but_for_what_is_drawn() -> None:
-    """Place, links and options are those of the walk, in any order of asking; nothing is drawn."""
-    sweep = load_sweep(blocks({"grid": {"links": [60, 90], "tolerance": [1e-5, 1e-6]}}, {"samples": 2}))
-    indices = [*sweep.indices.tolist(), *reversed(range(sweep.walk_count))]
-    for index, undrawn in zip(indices, sweep.undrawn(indices), strict=True):
-        walk = sweep.planned(index)
-        assert undrawn.drawn == {} != walk.drawn
-        assert (undrawn.index, undrawn.block, undrawn.cell, undrawn.sample) == (
-            walk.index,
-            walk.block,
-            walk.cell,
-            walk.sample,
-        )
-        assert (undrawn.setup.options, undrawn.setup.scene.links) == (walk.setup.options, walk.setup.scene.links)
-    with pytest.raises(IndexError):
-        list(sweep.undrawn([sweep.walk_count]))
-
-
 def test_first_sample_is_that_of_a_single_walk() -> None:
     """Sample 0 of cell 0 is what a single walk draws from the same seed; the others follow the same rule."""
     settings = {"links": 90, "frequency": 12.0, "floor_friction": 0.1}
@@ -128,16 +109,6 @@ def test_same_samples_along_axes() -> None:
     assert all(len(set(column)) == 12 for column in distinct.T)
     apart = drawn(load_sweep(blocks({"grid": grid}, {"grid": grid})), 24)
     assert all(len(set(column)) == 24 for column in apart.T)
-
-
-def test_same_samples_about_different_means() -> None:
-    """Along an axis of means, the same standard normal numbers are drawn about each."""
-    given = content(grid={"floor_friction": [0.3, 0.5]}, distributions={"floor_friction": "table"})
-    sweep = load_sweep(given | {"same_samples_along": ["floor_friction"]})
-    values = drawn(sweep, 6).reshape(2, 3, -1)
-    friction = sweep.blocks[0].drawn.index("floor_friction")
-    assert values[1, :, friction] - values[0, :, friction] == pytest.approx(np.full(3, 0.2), rel=1e-12)
-    assert (np.delete(values[0], friction, axis=1) == np.delete(values[1], friction, axis=1)).all()
 
 
 # Distributions
@@ -312,25 +283,6 @@ def unit_cube(names: list[str], sampler: str, samples: int, seed: int = 7) -> Sw
 
 
 FRACTIONS = ["floor_restitution", "floor_friction", "chain_restitution", "chain_friction"]
-
-
-def test_sobol_points_are_even() -> None:
-    """Scrambled Sobol points have a discrepancy far below that of random ones, and another for each cell and seed."""
-    discrepancy = {
-        sampler: stats.qmc.discrepancy(drawn(unit_cube(FRACTIONS, sampler, 256), 256))
-        for sampler in ("random", "sobol")
-    }
-    assert discrepancy["sobol"] < 0.1 * discrepancy["random"]
-    others = [unit_cube(FRACTIONS, "sobol", 8, seed) for seed in (7, 8)]
-    assert (drawn(others[0], 8) != drawn(others[1], 8)).all()
-    cells = drawn(load_sweep(content(sampler="sobol", samples=8)), 32).reshape(4, 8, -1)
-    assert all((a != b).all() for a, b in itertools.combinations(cells, 2))
-
-
-def test_latin_hypercube_has_one_point_in_each_stratum() -> None:
-    """Each of N equal parts of every quantity holds exactly one of N samples."""
-    points = drawn(unit_cube(FRACTIONS, "latin_hypercube", 50), 50)
-    assert (np.sort((points * 50).astype(int), axis=0) == np.arange(50)[:, None]).all()
 
 
 def ishigami(points: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ from warpchain.cli.walk_commands import FAILED, plot_walk
 from warpchain.cli.words import JSON, argument, option, output, output_path
 
 if TYPE_CHECKING:
-    from warpchain.run.sweep_run import DaskClient, Executor
+    from warpchain.run.workers import DaskClient, Executor
     from warpchain.store.sweep_result import SweepResult
 
 _FILE: Final = "The sweep, or the bare name of one that comes with warpchain, such as figure6."
@@ -38,12 +38,12 @@ def sweep(
     ] = None,
     part: Annotated[
         str | None,
-        option("K/N", "Run only the K-th of N parts, in a folder of its own; merge puts the parts together."),
+        option("K/N", "Run only the K-th of N parts; merge puts them together."),
     ] = None,
-    seed: Annotated[int | None, option("S", "Seed, instead of that of the file.", min=0)] = None,
-    samples: Annotated[int | None, option("N", "Samples of each cell, instead of those of the file.", min=1)] = None,
+    seed: Annotated[int | None, option("S", "Seed instead of the file's.", min=0)] = None,
+    samples: Annotated[int | None, option("N", "Samples of each cell instead of the file's.", min=1)] = None,
     estimate: Annotated[
-        bool, typer.Option("--estimate", help="Run a few walks, say how long all would take and how large they are.")
+        bool, typer.Option("--estimate", help="Try a few walks; say how long all take, and their size.")
     ] = False,
     fresh: Annotated[bool, typer.Option("--fresh", help="Discard what another sweep left in the folder.")] = False,
     new: Annotated[
@@ -107,7 +107,9 @@ def info(
 
 
 def plot(
-    path: Annotated[Path, argument("PATH", "Folder of a sweep, a merged file, or the file of a saved walk.")],
+    path: Annotated[
+        Path, argument("PATH", "Folder of a sweep or of a walk, a merged file, or the file of a saved walk.")
+    ],
     folder: Annotated[Path | None, output("DIR", "Folder of the figures. Default: that of PATH.")] = None,
     quantity: Annotated[
         str | None,
@@ -128,6 +130,8 @@ def plot(
     from warpchain.store.sweep_result import KIND
 
     is_file = os.path.isfile(path)
+    if (path / "walk.h5").exists() and not (path / "sweep.json").exists():
+        path, is_file = path / "walk.h5", True
     if (
         is_file and kind_of_hdf5(path, "give the folder of a sweep, a merged file, or the file of a saved walk") != KIND
     ) or (path.suffix == ".h5" and not os.path.exists(path)):

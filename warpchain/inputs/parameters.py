@@ -31,6 +31,8 @@ Source = Literal["measured", "looked up", "adjusted", "chosen here"]
 Limits = Mapping[str, float]
 
 FRACTION: Final[Limits] = {"ge": 0.0, "le": 1.0}
+FRICTION: Final[Limits] = {"ge": 0.0, "le": 10.0}
+"""Rubber has more than 1."""
 SIGNED_FRACTION: Final[Limits] = {"ge": -1.0, "le": 1.0}
 LENGTH: Final[Limits] = {"ge": 1e-9, "le": 1e3}
 """From a few atoms to a kilometre: like the next ones far beyond any chain, and small enough for squares and ratios."""
@@ -104,7 +106,7 @@ class Parameters(Section):
         "e_fc", DIMENSIONLESS, 0.018, 0.004, FRACTION, "measured", "normal restitution, floor and chain"
     )
     floor_friction: float = _row(
-        "μ_fc", DIMENSIONLESS, 0.27, 0.02, FRACTION, "measured", "friction coefficient, floor and chain"
+        "μ_fc", DIMENSIONLESS, 0.27, 0.02, FRICTION, "measured", "friction coefficient, floor and chain"
     )
     gravity: float = _row("g", "m/s²", 9.809, 0.0, GRAVITY, "looked up", "gravitational acceleration, along −y")
     chain_restitution: float = _row(

@@ -10,7 +10,7 @@ from warpchain.inputs.floor import Array, Points, checked_profile, slope_points
 from warpchain.inputs.options import on_gpu
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.sprocket_motion import Motion, checked_motion
-from warpchain.inputs.validation import InputError, Section, number_field
+from warpchain.inputs.validation import InputError, Section, Whole, number_field
 
 MOST_LINKS: Final = 100_000
 """A chain of so many links takes 0.4 GB, and kernels of its own."""
@@ -18,6 +18,8 @@ MOST_LINKS_ON_GPU: Final = 1024
 """A chain is a block of threads there, one for each link, and CUDA has no larger blocks."""
 HIGHEST_FREQUENCY: Final = 1e4
 """There Table 1's chain moves at 3.8 km/s, under a tension that stretches its joints by a third of a link [Hz]."""
+LIKELY_FREQUENCY: Final = 300.0
+"""Greatest frequency of a sprocket, far above what any loop holds [Hz]; a greater one is in turns a minute."""
 LEAST_SPROCKET: Final = 1e-3
 """Least distance of the joints from the sprocket's centre, in link lengths; far smaller ones are lost in rounding."""
 HIGHEST: Final = 1e6
@@ -55,7 +57,7 @@ class Scene(Section):
             tilts has no flat floor.
     """
 
-    links: Annotated[int, AfterValidator(_even)] = number_field(
+    links: Annotated[Whole, AfterValidator(_even)] = number_field(
         60,
         "1",
         "number of links around the loop, even: inner and outer links alternate",
@@ -317,10 +319,15 @@ def check_scene(scene: Scene, parameters: Parameters) -> None:
 
     Raises:
         InputError: the chain is too short for its sprocket, or the sprocket too small, or `contact_radius` finds none,
-            or the links are too point-like for the load factor that is given.
+            or the links are too point-like for the load factor that is given, or the frequency is one of minutes.
     """
     if scene.start == "ellipse":
         return
+    if scene.frequency > LIKELY_FREQUENCY:
+        raise InputError(
+            f"scene.frequency: {scene.frequency:g} Hz is far above what a loop holds, 35 Hz with 60 links; if that is "
+            f"in turns a minute, give {scene.frequency / 60:g}"
+        )
     contact_radius(scene, parameters)
     if joint_radius(scene, parameters) < LEAST_SPROCKET * parameters.link_length:
         raise InputError(

@@ -14,10 +14,10 @@ import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, TypeVar, get_args
+from typing import Annotated, Any, Final, TypeVar, get_args
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 
 STRICT: Final = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -99,6 +99,11 @@ def number_field(default: Any, unit: str, description: str, **more: Any) -> Any:
     """
     limits = {name: more.pop(name) for name in ("ge", "gt", "le", "lt", "exclude_if") if name in more}
     return Field(default, description=description, json_schema_extra={"unit": unit, **more}, **limits)
+
+
+WHOLE: Final = BeforeValidator(lambda given: int(given) if isinstance(given, float) and given.is_integer() else given)
+"""Of whole numbers: 60.0 is sixty."""
+Whole = Annotated[int, WHOLE]
 
 
 def field_unit(field: FieldInfo) -> str:
@@ -300,6 +305,7 @@ def checked_whole(value: object, path: str, least: int, most: int) -> int:
     Raises:
         InputError: it is not; the message begins with `path`.
     """
+    value = int(value) if isinstance(value, float) and value.is_integer() else value
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
         limit = f"2**{most.bit_length()} - 1" if most > 2**64 else str(most)
         raise InputError(f"{path}: {shown(value)} is no whole number from {least} to {limit}; give one")

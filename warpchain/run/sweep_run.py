@@ -8,11 +8,10 @@ import concurrent.futures
 import contextlib
 import os
 import re
-import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 
@@ -23,9 +22,9 @@ from warpchain.inputs.options import Options, on_gpu
 from warpchain.inputs.sections import takes_fields
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, checked_path, plain, shown, validated
-from warpchain.run.lost_workers import losses_named
 from warpchain.run.progress_bar import OnProgress, SweepProgress, counts_text, progress_bar
-from warpchain.run.sweep_keywords import sweep_of_keywords
+from warpchain.run.sweep_keywords import KEYS, sweep_of_keywords
+from warpchain.run.workers import DaskClient, Executor, Pulse, losses_named, pulsing_threads
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.manifest import Shard
@@ -45,45 +44,11 @@ SHARDS = 128
 """Least number of shards of a sweep, about, if it has as many walks: the grain of progress and of a restart."""
 
 
-class Executor(Protocol):
-    """An executor such as those of ``concurrent.futures``, ``mpi4py.futures`` and Dask's ``get_executor()``."""
-
-    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> "concurrent.futures.Future[Any]":
-        """Run ``function(*arguments)`` somewhere."""
-        ...
-
-
-@runtime_checkable
-class DaskClient(Protocol):
-    """What is used of ``distributed.Client``, which has no such method ``submit`` as executors have."""
-
-    def get_executor(self, *, pure: bool) -> Executor:
-        """An executor on the workers."""
-        ...
-
-    def nthreads(self) -> Mapping[str, int]:
-        """Number of threads of each worker."""
-        ...
-
-
-@takes_fields("scene", "parameters", "options")
+@takes_fields("scene", "parameters", "options", beside=KEYS)
 def sweep(
     source: str | os.PathLike[str] | Mapping[str, Any] | Sweep | None = None,
     out: str | os.PathLike[str] | None = None,
     *,
-    grid: Mapping[str, Any] | None = None,
-    points: Mapping[str, Any] | None = None,
-    samples: int | None = None,
-    sampler: str | None = None,
-    preset: str | Sequence[str] | None = None,
-    scene: Mapping[str, Any] | None = None,
-    parameters: Mapping[str, Any] | None = None,
-    options: Mapping[str, Any] | None = None,
-    distributions: Mapping[str, Any] | None = None,
-    same_samples_along: Sequence[str] | None = None,
-    record: Mapping[str, Any] | None = None,
-    name: str | None = None,
-    seed: int | None = None,
     part: str | None = None,
     device: str | None = None,
     executor: "Executor | DaskClient | None" = None,
@@ -103,7 +68,7 @@ def sweep(
         out: Folder of the results. A sweep that was killed goes on where it was, and leaves the same bytes. A sweep
             with more samples than the folder, and else the same, adds them; latin hypercubes do not grow.
         settings: Whatever :func:`walk` takes; a list, an array or a range ``{"from":, "to":, "step":}`` is an axis of
-            the grid. The last axis varies fastest.
+            the grid. The last axis varies fastest. Beside these the keys of a sweep file:
         grid: Further axes, which come before those of the settings.
         points: Parameter sets, as a table or a mapping: quantity → its value in each set. They are one more axis,
             ``point``, beside the grid.
@@ -136,23 +101,7 @@ def sweep(
         OSError: The folder cannot be read or written.
         LostWorkersError: Worker processes were killed, or the scheduler of a Dask client was closed.
     """
-    keys = {
-        "grid": grid,
-        "points": points,
-        "samples": samples,
-        "sampler": sampler,
-        "preset": preset,
-        "scene": scene,
-        "parameters": parameters,
-        "options": options,
-        "distributions": distributions,
-        "same_samples_along": same_samples_along,
-        "record": record,
-        "name": name,
-        "seed": seed,
-    }
-    given = {key: value for key, value in keys.items() if value is not None}
-    planned, folder, own = _checked_call(source, out, given, settings, device, workers, part)
+    planned, folder, own = _checked_call(source, out, settings, device, workers, part)
     count = plain(workers, "workers")
     if isinstance(executor, DaskClient):
         count = count or sum(executor.nthreads().values())
@@ -167,7 +116,6 @@ def sweep(
 def _checked_call(
     source: str | os.PathLike[str] | Mapping[str, Any] | Sweep | None,
     out: str | os.PathLike[str] | None,
-    keys: Mapping[str, object],
     settings: Mapping[str, object],
     device: str | None,
     workers: int | None,
@@ -179,9 +127,10 @@ def _checked_call(
         InputError: Something is refused; one line for each value.
     """
     problems, planned, own = [], None, (1, 1)
-    replaced = {key: plain(keys[key], key) for key in ("seed", "samples") if key in keys}
-    if source is not None and (others := {**keys, **settings}.keys() - replaced.keys()):
-        names = ", ".join(name for name in (*keys, *settings) if name in others)
+    settings = {name: value for name, value in settings.items() if value is not None or name not in KEYS}
+    replaced = {name: plain(settings[name], name) for name in ("seed", "samples") if name in settings}
+    if source is not None and (others := [name for name in settings if name not in replaced]):
+        names = ", ".join(others)
         problems.append(f"{names}: given together with a source; leave one out, or write it into the source")
     if out is None:
         problems.append("out: missing; give the folder of the results")
@@ -192,7 +141,7 @@ def _checked_call(
         problems.append(f"workers: {shown(count)} is not a number of workers; give a whole number from 1")
     try:
         own = own if part is None else _part(part)
-        planned = sweep_of_keywords(keys, settings, out) if source is None else load_sweep(source, **replaced)
+        planned = sweep_of_keywords(settings, out) if source is None else load_sweep(source, **replaced)
         if device is not None:
             planned = on_device(planned, device)
     except InputError as error:
@@ -244,7 +193,7 @@ def _run_in_folder(
                 report(progress)
                 prepare(planned)
                 progress.compiling = False
-                with _threads(at_once) as (threads, pulse):
+                with pulsing_threads(at_once) as (threads, pulse):
                     _run(threads, pulse, planned, store, missing, at_once, progress, report)
         counts = counts_text(progress) or "nothing to do"
         store.log(f"complete after {progress.seconds:.1f} s: {counts}")
@@ -292,7 +241,7 @@ def run_shards(
     stamp: str,
     shards: Sequence[Shard],
     threads: int | None = None,
-    pulse: "Pulse | None" = None,
+    pulse: Pulse | None = None,
 ) -> None:
     """Run the walks of some shards and write each shard as soon as its walks are over; what a worker does.
 
@@ -328,36 +277,6 @@ def run_shards(
                 motions[shard][row] = run.recorder.motion()
             if (rows[shard]["status"] != MISSING).all():
                 write_shard(directory, stamp, shard, rows.pop(shard), motions.pop(shard))
-
-
-class Pulse:
-    """What tasks in threads of this process and their sweep tell one another.
-
-    Attributes:
-        stop: Set when the work is to be abandoned.
-        over: Number of walks that are over.
-    """
-
-    def __init__(self) -> None:
-        """Begin to count."""
-        self.stop, self.over, self._lock = threading.Event(), 0, threading.Lock()
-
-    def beat(self) -> None:
-        """Count a walk."""
-        with self._lock:
-            self.over += 1
-
-
-@contextlib.contextmanager
-def _threads(count: int) -> Iterator[tuple[Executor, Pulse]]:
-    """Threads of this process, and their pulse; launches run outside of Python's lock."""
-    pulse = Pulse()
-    with concurrent.futures.ThreadPoolExecutor(count) as threads:
-        try:
-            yield threads, pulse
-        except BaseException:
-            pulse.stop.set()
-            raise
 
 
 def prepare(planned: Sweep) -> None:

@@ -309,8 +309,10 @@ class BlockResult:
         return xarray.Dataset(variables, coordinates, {"block": self.name})
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """The block as a table with one row for each walk: values of the axes, sample, columns."""
-        return self.to_xarray().to_dataframe().reset_index()
+        """The block as a table with one row for each walk: values of the axes, sample, columns; statuses by label."""
+        table = self.to_xarray().to_dataframe().reset_index()
+        labels = {MISSING: "missing"} | {int(status): status.label for status in Status}
+        return table.assign(status=table["status"].map(labels))
 
     def variables(self) -> tuple[_Variables, _Variables]:
         """Coordinates and variables."""

@@ -147,15 +147,20 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             warnings.warn(f"{problem}; its walks are computed again", InputWarning, stacklevel=4)
 
     def _describe(self) -> None:
-        """Write what the folder says of its sweep, if that is new; sweep.yaml is never older than sweep.json."""
+        """Write what the folder says of its sweep, if that is new; sweep.yaml is never older than sweep.json.
+
+        Lines of comments that somebody has added to sweep.yaml stay, at its head.
+        """
         description = self.directory / "sweep.yaml"
+        old = description.read_text("utf-8", "replace").splitlines() if description.is_file() else []
+        comments = [line + "\n" for line in old if line.startswith("#") and line not in _YAML_HEAD]
         if read_manifest(self.directory).growth != self.manifest.growth:
             remove_output(description)
             write_whole(self.directory / "sweep.json", self.manifest.text())
         if not description.exists():
             sweep = self.manifest.sweep.canonical()
             text = yaml.safe_dump(sweep, sort_keys=False, allow_unicode=True)
-            write_whole(description, _YAML_HEAD + text)
+            write_whole(description, _YAML_HEAD + "".join(comments) + text)
 
 
 def read_rows(directory: Folder, manifest: Manifest) -> Rows:
@@ -186,7 +191,8 @@ def running_rate(directory: Folder) -> float | None:
     except BlockingIOError:
         folder = Path(directory) / "shards"
         done = sum(len(shard) for shard in present if (folder / shard.name).stat().st_mtime >= began)
-        return done / max(time.time() - began, 1e-3)
+        seconds = time.time() - began  # negative if the clock was set back
+        return done / seconds if seconds > 0 else 0.0
     except FileNotFoundError:
         pass
     return None
@@ -224,7 +230,7 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
     if found.numerics_version != NUMERICS_VERSION:
         raise InputError(
             f"{folder}: its walks are of numerics {found.numerics_version}, but this warpchain has "
-            f"{NUMERICS_VERSION}; use the version that began it, give another folder, or start anew with --fresh"
+            f"{NUMERICS_VERSION}; use the version that began it, give another folder, or start anew with fresh"
         )
     if found.part != manifest.part:
         raise InputError(
@@ -238,7 +244,7 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
     if len(there) != len(sweep.blocks) or sweep.digest(there) != digest:
         raise InputError(
             f"{folder}: holds another sweep ({found.sweep.name}), or this one before it was changed; "
-            "give another folder, or start anew with --fresh, which deletes what is there"
+            "give another folder, or start anew with fresh, which deletes what is there"
         )
     for count, block in zip(there, sweep.blocks, strict=True):
         name, asked, sampler = block.name, block.samples_given, block.sampler

@@ -220,7 +220,8 @@ def read_manifest(directory: Folder) -> Manifest:
         with open_regular(path) as file:
             text = file.read(MOST_BYTES + 1)
     except (FileNotFoundError, NotADirectoryError):
-        raise InputError(f"{directory}: no sweep in this folder; give the folder of one, or a merged file") from None
+        there = "a saved walk, no sweep" if (Path(directory) / "walk.h5").exists() else "no sweep"
+        raise InputError(f"{directory}: {there} in this folder; give the folder of one, or a merged file") from None
     if len(text) > MOST_BYTES:
         raise InputError(f"{path}: over {MOST_BYTES} bytes, the limit of a sweep.json; give the folder of a sweep")
     head, checked = _HEAD.match(text), _CHECKED.fullmatch(text)

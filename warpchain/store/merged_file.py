@@ -135,7 +135,9 @@ def _joined(results: Sequence[SweepResult]) -> SweepResult:
         blocks[first.name] = replace(first, columns=columns)
     sweeps = tuple(sweep for result in results for sweep in result.origin.sweeps)
     digests = ", ".join(result.provenance["digest"] for result in results)
-    origin = Origin(sweeps, results[0].provenance | {"digest": digests})
+    software = [result.provenance["versions"] for result in results]
+    versions = {name: ", ".join(dict.fromkeys(each[name] for each in software)) for name in software[0]}
+    origin = Origin(sweeps, results[0].provenance | {"digest": digests, "versions": versions})
     return SweepResult(blocks={name: replace(block, origin=origin) for name, block in blocks.items()}, origin=origin)
 
 

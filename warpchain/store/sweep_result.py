@@ -21,7 +21,7 @@ from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.folder import read_rows
 from warpchain.store.manifest import Folder, Manifest, read_manifest, stored_sweep
 from warpchain.store.repeated import place_of_index
-from warpchain.store.shards import opened_motions
+from warpchain.store.shards import opened_motions, stamp
 from warpchain.sweeps.block import Block
 from warpchain.walks.rows import COLUMNS, MISSING, STORED_COLUMNS, Rows, derived_columns, drawn_column, quantity_of
 from warpchain.walks.walk_result import WalkResult
@@ -37,7 +37,7 @@ Array = NDArray[Any]
 
 KIND: Final = "warpchain sweep result"
 REMEDY: Final = "merge the folders again, or fetch another copy of the file"
-WANTED: Final = "give a folder of a sweep, or a file that warpchain merge wrote"
+WANTED: Final = "give a folder of a sweep or a merged file; a saved walk is for plot, animate and load_walk"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -233,8 +233,15 @@ def load(path: Folder) -> SweepResult:
 
 
 def _load_folder(directory: Folder) -> SweepResult:
-    manifest, folder = read_manifest(directory), Path(directory).absolute()
-    present = read_rows(directory, manifest)
+    folder = Path(directory).absolute()
+    while True:
+        manifest, begun = read_manifest(directory), stamp(directory)
+        try:
+            present = read_rows(directory, manifest)
+            break
+        except (OSError, InputError):
+            if stamp(directory) == begun:  # else a run has begun anew or added samples meanwhile
+                raise
 
     def columns(block: Block) -> dict[str, Array]:
         rows = present[present["block"] == manifest.sweep.blocks.index(block)]

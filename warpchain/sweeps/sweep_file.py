@@ -6,10 +6,8 @@ that begins with the path of the offending value, such as `sweep.blocks[0].grid.
 
 import math
 import os
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from decimal import Decimal
 from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import (
@@ -22,7 +20,6 @@ from pydantic import (
     Tag,
     ValidationError,
     ValidationInfo,
-    WrapValidator,
     create_model,
     model_validator,
 )
@@ -33,11 +30,12 @@ from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.validation import (
     FIELDS,
     LONGEST_NAME,
-    MOST_VALUES,
     SECTION_OF,
     STRICT,
     SYMBOL_OF,
+    WHOLE,
     InputError,
+    Whole,
     by_name,
     field_bounds,
     full_name,
@@ -47,6 +45,7 @@ from warpchain.inputs.validation import (
     suggestion,
 )
 from warpchain.inputs.yaml_files import read_yaml
+from warpchain.sweeps.axes import AXIS_LIMIT, CELL_LIMIT, axis
 from warpchain.sweeps.block import POINT, Block, Value
 from warpchain.sweeps.designs import SAMPLERS, check_design
 from warpchain.sweeps.recording import Frames, Recording
@@ -55,10 +54,6 @@ from warpchain.sweeps.shipped import sweep_path
 VERSION: Final = 1
 """Version of the file format."""
 
-AXIS_LIMIT: Final = 10_000
-"""Most values of one axis."""
-CELL_LIMIT: Final = 100_000
-"""Most cells of a sweep, because each is checked when the sweep is loaded."""
 WALK_LIMIT: Final = 2**24
 """Most walks of a sweep, 17 million: results are read as a whole, some 700 bytes a walk, and have to fit into memory.
 
@@ -114,61 +109,6 @@ def _mapping_of(title: str, types: Mapping[str, Any]) -> Any:
 def _section(name: str) -> Any:
     """Annotation of the values of a section."""
     return _mapping_of(name, {field: _TYPES[field] for field in SECTIONS[name].model_fields})
-
-
-# Grid
-
-
-class _Range(BaseModel):
-    """Values from one to another, both included, in steps or of a number."""
-
-    model_config = STRICT
-    first: float = Field(alias="from")
-    last: float = Field(alias="to")
-    step: float | None = Field(None, gt=0)
-    count: int | None = Field(None, ge=2, le=AXIS_LIMIT)
-
-    def values(self) -> list[int | float]:
-        """All values, computed in decimals, so that three steps of 0.1 from 0 lead to 0.3 and to no other number."""
-        first, last = Decimal(str(self.first)), Decimal(str(self.last))
-        if first >= last:
-            raise InputError(f"to: {self.last} is not greater than from: {self.first}; give a greater value")
-        if (self.step is None) == (self.count is None):
-            raise InputError("step: a range needs either step or count; give one of them")
-        step = (last - first) / (self.count - 1) if self.count else Decimal(str(self.step))
-        if (last - first) / step >= AXIS_LIMIT:
-            raise InputError(f"step: gives more than {AXIS_LIMIT} values; give a larger step")
-        intervals = int((last - first) / step) if self.count is None else self.count - 1
-        below = first + intervals * step
-        if self.count is None and below != last:
-            raise InputError(
-                f"to: steps of {step} from {first} miss {last}; give {below} or {below + step}, or a count"
-            )
-        values = [first + number * step for number in range(intervals)] + [last]
-        return [int(value) if value == int(value) and abs(value) < 2**53 else float(value) for value in values]
-
-
-def _expanded(values: Any, check: Callable[[Any], list[Any]], info: ValidationInfo) -> list[Any]:
-    """The values of an axis, those of a range written out; together no more than sweeps of `CELL_LIMIT` cells have."""
-    if isinstance(values, Mapping):
-        if info.context["expanded"] > CELL_LIMIT + MOST_VALUES:  # type: ignore[index]
-            raise ValueError(f"more than {CELL_LIMIT} values in the ranges of all axes; give fewer")
-        try:
-            values = _Range.model_validate(values).values()
-        except ValidationError as error:
-            raise InputError(refusals(error, "", _KEYS)[0]) from None
-        info.context["expanded"] += len(values)  # type: ignore[index]
-    checked = check(values)
-    value, count = Counter(checked).most_common(1)[0]
-    if count > 1:
-        raise ValueError(f"{shown(value)} is given twice; leave one out")
-    return checked
-
-
-def _axis(kind: Any) -> Any:
-    """Annotation of the values of an axis, a list or a range."""
-    listed = Annotated[list[kind], Field(min_length=1, max_length=AXIS_LIMIT)]
-    return Annotated[listed, WrapValidator(_expanded, json_schema_input_type=listed | _Range)]
 
 
 # Distributions
@@ -238,7 +178,9 @@ class BlockKeys(BaseModel):
     model_config = STRICT
 
     preset: _Preset | None = Field(None, description="parameters to start from; may also be an axis of the grid")
-    samples: int | None = Field(None, ge=1, le=2**30, description="samples in each cell of the grid")
+    samples: Annotated[int, Field(ge=1, le=2**30), WHOLE] | None = Field(
+        None, description="samples in each cell of the grid"
+    )
     sampler: _Sampler | None = Field(None, description="how samples are drawn, see below; default: random")
     scene: Annotated[dict[str, Value], _section("scene")] = Field(
         {}, description="fields of the [scene](scene.md) that differ from their defaults"
@@ -254,7 +196,7 @@ class BlockKeys(BaseModel):
     ] = Field({}, description="what samples draw, see below")
     grid: Annotated[
         dict[str, list[Value]],
-        _mapping_of("grid", {"preset": _axis(_Preset), **{name: _axis(kind) for name, kind in _TYPES.items()}}),
+        _mapping_of("grid", {"preset": axis(_Preset), **{name: axis(kind) for name, kind in _TYPES.items()}}),
     ] = Field({}, description="axes of the grid, see below; not in a file with blocks")
 
     points: Annotated[
@@ -265,8 +207,7 @@ class BlockKeys(BaseModel):
         ),
     ] = Field(
         {},
-        description="parameter sets: quantity → its value in each set, lists of one length; one more axis, `point`, "
-        "beside those of the grid; not in a file with blocks",
+        description="parameter sets: quantity → its value in each; one more axis, `point`; not in a file with blocks",
     )
 
     @model_validator(mode="before")
@@ -309,7 +250,7 @@ class SweepFile(BlockKeys):
     name: Annotated[str, AfterValidator(_printable)] = Field(
         max_length=LONGEST_NAME, description="name of the sweep, in figures and pages; of a block, unique in its sweep"
     )
-    seed: int = Field(ge=0, le=LARGEST_SEED, description="whole number from which all random numbers follow")
+    seed: Whole = Field(ge=0, le=LARGEST_SEED, description="whole number from which all random numbers follow")
     blocks: list[BlockOfFile] | None = Field(
         None, min_length=1, description="list of blocks; what a block does not say is taken from the file"
     )

@@ -23,11 +23,11 @@ from warpchain.engine.control import (
     suitable_load,
 )
 from warpchain.engine.snapshot import change, restore, set_first_area, set_frame_marks, take_snapshot
+from warpchain.engine.sprocket_motion import motion_rows
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
 from warpchain.inputs.floor import body_of, circles_of, raised_by
 from warpchain.inputs.scene import contact_radius, floor_points, joint_radius, loop_speed, settling_time
 from warpchain.inputs.setup import Setup
-from warpchain.inputs.sprocket_motion import motion_rows
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
 from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError

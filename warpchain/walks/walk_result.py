@@ -406,13 +406,15 @@ def read_motion(group: "h5py.Group", links: int) -> dict[str, Any]:
 
 
 def load_walk(path: str | os.PathLike[str]) -> WalkResult:
-    """Read a walk that `WalkResult.save` wrote; every number comes back to the bit.
+    """Read a walk that `WalkResult.save` wrote, or the `walk.h5` of a folder; every number comes back to the bit.
 
     Raises:
         OSError: the file cannot be read.
         InputError: the file is no walk, or belongs to another version of warpchain. It is a `ValueError`.
         DamagedFileError: the file is damaged or cut short. It is an `InputError`.
     """
+    if os.path.isdir(path):
+        path = os.path.join(path, "walk.h5")
     remedy = "run the walk again, or fetch another copy of the file"
     with reading_hdf5(path, KIND, remedy, "give a file written by WalkResult.save") as file:
         given = json.loads(file.attrs["setup"])
