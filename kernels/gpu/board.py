@@ -59,6 +59,12 @@ def load_extremes(K: wp.array2d(dtype=wp.float64), state: State, world: int, fix
 
 
 @wp.func
+def raise_value(K: wp.array2d(dtype=wp.float64), value: int, x: wp.float32):
+    """Raises one of the chain's values on the board to x; for one thread."""
+    K[layout.BOARD_VALUES, value] = wp.max(K[layout.BOARD_VALUES, value], wp.float64(x))
+
+
+@wp.func
 def store_extremes(K: wp.array2d(dtype=wp.float64), state: State, world: int, fixed_depth: int):
     """Stores what :func:`load_extremes` has written; for one thread."""
     state.extremes[world, layout.OPENING] = K[layout.BOARD_VALUES, layout.VALUE_OPENING]

@@ -27,12 +27,13 @@ from warpchain.kernels.gpu.board import (
     load_link,
     place_of,
     publish,
+    raise_value,
     store_extremes,
     store_link,
     store_losses,
 )
 from warpchain.kernels.gpu.contacts.neighbour_list import block_list
-from warpchain.kernels.gpu.contacts.proximity import block_proximity, upper_bound
+from warpchain.kernels.gpu.contacts.proximity import block_proximity, moving_sprocket_contact, upper_bound
 from warpchain.kernels.gpu.contacts.self_contacts import block_self_contacts, touch_layout
 from warpchain.kernels.gpu.explicit import explicit_attempt
 from warpchain.kernels.gpu.functions import board_size, shares_board
@@ -70,12 +71,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     Args:
         features: What the kernel is compiled for.
         block_dim: Threads in a block, at least the number of links of every chain; on a GPU a multiple of 32.
-        registers: Greatest number of registers a thread may take on a GPU; None: as many as a block of this size can
-            have.
+        registers: Most registers of a thread on a GPU; None: as many as a block of this size can have.
 
     Arrays of the kernel:
-        scratch: (W, ≥ :func:`gpu.functions.board_rows`, columns) float64.
-        lists: As on a CPU.
+        scratch: (W, ≥ :func:`gpu.functions.board_rows`, columns) float64; lists are as on a CPU.
     """
     available = REGISTERS_OF_MULTIPROCESSOR // block_dim // 8 * 8
     if available < 255:
@@ -88,6 +87,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     has_self = features.self_contact
     tilts = features.tilts
     has_contacts = has_fixed or has_self
+    meet_sprocket = moving_sprocket_contact()
     fixed_loss, fixed_depth, fixed_count = of_fixed_body(features.fixed_body)
     reuses_last = method.reuses_last
     needs_first_power = TABLEAUS[method.tableau].velocity_weights[0] != 0.0
@@ -343,9 +343,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 opening = proximity.opening
                 gap = proximity.gap
                 if lane == 0:
-                    K[chain_values, layout.VALUE_OPENING] = wp.max(
-                        K[chain_values, layout.VALUE_OPENING], wp.float64(opening)
-                    )
+                    raise_value(K, layout.VALUE_OPENING, opening)
                 if wp.static(tilts):
                     sum_up(K, P, M, place)
                     if lane == 0:
@@ -363,6 +361,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                             hits = meet_fixed_body(K, place, ground, constants(K), drive, world, time)
                         if hits > 0:
                             wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
+                if wp.static(features.moving_sprocket):
+                    is_near = bool(True)
+                    if lane < n:
+                        hits += meet_sprocket(K, place, ground, constants(K), drive, state, world, time)
                 if wp.static(has_self):
                     slack = wp.float32(0.5) * wp.float32(control.skin) - opening - proximity.displacement
                     is_stale = not slack > wp.float32(0.0)
@@ -374,9 +376,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
                 if wp.static(has_fixed):
                     if gap < wp.float32(0.0) and lane == 0:
-                        K[chain_values, layout.VALUE_FIXED_DEPTH] = wp.max(
-                            K[chain_values, layout.VALUE_FIXED_DEPTH], wp.float64(-gap)
-                        )
+                        raise_value(K, layout.VALUE_FIXED_DEPTH, -gap)
                         if wp.static(has_floor):
                             if is_hit:
                                 count_bounce(state, world, time, K[chain_values, layout.VALUE_LAST_IMPULSE])

@@ -10,6 +10,7 @@ from warpchain.inputs.floor import Array, Points, checked_profile, slope_points
 from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import on_gpu
 from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.sprocket_motion import Motion, checked_motion
 from warpchain.inputs.validation import InputError, Section, Whole, number_field, shown
 
 MOST_LINKS: Final = 100_000
@@ -133,6 +134,11 @@ class Scene(Section):
     walk_limit: float = number_field(
         20.0, "s", "longest time from the release to rest; then the walk ends as time_limit", gt=0, le=LONGEST
     )
+    release: Annotated[Motion | None, BeforeValidator(checked_motion)] = Field(
+        default=None,
+        description="motion of the sprocket from the release on, rows [time in s, x and y in m from its place, "
+        "frequency in Hz], after whose last it vanishes; null: it vanishes at once",
+    )
     floor: Annotated[Literal["flat"] | Points, BeforeValidator(checked_profile)] = Field(
         default="flat",
         description="flat, or a profile [[x, y], …] in m, whose ends go on straight",
@@ -243,6 +249,13 @@ class Scene(Section):
                 raise InputError(
                     f"{name}: {getattr(self, name)} moves the plane of the chain, which is fixed; give plane: tilting"
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _motion_needs_sprocket(self) -> Self:
+        if self.release is not None and (self.start == "ellipse" or self.plane == "tilting"):
+            word = "start: ellipse" if self.start == "ellipse" else "plane: tilting"
+            raise InputError(f"release: a motion of the sprocket, which {word} does not go with; leave one out")
         return self
 
     @model_validator(mode="after")
