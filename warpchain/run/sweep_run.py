@@ -140,7 +140,7 @@ def _checked_call(
     if count is not None and (isinstance(count, bool) or not isinstance(count, int) or count < 1):
         problems.append(f"workers: {shown(count)} is not a number of workers; give a whole number from 1")
     try:
-        own = own if part is None else _part(part)
+        own = own if part is None else checked_part(part)
         planned = sweep_of_keywords(settings, out) if source is None else load_sweep(source, **replaced)
         if device is not None:
             planned = on_device(planned, device)
@@ -151,7 +151,7 @@ def _checked_call(
     return planned, out, own
 
 
-def _part(given: object) -> tuple[int, int]:
+def checked_part(given: object) -> tuple[int, int]:
     """Number of a part and number of parts of "k/N", or an `InputError`."""
     found = re.fullmatch(r"([1-9]\d{0,5})/([1-9]\d{0,5})", given) if isinstance(given, str) else None
     if found is None or int(found[1]) > int(found[2]):
