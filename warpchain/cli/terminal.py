@@ -10,8 +10,6 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from warpchain.engine.tallies import LOST
 from warpchain.inputs.validation import printable
@@ -44,6 +42,8 @@ def status_line(every: float = math.inf) -> Iterator[Callable[[str], None]]:
 
         yield print_now_and_then
         return
+    from rich.console import Console
+
     with Console(stderr=True).status("starting") as line:
         yield line.update
 
@@ -94,6 +94,9 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
         whole |= {"inaccurate": result.inaccurate_count, "rate": rate, "time_left": time_left, "blocks": blocks}
         print(json.dumps(whole, indent=2, allow_nan=False))
         return
+    from rich.console import Console
+    from rich.table import Table
+
     console = Console(highlight=False, markup=False)
     counts = ", ".join(f"{count:,} {label}" for label, count in summary.items() if count or label == "at_rest")
     console.print(f"{printable(result.name)}: {result.walk_count:,} walks, {counts}")
@@ -132,12 +135,10 @@ def json_value(given: Any) -> Any:
 
 def print_walk(result: WalkResult) -> None:
     """Print the results of a walk on standard output."""
-    table = Table(box=None, show_header=False, pad_edge=False)
-    table.add_column(style="bold", no_wrap=True)
-    table.add_column()
-    for row in _walk_rows(result):
-        table.add_row(*row)
-    Console(highlight=False, markup=False).print(table)
+    rows = list(_walk_rows(result))
+    width = max(len(name) for name, _ in rows)
+    for name, value in rows:
+        print(f"{name:<{width}}  {value}")
 
 
 def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:
