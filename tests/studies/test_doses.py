@@ -22,7 +22,7 @@ def test_a_release_is_that_of_its_walk() -> None:
 
 
 def test_a_drag_acts_when_it_should(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In flight and in impacts add up to always; none at all is dragged for no time."""
+    """In flight and in impacts add up to always, but for chaos; none at all is dragged for no time."""
     monkeypatch.setattr(drag, "LATEST", 0.2)
     monkeypatch.setattr(drag, "END", 0.2)
     whole, flight, impacts = (drag.Variant(50.0, *when) for when in ((True, True), (True, False), (False, True)))
@@ -30,7 +30,7 @@ def test_a_drag_acts_when_it_should(monkeypatch: pytest.MonkeyPatch) -> None:
     state = [each[None] for each in drag.released(60, 15.0, 7)]
     found = drag.Loops(*state, "cpu").walk()["dragged_for"][:, 0]
     assert found[0] == 0 and found[1] == pytest.approx(0.2)
-    assert 0.02 < found[3] < found[2] < found[1]
+    assert 0.02 < min(found[2:]) and found[2] + found[3] == pytest.approx(0.2, abs=0.05)
 
 
 def test_the_page_has_the_tables_of_the_file() -> None:
