@@ -99,9 +99,7 @@ def separations_tables() -> str:
             chosen = (links == number) & (apart >= least)
             firsts = [time[chosen & (walks == walk)].min() for walk in np.unique(walks[chosen])]
             most = len(firsts) > len(FREQUENCIES) * len(RELEASES) / 2
-            texts.append(
-                f"{np.median(firsts):.2f} ({len(firsts)})" if len(firsts) > all_walks / 2 else f"({len(firsts)})"
-            )
+            texts.append(f"{np.median(firsts):.2f} ({len(firsts)})" if most else f"({len(firsts)})")
         lines.append((f"{number} links", *texts))
     second = table(["first touch at least m apart", *(f"m = {least}" for least in LEAST)], lines)
     return f"{first}\n\n{second}"
