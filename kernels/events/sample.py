@@ -39,10 +39,10 @@ def sampling(fixed_body: str, tilts: bool = False):
     [s] are arguments: on a GPU they are not in the state.
 
     Args:
-        fixed_body: On a ``"sprocket"`` it watches until the loop is stationary, on the ``"floor"`` until it is at rest.
+        fixed_body: On a ``"sprocket"`` it watches until the loop is stationary, on a floor until it rests or is far.
         tilts: Whether the plane of the chain may move; its sums must be those of the present state.
     """
-    has_floor = fixed_body == "floor"
+    has_floor = fixed_body not in ("none", "sprocket")
     is_driven = fixed_body == "sprocket"
 
     @wp.func
@@ -93,7 +93,7 @@ def sampling(fixed_body: str, tilts: bool = False):
         if wp.static(tilts):
             watch_fall(P, state, world, time)
         if wp.static(has_floor):
-            return watch_rest(state, control, world, time, summary, last_floor_impulse)
+            return watch_rest(state, drive, control, world, time, summary, last_floor_impulse)
         if wp.static(is_driven):
             if state.load_factor[world] > wp.float64(1.0):
                 rate = drag_rate(chain, state, drive, world, summary.height)

@@ -8,8 +8,8 @@ from warpchain.kernels.events.present_chain import has_changed, present_chain
 from warpchain.kernels.events.sample import next_mark, sampling
 from warpchain.kernels.events.softening import book_softening, contact_step, spring_tolerance
 from warpchain.kernels.features import Features
-from warpchain.kernels.gpu.board import write_constants
 from warpchain.kernels.gpu.contacts.self_contacts import TouchLayout
+from warpchain.kernels.gpu.stage import write_constants
 from warpchain.kernels.gpu.threads import clock
 from warpchain.kernels.layout import (
     BOARD_VALUES,
@@ -22,7 +22,7 @@ from warpchain.kernels.layout import (
     VALUE_STOP_TIME,
     VALUE_TOLERANCE,
 )
-from warpchain.kernels.physics.scaled_loads import write_inertias
+from warpchain.kernels.physics.scaled_loads import write_links
 from warpchain.kernels.types import Control, Drive, Model, Record, State
 
 wp.set_module_options({"enable_backward": False})
@@ -81,7 +81,7 @@ def block_sample(features: Features, touch: TouchLayout):
             book_softening(chain, after, state, world)
             write_constants(K, after)
             if wp.static(is_driven):
-                write_inertias(K, after)
+                write_links(K, model, world, state.load_factor[world])
         write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
         write_marks(K, state, control, world)
         if clock() > K[BOARD_VALUES, VALUE_DEADLINE]:

@@ -1,7 +1,6 @@
 """`warpchain bench`: its model against an independent one, its steps against counts, and the command itself."""
 
 import json
-import math
 from pathlib import Path
 
 import numpy as np
@@ -46,15 +45,6 @@ def test_scipy_ends_where_the_engine_does() -> None:
     assert flight.attempts > 10 and flight.seconds > 0
 
 
-def test_errors_are_distances() -> None:
-    """A link moved by (3, 4) µm is 5 µm off, whatever its angle; so are velocities."""
-    start = flights.flying(8)
-    moved = start[0].copy(), start[1].copy()
-    moved[0][3] += [3e-6, 4e-6, 1.0]
-    moved[1][5] += [0.3, -0.4, 9.0]
-    assert flights.errors(moved, start) == (pytest.approx(5e-6), pytest.approx(0.5))
-
-
 @pytest.mark.parametrize("device", ["cpu", "fibers"])
 def test_steps_are_those_of_a_flight(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is timed is the flight after its first millisecond."""
@@ -69,30 +59,6 @@ def test_steps_are_those_of_a_flight(device: str, monkeypatch: pytest.MonkeyPatc
     assert np.array_equal(flight.compared[0], first.position[-1])
     assert flight.accepted == whole.steps_accepted - first.steps_accepted > 10
     assert flight.rejected == whole.steps_rejected - first.steps_rejected
-
-
-def test_costs_follow_from_times_and_counts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A step's time is the median over the rounds by attempts and chains; the tolerance is that of the flight."""
-    start = flights.flying(4)
-    times = iter([4.0, 1.0, 2.0] * len(method_names()))
-    order: list[str] = []
-
-    def fake(start: flights.State, method: str, chains: int, device: str) -> flights.Flight:
-        order.append(method)
-        return flights.Flight(start, next(times), accepted=90, rejected=10)
-
-    monkeypatch.setattr(flights, "fly", fake)
-    monkeypatch.setattr(flights, "COMPARED_TIME", 1e-5)
-    costs = flights.step_costs("cpu", links=[4], chains=5, rounds=3, report=lambda line: None)
-    assert order == list(method_names()) * 3
-    *ours, scipy = costs
-    assert [cost.method for cost in ours] == list(method_names())
-    for cost in ours:
-        assert cost.links == len(start[0]) and cost.rejected == pytest.approx(0.1)
-        assert cost.step == pytest.approx((flights.TIMED - 1e-5) / 90)
-    assert {cost.method: cost.tolerance for cost in ours} == dict.fromkeys(method_names(), 1e-6) | {"hybrid": 1e-3}
-    assert scipy.method == flights.SCIPY and math.isnan(scipy.rejected) and scipy.microseconds > 0
-    assert scipy.position_error < 1e-9
 
 
 def test_a_rate_is_walks_by_time(monkeypatch: pytest.MonkeyPatch) -> None:

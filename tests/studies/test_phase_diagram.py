@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import warpchain
-from studies.common import with_tables
-from studies.phase_diagram import candidates, cells, laws, run, scales, tables
+from studies.phase_diagram import candidates, cells, laws, run, scales
 from studies.phase_diagram.endings import Ending, endings
 from tests.support.made_sweeps import distance, make_sweep
 from warpchain import InputError, Status
@@ -111,24 +110,6 @@ def test_parts_that_do_not_belong_together_are_refused(tmp_path: Path) -> None:
     assert len(read(first, tmp_path / "apart")) == 7
 
 
-def test_an_ending_is_compared_with_the_others_of_its_cell() -> None:
-    """Its walks are none of the others; a cell with few walks on either side tells nothing."""
-    counted = {f"{dx}{way.label}": np.zeros(3) for way in cells.WAYS for dx in ("", "dx_")}
-    counted |= {f"dx_{way.label}": np.full(3, math.nan) for way in cells.WAYS}
-    for way, number, distance_ in (
-        (Ending.FIRST, [200, 19, 900], [1.0, 1.0, 3.0]),
-        (Ending.SECOND, [100, 500, 0], [2.0, 2.0, math.nan]),
-        (Ending.LATER, [300, 500, 19], [4.0, 2.0, 1.0]),
-    ):
-        counted[way.label], counted[f"dx_{way.label}"] = np.array(number, float), np.array(distance_)
-    np.testing.assert_allclose(tables.over_others(counted, [Ending.FIRST]), [1 / 3.5, math.nan, math.nan])
-    np.testing.assert_allclose(tables.over_others(counted, [Ending.SECOND], [Ending.LATER]), [0.5, 1.0, math.nan])
-    both = tables.over_others(counted, [Ending.FIRST, Ending.SECOND])
-    np.testing.assert_allclose(both, [4 / 3 / 4, (19 + 1000) / 519 / 2, math.nan])
-    assert tables.text_of_ratios(both) == "0.658 (0.33 to 0.98, 2 cells)"
-    assert tables.text_of_ratios(both[2:]) == "" and tables.text_of_ratios(both[1:]) == "0.982 (one cell)"
-
-
 def made_cells(exponent: float, power: float, noise: float = 0.0) -> dict[str, np.ndarray]:
     """Cells of the law Δx = n^power F(ν n^exponent), with a curve F that is no power."""
     links, frequency = (axis.ravel() for axis in np.meshgrid(np.arange(30.0, 241, 10), np.arange(3.0, 61, 3)))
@@ -149,21 +130,6 @@ def test_the_search_finds_the_exponent_of_a_made_law(exponent: float) -> None:
     fitting = {-0.5: "Δx/(nℓ) over v²/(g nℓ)", 0.0: "Δx/(nℓ) over ν²ℓ/g"}.get(exponent)
     left = {law.name: laws.rms_residual(law.x(points), law.y(points)) for law in laws.CANDIDATES}
     assert all((value < 0.5) == (name == fitting) for name, value in left.items()), left
-
-
-def test_both_exponents_are_found() -> None:
-    """The power of n beside the variable is found where the curve is no power law."""
-    c, d = laws.best_powers(laws.points_of(made_cells(-0.8, 0.4)))
-    assert (c, d) == (pytest.approx(-0.8, abs=0.01), pytest.approx(0.4, abs=0.02))
-
-
-def test_errors_are_those_of_the_noise() -> None:
-    """The residual is that of the noise in per cent, and the exponent is right within a few of its errors."""
-    points = laws.points_of(made_cells(-0.5, 1.0, noise=0.05))
-    x = points.frequency * points.links**-0.5
-    assert laws.rms_residual(x, points.distance / points.length) == pytest.approx(5.0, rel=0.1)
-    (error,) = laws.bootstrap(points, laws.best_variable)
-    assert 0 < error < 0.05 and abs(laws.best_variable(points) + 0.5) < 4 * error
 
 
 def test_a_power_law_is_found() -> None:
@@ -231,20 +197,6 @@ def test_the_exponents_of_a_made_time_are_found(exponents: tuple[float, float, f
     assert np.abs(curve.left(found, exponents)).max() < 1e-12
     assert np.abs(curve.left(found, (0.0, 0.0, 0.0))).max() > 0.1
     assert curve.best_exponents(found, np.arange(20)) == pytest.approx(exponents, abs=1e-4)
-
-
-def test_the_page_has_the_tables_of_the_files() -> None:
-    """All tables but that of the laws, with its bootstrap, are rendered from the committed files."""
-    found = cells.read_csv()
-    page = (run.FOLDER / "README.md").read_text(encoding="utf-8")
-    made = {name: render(found) for name, render in tables.TABLES.items() if name != "scaling"}
-    ends = cells.read_csv(cells.ENDINGS)
-    made["endings"] = tables.table_of_endings(ends)
-    made["walking time"] = candidates.walking_time(found)
-    made["scales"] = scales.table(scales.Cells(cells.read_rows(scales.CSV)), scales.Curve(found))
-    assert with_tables(page, made) == page, "out of date; run python -m studies.phase_diagram.run"
-    assert np.array_equal(ends["told"], sum(ends[way.label] for way in cells.WAYS))
-    assert np.array_equal(found["walks"], found["at_rest"] + sum(found[code.label] for code in cells.FAILURES))
 
 
 @pytest.mark.slow

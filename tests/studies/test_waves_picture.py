@@ -6,18 +6,13 @@ import numpy as np
 import pytest
 
 from studies.waves.fields import (
-    Impact,
     characteristic,
     curvatures,
-    floor_contacts,
-    impacts,
     in_room,
     joints_below,
     normal_velocities,
-    self_contacts,
     stacked_power,
     tensions,
-    wave_speeds,
 )
 from studies.waves.picture import waves_figure
 from tests.support.made_walks import make_walk
@@ -92,38 +87,6 @@ def test_in_the_room_one_wave_stands_and_one_runs_twice_as_fast() -> None:
     fast = in_room(curvatures(ring(time, bumps=wave(time, SPEED)), LENGTH), below, 2 * LINKS)
     moved = np.unwrap(np.argmax(fast, axis=1).astype(float), period=2 * LINKS)
     assert (moved[-1] - moved[0]) / 2 * LENGTH == pytest.approx(2 * SPEED * 0.05, rel=0.03)
-
-
-def test_speed_of_waves() -> None:
-    """c = √(Tℓ/m̄), which is v under the tension m̄v²/ℓ of a ring; no speed under pressure."""
-    tension = np.array([0.0025 * 3.0**2 / LENGTH, 0.0, -4.0])
-    np.testing.assert_allclose(wave_speeds(tension, LENGTH, 0.0025), [3.0, 0.0, 0.0], rtol=1e-12)
-
-
-def test_contacts_and_impacts() -> None:
-    """The floor touches within 2 % of the radius; neighbours do not touch each other; 10 ms without contact end one."""
-    time = np.arange(50) * 1e-3
-    joints = ring(0.0 * time)
-    joints[..., 1] += 1.0
-    assert not floor_contacts(joints, 0.004).any() and not self_contacts(joints, 0.004).any()
-    joints[5:9, 3, 1], joints[12, 7, 1], joints[30, 8, 1], joints[31, 8, 1] = 0.00407, 0.004, 0.003, 0.0041
-    touching = floor_contacts(joints, 0.004)
-    assert list(zip(*np.nonzero(touching), strict=True)) == [
-        *((frame, 3) for frame in (5, 6, 7, 8)),
-        (12, 7),
-        (30, 8),
-    ]
-    assert impacts(time, joints, touching) == [Impact(5, 3, 12, 7), Impact(30, 8, 30, 8)]
-    assert impacts(time, joints, np.zeros_like(touching)) == []
-    outwards = (joints[0] - joints[0].mean(axis=0)) / RADIUS
-    for frame, joint, other, distance in (
-        (20, 30, 10, 0.0081),
-        (21, 11, 10, 0.001),
-        (22, 0, 39, 0.001),
-        (23, 12, 10, 0),
-    ):
-        joints[frame, joint] = joints[frame, other] + distance * outwards[other]
-    assert list(zip(*np.nonzero(self_contacts(joints, 0.004)), strict=True)) == [(20, 10), (20, 30), (23, 10), (23, 12)]
 
 
 def bouncing_ring(interval: float = 2e-4, **changes: Any) -> WalkResult:
