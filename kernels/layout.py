@@ -89,7 +89,7 @@ ACCEPTED, REJECTED, FLOOR_IMPULSES, SPROCKET_IMPULSES, SELF_IMPULSES, BOUNCES, L
 COUNT_ROWS = 8
 
 # Links at least so far apart along the chain that touch are strands of the loop, and no crease of one of them: from
-# 12 to 24 the first touch of long chains comes at the same time.
+# 12 to 20 the first touch of long chains comes at the same time.
 STRANDS_APART = 16
 
 # State.extremes

@@ -12,7 +12,9 @@ import numpy as np
 from studies.common import table
 from studies.paper import further_tables as tables
 from studies.paper.claims import CLAIMS
+from studies.paper.figure5 import figure5_table
 from studies.paper.findings import changes, percent
+from studies.paper.separations import separations_tables
 from studies.paper.statistics import Effect, summary
 from studies.paper.verdicts import Bounds, Verdict, scaled
 from warpchain import Parameters
@@ -47,6 +49,8 @@ def page(numbers: Numbers) -> str:
         "sliding": tables.sliding_table(numbers),
         "distributions": tables.distributions_table(numbers),
         "thresholds": thresholds_table(numbers),
+        "figure5": figure5_table(),
+        "separations": separations_tables(),
         "impacts": impacts_table(numbers),
         "effects": effects_table(numbers),
         "friction": friction_table(numbers),

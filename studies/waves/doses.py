@@ -94,6 +94,16 @@ def summary_table(rows: Sequence[Row]) -> str:
     return table(head, lines).replace("-", "−").replace("−−−", "---")
 
 
+def tables(rows: Sequence[Row]) -> dict[str, str]:
+    """The tables of the page by their markers."""
+    halves = [(when, rate) for when in ("in flight", "in impacts") for rate in HALVES]
+    return {
+        "doses": _changes_table(rows, [("always", rate) for rate in RATES]),
+        "halves": _changes_table(rows, halves),
+        "all doses": summary_table(rows),
+    }
+
+
 def main(files: Annotated[list[Path] | None, typer.Argument()] = None) -> None:
     """Reduce files that are given, and write the tables."""
     if files:
@@ -101,14 +111,7 @@ def main(files: Annotated[list[Path] | None, typer.Argument()] = None) -> None:
         write_text(
             RESULTS, "\n".join([",".join(lines[0]), *(",".join(map(str, line.values())) for line in lines)]) + "\n"
         )
-    rows = read()
-    halves = [(when, rate) for when in ("in flight", "in impacts") for rate in HALVES]
-    tables = {
-        "doses": _changes_table(rows, [("always", rate) for rate in RATES]),
-        "halves": _changes_table(rows, halves),
-        "all doses": summary_table(rows),
-    }
-    write_tables(FOLDER / "README.md", tables)
+    write_tables(FOLDER / "README.md", tables(read()))
 
 
 if __name__ == "__main__":
