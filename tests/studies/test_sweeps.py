@@ -34,6 +34,7 @@ def path_of(name: str) -> Path:
         ("softened_drive", {"main": (4, 3, 2, 200)}),
         ("film_bank", {"main": (1, 4, 4, 512)}),
         ("film_bank_90", {"main": (1, 3, 4, 512)}),
+        ("film_pair", {"main": (1, 2, 2, 128)}),
         ("film_truths", dict.fromkeys(("same", "tangential", "heavier"), (1, 2, 4, 128))),
         ("film_truths_paper", {"main": (1, 2, 4, 128)}),
         ("floor_friction", {"spinning": (5, 3, 7, 100), "rest": (5, 3, 7, 100)}),
