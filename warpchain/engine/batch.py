@@ -304,9 +304,10 @@ class Batch:
         return time.perf_counter() - before
 
     def start(self, groups: Mapping[Features, Sequence[int]], attempts: int) -> None:
-        """Begin to carry on groups of worlds, each with its own features, by at most this many attempts; until :meth:`finish` the host may not read the worlds.
+        """Begin to carry on groups of worlds, each with its own features, by at most this many attempts.
 
-        On a GPU this returns at once, and launches of other batches go on at the same time.
+        Until :meth:`finish` the host may not read the worlds. On a GPU this returns at once, and launches of other
+        batches go on at the same time.
         """
         self.control.attempts = attempts
         arrays = [self.model, self.drive, self.state, self.record, self.scratch, self.lists, self.control]
