@@ -306,8 +306,7 @@ class Batch:
     def start(self, groups: Mapping[Features, Sequence[int]], attempts: int) -> None:
         """Begin to carry on groups of worlds, each with its own features, by at most this many attempts.
 
-        Until :meth:`finish` the host may not read the worlds. On a GPU this returns at once, and launches of other
-        batches go on at the same time.
+        Until :meth:`finish` the host may not read the worlds. On a GPU this returns at once.
         """
         self.control.attempts = attempts
         arrays = [self.model, self.drive, self.state, self.record, self.scratch, self.lists, self.control]
