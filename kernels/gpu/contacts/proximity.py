@@ -95,9 +95,9 @@ def block_proximity(features: Features, block_dim: int):
         write_maxima(memory, place.lane, values)
 
     @wp.func
-    def read_proximity(memory: wp.uint64, links: int) -> Proximity:
+    def read_proximity(memory: wp.uint64) -> Proximity:
         """Maxima over all links, after a barrier."""
-        values = read_maxima(memory, links)
+        values = read_maxima(memory)
         proximity = Proximity()
         proximity.opening = quick_root(wp.cast(values[0], wp.float32))
         proximity.gap = -from_order_key_single(values[1])
