@@ -71,10 +71,6 @@ def sweep(
         return
     if folder is None:
         raise InputError("--output: missing; give a folder for the results with -o DIR")
-    if device is not None and gpus is None and scheduler is None:
-        from warpchain.engine.devices import start_early
-
-        start_early(device)
     from warpchain.cli.terminal import print_sweep
     from warpchain.run.sweep_run import sweep as run
 
