@@ -111,17 +111,6 @@ def total_energy(position: Array, velocity: Array, parameters: Parameters, *, gr
     return energy + gravitational_energy(position, parameters) if gravity else energy
 
 
-def friction_power(velocity: Array, parameters: Parameters) -> float:
-    """Power that joint friction dissipates, Σ f(w) w with w = θ̇_i − θ̇_{i+1}, W."""
-    spin = velocity[:, 2] - np.roll(velocity[:, 2], -1)
-    return float(np.sum(friction_torque(spin, parameters) * spin))
-
-
-def damping_power(position: Array, velocity: Array, parameters: Parameters) -> float:
-    """Power that joint damping dissipates, Σ b |Ċ|², W."""
-    return float(parameters.joint_damping * np.sum(joint_opening_rate(position, velocity, parameters) ** 2))
-
-
 def linear_momentum(velocity: Array, parameters: Parameters) -> Array:
     """Σ m Ẋ, (2,), kg m/s."""
     return link_masses(len(velocity), parameters) @ velocity[:, :2]
