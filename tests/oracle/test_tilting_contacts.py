@@ -12,7 +12,7 @@ from tests.support.tilted_chains import tilted_heap
 from warpchain.inputs.parameters import preset
 
 PAPER = preset("paper")
-HEAPS = range(300)
+HEAPS = range(150)
 
 
 def passed(seed: int):
@@ -103,4 +103,4 @@ def test_pass_keeps_the_laws():
             assert push > 0 and along <= parameters.floor_friction * push + 1e-11 * np.linalg.norm(each.impulse)
         merged += result.merging_loss > 1e-6 * before
         touched.append(len(result.impulses))
-    assert max(touched) >= 10 and np.mean(touched) > 2 and merged > 50
+    assert max(touched) >= 10 and np.mean(touched) > 2 and merged > 25

@@ -85,7 +85,7 @@ def fly(
     tolerance: float = 1e-9,
     longest_step: float | None = None,
 ) -> Batch:
-    """A flight without a floor that must reach its end without contacts; the batch afterwards.
+    """A flight that must reach its end without contacts; the batch afterwards.
 
     Args:
         start: of the chain.
@@ -97,9 +97,9 @@ def fly(
     """
     options = Options(method=method, tolerance=tolerance)
     batch = tilting_batch([start], [parameters], options, duration, longest_step=longest_step)
-    batch.run([0], batch.features(fixed_body="none", tilts=True))
+    batch.run([0], batch.features(fixed_body="floor", tilts=True))
     assert batch.status(0) == Status.FINISHED
-    assert batch.counts(0)["self"] == 0
+    assert batch.counts(0)["self"] == batch.counts(0)["floor"] == 0
     return batch
 
 
