@@ -104,7 +104,7 @@ def tapped(links, spins, times, parameters=SOFT):
     position, velocity = tapped_ring(links, parameters, SPEED, spins)
     motion = warpchain.simulate(
         parameters,
-        position + [0.0, 1.0, 0.0],  # above the floor
+        position + np.array([0.0, 1.0, 0.0]),  # above the floor
         velocity,
         float(times[-1]),
         times=times,
