@@ -6,7 +6,6 @@ import shlex
 import stat
 import subprocess
 import sys
-from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -73,17 +72,16 @@ def reduced(sweep: Any) -> Any:
 
 
 def test_no_block_is_left_out_silently() -> None:
-    """Each block is Python or shell that is run, a file that is shown, or is marked with a reason; so many are."""
-    reasons: Counter[str] = Counter()
+    """Each block is Python or shell that is run, a file that is shown, or is marked with a reason that counts."""
+    reasons = []
     for page in PAGES:
         for block in code_blocks(page):
             assert block.language in ("python", "sh", "yaml", "text", "mermaid"), (name_of(page), block)
             if block.reason is not None:
-                reasons[block.reason] += 1
+                reasons.append(block.reason)
             elif block.language == "sh":
                 assert "warpchain" in block.code, f"{name_of(page)}: nothing of it is run; say so\n{block.code}"
     assert set(reasons) <= set(REASONS)
-    assert reasons == {"needs a GPU": 6, "needs a cluster": 2, "takes minutes": 2, "sets up an environment": 3}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
