@@ -110,18 +110,6 @@ def test_they_do_not_change_the_walk() -> None:
         assert (walk.steps_accepted, walk.steps_rejected) == (plain.steps_accepted, plain.steps_rejected)
 
 
-def test_nothing_is_kept_of_the_time_under_load() -> None:
-    """A long record begins when the loop has its own loads again; if they were never multiplied, with the hold."""
-    whole = brief_walk(record_before=1e3, frame_interval=1e-3)
-    before = whole.before_release
-    assert before is not None
-    period = 40 * preset("soft").link_length / (2 * np.pi * 12.0 * 0.0598)
-    assert 0.5 + period < -before.frame_time[0] < 0.5 + 3 * period < whole.hold_time
-    own = brief_walk(record_before=1e3, frame_interval=1e-3, load_factor=1.0, steady_time=0.2, steady_tolerance=0.2)
-    assert own.before_release is not None
-    assert own.before_release.frame_time[0] == pytest.approx(-own.hold_time, abs=1e-9)
-
-
 def test_by_default_half_a_second_is_kept_with_frames() -> None:
     """Frames bring 0.5 s of the time before; an ellipse has none, and a chain that was never released neither."""
     before = brief_walk().before_release

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-import warpchain
-from studies.phase_diagram import cells, laws, run, scales, tables
+from studies.phase_diagram import cells, laws, run, tables
 from studies.phase_diagram.endings import Ending, endings
 from tests.support.made_sweeps import distance, make_sweep
-from warpchain import InputError, Status
+from warpchain import Status
 from warpchain.sweeps.plan import PlannedWalk
 
 NAN = math.nan
@@ -86,28 +85,6 @@ def test_parts_are_reduced_together(tmp_path: Path) -> None:
     assert math.isnan(failed["dx_mean"]) and math.isnan(failed["dx_sd"]) and math.isnan(failed["dx_50"])
 
 
-def read(*paths: Path) -> dict[tuple[int, float], dict[str, np.ndarray]]:
-    """The walks of some parts by cell."""
-    return cells.walks_by_cell([warpchain.load(path) for path in paths])
-
-
-def test_parts_that_do_not_belong_together_are_refused(tmp_path: Path) -> None:
-    """The same walks twice, or walks of another kind, would make wrong statistics; the device does not matter."""
-    first = tmp_path / "first"
-    make_sweep(first, SWEEP)
-    for name, change, message in (
-        ("again", {"name": "again"}, "walks of another part, the seed is the same"),
-        ("scene", {"seed": 2, "scene": {"start": "rest"}}, "other settings than the parts before"),
-        ("axes", {"seed": 2, "grid": {"links": [60]}}, "give a sweep of links and frequency"),
-    ):
-        make_sweep(tmp_path / name, SWEEP | change)
-        with pytest.raises(InputError, match=message):
-            read(first, tmp_path / name)
-    apart = {"seed": 3, "grid": {"links": [120], "frequency": [3]}, "options": {"device": "cpu"}}
-    make_sweep(tmp_path / "apart", SWEEP | apart)
-    assert len(read(first, tmp_path / "apart")) == 7
-
-
 def made_cells(exponent: float) -> dict[str, np.ndarray]:
     """Cells of the law Δx = n F(ν n^exponent), with a curve F that is no power."""
     links, frequency = (axis.ravel() for axis in np.meshgrid(np.arange(30.0, 241, 10), np.arange(3.0, 61, 3)))
@@ -127,32 +104,6 @@ def test_the_search_finds_the_exponent_of_a_made_law(exponent: float) -> None:
     fitting = {-0.5: "Δx/(nℓ) over v²/(g nℓ)", 0.0: "Δx/(nℓ) over ν²ℓ/g"}.get(exponent)
     left = {law.name: laws.rms_residual(law.x(points), law.y(points)) for law in laws.CANDIDATES}
     assert all((value < 0.5) == (name == fitting) for name, value in left.items()), left
-
-
-@pytest.mark.parametrize("exponents", [(-0.5, 0.5, 0.0), (-0.5, 0.0, 0.5), (-0.3, 0.1, 0.2)])
-def test_the_exponents_of_a_made_time_are_found(exponents: tuple[float, float, float]) -> None:
-    """Cells whose Δx is the curve's with some time have no residual with it, and its exponents are found."""
-    curve = scales.Curve(cells.read_csv())
-    rows = []
-    for gravity, radius, link in [
-        (9.809, 0.06, 0.0127),
-        (4.0, 0.06, 0.0127),
-        (9.809, 0.1, 0.0127),
-        (9.809, 0.06, 0.02),
-    ]:
-        for links, frequency in [(60, 6), (60, 12), (120, 12), (120, 24), (180, 24)]:
-            ratios = np.array([gravity, radius, link]) / np.array(scales.NORMAL)
-            turns = 2 * np.pi * radius * frequency / (links * link) * np.prod(ratios ** np.array(exponents))
-            dx = links * link * curve(np.array([turns]))[0]
-            row = {"block": "gravity", "links": links, "frequency": frequency, "gravity": gravity, "radius": radius}
-            row |= {"link_length": link, "walks": 10, "at_rest": 10, "dx_mean": dx}
-            rows.append({name: str(value) for name, value in row.items()})
-    rows.append(rows[0] | {"at_rest": "9", "dx_mean": "1000"})  # too many failures
-    found = scales.Cells(rows)
-    assert len(found.names) == 20
-    assert np.abs(curve.left(found, exponents)).max() < 1e-12
-    assert np.abs(curve.left(found, (0.0, 0.0, 0.0))).max() > 0.1
-    assert curve.best_exponents(found, np.arange(20)) == pytest.approx(exponents, abs=1e-4)
 
 
 @pytest.mark.slow

@@ -6,13 +6,9 @@ import numpy as np
 import pytest
 
 from studies.waves.fields import (
-    Impact,
     characteristic,
     curvatures,
-    floor_contacts,
-    impacts,
     normal_velocities,
-    self_contacts,
     stacked_power,
     tensions,
 )
@@ -74,32 +70,6 @@ def test_a_wave_follows_its_characteristic(speed: float) -> None:
     assert max(power) > 0.97 and min(power) < 0.2
     assert stacked_power(bend, path - path[0], (3, 3)) > 0.97 > 0.2 > stacked_power(bend, path[0] - path, (3, 3))
     assert stacked_power(np.ones((5, LINKS)), np.arange(5.0)) == 0.0
-
-
-def test_contacts_and_impacts() -> None:
-    """The floor touches within 2 % of the radius; neighbours do not touch each other; 10 ms without contact end one."""
-    time = np.arange(50) * 1e-3
-    joints = ring(0.0 * time)
-    joints[..., 1] += 1.0
-    assert not floor_contacts(joints, 0.004).any() and not self_contacts(joints, 0.004).any()
-    joints[5:9, 3, 1], joints[12, 7, 1], joints[30, 8, 1], joints[31, 8, 1] = 0.00407, 0.004, 0.003, 0.0041
-    touching = floor_contacts(joints, 0.004)
-    assert list(zip(*np.nonzero(touching), strict=True)) == [
-        *((frame, 3) for frame in (5, 6, 7, 8)),
-        (12, 7),
-        (30, 8),
-    ]
-    assert impacts(time, joints, touching) == [Impact(5, 3, 12, 7), Impact(30, 8, 30, 8)]
-    assert impacts(time, joints, np.zeros_like(touching)) == []
-    outwards = (joints[0] - joints[0].mean(axis=0)) / RADIUS
-    for frame, joint, other, distance in (
-        (20, 30, 10, 0.0081),
-        (21, 11, 10, 0.001),
-        (22, 0, 39, 0.001),
-        (23, 12, 10, 0),
-    ):
-        joints[frame, joint] = joints[frame, other] + distance * outwards[other]
-    assert list(zip(*np.nonzero(self_contacts(joints, 0.004)), strict=True)) == [(20, 10), (20, 30), (23, 10), (23, 12)]
 
 
 def bouncing_ring(interval: float = 2e-4, **changes: Any) -> WalkResult:
