@@ -4,101 +4,22 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
 import warpchain
 from tests.oracle_model import motion_equations
+from tests.support.rigid_chains import PAPER, exact_rigid_flight, loop, projected, rigid_motion
 from warpchain import Parameters, Status, preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain
 from warpchain.kernels.methods.w_tableaus import ROS34PW2
 
 Array = NDArray[np.float64]
 
-PAPER, SOFT = preset("paper"), preset("soft")
+SOFT = preset("soft")
 SMOOTH = PAPER.with_values({"friction_smoothing": 20.0})
 LENGTHS = (4, 6, 8, 10, 12, 14, 16, 22, 60)
 """Every way in which a loop is cut into eight segments: less than a link each, full ones, short ones, one of each."""
 MOMENT = 1e-9
 """Duration [s] of a run in which nothing moves."""
-
-
-# --- by dense algebra ---
-
-
-def constraint_matrix(position: Array, parameters: Parameters) -> Array:
-    """G = ∂C/∂q of all joints, (2n, 3n)."""
-    n = len(position)
-    turned = parameters.link_length / 2 * np.column_stack([-np.sin(position[:, 2]), np.cos(position[:, 2])])
-    matrix = np.zeros((n, 2, n, 3))
-    for left in range(n):
-        right = (left + 1) % n
-        for d in range(2):
-            matrix[left, d, right, d] += 1
-            matrix[left, d, left, d] -= 1
-        matrix[left, :, right, 2] -= turned[right]
-        matrix[left, :, left, 2] -= turned[left]
-    return matrix.reshape(2 * n, 3 * n)
-
-
-def masses(n: int, parameters: Parameters) -> Array:
-    """Diagonal of M, (3n,)."""
-    mass = motion_equations.link_masses(n, parameters)
-    return np.column_stack([mass, mass, motion_equations.link_inertias(n, parameters)]).ravel()
-
-
-def rigid_motion(position: Array, velocity: Array, parameters: Parameters) -> tuple[Array, Array]:
-    """Accelerations (n, 3) and joint forces (n, 2) on rigid joints: M v̇ + Gᵀ F = Q and C̈ = 0, solved as one matrix.
-
-    G v̇ = −Ġ v, and C̈ = G v̇ + a (u ω² + u' ω'²); −F acts along ∂C/∂q because F pulls the left link forwards.
-    """
-    n = len(position)
-    forces = np.zeros((n, 3))
-    forces[:, 1] = -parameters.gravity * motion_equations.link_masses(n, parameters)
-    torque = motion_equations.friction_torque(velocity[:, 2] - np.roll(velocity[:, 2], -1), parameters)
-    forces[:, 2] = np.roll(torque, 1) - torque
-    inward = velocity[:, 2:] ** 2 * motion_equations.direction(position[:, 2])
-    bend = -parameters.link_length / 2 * (inward + np.roll(inward, -1, axis=0))
-    matrix = constraint_matrix(position, parameters)
-    whole = np.block([[np.diag(masses(n, parameters)), matrix.T], [matrix, np.zeros((2 * n, 2 * n))]])
-    solution = np.linalg.solve(whole, np.concatenate([forces.ravel(), bend.ravel()]))
-    return solution[: 3 * n].reshape(n, 3), solution[3 * n :].reshape(n, 2)
-
-
-def projected(position: Array, velocity: Array, parameters: Parameters) -> tuple[Array, Array]:
-    """The state with C = 0 and Ċ = 0 that is nearest in the metric of the masses, joint by joint to rounding."""
-    n = len(position)
-    inverse = 1 / masses(n, parameters)
-    for _ in range(6):
-        matrix = constraint_matrix(position, parameters)
-        opening = motion_equations.joint_opening(position, parameters).ravel()
-        pull = np.linalg.solve((matrix * inverse) @ matrix.T, opening)
-        position = position - (inverse * (matrix.T @ pull)).reshape(n, 3)
-    matrix = constraint_matrix(position, parameters)
-    pull = np.linalg.solve((matrix * inverse) @ matrix.T, matrix @ velocity.ravel())
-    return position, velocity - (inverse * (matrix.T @ pull)).reshape(n, 3)
-
-
-def exact_flight(position: Array, velocity: Array, parameters: Parameters, duration: float) -> Array:
-    """The state (2, n, 3) after a flight on rigid joints, by SciPy's DOP853 on the dense equations at 1e-12."""
-    shape = (2, len(position), 3)
-
-    def rates(_: float, state: Array) -> Array:
-        place, speed = state.reshape(shape)
-        return np.concatenate([speed.ravel(), rigid_motion(place, speed, parameters)[0].ravel()])
-
-    start = np.concatenate([position.ravel(), velocity.ravel()])
-    return solve_ivp(rates, (0, duration), start, method="DOP853", rtol=1e-12, atol=1e-12).y[:, -1].reshape(shape)
-
-
-# --- chains ---
-
-
-def loop(links: int, parameters: Parameters = PAPER) -> tuple[Array, Array]:
-    """A circulating ellipse in the air with joints that are closed and stay so, in NumPy to rounding."""
-    position, velocity = lay_chain(ellipse(1.3), links, parameters.link_length, 2.0, 0.1)
-    position[:, 1] += 0.3
-    velocity[:, 2] += 0.5 * np.sin(7.0 * np.arange(links))
-    return projected(position, velocity, parameters)
 
 
 def shaken(links: int, size: float, parameters: Parameters = PAPER) -> tuple[Array, Array]:
@@ -155,7 +76,7 @@ def test_rigid_flight_solves_the_dense_equations(links: int) -> None:
     """Whatever the number of links, a flight is that of M v̇ + Gᵀ F = Q with closed joints, which stay closed."""
     start = loop(links, SMOOTH)
     flight = fly(SMOOTH, *start, 1e-3, flight_tolerance=1e-9)
-    position, velocity = exact_flight(*start, SMOOTH, 1e-3)
+    position, velocity = exact_rigid_flight(*start, SMOOTH, 1e-3)
     assert np.abs(flight.position[-1] - position).max() < 1e-8
     assert np.abs(flight.velocity[-1] - velocity).max() < 1e-6
     assert np.abs(motion_equations.joint_opening(flight.position[-1], SMOOTH)).max() < 1e-11
@@ -210,7 +131,7 @@ def test_opening_gives_springs_the_forces_of_rigid_joints(links: int) -> None:
 def test_error_of_a_flight_falls_with_order_three(links: int) -> None:
     """Errors of places, speeds and of the friction booked fall as h³ against DOP853, friction smooth."""
     start, duration = loop(links, SMOOTH), 4e-3
-    place, speed = exact_flight(*start, SMOOTH, duration)
+    place, speed = exact_rigid_flight(*start, SMOOTH, duration)
     lost = motion_equations.total_energy(*start, SMOOTH) - motion_equations.total_energy(place, speed, SMOOTH)
     counts, errors = [8, 16, 32], []
     for count in counts:

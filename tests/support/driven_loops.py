@@ -1,0 +1,140 @@
+"""Loops on their sprocket: driven up to their release, and held on from there."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.engine.batch import Batch
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.scene import contact_radius, loop_speed
+from warpchain.inputs.setup import Setup
+from warpchain.kernels import layout
+from warpchain.run.single_walk import setup_walk
+from warpchain.status import Status
+from warpchain.walks.walk_phases import Phase, WalkRun
+
+Array = NDArray[np.float64]
+
+SHAPE = (layout.HEIGHT, layout.WIDTH, layout.CENTER_X, layout.CENTER_Y)
+"""Columns of a sample that say where a loop is."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A loop as it leaves its sprocket.
+
+    Attributes:
+        setup: Of its walk.
+        position: (n, 3), about the sprocket's centre.
+        velocity: (n, 3).
+        shape: Means over its last period of height, width, and x, y of its centre [m].
+        hold_time: For which it was held [s].
+        drift: Relative change of its shape in its last watch.
+        attempts: Attempted steps.
+        depth: Greatest by which circles sank into the sprocket [m].
+        is_released: Whether the hold ended in a release.
+    """
+
+    setup: Setup
+    position: Array
+    velocity: Array
+    shape: Array
+    hold_time: float
+    drift: float
+    attempts: int
+    depth: float
+    is_released: bool
+
+
+def period_of(setup: Setup) -> float:
+    """Time [s] in which a loop goes round, a quarter of a second if it stands still."""
+    speed = loop_speed(setup.scene, setup.parameters)
+    return setup.scene.links * setup.parameters.link_length / speed if speed > 0 else 0.25
+
+
+def released_loop(preset: str = "soft", drive: dict[str, float] | None = None, **settings: Any) -> Loop:
+    """Carry a walk to the end of its drive.
+
+    Args:
+        preset: Its chain.
+        drive: What its world's drive says otherwise.
+        settings: Of the walk.
+    """
+    setup = setup_walk(preset, {"method": "explicit"} | settings, None)
+    batch = Batch(1, setup.scene.links, setup.options, keeps_samples=True)
+    run = WalkRun(batch, 0, setup)
+    batch.set_drive(0, **(drive or {}))
+    samples: list[Array] = []
+    while True:
+        batch.run([0], run.features, lambda: samples.append(batch.drain_samples(0)))
+        position, velocity = batch.position(0), batch.velocity(0)
+        goes_on = run.next_phase()
+        if not goes_on or run.phase == Phase.WALK:
+            break
+    rows = np.concatenate(samples)
+    last = rows[rows[:, layout.TIME] > rows[-1, layout.TIME] - period_of(setup)]
+    return Loop(
+        setup=setup,
+        position=position,
+        velocity=velocity,
+        shape=last[:, SHAPE].mean(axis=0),
+        hold_time=run.hold_time,
+        drift=run.drift,
+        attempts=run.attempts,
+        depth=run.extremes["sprocket"],
+        is_released=goes_on,
+    )
+
+
+def hold(loop: Loop, parameters: Parameters, duration: float, load_factor: float = 1.0) -> Array:
+    """Hold a loop on for a time [s] with other parameters; `Loop.shape` of the end and its `bottom_curvature`, (5,)."""
+    setup = loop.setup
+    scene = setup.scene
+    batch = Batch(1, scene.links, setup.options, keeps_samples=True, frame_every=1)
+    batch.set_chain(0, parameters, scene.links, contact_radius(scene, parameters))
+    softness = 1.0 if setup.options.soften_drive else 0.0
+    batch.load(0, loop.position, loop.velocity, stop_time=duration, stop_status=Status.NOT_STEADY, softness=softness)
+    batch.set_drive(
+        0,
+        sprocket_speed=-2 * np.pi * scene.frequency,
+        loop_speed=loop_speed(scene, parameters),
+        loop_period=period_of(setup),
+        load_factor=load_factor,
+        steady_window=period_of(setup),
+        steady_tolerance=1e-12,
+        hold_softness=softness,
+        loaded_softness=softness,
+        push_rate=5e3,
+    )
+    samples: list[Array] = []
+    frames: list[tuple[Array, Array]] = []
+
+    def drain() -> None:
+        samples.append(batch.drain_samples(0))
+        frames.append(batch.drain_frames(0))
+
+    batch.run([0], batch.features(fixed_body="sprocket"), drain)
+    assert batch.status(0) == Status.NOT_STEADY
+    rows, times, joints = np.concatenate(samples), *(np.concatenate(parts) for parts in zip(*frames, strict=True))
+    since = duration - period_of(setup)
+    shape = rows[rows[:, layout.TIME] > since][:, SHAPE].mean(axis=0)
+    return np.append(shape, bottom_curvature(joints[times > since]))
+
+
+def bottom_curvature(joints: Array, reach: int = 3) -> float:
+    """Mean curvature [1/m] at the lowest joint: the turn from the chord before it to that behind it, by their length.
+
+    Args:
+        joints: (f, n, 2) [m].
+        reach: Links of a chord.
+    """
+    turns = []
+    for frame in joints:
+        lowest = int(np.argmin(frame[:, 1]))
+        before, here, behind = (frame[(lowest + step) % len(frame)] for step in (-reach, 0, reach))
+        first, second = here - before, behind - here
+        turn = np.arctan2(first[0] * second[1] - first[1] * second[0], first @ second)
+        turns.append(abs(turn) / (np.hypot(*first) + np.hypot(*second)) * 2)
+    return float(np.mean(turns))
