@@ -54,20 +54,6 @@ def test_they_end_with_the_release() -> None:
     assert repr(before) == f"<BeforeRelease: {kept}>"
 
 
-def test_forces_carry_the_loop() -> None:
-    """The mean tension is what bends the loop's momentum round, ρ v², and the weight's share, to 3 %."""
-    before = brief_walk(record_before=0.2).before_release
-    assert before is not None
-    step = before.frame_joints - np.roll(before.frame_joints, 1, axis=1)
-    along = step / np.hypot(step[..., :1], step[..., 1:])
-    tension = float(np.mean(np.sum(before.frame_forces * along, axis=2)))
-    parameters = preset("soft")
-    density = (parameters.inner_mass + parameters.outer_mass) / 2 / parameters.link_length
-    speed = 2 * np.pi * 12.0 * 0.0598
-    hanging = density * parameters.gravity * 20 * parameters.link_length / 4
-    assert tension == pytest.approx(density * speed**2 + hanging, rel=0.03)
-
-
 def test_loads_are_those_of_the_state() -> None:
     """In a frame of a given state: F = k C + b dC/dt and f(ω' − ω) of every joint, by formulas of their own."""
     links, parameters = 12, preset("soft")

@@ -95,7 +95,7 @@ def fly(
 
 
 class FloorOutcome(NamedTuple):
-    """Velocity (n, 3), the plane's rates (u, ω1, ω2), energy booked [J], number of impulses, height of the lowest rim."""
+    """Velocity (n, 3), the plane's rates (3,), energy booked [J], number of impulses, height of the lowest rim [m]."""
 
     velocity: Array
     rates: Array
