@@ -92,8 +92,7 @@ def test_fixed_steps_agree_with_the_cpu(method: str, fixed_body: str) -> None:
 
 def test_a_walk_gives_the_same_bits_in_any_batch(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Alone, among others of other lengths, in few or many slots and launches, after whatever ran before."""
-    settings = {"device": device, "method": "os32"}
-    setups = [brief_setup(seed, links=links, **settings) for seed in range(3) for links in (30, 60)]
+    setups = [brief_setup(seed, links=links, device=device) for seed in range(3) for links in (30, 60)]
     together = outcomes(setups)
     assert [outcomes([setup])[0] for setup in setups] == together
     assert outcomes(setups[::-1], slots=2)[::-1] == together
