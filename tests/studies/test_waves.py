@@ -23,7 +23,6 @@ from warpchain import Status, preset
 
 PAPER = preset("paper").with_values({"coulomb_friction": 0.0})
 SOFT = preset("soft").with_values({"coulomb_friction": 0.0})
-FREE = PAPER.with_values({"viscous_friction": 0.0})
 TENSION, SPEED = 15.0, 7.5
 PHASES = np.array([0.05, 0.3, 0.7, 1.0, 1.3, 1.5, np.pi / 2])
 
