@@ -125,7 +125,7 @@ def content_of(device: str, long: float) -> dict[str, object]:
         "name": "several kernels",
         "seed": 1,
         "preset": "soft",
-        "samples": 20,
+        "samples": 20 if device == "cuda" else 10,
         "scene": scene,
         "options": {"method": "dp5", "rest_time": 100.0, "device": device},
         "blocks": [
@@ -160,10 +160,11 @@ def broken_off(source: Path, folder: Path, how: signal.Signals) -> int:
 def test_a_sweep_gives_the_same_bytes_however_it_is_run(device: str, tmp_path: Path) -> None:
     """In this process, by a worker of a GPU, or ended by Ctrl-C or killed and begun again; its series are a walk's."""
     content = content_of(device, long=1.0 if device == "cuda" else 0.04)
+    samples = content["samples"]
     source = tmp_path / "sweep.yaml"
     source.write_text(yaml.safe_dump(content, sort_keys=False))
     whole = sweep(source, tmp_path / "whole")
-    assert whole.summary() == {"time_limit": 60, "not_steady": 20, "at_rest": 0, "missing": 0}
+    assert whole.summary() == {"time_limit": 3 * samples, "not_steady": samples, "at_rest": 0, "missing": 0}
     assert whole.blocks["leaning"].greatest_tilt.max() > 0.1004
     expected = data_of(tmp_path / "whole")
     with gpu_workers(1) as executor:
