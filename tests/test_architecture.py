@@ -236,6 +236,18 @@ def test_the_package_knows_no_study() -> None:
         assert not [name for name in imports(path.read_text(encoding="utf-8")) if name.startswith("studies")], path
 
 
+def test_planted_sins_are_found() -> None:
+    """A circle, a launch, a foreign import, a lazy one, and what a study must not take are seen."""
+    assert private("from warpchain.status import Status\nimport warpchain\nwarpchain.engine, warpchain.walk") == [
+        "warpchain.engine",
+        "warpchain.status.Status",
+    ]
+    assert set(circle({"a": ["b"], "b": ["c"], "c": ["a"], "d": ["a"]})) == {"a", "b", "c"}
+    assert launches("def f(): wp.launch(kernel, dim=1)") == {"wp.launch"}
+    assert foreign("import warp as wp, numpy\nfrom warpchain.engine import batch") == ["numpy", "warpchain"]
+    assert imported_modules("def f():\n    from warpchain.run import single_walk") == {"warpchain.run.single_walk"}
+
+
 def test_the_drawing_shows_the_arrows() -> None:
     """Arrows between wings in docs/architecture.md are those of the code, no more and no fewer."""
     text = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
@@ -268,6 +280,19 @@ def test_the_package_exports_little() -> None:
         assert getattr(warpchain, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'wlak'"):
         _ = warpchain.wlak
+
+
+def test_public_names_survive_the_import_of_modules() -> None:
+    """Importing a submodule does not put it in the place of a public function or class."""
+    modules = [module_of(path) for path in HOST if not path.stem.startswith("__")]
+    program = (
+        "import types, warpchain\n"
+        f"import {', '.join(modules)}\n"
+        "names = warpchain.__all__\n"
+        "print([name for name in names if isinstance(getattr(warpchain, name), types.ModuleType)])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, encoding="utf-8")
+    assert (done.stdout, done.stderr) == ("[]\n", "")
 
 
 def test_importing_starts_and_loads_nothing() -> None:

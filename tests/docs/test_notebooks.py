@@ -3,12 +3,22 @@
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.docs.code_blocks import ROOT
 
 NOTEBOOKS = sorted((ROOT / "docs/notebooks").glob("*.ipynb"))
+MOST_BYTES = 600_000
+MOST_LINES = 25
+"""Most lines of Python in the notebook of the sweep."""
+
+
+def code_cells(notebook: Path) -> list[Any]:
+    """The cells of a notebook that hold code."""
+    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    return [cell for cell in cells if cell["cell_type"] == "code"]
 
 
 @pytest.mark.slow
@@ -30,10 +40,17 @@ def test_notebook_runs(notebook: Path, tmp_path: Path, monkeypatch: pytest.Monke
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_committed_notebook_was_run(notebook: Path) -> None:
     """All cells were run in order, from the first; there are outputs, no errors and no paths of a machine."""
-    found = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
-    cells = [cell for cell in found if cell["cell_type"] == "code"]
+    cells = code_cells(notebook)
     assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
     outputs = [output for cell in cells for output in cell["outputs"]]
     assert outputs and all(output["output_type"] in ("display_data", "execute_result", "stream") for output in outputs)
     assert not [output for output in outputs if output.get("name") == "stderr"]
     assert not re.findall(r"(?<![\w.+/])/(?:home|root|tmp|work|Users|opt)/\w", json.dumps(outputs))
+
+
+def test_notebooks_are_small() -> None:
+    """Both are there, and together they do not weigh on a clone; the study takes few lines of Python."""
+    assert [path.name for path in NOTEBOOKS] == ["first_walk.ipynb", "sweep_with_xarray.ipynb"]
+    assert sum(path.stat().st_size for path in NOTEBOOKS) <= MOST_BYTES
+    lines = [line for cell in code_cells(NOTEBOOKS[1]) for line in "".join(cell["source"]).splitlines() if line.strip()]
+    assert len(lines) <= MOST_LINES
