@@ -3,14 +3,13 @@
 Run ``python docs/generate_reference.py`` after a change of any of these; a test compares the pages with the code.
 """
 
-import inspect
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Final, Literal, get_args, get_origin
 
+import typer
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
-from typer.models import ArgumentInfo, OptionInfo
 
 from warpchain.cli.main import app
 from warpchain.inputs.distributions import TABLE, Uniform
@@ -120,7 +119,7 @@ def parameters_page() -> str:
     }
     return (
         "# Parameters\n\n"
-        "The quantities of Table 1 of the paper, in SI units, by their source; *assumed* ones are not in the paper. "
+        "The quantities of Table 1 of the paper, in SI units, by source; those *chosen here* are not in the paper. "
         "After ± stands the standard deviation of the Gaussian that samples draw from; a draw outside the bounds is "
         "drawn again. `circle_radius` is smaller than half of `link_length`. A symbol, also in ASCII, stands for its "
         "name: `mu_fc=0.3` for `floor_friction=0.3`.\n\n"
@@ -242,49 +241,27 @@ def bracketed(unit: str) -> str:
     return "" if unit == "1" else f" [{unit}]"
 
 
-def option_row(name: str, annotation: Any, default: Any) -> tuple[str, str] | None:
-    """How an option is written, and its help; None for what is no option."""
-    kind, *notes = get_args(annotation) or (annotation,)
-    info = next((note for note in notes if isinstance(note, OptionInfo | ArgumentInfo)), None)
-    if info is None:
-        return None
-    kinds = [kind, *get_args(kind)]
-    choices = next((get_args(one) for one in kinds if get_origin(one) is Literal), ())
-    metavar = info.metavar or "/".join(str(choice) for choice in choices) or ("" if bool in kinds else "N")
-    help_text = " ".join((info.help or "").split())
-    if isinstance(info, ArgumentInfo):
-        return f"`{metavar}`", help_text
-    word = "--" + name.replace("_", "-")
-    given = [one for one in (info.default, *(info.param_decls or ())) if isinstance(one, str)]
-    names = given or ([word, word.replace("--", "--no-")] if bool in kinds else [word])
-    written = ", ".join(f"`{one}`" for one in names) + (f" `{metavar}`" if metavar else "")
-    has_default = isinstance(default, str | int) and not isinstance(default, bool)
-    return written, help_text + (f" Default: {default}." if has_default else "")
-
-
 def commands_page() -> str:
     """Every command with its options; those that are fields of the scene or of the options by their names only."""
     parts = [
         "# Commands\n\nWhat `--help` of each command says. Options that set a field have the meaning, values and "
         f"default of that field. `{JSON}`, where a command has it, prints one JSON object instead of tables.\n"
     ]
-    named = [
-        (command.name or function.__name__, function)
-        for command in app.registered_commands
-        if (function := command.callback) is not None
-    ]
-    for command, function in sorted(named, key=lambda item: item[0] != "walk"):
-        hints = get_type_hints(function, include_extras=True)
-        given = inspect.signature(function).parameters.items()
-        found = {name: option_row(name, hints[name], one.default) for name, one in given}
-        rows = {name: row for name, row in found.items() if row is not None and row[0] != f"`{JSON}`"}
+    group: Any = typer.main.get_command(app)
+    for name, command in sorted(group.commands.items(), key=lambda item: item[0] != "walk"):
+        context = command.make_context(name, [], resilient_parsing=True)
+        rows: dict[str, tuple[str, str]] = {}
+        for one in command.params:
+            words = one.metavar if one.param_type_name == "argument" else one.get_help_record(context)[0]
+            if one.opts != [JSON]:
+                rows[one.name] = f"`{words}`", " ".join((one.help or "").split())
         lines: list[tuple[str, str]] = []
         for page, model in (("scene", Scene), ("options", Options)):
-            fields = [rows.pop(name)[0] for name in list(rows) if command == "walk" and name in model.model_fields]
+            fields = [rows.pop(field)[0] for field in list(rows) if name == "walk" and field in model.model_fields]
             if fields:
                 lines.append((", ".join(fields), f"fields of the [{page}]({page}.md)"))
-        text = "\n\n".join(" ".join(part.split()) for part in (function.__doc__ or "").split("\n\n"))
-        parts.append(f"\n## warpchain {command}\n\n{text}\n\n" + listing([*lines, *rows.values()]))
+        text = "\n\n".join(" ".join(part.split()) for part in (command.callback.__doc__ or "").split("\n\n"))
+        parts.append(f"\n## warpchain {name}\n\n{text}\n\n" + listing([*lines, *rows.values()]))
     return "".join(parts)
 
 

@@ -1,25 +1,34 @@
-"""MkDocs hooks: studies, and files of the repository that pages link to, become part of the site.
+"""MkDocs hooks: studies, notebooks, and files of the repository that pages link to, become part of the site.
 
 Pages link as GitHub needs it, such as `../sweeps/figure6.yaml`. In the site files of docs/ lie at the top, studies in
-`studies/`, all others in `repository/`. Docstrings lose the roles that only Sphinx knows.
+`studies/`, all others in `repository/`. Formulas become MathML, which needs no script. A dead link ends the build.
 """
 
+import json
 import os
 import re
 from pathlib import Path
 from typing import Any
 
+from latex2mathml.converter import convert
+from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).parents[1]
 ROLE = re.compile(r":(?:attr|class|data|func|meth|mod):(?=<code>|`)")
 LINK = re.compile(r"\]\(((?!\w+:)[^)#\s]+)")
+WHOLE = re.compile(
+    r"(<(?:code|pre|math|script|style|svg|title)\b.*?</(?:code|pre|math|script|style|svg|title)>|<[^>]+>)", re.S
+)
+"""What has no subscripts: code, formulas, tags."""
+SUBSCRIPT = re.compile(r"(?<![\w.])([^\W\d_][\u0302-\u0308]?)_(?:\{([^}]+)\}|([a-zA-Z]+|\d)(?![a-zA-Z0-9_(]|\.\w))")
 
 
 def in_site(path: str) -> str:
     """Where a file of the repository is in the site."""
     if path == "README.md":
         return "index.md"
+    path = re.sub(r"^(docs/notebooks/.*)\.ipynb$", r"\1.md", path)
     return path.removeprefix("docs/") if path.startswith(("docs/", "studies/")) else f"repository/{path}"
 
 
@@ -33,8 +42,40 @@ def linked(page: str, target: str) -> str:
     return os.path.normpath(os.path.join(os.path.dirname(page), target))
 
 
+def notebook_page(notebook: Path) -> str:
+    """A notebook as Markdown: its texts, code and outputs."""
+    parts = []
+    for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"]:
+        source = "".join(cell["source"])
+        parts.append(source if cell["cell_type"] == "markdown" else f"```python\n{source}\n```")
+        for output in cell.get("outputs", ()):
+            data = {kind: "".join(text) for kind, text in output.get("data", {}).items()}
+            if "text/html" in data:
+                parts.append(f'<div class="output">{data["text/html"]}</div>')
+            elif "image/png" in data:
+                parts.append(
+                    f'<div class="output"><img alt="" src="data:image/png;base64,{data["image/png"].strip()}"></div>'
+                )
+            else:
+                parts.append("```text\n" + (data.get("text/plain") or "".join(output["text"])).rstrip() + "\n```")
+    return "\n\n".join([*parts, f"[This page as a notebook]({notebook.name})"])
+
+
+def on_config(config: Any) -> Any:
+    """Fences of the language math are formulas."""
+
+    def formula(source: str, *_: Any, **__: Any) -> str:
+        return f'<div class="formula">{convert(source, display="block")}</div>'
+
+    fences = config.mdx_configs["pymdownx.superfences"]["custom_fences"]
+    fences.append({"name": "math", "class": "math", "format": formula})
+    return config
+
+
 def on_files(files: Files, config: Any) -> Files:
-    """Add the pages of the studies, and all that pages link to."""
+    """Add the notebooks, the pages of the studies, and all that pages link to."""
+    for path in sorted((ROOT / "docs/notebooks").glob("*.ipynb")):
+        files.append(File.generated(config, f"notebooks/{path.stem}.md", content=notebook_page(path)))
     waiting = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob("studies/**/README.md"))
     waiting += [
         linked(in_repository(page.src_uri), match[1])
@@ -59,11 +100,43 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
     def moved(match: re.Match[str]) -> str:
         path = linked(source, match[1])
-        return f"]({os.path.relpath(in_site(path), folder)}" if (ROOT / path).is_file() else match[0]
+        # The page of a notebook links to the notebook itself.
+        stays = not (ROOT / path).is_file() or path == source.removesuffix(".md") + ".ipynb"
+        return match[0] if stays else f"]({os.path.relpath(in_site(path), folder)}"
 
     return LINK.sub(moved, markdown)
 
 
 def on_page_content(html: str, **_: Any) -> str:
-    """Take Sphinx roles away."""
-    return ROLE.sub("", html)
+    """Take Sphinx roles away, and set subscripts such as that of `ω_c`."""
+
+    def set_below(match: re.Match[str]) -> str:
+        return f"{match[1]}<sub>{match[2] or match[3]}</sub>"
+
+    html, texts, end = ROLE.sub("", html), [], 0
+    for whole in WHOLE.finditer(html):
+        texts += [SUBSCRIPT.sub(set_below, html[end : whole.start()]), whole[0]]
+        end = whole.end()
+    return "".join([*texts, SUBSCRIPT.sub(set_below, html[end:])])
+
+
+def on_post_build(config: Any) -> None:
+    """End the build if a link of a page leads nowhere, or to an anchor that its page lacks.
+
+    Raises:
+        PluginError: there are such links.
+    """
+    site = [path for path in Path(config.site_dir).rglob("*.html") if path.name != "404.html"]
+    pages = {path: path.read_text(encoding="utf-8") for path in site}
+    anchors = {path: set(re.findall(r'\bid="([^"]+)"', text)) for path, text in pages.items()}
+    dead = []
+    for page, text in pages.items():
+        for target in set(re.findall(r'<(?:a|img)\b[^>]*?\b(?:href|src)="([^"]*)"', text)):
+            path, _, anchor = target.partition("#")
+            file = Path(os.path.normpath(page.parent / path)) if path else page
+            if re.match(r"\w+:", target) or (file.is_dir() and not anchor):
+                continue
+            if not file.is_file() or (anchor and file in anchors and anchor not in anchors[file]):
+                dead.append(f"{page.relative_to(config.site_dir)}: {target}")
+    if dead:
+        raise PluginError("dead links:\n" + "\n".join(sorted(dead)))

@@ -50,7 +50,6 @@ class Stored:
         shape: of an array, such as "t 2" for an array of shape (t, 2); t instants, f frames, n links.
         empty: when an array has no instants or frames, although there are some; "" if that is never so.
         keys: of a dictionary its keys and their meanings.
-        sample: columns of a sample of the kernels that an array is made of; None if it is made otherwise.
     """
 
     unit: str
@@ -58,7 +57,6 @@ class Stored:
     shape: str = ""
     empty: str = ""
     keys: Mapping[str, str] = field(default_factory=dict)
-    sample: int | list[int] | None = None
 
     @property
     def described(self) -> str:

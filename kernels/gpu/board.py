@@ -29,48 +29,6 @@ def place_of(chain: Chain, lane: int) -> Place:
 
 
 @wp.func
-def write_constants(K: wp.array2d(dtype=wp.float64), chain: Chain):
-    """Writes the constants of stages and contacts on the board."""
-    K[layout.BOARD_VALUES, layout.VALUE_HALF_LENGTH] = chain.half_length
-    K[layout.BOARD_VALUES, layout.VALUE_STIFFNESS] = chain.joint_stiffness
-    K[layout.BOARD_VALUES, layout.VALUE_DAMPING] = chain.joint_damping
-    K[layout.BOARD_VALUES, layout.VALUE_VISCOUS] = chain.viscous_friction
-    K[layout.BOARD_VALUES, layout.VALUE_COULOMB] = chain.coulomb_friction
-    K[layout.BOARD_VALUES, layout.VALUE_INVERSE_SMOOTHING] = chain.inverse_smoothing
-    K[layout.BOARD_VALUES, layout.VALUE_GRAVITY] = chain.gravity
-    K[layout.BOARD_VALUES, layout.VALUE_CIRCLE_RADIUS] = chain.circle_radius
-    K[layout.BOARD_VALUES, layout.VALUE_HALF_WIDTH] = chain.half_width
-    K[layout.BOARD_VALUES, layout.VALUE_SPROCKET_RADIUS] = chain.sprocket_radius
-    K[layout.BOARD_VALUES, layout.VALUE_TANGENTIAL] = chain.tangential_restitution
-    K[layout.BOARD_VALUES, layout.VALUE_FLOOR_RESTITUTION] = chain.floor_restitution
-    K[layout.BOARD_VALUES, layout.VALUE_FLOOR_FRICTION] = chain.floor_friction
-    K[layout.BOARD_VALUES, layout.VALUE_SPROCKET_RESTITUTION] = chain.sprocket_restitution
-    K[layout.BOARD_VALUES, layout.VALUE_SPROCKET_FRICTION] = chain.sprocket_friction
-    K[layout.BOARD_VALUES, layout.VALUE_CHAIN_RESTITUTION] = chain.chain_restitution
-    K[layout.BOARD_VALUES, layout.VALUE_CHAIN_FRICTION] = chain.chain_friction
-    K[layout.BOARD_VALUES, layout.VALUE_PUSH_RATE] = chain.push_rate
-
-
-@wp.func
-def contact_constants(K: wp.array2d(dtype=wp.float64), n: int) -> Chain:
-    """Constants of contacts, from the board; other fields are 0."""
-    chain = Chain()
-    chain.link_count = n
-    chain.circle_radius = K[layout.BOARD_VALUES, layout.VALUE_CIRCLE_RADIUS]
-    chain.half_width = K[layout.BOARD_VALUES, layout.VALUE_HALF_WIDTH]
-    chain.sprocket_radius = K[layout.BOARD_VALUES, layout.VALUE_SPROCKET_RADIUS]
-    chain.tangential_restitution = K[layout.BOARD_VALUES, layout.VALUE_TANGENTIAL]
-    chain.floor_restitution = K[layout.BOARD_VALUES, layout.VALUE_FLOOR_RESTITUTION]
-    chain.floor_friction = K[layout.BOARD_VALUES, layout.VALUE_FLOOR_FRICTION]
-    chain.sprocket_restitution = K[layout.BOARD_VALUES, layout.VALUE_SPROCKET_RESTITUTION]
-    chain.sprocket_friction = K[layout.BOARD_VALUES, layout.VALUE_SPROCKET_FRICTION]
-    chain.chain_restitution = K[layout.BOARD_VALUES, layout.VALUE_CHAIN_RESTITUTION]
-    chain.chain_friction = K[layout.BOARD_VALUES, layout.VALUE_CHAIN_FRICTION]
-    chain.push_rate = K[layout.BOARD_VALUES, layout.VALUE_PUSH_RATE]
-    return chain
-
-
-@wp.func
 def load_link(K: wp.array2d(dtype=wp.float64), state: State, world: int, lane: int, n: int):
     """Writes a thread's link on the board; threads without a link get one at the origin that nothing acts on."""
     row = int(0)

@@ -22,32 +22,39 @@ from warpchain.kernels.events.tallies import add_count, attempts_made, count_bou
 from warpchain.kernels.events.tilting import in_room, write_tilting_sample
 from warpchain.kernels.features import COMPILER_FLAGS, Features
 from warpchain.kernels.gpu.board import (
-    contact_constants,
     link_is_finite,
     load_link,
     place_of,
     publish,
     store_link,
     store_losses,
-    write_constants,
 )
 from warpchain.kernels.gpu.contacts.neighbour_list import block_list
 from warpchain.kernels.gpu.contacts.proximity import block_proximity, upper_bound
 from warpchain.kernels.gpu.contacts.self_contacts import block_self_contacts, touch_layout
 from warpchain.kernels.gpu.explicit import explicit_attempt
-from warpchain.kernels.gpu.functions import shares_board
+from warpchain.kernels.gpu.functions import board_size, shares_board
 from warpchain.kernels.gpu.sample import block_sample, write_marks, write_step_bounds
-from warpchain.kernels.gpu.stage import Place, block_stage, error_of, read_link, vec3d, vec5d, write_first_stage
+from warpchain.kernels.gpu.stage import (
+    Place,
+    block_stage,
+    constants,
+    error_of,
+    read_link,
+    vec3d,
+    vec5d,
+    write_constants,
+    write_first_stage,
+)
 from warpchain.kernels.gpu.threads import barrier, barrier_if_any, block_maxima, clock, tile_address, vec4i
 from warpchain.kernels.gpu.tilting import block_tilting, copy_plane, write_felt_plane
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step, step_controller
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 from warpchain.kernels.methods.method import find_method
-from warpchain.kernels.physics.elementary import ONE, ZERO
-from warpchain.kernels.physics.plane import end_plane_step, mass_of
-from warpchain.kernels.physics.scaled_loads import under_load
-from warpchain.kernels.physics.softness import softened
-from warpchain.kernels.types import Control, Drive, Model, Record, State, read_chain
+from warpchain.kernels.physics.elementary import ZERO
+from warpchain.kernels.physics.plane import end_plane_step
+from warpchain.kernels.physics.scaled_loads import write_link
+from warpchain.kernels.types import Control, Drive, Ground, Model, Record, State, read_ground
 
 wp.set_module_options({"enable_backward": False})
 
@@ -74,7 +81,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     method = find_method(features.method)
     columns = features.columns
     lists = list_layout(columns)
-    has_floor = features.fixed_body == "floor"
+    has_floor = features.has_floor
     has_fixed = features.fixed_body != "none"
     has_self = features.self_contact
     tilts = features.tilts
@@ -85,11 +92,11 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     is_shared = shares_board(block_dim)
     width = block_dim + 1
     kept_width = columns if is_shared else width
-    plane_offset = wp.uint64(8 * layout.board_size(block_dim))
-    board_size = layout.board_size(block_dim) + layout.PLANE_ROWS * tilts if is_shared else 1
+    plane_offset = wp.uint64(8 * board_size(block_dim))
+    board_doubles = board_size(block_dim) + layout.PLANE_ROWS * tilts if is_shared else 1
     touch = touch_layout(columns, block_dim, in_lists=not is_shared)
     touch_size = touch.size if is_shared else 1
-    board_address = tile_address(wp.float64, board_size)
+    board_address = tile_address(wp.float64, board_doubles)
     touch_address = tile_address(wp.int32, touch_size)
     ends_address = tile_address(vec5d, block_dim)
     forces_address = tile_address(vec3d, block_dim)
@@ -126,12 +133,16 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
 
     @wp.func
     def measure_proximity(
-        ends: wp.tile[vec5d, block_dim], K: wp.array2d(dtype=wp.float64), maxima: wp.uint64, place: Place
+        ends: wp.tile[vec5d, block_dim],
+        K: wp.array2d(dtype=wp.float64),
+        maxima: wp.uint64,
+        place: Place,
+        ground: Ground,
     ):
         """Left end of the next link, and the proximity of the whole chain, in the state on the board."""
         link = read_link(K, place.lane)
         next_end = exchange_ends(ends, place, link)
-        write_proximity(K, maxima, place, link, next_end)
+        write_proximity(K, maxima, place, ground, link, next_end)
         barrier()
         return next_end, read_proximity(maxima)
 
@@ -159,7 +170,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         forces = wp.tile_empty(shape=(wp.static(block_dim),), dtype=vec3d, storage="shared")
         errors = wp.tile_empty(shape=(wp.static(block_dim),), dtype=wp.int32, storage="shared")
         maxima = wp.tile_empty(shape=(wp.static(block_dim),), dtype=vec4i, storage="shared")
-        board = wp.tile_empty(shape=(wp.static(board_size),), dtype=wp.float64, storage="shared")
+        board = wp.tile_empty(shape=(wp.static(board_doubles),), dtype=wp.float64, storage="shared")
         touches = wp.tile_empty(shape=(wp.static(touch_size),), dtype=wp.int32, storage="shared")
         if state.status[world] != RUNNING:
             return
@@ -187,29 +198,22 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         if wp.static(tilts and is_shared):
             P = wp.array(ptr=board_start + wp.static(plane_offset), shape=(layout.PLANE_ROWS,), dtype=wp.float64)
 
-        chain = read_chain(model, world)
-        if wp.static(is_driven):
-            chain = under_load(chain, state.load_factor[world])
+        chain = model.chains[world]
         n = chain.link_count
         place = place_of(chain, lane)
+        ground = read_ground(model, world)
         load_link(K, state, world, lane, n)
         is_fresh = state.is_fresh[world] != 0
         if lane < n:
-            inner = lane % 2 == 0
-            K[layout.MASS, lane] = wp.where(inner, chain.inner_mass, chain.outer_mass)
-            K[layout.INERTIA, lane] = wp.where(inner, chain.inner_inertia, chain.outer_inertia)
-            K[layout.INVERSE_MASS, lane] = ONE / K[layout.MASS, lane]
-            K[layout.INVERSE_INERTIA, lane] = ONE / K[layout.INERTIA, lane]
+            write_link(K, model, world, lane, state.load_factor[world])
             row = int(layout.BOARD_LOST_SELF)
             while row < wp.static(layout.BOARD_VALUES):
                 K[row, lane] = wp.where(is_fresh, ZERO, kept[row, lane])
                 row += 1
         if lane == 0:
-            chain = softened(chain, control, state.softness[world])
-            write_constants(K, chain)
+            write_constants(K, present(model, state, control, world))
             if wp.static(tilts):
                 copy_plane(P, state.plane[world])
-                K[chain_values, layout.VALUE_INVERSE_SQUARE] = ONE / (chain.half_length * chain.half_length)
                 write_felt_plane(K, P)
             write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
             K[chain_values, layout.VALUE_OPENING] = state.extremes[world, layout.OPENING]
@@ -218,6 +222,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             write_marks(K, state, control, world)
             T[wp.static(touch.fixed_hits)] = 0
             T[wp.static(touch.self_hits)] = 0
+            T[wp.static(touch.strand_hits)] = 0
             T[wp.static(touch.deepest)] = 0
             T[wp.static(touch.is_late)] = 0
             T[wp.static(touch.votes)] = 0
@@ -225,7 +230,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         barrier()  # the chain's constants are on the board
         publish(K, place)
         barrier()
-        next_end, proximity = measure_proximity(ends, K, maxima_start, place)
+        next_end, proximity = measure_proximity(ends, K, maxima_start, place, ground)
         opening = proximity.opening
         status = int(RUNNING)
         pairs = int(0)
@@ -237,7 +242,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     status = int(LIST_OVERFLOW)
             if wp.static(tilts):
                 if lane == 0:
-                    P[layout.SUM_MASS] = mass_of(chain)
+                    P[layout.SUM_MASS] = chain.mass
                 barrier()  # all have read the ends
                 sum_up(K, P, M, place)
         reach = time_to_contact(control, pairs, proximity.gap, slack, proximity.speed)
@@ -292,7 +297,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if wp.static(tilts):
                 begin_step(K, P, place, h)
             tolerance = K[chain_values, layout.VALUE_TOLERANCE]
-            result = attempt(ends, forces, maxima_start, K, place, h)
+            result = attempt(ends, forces, maxima_start, K, place, ground, h)
             own_error = int(0)
             if lane < n:
                 own_error = error_of(result, tolerance)
@@ -313,7 +318,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 accepted += 1
                 if lane < n:
                     K[layout.BOARD_LOST_FRICTION, lane] = K[layout.BOARD_LOST_FRICTION, lane] + h * result.friction
-                    dissipation = K[chain_values, layout.VALUE_DAMPING] * result.damping
+                    dissipation = constants(K).joint_damping * result.damping
                     K[layout.BOARD_LOST_DAMPING, lane] = K[layout.BOARD_LOST_DAMPING, lane] + h * dissipation
                     K[layout.X, lane] = result.x
                     K[layout.Y, lane] = result.y
@@ -330,7 +335,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 last_error = wp.max(error, wp.float32(1e-4))
                 proximity = result.proximity
                 if wp.static(not reuses_last):
-                    next_end, proximity = measure_proximity(ends, K, maxima_start, place)
+                    next_end, proximity = measure_proximity(ends, K, maxima_start, place, ground)
                 opening = proximity.opening
                 gap = proximity.gap
                 if lane == 0:
@@ -340,7 +345,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 if wp.static(tilts):
                     sum_up(K, P, M, place)
                     if lane == 0:
-                        end_plane_step(P, K[chain_values, layout.VALUE_GRAVITY], h)
+                        end_plane_step(P, constants(K).gravity, h)
                 is_hit = bool(False)
                 is_near = bool(False)
                 is_stale = bool(False)
@@ -349,9 +354,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if gap < wp.float32(0.0):
                         is_near = bool(True)
                         if wp.static(tilts):
-                            hits = meet_tilting_floor(K, P, M, contact_constants(K, n), place)
+                            hits = meet_tilting_floor(K, P, M, constants(K), place)
                         elif lane < n:
-                            hits = meet_fixed_body(K, place, contact_constants(K, n), drive, world, time)
+                            hits = meet_fixed_body(K, place, ground, constants(K), drive, world, time)
                         if hits > 0:
                             wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
                 if wp.static(has_self):
@@ -376,13 +381,13 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if is_stale:
                         if lane == 0:
                             add_count(state, world, layout.LIST_BUILDS, wp.int64(1))
-                        pairs = build_list(K, L, contact_constants(K, n), lane, control.skin, upper_bound(opening))
+                        pairs = build_list(K, L, constants(K), lane, control.skin, upper_bound(opening))
                         if pairs > wp.static(lists.capacity):
                             status = int(LIST_OVERFLOW)
                             pairs = int(wp.static(lists.capacity))
                         slack = wp.float32(0.5) * wp.float32(control.skin) - opening
                     if pairs > 0:
-                        touched = contact_constants(K, n)
+                        touched = constants(K)
                         touching = find_contacts(K, L, T, touched, lane, pairs, upper_bound(opening))
                         if touching > 0:
                             hits = resolve_contacts(K, L, T, E, F, touched, lane, touching)
@@ -426,6 +431,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             add_count(state, world, layout.REJECTED, wp.int64(attempts - accepted))
             add_count(state, world, fixed_count, wp.int64(T[wp.static(touch.fixed_hits)]))
             add_count(state, world, layout.SELF_IMPULSES, wp.int64(T[wp.static(touch.self_hits)]))
+            add_count(state, world, layout.STRAND_IMPULSES, wp.int64(T[wp.static(touch.strand_hits)]))
             state.extremes[world, layout.OPENING] = K[chain_values, layout.VALUE_OPENING]
             deepest = wp.cast(T[wp.static(touch.deepest)], wp.float32)
             raise_extreme(state, world, layout.SELF_DEPTH, wp.float64(deepest))

@@ -15,7 +15,7 @@ import typer
 
 import warpchain
 from studies.common import run_study, write_tables
-from studies.phase_diagram import cells, drawing, scales
+from studies.phase_diagram import candidates, cells, drawing, scales
 from studies.phase_diagram.tables import TABLES
 
 FOLDER: Final = Path(__file__).parent
@@ -30,7 +30,11 @@ def make(parts: Annotated[list[str] | None, typer.Argument()] = None, scaling: s
         cells.write_csv(scales.reduced(warpchain.load(scaling)), scales.CSV)
     found = cells.read_csv()
     varied, curve = scales.Cells(cells.read_rows(scales.CSV)), scales.Curve(found)
-    tables = {name: render(found) for name, render in TABLES.items()} | {"scales": scales.table(varied, curve)}
+    tables = {name: render(found) for name, render in TABLES.items()} | {
+        "scales": scales.table(varied, curve),
+        "candidates": candidates.table(found, varied),
+        "walking time": candidates.walking_time(found),
+    }
     write_tables(FOLDER / "README.md", tables)
     drawing.draw_maps(found, FOLDER / "figures" / "maps.png")
     drawing.draw_laws(found, FOLDER / "figures" / "laws.png")

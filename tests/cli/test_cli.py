@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 
@@ -19,17 +18,14 @@ from tests.support import command_line
 from tests.support.command_line import Answer, Command, process
 from warpchain import load_walk
 from warpchain.cli.main import main
-from warpchain.inputs.methods import METHODS
-from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
-from warpchain.inputs.scene import Scene
 
 command = command_line.command
 
 QUICK = "--links 32 --preset soft --method dp5 --start ellipse --frequency 5".split()
 """A walk of half a simulated second."""
 
-WALK_MODULE = import_module("warpchain.run.single_walk")
+WALK_MODULE = import_module("warpchain.walks.one_walk")
 
 
 @pytest.fixture(scope="module")
@@ -58,25 +54,6 @@ def test_help_is_quick_and_complete(tmp_path: Path) -> None:
     for option in options.split():
         assert f"--{option} " in answer.out
     assert min(computed) < 4.5 * min(libraries)
-
-
-def test_help_tells_the_defaults(command: Command) -> None:
-    """The defaults that help names are those of the models."""
-    words = " ".join(re.sub("[│╭╮╰╯─]", " ", command("walk", "--help").out).split())
-    scene, options = Scene(), Options()
-    named = {"links": scene.links, "frequency": scene.frequency, "start": scene.start, "device": options.device}
-    for name, default in (named | {"preset": "paper", "frame-interval": 2e-3, "method": "standard"}).items():
-        match = re.search(rf"--{name} .*?Default: (\S+)\.(?: |$)", words)
-        assert match is not None and type(default)(match[1]) == default, name
-    assert options == Options(method="standard") and options.tolerance == 3e-3
-    assert f"standard: {options.method} at 3e-3" in words
-    assert all(f"{name}: {title}" in words for name, title in METHODS.items())
-
-
-def test_alone_it_prints_help_and_its_version(command: Command) -> None:
-    """Without arguments the command lists its sub-commands; --version prints name and number."""
-    assert "walk" in command().out
-    assert re.fullmatch(r"warpchain \d+\.\d+\.\d+\S*\n", command("--version").out)
 
 
 REFUSED = {
@@ -128,24 +105,6 @@ def test_what_is_no_command_names_the_help(command: Command, arguments: str, lin
     assert answer.err == f"error: {line}\n"
 
 
-@pytest.mark.parametrize(
-    ("content", "problem"),
-    [
-        ("preset: soft\nscene: {links: 61}", "scene.links: 61 is odd"),
-        ("preset: soft\nscene: {gravity: 1.0}", "scene.gravity: unknown name; did you mean parameters.gravity?"),
-        ("scene: {links: 60}", "preset: missing"),
-        ("scene: {", "file.yaml, line 1"),
-    ],
-)
-def test_a_bad_file_is_refused_in_one_line(command: Command, tmp_path: Path, content: str, problem: str) -> None:
-    """What is wrong in a file is refused like what is wrong in an option."""
-    Path("file.yaml").write_text(content, encoding="utf-8")
-    answer = command("walk", "--config", "file.yaml", "-o", "new")
-    assert (answer.status, answer.out) == (2, "")
-    assert answer.err.startswith(f"error: {problem}") and answer.err.count("\n") == 1
-    assert not (tmp_path / "new").exists()
-
-
 @pytest.mark.parametrize("folder", ["file", "file/below", "/dev/null/below", "x" * 300])
 def test_a_folder_that_cannot_be_is_found_before_the_walk(
     command: Command, monkeypatch: pytest.MonkeyPatch, folder: str
@@ -157,14 +116,6 @@ def test_a_folder_that_cannot_be_is_found_before_the_walk(
     assert (answer.status, answer.out) == (2, "")
     assert answer.err.startswith("error: --output: ") and answer.err.count("\n") == 1
     assert [path.name for path in Path().iterdir()] == ["file"]
-
-
-@pytest.mark.parametrize("arguments", [["--animate", "gif"], ["--frame-interval", "0.001"]])
-def test_pictures_need_a_folder(command: Command, arguments: Sequence[str]) -> None:
-    """An option about files without a folder to put them is refused."""
-    answer = command("walk", *arguments)
-    assert (answer.status, answer.out) == (2, "")
-    assert answer.err == f"error: {arguments[0]}: there is no folder to write to; add -o DIR\n"
 
 
 def test_mp4_without_its_extra_is_found_before_the_walk(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -195,12 +146,12 @@ def test_json_is_one_object_with_everything(quick_walk: tuple[Answer, Path]) -> 
 
 
 def test_output_holds_record_and_pictures(quick_walk: tuple[Answer, Path]) -> None:
-    """The folder holds exactly the record, the two figures and the animation, and the record is that walk."""
+    """The folder holds exactly the record, the film strip and the film, and the record is that walk."""
     answer, folder = quick_walk
     assert [path.name for path in folder.iterdir()] == ["new"]
     files = {path.name: path.read_bytes() for path in (folder / "new/deep").iterdir()}
-    assert set(files) == {"walk.h5", "figure5.png", "film_strip.png", "walk.gif"}
-    assert files["figure5.png"].startswith(b"\x89PNG") and files["film_strip.png"].startswith(b"\x89PNG")
+    assert set(files) == {"walk.h5", "film_strip.png", "walk.gif"}
+    assert files["film_strip.png"].startswith(b"\x89PNG")
     assert files["walk.gif"].startswith(b"GIF89a")
     walk = load_walk(folder / "new/deep/walk.h5")
     assert walk.to_dict() == json.loads(answer.out)
@@ -219,7 +170,7 @@ def test_table_and_paths(command: Command) -> None:
         r"energy at release 0\.\d{5} J.*lost to floor 0\.\d{5} J.*unaccounted for -?[\d.]+e-\d+ J",
     ):
         assert re.search(part, words), part
-    assert answer.out.splitlines()[-3:] == ["new/walk.h5", "new/figure5.png", "new/film_strip.png"]
+    assert answer.out.splitlines()[-2:] == ["new/walk.h5", "new/film_strip.png"]
     frame_time = load_walk("new/walk.h5").frame_time
     np.testing.assert_allclose(np.diff(frame_time[:-1]), 1e-2, atol=5e-5)
 
@@ -261,13 +212,13 @@ def test_a_failed_walk_is_reported_and_kept(command: Command) -> None:
 def test_a_chain_that_was_never_released_leaves_no_pictures(command: Command) -> None:
     """A walk without time series leaves its record, and takes an earlier walk's pictures out of the folder."""
     Path("new").mkdir()
-    Path("new/figure5.png").write_bytes(b"of an earlier walk")
+    Path("new/energy.png").write_bytes(b"of an earlier walk")
     options = "--links 32 --preset soft --method dp5 --start spinning --set hold_limit=0.001 -o new"
     answer = command("walk", *options.split())
     assert answer.status == 1 and "not_steady" in answer.out
     assert [path.name for path in Path("new").iterdir()] == ["walk.h5"]
     lines = answer.err.splitlines()
-    assert [line.partition(":")[0] for line in lines] == ["new/figure5.png", "new/film_strip.png", "not_steady"]
+    assert [line.partition(":")[0] for line in lines] == ["new/film_strip.png", "not_steady"]
 
 
 @pytest.mark.parametrize("name", ["walk.h5", "loop.png", "walk.gif"])

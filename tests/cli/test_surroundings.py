@@ -30,7 +30,7 @@ def test_commands_work_with_stderr_closed(tmp_path: Path) -> None:
     assert (refused.returncode, refused.stdout, refused.stderr) == (2, "", "")
     walked = shell(f"{WALK} -o out 2>&-", tmp_path)
     assert walked.returncode == 1 and json.loads(walked.stdout)["status"] == "time_limit"
-    assert shell("plot out/walk.h5 --kind figure5 2>&-", tmp_path).returncode == 0
+    assert shell("plot out/walk.h5 --kind energy 2>&-", tmp_path).returncode == 0
     assert shell(f"{WALK} >&- 2>&-", tmp_path).returncode == 1
 
 

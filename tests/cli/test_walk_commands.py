@@ -46,9 +46,9 @@ def test_plot_draws_a_saved_walk_and_tells_what_it_leaves_out(
     command: Command, saved: Path, options: Sequence[str]
 ) -> None:
     """The figures stand beside the file or in the folder; this chain never was on a sprocket."""
-    answer = command("plot", str(saved), *options)
+    answer = command("plot", str(saved.parent), *options)
     folder = Path(options[-1]) if options else saved.parent
-    drawn = [folder / f"{kind}.png" for kind in ("figure5", "film_strip", "energy")]
+    drawn = [folder / f"{kind}.png" for kind in ("height_and_speed", "film_strip", "energy")]
     assert answer.status == 0
     assert sorted(answer.out.splitlines()) == sorted(map(str, drawn))
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in drawn)
@@ -62,7 +62,7 @@ def test_plot_of_a_walk_that_never_was_released_fails(command: Command) -> None:
     warpchain.walk(**never, frame_interval=None).save("walk.h5")
     answer = command("plot", "walk.h5")
     assert (answer.status, answer.out) == (1, "")
-    names = ["energy.png", "figure5.png", "film_strip.png", "loop.png"]
+    names = ["energy.png", "film_strip.png", "height_and_speed.png", "loop.png"]
     assert sorted(line.partition(": not drawn; ")[0] for line in answer.err.splitlines()) == names
     assert [path.name for path in Path().iterdir()] == ["walk.h5"]
 
@@ -79,14 +79,14 @@ def test_loads_are_recorded(command: Command) -> None:
 @pytest.mark.parametrize(("suffix", "beginning"), [("gif", b"GIF89a"), ("html", b"<!DOCTYPE html>")])
 def test_animate_writes_a_moving_picture(command: Command, saved: Path, suffix: str, beginning: bytes) -> None:
     """The file is of the kind that its suffix says."""
-    answer = command("animate", str(saved), f"walk.{suffix}", "--slow", "8")
+    answer = command("animate", str(saved.parent), "-o", f"walk.{suffix}", "--slow", "8")
     assert (answer.status, answer.out, answer.err) == (0, f"walk.{suffix}\n", "")
     assert Path(f"walk.{suffix}").read_bytes()[: len(beginning)].upper() == beginning.upper()
 
 
 def test_like_repeats_a_walk_to_the_bit(command: Command, tiny_walk: WalkResult, saved: Path) -> None:
     """Setup, seed, and every number but the time it took are those of the saved walk."""
-    answer = command("walk", "--like", str(saved), "-o", "again")
+    answer = command("walk", "--like", str(saved.parent), "-o", "again")
     assert answer.status == 1  # of the time limit, as the saved walk
     again = warpchain.load_walk("again/walk.h5")
     assert (again.setup, again.seed, again.status) == (tiny_walk.setup, 7, tiny_walk.status)
@@ -127,7 +127,7 @@ def test_a_method_beside_like_brings_its_settings(
         seen.append(setup)
         raise InputError("enough")
 
-    monkeypatch.setattr("warpchain.run.single_walk.run_walk", run_walk)
+    monkeypatch.setattr("warpchain.walks.one_walk.run_walk", run_walk)
     assert command("walk", "--like", str(saved), *line.split()).err == "error: enough\n"
     assert seen[0].options == Options.model_validate(expected)
 
@@ -137,11 +137,10 @@ REFUSED = {
     "plot text.h5": "text.h5: not an HDF5 file",
     "plot saved/walk.h5 --quantity dx": "--quantity: a saved walk has no columns",
     "plot saved/walk.h5 -o text": "--output: text: Not a directory",
-    "animate nowhere.h5 walk.gif": "nowhere.h5: cannot be read (No such file or directory)",
-    "animate saved/walk.h5 walk.avi": "walk.avi: unknown kind of picture",
-    "animate saved/walk.h5 walk.gif --fps 0": "fps: 0.0 is not a positive number",
-    "animate saved/walk.h5 nowhere/walk.gif": "nowhere/walk.gif: cannot be written",
-    "animate saved/walk.h5": "Missing argument 'FILE'",
+    "animate nowhere.h5": "nowhere.h5: cannot be read (No such file or directory)",
+    "animate saved -o walk.avi": "walk.avi: unknown kind of picture",
+    "animate saved --fps 0": "fps: 0.0 is not a positive number",
+    "animate saved -o nowhere/walk.gif": "nowhere/walk.gif: cannot be written",
     "walk --like nowhere.h5": "nowhere.h5: cannot be read (No such file or directory)",
     "walk --like saved/walk.h5 --seed 3": "--seed: given together with --like",
     "walk --like saved/walk.h5 --links 61": "scene.links: 61 is odd",

@@ -102,19 +102,10 @@ def test_html_is_complete_in_itself(make: Any, tmp_path: Path) -> None:
 
 def test_titles_are_escaped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What a title says is text of the page, never a part of it."""
-    monkeypatch.setattr(animation, "setting", lambda walk: "</title><script>&")
+    monkeypatch.setattr(animation, "headline", lambda walk: "</title><script>&")
     animate(make_walk(), tmp_path / "walk.html")
     page = (tmp_path / "walk.html").read_text(encoding="utf-8")
     assert page.count("&lt;/title&gt;&lt;script&gt;&amp;") == 2 and page.count("<script>") == 1
-
-
-def test_html_thins_long_recordings(tmp_path: Path) -> None:
-    """A page holds at most 2,000 frames, evenly chosen, the first and the last among them."""
-    joints = np.resize(make_walk().frame_joints, (5001, 30, 2))
-    animate(make_walk(frame_time=np.linspace(0.0, 0.8, 5001), frame_joints=joints), tmp_path / "walk.html")
-    times = data_of(tmp_path / "walk.html")["time"]
-    assert len(times) == 2000 and times[0] == 0 and times[-1] == 800_000
-    assert set(np.diff(np.rint(np.array(times) / 160))) <= {2, 3}
 
 
 def test_mp4_without_encoder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from warpchain.pictures.labels import cell_text, number_text, quantity_label, short_texts
+from warpchain.pictures.labels import cell_text, number_text, short_texts
 
 
 @pytest.mark.parametrize(
@@ -26,15 +26,6 @@ def test_number_text(value: float, text: str) -> None:
 def test_short_texts(values: np.ndarray, texts: list[str]) -> None:
     """Values are exact in six digits, or else as short as they can be told apart."""
     assert short_texts(values) == texts
-
-
-def test_quantity_label() -> None:
-    """Quantities have the paper's symbols and units, others their names."""
-    assert quantity_label("floor_friction") == "floor friction $μ_\\mathrm{fc}$"
-    assert quantity_label("frequency") == "frequency of the sprocket $ν$ / Hz"
-    assert quantity_label("links") == "number of links $n$"
-    assert quantity_label("settle_time") == "settle time / s"
-    assert quantity_label("preset") == "preset"
 
 
 def test_cell_text() -> None:

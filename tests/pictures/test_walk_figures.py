@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 
 from tests.support.made_tilting_walks import make_tilting_walk
 from tests.support.made_walks import make_unreleased, make_walk
-from warpchain.pictures.chain import ABOVE, FRONT, SIDE, draw_chain, link_outlines, view_from
+from warpchain.pictures.chain import link_outlines
 from warpchain.pictures.film_strip import film_strip
-from warpchain.pictures.walk_figures import figure5
 from warpchain.pictures.walk_shape import kinds_of
 from warpchain.status import Status
 
@@ -42,38 +41,20 @@ def chains(axes: Any) -> list[PolyCollection]:
     return [child for child in axes.collections if isinstance(child, PolyCollection)][1::2]
 
 
-def test_figure5_draws_the_series() -> None:
-    """The lines of Figure 5 are the walks' series themselves, over a shared time axis."""
-    walks = [make_walk(), make_walk(links=34, center=2 * make_walk().center)]
-    height, speed = figure5(walks).axes
-    for walk, upper, lower in zip(walks, height.lines, speed.lines, strict=True):
-        np.testing.assert_array_equal(upper.get_xydata(), np.stack([walk.time, walk.center[:, 1]], axis=1))
-        np.testing.assert_array_equal(lower.get_xydata(), np.stack([walk.time, walk.center_velocity[:, 0]], axis=1))
-        assert upper.get_color() == lower.get_color()
-    assert height.get_shared_x_axes().joined(height, speed)
-    legend = height.get_legend()
-    assert legend is not None
-    assert [text.get_text() for text in legend.get_texts()] == ["n = 30, ν = 15 Hz", "n = 34, ν = 15 Hz"]
+def test_height_and_speed_are_the_series() -> None:
+    """The lines are the walk's series themselves, over a shared time axis."""
+    walk = make_walk()
+    height, speed = walk.plot().axes
+    np.testing.assert_array_equal(height.lines[0].get_xydata(), np.stack([walk.time, walk.center[:, 1]], axis=1))
+    np.testing.assert_array_equal(speed.lines[0].get_xydata(), np.stack([walk.time, walk.center_velocity[:, 0]], 1))
+    assert height.get_shared_x_axes().joined(height, speed) and height.get_title(loc="left") == "30 links, 15 Hz"
     assert "/ m" in height.get_ylabel() and "/ (m/s)" in speed.get_ylabel() and "/ s" in speed.get_xlabel()
-
-
-def test_figure5_legend_names_each_label_once() -> None:
-    """Walks of one label share a colour and a legend entry."""
-    height = figure5([make_walk()] * 3, labels=["a", "b", "a"]).axes[0]
-    legend = height.get_legend()
-    assert legend is not None and [text.get_text() for text in legend.get_texts()] == ["a", "b"]
-    first, second, third = (line.get_color() for line in height.lines)
-    assert first == third != second
 
 
 def test_refusals() -> None:
     """What a walk cannot show is refused with what happened to it, and unknown figures with those there are."""
-    with pytest.raises(ValueError, match="walks: empty"):
-        figure5([])
-    with pytest.raises(ValueError, match=r"walks\[1\]: it has no time series\. The chain did not circulate"):
-        figure5([make_walk(), make_unreleased()])
-    with pytest.raises(ValueError, match="labels: 2 for 1 walks"):
-        figure5([make_walk()], labels=["a", "b"])
+    with pytest.raises(ValueError, match=r"walk: it has no time series\. The chain did not circulate"):
+        make_unreleased().plot()
     with pytest.raises(ValueError, match="kind: 'pie' is unknown"):
         make_walk().plot("pie")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="ax: film_strip has several axes"):
@@ -131,16 +112,22 @@ def test_film_strip_shows_the_walk(tmp_path: Path) -> None:
     """The strip holds the chosen number of chains to scale, the path of their centre, the distance and close-ups."""
     walk = make_walk()
     figure = film_strip(walk, count=7)
-    strip, *close_ups, _ = figure.axes
+    strip, *close_ups = figure.axes
     assert len(chains(strip)) == 7
     assert any(np.array_equal(line.get_xydata(), walk.center) for line in strip.lines)
-    assert "$\\Delta x$ = 0.640 m" in [text.get_text() for text in strip.texts]
+    assert "Δx = 0.640 m" in [text.get_text() for text in strip.texts]
     outlines = [np.asarray(path.vertices)[:-1] for path in chains(strip)[0].get_paths()]
     expected = link_outlines(walk.frame_joints[0], RADIUS)
     np.testing.assert_allclose(outlines, [*expected[0::2], *expected[1::2]], atol=1e-12)
     fills = np.asarray(chains(strip)[0].get_facecolor())
     assert np.all(fills[0, :3] > fills[-1, :3])  # inner links are paler
-    assert [axes.get_title("left").split("  ")[1] for axes in close_ups] == [
+    times = [text.get_text() for text in strip.texts if text.get_text().endswith(" s")]
+    assert len(times) == 7 and times == sorted(times) and (times[0], times[-1]) == ("0.00 s", "0.80 s")
+    boxes = [patch.get_extents() for patch in strip.patches if not patch.get_fill()]
+    assert len(boxes) == 4 and not any(
+        one.padded(-1).overlaps(other) for one, other in itertools.combinations(boxes, 2)
+    )
+    assert [axes.get_title("left") for axes in close_ups] == [
         "first touch, 0.140 s",
         "collapse, 0.540 s",
         "first self-contact, 0.660 s",
@@ -155,8 +142,8 @@ def test_film_strip_shows_the_walk(tmp_path: Path) -> None:
 def test_film_strips_of_odd_walks() -> None:
     """A walk that did not rest gets no distance, and its last close-up is the end; one frame is enough."""
     figure = film_strip(make_walk(status=Status.TIME_LIMIT, dx=math.nan, sprocket_height=math.nan))
-    assert not any("Delta" in text.get_text() for text in figure.axes[0].texts)
-    assert "end" in figure.axes[-2].get_title("left")
+    assert not any("Δ" in text.get_text() for text in figure.axes[0].texts)
+    assert "end" in figure.axes[-1].get_title("left")
     for walk, make in ((make_walk(), make_walk), (make_tilting_walk(), make_tilting_walk)):
         names = ("frame_time", "frame_joints", "frame_origin", "frame_axes")
         film_strip(make(**{name: getattr(walk, name)[:1] for name in names})).draw_without_rendering()
@@ -168,10 +155,10 @@ def test_film_strip_shows_three_sides_of_a_plane_that_tilts(tmp_path: Path) -> N
     joints = walk.joints_in_room
     assert joints is not None
     figure = film_strip(walk, count=7)
-    side, front, above, _ = figure.axes
+    side, front, above = figure.axes
     colors = []
     for axes, names, columns in ((side, "xy", (0, 1)), (front, "zy", (2, 1)), (above, "xz", (0, 2))):
-        assert (axes.get_xlabel(), axes.get_ylabel()) == tuple(f"${name}$ / m" for name in names)
+        assert (axes.get_xlabel(), axes.get_ylabel()) == tuple(f"{name} / m" for name in names)
         assert len(chains(axes)) == 7
         for chain, frame in ((chains(axes)[0], 0), (chains(axes)[-1], -1)):
             corners = np.concatenate([np.asarray(path.vertices) for path in chain.get_paths()])
@@ -196,40 +183,6 @@ def test_film_strips_of_short_and_long_walks_fit(stretch: float, tmp_path: Path)
 
 
 # A chain in the room
-
-
-def test_views_show_the_axes_of_the_room() -> None:
-    """A view from a corner is a rotation that keeps the vertical upright, and looks down."""
-    view = view_from(0.6, 0.4)
-    np.testing.assert_allclose(view @ view.T, np.eye(3), atol=1e-15)
-    assert np.linalg.det(view) == pytest.approx(1) and min(view[2]) > 0 and view[0, 1] == 0
-    np.testing.assert_allclose(view_from(0.0, 0.0), SIDE, atol=1e-15)
-    for azimuth, elevation, inverted, mirror in (
-        (np.pi / 2, 0.0, FRONT, (-1, 1, 1)),
-        (0.0, np.pi / 2, ABOVE, (1, -1, 1)),
-    ):
-        np.testing.assert_allclose(view_from(azimuth, elevation), inverted * np.array(mirror)[:, None], atol=1e-15)
-
-
-def test_nearer_links_are_drawn_later() -> None:
-    """From above, links of a kind are drawn in the order of their heights; outer links cover their neighbours."""
-    in_room = make_tilting_walk().joints_in_room
-    assert in_room is not None
-    joints = in_room[20]
-    axes = Figure().subplots()
-    chain = draw_chain(axes, joints, RADIUS, ABOVE, ("white", "black", "black"), edge=1.0)
-    outer = np.asarray(chain.get_facecolor())[:, 0] == 0
-    drawn = [np.asarray(path.vertices)[:-1] for path in chain.get_paths()]
-    numbers = [
-        int(np.argmin([np.abs(one - other).max() for other in link_outlines(joints[:, [0, 2]], RADIUS)]))
-        for one in drawn
-    ]
-    assert np.array_equal(np.array(numbers) % 2 == 1, outer)
-    height = (joints + np.roll(joints, 1, axis=0))[numbers, 1] / 2
-    for kind in (outer, ~outer):
-        assert np.all(np.diff(height[kind]) >= -1e-12)
-    for number in range(1, 30, 2):
-        assert all(numbers.index(number) > numbers.index(other % 30) for other in (number - 1, number + 1))
 
 
 def test_link_outlines_are_two_circles() -> None:

@@ -112,6 +112,7 @@ def test_cells_without_walks_are_gaps_and_failures_a_strip(tmp_path: Path) -> No
         ({"start": STARTS, "floor_friction": [0.2, 0.1]}, "start", "floor_friction", "start"),
         ({"soften_drive": [True, False], "frequency": [10, 20]}, "soften_drive", "frequency", "soften drive"),
         ({"links": [60, 90, 120], "frequency": [10, 20]}, "frequency", "links", "$ν$ / Hz"),
+        ({"links": [60, 90, 120, 150], "frequency": [10, 20, 30]}, "links", "frequency", "$n$"),
     ],
 )
 def test_two_axes_are_lines(tmp_path: Path, grid: dict[str, Any], along: str, across: str, title: str) -> None:
@@ -131,22 +132,6 @@ def test_two_axes_are_lines(tmp_path: Path, grid: dict[str, Any], along: str, ac
     assert legend_texts(figure) == [title, *short_texts(np.array(grid[along])[rows]), "± standard error"]
     handles = figure.legends[0].legend_handles[:-1]
     assert [handle.get_color() for handle in handles] == [line.get_color() for line in axes.lines]
-
-
-def test_three_axes_are_small_multiples(tmp_path: Path) -> None:
-    """The shortest axis gives the panels; all have the same axes and colours."""
-    grid = {"floor_friction": FRICTION, "start": ["rest", "ellipse"], "gravity": GRAVITY}
-    result = make_sweep(tmp_path, sweep(grid), flawed)
-    figure = result.plot()
-    drawn = panels(figure)
-    assert list(drawn) == ["start = rest", "start = ellipse"]
-    means = result.statistics().mean[np.argsort(FRICTION)]
-    for number, axes in enumerate(drawn.values()):
-        np.testing.assert_array_equal([mean for _, mean in lines(axes)], means[:, number].T)
-    assert len({(axes.get_xlim(), axes.get_ylim()) for axes in drawn.values()}) == 1
-    lost = [axes.get_xlabel() for axes in drawn.values()]
-    assert lost == ["4 of 36 walks failed", ""]
-    assert legend_texts(figure) == ["$g$ / m/s²", "1.6", "3.7", "9.8", "± standard error"]
 
 
 def test_further_axes_are_panels(tmp_path: Path) -> None:
@@ -188,7 +173,7 @@ def test_a_small_map_has_numbers(tmp_path: Path) -> None:
     result = make_sweep(tmp_path, sweep({"gravity": GRAVITY, "floor_friction": [0.1, 0.2]}), flawed)
     (axes,) = panels(result.plot("map")).values()
     texts = [text.get_text() for text in axes.texts]
-    assert f"{result.statistics().mean[0, 0]:.3g}" in texts and "–" in texts and "3 failed" in texts
+    assert f"{result.statistics().mean[0, 0]:.3g}" in texts and "–\n3 failed" in texts
 
 
 # Blocks, quantities, places to draw
@@ -242,27 +227,6 @@ def test_a_figure_or_axes_may_be_given(tmp_path: Path) -> None:
     assert result.plot(figure=other) is other and other.axes
 
 
-def test_what_cannot_be_drawn_is_refused(tmp_path: Path) -> None:
-    """The reason is one line."""
-    one_axis = make_sweep(tmp_path / "a", sweep({"gravity": GRAVITY}))
-    one_cell = make_sweep(tmp_path / "b", sweep({"gravity": [9.8]}))
-    failed = make_sweep(tmp_path / "c", sweep({"gravity": GRAVITY}), lambda walk: Status.NOT_FINITE)
-    several = make_sweep(tmp_path / "d", sweep({"links": [60, 90], "gravity": GRAVITY, "floor_friction": FRICTION}))
-    for result, settings, reason in (
-        (one_axis, {"kind": "bars"}, "kind: 'bars' is unknown; give 'lines', 'map' or None"),
-        (one_axis, {"kind": "map"}, "a figure of a grid takes a block with two axes of several values"),
-        (one_cell, {}, "a figure of a grid takes a block with an axis of several values"),
-        (failed, {}, "no walk has come to rest"),
-        (several, {"ax": Figure().subplots()}, "ax: this figure has 2 panels; leave ax out, or give figure"),
-        (one_axis, {"ax": Figure().subplots(), "figure": Figure()}, "ax: given together with figure; leave one out"),
-    ):
-        with pytest.raises(ValueError) as problem:
-            result.plot(**settings)
-        assert str(problem.value) == reason
-    with pytest.raises(NothingToShow):
-        one_cell.plot()
-
-
 def test_what_a_walk_does_not_have_is_in_no_mean(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """−1 and NaN of walks without a quantity are not averaged; figures say how many have none."""
 
@@ -296,21 +260,13 @@ def test_what_a_walk_does_not_have_is_in_no_mean(tmp_path: Path, capsys: pytest.
 @pytest.mark.parametrize(
     ("grid", "names"),
     [
-        ({"gravity": GRAVITY}, ["responses"]),
-        ({"start": STARTS}, ["responses"]),
-        ({"links": [60, 90]}, ["figure6", "responses"]),
-        ({"frequency": [10, 20]}, ["figure6"]),
-        ({"tolerance": [1e-6, 1e-9]}, ["responses"]),
-        ({"links": [60, 90], "start": ["rest", "ellipse"]}, ["figure6", "against_links_and_start"]),
-        ({"links": [60, 90], "frequency": [10, 20], "start": ["rest", "ellipse"]}, ["figure6", "heat_map"]),
-        ({"links": [60, 90], "frequency": [10, 20], "gravity": GRAVITY}, ["against_gravity"]),
-        (
-            {"links": [60, 90], "frequency": [10, 20], "soften_drive": [True, False]},
-            ["against_links_and_frequency_and_soften_drive"],
-        ),
-        ({"links": [60, 90], "floor_friction": FRICTION}, ["against_links_and_floor_friction"]),
-        ({"gravity": GRAVITY, "method": ["os32", "dp5"]}, ["against_gravity_and_method"]),
-        ({"gravity": EIGHT, "floor_friction": NINE}, ["against_gravity_and_floor_friction"]),
+        ({"gravity": GRAVITY}, ["distance_against_gravity"]),
+        ({"links": [60, 90]}, ["distance", "distance_against_links"]),
+        ({"frequency": [10, 20]}, ["distance"]),
+        ({"tolerance": [1e-6, 1e-9]}, ["distance_against_tolerance"]),
+        ({"links": [60, 90], "frequency": [10, 20], "start": ["rest", "ellipse"]}, ["distance", "distance_map"]),
+        ({"links": [60, 90], "floor_friction": FRICTION}, ["distance_against_links_and_floor_friction"]),
+        ({"gravity": EIGHT, "floor_friction": NINE}, ["distance_against_gravity_and_floor_friction"]),
     ],
 )
 def test_every_grid_has_a_figure(tmp_path: Path, grid: dict[str, Any], names: list[str]) -> None:
@@ -334,52 +290,38 @@ def test_responses_are_panels_of_all_blocks_that_vary_one_quantity(tmp_path: Pat
         return {9: Status.NOT_FINITE, 10: None}.get(walk.index, distance(walk))
 
     result = make_sweep(tmp_path, sweep(blocks=blocks), outcome)
-    (picture,) = [picture for picture in figures(result) if picture.name == "responses"]
+    (picture,) = [picture for picture in figures(result) if picture.name == "distance_responses"]
     friction, stiffness, presets = picture.figure.axes
     assert friction.get_xlabel() == "floor friction $μ_\\mathrm{fc}$"
     assert stiffness.get_xlabel() == "joint stiffness $k$ / N/m\n1 of 6 walks failed, 1 of 6 not run yet"
     assert [text.get_text() for text in presets.get_xticklabels()] == ["soft", "paper"]
     np.testing.assert_array_equal(lines(friction)[0][1], result.blocks["friction"].statistics().mean)
-    assert picture.caption.startswith("Distance walked against the one quantity that a block varies: means")
+    assert picture.caption.startswith("Distance walked against the one quantity that a block varies")
 
 
-@pytest.fixture(scope="module")
-def compared(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder of a sweep over links, frequency and tolerance."""
-    folder = tmp_path_factory.mktemp("compared")
-    make_sweep(folder, TOLERANCE)
-    return folder
-
-
-def run_plot(*arguments: str | Path) -> int:
-    """`warpchain plot`; its exit status."""
-    with pytest.raises(SystemExit) as end:
-        main(["plot", *map(str, arguments)])
-    return int(end.value.code or 0)
-
-
-def test_plot_draws_another_quantity(compared: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_plot_draws_another_quantity(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Figures of another column have its name, and those of the distance alone are not written."""
-    assert run_plot(compared, "-o", tmp_path, "--quantity", "walk_time") == 0
-    written = capsys.readouterr().out.split()
-    assert written == [str(path) for path in tmp_path.iterdir()]
-    assert [Path(path).name for path in written] == ["against_tolerance_walk_time.png"]
-    assert run_plot(compared, "-o", tmp_path) == 0
-    assert [Path(path).name for path in capsys.readouterr().out.split()] == ["tolerance.png", "status_counts.png"]
+    make_sweep(tmp_path / "compared", TOLERANCE)
+    for words, names in (
+        (["--quantity", "walk_time"], ["walk_time_against_links_and_frequency_and_tolerance.png"]),
+        ([], ["tolerance.png"]),
+    ):
+        with pytest.raises(SystemExit):
+            main(["plot", str(tmp_path / "compared"), "-o", str(tmp_path / "drawn"), *words])
+        assert [Path(path).name for path in capsys.readouterr().out.split()] == names
 
 
-def test_a_third_quantity_runs_along_x(tmp_path: Path) -> None:
-    """Beside links and frequency: a panel for each frequency, a line for each number of links, each through its means.
-
-    Panels whose values are far apart have y axes of their own, which begin at zero.
-    """
+def test_the_axis_along_x_may_be_chosen(tmp_path: Path) -> None:
+    """Three frequencies or more run along x, else the longest axis; x= names another one, or is refused."""
     grid = {"links": [60, 120], "frequency": [10, 20, 30], "floor_friction": FRICTION}
-    result = make_sweep(tmp_path, sweep(grid), lambda walk: walk.setup.scene.frequency**2 + walk.sample)
-    (picture,) = [each for each in figures(result) if each.name == "against_floor_friction"]
-    panels = [axes for axes in picture.figure.axes if axes.get_title(loc="left")]
-    assert [axes.get_title(loc="left") for axes in panels] == [f"$ν$ = {f} Hz" for f in (10, 20, 30)]
-    means = result.statistics().mean
-    for column, axes in enumerate(panels):
-        np.testing.assert_array_equal([line.get_ydata() for line in axes.lines], means[:, column])
-        low, high = axes.get_ylim()
-        assert low == 0 and means[:, column].max() < high < 1.2 * means[:, column].max()
+    result = make_sweep(tmp_path, sweep(grid))
+    assert result.plot().get_supxlabel() == "frequency of the sprocket $ν$ / Hz"
+    figure = result.plot(x="floor_friction")
+    assert figure.get_supxlabel() == "floor friction $μ_\\mathrm{fc}$"
+    drawn = panels(figure)
+    assert list(drawn) == ["$n$ = 60", "$n$ = 120"]
+    means = result.statistics().mean[..., np.argsort(FRICTION)]
+    for row, axes in enumerate(drawn.values()):
+        np.testing.assert_array_equal([mean for _, mean in lines(axes)], means[row])
+    with pytest.raises(InputError, match=r"^x: 'gravity' is no axis of several values; give one of links, freq"):
+        result.plot(x="gravity")

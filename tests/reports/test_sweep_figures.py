@@ -1,20 +1,16 @@
 """Figures of sweeps, and the numbers that stand on them."""
 
 import math
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from tests.support.made_sweeps import FIGURE_6, SENSITIVITY, TOLERANCE, distance, make_sweep
 from warpchain.pictures.style import GREEN, RED, NothingToShow, Picture
-from warpchain.reports.grids import heat_map
 from warpchain.reports.statistics import sensitivities, tolerance_agreement
 from warpchain.reports.sweep_figures import (
     figure6,
@@ -114,47 +110,7 @@ def test_figure6_counts_what_is_not_in_the_means(flawed6: SweepResult) -> None:
     assert len(means(second, GREEN)) == 1
 
 
-def test_figure6_tells_blocks_of_one_start_apart(tmp_path: Path) -> None:
-    """Starts may be an axis; another block of the same start gets its name, a colour and a marker of its own."""
-    blocks = [
-        {"name": "all", "grid": {"start": ["rest", "ellipse"], "frequency": [10, 20]}},
-        {"name": "paper", "preset": "paper", "grid": {"frequency": [10, 20]}},
-        {"name": "other", "grid": {"frequency": [10, 20], "floor_friction": [0.2, 0.3]}},
-    ]
-    figure = figure6(make_sweep(tmp_path, one_block(blocks=blocks, samples=2))).figure
-    texts = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert texts[:3] == ["started at rest", "started as an ellipse", "paper, started at rest"] and len(texts) == 5
-    handles = [handle for handle in figure.legends[0].legend_handles if isinstance(handle, Line2D)][:3]
-    assert len({handle.get_color() for handle in handles}) == len({handle.get_marker() for handle in handles}) == 3
-
-
-def test_figure6_needs_walks(tmp_path: Path) -> None:
-    """Without walks at rest, or without a fitting block, there is no figure; the reason is one line."""
-    result = make_sweep(tmp_path, one_block(grid={"frequency": [10, 20]}), lambda walk: Status.NOT_STEADY)
-    with pytest.raises(NothingToShow, match=r"^[^\n]+$"):
-        figure6(result)
-    result = make_sweep(tmp_path / "other", one_block(grid={"frequency": [10], "gravity": [1.6, 9.8]}))
-    with pytest.raises(NothingToShow, match="links and frequency"):
-        figure6(result)
-
-
 # Maps
-
-
-def test_heat_map_shows_the_statistics(flawed6: SweepResult) -> None:
-    """Maps hold mean and standard deviation of each cell, holes where there are none, and counts of what is lost."""
-    figure = heat_map(flawed6).figure
-    mean, sd = (axes for axes in figure.axes if axes.images and axes.get_ylim()[1] == 1.5)
-    found = flawed6.blocks["rest"].statistics()
-    np.testing.assert_array_equal(np.ma.filled(mean.images[0].get_array(), np.nan), found.mean)
-    np.testing.assert_array_equal(np.ma.filled(sd.images[0].get_array(), np.nan), found.sd)
-    assert [text.get_text() for text in mean.get_xticklabels()] == ["10", "20"]
-    texts = [text.get_text() for text in mean.texts]
-    assert "1 failed" in texts and "3 failed" in texts and f"{found.mean[0, 0]:.3g}" in texts
-    assert [axes.get_ylabel() for axes in figure.axes if axes.get_ylabel()] == [
-        "mean $Δx$ / m",
-        "standard deviation of $Δx$ / m",
-    ]
 
 
 # Tolerances
@@ -270,52 +226,27 @@ def test_sensitivity_leaves_out_incomplete_samples(tmp_path: Path) -> None:
 # All of them
 
 
-def test_status_counts(flawed6: SweepResult, sweep6: SweepResult) -> None:
-    """Every end of every block has a bar as long as its count, which stands beside it."""
+def test_status_counts(flawed6: SweepResult) -> None:
+    """Every end has a bar as long as its count, which stands beside it."""
     axes = status_counts(flawed6).figure.axes[0]
-    bars = dict(
-        zip(
-            [text.get_text() for text in axes.get_yticklabels()],
-            [patch.get_width() for patch in axes.patches],
-            strict=True,
-        )
-    )
-    assert bars == {
-        "rest: at rest": 8,
-        "rest: time limit": 1,
-        "rest: not finite": 3,
-        "ellipse: at rest": 3,
-        "ellipse: not run yet": 3,
-    }
-    assert " 1 (8.33%)" in [text.get_text() for text in axes.texts]
-    assert [text.get_text() for text in status_counts(sweep6).figure.axes[0].texts] == [" 360", " 120"]
+    labels = [text.get_text() for text in axes.get_yticklabels()]
+    bars = dict(zip(labels, [patch.get_width() for patch in axes.patches], strict=True))
+    assert bars == {"at rest": 11, "time limit": 1, "not finite": 3, "not run yet": 3}
+    assert " 1 (5.56%)" in [text.get_text() for text in axes.texts]
 
 
 def test_figures_are_those_that_a_sweep_has_something_for(
-    tmp_path: Path, sweep6: SweepResult, saltelli: SweepResult
+    tmp_path: Path, sweep6: SweepResult, saltelli: SweepResult, flawed6: SweepResult
 ) -> None:
-    """Each kind of sweep gives its own figures, all of which can be drawn; counts are always among them."""
+    """Each kind of sweep gives its own figures, all of which can be drawn; counts only if walks ended differently."""
     compared = make_sweep(tmp_path / "a", TOLERANCE)
-    nothing = make_sweep(tmp_path / "b", one_block(grid={"frequency": [10, 20]}), lambda walk: None)
     for result, names in (
-        (sweep6, ["figure6", "heat_map", "status_counts"]),
-        (compared, ["tolerance", "status_counts"]),
-        (saltelli, ["figure6", "sensitivity", "status_counts"]),
-        (nothing, ["status_counts"]),
+        (sweep6, ["distance", "distance_map"]),
+        (compared, ["tolerance"]),
+        (saltelli, ["distance", "sensitivity"]),
+        (flawed6, ["distance", "distance_map", "status_counts"]),
     ):
         pictures = list(figures(result))
         assert [picture.name for picture in pictures] == names
         assert all(picture.caption.endswith((".", "%")) and "\n" not in picture.caption for picture in pictures)
         pictures[0].figure.savefig(tmp_path / "picture.png", dpi=40)
-
-
-def test_light_import() -> None:
-    """Numbers need no matplotlib, and figures no pyplot."""
-    program = (
-        "import sys, warpchain.reports.statistics\n"
-        "print('matplotlib' in sys.modules)\n"
-        "import warpchain.reports.sweep_figures\n"
-        "print('matplotlib.pyplot' in sys.modules)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["False", "False"]

@@ -121,7 +121,7 @@ def with_walk(monkeypatch: pytest.MonkeyPatch, made: Callable[..., WalkResult], 
         asked.append(setup)
         return made(**changes)
 
-    monkeypatch.setattr("warpchain.run.single_walk.run_walk", run_walk)
+    monkeypatch.setattr("warpchain.walks.one_walk.run_walk", run_walk)
     return asked
 
 
@@ -153,27 +153,6 @@ def test_failed_walks(page: str) -> None:
         assert f"{status.label}: 1" in document.texts["failed-walks"]
         assert status.sentence in document.texts["failed-walks"]
     assert Status.NOT_STEADY.sentence not in document.texts["failed-walks"]
-
-
-def test_counts_at_the_top(page: str) -> None:
-    """The first thing to see is the name and how many walks there are, failed and missing ones too."""
-    top = Document(page).texts[""]
-    assert "made <up> & down" in top
-    assert re.search(r"walks18at rest15failed2not run yet1", top)
-
-
-@pytest.mark.usefixtures("no_figures")
-def test_many_failures_are_cut_short(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A long list of failures ends with how many more there are; a sweep without failures says so."""
-    monkeypatch.setattr(sweep_page, "_MOST_LISTED", 2)
-    content = CONTENT | {"blocks": None, "grid": {"frequency": [10]}, "samples": 5}
-    make_sweep(tmp_path / "sweep", content, lambda walk: Status.STEP_LIMIT)
-    write_report(tmp_path / "sweep", tmp_path / "report.html")
-    document = Document((tmp_path / "report.html").read_text())
-    assert len(document.rows["failed-walks"]) == 3 and "… and 3 more." in document.texts["failed-walks"]
-    make_sweep(tmp_path / "good", content)
-    write_report(tmp_path / "good", tmp_path / "report.html")
-    assert "None." in Document((tmp_path / "report.html").read_text()).texts["failed-walks"]
 
 
 def test_parameters_with_units(page: str) -> None:

@@ -15,9 +15,9 @@ from tests.support.killed_processes import kill_often
 from warpchain.cli.main import main
 from warpchain.inputs.validation import InputError
 from warpchain.run.gpu_workers import gpu_workers, visible_gpus
-from warpchain.run.lost_workers import LostWorkersError
 from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.sweep_run import sweep
+from warpchain.run.workers import LostWorkersError
 
 GPU_OF_WORKER = "__import__('time').sleep(0.5) or __import__('os').environ['CUDA_VISIBLE_DEVICES']"
 """Takes a while, so that other workers have to take the next ones; text, for workers cannot import tests."""

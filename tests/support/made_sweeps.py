@@ -96,9 +96,9 @@ def make_sweep(
 ) -> SweepResult:
     """A folder in which every walk has its outcome and columns; in shards of one walk, if some are not to be there."""
     sweep = load_sweep(content)
-    walks = [sweep.planned(index) for index in range(sweep.walk_count)]
-    outcomes = [outcome(walk) for walk in walks]
-    with SweepFolder.open(folder, sweep, shard_size=1 if None in outcomes else len(walks)) as store:
+    walks = {index: sweep.planned(index) for index in sweep.indices.tolist()}
+    outcomes = {index: outcome(walk) for index, walk in walks.items()}
+    with SweepFolder.open(folder, sweep, shard_size=1 if None in outcomes.values() else len(walks)) as store:
         for shard in store.missing():
             rows = missing_rows(shard.kind, shard.keys)
             for row, index in enumerate(shard.walks.tolist()):

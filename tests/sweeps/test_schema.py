@@ -46,6 +46,7 @@ def test_shipped_sweeps_are_valid(path: Path) -> None:
         content(grid={"preset": ["paper", "soft"]}, preset=None, parameters={"mu_fc": 0.3}),
         content(distributions={"all": "fixed", "tau_c": {"gaussian": {"sigma": 2e-5}}, "g": UNIFORM}),
         content(record={"series": True, "frames": {"samples": [0], "interval": 0.01, "before": 0.5}}),
+        content(points={"n": [60, 90], "mu_fc": [0.3, 0.2]}, grid=None),
         blocks({"samples": 1}, same_samples_along=[]),
     ],
 )
@@ -67,6 +68,7 @@ def test_what_a_sweep_may_say(given: dict[str, Any]) -> None:
         content(options={"method": "rk4"}),
         content(options={"self_contact": 1}),
         content(parameters={"m_outer": 0}),
+        content(points={"m_outer": 3e-3}),
         content(grid={"nu": [-5]}),
         content(distributions={"links": "fixed"}),
         content(distributions={"gravity": {"gaussian": {"mean": 9}}}),

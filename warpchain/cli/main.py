@@ -27,7 +27,7 @@ from warpchain.version import VERSION
 REFUSED: Final = 2
 """Exit status beside `FAILED` and `INTERRUPTED`."""
 
-app = typer.Typer(pretty_exceptions_enable=False)
+app = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode=None)  # boxes of rich would double the time of help
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -60,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 def _refuse_for(error: Exception) -> None:
     """Print what was refused or failed, and exit; return if the error is a defect of the program."""
     from warpchain.inputs.validation import DamagedFileError, InputError
-    from warpchain.run.lost_workers import LostWorkersError
+    from warpchain.run.workers import LostWorkersError
 
     if isinstance(error, typer.TyperException):
         context = getattr(error, "ctx", None)

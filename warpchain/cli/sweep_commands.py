@@ -14,11 +14,8 @@ from warpchain.cli.walk_commands import FAILED, plot_walk
 from warpchain.cli.words import JSON, argument, option, output, output_path
 
 if TYPE_CHECKING:
-    from warpchain.run.sweep_run import DaskClient, Executor
+    from warpchain.run.workers import DaskClient, Executor
     from warpchain.store.sweep_result import SweepResult
-
-LOG_EVERY: Final = 30.0
-"""Time [s] between two lines of progress where there is no terminal."""
 
 _FILE: Final = "The sweep, or the bare name of one that comes with warpchain, such as figure6."
 _DEVICE: Final = "cpu, cuda (the first GPU) or cuda:N, instead of what the sweep says."
@@ -39,6 +36,15 @@ def sweep(
     gpus: Annotated[
         int | None, option("N", "Run on the first N GPUs of this machine, a process for each.", min=1)
     ] = None,
+    part: Annotated[
+        str | None,
+        option("K/N", "Run only the K-th of N parts; merge puts them together."),
+    ] = None,
+    seed: Annotated[int | None, option("S", "Seed instead of the file's.", min=0)] = None,
+    samples: Annotated[int | None, option("N", "Samples of each cell instead of the file's.", min=1)] = None,
+    estimate: Annotated[
+        bool, typer.Option("--estimate", help="Try a few walks; say how long all take, and their size.")
+    ] = False,
     fresh: Annotated[bool, typer.Option("--fresh", help="Discard what another sweep left in the folder.")] = False,
     new: Annotated[
         Path | None,
@@ -46,7 +52,7 @@ def sweep(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Run a sweep, or what is left of it: many walks over a grid, with random samples in each cell."""
+    """Run a sweep, or what is left of it: many walks over a grid."""
     from warpchain.inputs.validation import InputError, printable
     from warpchain.sweeps.shipped import write_new_sweep
 
@@ -58,9 +64,16 @@ def sweep(
         return
     if source is None:
         raise InputError("FILE.yaml: missing; give a sweep file, or --new FILE.yaml to have one written")
+    if estimate:
+        _print_estimate(source, device, workers, seed, samples)
+        return
     if folder is None:
         raise InputError("--output: missing; give a folder for the results with -o DIR")
-    from warpchain.cli.terminal import print_sweep, status_line, sweep_progress_text
+    if device is not None and gpus is None and scheduler is None:
+        from warpchain.engine.devices import start_early
+
+        start_early(device)
+    from warpchain.cli.terminal import print_sweep
     from warpchain.run.sweep_run import sweep as run
 
     if gpus is not None:
@@ -70,7 +83,7 @@ def sweep(
         if device not in (None, "cuda"):
             raise InputError(f"--device: {device} is given together with --gpus; give cuda, or leave one out")
         device = "cuda"
-    with status_line(LOG_EVERY) as show, _executor(gpus, scheduler) as executor:
+    with _executor(gpus, scheduler) as executor:
         result = run(
             source,
             folder,
@@ -78,7 +91,9 @@ def sweep(
             executor=executor,
             workers=workers or gpus,
             fresh=fresh,
-            on_progress=lambda progress: show(sweep_progress_text(progress)),
+            part=part,
+            seed=seed,
+            samples=samples,
         )
     print_sweep(result, as_json)
     _note_failures(result)
@@ -87,7 +102,10 @@ def sweep(
 def info(
     directory: Annotated[Path, argument("DIR", "Folder of a sweep, or a merged file.")], as_json: AsJson = False
 ) -> None:
-    """Show how far a sweep is and what it has found so far; of a merged file, after its checksum is compared."""
+    """Show how far a sweep is and what it has found so far.
+
+    Of a merged file the checksum is compared first.
+    """
     from warpchain.cli.terminal import print_sweep
     from warpchain.store.folder import running_rate
     from warpchain.store.sweep_result import load
@@ -96,26 +114,29 @@ def info(
 
 
 def plot(
-    path: Annotated[Path, argument("PATH", "Folder of a sweep, a merged file, or the file of a saved walk.")],
+    path: Annotated[Path, argument("PATH", "Folder of a sweep or of a saved walk, or the file of either.")],
     folder: Annotated[Path | None, output("DIR", "Folder of the figures. Default: that of PATH.")] = None,
     quantity: Annotated[
         str | None,
         option("NAME", "Column of a sweep to draw: dx, walk_time, bounces, hold_time ... Default: dx."),
     ] = None,
     kind: Annotated[
-        Literal["figure5", "film_strip", "loop", "energy", "tilt"] | None,
+        Literal["film_strip", "height_and_speed", "loop", "energy", "tilt"] | None,
         typer.Option(help="Only figure of a walk to draw. Default: all that it has something for."),
     ] = None,
 ) -> None:
-    """Draw every figure that a sweep or a saved walk has something for.
+    """Draw all figures of a sweep or of a saved walk.
 
-    Of a sweep: Figures 6 and 5, grids, tolerance, sensitivity, statuses. Of a walk: figure5.png, film_strip.png,
-    loop.png, energy.png and, if the plane tilts, tilt.png; a line says what is left out and why.
+    Of a sweep: the distance as in the paper's Figure 6, maps, lines over any axes, tolerance, sensitivity, statuses. Of
+    a walk: film_strip.png, height_and_speed.png, loop.png, energy.png and, if the plane tilts, tilt.png; a line says
+    what is left out and why.
     """
+    from warpchain.cli.walk_files import record_of
     from warpchain.hdf5_files import kind_of_hdf5
     from warpchain.inputs.validation import InputError, printable
     from warpchain.store.sweep_result import KIND
 
+    path = record_of(path)
     is_file = os.path.isfile(path)
     if (
         is_file and kind_of_hdf5(path, "give the folder of a sweep, a merged file, or the file of a saved walk") != KIND
@@ -156,7 +177,10 @@ def report(
     ] = None,
     device: Annotated[str | None, option("NAME", f"Where the walk is run again: {_DEVICE}")] = None,
 ) -> None:
-    """Write one self-contained HTML page: figures, table, parameters, provenance, failed walks, a walk in motion."""
+    """Write one HTML page with all of a sweep, and a walk in motion.
+
+    It has figures, tables, parameters, provenance and failed walks, and loads nothing else.
+    """
     from warpchain.inputs.validation import InputError, printable
     from warpchain.reports.sweep_page import write_report
 
@@ -171,7 +195,7 @@ def merge(
     directories: Annotated[list[Path], argument("DIR...", "Folder of a sweep, or several; merged files, too.")],
     path: Annotated[Path, argument("FILE.h5", "The file to write.", parser=output_path)],
 ) -> None:
-    """Put all results into one HDF5 file with named axes and units, which xarray opens.
+    """Put the results of folders into one file, which xarray opens.
 
     Folders of the same sweep with different seeds are put together: their samples stand one behind the other.
     """
@@ -180,6 +204,20 @@ def merge(
 
     merge_shards(directories, path)
     print(printable(str(path)))
+
+
+def _print_estimate(
+    source: Path, device: str | None, workers: int | None, seed: int | None, samples: int | None
+) -> None:
+    """Say how long a sweep would take on this machine, and how much of the disk."""
+    from warpchain.run.estimate import estimate_sweep
+    from warpchain.run.progress_bar import duration_text
+
+    found = estimate_sweep(source, device=device, workers=workers, seed=seed, samples=samples)
+    print(
+        f"{found.walks:,} walks: about {duration_text(found.seconds)} with {found.workers} at once on this machine, "
+        f"{found.bytes / 1e6:,.1f} MB on disk ({found.pilots} walks tried)"
+    )
 
 
 @contextlib.contextmanager
@@ -233,8 +271,9 @@ def _note_failures(result: "SweepResult") -> None:
     """Say which walks failed and leave with exit status 1 if any did."""
     from warpchain.status import Status
 
-    failed = {label: n for label, n in result.summary().items() if n and label not in ("at_rest", "missing")}
+    ended = {status.label: status for status in Status if not status.ok}
+    failed = {label: n for label, n in result.summary().items() if n and label in ended}
     for label, count in failed.items():
-        print(f"{count} {label}: {Status[label.upper()].sentence}", file=sys.stderr)
+        print(f"{count} {label}: {ended[label].sentence}", file=sys.stderr)
     if failed:
         raise typer.Exit(FAILED)

@@ -1,20 +1,25 @@
 """The folder of a walk: its record, its figures, its moving picture."""
 
+import os
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final, get_args
 
 from warpchain.files import DISK_FAILURES, checked_output, failure, make_folder, remedy, remove_output
 from warpchain.inputs.validation import InputError, one_line
-from warpchain.pictures.style import save_figure
 from warpchain.pictures.walk_shape import Kind
-from warpchain.walks.walk_result import WalkResult
 
-_RECORD: Final = "walk.h5"
-_KINDS: Final[tuple[Kind, ...]] = ("figure5", "film_strip", "loop", "tilt")
-"""Figures that are drawn beside the record."""
+if TYPE_CHECKING:
+    from warpchain.walks.walk_result import WalkResult
+
+RECORD: Final = "walk.h5"
+
+
+def record_of(path: Path) -> Path:
+    """The record in the folder of a walk, if the path is one, or else the path itself."""
+    return path / RECORD if os.path.isfile(path / RECORD) else path
 
 
 def try_walk_folder(folder: Path, animation: str | None) -> None:
@@ -22,7 +27,7 @@ def try_walk_folder(folder: Path, animation: str | None) -> None:
     try_folder(folder)
     if folder.is_dir():
         moving = [] if animation is None else [f"walk.{animation}"]
-        for name in (_RECORD, *(f"{kind}.png" for kind in _KINDS), *moving):
+        for name in (RECORD, *(f"{kind}.png" for kind in get_args(Kind)), *moving):
             checked_output(folder / name)
 
 
@@ -49,21 +54,20 @@ def try_folder(folder: Path) -> None:
         raise InputError(f"--output: {folder}: {error.strerror}; give a folder that can be written to") from None
 
 
-def write_walk(result: WalkResult, folder: Path, animation: str | None) -> Iterator[Path]:
-    """Write the record, then its pictures, each whole or not at all; yield the path of each.
+def write_walk(result: "WalkResult", folder: Path, animation: str | None) -> Iterator[Path]:
+    """Write the record, then its film strip and its moving picture, whole or not at all; yield the path of each.
 
-    Pictures of an earlier walk that this one has none of are deleted: they do not belong to this record.
+    Figures of an earlier walk are deleted: they do not belong to this record.
 
     Raises:
         OSError: a file cannot be written.
     """
     make_folder(folder)
-    result.save(folder / _RECORD)
-    yield folder / _RECORD
-    for kind in _KINDS:
+    result.save(folder / RECORD)
+    yield folder / RECORD
+    for kind in get_args(Kind):
         remove_output(folder / f"{kind}.png")
-    has = {"loop": result.before_release is not None, "tilt": result.joints_in_room is not None}
-    yield from draw_figures(result, folder, [kind for kind in _KINDS if has.get(kind, True)])
+    yield from draw_figures(result, folder, ["film_strip"])
     if animation is not None:
         path = folder / f"walk.{animation}"
         try:
@@ -75,12 +79,14 @@ def write_walk(result: WalkResult, folder: Path, animation: str | None) -> Itera
             yield path
 
 
-def draw_figures(walk: WalkResult, folder: Path, kinds: Iterable[Kind]) -> Iterator[Path]:
+def draw_figures(walk: "WalkResult", folder: Path, kinds: Iterable[Kind]) -> Iterator[Path]:
     """Draw figures into a folder; yield the path of each, and say on stderr which a walk has nothing for, and why.
 
     Raises:
         OSError: a file cannot be written.
     """
+    from warpchain.pictures.style import save_figure
+
     for kind in kinds:
         path = folder / f"{kind}.png"
         try:

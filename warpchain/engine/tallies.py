@@ -18,6 +18,7 @@ COUNTS: Final = {
     **IMPULSES,
     "bounces": "number of bounces off the floor",
     "list_builds": "number of neighbour lists built",
+    "strands": "number of impulses between strands of the loop",
 }
 """Counters."""
 EXTREMES: Final = {"opening": "greatest distance between two joined link ends", **DEPTHS}

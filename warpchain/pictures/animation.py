@@ -8,14 +8,17 @@ import math
 import os
 import subprocess
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.files import checked_output, replacing, write_whole
 from warpchain.pictures.film import DPI, EDGE, INNER, OUTER, Film, floor_marks, side_box
-from warpchain.pictures.walk_shape import Walk, checked_joints, setting
+from warpchain.pictures.walk_shape import checked_joints, headline
+
+if TYPE_CHECKING:
+    from warpchain.walks.walk_result import WalkResult
 
 _PLAYER: Final = Path(__file__).with_name("player.html")
 """The page with a player, which says what its data are."""
@@ -30,7 +33,7 @@ _SLOWEST_GIF, _FASTEST_GIF = 1, 50
 """Pictures per second of a GIF."""
 
 
-def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
+def animate(walk: "WalkResult", path: str | os.PathLike[str], *, fps: float = 30.0, slow: float = 4.0) -> None:
     """Write a moving picture of a walk; the suffix of `path` gives the format: .gif, .mp4 or .html.
 
     If there are more pictures than frames, each frame is shown until the next one. A chain whose plane tilts is seen
@@ -56,7 +59,7 @@ def animate(walk: Walk, path: str | os.PathLike[str], *, fps: float = 30.0, slow
         _write_mp4(walk, target, fps, slow)
 
 
-def _chosen_frames(walk: Walk, fps: float, slow: float) -> list[int]:
+def _chosen_frames(walk: "WalkResult", fps: float, slow: float) -> list[int]:
     """Number of the frame that each picture shows: the last one recorded by then. Pictures come at a constant rate."""
     start, end = walk.frame_time[0], walk.frame_time[-1]
     marks = start + np.arange(math.floor((end - start) * fps * slow + 1e-6) + 1) / (fps * slow)
@@ -64,7 +67,7 @@ def _chosen_frames(walk: Walk, fps: float, slow: float) -> list[int]:
     return chosen if chosen[-1] == len(walk.frame_time) - 1 else [*chosen, len(walk.frame_time) - 1]
 
 
-def _write_gif(walk: Walk, path: Path, fps: float, slow: float) -> None:
+def _write_gif(walk: "WalkResult", path: Path, fps: float, slow: float) -> None:
     """Write pictures with equal delays in whole hundredths of a second; Pillow writes equal ones once.
 
     matplotlib's writer of GIFs cuts its delays off: at 30 pictures a second they would be 10 % too short.
@@ -88,7 +91,7 @@ def _write_gif(walk: Walk, path: Path, fps: float, slow: float) -> None:
         next(pictures).save(part, format="GIF", save_all=True, append_images=pictures, duration=10 * delay, loop=0)
 
 
-def _write_mp4(walk: Walk, path: Path, fps: float, slow: float) -> None:
+def _write_mp4(walk: "WalkResult", path: Path, fps: float, slow: float) -> None:
     """Let ffmpeg code the pictures; `imageio_ffmpeg` brings it."""
     import matplotlib as mpl
     from matplotlib.animation import FFMpegWriter
@@ -115,7 +118,7 @@ def _write_mp4(walk: Walk, path: Path, fps: float, slow: float) -> None:
             raise OSError("ffmpeg ended early") from error
 
 
-def player(walk: Walk, slow: float = 4.0) -> str:
+def player(walk: "WalkResult", slow: float = 4.0) -> str:
     """A page with a player of the frames from the side: lengths in tenths of a millimetre, times in microseconds.
 
     Args:
@@ -130,7 +133,6 @@ def player(walk: Walk, slow: float = 4.0) -> str:
     frames = np.rint(np.linspace(0, len(walk.frame_time) - 1, count)).astype(int)
     times, box = walk.frame_time[frames], side_box(walk, joints)
     center = np.stack([np.interp(times, walk.time, walk.center[:, axis]) for axis in (0, 1)], axis=1)
-    title = setting(walk) + (f": \u0394x = {walk.dx:.3f} m" if math.isfinite(walk.dx) else "")
     data = {
         "time": _whole(times, 1e6),
         "joints": _whole(joints[frames, :, :2].reshape(count, -1)),
@@ -142,7 +144,7 @@ def player(walk: Walk, slow: float = 4.0) -> str:
         "slow": slow,
         "colors": {"inner": INNER, "outer": OUTER, "edge": EDGE},
     }
-    title = html.escape(title if walk.joints_in_room is None else f"{title}, from the side")
+    title = html.escape(headline(walk) + ", from the side" * (walk.joints_in_room is not None))
     content = json.dumps(data, separators=(",", ":"), allow_nan=False)
     return _PLAYER.read_text(encoding="utf-8").replace("{{title}}", title).replace("{{data}}", content)
 

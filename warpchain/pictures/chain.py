@@ -4,7 +4,7 @@ A view is a matrix of three orthogonal unit vectors, shape (3, 3): what points t
 up, and what points towards the viewer.
 """
 
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,7 +13,9 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from warpchain.pictures.style import GROUND, INK
-from warpchain.pictures.walk_shape import Walk
+
+if TYPE_CHECKING:
+    from warpchain.walks.walk_result import WalkResult
 
 Array = NDArray[np.float64]
 
@@ -94,7 +96,7 @@ def draw_chain(
     return links
 
 
-def sprocket_circle(walk: Walk) -> Array | None:
+def sprocket_circle(walk: "WalkResult") -> Array | None:
     """Points of the sprocket's circle x, y, z [m], shape (100, 3); None without one."""
     if walk.sprocket_center is None:
         return None
@@ -103,7 +105,7 @@ def sprocket_circle(walk: Walk) -> Array | None:
     return np.asarray(circle + np.array([*walk.sprocket_center, 0.0]))
 
 
-def walk_box(walk: Walk, joints: Array) -> tuple[Array, Array]:
+def walk_box(walk: "WalkResult", joints: Array) -> tuple[Array, Array]:
     """Least and greatest x, y, z of a walk and its sprocket, with a margin; from the floor on [m], each shape (3,)."""
     parameters = walk.setup.parameters
     margin = parameters.circle_radius + 2 * max(parameters.circle_radius, parameters.half_width)

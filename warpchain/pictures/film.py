@@ -1,6 +1,6 @@
 """Single pictures of a film of a walk, all to the same scale: from the side, or a plane that tilts from a corner."""
 
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 
 from warpchain.pictures.chain import SIDE, draw_chain, draw_ground, sprocket_circle, view_from, walk_box
 from warpchain.pictures.style import BLUE, FAINT, GROUND, INK, tidy
-from warpchain.pictures.walk_shape import Walk, center_in_room, checked_joints
+from warpchain.pictures.walk_shape import center_in_room, checked_joints, headline
+
+if TYPE_CHECKING:
+    from warpchain.walks.walk_result import WalkResult
 
 Array = NDArray[np.float64]
 
@@ -33,7 +36,7 @@ def floor_marks(low: float, high: float, most: int = 9) -> list[float]:
     return [round(float(mark), 6) for mark in marks if low <= mark <= high]
 
 
-def side_box(walk: Walk, joints: Array) -> Array:
+def side_box(walk: "WalkResult", joints: Array) -> Array:
     """Left and right, bottom and top of what is shown from the side [m], shape (2, 2), with some of the floor."""
     low, high = walk_box(walk, joints)
     return np.array([[low[0], -0.045 * max(high[:2] - low[:2])], high[:2]]).T
@@ -46,7 +49,7 @@ class Film:
         figure: the picture of the frame that was drawn last; an even number of pixels wide and high, for video.
     """
 
-    def __init__(self, walk: Walk) -> None:
+    def __init__(self, walk: "WalkResult") -> None:
         """Fit the walk and the floor below it into the picture.
 
         Raises:
@@ -83,6 +86,7 @@ class Film:
             center = circle[:-1].mean(axis=0)
             for path in (circle, np.stack([center, center * (1.0, 0.0, 1.0)])):
                 self._axes.plot(*self._project(path), color=FAINT, linewidth=0.8)
+        self.figure.text(0.015, 0.975, headline(walk), va="top", fontsize=11, color=INK)
         self._moving: list[Any] = []
 
     def draw(self, frame: int) -> None:

@@ -1,26 +1,29 @@
 """A film strip: the chain at instants along its walk, drawn to scale.
 
-Sizes on paper are in inches: constrained layout clips labels of axes with a fixed aspect.
+Sizes on paper are in inches: constrained layout clips labels of axes with a fixed aspect. Texts are plain: formulas
+would take a third of the time that this figure takes, and every walk has one.
 """
 
-from dataclasses import dataclass
-from typing import Any, Final
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from warpchain.pictures.chain import ABOVE, FRONT, SIDE, draw_chain, draw_ground, sprocket_circle, walk_box
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.style import DASHES, DOTS, FAINT, GROUND, INK, tidy
-from warpchain.pictures.walk_shape import Walk, center_in_room, checked_joints, setting
+from warpchain.pictures.walk_shape import center_in_room, checked_joints, setting
 from warpchain.status import Status
+
+if TYPE_CHECKING:
+    from warpchain.walks.walk_result import WalkResult
 
 Array = NDArray[np.float64]
 
@@ -28,23 +31,26 @@ _WIDTH: Final = 10.0
 _HIGHEST: Final = 4.6
 _DEEPEST: Final = 8.0
 """Width of the paper, greatest height of the side view, and of it and the view from above together."""
-_LEFT, _BETWEEN, _RIGHT, _TOP, _BELOW, _FOOT = 0.9, 0.85, 0.25, 0.35, 0.85, 0.75
-"""Room for labels: beside, between and above the views, below each row, and for the legend at the foot."""
+_LEFT, _BETWEEN, _RIGHT, _TOP, _BELOW, _FOOT = 0.9, 0.85, 0.25, 0.6, 0.85, 0.1
+"""Room for labels: beside and between the views, for legend and titles above them, below each row, at the foot."""
+_CLOCK: Final = 0.2
+"""Room for the times above the chains."""
 _NARROWEST: Final = 1.3
 """Least width of the view from the front."""
 _FLOOR: Final = 0.4
 """Height of the floor in the side view."""
 _CLOSE_UP_LINKS, _CLOSE_UP_ASPECT = 9, 1.5
 """Width of a close-up [links], and its width over its height."""
+_HALO: Final = (withStroke(linewidth=2.5, foreground="white"),)
 
 
-def film_strip(walk: Walk, *, count: int | None = None, figure: Figure | None = None) -> Figure:
+def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure | None = None) -> Figure:
     """The chain along its walk, drawn to scale, and close-ups of up to four moments.
 
-    In the strip the centre of mass moves equally far from each instant to the next. Colour is time; outer links are
-    darker than inner ones. The close-ups show the first touch of the floor, the first self-contact, the collapse and
-    the end. A chain whose plane tilts is seen from the side, from the front and from above instead, all to one scale.
-    From the front z grows to the left, and from above downwards, as such a viewer sees it.
+    In the strip the centre of mass moves equally far from each instant to the next. Above each chain stands its time;
+    outer links are darker than inner ones. The close-ups show the first touch of the floor, the first self-contact, the
+    collapse and the end. A chain whose plane tilts is seen from the side, from the front and from above instead, all to
+    one scale. From the front z grows to the left, and from above downwards, as such a viewer sees it.
 
     Args:
         walk: a walk with frames.
@@ -72,7 +78,7 @@ def film_strip(walk: Walk, *, count: int | None = None, figure: Figure | None = 
         broad = _NARROWEST / scale
     close_up_width = min((across + 0.1) / max(1, len(close_ups)), _WIDTH / 3)
     lower = scale * broad + 0.5 if tilts else (close_up_width - 0.1) / _CLOSE_UP_ASPECT
-    width, height, depth = scale * size[0], scale * size[1] + _FLOOR, _FLOOR / scale
+    width, height, depth, top = scale * size[0], scale * size[1] + _FLOOR + _CLOCK, _FLOOR / scale, _CLOCK / scale
     paper = np.array([_WIDTH, _TOP + height + _BELOW + lower + _FOOT])
     figure = InlineFigure(tuple(paper)) if figure is None else figure
 
@@ -82,53 +88,44 @@ def film_strip(walk: Walk, *, count: int | None = None, figure: Figure | None = 
     left = _LEFT + (across - scale * (size[0] + broad)) / 2
     bottom = _FOOT + lower + _BELOW
     side = panel(left, bottom, width, height)
-    side.set(xlim=(low[0], high[0]), ylim=(-depth, high[1]), xlabel="$x$ / m", ylabel="$y$ / m")
-    views = [("from the side", side, SIDE)]
+    side.set(xlim=(low[0], high[0]), ylim=(-depth, high[1] + top), xlabel="x / m", ylabel="y / m")
+    views = [(f"{setting(walk)}{', from the side' * tilts}", side, SIDE)]
     draw_ground(side, low[0], high[0], -depth)
     _draw_distance(side, walk, -0.5 * depth)
     if tilts:
         z = (low[2] + high[2]) / 2 + np.array([0.5, -0.5]) * broad
         front = panel(left + width + _BETWEEN, bottom, scale * broad, height)
-        front.set(xlim=z, ylim=(-depth, high[1]), xlabel="$z$ / m", ylabel="$y$ / m")
+        front.set(xlim=z, ylim=(-depth, high[1] + top), xlabel="z / m", ylabel="y / m")
+        front.xaxis.set_major_locator(MaxNLocator(4))
         above = panel(left, _FOOT + 0.5, width, scale * broad)
-        above.set(xlim=(low[0], high[0]), ylim=z, xlabel="$x$ / m", ylabel="$z$ / m", facecolor=GROUND)
+        above.set(xlim=(low[0], high[0]), ylim=z, xlabel="x / m", ylabel="z / m", facecolor=GROUND)
         draw_ground(front, z[0], z[1], -depth)
         views += [("from the front", front, FRONT), ("from above", above, ABOVE)]
-    color_of = _time_colors(walk)
+    # viridis without its palest end, which can hardly be seen on white paper
+    colors = colormaps["viridis"](0.9 * walk.frame_time / (walk.frame_time[-1] or 1.0))[:, :3]
     center = center_in_room(walk)
     path = np.stack([np.interp(walk.frame_time, walk.time, row) for row in center.T], axis=1)
     radius = walk.setup.parameters.circle_radius
     shown = _instants(path, float(np.ptp(joints[0, :, 0])), count)
     for title, axes, view in views:
         for frame in shown:
-            draw_chain(axes, joints[frame], radius, view, _link_colors(color_of, walk.frame_time[frame]), edge=0.25)
+            draw_chain(axes, joints[frame], radius, view, _link_colors(colors[frame]), edge=0.25)
         _draw_way(axes, walk, center, view)
         tidy(axes)
-        if tilts:
-            axes.set_title(title, fontsize="medium", loc="left")
+        axes.set_title(title, fontsize="medium", loc="left")
+    _write_times(side, walk.frame_time[shown], joints[shown, :, :2], colors[shown], 1.2 * radius, 1 / scale)
     for number, close_up in enumerate(close_ups):
         axes = panel(_LEFT + number * close_up_width, _FOOT, close_up_width - 0.1, lower)
-        colors = _link_colors(color_of, walk.frame_time[close_up.frame])
-        draw_chain(axes, joints[close_up.frame], radius, SIDE, colors, edge=0.6)
-        _frame_close_up(axes, side, close_up, number, walk.frame_time[close_up.frame])
-    bar = panel(_LEFT, 0.45, 4.4, 0.14)
-    colorbar = figure.colorbar(color_of, cax=bar, orientation="horizontal", label="time since release / s")
-    colorbar.outline.set_visible(False)
-    style: dict[str, Any] = {"frameon": False, "title": setting(walk), "alignment": "left", "borderaxespad": 0.0}
-    place = (1 - _RIGHT / paper[0], 0.05 / paper[1])
-    figure.legend(*side.get_legend_handles_labels(), loc="lower right", bbox_to_anchor=place, ncols=2, **style)
+        draw_chain(axes, joints[close_up.frame], radius, SIDE, _link_colors(colors[close_up.frame]), edge=0.6)
+        _frame_close_up(axes, side, close_up, "abcd"[number], walk.frame_time[close_up.frame])
+    style: dict[str, Any] = {"frameon": False, "ncols": 2, "borderaxespad": 0.0, "fontsize": "small"}
+    place = (1 - _RIGHT / paper[0], 1 - 0.08 / paper[1])
+    figure.legend(*side.get_legend_handles_labels(), loc="upper right", bbox_to_anchor=place, **style)
     return figure
 
 
-def _time_colors(walk: Walk) -> ScalarMappable:
-    """Colours of the times of the frames: viridis without its palest end, which can hardly be seen on white paper."""
-    colors = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)), name="time")
-    return ScalarMappable(Normalize(float(walk.frame_time[0]), float(walk.frame_time[-1])), colors)
-
-
-def _link_colors(color_of: ScalarMappable, moment: float) -> tuple[Array, Array, Array]:
-    """Colours of inner links, of outer links and of edges at a time [s], shape (3,) each."""
-    color = color_of.to_rgba(np.array([moment]))[0, :3]
+def _link_colors(color: Array) -> tuple[Array, Array, Array]:
+    """Colours of inner links, of outer links and of edges, shape (3,) each."""
     return 1 - 0.45 * (1 - color), color, 0.6 * color
 
 
@@ -147,7 +144,29 @@ def _instants(path: Array, width: float, count: int | None) -> list[int]:
     return sorted({0, *(int(np.argmin(np.abs(way - mark))) for mark in marks), len(way) - 1})
 
 
-def _draw_way(axes: Axes, walk: Walk, center: Array, view: Array) -> None:
+def _write_times(axes: Axes, times: Array, joints: Array, colors: Array, gap: float, inch: float) -> None:
+    """Write the time of each chain above its highest joint, one line higher where it would touch an earlier time.
+
+    Args:
+        axes: the view from the side.
+        times: of k instants [s], shape (k,).
+        joints: joints x, y [m], shape (k, n, 2).
+        colors: of the chains, shape (k, 3).
+        gap: from a joint to the text [m].
+        inch: on paper [m].
+    """
+    wide, high = 0.42 * inch, 0.15 * inch
+    taken = np.empty((0, 2))
+    for number in range(len(times)):
+        x, y = joints[number, np.argmax(joints[number, :, 1])] + (0.0, gap)
+        while np.any((np.abs(taken[:, 0] - x) < wide) & (np.abs(taken[:, 1] - y) < high)):
+            y += 0.5 * high
+        taken = np.append(taken, [[x, y]], axis=0)
+        style: dict[str, Any] = {"color": 0.7 * colors[number], "fontsize": "small", "path_effects": _HALO}
+        axes.text(x, y, f"{times[number]:.2f} s", ha="center", va="bottom", zorder=6, **style)
+
+
+def _draw_way(axes: Axes, walk: "WalkResult", center: Array, view: Array) -> None:
     """The sprocket, its height above the floor, and the path of the centre of mass."""
     circle = sprocket_circle(walk)
     if circle is not None:
@@ -160,7 +179,7 @@ def _draw_way(axes: Axes, walk: Walk, center: Array, view: Array) -> None:
     axes.plot(*(view @ center.T)[:2], color=INK, linewidth=1.4, linestyle=DOTS, label="centre of mass", zorder=4)
 
 
-def _draw_distance(axes: Axes, walk: Walk, depth: float) -> None:
+def _draw_distance(axes: Axes, walk: "WalkResult", depth: float) -> None:
     """The distance walked, if there is one, at height `depth` [m]."""
     if not np.isfinite(walk.dx):
         return
@@ -171,7 +190,7 @@ def _draw_distance(axes: Axes, walk: Walk, depth: float) -> None:
     for x in (start, end):
         axes.plot([x, x], [0.0, 1.6 * depth], color=INK, linewidth=0.8, zorder=4)
     box = {"facecolor": GROUND, "edgecolor": "none", "pad": 2.0}
-    text = f"$\\Delta x$ = {walk.dx:.3f} m"
+    text = f"Δx = {walk.dx:.3f} m"
     axes.text((start + end) / 2, depth, text, ha="center", va="center", bbox=box, zorder=4)
 
 
@@ -185,22 +204,21 @@ class _CloseUp:
     high: Array
 
 
-def _frame_close_up(axes: Axes, strip: Axes, close_up: _CloseUp, number: int, moment: float) -> None:
+def _frame_close_up(axes: Axes, strip: Axes, close_up: _CloseUp, letter: str, moment: float) -> None:
     """The floor and the title of a close-up, and its box with a letter in the strip."""
     (x, y), (right, top) = close_up.low, close_up.high
-    letter = f"$\\mathbf{{{'abcd'[number]}}}$"
     draw_ground(axes, x, right, min(y, 0.0))
     axes.set(xlim=(x, right), ylim=(y, top), xticks=[], yticks=[])
-    axes.set_title(f"{letter}  {close_up.title}, {moment:.3f} s", fontsize="medium", loc="left")
+    axes.set_title(f"{close_up.title}, {moment:.3f} s", fontsize="medium", loc="left", x=0.07)
+    axes.annotate(
+        letter, (0.0, 1.0), xycoords="axes fraction", xytext=(0, 6), textcoords="offset points", weight="bold"
+    )
     strip.add_patch(Rectangle((x, y), right - x, top - y, fill=False, edgecolor=INK, linewidth=0.8, zorder=5))
-    # Neighbouring boxes often overlap, so their letters are at alternate corners.
-    side = {"ha": "right", "x": right} if number % 2 else {"ha": "left", "x": x}
-    halo = [withStroke(linewidth=3.0, foreground="white")]
-    strip.text(y=top, s=letter, va="bottom", zorder=5, path_effects=halo, **side)
+    strip.text(x, top, f" {letter}", ha="left", va="top", weight="bold", zorder=6, path_effects=_HALO)
 
 
-def _close_ups(walk: Walk) -> list[_CloseUp]:
-    """At most four moments in order of time, no frame twice.
+def _close_ups(walk: "WalkResult") -> list[_CloseUp]:
+    """At most four moments in order of time, no frame twice, whose boxes lie side by side.
 
     They are the first touch of the floor, the first self-contact, the collapse and the end, as far as they happen. The
     collapse is the last time at which the top of the chain is half as high as at the release.
@@ -226,7 +244,25 @@ def _close_ups(walk: Walk) -> list[_CloseUp]:
     for frame, (title, spot) in sorted(found.items()):
         low = np.maximum(spot - size / 2, (-np.inf, -0.1 * size[1]))
         close_ups.append(_CloseUp(title, frame, low, low + size))
-    return close_ups
+    return _side_by_side(close_ups)
+
+
+def _side_by_side(close_ups: list[_CloseUp]) -> list[_CloseUp]:
+    """Move close-ups that overlap apart, each by half of it; three of one spot would lose it, and stay overlapped."""
+    lows = np.array([close_up.low for close_up in close_ups])
+    size = close_ups[0].high - close_ups[0].low
+    for _ in range(10):
+        for one in range(len(lows)):
+            for other in range(one):
+                way = lows[one] - lows[other]
+                overlap = size[0] - abs(way[0])
+                if overlap > 0 and abs(way[1]) < size[1]:
+                    shift = 0.5 * overlap * (1 if way[0] >= 0 else -1)
+                    lows[one, 0], lows[other, 0] = lows[one, 0] + shift, lows[other, 0] - shift
+    reach = 0.45 * size[0]
+    wanted = np.array([close_up.low[0] for close_up in close_ups])
+    lows[:, 0] = np.clip(lows[:, 0], wanted - reach, wanted + reach)
+    return [replace(each, low=low, high=low + size) for each, low in zip(close_ups, lows, strict=True)]
 
 
 def _first_meeting(joints: Array, distance: float) -> tuple[int, Array] | None:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib import colormaps
@@ -10,13 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure, SubFigure
-from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullLocator, PercentFormatter
 from numpy.typing import NDArray
 
-from warpchain.pictures.grid_panels import MOST_LINES, Axis, Cells, Kind, Panel, grid_panels, line_values
+from warpchain.pictures.grid_panels import MOST_LINES, Axis, Kind, Panel, grid_panels, line_values
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.labels import (
     COUNTS,
@@ -29,6 +28,9 @@ from warpchain.pictures.labels import (
     with_unit,
 )
 from warpchain.pictures.style import BLUE, FAINT, GROUND, INK, LINE_COLORS, RED, label_room, panel_grid, tidy
+
+if TYPE_CHECKING:
+    from warpchain.store.cell_statistics import CellStatistics
 
 Array = NDArray[Any]
 
@@ -50,18 +52,16 @@ _DECADES: Final = 30
 _DEEP, _LIGHT = 0.35, 0.13
 """Opacity of the bands of one standard error and one standard deviation."""
 
-_MOST_APART: Final = 3
-"""Panels have y axes of their own if the greatest value of one is at least so many times that of another."""
-
 _PANEL_SIZES: Final = {1: (5.2, 3.6), 2: (3.6, 2.9), 3: (3.0, 2.6), 4: (2.6, 2.4)}
 """Number of columns → width and height of a panel [inches]."""
 
 
 def draw_grid(
-    blocks: Mapping[str, Cells],
+    blocks: "Mapping[str, CellStatistics]",
     quantity: str = "dx",
     kind: Kind | None = None,
     *,
+    x: str | None = None,
     ax: Axes | None = None,
     figure: Figure | SubFigure | None = None,
     label: str = "",
@@ -74,7 +74,8 @@ def draw_grid(
     Args:
         blocks: name of each block → the statistics of its cells.
         quantity: name of the quantity, for labels.
-        kind: as `ax`, `figure`, what is returned and errors, see `SweepResult.plot`.
+        kind: as `x`, `ax`, `figure`, what is returned and errors, see `SweepResult.plot`.
+        x: see there.
         ax: see there.
         figure: see there.
         label: what is shown, without its unit; by default name and symbol of the quantity.
@@ -86,23 +87,20 @@ def draw_grid(
         raise ValueError(f"kind: {kind!r} is unknown; give 'lines', 'map' or None")
     if ax is not None and figure is not None:
         raise ValueError("ax: given together with figure; leave one out")
-    panels, left_out = grid_panels(blocks, kind)
+    panels, left_out = grid_panels(blocks, kind, x)
     label = with_unit(label or quantity_text(quantity), next(iter(blocks.values())).unit)
     if ax is not None and len(panels) > 1:
         raise ValueError(f"ax: this figure has {len(panels)} panels; leave ax out, or give figure")
     alike = len({panel.signature for panel in panels}) == 1
-    apart = _are_apart(panels)
-    if ax is not None:
-        areas, owner = [ax], None
-    else:
-        columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
+    are_lines = all(panel.kind == "lines" for panel in panels)
+    columns = len(panels) if len(panels) <= 3 else min(4, math.ceil(len(panels) ** 0.5))
+    if ax is None:
         figure = InlineFigure(figsize=_size(panels, columns), layout="constrained") if figure is None else figure
-        sharey = (alike or all(panel.kind == "lines" for panel in panels)) and not apart
-        areas, _ = panel_grid(figure, len(panels), columns, sharex=alike, sharey=sharey)
-        owner = figure
+        areas, _ = panel_grid(figure, len(panels), columns, sharex=alike, sharey=alike or are_lines)
+    else:
+        areas, figure = [ax], None
     plotted = list(zip(areas, panels, strict=True))
     values = line_values(panels)
-    most_failed = max(float(panel.failed_share.max()) for panel in panels)
     for axes, panel in plotted:
         axes.set_title(panel.title, fontsize="medium", loc="left")
         if panel.kind == "lines":
@@ -110,29 +108,20 @@ def draw_grid(
             _draw_lines(axes, panel, colors)
             _set_ticks(axes, panel.across, panels)
             if panel.cells.failed.any():
-                _draw_failed_strip(axes, panel, colors, most_failed)
-    _draw_maps([each for each in plotted if each[1].kind == "map"], label, with_numbers=_has_numbers(panels))
-    for group in [[each] for each in plotted] if apart else [plotted]:
-        _set_limits([each for each in group if each[1].kind == "lines"], from_zero=apart)
-    _label(owner, plotted, label, alike=alike)
-    if owner is None:
+                _draw_failed_strip(axes, panel, colors, max(float(each.failed_share.max()) for each in panels))
+    _draw_maps([each for each in plotted if each[1].kind == "map"], label)
+    _begin_at_zero([axes for axes, panel in plotted if panel.kind == "lines"])
+    _label(figure, plotted, label, alike=alike)
+    if figure is None:
         _draw_legends(areas[0], plotted)
         return areas[0].figure
     if left_out:
         note = f"{len(panels)} of {len(panels) + left_out} panels, chosen evenly"
-        owner.suptitle(note, fontsize="medium", color=RED)
+        figure.suptitle(note, fontsize="medium", color=RED)
     beside = any(panel.along for panel in panels if panel.kind == "lines")
-    _draw_legends(
-        owner, plotted, loc="outside right upper" if beside else "outside upper right", ncols=1 if beside else 2
-    )
-    return owner
-
-
-def _has_numbers(panels: Sequence[Panel]) -> bool:
-    """Whether there are only maps, with room for numbers."""
-    return (
-        all(panel.kind == "map" for panel in panels) and sum(panel.cells.mean.size for panel in panels) <= _MOST_NUMBERS
-    )
+    place = "outside right upper" if beside else "outside upper right"
+    _draw_legends(figure, plotted, loc=place, ncols=1 if beside else 2)
+    return figure
 
 
 def _size(panels: Sequence[Panel], columns: int) -> tuple[float, float]:
@@ -195,11 +184,8 @@ def _set_ticks(axes: Axes, across: Axis, panels: Sequence[Panel]) -> None:
         if len(across.values) > label_room(axes, across.texts)[0]:
             axes.tick_params(axis="x", rotation=30)
         return
-    values = np.unique(
-        np.concatenate(
-            [item.across.values for item in panels if item.across.name == across.name and item.across.is_numeric]
-        )
-    )
+    named = [panel.across for panel in panels if panel.across.name == across.name and panel.across.is_numeric]
+    values = np.unique(np.concatenate([axis.values for axis in named]))
     placed = values.astype(float)
     if values[0] > 0 and values[-1] >= _DECADES * values[0] and _unevenness(np.log(placed)) <= _unevenness(placed):
         axes.set_xscale("log")
@@ -237,15 +223,28 @@ def _draw_failed_strip(axes: Axes, panel: Panel, colors: Sequence[str], most: fl
     tidy(strip)
 
 
-def _draw_maps(maps: Sequence[tuple[Axes, Panel]], label: str, *, with_numbers: bool) -> None:
-    """Maps in common colours, whose meaning is the label."""
+def _has_numbers(maps: Sequence[Panel]) -> bool:
+    """Whether there is room for numbers in maps."""
+    return sum(panel.cells.mean.size for panel in maps) <= _MOST_NUMBERS
+
+
+def _draw_maps(maps: Sequence[tuple[Axes, Panel]], label: str) -> None:
+    """Maps in common colours, whose meaning is the label; cells that are NaN stay empty."""
     if not maps:
         return
-    known = np.concatenate([panel.cells.mean[np.isfinite(panel.cells.mean)] for _, panel in maps])
-    colors = {"vmin": known.min(), "vmax": known.max(), "cmap": "viridis"} if len(known) else {}
+    means = np.concatenate([panel.cells.mean.ravel() for _, panel in maps])
+    colors = {"vmin": np.nanmin(means), "vmax": np.nanmax(means)} if np.isfinite(means).any() else {}
+    with_numbers = _has_numbers([panel for _, panel in maps])
     for axes, panel in maps:
         assert panel.along is not None
-        image = _draw_map(axes, panel.cells.mean, panel.across.texts, panel.along.texts, **colors)
+        image = axes.imshow(panel.cells.mean, origin="lower", aspect="auto", cmap="viridis", **colors)
+        columns, rows = panel.across.texts, panel.along.texts
+        for axis, texts, room in zip((axes.xaxis, axes.yaxis), (columns, rows), label_room(axes, columns), strict=True):
+            every = slice(None, None, math.ceil(len(texts) / max(1, min(_MOST_ROWS, int(room)))))
+            axis.set_ticks(range(len(texts))[every], list(texts[every]))
+        axes.set_facecolor(GROUND)
+        axes.spines[:].set_visible(False)
+        axes.tick_params(color=FAINT)
         if with_numbers:
             _write_values(axes, image, panel.cells.mean, panel.counts)
         else:
@@ -254,27 +253,7 @@ def _draw_maps(maps: Sequence[tuple[Axes, Panel]], label: str, *, with_numbers: 
     areas[0].figure.colorbar(image, ax=areas, label=label).outline.set_visible(False)
 
 
-def _draw_map(axes: Axes, table: Array, columns: Sequence[str], rows: Sequence[str], **colors: Any) -> AxesImage:
-    """Draw a table from the bottom row up; cells that are NaN stay empty.
-
-    Args:
-        axes: where to draw.
-        table: values, shape (rows, columns).
-        columns: label of each column.
-        rows: label of each row.
-        colors: `cmap`, `vmin` and `vmax`, as of matplotlib's `imshow`.
-    """
-    image = axes.imshow(table, origin="lower", aspect="auto", **colors)
-    for axis, texts, room in zip((axes.xaxis, axes.yaxis), (columns, rows), label_room(axes, columns), strict=True):
-        every = slice(None, None, math.ceil(len(texts) / max(1, min(_MOST_ROWS, int(room)))))
-        axis.set_ticks(range(len(texts))[every], list(texts[every]))
-    axes.set_facecolor(GROUND)
-    axes.spines[:].set_visible(False)
-    axes.tick_params(color=FAINT)
-    return image
-
-
-def _write_values(axes: Axes, image: AxesImage, table: Array, cells: Mapping[str, Array]) -> None:
+def _write_values(axes: Axes, image: Any, table: Array, cells: Mapping[str, Array]) -> None:
     """Write into each cell of a map its value, and how many of its walks failed or have not been run.
 
     Args:
@@ -283,17 +262,15 @@ def _write_values(axes: Axes, image: AxesImage, table: Array, cells: Mapping[str
         table: its values; a dash stands for NaN, unless the cell has no walks at all.
         cells: numbers of walks: name of `COUNTS` → table.
     """
-    for (row, column), value in np.ndenumerate(table):
-        rested, absent, lost, waiting = (cells[name][row, column] for name in COUNTS)
+    for place, value in np.ndenumerate(table):
+        rested, absent, lost, waiting = (cells[name][place] for name in COUNTS)
         if not (rested or absent or lost or waiting):
             continue
         text = f"{value:.3g}" if np.isfinite(value) else "–"
-        parts = [f"{lost:.0f} failed"] * bool(lost) + [f"{waiting:.0f} to run"] * bool(waiting)
+        text += f"\n{lost:.0f} failed" * bool(lost) + f"\n{waiting:.0f} to run" * bool(waiting)
         red, green, blue, _ = image.to_rgba(value) if np.isfinite(value) else (1.0, 1.0, 1.0, 1.0)
         color = INK if 0.3 * red + 0.59 * green + 0.11 * blue > 0.5 else "white"
-        axes.text(column, row, text, ha="center", va="bottom" if parts else "center", color=color, fontsize="small")
-        if parts:
-            axes.text(column, row, "\n".join(parts), ha="center", va="top", color=color, fontsize="xx-small")
+        axes.text(place[1], place[0], text, ha="center", va="center", color=color, fontsize="small")
 
 
 def _draw_failed(axes: Axes, share: Array) -> None:
@@ -306,21 +283,12 @@ def _draw_failed(axes: Axes, share: Array) -> None:
     axes.add_collection(dots, autolim=False)
 
 
-def _set_limits(plotted: Sequence[tuple[Axes, Panel]], *, from_zero: bool) -> None:
-    """Give all lines the same y axis, from zero if that is asked for or the values need more than half of that."""
-    ends = []
-    for _, panel in plotted:
-        half = np.nan_to_num(panel.cells.standard_error if panel.along else panel.cells.sd)
-        ends += [panel.cells.mean - half, panel.cells.mean + half]
-    if not ends or not np.isfinite(known := np.concatenate(ends, axis=None)).any():
-        return
-    low, high = np.nanmin(known), np.nanmax(known)
-    if low >= 0 and (low < 0.5 * high or from_zero):
-        low = 0.0
-    margin = 0.05 * (high - low)
-    for axes, _ in plotted:
-        if margin > 0:
-            axes.set_ylim(low - margin * (low != 0), high + margin)
+def _begin_at_zero(panels: Sequence[Axes]) -> None:
+    """Let the common y axis of lines begin at zero if all is positive and takes more than half of it."""
+    if panels:
+        low, high = (f(getattr(axes.dataLim, end) for axes in panels) for f, end in ((min, "y0"), (max, "y1")))
+        if 0 <= low < 0.5 * high:
+            panels[0].set_ylim(0.0, 1.05 * high)
 
 
 def _label(
@@ -344,12 +312,6 @@ def _label(
         figure.supylabel(rows, fontsize="medium")
 
 
-def _are_apart(panels: Sequence[Panel]) -> bool:
-    """Whether lines of one panel would be flat on the y axis of another."""
-    tops = [np.nanmax(np.abs(panel.cells.mean)) for panel in panels if np.isfinite(panel.cells.mean).any()]
-    return all(panel.kind == "lines" for panel in panels) and max(tops) >= _MOST_APART * min(tops)
-
-
 def _draw_legends(owner: Axes | Figure | SubFigure, plotted: Sequence[tuple[Axes, Panel]], **place: Any) -> None:
     """One legend of all panels; if their lines are of several axes, each panel has one of its own, too."""
     panels = [panel for _, panel in plotted]
@@ -364,7 +326,8 @@ def _draw_legends(owner: Axes | Figure | SubFigure, plotted: Sequence[tuple[Axes
         handles.append(Patch(color=(FAINT, _DEEP), linewidth=0, label="± standard error"))
     if any(panel.along is None for panel in panels):
         handles.append(Patch(color=(FAINT, _LIGHT), linewidth=0, label="± standard deviation"))
-    if not _has_numbers(panels) and any(panel.kind == "map" and panel.cells.failed.any() for panel in panels):
+    maps = [panel for panel in panels if panel.kind == "map"]
+    if not _has_numbers(maps) and any(panel.cells.failed.any() for panel in maps):
         handles.append(Line2D([], [], color=RED, marker="o", linestyle="", label="share of walks failed"))
     if handles:
         owner.legend(handles=handles, title=title, **style, **place)

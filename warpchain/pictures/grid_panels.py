@@ -1,18 +1,22 @@
 """How a grid of any number of axes becomes panels of lines or maps.
 
-The longest axis of numbers runs along x. The next one gives the lines, or the rows of a map if both have many values;
-all other axes give panels. What varies beside links and frequency runs along x, with a line for each number of links.
+Along x runs the frequency if it has three values or more, else the longest axis of numbers. The next longest axis gives
+the lines, or the rows of a map if both have many values; all other axes give panels.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.inputs.validation import InputError, shown
 from warpchain.pictures.labels import COUNTS, math_symbol, short_texts, unit_text
 from warpchain.pictures.style import LINE_COLORS, NothingToShow
+
+if TYPE_CHECKING:
+    from warpchain.store.cell_statistics import CellStatistics
 
 Array = NDArray[Any]
 
@@ -23,25 +27,6 @@ MOST_LINES: Final = len(LINE_COLORS)
 
 MOST_PANELS: Final = 24
 """Greatest number of panels of a block; of more, so many are chosen evenly."""
-
-
-@dataclass(frozen=True, match_args=False, kw_only=True)  # frozen: its attributes are only read
-class Cells(Protocol):
-    """Statistics of a quantity in each cell of a grid, see `CellStatistics`; arrays over its axes."""
-
-    axes: dict[str, Array]
-    unit: str
-    mean: Array
-    sd: Array
-    count: Array
-    absent: Array
-    failed: Array
-    missing: Array
-
-    @property
-    def standard_error(self) -> Array:
-        """Standard error of the mean; NaN with fewer than two walks."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +68,7 @@ class Panel:
     across: Axis
     along: Axis | None
     title: str
-    cells: Cells
+    cells: "CellStatistics"
 
     @property
     def counts(self) -> dict[str, Array]:
@@ -105,24 +90,31 @@ class Panel:
         return self.kind, *(axis.name for axis in axes), *(tuple(axis.values.tolist()) for axis in placed)
 
 
-def grid_panels(blocks: Mapping[str, Cells], kind: Kind | None) -> tuple[list[Panel], int]:
+def grid_panels(
+    blocks: "Mapping[str, CellStatistics]", kind: Kind | None, x: str | None = None
+) -> tuple[list[Panel], int]:
     """The panels of all blocks, and the number of those that are left out because there are too many.
 
     Args:
         blocks: name of each block → the statistics of its cells.
         kind: of all panels; None for what shows a grid best.
+        x: the axis along x; None for what shows a grid best.
 
     Raises:
+        InputError: no block has this axis.
         NothingToShow: no block has an axis of several values, or two for a map, or there is no mean.
     """
     axes = {name: [name for name, values in cells.axes.items() if len(values) > 1] for name, cells in blocks.items()}
+    if x is not None and not any(x in own for own in axes.values()):
+        known = ", ".join(dict.fromkeys(name for own in axes.values() for name in own))
+        raise InputError(f"x: {shown(x)} is no axis of several values; give one of {known}")
     panels: list[Panel] = []
     left_out = 0
     for name, cells in blocks.items():
-        if len(axes[name]) < (2 if kind == "map" else 1):
+        if len(axes[name]) < (2 if kind == "map" else 1) or (x is not None and x not in axes[name]):
             continue
         is_named = sum(set(own) == set(axes[name]) for own in axes.values()) > 1
-        found = list(_panels(cells, kind, name if is_named else ""))
+        found = list(_panels(cells, kind, x, name if is_named else ""))
         chosen = np.unique(np.linspace(0, len(found) - 1, MOST_PANELS).round().astype(int))
         panels += [found[number] for number in chosen]
         left_out += len(found) - len(chosen)
@@ -147,13 +139,13 @@ def line_values(panels: Iterable[Panel]) -> dict[str, Array]:
     return found
 
 
-def _panels(cells: Cells, kind: Kind | None, block: str) -> Iterator[Panel]:
+def _panels(cells: "CellStatistics", kind: Kind | None, x: str | None, block: str) -> Iterator[Panel]:
     """The panels of a block; titles begin with `block`, if it is not empty."""
     given = [Axis(name, np.asarray(values)) for name, values in cells.axes.items()]
     rising = [np.argsort(axis.values) if axis.is_numeric else np.arange(len(axis.values)) for axis in given]
     axes = [Axis(axis.name, axis.values[order]) for axis, order in zip(given, rising, strict=True)]
     several = [axis for axis in axes if len(axis.values) > 1]
-    chosen, across, along, others = _roles(several, kind)
+    chosen, across, along, others = _roles(several, kind, x)
     order = [several.index(axis) for axis in (*others, along, across) if axis is not None]
 
     def arranged(table: Array) -> Array:
@@ -171,19 +163,20 @@ def _panels(cells: Cells, kind: Kind | None, block: str) -> Iterator[Panel]:
         yield Panel(chosen, across, along, title, replace(cells, **here))
 
 
-def _roles(axes: Sequence[Axis], kind: Kind | None) -> tuple[Kind, Axis, Axis | None, list[Axis]]:
+def _roles(axes: Sequence[Axis], kind: Kind | None, x: str | None) -> tuple[Kind, Axis, Axis | None, list[Axis]]:
     """What the axes of a grid become: kind, x axis, lines or rows, panels."""
-    named = {axis.name: axis for axis in axes}
-    third = [axis for axis in axes if axis.name not in ("links", "frequency")]
-    if kind != "map" and len(axes) == 3 and len(third) == 1 and third[0].is_numeric:
-        return "lines", third[0], named["links"], [named["frequency"]]
-    across = max(reversed(axes), key=lambda axis: (axis.is_numeric, len(axis.values)))
+
+    def fit(axis: Axis) -> tuple[bool, bool, bool, int]:
+        is_frequency = axis.name == "frequency" and len(axis.values) > 2
+        return axis.name == x, axis.is_numeric, is_frequency, len(axis.values)
+
+    across = max(reversed(axes), key=fit)
     others = [axis for axis in axes if axis is not across]
     others.sort(key=lambda axis: (kind == "map" and axis.is_numeric, len(axis.values)))
     along = others.pop() if others else None
     if along is not None and len(along.values) > MOST_LINES:
         is_short = len(across.values) <= MOST_LINES
         kind = kind or ("lines" if is_short else "map")
-        if kind == "lines" and is_short:  # a long axis of names beside few numbers
+        if kind == "lines" and is_short and x is None:  # a long axis beside a short one
             across, along = along, across
     return kind or "lines", across, along, [axis for axis in axes if axis in others]

@@ -1,6 +1,6 @@
 """The figure of a stationary loop: its mean shape, curvature and tension, beside a catenary."""
 
-from typing import Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,7 +12,10 @@ from warpchain.loop.catenary import Catenary
 from warpchain.loop.stationary_loop import StationaryLoop
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.style import BLUE, FAINT, GREEN, GROUND, INK, tidy
-from warpchain.pictures.walk_shape import Walk, setting
+from warpchain.pictures.walk_shape import setting
+
+if TYPE_CHECKING:
+    from warpchain.walks.walk_result import WalkResult
 
 SIMULATED: Final[dict[str, Any]] = {"color": BLUE, "linewidth": 2.2}
 HANGING: Final[dict[str, Any]] = {"color": GREEN, "linewidth": 1.2}
@@ -23,7 +26,7 @@ IN_LINKS: Final = 2.0
 """The tension is shown this many links away from the sprocket: averages near it include links that touch it."""
 
 
-def loop_figure(walk: Walk, *, figure: Figure | None = None) -> Figure:
+def loop_figure(walk: "WalkResult", *, figure: Figure | None = None) -> Figure:
     """The mean loop of a walk before its release, to scale, and its curvature and tension along the arc.
 
     Raises:

@@ -63,13 +63,18 @@ class Picture:
 
 
 def save_figure(figure: "Figure", path: str | os.PathLike[str]) -> None:
-    """Write a figure, whole or not at all; the suffix of `path` gives the format.
+    """Write a figure as a PNG, whole or not at all.
+
+    It is painted directly, which takes half the time of `savefig`: that draws everything once more beforehand.
 
     Raises:
         OSError: the file cannot be written.
     """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure.set_dpi(PICTURE_DPI)
     with replacing(path) as part:
-        figure.savefig(part, dpi=PICTURE_DPI)
+        FigureCanvasAgg(figure).print_png(part)  # type: ignore[no-untyped-call]
 
 
 def tidy(axes: "Axes", *, grid: Literal["x", "y", "both"] | None = None) -> None:

@@ -1,14 +1,12 @@
-"""Figures of sweeps: the paper's Figures 6 and 5, maps, tolerances compared, sensitivity, how walks ended.
+"""Figures of sweeps: the paper's Figure 6, maps, tolerances compared, sensitivity, how walks ended.
 
 Means and standard deviations are those of the walks that came to rest. The number of walks that failed, or have not
 been run yet, is on the figure.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from functools import partial
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -40,17 +38,12 @@ from warpchain.pictures.style import (
     panel_grid,
     tidy,
 )
-from warpchain.reports.figure5 import sweep_figure5
-from warpchain.reports.grids import grid_pictures, has_series, heat_map
+from warpchain.reports.grids import grid_pictures, has_series
 from warpchain.reports.statistics import CONFIDENCE, sensitivities, tolerance_agreement
 from warpchain.status import Status
-from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.sweep_result import SweepResult
 
 Array = NDArray[np.float64]
-
-_MOST_BLOCKS: Final = 6
-"""Greatest number of blocks whose walks are counted separately."""
 
 _STARTS: Final = {
     "rest": ("started at rest", RED, "o"),
@@ -64,24 +57,22 @@ _OTHER_MARKERS: Final = "s^vP*X"
 
 
 def figures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
-    """Every figure that the sweep has the walks for, the paper's Figures 6 and 5 first.
+    """Every figure that the sweep has the walks for, the paper's Figure 6 first.
 
     Args:
         result: a sweep.
-        quantity: a column of numbers; for any other than ``dx`` there are just its maps and its figures over grids.
+        quantity: a column of numbers; for any other than ``dx`` there are just its figures over grids.
 
     Raises:
         InputError: there is no such column.
     """
     result.cell_statistics(quantity)
-    draws: list[Callable[[SweepResult], Picture]] = [partial(heat_map, quantity=quantity)]
-    last: list[Callable[[SweepResult], Picture]] = []
-    if quantity == "dx":
-        draws = [figure6, sweep_figure5, *draws, tolerance, sensitivity]
-        last = [status_counts]
-    for draw in (*draws, *grid_pictures(result, quantity), *last):
+    for draw in (figure6, tolerance, sensitivity) if quantity == "dx" else ():
         with suppress(NothingToShow):
             yield draw(result)
+    yield from grid_pictures(result, quantity)
+    if quantity == "dx" and len([count for count in result.summary().values() if count]) > 1:
+        yield status_counts(result)
 
 
 def figure6(result: SweepResult) -> Picture:
@@ -94,40 +85,35 @@ def figure6(result: SweepResult) -> Picture:
         NothingToShow: no walk of such a block has come to rest, or none of the blocks has several cells.
     """
     series = _all_series(result)
-    if not any(item.cells.count.any() for item in series) or all(len(item.places) == 1 for item in series):
+    rows = [row for item in series for row in item.cells.values()]
+    numbers = sorted({links for item in series for links in item.cells})
+    frequencies = sorted({frequency for row in rows for frequency in row})
+    lows = [mean - 2 * np.nan_to_num(sd) for row in rows for mean, sd, _ in row.values() if np.isfinite(mean)]
+    if not lows or len(numbers) == len(frequencies) == 1:
         raise NothingToShow("Figure 6 takes walks at rest in a block with nothing but links and frequency as axes")
-    numbers = sorted({links for item in series for links, _ in item.places})
-    frequencies = sorted({frequency for item in series for _, frequency in item.places})
     gap = float(np.diff(frequencies).min()) if len(frequencies) > 1 else 1.0
     columns = {1: 1, 2: 2, 4: 2}.get(len(numbers), 3)
     figure, used, empty = _grid(len(numbers), columns, (3.1, 2.6), (0.0, 1.0))
     for links, axes in zip(numbers, used, strict=True):
-        here = [item for item in series if item.at(links)]
+        here = [item for item in series if links in item.cells]
         for number, item in enumerate(here):
             # Boxes of several series stand side by side about their frequency.
             shift = gap * (number - (len(here) - 1) / 2) * 0.7 / len(here)
             _draw_boxes(axes, item, links, shift, gap * min(0.36, 0.6 / len(here)))
         axes.set_title(f"$n$ = {links}", fontsize="medium", loc="left")
-        lost = [
-            {name: getattr(item.cells, name)[place] for name in COUNTS}
-            for item in here
-            for place in item.at(links).values()
-        ]
+        lost = [counts for item in here for _, _, counts in item.cells[links].values()]
         axes.set_xlabel(lost_note(lost), color=RED, fontsize="small")
         tidy(axes, grid="y")
     first = used[0]
     if len(frequencies) <= 8:
         first.set_xticks(frequencies, [f"{frequency:g}" for frequency in frequencies])
     first.set_xlim(frequencies[0] - 0.6 * gap, frequencies[-1] + 0.6 * gap)
-    lowest = min(
-        np.nanmin(item.cells.mean - 2 * np.nan_to_num(item.cells.sd)) for item in series if item.cells.count.any()
-    )
-    first.set_ylim(bottom=min(0.0, 1.05 * lowest))
+    first.set_ylim(bottom=min(0.0, 1.05 * min(lows)))
     figure.supxlabel(FREQUENCY, fontsize="medium")
     figure.supylabel(DISTANCE, fontsize="medium")
     _draw_legend(figure, empty[-1] if empty else None, series)
     caption = "Distance walked against the frequency of the sprocket, as in the paper's Figure 6: mean, box of one and "
-    return Picture("figure6", caption + "bar of two standard deviations.", figure)
+    return Picture("distance", caption + "bar of two standard deviations.", figure)
 
 
 def tolerance(result: SweepResult) -> Picture:
@@ -218,30 +204,16 @@ def sensitivity(result: SweepResult) -> Picture:
 
 
 def status_counts(result: SweepResult) -> Picture:
-    """Number of walks by status, missing ones included, of each block; of the whole sweep if it has many blocks."""
-    summaries = {name: block.summary() for name, block in result.blocks.items()}
-    if not 1 < len(summaries) <= _MOST_BLOCKS:
-        summaries = {"": result.summary()}
-    rows = [
-        (name, label, count)
-        for name, summary in summaries.items()
-        for label, count in summary.items()
-        if count or label == Status.AT_REST.label
-    ]
-    figure = Figure(figsize=(7.0, 0.9 + 0.32 * len(rows)), layout="constrained")
+    """Number of walks by status, missing ones included."""
+    counts = {label: count for label, count in result.summary().items() if count}
+    figure = Figure(figsize=(7.0, 0.9 + 0.32 * len(counts)), layout="constrained")
     axes = figure.subplots()
-    texts = []
-    for place, (name, label, count) in enumerate(rows):
-        color = {Status.AT_REST.label: BLUE, "missing": FAINT}.get(label, RED)
-        axes.barh(place, count, 0.7, color=color)
-        whole = sum(summaries[name].values())
-        share = "" if count in (0, whole) else f" ({count / whole:.2%})"
-        axes.text(count, place, f" {count:,}{share}", va="center", color=INK)
-        text = "not run yet" if label == "missing" else label.replace("_", " ")
-        texts.append(f"{name}: {text}" if name else text)
-    axes.set_yticks(range(len(rows)), texts)
-    axes.set_ylim(len(rows) - 0.4, -0.6)
-    axes.set_xlim(0, 1.22 * max(1, *(count for _, _, count in rows)))
+    texts = ["not run yet" if label == "missing" else label.replace("_", " ") for label in counts]
+    colors = [{Status.AT_REST.label: BLUE, "missing": FAINT}.get(label, RED) for label in counts]
+    bars = axes.barh(texts, list(counts.values()), 0.7, color=colors)
+    axes.bar_label(bars, [f" {count:,} ({count / result.walk_count:.2%})" for count in counts.values()], color=INK)
+    axes.invert_yaxis()
+    axes.margins(x=0.22)
     axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
     axes.set_xlabel("walks")
     tidy(axes)
@@ -268,51 +240,40 @@ def _grid(
     return figure, *panel_grid(figure, count, columns, sharex=True)
 
 
-@dataclass(frozen=True)
-class Series:
-    """The cells of one block and start in Figure 6.
-
-    Attributes:
-        label: for the legend.
-        color: of its marks.
-        marker: of its means.
-        cells: statistics of the block.
-        places: links and frequency → place of the cell in the block's grid.
-    """
+class _Series(NamedTuple):
+    """Label, colour and marker of one block and start in Figure 6; links → frequency → mean, s.d., counts."""
 
     label: str
     color: str
     marker: str
-    cells: CellStatistics
-    places: dict[tuple[int, float], tuple[int, ...]]
-
-    def at(self, links: int) -> dict[float, tuple[int, ...]]:
-        """Frequency → place of the cells with a number of links."""
-        return {frequency: place for (number, frequency), place in self.places.items() if number == links}
+    cells: dict[int, dict[float, tuple[float, float, dict[str, int]]]]
 
 
-def _all_series(result: SweepResult) -> list[Series]:
+def _all_series(result: SweepResult) -> list[_Series]:
     """The series of every block in which nothing but links, frequency and start varies."""
-    series: list[Series] = []
+    series: list[_Series] = []
     for block, given in zip(result.blocks.values(), result.sweep["blocks"], strict=True):
-        starts: dict[str, dict[tuple[int, float], tuple[int, ...]]] = {}
+        found, starts = block.statistics("dx"), dict[str, Any]()
         for place in np.ndindex(*block.shape[:-1]) if has_series(block) else ():
             values = {**given["scene"], **cell_values(block.axes, place)}
-            starts.setdefault(str(values["start"]), {})[values["links"], values["frequency"]] = place
-        for start, places in starts.items():
+            counts = {name: int(getattr(found, name)[place]) for name in COUNTS}
+            cell = float(found.mean[place]), float(found.sd[place]), counts
+            starts.setdefault(str(values["start"]), {}).setdefault(values["links"], {})[values["frequency"]] = cell
+        for start, cells in starts.items():
             label, color, marker = _STARTS[start]
             if any(item.color == color for item in series):
                 # Another block has this start: this one gets its name in the legend, another colour and marker.
                 label, marker = f"{block.name}, {label}", _OTHER_MARKERS[len(series) % len(_OTHER_MARKERS)]
                 color = next((other for other in _OTHER_COLORS if all(other != item.color for item in series)), INK)
-            series.append(Series(label, color, marker, block.statistics("dx"), places))
+            series.append(_Series(label, color, marker, cells))
     return series
 
 
-def _draw_boxes(axes: Axes, series: Series, links: int, shift: float, width: float) -> None:
+def _draw_boxes(axes: Axes, series: _Series, links: int, shift: float, width: float) -> None:
     """Mean, box and bar at each frequency of one number of links."""
-    for frequency, place in series.at(links).items():
-        x, mean, sd, color = frequency + shift, series.cells.mean[place], series.cells.sd[place], series.color
+    color = series.color
+    for frequency, (mean, sd, _) in series.cells[links].items():
+        x = frequency + shift
         if np.isfinite(sd):
             axes.plot([x, x], [mean - 2 * sd, mean + 2 * sd], color=color, linewidth=1.2)
             box = (x - width / 2, mean - sd), width, 2 * sd
@@ -322,7 +283,7 @@ def _draw_boxes(axes: Axes, series: Series, links: int, shift: float, width: flo
             axes.plot([x], [mean], series.marker, color=color, markersize=4.5, zorder=3)
 
 
-def _draw_legend(figure: Figure, empty: Axes | None, series: Sequence[Series]) -> None:
+def _draw_legend(figure: Figure, empty: Axes | None, series: Sequence[_Series]) -> None:
     """Explain colours and markers, in the place of an empty panel or else above the panels."""
     handles: list[Any] = [
         Line2D([], [], color=item.color, marker=item.marker, linestyle="", label=item.label) for item in series

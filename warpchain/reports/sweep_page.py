@@ -18,7 +18,6 @@ from warpchain.files import checked_output, write_whole
 from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.validation import InputError
 from warpchain.pictures.labels import axis_symbol, cell_text, cell_values, number_text, unit_text, with_unit
-from warpchain.pictures.walk_shape import Walk
 from warpchain.reports.html_page import REPORTS, page, picture, table
 from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
@@ -28,6 +27,7 @@ from warpchain.sweeps.plan import load_sweep
 from warpchain.sweeps.recording import Recording
 from warpchain.version import VERSION
 from warpchain.walks.rows import MISSING, fault_remedies, field_column
+from warpchain.walks.walk_result import WalkResult
 
 Array = NDArray[Any]
 
@@ -56,8 +56,9 @@ def write_report(
     """
     result = load(directory)
     checked_output(path, REPORTS)
-    if animation_of is not None and not 0 <= animation_of < result.walk_count:
-        raise InputError(f"--walk: there is no walk {animation_of}; give 0 … {result.walk_count - 1}")
+    known = result.origin.sweeps[0].indices
+    if animation_of is not None and animation_of not in known:
+        raise InputError(f"--walk: there is no walk {animation_of}; give 0 … {known.max()}")
     sections = {
         "Figures": _figures(result),
         "Cells": _cells(result),
@@ -170,10 +171,8 @@ def _walk_table(
 
 def _walk(result: SweepResult, index: int, device: str | None) -> str:
     """One walk, as kept or else run again: its numbers, a player, and its pictures."""
-    from warpchain.pictures.film_strip import film_strip
-    from warpchain.pictures.walk_figures import figure5
-    from warpchain.run.single_walk import run_walk
     from warpchain.run.sweep_run import on_device
+    from warpchain.walks.one_walk import run_walk
 
     sweep = load_sweep(result.sweep)
     planned = (sweep if device is None else on_device(sweep, device)).planned(index)
@@ -194,14 +193,15 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
     parts = [f"<p>{escape(text)}</p>", _player(walk)]
     if len(walk.frame_time) and np.isfinite(walk.frame_joints).all():
         caption = "Height and speed of the centre of mass, as in the paper's Figure 5."
-        parts += [picture(film_strip(walk), "The walk, drawn to scale."), picture(figure5([walk]), caption)]
+        parts += [picture(walk.plot("film_strip"), "The walk, drawn to scale.")]
+        parts += [picture(walk.plot("height_and_speed"), caption)]
     if planned.drawn:
         rows = [[name, number_text(value), unit_text(name)] for name, value in planned.drawn.items()]
         parts.append("<h3>Drawn for this walk</h3>" + table(["name", "value", "unit"], rows))
     return "\n".join(parts)
 
 
-def _player(walk: Walk) -> str:
+def _player(walk: WalkResult) -> str:
     """A frame with the page of the moving picture, or the reason why there is none."""
     from warpchain.pictures.animation import player
 
@@ -217,7 +217,7 @@ def _player(walk: Walk) -> str:
     return f'<iframe title="the walk in motion" {style} srcdoc="{content}"></iframe>'
 
 
-def _compared(walk: Walk, block: BlockResult, place: tuple[int, ...]) -> str:
+def _compared(walk: WalkResult, block: BlockResult, place: tuple[int, ...]) -> str:
     """Whether a walk that was run again has the same result as in the sweep."""
     status, dx = int(block.columns["status"][place]), float(block.columns["dx"][place])
     if status == MISSING:
@@ -251,7 +251,8 @@ def _value(block: Mapping[str, Any], section: str, name: str) -> str:
         values = [_plain(value) for value in block["grid"][name]]
         return ", ".join(values) if len(values) <= 12 else f"{values[0]} … {values[-1]} ({len(values)} values)"
     own = block if name == "preset" else block[section]
-    plain = _plain(own[name]) if name in own else "of the preset"
+    default = SECTIONS["scene"].model_fields[name].default if section == "scene" else "of the preset"
+    plain = _plain(own.get(name, default))
     distribution = block["distributions"].get(name, {})
     if "gaussian" in distribution:
         gaussian = distribution["gaussian"]

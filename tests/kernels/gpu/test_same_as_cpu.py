@@ -21,6 +21,7 @@ from tests.support.blocks_under_test import (
     launch_blocks,
     launch_chains,
 )
+from tests.support.unlike_links import unlike_links
 from warpchain.engine.batch import Batch
 from warpchain.engine.kernel_choice import most_registers
 from warpchain.inputs.start_shapes import ellipse, lay_chain
@@ -46,7 +47,7 @@ pytestmark = pytest.mark.usefixtures("without_fused_operations")
 def test_fixed_steps_equal_a_cpu_kernel(method: str, fixed_body: str, self_contact: bool, block_dim: int) -> None:
     """Forty steps with dozens of impulses of every kind end in the same state, to the bit."""
     raised = 0.9 * SOFT.sprocket_radius if fixed_body == "sprocket" else 0.0
-    chains = [heap(LINKS, 3, raised=raised), heap(LINKS, 18, tilt=np.pi, raised=raised)]
+    chains = [heap(LINKS, 3, raised=raised), heap(min(40, block_dim), 18, tilt=np.pi, raised=raised)]
     ours, theirs = (batch_of(chains, method=method, self_contact=self_contact) for _ in range(2))
     features = ours.features(fixed_body=fixed_body)
     launch_blocks(ours, features, 40, block_dim=block_dim)
@@ -55,6 +56,22 @@ def test_fixed_steps_equal_a_cpu_kernel(method: str, fixed_body: str, self_conta
         assert counts["accepted"] == 40
         assert counts[fixed_body] > 10
         assert (counts["self"] > 10) == self_contact
+    assert (theirs.counts(1)["strands"] > 0) == self_contact
+    assert_same(ours, theirs)
+
+
+@pytest.mark.parametrize("links", [LINKS, LINKS + 1])
+def test_unlike_links_equal_a_cpu_kernel(links: int) -> None:
+    """Forty steps of links and joints that all differ, in a heap on the floor, an odd number of them as well."""
+    position, velocity = heap(links + links % 2)
+    ours, theirs = (batch_of([(position[:links], velocity[:links])], method="os32") for _ in range(2))
+    for batch in (ours, theirs):
+        batch.set_chain(0, SOFT, links, own=unlike_links(links, SOFT).own)
+    features = ours.features(fixed_body="floor")
+    launch_blocks(ours, features, 40, block_dim=links)
+    launch_chains(theirs, features, 40)
+    assert theirs.counts(0)["self"] > 10
+    assert theirs.counts(0)["floor"] > 10
     assert_same(ours, theirs)
 
 
