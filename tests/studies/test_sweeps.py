@@ -32,6 +32,7 @@ def path_of(name: str) -> Path:
         ),
         ("unsoftened_hold", {"softened": (400,), "own_joints": (400,)}),
         ("softened_drive", {"main": (4, 3, 2, 200)}),
+        ("charm", {"ellipse": (2, 2, 8, 300), "sprocket": (2, 5, 60)}),
         ("floor_friction", {"spinning": (5, 3, 7, 100), "rest": (5, 3, 7, 100)}),
         (
             "paper_claims",
