@@ -28,7 +28,7 @@ DRAWN: Final = (0.0, 0.02, 0.1)
 
 
 def distances(block: Block) -> str:
-    """Δx with standard error, duration, bounces and share at rest, for each cell, in Markdown."""
+    """Δx with its errors, duration, bounces and share at rest of each cell, in Markdown."""
     cells = block.statistics()
     rest = block.columns["status"] == warpchain.Status.AT_REST
     means = {
@@ -43,13 +43,14 @@ def distances(block: Block) -> str:
                 *(f"{value:g}" for value in values[:-1]),
                 f"{1e3 * values[-1]:g}",
                 f"{cells.mean[place]:.3f} ± {cells.standard_error[place]:.3f}",
+                f"{cells.sd[place]:.3f}",
                 f"{means['walk_time'][place]:.2f}",
                 f"{means['bounces'][place]:.1f}",
                 f"{rest[place].mean():.0%}",
             )
         )
     names = [name.replace("frequency", "ν / Hz") for name in block.axes][:-1]
-    return table((*names, "charm / g", "Δx / m", "t / s", "bounces", "at rest"), rows)
+    return table((*names, "charm / g", "Δx / m", "σ / m", "t / s", "bounces", "at rest"), rows)
 
 
 def draw_distances(panel: Axes, block: Block) -> None:
@@ -69,7 +70,7 @@ def draw_distances(panel: Axes, block: Block) -> None:
         )
     panel.set_xlabel("mass of the charm / g")
     panel.set_ylabel(DISTANCE)
-    panel.set_ylim(bottom=0)
+    panel.set_ylim(0, 1.3 * panel.get_ylim()[1])
     panel.legend(frameon=False, fontsize="small")
     tidy(panel, grid="both")
 
@@ -97,7 +98,7 @@ def draw_loops(panels: np.ndarray, links: int = 60, frequency: float = 15.0) -> 
         panel.set_title(f"charm of {1e3 * mass:g} g", loc="left", fontsize="medium")
         panel.set_aspect("equal")
         panel.set_xlim(-0.2, 0.3 * len(TIMES) - 0.1)
-        panel.set_ylim(-0.07, 0.42)
+        panel.set_ylim(-0.07, 0.5)
         panel.set_axis_off()
 
 
