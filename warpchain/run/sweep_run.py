@@ -140,7 +140,7 @@ def _checked_call(
     if count is not None and (isinstance(count, bool) or not isinstance(count, int) or count < 1):
         problems.append(f"workers: {shown(count)} is not a number of workers; give a whole number from 1")
     try:
-        own = own if part is None else _part(part)
+        own = own if part is None else checked_part(part)
         planned = sweep_of_keywords(settings, out) if source is None else load_sweep(source, **replaced)
         if device is not None:
             planned = on_device(planned, device)
@@ -151,7 +151,7 @@ def _checked_call(
     return planned, out, own
 
 
-def _part(given: object) -> tuple[int, int]:
+def checked_part(given: object) -> tuple[int, int]:
     """Number of a part and number of parts of "k/N", or an `InputError`."""
     found = re.fullmatch(r"([1-9]\d{0,5})/([1-9]\d{0,5})", given) if isinstance(given, str) else None
     if found is None or int(found[1]) > int(found[2]):
@@ -208,11 +208,11 @@ def on_device(planned: Sweep, device: str) -> Sweep:
     Raises:
         InputError: The sweep's grid goes over devices.
     """
-    if any("device" in block.axes for block in planned.blocks):
+    if any("device" in block.varied for block in planned.blocks):
         raise InputError(f"device: {device} is given, but the sweep's grid goes over devices; leave one of them out")
     canonical = planned.canonical()
     for block, content in zip(planned.blocks, canonical["blocks"], strict=True):
-        first = {name: values[0] for name, values in block.axes.items() if name in Options.model_fields}
+        first = {name: values[0] for name, values in block.varied.items() if name in Options.model_fields}
         given = {**block.sections["options"], **first, "device": device}
         options = validated(Options, given, "options").model_dump()
         content["options"] = {name: options[name] for name in content["options"]}
@@ -221,8 +221,7 @@ def on_device(planned: Sweep, device: str) -> Sweep:
 
 def _devices(planned: Sweep) -> set[str]:
     """Devices of all walks."""
-    given = [block.axes.get("device") or (block.sections["options"].get("device", "cpu"),) for block in planned.blocks]
-    return {str(device) for devices in given for device in devices}
+    return {setup.options.device for setup in one_of_each_kind(planned)}
 
 
 def _is_on_gpu(planned: Sweep) -> bool:
