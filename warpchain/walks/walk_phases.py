@@ -110,7 +110,7 @@ class WalkRun:
         from_rest = scene.start == "rest"
         speed = 2 * math.pi * scene.frequency * joint_radius(scene, parameters)
         if not self._has_sprocket:
-            batch.set_chain(world, parameters, scene.links)
+            self._set_chain()
             try:
                 position, velocity = lay_chain(
                     ellipse(scene.ellipse_aspect), scene.links, parameters.link_length, speed, scene.phase
@@ -131,7 +131,7 @@ class WalkRun:
             self._hold_softness = hold_softness(parameters, tension, HOLD_STRAIN)
             loaded_softness = hold_softness(parameters, tension + load_factor * weight, LOADED_STRAIN)
         period = scene.links * parameters.link_length / speed if speed > 0 else STILL_PERIOD
-        batch.set_chain(world, parameters, scene.links, contact_radius(scene, parameters))
+        self._set_chain(contact_radius(scene, parameters))
         self._settled = settling_time(scene)
         spin_up = scene.spin_up_time if from_rest and speed > 0 else 0.0
         self._at_full_speed = self._settled + spin_up
@@ -359,7 +359,7 @@ class WalkRun:
     def _go_on(self, start: State) -> None:
         """Place a chain as a state has it; if that was taken from a walk, go on with the walk."""
         batch, world, memory, interval = self._batch, self._world, start.memory, self.recorder.keep.frame_interval
-        batch.set_chain(world, self.setup.parameters, start.links)
+        self._set_chain()
         self._released = True
         if not memory:
             self._load(start.position, start.velocity)
@@ -414,18 +414,19 @@ class WalkRun:
         scene = self.setup.scene
         self.raised = self._hanging_raise if scene.clearance_of == "hanging" else self._raise(position)
         position[:, 1] += self.raised
-        self._batch.set_chain(self._world, self.setup.parameters, scene.links)
+        self._set_chain(None if scene.release is None else contact_radius(scene, self.setup.parameters))
         self._load(position, velocity)
         if self._tilts:
             self._batch.set_plane(self._world, released_plane(self.setup, position))
         if scene.release is not None:
-            self._batch.set_chain(
-                self._world, self.setup.parameters, scene.links, contact_radius(scene, self.setup.parameters)
-            )
             self._batch.set_drive(self._world, motion=motion_rows(scene.release, scene.frequency, self.raised))
             self._batch.resume(self._world, min(scene.release[-1][0], self._walk_end), Status.FINISHED)
             self._moves_sprocket = True
         self._released = True
+
+    def _set_chain(self, radius: float | None = None) -> None:
+        """Set the chain's constants, and the radius [m] at which circles touch the sprocket, if there is one."""
+        self._batch.set_chain(self._world, self.setup.parameters, self.setup.scene.links, radius)
 
     def _load(self, position: Array, velocity: Array) -> None:
         """Begin the walk of a chain whose parameters are set."""
