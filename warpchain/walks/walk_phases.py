@@ -22,7 +22,7 @@ from warpchain.engine.control import (
     push_rate,
     suitable_load,
 )
-from warpchain.engine.snapshot import change, restore, set_first_area, set_frame_marks, take_snapshot
+from warpchain.engine.snapshot import set_first_area, take_snapshot
 from warpchain.engine.sprocket_motion import motion_rows
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
 from warpchain.inputs.floor import body_of, circles_of, raised_by
@@ -34,8 +34,9 @@ from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
+from warpchain.walks.going_on import go_on
 from warpchain.walks.motion import NOTHING, Keep
-from warpchain.walks.moving_plane import angles, lowest_point, plane_of_state, released_plane, state_of_plane
+from warpchain.walks.moving_plane import angles, lowest_point, released_plane
 from warpchain.walks.recorder import Recorder
 
 Array = NDArray[np.float64]
@@ -358,7 +359,7 @@ class WalkRun:
 
     def _go_on(self, start: State) -> None:
         """Place a chain as a state has it; if that was taken from a walk, go on with the walk."""
-        batch, world, memory, interval = self._batch, self._world, start.memory, self.recorder.keep.frame_interval
+        batch, world, memory = self._batch, self._world, start.memory
         self._set_chain()
         self._released = True
         if not memory:
@@ -368,28 +369,11 @@ class WalkRun:
             setattr(self, name, memory[f"run/{name}"].item())
         self.drive_counts = dict(zip(COUNTS, memory["run/counts"].tolist(), strict=True))
         self.drive_extremes = dict(zip(EXTREMES, memory["run/extremes"].tolist(), strict=True))
-        restore(batch, world, memory)
-        self._set_floor()
-        set_frame_marks(batch, world, interval)
-        if "scratch" in memory and self._is_at(start):
-            batch.resume(world, self._walk_end, Status.TIME_LIMIT)
+        if go_on(batch, world, start, self._walk_end, self.recorder.keep.frame_interval):
             self.recorder.go_on(memory["state/last_sample"], start.time)
-            return
-        if self._tilts:
-            batch.set_plane(world, plane_of_state(start))
-        # it stops at once, and so makes the sample with which its new ledger begins
-        change(batch, world, start.position, start.velocity)
-        batch.resume(world, batch.time(world), Status.FINISHED)
-        self._first_area = float(memory["state/first_area"])
-
-    def _is_at(self, start: State) -> bool:
-        """Whether the world has the places and velocities of a state, to the bit."""
-        batch, world = self._batch, self._world
-        pairs = [(batch.position(world), start.position), (batch.velocity(world), start.velocity)]
-        if self._tilts:
-            ours = state_of_plane(batch.plane(world))
-            pairs += [(values, getattr(start, name)) for name, values in ours.items()]
-        return all(here.tobytes() == there.tobytes() for here, there in pairs)
+        else:
+            self._first_area = float(memory["state/first_area"])
+        self._set_floor()
 
     def _start_drive(self) -> None:
         limit = self._at_full_speed + self.setup.scene.hold_limit
