@@ -32,6 +32,7 @@ def path_of(name: str) -> Path:
         ),
         ("unsoftened_hold", {"softened": (400,), "own_joints": (400,)}),
         ("softened_drive", {"main": (4, 3, 2, 200)}),
+        ("slopes", {"slope": (2, 3, 13, 100), "friction": (4, 7, 50), "stairs": (2, 3, 100)}),
         ("floor_friction", {"spinning": (5, 3, 7, 100), "rest": (5, 3, 7, 100)}),
         (
             "paper_claims",

@@ -11,7 +11,6 @@ from tests.support.folded_chains import folded_chain
 from tests.support.kernels_under_test import FLOOR, TERRAIN, ContactPass, Placed
 from warpchain.inputs.floor import distances
 from warpchain.inputs.parameters import preset
-from warpchain.status import Status
 
 PAPER, SOFT = preset("paper"), preset("soft")
 STAIRS = np.array([[-0.05, 0.0], [0.0, 0.0], [0.0, -0.02], [0.03, -0.02], [0.03, -0.04], [0.1, -0.04]])
@@ -158,40 +157,3 @@ def test_a_fall_equals_a_second_program(points):
     assert min(count, found.impulses["floor"]) > 500
     assert_allclose(found.position[0, :, :2], expected[:, :2], atol=1e-5)
     assert_allclose(found.position[0, :, 2], expected[:, 2], atol=1e-3)
-
-
-@pytest.mark.parametrize(
-    "scene",
-    [
-        {"slope": 8.0},
-        {"slope": -5.0},
-        {"floor": [[-1, 0], [0.1, 0], [0.1, -0.02], [0.2, -0.02], [0.2, 0.01], [1, 0.01]]},
-    ],
-    ids=["down", "up", "pit and step"],
-)
-def test_energy_is_accounted_for_on_every_floor(scene):
-    """What a walk begins with is what it ends with and what was lost, to a thousandth."""
-    walk = warpchain.walk(links=24, start="ellipse", preset="soft", method="explicit", frame_interval=None, **scene)
-    at_release = walk.energy["kinetic_at_release"]
-    assert walk.status == Status.AT_REST and walk.impulses["floor"] > 100
-    assert abs(walk.energy["residual"]) < 1e-3 * at_release
-    assert walk.greatest_penetration["floor"] < 2e-4
-
-
-def test_a_walk_down_a_steep_slope_ends_by_its_distance():
-    """It ends where its centre has gone the limit along the slope, and Δx is that of no chain at rest."""
-    walk = warpchain.walk(links=24, start="ellipse", preset="soft", method="explicit", slope=30.0, distance_limit=0.5)
-    assert walk.status == Status.DISTANCE_LIMIT and walk.status.ok and np.isnan(walk.dx)
-    assert walk.center[-1, 0] / np.cos(np.radians(30)) == pytest.approx(0.5, abs=0.01)
-    assert walk.center[-1, 0] >= 0.5 * np.cos(np.radians(30)) > walk.center[-2, 0]
-
-
-def test_the_release_is_at_its_clearance_from_the_profile():
-    """The nearest circle of the first frame is at the clearance from the floor, whatever is below the chain."""
-    for scene in ({"slope": 20.0}, {"floor": BOX.tolist()}):
-        walk = warpchain.walk(
-            links=24, start="ellipse", preset="soft", method="explicit", clearance=0.02, distance_limit=1e-3, **scene
-        )
-        points = BOX if "floor" in scene else np.array([[0, 0], [np.cos(np.radians(20)), -np.sin(np.radians(20))]])
-        first = distances(points, walk.frame_joints[0]).min() - SOFT.circle_radius
-        assert first == pytest.approx(0.02, abs=1e-4)

@@ -17,7 +17,7 @@ import yaml
 
 from tests.kernels.methods.test_flight import FLIGHTS, exact_flight, greatest
 from tests.run.test_sweep_run import brief_setup, data_of, outcomes
-from tests.support.blocks_under_test import FIXED_STEP, SOFT, heap
+from tests.support.blocks_under_test import FIXED_STEP, HILLS, SOFT, heap
 from warpchain import simulate, sweep, walk
 from warpchain.engine.batch import Batch
 from warpchain.engine.sprocket_motion import motion_rows
@@ -31,7 +31,7 @@ LINKS, STEPS = 60, 300
 
 def fixed_steps(device: str, method: str, fixed_body: str) -> dict[str, np.ndarray]:
     """State and counters of two heaps in which everything touches everything, after steps of equal length."""
-    batch = Batch(2, LINKS, Options(method=method, tolerance=0.1, device=device))
+    batch = Batch(2, LINKS, Options(method=method, tolerance=0.1, device=device), faces=len(HILLS) - 1)
     batch.control.skin = 1e-9  # so that no step may be longer than …
     batch.control.contact_step = FIXED_STEP
     for world in range(2):
@@ -39,6 +39,7 @@ def fixed_steps(device: str, method: str, fixed_body: str) -> dict[str, np.ndarr
         if fixed_body == "sprocket":
             position[:, 1] += 0.9 * SOFT.sprocket_radius
         batch.set_chain(world, SOFT, LINKS)
+        batch.set_floor(world, HILLS if fixed_body == "terrain" else HILLS[[0, -1]], SOFT)
         batch.load(world, position, velocity, stop_time=STEPS * FIXED_STEP, stop_status=Status.FINISHED)
         batch.set_drive(world, sprocket_speed=-50.0)
         batch.set_drive(world, motion=motion_rows(((0.01, 0.002, -0.01, 5.0),), 8.0, 0.02))
@@ -64,6 +65,7 @@ def compare(ours: dict[str, np.ndarray], theirs: dict[str, np.ndarray]) -> float
 
 
 CASES = [("rkf78", "floor"), ("dp5", "sprocket"), ("bs32", "floor"), ("os32", "floor"), ("dp5", "floor")]
+CASES += [("os32", "slope"), ("os32", "terrain")]
 
 
 @pytest.fixture

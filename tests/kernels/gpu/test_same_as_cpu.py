@@ -14,6 +14,7 @@ import warp as wp
 
 from tests.support.blocks_under_test import (
     FIXED_STEP,
+    HILLS,
     SOFT,
     assert_same,
     batch_of,
@@ -31,7 +32,6 @@ from warpchain.kernels.gpu.loop import make_advance_block
 from warpchain.status import Status
 
 LINKS = 12
-HILLS = np.array([[-1.0, -0.002], [-0.02, 0.003], [0.0, -0.001], [0.015, 0.002], [0.03, -0.01], [1.0, -0.01]])
 
 
 pytestmark = pytest.mark.usefixtures("without_fused_operations")
