@@ -76,8 +76,9 @@ def heights(points: Array, x: Array) -> Array:
     """Height [m] of the floor at x; at an upright face that of one of its ends."""
     left, right = points[0, 0], points[-1, 0]
     rise = [float(step[1] / step[0]) for step in (points[1] - points[0], points[-1] - points[-2])]
-    height: Array = np.interp(x, points[:, 0], points[:, 1])
-    return height + rise[0] * np.minimum(x - left, 0.0) + rise[1] * np.maximum(x - right, 0.0)
+    beyond = rise[0] * np.minimum(x - left, 0.0) + rise[1] * np.maximum(x - right, 0.0)
+    height: Array = np.interp(x, points[:, 0], points[:, 1]) + beyond
+    return height
 
 
 def distances(points: Array, places: Array) -> Array:
