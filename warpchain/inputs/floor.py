@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.inputs.validation import shown
+from warpchain.inputs.validation import InputError, shown
 
 Array = NDArray[np.float64]
 Points = tuple[tuple[float, float], ...]
@@ -96,6 +96,21 @@ def circles_of(position: Array, link_length: float) -> Array:
     """Centres of the circles of links (n, 3), (2 n, 2): the left ones, then the right ones."""
     arms = link_length / 2 * np.stack([np.cos(position[:, 2]), np.sin(position[:, 2])], axis=1)
     return np.concatenate([position[:, :2] - arms, position[:, :2] + arms])
+
+
+def check_above(points: Array | None, position: Array, link_length: float, path: str) -> None:
+    """Check that the middle of no circle of links (n, 3) is below the floor, where it would never come out.
+
+    Raises:
+        InputError: one is; the message begins with `path`.
+    """
+    circles = circles_of(position, link_length)
+    depth = -(circles[:, 1] if points is None else distances(points, circles))
+    if depth.max() > 0:
+        raise InputError(
+            f"{path}: link {int(depth.argmax()) % len(position)} starts {depth.max():.3g} m inside the floor; "
+            "raise the chain, or lower the floor"
+        )
 
 
 def raised_by(points: Array, circles: Array, radius: float, clearance: float) -> float:

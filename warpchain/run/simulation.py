@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.tallies import LOST
-from warpchain.inputs.floor import body_of, checked_profile, circles_of, distances
+from warpchain.inputs.floor import body_of, check_above, checked_profile
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import check_links_on_gpu
@@ -91,7 +91,7 @@ def simulate(
             f"give at most {MOST_PLACES // state.links}"
         )
     if points is not None:
-        _check_above(points, state.position, chain)
+        check_above(points, state.position, chain.link_length, "position")
     with gpu_turn([options.device]):
         body = "none" if floor is False else body_of(points)
         return _follow(options, chain, state.position, state.velocity, instants, end, body, points)
@@ -260,20 +260,6 @@ def _checked_floor(floor: Any) -> Array | None:
     except ValueError as problem:
         raise InputError(f"floor: {problem}") from None
     return None if profile == "flat" else np.array(profile)
-
-
-def _check_above(points: Array, start: Array, chain: Parameters) -> None:
-    """Check that the middle of no circle is below the floor, where it would never come out.
-
-    Raises:
-        InputError: one is.
-    """
-    depth = -distances(points, circles_of(start, chain.link_length))
-    if depth.max() > 0:
-        raise InputError(
-            f"position: link {int(depth.argmax()) % len(start)} starts {depth.max():.3g} m inside the floor; "
-            "raise the chain, or lower the floor"
-        )
 
 
 def _checked_times(duration: object, times: Sequence[float] | Array | None) -> Array:

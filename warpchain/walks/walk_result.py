@@ -76,9 +76,10 @@ class WalkResult:
     """One walk, from the release to its end: t instants and f frames of a chain of n links.
 
     Time counts from the release, x from the centre of sprocket or ellipse, y up from the floor. Units, meanings and
-    shapes stand beside the fields. `setup` is complete; `seed` is that of the random draw, None if nothing was drawn;
-    `versions` names the software. `before_release` is the motion on the sprocket just before the release, None if it
-    was not kept.
+    shapes stand beside the fields. Time series have a row at every `record_interval` exactly, and at the end; at an
+    impact a row of a velocity or an energy lies between the values before and after. Frames are at the ends of steps.
+    `setup` is complete; `seed` is that of the random draw, None if nothing was drawn; `versions` names the software.
+    `before_release` is the motion on the sprocket just before the release, None if it was not kept.
 
     Raises:
         ValueError: an array has another shape, or a dictionary other keys, than stands beside its field; or times do
