@@ -251,7 +251,7 @@ def test_what_a_walk_does_not_have_is_in_no_mean(tmp_path: Path, capsys: pytest.
         result.plot(quantity="hold_time")
     with pytest.raises(SystemExit, match="2"):
         main(["plot", str(tmp_path), "--quantity", "hold_time"])
-    assert capsys.readouterr().err.startswith("error: --quantity: hold_time: no walk at rest has one")
+    assert capsys.readouterr().err.startswith("error: --quantity: hold_time: no walk at rest has a value")
 
 
 # All figures of a sweep
