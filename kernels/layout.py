@@ -9,49 +9,46 @@ from itertools import accumulate
 # State at the start of the step.
 X, Y, THETA, U, V, OMEGA = range(6)
 COSINE, SINE = 6, 7
-# Constants of the links.
-MASS, INERTIA, INVERSE_MASS, INVERSE_INERTIA = range(8, 12)
+# Constants of the links, under their present loads; friction of the joints, β [N m s] and τ_c [N m].
+MASS, INERTIA, INVERSE_MASS, INVERSE_INERTIA, VISCOUS, COULOMB = range(8, 14)
 # A stage: link ends, arm, spin. Rows of left ends and of the spin are padded: column n repeats column 0.
-LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y = range(12, 16)
-LEFT_U, LEFT_V, RIGHT_U, RIGHT_V = range(16, 20)
-STAGE_ARM_X, STAGE_ARM_Y, STAGE_SPIN = 20, 21, 22
+LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y = range(14, 18)
+LEFT_U, LEFT_V, RIGHT_U, RIGHT_V = range(18, 22)
+STAGE_ARM_X, STAGE_ARM_Y, STAGE_SPIN = 22, 23, 24
 # A finished attempt: candidate state and its error ratio.
-NEW_X, NEW_Y, NEW_THETA, NEW_U, NEW_V, NEW_OMEGA = range(23, 29)
-ERROR = 29
+NEW_X, NEW_Y, NEW_THETA, NEW_U, NEW_V, NEW_OMEGA = range(25, 31)
+ERROR = 31
 # Joint forces and torques, shifted by one: column i + 1 is joint i, column 0 repeats column n. They lie at least three
 # rows from the stage rows they are computed from. Closer, clang allows for a load that waits for the store of an
 # earlier column, and vectorises by 2 instead of 8.
-FORCE_X, FORCE_Y, TORQUE = 30, 31, 32
+FORCE_X, FORCE_Y, TORQUE = 32, 33, 34
 # Energy [J] lost so far: per joint to friction and damping, per link to floor or sprocket.
-LOST_FRICTION, LOST_DAMPING, LOST_FIXED = 33, 34, 35
+LOST_FRICTION, LOST_DAMPING, LOST_FIXED = 35, 36, 37
 # Joint positions when the neighbour list was built.
-LISTED_X, LISTED_Y = 36, 37
+LISTED_X, LISTED_Y = 38, 39
 # Per stage, in this order: accelerations of x, y, θ, and the power [W] lost in each joint to friction and damping.
-STAGES = 38
+STAGES = 40
 STAGE_ROWS = 5
 
-# On a GPU the first 16 rows above and the following ones lie on a board that all threads of a block share. Between
+# Model.links: what links and joints have of their own, one after the other as in a chain's parameters.
+OWN_MASS, OWN_INERTIA, OWN_VISCOUS, OWN_COULOMB = range(4)
+LINK_ROWS = 4
+
+# On a GPU the first 18 rows above and the following ones lie on a board that all threads of a block share. Between
 # launches the scratch keeps the rows from BOARD_LOST_SELF up to BOARD_VALUES. Every row less leaves a multiprocessor
 # more cache for register spills.
-BOARD_LOST_SELF, BOARD_LOST_FRICTION, BOARD_LOST_DAMPING, BOARD_LOST_FIXED = range(16, 20)
-BOARD_LISTED_X, BOARD_LISTED_Y = 20, 21
+BOARD_LOST_SELF, BOARD_LOST_FRICTION, BOARD_LOST_DAMPING, BOARD_LOST_FIXED = range(18, 22)
+BOARD_LISTED_X, BOARD_LISTED_Y = 22, 23
 # First stage of the next step: accelerations, then the two powers (see STAGES).
-BOARD_FIRST = 22
-# Values of the whole chain, in the first columns of one more row.
-BOARD_VALUES = 27
+BOARD_FIRST = 24
+# Values of the whole chain, in the first columns of one more row; behind them its constants, see gpu.stage.constants.
+BOARD_VALUES = 29
 VALUE_OPENING, VALUE_FIXED_DEPTH, VALUE_LAST_IMPULSE, VALUE_STOP_TIME, VALUE_NEXT_SAMPLE = range(5)
-VALUE_STIFFNESS, VALUE_DAMPING, VALUE_VISCOUS, VALUE_COULOMB, VALUE_INVERSE_SMOOTHING = range(5, 10)
-VALUE_GRAVITY, VALUE_CIRCLE_RADIUS, VALUE_SPROCKET_RADIUS, VALUE_TANGENTIAL = range(10, 14)
-VALUE_FLOOR_RESTITUTION, VALUE_FLOOR_FRICTION, VALUE_SPROCKET_RESTITUTION, VALUE_SPROCKET_FRICTION = range(14, 18)
-VALUE_CHAIN_RESTITUTION, VALUE_CHAIN_FRICTION, VALUE_HALF_LENGTH = 18, 19, 20
-VALUE_DEADLINE, VALUE_CONTACT_STEP, VALUE_TOLERANCE = 21, 22, 23
+VALUE_DEADLINE, VALUE_CONTACT_STEP, VALUE_TOLERANCE = 5, 6, 7
 # A plane that tilts, as the links feel it: seven values, see gpu.tilting; and in the attempt before.
-VALUE_HALF_WIDTH = 24
-VALUE_PLANE, VALUE_PLANE_BEFORE = 25, 32
-VALUE_INVERSE_SQUARE = 39
-VALUE_PUSH_RATE = 40
-VALUES = 41
-BOARD_ROWS = 28
+VALUE_PLANE, VALUE_PLANE_BEFORE = 8, 15
+VALUES = 22
+BOARD_ROWS = 30
 
 # State.watch
 WINDOW_START, WINDOW_COUNT, SUM_HEIGHT, SUM_WIDTH, SUM_X, SUM_Y, SUM_SPEED = range(7)
@@ -62,11 +59,12 @@ HOLD_LOAD, LOADED_SINCE, UNLOADED_SINCE, DRIFT = range(18, 22)
 REST_SINCE, LAST_FLOOR_IMPULSE = 22, 23
 SOFTENED_AT = 24
 FELL_AT, GREATEST_LEAN = 25, 26
-# The first sample after the first self-contact, and that after which the loop encloses less than half of its area at
-# the release: time, bounces begun, time since the last impulse on the floor.
+# The first sample after the first self-contact, after that between strands of the loop, and that after which the loop
+# encloses less than half of its area at the release: time, bounces begun, time since the last impulse on the floor.
 SELF_CONTACT_AT, SELF_CONTACT_BOUNCES, SELF_CONTACT_FLIGHT = 27, 28, 29
 COLLAPSED_AT, COLLAPSE_BOUNCES, COLLAPSE_FLIGHT = 30, 31, 32
-WATCH_ROWS = 33
+STRANDS_MET_AT, STRANDS_MET_BOUNCES, STRANDS_MET_FLIGHT = 33, 34, 35
+WATCH_ROWS = 36
 
 # State.plane. First the plane itself: lateral speed u [m/s], rates ω1, ω2 [rad/s] about e1 and e2, the components of
 # the room's X and Y axes along e1, e2, e3, and the room's coordinates of the plane's origin [m].
@@ -87,8 +85,12 @@ MOMENTUM, START_XX, RATE_XX, MEAN_RATE_XX = 39, 42, 45, 48
 PLANE_ROWS = 51
 
 # State.counts
-ACCEPTED, REJECTED, FLOOR_IMPULSES, SPROCKET_IMPULSES, SELF_IMPULSES, BOUNCES, LIST_BUILDS = range(7)
-COUNT_ROWS = 7
+ACCEPTED, REJECTED, FLOOR_IMPULSES, SPROCKET_IMPULSES, SELF_IMPULSES, BOUNCES, LIST_BUILDS, STRAND_IMPULSES = range(8)
+COUNT_ROWS = 8
+
+# Links at least so far apart along the chain that touch are strands of the loop, and no crease of one of them: from
+# 12 to 20 the first touch of long chains comes at the same time.
+STRANDS_APART = 16
 
 # State.extremes
 OPENING, FLOOR_DEPTH, SPROCKET_DEPTH, SELF_DEPTH = range(4)
@@ -108,6 +110,21 @@ PLANE_COLUMN = 13
 CENTER_Z, CENTER_W = 25, 26
 ALL_COLUMNS = 27
 
+# Model.faces: where a face begins, the unit vector along it, that along the face before it if the corner between them
+# is convex and 0 otherwise, and where along it it begins and ends: infinite for the first and the last face.
+FACE_X, FACE_Y, ALONG_X, ALONG_Y, BEFORE_X, BEFORE_Y, FACE_BEGIN, FACE_END = range(8)
+FACE_VALUES = 8
+# Drive.motion: time [s], place x, y [m] of the sprocket, its velocity u, v [m/s], angular velocity [rad/s].
+MOTION_TIME, MOTION_X, MOTION_Y, MOTION_U, MOTION_V, MOTION_TURNING = range(6)
+MOTION_VALUES, MOTION_ROWS = 6, 17
+
+# Model.cells: the first and the last face near a cell, and the height that they stay below. The last row: x of the
+# first cell, cells per metre, and how far beyond a link faces are near.
+FIRST_FACE, LAST_FACE, TOP = range(3)
+CELLS_LEFT, CELLS_PER_LENGTH, GROUND_MARGIN = range(3)
+CELL_VALUES = 3
+GROUND_CELLS = 128
+
 # Capacity of the neighbour list, in pairs of joints per column.
 PAIRS_PER_LINK = 8
 
@@ -124,11 +141,6 @@ def scratch_rows(stages: int) -> int:
     At least those of four stages: between attempts their rows hold terms of sums, if the plane of the chain tilts.
     """
     return STAGES + STAGE_ROWS * max(stages, 4)
-
-
-def board_size(threads: int) -> int:
-    """Doubles of a board: a column per thread of the block and one more, and the row of the chain's values."""
-    return BOARD_VALUES * (threads + 1) + max(threads + 1, VALUES)
 
 
 LANES = 8

@@ -3,6 +3,8 @@
 World (one chain instance) is always axis 0. W: number of worlds; n: links of a world (``link_count``); N: greatest n.
 """
 
+from typing import Any
+
 import warp as wp
 
 wp.set_module_options({"enable_backward": False})
@@ -12,31 +14,56 @@ LOADING_TIME = wp.constant(wp.float64(0.25))
 
 
 @wp.struct
-class Model:
-    """Constants of the chains, which no run changes. Every array has shape (W,)."""
+class Chain:
+    """One world's constants; in a kernel also under its present loads and with its present softness.
 
-    link_count: wp.array(dtype=wp.int32)  # n
-    link_length: wp.array(dtype=wp.float64)  # ℓ [m], joint to joint
-    inner_mass: wp.array(dtype=wp.float64)  # [kg], links 0, 2, 4, …
-    outer_mass: wp.array(dtype=wp.float64)  # [kg], links 1, 3, 5, …
-    inner_inertia: wp.array(dtype=wp.float64)  # [kg m²]
-    outer_inertia: wp.array(dtype=wp.float64)  # [kg m²]
-    joint_stiffness: wp.array(dtype=wp.float64)  # k [N/m]
-    joint_damping: wp.array(dtype=wp.float64)  # b [N s/m]
-    viscous_friction: wp.array(dtype=wp.float64)  # β [N m s]
-    coulomb_friction: wp.array(dtype=wp.float64)  # τ_c [N m]
-    friction_smoothing: wp.array(dtype=wp.float64)  # ω_c [rad/s]
-    gravity: wp.array(dtype=wp.float64)  # g [m/s²], along −y
-    circle_radius: wp.array(dtype=wp.float64)  # r [m], of a link's two circles
-    half_width: wp.array(dtype=wp.float64)  # h [m], of a link, across the plane of the chain
-    tangential_restitution: wp.array(dtype=wp.float64)  # e_t
-    floor_restitution: wp.array(dtype=wp.float64)  # e_fc
-    floor_friction: wp.array(dtype=wp.float64)  # μ_fc
-    chain_restitution: wp.array(dtype=wp.float64)  # e_cc
-    chain_friction: wp.array(dtype=wp.float64)  # μ_cc
-    sprocket_restitution: wp.array(dtype=wp.float64)  # e_sc
-    sprocket_friction: wp.array(dtype=wp.float64)  # μ_sc
-    sprocket_radius: wp.array(dtype=wp.float64)  # [m], the radius that link circles touch; centre at the origin
+    The host fills a field from the parameter of its name, or as ``engine/constants.py`` says, or else with 0.
+    """
+
+    link_count: wp.int32  # n
+    half_length: wp.float64  # a [m], half of the distance between a link's joints
+    inverse_square: wp.float64  # 1/a² [1/m²]
+    mass: wp.float64  # of all links [kg]
+    joint_stiffness: wp.float64  # k [N/m]
+    joint_damping: wp.float64  # b [N s/m]
+    inverse_smoothing: wp.float64  # 1/ω_c [s/rad]
+    gravity: wp.float64  # g [m/s²], along −y
+    circle_radius: wp.float64  # r [m], of a link's two circles
+    half_width: wp.float64  # h [m], of a link, across the plane of the chain
+    tangential_restitution: wp.float64  # e_t
+    floor_restitution: wp.float64  # e_fc
+    floor_friction: wp.float64  # μ_fc
+    chain_restitution: wp.float64  # e_cc
+    chain_friction: wp.float64  # μ_cc
+    sprocket_restitution: wp.float64  # e_sc
+    sprocket_friction: wp.float64  # μ_sc
+    sprocket_radius: wp.float64  # [m], the radius that link circles touch; centre at the origin
+    push_rate: wp.float64  # speed at which floor and links push out sunken circles, per depth [1/s]
+    # the plane that the links move in, if it tilts, see physics.plane: otherwise 0
+    plane_speed: wp.float64
+    turn_x: wp.float64
+    turn_y: wp.float64
+    up_x: wp.float64
+    up_y: wp.float64
+    up_z: wp.float64
+    origin_height: wp.float64
+
+
+CHAIN_NUMBERS: Any = Chain.numpy_dtype()  # type: ignore[attr-defined]
+"""Type of a world's constants in structured NumPy arrays."""
+CHAIN_DOUBLES: int = CHAIN_NUMBERS["itemsize"] // 8
+"""Their size, in doubles."""
+
+
+@wp.struct
+class Model:
+    """What no run changes."""
+
+    chains: wp.array(dtype=Chain)  # (W,)
+    links: wp.array3d(dtype=wp.float64)  # (W, LINK_ROWS, N): what each link and joint has of its own, see layout
+    # the floor, if it is not flat, see contacts.terrain
+    faces: wp.array3d(dtype=wp.float64)  # (W, faces, FACE_VALUES)
+    cells: wp.array3d(dtype=wp.float64)  # (W, GROUND_CELLS + 1, CELL_VALUES)
 
 
 @wp.struct
@@ -58,6 +85,8 @@ class Drive:
     hold_softness: wp.array(dtype=wp.float64)  # of the joints from the hold to the release, 1 to 2; 0: own values
     loaded_softness: wp.array(dtype=wp.float64)  # of the joints under load
     push_rate: wp.array(dtype=wp.float64)  # speed at which the sprocket pushes out sunken circles, per depth [1/s]
+    motion: wp.array3d(dtype=wp.float64)  # (W, MOTION_ROWS, MOTION_VALUES): of the sprocket above a floor
+    farthest: wp.array(dtype=wp.float64)  # |x| of the centre of mass at which a walk ends [m]; 0: at none
 
 
 @wp.struct
@@ -141,70 +170,20 @@ class Control:
 
 
 @wp.struct
-class Chain:
-    """One world's constants, under its present loads and with its present softness."""
+class Ground:
+    """The floor of one world, if it is not flat, see :mod:`contacts.terrain`."""
 
-    link_count: wp.int32
-    half_length: wp.float64
-    inner_mass: wp.float64
-    outer_mass: wp.float64
-    inner_inertia: wp.float64
-    outer_inertia: wp.float64
-    joint_stiffness: wp.float64
-    joint_damping: wp.float64
-    viscous_friction: wp.float64
-    coulomb_friction: wp.float64
-    inverse_smoothing: wp.float64
-    gravity: wp.float64
-    circle_radius: wp.float64
-    tangential_restitution: wp.float64
-    floor_restitution: wp.float64
-    floor_friction: wp.float64
-    chain_restitution: wp.float64
-    chain_friction: wp.float64
-    sprocket_restitution: wp.float64
-    sprocket_friction: wp.float64
-    sprocket_radius: wp.float64
-    half_width: wp.float64
-    push_rate: wp.float64  # speed at which floor and links push out sunken circles, per depth [1/s]
-    # the plane that the links move in, if it tilts, see physics.plane: otherwise 0
-    plane_speed: wp.float64
-    turn_x: wp.float64
-    turn_y: wp.float64
-    up_x: wp.float64
-    up_y: wp.float64
-    up_z: wp.float64
-    origin_height: wp.float64
-    inverse_square: wp.float64  # of half a link length [1/m²]
+    faces: wp.array2d(dtype=wp.float64)
+    cells: wp.array2d(dtype=wp.float64)
 
 
 @wp.func
-def read_chain(model: Model, world: int) -> Chain:
-    """Constants of one world."""
-    chain = Chain()
-    chain.link_count = model.link_count[world]
-    chain.half_length = wp.float64(0.5) * model.link_length[world]
-    chain.inner_mass = model.inner_mass[world]
-    chain.outer_mass = model.outer_mass[world]
-    chain.inner_inertia = model.inner_inertia[world]
-    chain.outer_inertia = model.outer_inertia[world]
-    chain.joint_stiffness = model.joint_stiffness[world]
-    chain.joint_damping = model.joint_damping[world]
-    chain.viscous_friction = model.viscous_friction[world]
-    chain.coulomb_friction = model.coulomb_friction[world]
-    chain.inverse_smoothing = wp.float64(1.0) / model.friction_smoothing[world]
-    chain.gravity = model.gravity[world]
-    chain.circle_radius = model.circle_radius[world]
-    chain.tangential_restitution = model.tangential_restitution[world]
-    chain.floor_restitution = model.floor_restitution[world]
-    chain.floor_friction = model.floor_friction[world]
-    chain.chain_restitution = model.chain_restitution[world]
-    chain.chain_friction = model.chain_friction[world]
-    chain.sprocket_restitution = model.sprocket_restitution[world]
-    chain.sprocket_friction = model.sprocket_friction[world]
-    chain.sprocket_radius = model.sprocket_radius[world]
-    chain.half_width = model.half_width[world]
-    return chain
+def read_ground(model: Model, world: int) -> Ground:
+    """The floor of one world."""
+    ground = Ground()
+    ground.faces = model.faces[world]
+    ground.cells = model.cells[world]
+    return ground
 
 
 def make_entry(module: wp.Module, is_block: bool):

@@ -16,16 +16,18 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from tests.support.setups import setup_walk
 from warpchain.cli.main import main
 from warpchain.inputs.distributions import DRAWABLE
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import preset
+from warpchain.inputs.scene import Scene
 from warpchain.inputs.setup import read_setup, resolve
-from warpchain.inputs.validation import FIELDS, LONGEST_LINE, NAME_OF_SYMBOL, SECTION_OF, InputError
-from warpchain.inputs.value_list import list_values
+from warpchain.inputs.validation import FIELDS, LONGEST_LINE, NAME_OF_SYMBOL, SECTION_OF, InputError, field_choices
 from warpchain.inputs.yaml_files import parse_yaml
-from warpchain.run import single_walk
-from warpchain.run.single_walk import setup_walk
 from warpchain.sweeps.designs import SAMPLERS
 from warpchain.sweeps.plan import load_sweep
+from warpchain.walks import one_walk
 
 SECONDS = 5.0
 """Most processor time of an input."""
@@ -53,7 +55,7 @@ HOSTILE = st.recursive(
     max_leaves=8,
 )
 NAMES = st.one_of(st.sampled_from([*FIELDS, *NAME_OF_SYMBOL, "preset", "__class__", "<<"]), TEXTS)
-ENTRIES = {entry.name: entry for entries in list_values("soft").values() for entry in entries}
+VALUES = {name: value for model in (preset("soft"), Scene(), Options()) for name, value in model.model_dump().items()}
 
 
 def mostly(usual: st.SearchStrategy[Any], hostile: st.SearchStrategy[Any] = HOSTILE) -> st.SearchStrategy[Any]:
@@ -63,14 +65,14 @@ def mostly(usual: st.SearchStrategy[Any], hostile: st.SearchStrategy[Any] = HOST
 
 def plausible(name: str) -> st.SearchStrategy[Any]:
     """Values that a field may have, and some just beyond."""
-    entry = ENTRIES.get(name)
+    value = VALUES.get(name)
     if name == "links":
         return st.sampled_from([60, 40, 90, 62, 31, 4, 400])
-    if entry is None or entry.value is None:
+    if value is None:
         return NUMBERS
-    if entry.choices or isinstance(entry.value, str):
-        return st.sampled_from([*entry.choices, entry.value, "other"])
-    return st.sampled_from([1, 1.0, 0.9, 1.1, 0.5, 3.0, -1.0, 0.0]).map(lambda factor: entry.value * factor)
+    if isinstance(value, bool | str):
+        return st.sampled_from([*field_choices(FIELDS[name]), value, "other"])
+    return st.sampled_from([1, 1.0, 0.9, 1.1, 0.5, 3.0, -1.0, 0.0]).map(lambda factor: value * factor)
 
 
 def mapping_of(
@@ -113,6 +115,7 @@ KEPT = st.fixed_dictionaries(
 BLOCK = {
     **{of: mostly(section(of)) for of in ("scene", "options", "parameters")},
     "distributions": mostly(mapping_of(st.sampled_from(["all", *DRAWABLE]), law)),
+    "points": mostly(mapping_of(st.sampled_from(["mu_fc", "r", "phase"]), axis), HOSTILE),
     "grid": mostly(mapping_of(st.sampled_from(["links", "frequency", "mu_fc", "tolerance", "preset", "start"]), axis)),
     "samples": mostly(st.sampled_from([1, 2, 4, 8, 2**30])),
     "sampler": mostly(st.sampled_from(SAMPLERS)),
@@ -188,7 +191,8 @@ def test_content_of_a_sweep(content: Any) -> None:
     sweep = taken(lambda: load_sweep(content))
     if sweep is not None:
         assert load_sweep(json.loads(json.dumps(sweep.canonical()))).digest() == sweep.digest()
-        assert sweep.planned(sweep.walk_count - 1).index == sweep.walk_count - 1
+        last = int(sweep.indices[-1])
+        assert sweep.planned(last).index == last
 
 
 @hostile_inputs
@@ -212,7 +216,7 @@ def test_command_lines(monkeypatch: pytest.MonkeyPatch, words: list[tuple[str, s
     def begin(setups: Any, **_: object) -> Any:
         raise SystemExit(0)
 
-    monkeypatch.setattr(single_walk, "run_setups", begin)
+    monkeypatch.setattr(one_walk, "run_setups", begin)
     sets = [word for name, value in words for word in ("--set", f"{name}={value}")]
     err = io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True)
     with contextlib.redirect_stderr(err), pytest.raises(SystemExit) as end:

@@ -11,17 +11,20 @@ To run:
     walk(...)        one walk: hang a chain on its sprocket, spin it up, release it and follow it to rest
     sweep(...)       many walks: a grid of values with random samples, kept in a folder
     simulate(...)    the motion of any given chain, without sprocket
+    Chains(...)      many given chains, whose velocities may be changed between runs
 
 To read:
 
     load(folder)     results of a sweep, as far as it has run
     load_walk(path)  a walk that `WalkResult.save` wrote
     preset(name)     the parameters of a named preset, "paper" or "soft"
+    films            a module: friction of the floor and parameters of a chain from films of walks
 
 What they return, take and raise:
 
     WalkResult       one walk: status, distance, energies, time series, frames; `plot`, `animate`, `save`
     SweepResult      a sweep: arrays with named axes and units
+    State            a chain at one instant, from which a walk goes on: `WalkResult.state`, `State.of_joints`
     Trajectory       the motion of a given chain
     Parameters       physical parameters of a chain, its sprocket and the floor
     Status           how a walk ended, with a sentence that says what to try
@@ -35,9 +38,12 @@ from typing import TYPE_CHECKING, Any
 from warpchain import version as _version
 
 if TYPE_CHECKING:
+    from warpchain import films as films
     from warpchain.inputs.parameters import Parameters
     from warpchain.inputs.parameters import preset as preset
+    from warpchain.inputs.state import State
     from warpchain.inputs.validation import InputError
+    from warpchain.run.simulation import Chains as Chains
     from warpchain.run.simulation import simulate
     from warpchain.run.single_walk import walk
     from warpchain.run.sweep_run import sweep
@@ -49,12 +55,15 @@ if TYPE_CHECKING:
 __version__ = _version.VERSION
 
 _HOMES = {
+    "Chains": "run.simulation",
     "InputError": "inputs.validation",
     "Parameters": "inputs.parameters",
+    "State": "inputs.state",
     "Status": "status",
     "SweepResult": "store.sweep_result",
     "Trajectory": "walks.trajectory",
     "WalkResult": "walks.walk_result",
+    "films": "films",
     "load": "store.sweep_result",
     "load_walk": "walks.walk_result",
     "preset": "inputs.parameters",
@@ -64,12 +73,15 @@ _HOMES = {
 }
 
 __all__ = [
+    "Chains",
     "InputError",
     "Parameters",
+    "State",
     "Status",
     "SweepResult",
     "Trajectory",
     "WalkResult",
+    "films",
     "load",
     "load_walk",
     "preset",
@@ -85,7 +97,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'warpchain' has no attribute {name!r}")
     from importlib import import_module
 
-    value = getattr(import_module(f"warpchain.{_HOMES[name]}"), name)
+    home = import_module(f"warpchain.{_HOMES[name]}")
+    value = home if _HOMES[name] == name else getattr(home, name)
     globals()[name] = value
     return value
 

@@ -50,7 +50,6 @@ class Stored:
         shape: of an array, such as "t 2" for an array of shape (t, 2); t instants, f frames, n links.
         empty: when an array has no instants or frames, although there are some; "" if that is never so.
         keys: of a dictionary its keys and their meanings.
-        sample: columns of a sample of the kernels that an array is made of; None if it is made otherwise.
     """
 
     unit: str
@@ -58,7 +57,6 @@ class Stored:
     shape: str = ""
     empty: str = ""
     keys: Mapping[str, str] = field(default_factory=dict)
-    sample: int | list[int] | None = None
 
     @property
     def described(self) -> str:
@@ -167,13 +165,13 @@ def hdf5_image(kind: str, fill: "Callable[[h5py.File], None]") -> bytes:
 
 @contextmanager
 def reading_hdf5(
-    path: str | os.PathLike[str], kind: str, remedy: str, wanted: str | None = None
+    path: str | os.PathLike[str], kind: str | None, remedy: str, wanted: str | None = None
 ) -> "Iterator[h5py.File]":
     """An HDF5 file that `hdf5_image` made, undamaged and of the right kind.
 
     Args:
         path: the file.
-        kind: its kind.
+        kind: its kind; None for any.
         remedy: what to do about a damaged or an older file.
         wanted: which file to give instead of one of another kind; None if a sweep has it in its folder.
 
@@ -186,7 +184,7 @@ def reading_hdf5(
 
     _compare(path, remedy, wanted)
     with h5py.File(path, "r", locking=False) as file:
-        if file.attrs["format"] != kind:
+        if kind is not None and file.attrs["format"] != kind:
             raise InputError(
                 f"{path}: a {file.attrs['format']}, not a {kind}; {wanted or 'move it out of this folder'}"
             )
@@ -197,10 +195,7 @@ def reading_hdf5(
 
 def kind_of_hdf5(path: str | os.PathLike[str], wanted: str) -> str:
     """The kind of an HDF5 file that `hdf5_image` made; errors as of `reading_hdf5`."""
-    import h5py
-
-    _compare(path, "fetch another copy of it", wanted)
-    with h5py.File(path, "r", locking=False) as file:
+    with reading_hdf5(path, None, "fetch another copy of it", wanted) as file:
         return str(file.attrs["format"])
 
 

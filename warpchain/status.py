@@ -18,6 +18,7 @@ class Status(IntEnum):
     NOT_FINITE = codes.NOT_FINITE
     NOT_STEADY = codes.NOT_STEADY
     LIST_OVERFLOW = codes.LIST_OVERFLOW
+    DISTANCE_LIMIT = codes.DISTANCE_LIMIT
 
     @property
     def label(self) -> str:
@@ -26,8 +27,8 @@ class Status(IntEnum):
 
     @property
     def ok(self) -> bool:
-        """Whether the run ended as it should: at rest, or at the end of its duration."""
-        return self in (Status.AT_REST, Status.FINISHED)
+        """Whether the run ended as it should: at rest, or at the end of its duration or distance."""
+        return self in (Status.AT_REST, Status.FINISHED, Status.DISTANCE_LIMIT)
 
     @property
     def sentence(self) -> str:
@@ -38,10 +39,10 @@ class Status(IntEnum):
 _SENTENCES: Final[dict[Status, str]] = {
     Status.RUNNING: "The run has not ended yet; let it go on.",
     Status.AT_REST: "The chain came to rest.",
-    Status.FINISHED: "The simulation reached its duration.",
+    Status.FINISHED: "The run reached its planned end.",
     Status.TIME_LIMIT: (
         "The chain was still moving at the time limit of the walk; raise scene.walk_limit, "
-        "or give the floor more friction if the chain slides without end."
+        "give more floor_friction if it slides without end, or scene.distance_limit on a steep slope."
     ),
     Status.STEP_LIMIT: (
         "The walk used up its steps; raise options.step_limit, loosen options.tolerance or soften the joints."
@@ -58,6 +59,7 @@ _SENTENCES: Final[dict[Status, str]] = {
         "The chain did not circulate steadily on the sprocket within scene.hold_limit; "
         "raise that limit or scene.spin_up_time, or lower scene.frequency."
     ),
+    Status.DISTANCE_LIMIT: "The chain was still moving when it was scene.distance_limit away.",
     Status.LIST_OVERFLOW: (
         "More links came close to one another than the neighbour list can hold; lower options.skin or circle_radius."
     ),

@@ -3,7 +3,20 @@
 import warp as wp
 
 from warpchain.kernels.contacts.impulse import collision_impulse, inverse_masses
-from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, LEFT_X, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, U, V, X, Y
+from warpchain.kernels.layout import (
+    INVERSE_INERTIA,
+    INVERSE_MASS,
+    LEFT_X,
+    LEFT_Y,
+    OMEGA,
+    RIGHT_X,
+    RIGHT_Y,
+    STRANDS_APART,
+    U,
+    V,
+    X,
+    Y,
+)
 from warpchain.kernels.physics.elementary import HALF, TWO, ZERO, quotient
 from warpchain.kernels.types import Chain
 
@@ -21,6 +34,13 @@ def are_neighbours(link_a: int, link_b: int, link_count: int):
     """True for the same link or links that share a joint."""
     apart = wp.abs(link_a - link_b)
     return apart < 2 or apart > link_count - 2
+
+
+@wp.func
+def are_strands(link_a: int, link_b: int, link_count: int):
+    """True for links at least :data:`STRANDS_APART` apart along the chain: strands of the loop, no crease of one."""
+    apart = wp.abs(link_a - link_b)
+    return apart >= STRANDS_APART and apart <= link_count - STRANDS_APART
 
 
 @wp.func
@@ -52,21 +72,18 @@ def circles_of_links(
     center_a_y: wp.float64,
     center_b_x: wp.float64,
     center_b_y: wp.float64,
-    mass: wp.float64,
-    inertia_a: wp.float64,
-    inertia_b: wp.float64,
 ):
     """Geometry of the contact of a circle of link A and one of link B, without branches.
 
     It returns numbers, not a struct: clang kept a struct in memory, and a pile on the CPU was twice as slow.
 
     Arguments: the radius of both circles, centres ``end`` of the circles of A and B and centres of mass ``center`` of
-    the links [m], the sum 1/m_A + 1/m_B [1/kg], and 1/I_A and 1/I_B [1/(kg m²)].
+    the links [m].
 
     Returns:
         Depth of the overlap [m], 0 if there is none (concentric circles have no normal and count as none); normal from
-        A to B; levers of A crossed with normal and tangent [m], likewise of B; 1/W_nn [kg] and 1/det W [kg²]. Without
-        an overlap only the depth has a meaning.
+        A to B; levers of A crossed with normal and tangent [m], likewise of B. Without an overlap only the depth has a
+        meaning.
     """
     dx = end_b_x - end_a_x
     dy = end_b_y - end_a_y
@@ -87,9 +104,31 @@ def circles_of_links(
     a_t = ax * nx + ay * ny
     b_n = bx * ny - by * nx
     b_t = bx * nx + by * ny
-    w_nn, w_nt, w_tt = effective_masses(mass, inertia_a, inertia_b, a_n, a_t, b_n, b_t)
+    return depth, nx, ny, a_n, a_t, b_n, b_t
+
+
+@wp.func
+def divisors(
+    K: wp.array2d(dtype=wp.float64),
+    link_a: int,
+    link_b: int,
+    a_n: wp.float64,
+    a_t: wp.float64,
+    b_n: wp.float64,
+    b_t: wp.float64,
+):
+    """1/W_nn [kg] and 1/det W [kg²] of a contact of two links; the levers are those of :func:`circles_of_links`."""
+    w_nn, w_nt, w_tt = effective_masses(
+        K[INVERSE_MASS, link_a] + K[INVERSE_MASS, link_b],
+        K[INVERSE_INERTIA, link_a],
+        K[INVERSE_INERTIA, link_b],
+        a_n,
+        a_t,
+        b_n,
+        b_t,
+    )
     inverse_nn, inverse_determinant = inverse_masses(w_nn, w_nt, w_tt)
-    return depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant
+    return inverse_nn, inverse_determinant
 
 
 @wp.func
@@ -101,7 +140,9 @@ def links_of(p: int, q: int, half: int, second: int, n: int):
 
 @wp.func
 def touching_circles(K: wp.array2d(dtype=wp.float64), chain: Chain, p: int, q: int, half: int, second: int):
-    """Geometry of a contact, see :func:`links_of` and :func:`circles_of_links`; depth 0 for links that share a joint.
+    """Geometry of a contact and its divisors, see :func:`links_of`, :func:`circles_of_links` and :func:`divisors`.
+
+    The depth is 0 for links that share a joint.
 
     Joint j's left-hand circle belongs to link j's right end, its right-hand circle to the left end of the link after.
     """
@@ -114,7 +155,7 @@ def touching_circles(K: wp.array2d(dtype=wp.float64), chain: Chain, p: int, q: i
     if are_neighbours(link_a, link_b, chain.link_count):
         bx = ax
         by = ay
-    return circles_of_links(
+    depth, nx, ny, a_n, a_t, b_n, b_t = circles_of_links(
         chain.circle_radius,
         ax,
         ay,
@@ -124,10 +165,9 @@ def touching_circles(K: wp.array2d(dtype=wp.float64), chain: Chain, p: int, q: i
         K[Y, link_a],
         K[X, link_b],
         K[Y, link_b],
-        K[INVERSE_MASS, link_a] + K[INVERSE_MASS, link_b],
-        K[INVERSE_INERTIA, link_a],
-        K[INVERSE_INERTIA, link_b],
     )
+    inverse_nn, inverse_determinant = divisors(K, link_a, link_b, a_n, a_t, b_n, b_t)
+    return depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant
 
 
 @wp.func

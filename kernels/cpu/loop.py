@@ -11,16 +11,11 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.codes import LIST_OVERFLOW, NOT_FINITE, RUNNING, STEP_LIMIT, STEP_TOO_SMALL
-from warpchain.kernels.contacts.fixed_body import sprocket_turning
+from warpchain.kernels.contacts.fixed_body import BODIES
 from warpchain.kernels.contacts.list_layout import list_layout
+from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.neighbour_list import list_slack, neighbour_list
-from warpchain.kernels.cpu.contacts.proximity import (
-    floor_gap,
-    greatest_opening,
-    resolve_floor,
-    resolve_sprocket,
-    sprocket_gap,
-)
+from warpchain.kernels.cpu.contacts.proximity import fixed_contacts, greatest_opening
 from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
 from warpchain.kernels.cpu.contacts.time_to_contact import FLIGHT_SKIN, LEAST_SLACK, step_bound
 from warpchain.kernels.cpu.explicit import place_ends
@@ -52,36 +47,33 @@ from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step
 from warpchain.kernels.physics.elementary import ONE, ZERO
 from warpchain.kernels.physics.geometry import whole_lanes
 from warpchain.kernels.physics.plane import begin_plane_step, end_plane_step, on_plane
-from warpchain.kernels.physics.scaled_loads import write_inertias
-from warpchain.kernels.types import Chain, Control, Drive, Model, Record, State
+from warpchain.kernels.physics.scaled_loads import write_links
+from warpchain.kernels.types import Chain, Control, Drive, Model, Record, State, read_ground
 
 wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def load_state(K: wp.array2d(dtype=wp.float64), state: State, chain: Chain, world: int):
-    """Fills the rows of the state and of the links' constants; rows of losses start at zero."""
+def load_state(K: wp.array2d(dtype=wp.float64), model: Model, state: State, chain: Chain, world: int):
+    """Fills the rows of the state; rows of losses start at zero, columns behind the links are links without mass."""
     i = int(0)
     while i < chain.link_count:
         row = int(0)
         while row < 6:
             K[row, i] = state.links[world, row, i]
             row += 1
-        mass = wp.where(i % 2 == 0, chain.inner_mass, chain.outer_mass)
-        K[layout.MASS, i] = mass
-        K[layout.INVERSE_MASS, i] = ONE / mass
         K[layout.LOST_FRICTION, i] = ZERO
         K[layout.LOST_DAMPING, i] = ZERO
         K[layout.LOST_FIXED, i] = ZERO
         i += 1
-    # columns up to whole vectors: links without mass, which nothing moves
+    # columns up to whole vectors
     while i < whole_lanes(chain.link_count):
         row = int(0)
         while row < wp.static(layout.STAGES):
             K[row, i] = ZERO
             row += 1
         i += 1
-    write_inertias(K, chain)
+    write_links(K, model, world, state.load_factor[world])
 
 
 @wp.func
@@ -137,11 +129,16 @@ def make_advance(features: Features):
     method = cpu_method(features.method, tilts)
     list_size = list_layout(columns).size
     list_count = list_layout(columns).count
-    has_floor = features.fixed_body == "floor"
-    has_sprocket = features.fixed_body == "sprocket"
-    has_fixed = has_floor or has_sprocket
+    has_floor = features.has_floor
+    has_fixed = features.fixed_body != "none"
     has_self = features.self_contact
-    fixed_gap, resolve_fixed = (sprocket_gap, resolve_sprocket) if has_sprocket else (floor_gap, resolve_floor)
+    if has_fixed:
+        fixed_gap, resolve_fixed = fixed_contacts(features.fixed_body)
+        face_of, face_at = BODIES[features.fixed_body].face, BODIES[features.fixed_body].motion
+    moves = features.moving_sprocket
+    if moves:
+        sprocket_gap, resolve_sprocket = fixed_contacts("moving sprocket")
+        sprocket_at = BODIES["moving sprocket"].motion
     fixed_loss, fixed_depth, fixed_count = of_fixed_body(features.fixed_body)
     reuses_last = method.reuses_last
     is_driven = features.is_driven
@@ -150,7 +147,7 @@ def make_advance(features: Features):
     first_stage, attempt, commit = method.first_stage, method.attempt, method.commit
     growth, shrinkage = method.growth, method.shrinkage
     # on the sprocket the pauses between impulses are too short for a flight
-    flight = None if has_sprocket else rigid_flight(features.method, columns)
+    flight = None if is_driven or moves else rigid_flight(features.method, columns)
     has_flight = flight is not None
     if flight is not None:
         attempt_flight, commit_flight = flight.attempt, flight.commit
@@ -187,16 +184,20 @@ def make_advance(features: Features):
         list_memory = lists[world]
         L = wp.array(ptr=list_memory.ptr, shape=(wp.static(list_size),), dtype=wp.int32)
         P = state.plane[world]
+        ground = read_ground(model, world)
+        still = Face()
+        if wp.static(has_fixed):
+            still = face_of(ground)
         status = int(RUNNING)
         if state.is_fresh[world] != 0:
-            load_state(K, state, chain, world)
+            load_state(K, model, state, chain, world)
             place_ends(K, chain)
             if wp.static(tilts):
                 write_plane_sums(K, P, chain)
             if wp.static(has_floor and tilts):
                 state.gap[world] = tilting_gap(K, on_plane(chain, P, 0))
             elif wp.static(has_fixed):
-                state.gap[world] = fixed_gap(K, chain)
+                state.gap[world] = fixed_gap(K, chain, ground, still)
             if wp.static(has_self):
                 if not build_list(K, L, chain, control.skin, greatest_opening(K, chain)):
                     status = int(LIST_OVERFLOW)
@@ -217,9 +218,10 @@ def make_advance(features: Features):
             if time >= next_mark(state, control, world):
                 softness = state.softness[world]
                 load_factor = state.load_factor[world]
-                self_impulses = state.counts[world, layout.SELF_IMPULSES]
+                touches = state.counts[world, layout.SELF_IMPULSES]
+                meetings = state.counts[world, layout.STRAND_IMPULSES]
                 last_impulse = state.watch[world, layout.LAST_FLOOR_IMPULSE]
-                status = sample(K, chain, drive, state, record, control, world, time, self_impulses, last_impulse)
+                status = sample(K, chain, drive, state, record, control, world, time, touches, meetings, last_impulse)
                 longest = contact_step(state, control, world, wp.static(is_driven))
                 tolerance = spring_tolerance(drive, state, control, world, wp.static(is_driven))
                 if has_changed(state, world, softness, load_factor):
@@ -227,7 +229,7 @@ def make_advance(features: Features):
                     book_softening(chain, after, state, world)
                     chain = after
                     if wp.static(is_driven):
-                        write_inertias(K, chain)
+                        write_links(K, model, world, state.load_factor[world])
                     has_first_stage = int(0)
                 if status != RUNNING:
                     break
@@ -255,7 +257,7 @@ def make_advance(features: Features):
             here = chain
             if wp.static(tilts):
                 here = on_plane(chain, P, 0)
-            h = wp.min(step, bound_of_step(K, L, here, control, is_rigid != 0, gap, slack, longest))
+            h = wp.min(step, bound_of_step(K, L, here, still, control, is_rigid != 0, gap, slack, longest))
             reaches_stop = time + h >= stop_time
             if reaches_stop:
                 h = stop_time - time
@@ -317,19 +319,27 @@ def make_advance(features: Features):
                     if wp.static(tilts):
                         gap = tilting_gap(K, felt)
                     else:
-                        gap = fixed_gap(K, chain)
+                        gap = fixed_gap(K, chain, ground, still)
                     if gap < ZERO:
                         raise_extreme(state, world, fixed_depth, -gap)
                         if wp.static(tilts):
                             impulses = resolve_tilting_floor(K, P, chain)
                         else:
-                            turning = sprocket_turning(drive, world, time)
-                            impulses = resolve_fixed(K, chain, turning, drive.push_rate[world])
+                            impulses = resolve_fixed(K, chain, ground, face_at(still, drive, world, time))
                         add_count(state, world, fixed_count, impulses)
                         if wp.static(has_floor):
                             if impulses > wp.int64(0):
                                 count_bounce(state, world, time, state.watch[world, layout.LAST_FLOOR_IMPULSE])
                                 state.watch[world, layout.LAST_FLOOR_IMPULSE] = time
+                if wp.static(moves):
+                    moved = sprocket_at(Face(), drive, world, time)
+                    overlap = -sprocket_gap(K, chain, ground, moved)
+                    if overlap > ZERO:
+                        raise_extreme(state, world, layout.SPROCKET_DEPTH, overlap)
+                        on_sprocket = resolve_sprocket(K, chain, ground, moved)
+                        add_count(state, world, layout.SPROCKET_IMPULSES, on_sprocket)
+                        impulses += on_sprocket
+                    gap = wp.min(gap, ZERO)  # the sprocket may come nearer by itself: steps stay short
                 if wp.static(has_self):
                     skin = control.skin
                     least_slack = ZERO
@@ -345,8 +355,9 @@ def make_advance(features: Features):
                             status = int(LIST_OVERFLOW)
                         slack = list_slack(K, chain, skin, opening)
                     if L[wp.static(list_count)] > 0:
-                        hits, lost, depth = resolve_self_contacts(K, L, chain, opening)
+                        hits, strands, lost, depth = resolve_self_contacts(K, L, chain, opening)
                         add_count(state, world, layout.SELF_IMPULSES, hits)
+                        add_count(state, world, layout.STRAND_IMPULSES, strands)
                         raise_extreme(state, world, layout.SELF_DEPTH, depth)
                         book_loss(state, world, layout.LOSS_SELF, lost)
                         impulses += hits

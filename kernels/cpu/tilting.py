@@ -37,7 +37,7 @@ from warpchain.kernels.layout import (
 )
 from warpchain.kernels.physics.elementary import TWO, ZERO, from_order_key, order_bits, order_key
 from warpchain.kernels.physics.geometry import LANES, whole_lanes
-from warpchain.kernels.physics.plane import invert_plane_mass, mass_of, motion_terms, on_plane, place_terms, plane_load
+from warpchain.kernels.physics.plane import invert_plane_mass, motion_terms, on_plane, place_terms, plane_load
 from warpchain.kernels.types import Chain
 
 wp.set_module_options({"enable_backward": False})
@@ -103,7 +103,7 @@ def write_plane_sums(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float
         i += 1
     for k in range(wp.static(SUMS_OF_PLACES + SUMS_OF_MOTION)):
         P[wp.static(layout.PLANE_SUMS + k)] = row_sum(K, wp.static(SUMS + k), count)
-    P[layout.SUM_MASS] = mass_of(chain)
+    P[layout.SUM_MASS] = chain.mass
     invert_plane_mass(P)
 
 

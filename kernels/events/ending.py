@@ -1,8 +1,8 @@
-"""How a walk loses its loop: first contact of the chain with itself, and collapse."""
+"""How a walk loses its loop: first contact of the chain with itself, of its strands, and collapse."""
 
 import warp as wp
 
-from warpchain.kernels.layout import BOUNCES, COLLAPSED_AT, SELF_CONTACT_AT
+from warpchain.kernels.layout import BOUNCES, COLLAPSED_AT, SELF_CONTACT_AT, STRANDS_MET_AT
 from warpchain.kernels.physics.elementary import HALF, ZERO
 from warpchain.kernels.types import State
 
@@ -26,24 +26,28 @@ def watch_ending(
     world: int,
     time: wp.float64,
     area: wp.float64,
-    self_impulses: wp.int64,
+    touches: wp.int64,
+    meetings: wp.int64,
     last_floor_impulse: wp.float64,
     is_first: bool,
 ):
-    """Notes the first sample with an impulse between links before it, and the first with less than half of the area.
+    """Notes the first samples with an impulse between links, or strands, before them, and with less than half the area.
 
     Args:
         state: Of all worlds.
         world: Index.
         time: Of the sample [s].
         area: Inside the loop [m²]; a loop that is numbered clockwise has negative areas.
-        self_impulses: Impulses between links so far in this run.
+        touches: Impulses between links so far in this run.
+        meetings: Those between strands of the loop.
         last_floor_impulse: Time [s] of the last impulse on the floor.
         is_first: Whether this is the first sample of the run.
     """
     if is_first:
         state.first_area[world] = area
-    if self_impulses > wp.int64(0) and state.watch[world, SELF_CONTACT_AT] < ZERO:
+    if touches > wp.int64(0) and state.watch[world, SELF_CONTACT_AT] < ZERO:
         note(state, world, SELF_CONTACT_AT, time, last_floor_impulse)
+    if meetings > wp.int64(0) and state.watch[world, STRANDS_MET_AT] < ZERO:
+        note(state, world, STRANDS_MET_AT, time, last_floor_impulse)
     if area / state.first_area[world] < HALF and state.watch[world, COLLAPSED_AT] < ZERO:
         note(state, world, COLLAPSED_AT, time, last_floor_impulse)

@@ -7,7 +7,7 @@ import warp as wp
 from warpchain.kernels.physics.elementary import ONE
 from warpchain.kernels.physics.scaled_loads import under_load
 from warpchain.kernels.physics.softness import softened
-from warpchain.kernels.types import Chain, Control, Model, State, read_chain
+from warpchain.kernels.types import Chain, Control, Model, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -28,7 +28,7 @@ def present_chain(is_driven: bool):
 
     @wp.func
     def present(model: Model, state: State, control: Control, world: int) -> Chain:
-        chain = read_chain(model, world)
+        chain = model.chains[world]
         if wp.static(is_driven):
             chain = under_load(chain, state.load_factor[world])
         return softened(chain, control, state.softness[world])

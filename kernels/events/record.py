@@ -5,7 +5,7 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.codes import NOT_FINITE, RUNNING
 from warpchain.kernels.events.summary import Summary
-from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, SINE, TIME, U, V
+from warpchain.kernels.layout import COSINE, COULOMB, LEFT_X, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, SINE, TIME, VISCOUS, U, V
 from warpchain.kernels.physics.elementary import ZERO
 from warpchain.kernels.physics.joint import friction_torque, joint_force
 from warpchain.kernels.types import Chain, Record, State
@@ -55,7 +55,8 @@ def write_load(loads: wp.array2d(dtype=wp.float64), row: int, K: wp.array2d(dtyp
     rate_y = (K[V, j] - a * K[OMEGA, j] * K[COSINE, j]) - (K[V, i] + a * K[OMEGA, i] * K[COSINE, i])
     loads[row, i] = joint_force(chain, K[LEFT_X, i + 1] - K[RIGHT_X, i], rate_x)
     loads[row, n + i] = joint_force(chain, K[LEFT_Y, i + 1] - K[RIGHT_Y, i], rate_y)
-    loads[row, 2 * n + i] = friction_torque(chain, K[OMEGA, j] - K[OMEGA, i])
+    spin = K[OMEGA, j] - K[OMEGA, i]
+    loads[row, 2 * n + i] = friction_torque(K[VISCOUS, i], K[COULOMB, i], spin, chain.inverse_smoothing)
 
 
 @wp.func

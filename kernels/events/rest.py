@@ -1,4 +1,4 @@
-"""The end of a walk: a chain that has been slow for a while, on the floor, is at rest.
+"""The end of a walk: a chain that has been slow for a while, on the floor, is at rest. On a slope it may never be.
 
 What lies on the floor touches it all the time. A chain that is slow in mid-air, at the top of a bounce or under little
 gravity, is not at rest: an impulse on the floor must be at most as long ago as the rest time.
@@ -6,25 +6,34 @@ gravity, is not at rest: an impulse on the floor must be at most as long ago as 
 
 import warp as wp
 
-from warpchain.kernels.codes import AT_REST, FINISHED, RUNNING
+from warpchain.kernels.codes import AT_REST, DISTANCE_LIMIT, FINISHED, RUNNING
 from warpchain.kernels.events.summary import Summary
 from warpchain.kernels.layout import REST_SINCE
 from warpchain.kernels.physics.elementary import ZERO
-from warpchain.kernels.types import Control, State
+from warpchain.kernels.types import Control, Drive, State
 
 wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
 def watch_rest(
-    state: State, control: Control, world: int, time: wp.float64, summary: Summary, last_floor_impulse: wp.float64
+    state: State,
+    drive: Drive,
+    control: Control,
+    world: int,
+    time: wp.float64,
+    summary: Summary,
+    last_floor_impulse: wp.float64,
 ):
     """Status AT_REST once both speeds, the centre's and the rms, have been low for the rest time, else RUNNING.
 
+    DISTANCE_LIMIT once the centre is as far away as a walk may go.
     A run that is to finish at a given time is not ended earlier.
     """
     if state.stop_status[world] == FINISHED:
         return RUNNING
+    if drive.farthest[world] > ZERO and wp.abs(summary.center_x) >= drive.farthest[world]:
+        return DISTANCE_LIMIT
     speed = wp.sqrt(summary.center_u * summary.center_u + summary.center_v * summary.center_v)
     if wp.max(speed, summary.rms_speed) < control.rest_speed:
         if state.watch[world, REST_SINCE] < ZERO:

@@ -35,14 +35,14 @@ def sampling(fixed_body: str, tilts: bool = False):
 
     It is called at or after :func:`next_mark`. If only a frame is due, nothing but the record changes. It may also
     change the softness of the joints, and on a sprocket the chain's loads and the velocities of its links. Impulses
-    between links so far and the time of the last one on the floor [s] are arguments: on a GPU they are not in the
-    state.
+    between links so far (``touches``), those between strands (``meetings``) and the time of the last one on the floor
+    [s] are arguments: on a GPU they are not in the state.
 
     Args:
-        fixed_body: On a ``"sprocket"`` it watches until the loop is stationary, on the ``"floor"`` until it is at rest.
+        fixed_body: On a ``"sprocket"`` it watches until the loop is stationary, on a floor until it rests or is far.
         tilts: Whether the plane of the chain may move; its sums must be those of the present state.
     """
-    has_floor = fixed_body == "floor"
+    has_floor = fixed_body not in ("none", "sprocket")
     is_driven = fixed_body == "sprocket"
 
     @wp.func
@@ -55,7 +55,8 @@ def sampling(fixed_body: str, tilts: bool = False):
         control: Control,
         world: int,
         time: wp.float64,
-        self_impulses: wp.int64,
+        touches: wp.int64,
+        meetings: wp.int64,
         last_floor_impulse: wp.float64,
     ):
         frame_mark = state.next_frame[world]
@@ -85,14 +86,14 @@ def sampling(fixed_body: str, tilts: bool = False):
         passed = wp.int64(wp.floor(time / control.sample_interval))
         state.next_sample[world] = wp.max(mark, passed) + wp.int64(1)
         if wp.static(not is_driven):
-            watch_ending(state, world, time, summary.area, self_impulses, last_floor_impulse, is_first)
+            watch_ending(state, world, time, summary.area, touches, meetings, last_floor_impulse, is_first)
         if wp.static(has_floor):
             watch_stiffening(state, drive, control, world, time)
             watch_collapse(chain, state, control, world, time, summary.area, is_first)
         if wp.static(tilts):
             watch_fall(P, state, world, time)
         if wp.static(has_floor):
-            return watch_rest(state, control, world, time, summary, last_floor_impulse)
+            return watch_rest(state, drive, control, world, time, summary, last_floor_impulse)
         if wp.static(is_driven):
             if state.load_factor[world] > wp.float64(1.0):
                 rate = drag_rate(chain, state, drive, world, summary.height)

@@ -27,6 +27,7 @@ from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, THETA
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 from warpchain.kernels.physics.elementary import LARGEST_TURN, ONE, ZERO, cos_sin
 from warpchain.kernels.physics.geometry import turned
+from warpchain.kernels.types import Ground
 
 wp.set_module_options({"enable_backward": False})
 
@@ -55,7 +56,7 @@ def explicit_attempt(name: str, block_dim: int, write_proximity: Any, read_proxi
         tilts: Whether the plane of the chain may move.
 
     Returns:
-        ``attempt(ends, forces, maxima, K, place, h)`` → Attempt, from the state and first stage on the board;
+        ``attempt(ends, forces, maxima, K, place, ground, h)`` → Attempt, from the state and first stage on the board;
         ``maxima``: memory of ``write_proximity``.
     """
     tableau = TABLEAUS[name]
@@ -105,6 +106,7 @@ def explicit_attempt(name: str, block_dim: int, write_proximity: Any, read_proxi
         maxima: wp.uint64,
         K: wp.array2d(dtype=wp.float64),
         place: Place,
+        ground: Ground,
         h: wp.float64,
     ):
         lane = place.lane
@@ -169,10 +171,10 @@ def explicit_attempt(name: str, block_dim: int, write_proximity: Any, read_proxi
                 result.cosine = new_cosine
                 result.sine = new_sine
                 if wp.static(reuses_last):
-                    write_proximity(K, maxima, place, there, next_end)
+                    write_proximity(K, maxima, place, ground, there, next_end)
             rates = stage(forces, K, place, next_end, there, inverse_mass, inverse_inertia)
             if wp.static(s == last and reuses_last):
-                result.proximity = read_proximity(maxima)
+                result.proximity = read_proximity(maxima, place.links)
             ax[s] = rates.x
             ay[s] = rates.y
             at[s] = rates.theta

@@ -1,6 +1,7 @@
 """Where the board lies: in the shared memory of a block or in the chain's scratch."""
 
 from warpchain.kernels import layout
+from warpchain.kernels.types import CHAIN_DOUBLES
 
 LARGEST_SHARED_BLOCK = 512
 """Most threads of a block whose board fits into its shared memory."""
@@ -11,8 +12,13 @@ def shares_board(block_dim: int) -> bool:
     return block_dim <= LARGEST_SHARED_BLOCK
 
 
+def board_size(threads: int) -> int:
+    """Doubles of a board: a column per thread of the block and one more; the chain's values and constants."""
+    return layout.BOARD_VALUES * (threads + 1) + max(threads + 1, layout.VALUES + CHAIN_DOUBLES)
+
+
 def board_rows(block_dim: int, columns: int) -> int:
     """Rows of a chain's scratch of this width: for the part of the board kept between launches, or for all of it."""
     if shares_board(block_dim):
         return layout.BOARD_VALUES
-    return -(-layout.board_size(block_dim) // columns)
+    return -(-board_size(block_dim) // columns)

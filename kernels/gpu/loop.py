@@ -22,32 +22,42 @@ from warpchain.kernels.events.tallies import add_count, attempts_made, count_bou
 from warpchain.kernels.events.tilting import in_room, write_tilting_sample
 from warpchain.kernels.features import COMPILER_FLAGS, Features
 from warpchain.kernels.gpu.board import (
-    contact_constants,
     link_is_finite,
+    load_extremes,
     load_link,
     place_of,
     publish,
+    raise_value,
+    store_extremes,
     store_link,
     store_losses,
-    write_constants,
 )
 from warpchain.kernels.gpu.contacts.neighbour_list import block_list
-from warpchain.kernels.gpu.contacts.proximity import block_proximity, upper_bound
+from warpchain.kernels.gpu.contacts.proximity import block_proximity, moving_sprocket_contact, upper_bound
 from warpchain.kernels.gpu.contacts.self_contacts import block_self_contacts, touch_layout
 from warpchain.kernels.gpu.explicit import explicit_attempt
-from warpchain.kernels.gpu.functions import shares_board
+from warpchain.kernels.gpu.functions import board_size, shares_board
 from warpchain.kernels.gpu.sample import block_sample, write_marks, write_step_bounds
-from warpchain.kernels.gpu.stage import Place, block_stage, error_of, read_link, vec3d, vec5d, write_first_stage
+from warpchain.kernels.gpu.stage import (
+    Place,
+    block_stage,
+    constants,
+    error_of,
+    read_link,
+    vec3d,
+    vec5d,
+    write_constants,
+    write_first_stage,
+)
 from warpchain.kernels.gpu.threads import barrier, barrier_if_any, block_maxima, clock, tile_address, vec4i
 from warpchain.kernels.gpu.tilting import block_tilting, copy_plane, write_felt_plane
 from warpchain.kernels.methods.controller import LEAST_SHRINKAGE, next_step, step_controller
 from warpchain.kernels.methods.explicit_tableaus import TABLEAUS
 from warpchain.kernels.methods.method import find_method
-from warpchain.kernels.physics.elementary import ONE, ZERO
-from warpchain.kernels.physics.plane import end_plane_step, mass_of
-from warpchain.kernels.physics.scaled_loads import under_load
-from warpchain.kernels.physics.softness import softened
-from warpchain.kernels.types import Control, Drive, Model, Record, State, read_chain
+from warpchain.kernels.physics.elementary import ZERO
+from warpchain.kernels.physics.plane import end_plane_step
+from warpchain.kernels.physics.scaled_loads import write_link
+from warpchain.kernels.types import Control, Drive, Ground, Model, Record, State, read_ground
 
 wp.set_module_options({"enable_backward": False})
 
@@ -61,12 +71,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     Args:
         features: What the kernel is compiled for.
         block_dim: Threads in a block, at least the number of links of every chain; on a GPU a multiple of 32.
-        registers: Greatest number of registers a thread may take on a GPU; None: as many as a block of this size can
-            have.
+        registers: Most registers of a thread on a GPU; None: as many as a block of this size can have.
 
     Arrays of the kernel:
-        scratch: (W, ≥ :func:`gpu.functions.board_rows`, columns) float64.
-        lists: As on a CPU.
+        scratch: (W, ≥ :func:`gpu.functions.board_rows`, columns) float64; lists are as on a CPU.
     """
     available = REGISTERS_OF_MULTIPROCESSOR // block_dim // 8 * 8
     if available < 255:
@@ -74,22 +82,23 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     method = find_method(features.method)
     columns = features.columns
     lists = list_layout(columns)
-    has_floor = features.fixed_body == "floor"
+    has_floor = features.has_floor
     has_fixed = features.fixed_body != "none"
     has_self = features.self_contact
     tilts = features.tilts
     has_contacts = has_fixed or has_self
+    meet_sprocket = moving_sprocket_contact()
     fixed_loss, fixed_depth, fixed_count = of_fixed_body(features.fixed_body)
     reuses_last = method.reuses_last
     needs_first_power = TABLEAUS[method.tableau].velocity_weights[0] != 0.0
     is_shared = shares_board(block_dim)
     width = block_dim + 1
     kept_width = columns if is_shared else width
-    plane_offset = wp.uint64(8 * layout.board_size(block_dim))
-    board_size = layout.board_size(block_dim) + layout.PLANE_ROWS * tilts if is_shared else 1
+    plane_offset = wp.uint64(8 * board_size(block_dim))
+    board_doubles = board_size(block_dim) + layout.PLANE_ROWS * tilts if is_shared else 1
     touch = touch_layout(columns, block_dim, in_lists=not is_shared)
     touch_size = touch.size if is_shared else 1
-    board_address = tile_address(wp.float64, board_size)
+    board_address = tile_address(wp.float64, board_doubles)
     touch_address = tile_address(wp.int32, touch_size)
     ends_address = tile_address(vec5d, block_dim)
     forces_address = tile_address(vec3d, block_dim)
@@ -100,8 +109,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     attempt = explicit_attempt(method.tableau, block_dim, write_proximity, read_proximity, tilts)
     begin_step, sum_up, meet_tilting_floor = block_tilting(block_dim)
     growth, shrinkage = step_controller(method.order, method.error_order, wp.float32)
-    build_list = block_list(columns, block_dim)
-    clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, block_dim, touch)
+    build_list = block_list(columns)
+    clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, touch)
     chain_values = layout.BOARD_VALUES
     is_driven = features.is_driven
     present = present_chain(is_driven)
@@ -126,14 +135,18 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
 
     @wp.func
     def measure_proximity(
-        ends: wp.tile[vec5d, block_dim], K: wp.array2d(dtype=wp.float64), maxima: wp.uint64, place: Place
+        ends: wp.tile[vec5d, block_dim],
+        K: wp.array2d(dtype=wp.float64),
+        maxima: wp.uint64,
+        place: Place,
+        ground: Ground,
     ):
         """Left end of the next link, and the proximity of the whole chain, in the state on the board."""
         link = read_link(K, place.lane)
         next_end = exchange_ends(ends, place, link)
-        write_proximity(K, maxima, place, link, next_end)
+        write_proximity(K, maxima, place, ground, link, next_end)
         barrier()
-        return next_end, read_proximity(maxima)
+        return next_end, read_proximity(maxima, place.links)
 
     @wp.kernel(
         name="advance",
@@ -159,7 +172,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         forces = wp.tile_empty(shape=(wp.static(block_dim),), dtype=vec3d, storage="shared")
         errors = wp.tile_empty(shape=(wp.static(block_dim),), dtype=wp.int32, storage="shared")
         maxima = wp.tile_empty(shape=(wp.static(block_dim),), dtype=vec4i, storage="shared")
-        board = wp.tile_empty(shape=(wp.static(board_size),), dtype=wp.float64, storage="shared")
+        board = wp.tile_empty(shape=(wp.static(board_doubles),), dtype=wp.float64, storage="shared")
         touches = wp.tile_empty(shape=(wp.static(touch_size),), dtype=wp.int32, storage="shared")
         if state.status[world] != RUNNING:
             return
@@ -187,37 +200,31 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         if wp.static(tilts and is_shared):
             P = wp.array(ptr=board_start + wp.static(plane_offset), shape=(layout.PLANE_ROWS,), dtype=wp.float64)
 
-        chain = read_chain(model, world)
-        if wp.static(is_driven):
-            chain = under_load(chain, state.load_factor[world])
+        chain = model.chains[world]
         n = chain.link_count
-        place = place_of(chain, lane)
+        place = place_of(chain, lane, wp.static(block_dim), wp.static(tilts))
+        if lane >= place.threads:
+            return
+        ground = read_ground(model, world)
         load_link(K, state, world, lane, n)
         is_fresh = state.is_fresh[world] != 0
         if lane < n:
-            inner = lane % 2 == 0
-            K[layout.MASS, lane] = wp.where(inner, chain.inner_mass, chain.outer_mass)
-            K[layout.INERTIA, lane] = wp.where(inner, chain.inner_inertia, chain.outer_inertia)
-            K[layout.INVERSE_MASS, lane] = ONE / K[layout.MASS, lane]
-            K[layout.INVERSE_INERTIA, lane] = ONE / K[layout.INERTIA, lane]
+            write_link(K, model, world, lane, state.load_factor[world])
             row = int(layout.BOARD_LOST_SELF)
             while row < wp.static(layout.BOARD_VALUES):
                 K[row, lane] = wp.where(is_fresh, ZERO, kept[row, lane])
                 row += 1
         if lane == 0:
-            chain = softened(chain, control, state.softness[world])
-            write_constants(K, chain)
+            write_constants(K, present(model, state, control, world))
             if wp.static(tilts):
                 copy_plane(P, state.plane[world])
-                K[chain_values, layout.VALUE_INVERSE_SQUARE] = ONE / (chain.half_length * chain.half_length)
                 write_felt_plane(K, P)
             write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
-            K[chain_values, layout.VALUE_OPENING] = state.extremes[world, layout.OPENING]
-            K[chain_values, layout.VALUE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
-            K[chain_values, layout.VALUE_LAST_IMPULSE] = state.watch[world, layout.LAST_FLOOR_IMPULSE]
+            load_extremes(K, state, world, fixed_depth)
             write_marks(K, state, control, world)
             T[wp.static(touch.fixed_hits)] = 0
             T[wp.static(touch.self_hits)] = 0
+            T[wp.static(touch.strand_hits)] = 0
             T[wp.static(touch.deepest)] = 0
             T[wp.static(touch.is_late)] = 0
             T[wp.static(touch.votes)] = 0
@@ -225,19 +232,19 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         barrier()  # the chain's constants are on the board
         publish(K, place)
         barrier()
-        next_end, proximity = measure_proximity(ends, K, maxima_start, place)
+        next_end, proximity = measure_proximity(ends, K, maxima_start, place, ground)
         opening = proximity.opening
         status = int(RUNNING)
         pairs = int(0)
         slack = wp.float32(0.5) * wp.float32(control.skin) - opening
         if is_fresh:
             if wp.static(has_self):
-                pairs = build_list(K, L, chain, lane, control.skin, upper_bound(opening))
+                pairs = build_list(K, L, chain, lane, place.threads, control.skin, upper_bound(opening))
                 if pairs > wp.static(lists.capacity):
                     status = int(LIST_OVERFLOW)
             if wp.static(tilts):
                 if lane == 0:
-                    P[layout.SUM_MASS] = mass_of(chain)
+                    P[layout.SUM_MASS] = chain.mass
                 barrier()  # all have read the ends
                 sum_up(K, P, M, place)
         reach = time_to_contact(control, pairs, proximity.gap, slack, proximity.speed)
@@ -273,6 +280,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 pauses = record_is_full(record, world) or T[wp.static(touch.is_late)] != 0
                 barrier()
                 if has_changed(state, world, softness, load_factor):
+                    if wp.static(is_driven) and lane < n:
+                        write_link(K, model, world, lane, state.load_factor[world])
                     next_end = exchange_ends(ends, place, read_link(K, lane))
                     evaluate_first_stage(forces, K, place, next_end)
                 if pauses or status != RUNNING:
@@ -292,11 +301,11 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             if wp.static(tilts):
                 begin_step(K, P, place, h)
             tolerance = K[chain_values, layout.VALUE_TOLERANCE]
-            result = attempt(ends, forces, maxima_start, K, place, h)
+            result = attempt(ends, forces, maxima_start, K, place, ground, h)
             own_error = int(0)
             if lane < n:
                 own_error = error_of(result, tolerance)
-            error = wp.cast(greatest(errors, lane, own_error), wp.float32)
+            error = wp.cast(greatest(errors, lane, n, own_error), wp.float32)
             attempts += 1
             if not (error <= wp.float32(1.0)):
                 if wp.isfinite(error):
@@ -305,7 +314,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     step = h * LEAST_SHRINKAGE
                     broken = wp.where(lane >= n or link_is_finite(K, lane), 0, 1)
                     barrier()  # all have read the errors
-                    if greatest(errors, lane, broken) > 0:
+                    if greatest(errors, lane, n, broken) > 0:
                         status = int(NOT_FINITE)
                 if status == RUNNING and step < control.smallest_step:
                     status = int(STEP_TOO_SMALL)
@@ -313,7 +322,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 accepted += 1
                 if lane < n:
                     K[layout.BOARD_LOST_FRICTION, lane] = K[layout.BOARD_LOST_FRICTION, lane] + h * result.friction
-                    dissipation = K[chain_values, layout.VALUE_DAMPING] * result.damping
+                    dissipation = constants(K).joint_damping * result.damping
                     K[layout.BOARD_LOST_DAMPING, lane] = K[layout.BOARD_LOST_DAMPING, lane] + h * dissipation
                     K[layout.X, lane] = result.x
                     K[layout.Y, lane] = result.y
@@ -330,17 +339,15 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 last_error = wp.max(error, wp.float32(1e-4))
                 proximity = result.proximity
                 if wp.static(not reuses_last):
-                    next_end, proximity = measure_proximity(ends, K, maxima_start, place)
+                    next_end, proximity = measure_proximity(ends, K, maxima_start, place, ground)
                 opening = proximity.opening
                 gap = proximity.gap
                 if lane == 0:
-                    K[chain_values, layout.VALUE_OPENING] = wp.max(
-                        K[chain_values, layout.VALUE_OPENING], wp.float64(opening)
-                    )
+                    raise_value(K, layout.VALUE_OPENING, opening)
                 if wp.static(tilts):
                     sum_up(K, P, M, place)
                     if lane == 0:
-                        end_plane_step(P, K[chain_values, layout.VALUE_GRAVITY], h)
+                        end_plane_step(P, constants(K).gravity, h)
                 is_hit = bool(False)
                 is_near = bool(False)
                 is_stale = bool(False)
@@ -349,11 +356,15 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if gap < wp.float32(0.0):
                         is_near = bool(True)
                         if wp.static(tilts):
-                            hits = meet_tilting_floor(K, P, M, contact_constants(K, n), place)
+                            hits = meet_tilting_floor(K, P, M, constants(K), place)
                         elif lane < n:
-                            hits = meet_fixed_body(K, place, contact_constants(K, n), drive, world, time)
+                            hits = meet_fixed_body(K, place, ground, constants(K), drive, world, time)
                         if hits > 0:
                             wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
+                if wp.static(features.moving_sprocket):
+                    is_near = bool(True)
+                    if lane < n:
+                        hits += meet_sprocket(K, place, ground, constants(K), drive, state, world, time)
                 if wp.static(has_self):
                     slack = wp.float32(0.5) * wp.float32(control.skin) - opening - proximity.displacement
                     is_stale = not slack > wp.float32(0.0)
@@ -365,9 +376,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
                 if wp.static(has_fixed):
                     if gap < wp.float32(0.0) and lane == 0:
-                        K[chain_values, layout.VALUE_FIXED_DEPTH] = wp.max(
-                            K[chain_values, layout.VALUE_FIXED_DEPTH], wp.float64(-gap)
-                        )
+                        raise_value(K, layout.VALUE_FIXED_DEPTH, -gap)
                         if wp.static(has_floor):
                             if is_hit:
                                 count_bounce(state, world, time, K[chain_values, layout.VALUE_LAST_IMPULSE])
@@ -376,16 +385,16 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if is_stale:
                         if lane == 0:
                             add_count(state, world, layout.LIST_BUILDS, wp.int64(1))
-                        pairs = build_list(K, L, contact_constants(K, n), lane, control.skin, upper_bound(opening))
+                        pairs = build_list(K, L, constants(K), lane, place.threads, control.skin, upper_bound(opening))
                         if pairs > wp.static(lists.capacity):
                             status = int(LIST_OVERFLOW)
                             pairs = int(wp.static(lists.capacity))
                         slack = wp.float32(0.5) * wp.float32(control.skin) - opening
                     if pairs > 0:
-                        touched = contact_constants(K, n)
-                        touching = find_contacts(K, L, T, touched, lane, pairs, upper_bound(opening))
+                        touched = constants(K)
+                        touching = find_contacts(K, L, T, touched, lane, place.threads, pairs, upper_bound(opening))
                         if touching > 0:
-                            hits = resolve_contacts(K, L, T, E, F, touched, lane, touching)
+                            hits = resolve_contacts(K, L, T, E, F, touched, lane, place.threads, touching)
                             if hits > 0:
                                 wp.atomic_add(T, wp.static(touch.self_hits), hits)
                             if not is_hit:
@@ -426,11 +435,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             add_count(state, world, layout.REJECTED, wp.int64(attempts - accepted))
             add_count(state, world, fixed_count, wp.int64(T[wp.static(touch.fixed_hits)]))
             add_count(state, world, layout.SELF_IMPULSES, wp.int64(T[wp.static(touch.self_hits)]))
-            state.extremes[world, layout.OPENING] = K[chain_values, layout.VALUE_OPENING]
+            add_count(state, world, layout.STRAND_IMPULSES, wp.int64(T[wp.static(touch.strand_hits)]))
+            store_extremes(K, state, world, fixed_depth)
             deepest = wp.cast(T[wp.static(touch.deepest)], wp.float32)
             raise_extreme(state, world, layout.SELF_DEPTH, wp.float64(deepest))
-            state.extremes[world, fixed_depth] = K[chain_values, layout.VALUE_FIXED_DEPTH]
-            state.watch[world, layout.LAST_FLOOR_IMPULSE] = K[chain_values, layout.VALUE_LAST_IMPULSE]
             state.is_fresh[world] = 0
             state.has_first_stage[world] = 1
             state.time_to_contact[world] = wp.float64(reach)

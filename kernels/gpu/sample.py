@@ -8,12 +8,13 @@ from warpchain.kernels.events.present_chain import has_changed, present_chain
 from warpchain.kernels.events.sample import next_mark, sampling
 from warpchain.kernels.events.softening import book_softening, contact_step, spring_tolerance
 from warpchain.kernels.features import Features
-from warpchain.kernels.gpu.board import write_constants
 from warpchain.kernels.gpu.contacts.self_contacts import TouchLayout
+from warpchain.kernels.gpu.stage import write_constants
 from warpchain.kernels.gpu.threads import clock
 from warpchain.kernels.layout import (
     BOARD_VALUES,
     SELF_IMPULSES,
+    STRAND_IMPULSES,
     VALUE_CONTACT_STEP,
     VALUE_DEADLINE,
     VALUE_LAST_IMPULSE,
@@ -21,7 +22,6 @@ from warpchain.kernels.layout import (
     VALUE_STOP_TIME,
     VALUE_TOLERANCE,
 )
-from warpchain.kernels.physics.scaled_loads import write_inertias
 from warpchain.kernels.types import Control, Drive, Model, Record, State
 
 wp.set_module_options({"enable_backward": False})
@@ -48,7 +48,8 @@ def block_sample(features: Features, touch: TouchLayout):
     """Warp function ``take_sample(K, T, model, drive, state, record, control, world, time)`` for one thread of a block.
 
     The board's rows of ends must be written, and a barrier passed; the caller has a barrier afterwards. The status goes
-    to the mailbox, and ``is_late`` is set when the launch has lasted long enough.
+    to the mailbox, and ``is_late`` is set when the launch has lasted long enough. If the loads of a driven chain have
+    changed, each thread has to write the constants of its link.
     """
     is_driven = features.is_driven
     sample = sampling(features.fixed_body, features.tilts)
@@ -69,17 +70,16 @@ def block_sample(features: Features, touch: TouchLayout):
         softness = state.softness[world]
         load_factor = state.load_factor[world]
         chain = present(model, state, control, world)
-        self_impulses = state.counts[world, SELF_IMPULSES] + wp.int64(T[wp.static(touch.self_hits)])
+        touches = state.counts[world, SELF_IMPULSES] + wp.int64(T[wp.static(touch.self_hits)])
+        meetings = state.counts[world, STRAND_IMPULSES] + wp.int64(T[wp.static(touch.strand_hits)])
         last_impulse = K[BOARD_VALUES, VALUE_LAST_IMPULSE]
         T[wp.static(touch.mailbox)] = sample(
-            K, chain, drive, state, record, control, world, time, self_impulses, last_impulse
+            K, chain, drive, state, record, control, world, time, touches, meetings, last_impulse
         )
         if has_changed(state, world, softness, load_factor):
             after = present(model, state, control, world)
             book_softening(chain, after, state, world)
             write_constants(K, after)
-            if wp.static(is_driven):
-                write_inertias(K, after)
         write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
         write_marks(K, state, control, world)
         if clock() > K[BOARD_VALUES, VALUE_DEADLINE]:

@@ -14,7 +14,7 @@ import warp as wp
 from warpchain.kernels import layout
 from warpchain.kernels.layout import COSINE, OMEGA, SINE, U, V, X, Y
 from warpchain.kernels.methods.controller import error_scale, quick_quotient
-from warpchain.kernels.physics.elementary import order_bits_single
+from warpchain.kernels.physics.elementary import ZERO, order_bits_single
 from warpchain.kernels.physics.geometry import end_positions, end_velocities
 from warpchain.kernels.physics.joint import friction_torque, joint_force, link_acceleration
 from warpchain.kernels.physics.plane import plane_load
@@ -51,6 +51,7 @@ class Place:
     before: wp.int32  # the link to the left
     after: wp.int32  # the link to the right
     links: wp.int32  # number of links of the chain
+    threads: wp.int32  # number of threads of the block that stay, see threads.busy_threads
 
 
 @wp.struct
@@ -95,6 +96,32 @@ class Attempt:
     turns_far: bool  # further than the method allows in one step
 
 
+@wp.func_native("return reinterpret_cast<::wp::uint64>(K.data + offset);")
+def address_on_board(K: wp.array2d(dtype=wp.float64), offset: int) -> wp.uint64:
+    """Where a number on the board lies; with ``K.ptr`` the compiler would not know that it is shared memory."""
+    ...
+
+
+@wp.func
+def constants_address(K: wp.array2d(dtype=wp.float64)):
+    """Where the chain's constants lie on the board."""
+    return address_on_board(K, wp.static(layout.BOARD_VALUES) * K.shape[1] + wp.static(layout.VALUES))
+
+
+@wp.func
+def constants(K: wp.array2d(dtype=wp.float64)) -> Chain:
+    """The chain's constants, from the board; the compiler loads the fields that are used."""
+    chains = wp.array(ptr=constants_address(K), shape=(1,), dtype=Chain)
+    return chains[0]
+
+
+@wp.func
+def write_constants(K: wp.array2d(dtype=wp.float64), chain: Chain):
+    """Writes the chain's constants on the board."""
+    chains = wp.array(ptr=constants_address(K), shape=(1,), dtype=Chain)
+    chains[0] = chain
+
+
 @wp.func
 def read_link(K: wp.array2d(dtype=wp.float64), column: int) -> Link:
     """A link, from the board."""
@@ -104,7 +131,7 @@ def read_link(K: wp.array2d(dtype=wp.float64), column: int) -> Link:
     link.u = K[U, column]
     link.v = K[V, column]
     link.omega = K[OMEGA, column]
-    half_length = K[layout.BOARD_VALUES, layout.VALUE_HALF_LENGTH]
+    half_length = constants(K).half_length
     link.arm_x = half_length * K[COSINE, column]
     link.arm_y = half_length * K[SINE, column]
     return link
@@ -131,19 +158,6 @@ def read_first_stage(K: wp.array2d(dtype=wp.float64), column: int) -> Rates:
     first.friction = K[layout.BOARD_FIRST + 3, column]
     first.damping = K[layout.BOARD_FIRST + 4, column]
     return first
-
-
-@wp.func
-def joint_constants(K: wp.array2d(dtype=wp.float64)) -> Chain:
-    """Constants of joints, from the board; other fields, gravity among them, are 0."""
-    chain = Chain()
-    chain.half_length = K[layout.BOARD_VALUES, layout.VALUE_HALF_LENGTH]
-    chain.joint_stiffness = K[layout.BOARD_VALUES, layout.VALUE_STIFFNESS]
-    chain.joint_damping = K[layout.BOARD_VALUES, layout.VALUE_DAMPING]
-    chain.viscous_friction = K[layout.BOARD_VALUES, layout.VALUE_VISCOUS]
-    chain.coulomb_friction = K[layout.BOARD_VALUES, layout.VALUE_COULOMB]
-    chain.inverse_smoothing = K[layout.BOARD_VALUES, layout.VALUE_INVERSE_SMOOTHING]
-    return chain
 
 
 @wp.func
@@ -257,7 +271,7 @@ def block_stage(block_dim: int, tilts: bool = False):
         inverse_inertia: wp.float64,
     ):
         # constants are read from the board where they are needed: that costs less than registers
-        chain = joint_constants(K)
+        chain = constants(K)
         _left_x, _left_y, right_x, right_y = end_positions(link.x, link.y, link.arm_x, link.arm_y)
         _left_u, _left_v, right_u, right_v = end_velocities(link.u, link.v, link.omega, link.arm_x, link.arm_y)
         cu = next_end[2] - right_u
@@ -265,13 +279,16 @@ def block_stage(block_dim: int, tilts: bool = False):
         spin = link.omega - next_end[4]
         force_x = joint_force(chain, next_end[0] - right_x, cu)
         force_y = joint_force(chain, next_end[1] - right_y, cv)
-        torque = friction_torque(chain, spin)
+        torque = friction_torque(
+            K[layout.VISCOUS, place.column], K[layout.COULOMB, place.column], spin, chain.inverse_smoothing
+        )
         friction = torque * spin
         damping = cu * cu + cv * cv
         forces[place.lane] = vec3d(force_x, force_y, torque)
         left = forces[place.before]
+        chain.gravity = ZERO
         if wp.static(not tilts):
-            chain.gravity = K[layout.BOARD_VALUES, layout.VALUE_GRAVITY]
+            chain.gravity = constants(K).gravity
         rates = Rates()
         ax, ay, at = link_acceleration(
             chain,
@@ -287,9 +304,7 @@ def block_stage(block_dim: int, tilts: bool = False):
             torque,
         )
         if wp.static(tilts):
-            chain.gravity = K[layout.BOARD_VALUES, layout.VALUE_GRAVITY]
-            felt = felt_plane(K, chain, wp.static(layout.VALUE_PLANE))
-            felt.inverse_square = K[layout.BOARD_VALUES, layout.VALUE_INVERSE_SQUARE]
+            felt = felt_plane(K, constants(K), wp.static(layout.VALUE_PLANE))
             load_x, load_y, load_turn = plane_load(felt, link.x, link.y, link.arm_x, link.arm_y)
             ax += load_x
             ay += load_y

@@ -18,7 +18,7 @@ from warpchain.kernels.contacts.tilting_floor import (
     steepness,
 )
 from warpchain.kernels.gpu.board import ends_of
-from warpchain.kernels.gpu.stage import Place, felt_plane, read_link
+from warpchain.kernels.gpu.stage import Place, constants, felt_plane, read_link
 from warpchain.kernels.gpu.threads import barrier, warp_width
 from warpchain.kernels.layout import (
     BOARD_FIRST,
@@ -168,9 +168,7 @@ def copy_plane(target: wp.array(dtype=wp.float64), source: wp.array(dtype=wp.flo
 @wp.func
 def shift_first_stage(K: wp.array2d(dtype=wp.float64), lane: int):
     """Changes a link's first stage on the board from the plane of the attempt before to that of this one."""
-    own = Chain()
-    own.gravity = K[BOARD_VALUES, layout.VALUE_GRAVITY]
-    own.inverse_square = K[BOARD_VALUES, layout.VALUE_INVERSE_SQUARE]
+    own = constants(K)
     link = read_link(K, lane)
     now = felt_plane(K, own, VALUE_PLANE)
     before = felt_plane(K, own, VALUE_PLANE_BEFORE)
@@ -184,9 +182,7 @@ def shift_first_stage(K: wp.array2d(dtype=wp.float64), lane: int):
 @wp.func
 def places_of(K: wp.array2d(dtype=wp.float64), i: int):
     """The part of link i in the sums for its plane that depend on places."""
-    chain = Chain()
-    chain.half_width = K[BOARD_VALUES, layout.VALUE_HALF_WIDTH]
-    return place_terms(chain, K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[COSINE, i], K[SINE, i])
+    return place_terms(constants(K), K[MASS, i], K[INERTIA, i], K[X, i], K[Y, i], K[COSINE, i], K[SINE, i])
 
 
 @wp.func
@@ -237,7 +233,7 @@ def block_tilting(block_dim: int):
     @wp.func
     def begin(K: wp.array2d(dtype=wp.float64), P: wp.array(dtype=wp.float64), place: Place, h: wp.float64):
         if place.lane == 0:
-            begin_plane_step(P, K[BOARD_VALUES, layout.VALUE_GRAVITY], h)
+            begin_plane_step(P, constants(K).gravity, h)
             write_felt_plane(K, P)
         barrier()
         if place.lane < place.links:

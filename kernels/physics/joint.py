@@ -23,18 +23,12 @@ def joint_force(chain: Chain, opening: wp.float64, opening_rate: wp.float64):
 
 
 @wp.func
-def smoothed_torque(chain: Chain, spin: wp.float64, inverse_smoothing: wp.float64):
+def friction_torque(viscous: wp.float64, coulomb: wp.float64, spin: wp.float64, inverse_smoothing: wp.float64):
     """f(w) = β w + τ_c tanh(w / ω_c) [N m] of a joint's spin w [rad/s], with a smoothing given as 1/ω_c [s/rad].
 
     The spin w of a joint is ω of the link left of it less ω of the link right of it.
     """
-    return chain.viscous_friction * spin + chain.coulomb_friction * tanh(spin * inverse_smoothing)
-
-
-@wp.func
-def friction_torque(chain: Chain, spin: wp.float64):
-    """The torque f(w) of a joint [N m], with the chain's own ω_c."""
-    return smoothed_torque(chain, spin, chain.inverse_smoothing)
+    return viscous * spin + coulomb * tanh(spin * inverse_smoothing)
 
 
 @wp.func

@@ -100,14 +100,7 @@ def on_plane(own: Chain, P: wp.array(dtype=wp.float64), first: int) -> Chain:
     chain.up_y = P[first + UP + 1]
     chain.up_z = P[first + UP + 2]
     chain.origin_height = P[first + ORIGIN + 1]
-    chain.inverse_square = ONE / (own.half_length * own.half_length)
     return chain
-
-
-@wp.func
-def mass_of(chain: Chain):
-    """Mass [kg] of the chain."""
-    return wp.float64(chain.link_count // 2) * (chain.inner_mass + chain.outer_mass)
 
 
 @wp.func

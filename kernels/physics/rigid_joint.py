@@ -70,8 +70,6 @@ def switch_smoothing(chain: Chain, h: wp.float64, relative_acceleration: wp.floa
 
 
 @wp.func
-def steepness(chain: Chain, spin: wp.float64, inverse_smoothing: wp.float64):
+def steepness(viscous: wp.float64, coulomb: wp.float64, spin: wp.float64, inverse_smoothing: wp.float64):
     """Approximation of f(w)/w [N m s], used for f'(w) in the matrix of the stages."""
-    return chain.viscous_friction + chain.coulomb_friction * inverse_smoothing / (
-        ONE + wp.abs(spin) * inverse_smoothing
-    )
+    return viscous + coulomb * inverse_smoothing / (ONE + wp.abs(spin) * inverse_smoothing)

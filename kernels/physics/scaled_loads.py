@@ -25,9 +25,24 @@ loads.
 
 import warp as wp
 
-from warpchain.kernels.layout import COSINE, INERTIA, INVERSE_INERTIA, SINE, U, V
+from warpchain.kernels.layout import (
+    COSINE,
+    COULOMB,
+    INERTIA,
+    INVERSE_INERTIA,
+    INVERSE_MASS,
+    MASS,
+    OWN_COULOMB,
+    OWN_INERTIA,
+    OWN_MASS,
+    OWN_VISCOUS,
+    SINE,
+    VISCOUS,
+    U,
+    V,
+)
 from warpchain.kernels.physics.elementary import HALF, ONE, TWO
-from warpchain.kernels.types import Chain
+from warpchain.kernels.types import Chain, Model
 
 wp.set_module_options({"enable_backward": False})
 
@@ -52,25 +67,32 @@ def scaled_inertia(inertia: wp.float64, mass: wp.float64, length: wp.float64, fa
 
 @wp.func
 def under_load(own: Chain, factor: wp.float64) -> Chain:
-    """The chain with its loads multiplied by a factor; for a factor of 1 the same bits."""
+    """The chain in a field of gravity that is multiplied by a factor; for a factor of 1 the same bits."""
     chain = own
-    length = TWO * own.half_length
     chain.gravity = factor * own.gravity
-    chain.viscous_friction = factor * own.viscous_friction
-    chain.coulomb_friction = factor * own.coulomb_friction
-    chain.inner_inertia = scaled_inertia(own.inner_inertia, own.inner_mass, length, factor)
-    chain.outer_inertia = scaled_inertia(own.outer_inertia, own.outer_mass, length, factor)
     return chain
 
 
 @wp.func
-def write_inertias(K: wp.array2d(dtype=wp.float64), chain: Chain):
-    """Writes each link's rotary inertia and its inverse into the rows of constants."""
+def write_link(K: wp.array2d(dtype=wp.float64), model: Model, world: int, i: int, factor: wp.float64):
+    """Writes the constants of link i and of joint i, with loads multiplied by a factor, into their rows."""
+    mass = model.links[world, OWN_MASS, i]
+    length = TWO * model.chains[world].half_length
+    inertia = scaled_inertia(model.links[world, OWN_INERTIA, i], mass, length, factor)
+    K[MASS, i] = mass
+    K[INVERSE_MASS, i] = ONE / mass
+    K[INERTIA, i] = inertia
+    K[INVERSE_INERTIA, i] = ONE / inertia
+    K[VISCOUS, i] = factor * model.links[world, OWN_VISCOUS, i]
+    K[COULOMB, i] = factor * model.links[world, OWN_COULOMB, i]
+
+
+@wp.func
+def write_links(K: wp.array2d(dtype=wp.float64), model: Model, world: int, factor: wp.float64):
+    """Writes the constants of all links and joints, see :func:`write_link`."""
     i = int(0)
-    while i < chain.link_count:
-        inertia = wp.where(i % 2 == 0, chain.inner_inertia, chain.outer_inertia)
-        K[INERTIA, i] = inertia
-        K[INVERSE_INERTIA, i] = ONE / inertia
+    while i < model.chains[world].link_count:
+        write_link(K, model, world, i, factor)
         i += 1
 
 

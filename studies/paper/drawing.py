@@ -36,8 +36,7 @@ def figures(numbers: Numbers, sweeps: Mapping[str, SweepResult]) -> Iterator[tup
     yield "distances", distances(numbers)
     yield "effects", effects(numbers)
     yield "friction", friction(numbers)
-    if "by_links" in numbers["paper_claims"]["starts"]["rest"]:
-        yield "self_contacts", self_contacts(numbers)
+    yield "strands", strands(numbers)
     if "paper_shapes" in sweeps:
         yield "impacts", outlines(sweeps["paper_shapes"])
 
@@ -158,14 +157,14 @@ def friction(numbers: Numbers) -> Figure:
     return figure
 
 
-def self_contacts(numbers: Numbers) -> Figure:
-    """Shares of walks by the bounce after which the loop first touches itself."""
-    content = numbers["paper_claims"]
+def strands(numbers: Numbers) -> Figure:
+    """Shares of walks by the bounce after which strands of the loop first meet."""
+    content = numbers["paper_strands"]
     links = content["cells"]["links"]
     figure = Figure(figsize=(8, 3.2), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
     for axes, start, title in zip(panels, ("rest", "ellipse"), ("from rest", "as an ellipse"), strict=True):
-        counts = np.array([each["contact"] for each in content["starts"][start]["by_links"]], np.float64)
+        counts = np.array([each["strands"] for each in content["strands"]["starts"][start]], np.float64)
         shares = counts / counts.sum(axis=1, keepdims=True)
         bottom = np.zeros(len(links))
         for number, label in enumerate(_CONTACT):
@@ -177,7 +176,7 @@ def self_contacts(numbers: Numbers) -> Figure:
         axes.set_xlabel("number of links $n$")
         axes.yaxis.set_major_formatter(PercentFormatter(1.0, 0))
         tidy(axes)
-    panels[0].set_ylabel("walks that touch themselves first")
+    panels[0].set_ylabel("walks whose strands first meet")
     handles, labels = panels[1].get_legend_handles_labels()
     figure.legend(handles[::-1], labels[::-1], frameon=False, fontsize="small", loc="outside right center")
     return figure

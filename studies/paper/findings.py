@@ -4,25 +4,19 @@ A function takes the numbers of all sweeps, name → content, and gives a senten
 `studies.paper.verdicts`.
 """
 
-import csv
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.paper.reduction import effect_of
 from studies.paper.statistics import Effect, exceeding, summary
-from studies.paper.verdicts import LITTLE, UNSEEN, Verdict, direction, share, smallness, together
+from studies.paper.verdicts import Verdict, bounds, direction, share, smallness, together
+from studies.waves import doses
 
 Numbers = Mapping[str, Any]
 
-MODERATE: Final = 0.2
-"""Greatest standard deviation of a walk over the mean of its cell that "varies only moderately" may mean."""
-PAIRS: Final = Path(__file__).parents[1] / "waves" / "results" / "do_waves_matter.csv"
-"""Pairs of walks with and without a drag on waves."""
 LONG: Final = 150
 """Chains of so many links or more are those that the paper's start from rest underestimates."""
 
@@ -33,6 +27,8 @@ class Finding:
 
     text: str
     verdict: Verdict
+    is_typed: bool = False
+    """Whether a person wrote it, from another page."""
 
 
 Check = Callable[[Numbers], Finding]
@@ -97,11 +93,13 @@ def shape(numbers: Numbers) -> Finding:
     texts = [f"{name} {percent(kept[name]['quantiles'][1])}" for name in names]
     within = [kept[name]["within_a_tenth"] for name in names]
     count, without = found["walks"], found["without"]
+    every = count + without
     text = (
-        f"medians of {count} loops: {', '.join(texts)}; within 10 % in {', '.join(map(str, within))}; "
-        f"{without} more loops do not rise again"
+        f"medians of {count} loops that rise again: {', '.join(texts)}; within 10 % in "
+        f"{', '.join(map(str, within))} of them; {without} of all {every} do not rise again, so of all "
+        f"{', '.join(percent(each / every, sign=False) for each in within)} keep them"
     )
-    return Finding(text, together([share(each, count) for each in within]))
+    return Finding(text, together([share(each, total) for each in within for total in (count, every)]))
 
 
 def speed(numbers: Numbers) -> Finding:
@@ -111,10 +109,11 @@ def speed(numbers: Numbers) -> Finding:
     low, median, high = (percent(each) for each in of_walks["quantiles"])
     slightly = of_walks["falls_by_less_than_a_fifth"]
     text = (
-        f"median {median}, {low} to {high} in nine of ten loops; falls by up to 20 % in {slightly} of {count}, "
-        f"rises in {count - of_walks['falls']}; {without} more loops do not rise again"
+        f"median {median}, {low} to {high} in nine of ten loops that rise again; falls by up to 20 % in {slightly} of "
+        f"{count}, rises in {count - of_walks['falls']}; {without} more do not rise again: slightly in "
+        f"{percent(slightly / (count + without), sign=False)} of all"
     )
-    return Finding(text, share(slightly, count))
+    return Finding(text, together([share(slightly, total) for total in (count, count + without)]))
 
 
 def faster(numbers: Numbers) -> Finding:
@@ -140,7 +139,7 @@ def moderate(numbers: Numbers) -> Finding:
     """Δx varies only moderately while links and frequency stay."""
     rest = numbers["paper_claims"]["starts"]["rest"]
     relative = np.array(rest["sd"], np.float64) / np.array(rest["mean"], np.float64)
-    within = int((relative <= MODERATE).sum())
+    within = int((relative <= bounds().moderate).sum())
     text = (
         f"standard deviation of a walk {percent(np.nanmin(relative), sign=False)} to "
         f"{percent(np.nanmax(relative), sign=False)} of the mean, median "
@@ -163,55 +162,55 @@ def underestimate(numbers: Numbers) -> Finding:
     return Finding(text, direction(found.rises, found.falls, found.cells))
 
 
-def _histograms(numbers: Numbers, start: str) -> NDArray[np.int64] | None:
-    """Walks by number of bounces before they touch themselves, of the long chains together."""
-    found = numbers["paper_claims"]["starts"][start].get("by_links")
-    if found is None:
-        return None
-    counts: NDArray[np.int64] = np.sum([each["contact"] for each in found[long_chains(numbers)]], axis=0)
-    return counts
-
-
-NOT_RECORDED: Final = Finding("the sweep has no such column; run it again", Verdict.OPEN)
+def _by_links(numbers: Numbers, start: str) -> list[Any]:
+    """What happens to loops, of each number of links of the long chains."""
+    found: list[Any] = numbers["paper_strands"]["strands"]["starts"][start][long_chains(numbers)]
+    return found
 
 
 def self_collision(numbers: Numbers) -> Finding:
-    """Long chains from rest run into themselves right after their second collision with the floor."""
-    counts = _histograms(numbers, "rest")
-    if counts is None:
-        return NOT_RECORDED
-    first, second, third = (counts[place] / counts.sum() for place in (1, 2, 3))
+    """Strands of long chains from rest meet right after their second collision with the floor."""
+    found = _by_links(numbers, "rest")
+    met, crease = (np.sum([each[event] for each in found], axis=0) for event in ("strands", "crease"))
+    first, second, third, later = (percent(each, sign=False) for each in met[1:5] / met.sum())
+    most = [bounce for each in found for bounce in each["most_frequent"]]
     text = (
-        "150 and 180 links from rest first crease or touch themselves after the first bounce in "
-        f"{percent(first, sign=False)} of the walks, after the second in {percent(second, sign=False)}, after the "
-        f"third in {percent(third, sign=False)}"
+        f"strands of 150 and 180 links from rest first meet after the first collision in {first} of the walks, after "
+        f"the second in {second}, the third in {third}, later in {later}; after the second most often in "
+        f"{most.count(2)} of {len(most)} cells. They first crease after the first collision in "
+        f"{percent(crease[1] / crease.sum(), sign=False)}"
     )
-    return Finding(text, Verdict.OPEN)
+    return Finding(text, share(most.count(2), len(most)))
 
 
 def cause(numbers: Numbers) -> Finding:
-    """Among long chains from rest, those that run into themselves early walk less far than others of their cell."""
-    content = numbers["paper_claims"]
-    found = content["starts"]["rest"].get("by_links")
-    if found is None:
-        return NOT_RECORDED
-    texts, falls, known = [], 0, 0
-    for links, each in zip(content["cells"]["links"], found, strict=True):
-        if links < LONG - 30:
-            continue
-        if "early_over_late" not in each:
-            texts.append(f"{links} links: no walk touched itself later")
-            continue
-        effect = effect_of(each["early_over_late"])
-        change = percent(float(effect.relative), float(effect.half_width))
-        texts.append(f"{links} links: {change} ({each['early']} and {each['late']} walks)")
-        falls, known = falls + int(effect.sign < 0), known + 1
+    """Long chains from rest walk further if their links pass through one another, an ellipse less so."""
+    found = {start: part(effect_of(each), long_chains(numbers)) for start, each in _through(numbers).items()}
+    rest, ellipse = (summary(found[start]) for start in ("spinning", "ellipse"))
+    early = [
+        f"{links} links {percent(float(effect.relative), float(effect.half_width))}"
+        for links, effect in (
+            (links, effect_of(each["early_over_late"]))
+            for links, each in zip(
+                numbers["paper_strands"]["cells"]["links"],
+                numbers["paper_strands"]["strands"]["starts"]["rest"],
+                strict=True,
+            )
+            if "early_over_late" in each
+        )
+    ]
     text = (
-        "Δx of walks that creased or touched themselves by their second bounce against the others of their cell, from "
-        "rest: "
-        f"{'; '.join(texts)}"
+        f"with links that pass through one another 150 and 180 links walk {percent(rest.mean, rest.half_width)} "
+        f"further from the sprocket ({rest.rises} of {rest.cells} cells rise, {rest.falls} fall), "
+        f"{percent(ellipse.mean, ellipse.half_width)} as an ellipse; within a cell, strands met by the second bounce "
+        f"against later: {', '.join(early)}"
     )
-    return Finding(text, share(falls, known))
+    return Finding(text, direction(rest.rises, rest.falls, rest.cells))
+
+
+def _through(numbers: Numbers) -> Mapping[str, Any]:
+    found: Mapping[str, Any] = numbers["paper_through"]["through"]
+    return found
 
 
 def losses(numbers: Numbers) -> Finding:
@@ -230,14 +229,10 @@ def losses(numbers: Numbers) -> Finding:
 
 
 def delay(numbers: Numbers) -> Finding:
-    """Starting as an ellipse delays the loop's running into itself."""
-    if "delay" not in numbers["paper_claims"]["starts"]:
-        return NOT_RECORDED
-    effect = part(effect_of(numbers["paper_claims"]["starts"]["delay"]), long_chains(numbers))
+    """Starting as an ellipse delays the meeting of the loop's strands."""
+    effect = part(effect_of(numbers["paper_strands"]["strands"]["delay"]), long_chains(numbers))
     found = summary(effect)
-    text = (
-        f"bounces before the first crease or touch, ellipse against rest, pairs in which both touch: {counted(effect)}"
-    )
+    text = f"bounces before strands meet, ellipse against rest, pairs in which they do: {counted(effect)}"
     return Finding(text, direction(found.rises, found.falls, found.cells))
 
 
@@ -254,7 +249,7 @@ def single_walks(numbers: Numbers) -> Finding:
 def means(numbers: Numbers) -> Finding:
     """Means of 12 walks differ by less than a few per cent between the tolerances."""
     effect = effect_of(numbers["paper_tolerance"]["tolerance"]["means"])
-    found, within = summary(effect), int((np.abs(effect.relative[effect.known]) <= UNSEEN).sum())
+    found, within = summary(effect), int((np.abs(effect.relative[effect.known]) <= bounds().unseen).sum())
     greatest = float(np.abs(effect.relative[effect.known]).max(initial=0.0))
     text = (
         f"means of 12 by up to {percent(greatest, sign=False)}, within 5 % in {within} of {found.cells} cells; all "
@@ -288,9 +283,7 @@ def floor_friction(numbers: Numbers) -> Finding:
 
 def collapse(numbers: Numbers) -> Finding:
     """Longer links lose their loop after fewer bounces."""
-    found = numbers["paper_claims"].get("collapse")
-    if found is None:
-        return NOT_RECORDED
+    found = numbers["paper_claims"]["collapse"]
     steps = [(each["value"], effect_of(each)) for each in found["values"]]
     bounced = _monotonic(numbers, "link_length", steps, -1, "bounces before the collapse")
     distances = (f"{value:g}: {percent(summary(effect).mean)}" for value, effect in changes(numbers, "link_length"))
@@ -321,16 +314,16 @@ def _monotonic(
     return Finding(text, direction(agreeing, against, cells))
 
 
-def small(names: Mapping[str, str], bound: float) -> Check:
+def small(names: Mapping[str, str], kind: str) -> Check:
     """Quantities have an effect smaller than a bound.
 
     Args:
         names: quantity → its symbol.
-        bound: greatest relative effect.
+        kind: of bound, as `verdicts.Bounds` has it.
     """
 
     def check(numbers: Numbers) -> Finding:
-        texts, total, above = [], 0, 0
+        texts, total, above, bound = [], 0, 0, getattr(bounds(), kind)
         for name, symbol in names.items():
             steps = changes(numbers, name)
             worst = max((summary(effect) for _, effect in steps), key=lambda found: abs(found.mean))
@@ -357,33 +350,29 @@ def spread(numbers: Numbers) -> Finding:
 
 
 def waves(numbers: Numbers) -> Finding:
-    """Waves influence the distance: from the pairs of walks of the study of waves, not from this page's sweeps.
+    """Short fast waves influence the distance: from the drags of the study of waves, not from this page's sweeps.
 
-    One drag, of one rate, cannot show more than a part of that.
+    It agrees if a gentle drag in flight alone changes Δx significantly in most cells.
     """
-    with PAIRS.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    changes = {
-        name: [
-            (float(row["change_percent"]), float(row["change_error_percent"])) for row in rows if row["variant"] == name
-        ]
-        for name in ("drag 50/s on waves of up to 24 links", "drag 50/s")
-    }
-    short, every = changes.values()
-    known = sum(abs(change) > 1.96 * error for change, error in short)
-    ends = [percent(end([change for change, _ in found]) / 100) for found in (short, every) for end in (min, max)]
+    rows = doses.read()
+    gentle, strong = (doses.changes(rows, "in flight", rate) for rate in (50.0, 250.0))
+    always = doses.changes(rows, "always", 50.0)
+    known = [int(np.sum(np.abs(values) > 1.96 * errors)) for values, errors in (gentle, strong, always)]
+    ends = [f"{percent(values.min() / 100)} to {percent(values.max() / 100)}" for values, _ in (gentle, strong, always)]
+    count = len(gentle[0])
     text = (
-        f"with a drag of 50/s on fast waves of up to 24 links Δx changes by {ends[0]} to {ends[1]}, significantly in "
-        f"{known} of {len(short)} cells; on all, long swings of the loop included, by {ends[2]} to {ends[3]}"
+        f"a drag of 50/s on fast waves of up to 24 links, in flight alone, changes Δx by {ends[0]}, significantly in "
+        f"{known[0]} of {count} cells; 250/s by {ends[1]}, {known[1]} cells; 50/s in impacts as well by {ends[2]}, "
+        f"{known[2]} cells"
     )
-    return Finding(text, together([share(known, len(short)), Verdict.DIFFERS]))
+    return Finding(text, together([share(known[0], count), Verdict.PART]))
 
 
 def stated(text: str, verdict: Verdict) -> Check:
     """What another page shows; nothing of this page's sweeps."""
 
     def check(numbers: Numbers) -> Finding:
-        return Finding(text, verdict)
+        return Finding(text, verdict, is_typed=True)
 
     return check
 
@@ -398,8 +387,8 @@ ADJUSTED: Final = {
 }
 """Table 1's adjusted parameters and their symbols."""
 
-LITTLE_EFFECT: Final = small(ADJUSTED, LITTLE)
-UNNOTICED_DAMPING: Final = small({"joint_damping": "b"}, UNSEEN)
-NO_RESTITUTION: Final = small({"floor_restitution": "e_fc"}, UNSEEN)
-MASSES: Final = small({"inner_mass": "m_inner", "outer_mass": "m_outer"}, UNSEEN)
-INERTIAS: Final = small({"inner_inertia": "I_inner", "outer_inertia": "I_outer"}, UNSEEN)
+LITTLE_EFFECT: Final = small(ADJUSTED, "little")
+UNNOTICED_DAMPING: Final = small({"joint_damping": "b"}, "unseen")
+NO_RESTITUTION: Final = small({"floor_restitution": "e_fc"}, "unseen")
+MASSES: Final = small({"inner_mass": "m_inner", "outer_mass": "m_outer"}, "unseen")
+INERTIAS: Final = small({"inner_inertia": "I_inner", "outer_inertia": "I_outer"}, "unseen")

@@ -3,17 +3,20 @@
 import re
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from studies.common import table
+from studies.paper import further_tables as tables
 from studies.paper.claims import CLAIMS
+from studies.paper.figure5 import figure5_table
 from studies.paper.findings import changes, percent
-from studies.paper.reduction import effect_of
+from studies.paper.separations import separations_tables
 from studies.paper.statistics import Effect, summary
-from studies.paper.verdicts import Verdict
+from studies.paper.verdicts import Bounds, Verdict, scaled
 from warpchain import Parameters
 
 Numbers = Mapping[str, Any]
@@ -38,7 +41,16 @@ def page(numbers: Numbers) -> str:
         "reasons": reasons(numbers),
         "distances": distances_table(numbers),
         "ellipses": ellipses_text(numbers),
-        "contacts": contacts_table(numbers),
+        "contacts": tables.strands_table(numbers),
+        "through": tables.through_table(numbers),
+        "open": tables.open_table(numbers),
+        "rest": tables.rest_table(numbers),
+        "lengths": tables.lengths_table(numbers),
+        "sliding": tables.sliding_table(numbers),
+        "distributions": tables.distributions_table(numbers),
+        "thresholds": thresholds_table(numbers),
+        "figure5": figure5_table(),
+        "separations": separations_tables(),
         "impacts": impacts_table(numbers),
         "effects": effects_table(numbers),
         "friction": friction_table(numbers),
@@ -56,8 +68,28 @@ def claims_table(numbers: Numbers) -> str:
     rows = []
     for number, claim in enumerate(CLAIMS, 1):
         finding = claim.check(numbers)
-        rows.append([str(number), claim.sentence, finding.text, claim.source, f"*{finding.verdict}*"])
+        mark = " †" if finding.is_typed else ""
+        rows.append([str(number), claim.sentence, f"{finding.text}{mark}", claim.source, f"*{finding.verdict}*"])
     return table(["", "the paper", "here", "from", "verdict"], rows)
+
+
+def thresholds_table(numbers: Numbers) -> str:
+    """Which verdicts change if one bound of the rules is halved or doubled."""
+    usual = [claim.check(numbers).verdict for claim in CLAIMS]
+    rows = []
+    for field in fields(Bounds):
+        row = [field.name, f"{getattr(Bounds(), field.name):g}"]
+        for factor in (0.5, 2.0):
+            with scaled(field.name, factor):
+                found = [claim.check(numbers).verdict for claim in CLAIMS]
+            changed = [
+                f"{number}: *{before}* → *{after}*"
+                for number, (before, after) in enumerate(zip(usual, found, strict=True), 1)
+                if before != after
+            ]
+            row.append("; ".join(changed) or "none")
+        rows.append(row)
+    return table(["bound", "value", "halved", "doubled"], rows)
 
 
 def verdict_counts(numbers: Numbers) -> str:
@@ -96,36 +128,6 @@ def ellipses_text(numbers: Numbers) -> str:
     means = np.array(content["starts"]["ellipse"]["mean"], np.float64)[links >= 90][:, frequencies >= 10]
     difference = np.abs(means / means.mean(axis=0) - 1)
     return f"{percent(float(np.nanmax(difference)), sign=False)} from 10 Hz on"
-
-
-def contacts_table(numbers: Numbers) -> str:
-    """When loops first touch themselves and collapse, by start and links; a sentence where the sweep does not say."""
-    content = numbers["paper_claims"]
-    head = [
-        "start",
-        "links",
-        "the loop",
-        "before",
-        "after 1",
-        "after 2",
-        "after 3",
-        "later",
-        "never",
-        "early over late",
-    ]
-    rows = []
-    for start in ("rest", "ellipse"):
-        for links, each in zip(content["cells"]["links"], content["starts"][start].get("by_links", ()), strict=False):
-            ratio = "—"
-            if "early_over_late" in each:
-                effect = effect_of(each["early_over_late"])
-                ratio = percent(float(effect.relative), float(effect.half_width))
-            for event, text, last in (("contact", "touches itself", ratio), ("collapse", "collapses", "")):
-                total = max(1, sum(each[event]))
-                rows.append([start, str(links), text, *(f"{100 * count / total:.0f} %" for count in each[event]), last])
-    if not rows:
-        return "The sweep has no columns of self-contacts; run it again."
-    return f"![When loops first touch themselves](figures/self_contacts.png)\n\n{table(head, rows)}"
 
 
 def impacts_table(numbers: Numbers) -> str:

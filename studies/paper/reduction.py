@@ -6,15 +6,26 @@ The numbers are plain and rounded, so that a small file of JSON holds them.
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.paper.further import (
+    CELLS,
+    at_rest,
+    left_open,
+    more,
+    plain,
+    rest_and_hold,
+    strands,
+    through,
+    until_collapse,
+)
 from studies.paper.impacts import Block, impacts
 from studies.paper.statistics import Effect, mean, paired, spread, unpaired
-from warpchain import InputError, Parameters, Status, SweepResult, preset
+from warpchain import InputError, Parameters, SweepResult, preset
 
 Array = NDArray[np.float64]
 Numbers = dict[str, Any]
@@ -22,19 +33,19 @@ Numbers = dict[str, Any]
 DIGITS: Final = 4
 """Significant digits that are kept."""
 
-SWEEPS: Final = ("paper_claims", "paper_joints", "paper_tolerance", "paper_shapes")
+WHOLE: Final[dict[str, tuple[str, Callable[[Mapping[str, Block]], Any]]]] = {
+    "paper_strands": ("strands", lambda blocks: strands(blocks["start"])),
+    "paper_through": ("through", lambda blocks: through(blocks["main"])),
+    "paper_open": ("left_open", left_open),
+    "paper_rest": ("rest_and_hold", lambda blocks: rest_and_hold(blocks["main"])),
+    "paper_more": ("more", more),
+}
+"""Sweeps that one function reduces: name → key of its numbers, and the function."""
+SWEEPS: Final = ("paper_claims", "paper_joints", "paper_tolerance", "paper_shapes", *WHOLE)
 """Sweeps that the page is made of."""
-
-CONTACT: Final = "bounces_before_self_contact"
-"""Column with the number of bounces before a loop first touches itself, −1 if it never does."""
-COLLAPSE: Final = "bounces_before_collapse"
-"""Column with the number of bounces before a loop collapses, −1 if it never does."""
 
 DEFAULTS: Final = {"clearance": 0.01, "phase": 0.0}
 """Scene of a walk that is not told otherwise: height of the release [m] and part of a loop period."""
-
-CELLS: Final = ("links", "frequency")
-"""Axes of the cells."""
 
 
 def reduced(result: SweepResult) -> Numbers:
@@ -57,20 +68,24 @@ def reduced(result: SweepResult) -> Numbers:
     for block in result.blocks.values():
         content.setdefault("cells", {name: block.axes[name].tolist() for name in CELLS})
         further = [name for name in block.axes if name not in CELLS]
-        if further:
+        if further and result.name in ("paper_claims", "paper_joints", "paper_tolerance"):
             name = further[0]
             content.setdefault("effects", {})[name] = effects(
                 at_rest(block), block, name, _reference(result, block, name)
             )
+    if result.name in WHOLE:
+        key, reduce = WHOLE[result.name]
+        content[key] = reduce(result.blocks)
     for key, name, reduce in (
         ("starts", "start", starts),
         ("friction", "floor_friction", friction),
     ):
-        if name in result.blocks:
+        if name in result.blocks and result.name == "paper_claims":
             content[key] = reduce(result.blocks[name])
-    if "link_length" in result.blocks and CONTACT in (block := result.blocks["link_length"]).columns:
+    if "link_length" in result.blocks:
+        block = result.blocks["link_length"]
         content["collapse"] = effects(
-            bounces_until_collapse(block), block, "link_length", _reference(result, block, "link_length")
+            until_collapse(block), block, "link_length", _reference(result, block, "link_length")
         )
     if "floor_friction" in result.blocks:
         block = result.blocks["floor_friction"]
@@ -89,20 +104,12 @@ def reduced(result: SweepResult) -> Numbers:
 
 def content_digest(sweep: Mapping[str, Any]) -> str:
     """SHA-256 of what a sweep varies and draws, whatever computes it and however many samples it has."""
-    content = dict(sweep)
+    kept = ("name", "preset", "sampler", "distributions", "grid")
+    content = {name: sweep[name] for name in ("seed", "same_samples_along")}
     content["blocks"] = [
-        {name: value for name, value in block.items() if name not in ("options", "samples")}
-        for block in sweep["blocks"]
+        {name: block.get(name) for name in kept} | {"start": block["scene"].get("start")} for block in sweep["blocks"]
     ]
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-
-
-def at_rest(block: Block, quantity: str = "dx") -> Array:
-    """A column with the cells in front and the samples behind, NaN for walks that did not come to rest."""
-    order = [block.dims.index(name) for name in CELLS]
-    others = [number for number in range(len(block.dims)) if number not in order]
-    values = np.where(block.columns["status"] == Status.AT_REST, block.columns[quantity], np.nan)
-    return np.transpose(values, order + others)
 
 
 def effects(table: Array, block: Block, name: str, reference: float | str) -> Numbers:
@@ -118,7 +125,7 @@ def effects(table: Array, block: Block, name: str, reference: float | str) -> Nu
     return {
         "reference": reference,
         "values": [
-            {"value": value, **_content(paired(table[:, :, number], before))}
+            {"value": value, **plain(paired(table[:, :, number], before))}
             for number, value in enumerate(values)
             if value != reference
         ],
@@ -137,17 +144,10 @@ def starts(block: Block) -> Numbers:
             "mean": mean(here).tolist(),
             "sd": (spread(here) * mean(here)).tolist(),
             "bounces": mean(at_rest(block, "bounces")[:, :, number]).tolist(),
-            "faster": _content(unpaired(here[:, 1:], here[:, :-1])),
-            "longer": _content(unpaired(here[1:], here[:-1])),
+            "faster": plain(unpaired(here[:, 1:], here[:, :-1])),
+            "longer": plain(unpaired(here[1:], here[:-1])),
         }
         content[start]["losses"] = {name: value[:, :, number].tolist() for name, value in losses.items()}
-        if CONTACT in block.columns:
-            content[start] |= self_contact(block, number)
-    if CONTACT in block.columns:
-        before = at_rest(block, CONTACT)
-        before = np.where(before < 0, np.nan, before)
-        ends = (before[:, :, values.index(start)] for start in ("ellipse", "rest"))
-        content["delay"] = _content(paired(*ends))
     return content
 
 
@@ -156,44 +156,6 @@ def shares_of_losses(block: Block) -> dict[str, Array]:
     lost = {name: at_rest(block, name) for name in block.columns if name.startswith("loss_")}
     total = np.sum(list(lost.values()), axis=0)
     return {name.removeprefix("loss_"): mean(each / total) for name, each in lost.items()}
-
-
-def self_contact(block: Block, start: int) -> Numbers:
-    """After how many bounces loops first touched themselves and collapsed, and what early contact does to Δx."""
-    contact, collapse, distance = (at_rest(block, name)[:, :, start] for name in (CONTACT, COLLAPSE, "dx"))
-    # Relative to the mean of the cell, so that walks of all frequencies of one number of links can be put together.
-    relative = distance / mean(distance)[..., np.newaxis]
-    by_links = []
-    for links in range(len(contact)):
-        there, ratio = contact[links][np.isfinite(contact[links])], relative[links]
-        early, late = (ratio[np.isfinite(ratio) & each] for each in (_early(contact[links]), ~_early(contact[links])))
-        by_links.append(
-            {
-                "contact": _histogram(there),
-                "collapse": _histogram(collapse[links][np.isfinite(collapse[links])]),
-                "early": len(early),
-                "late": len(late),
-                **({"early_over_late": _content(unpaired(early, late))} if min(len(early), len(late)) > 1 else {}),
-            }
-        )
-    return {"by_links": by_links}
-
-
-def _early(bounces: Array) -> NDArray[np.bool_]:
-    """Whether a loop touched itself before its third bounce."""
-    return (bounces >= 0) & (bounces <= 2)
-
-
-def _histogram(bounces: Array) -> list[int]:
-    """Numbers of walks with 0, 1, 2, 3 and more bounces before an event, and of those without the event."""
-    counts = [int((bounces == number).sum()) for number in range(4)]
-    return [*counts, int((bounces > 3).sum()), int((bounces < 0).sum())]
-
-
-def bounces_until_collapse(block: Block) -> Array:
-    """Number of bounces before the loop collapses, or all bounces of a loop that never does; see `at_rest`."""
-    collapse, every = at_rest(block, COLLAPSE), at_rest(block, "bounces")
-    return np.where(collapse < 0, every, collapse)
 
 
 def friction(block: Block) -> Numbers:
@@ -227,7 +189,7 @@ def tolerance(block: Block) -> Numbers:
         "median": float(np.median(single)),
         "nine_of_ten": float(np.quantile(single, 0.9)),
         "greatest": float(single.max()),
-        "means": _content(means),
+        "means": plain(means),
     }
 
 
@@ -266,19 +228,8 @@ def _reference(result: SweepResult, block: Block, name: str) -> float | str:
     return DEFAULTS[name]
 
 
-def _content(effect: Effect) -> Numbers:
-    """An effect as plain numbers."""
-    return {
-        "relative": effect.relative.tolist(),
-        "half_width": effect.half_width.tolist(),
-        "sign": effect.sign.tolist(),
-        "pairs": effect.pairs.tolist(),
-        "lost": effect.lost,
-    }
-
-
 def effect_of(content: Mapping[str, Any]) -> Effect:
-    """The effect that `_content` wrote, with its numbers rounded; null stands for NaN."""
+    """The effect that `further.plain` wrote, with its numbers rounded; null stands for NaN."""
     return Effect(
         relative=np.array(content["relative"], np.float64),
         half_width=np.array(content["half_width"], np.float64),

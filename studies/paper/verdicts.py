@@ -1,18 +1,50 @@
 """Rules by which numbers become verdicts."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
-FEW: Final = 0.1
-"""Share of comparisons that may contradict a claim: a test at 95 % errs in one of twenty."""
-MOST: Final = 0.5
-"""Share of comparisons that must show what a claim says."""
 
-UNSEEN: Final = 0.05
-"""Greatest relative effect that "no dependence" may mean: means of the paper's 12 walks, of which each scatters by 5 to
-10 %, differ by that much by chance."""
-LITTLE: Final = 0.1
-"""Greatest relative effect that "little effect" may mean."""
+@dataclass(frozen=True)
+class Bounds:
+    """What the rules allow.
+
+    Attributes:
+        few: share of comparisons that may contradict a claim: a test at 95 % errs in one of twenty.
+        most: share of comparisons that must show what a claim says.
+        unseen: greatest relative effect that "no dependence" may mean: means of the paper's 12 walks, of which each
+            scatters by 5 to 10 %, differ by that much by chance.
+        little: greatest relative effect that "little effect" may mean.
+        moderate: greatest standard deviation of a walk over the mean of its cell that "moderately" may mean.
+    """
+
+    few: float = 0.1
+    most: float = 0.5
+    unseen: float = 0.05
+    little: float = 0.1
+    moderate: float = 0.2
+
+
+USUAL: Final = Bounds()
+_bounds: ContextVar[Bounds] = ContextVar("bounds", default=USUAL)
+
+
+def bounds() -> Bounds:
+    """The bounds that hold now."""
+    return _bounds.get()
+
+
+@contextmanager
+def scaled(name: str, factor: float) -> Iterator[None]:
+    """Within it a bound is so many times as great."""
+    token = _bounds.set(replace(USUAL, **{name: factor * getattr(USUAL, name)}))
+    try:
+        yield
+    finally:
+        _bounds.reset(token)
 
 
 class Verdict(StrEnum):
@@ -28,9 +60,9 @@ def direction(with_claim: int, against: int, comparisons: int) -> Verdict:
     """A claim that something rises, or falls, from the significant comparisons with it and against it, and all."""
     if not comparisons:
         return Verdict.OPEN
-    if with_claim >= MOST * comparisons and against <= FEW * comparisons:
+    if with_claim >= bounds().most * comparisons and against <= bounds().few * comparisons:
         return Verdict.AGREES
-    in_part = with_claim > FEW * comparisons and with_claim >= against
+    in_part = with_claim > bounds().few * comparisons and with_claim >= against
     return Verdict.PART if in_part else Verdict.DIFFERS
 
 
@@ -43,9 +75,9 @@ def share(fulfilled: int, cases: int) -> Verdict:
     """A claim about every case: agrees if nearly all fulfil it, in part if at least half do."""
     if not cases:
         return Verdict.OPEN
-    if fulfilled >= (1 - FEW) * cases:
+    if fulfilled >= (1 - bounds().few) * cases:
         return Verdict.AGREES
-    return Verdict.PART if fulfilled >= MOST * cases else Verdict.DIFFERS
+    return Verdict.PART if fulfilled >= bounds().most * cases else Verdict.DIFFERS
 
 
 def together(verdicts: list[Verdict]) -> Verdict:

@@ -68,7 +68,7 @@ class Grid:
         return image
 
 
-def draw_maps(cells: Mapping[str, Array], path: Path) -> None:
+def draw_maps(cells: Mapping[str, Array], ends: Mapping[str, Array], path: Path) -> None:
     """Mean of Δx, its spread, bounces, and ways of ending with their shares; dots: share of walks that failed."""
     grid = Grid(cells)
     walks = np.maximum(cells["walks"], 1)
@@ -94,7 +94,7 @@ def draw_maps(cells: Mapping[str, Array], path: Path) -> None:
         else:
             grid.map(axes, values, f"{title}: too few walks")
         draw_failed(axes, np.nan_to_num(grid.table(failed)))
-    draw_endings(lower_right, grid, cells)
+    draw_endings(lower_right, Grid(ends), ends)
     draw_failed(lower_right, np.nan_to_num(grid.table(failed)), color="white", rim=INK)  # red is one of its colours
     save_figure(figure, path)
 

@@ -1,8 +1,8 @@
 """Ways in which walks end: where and when the loop was lost, from the columns of a sweep.
 
 Every walk that is at rest has one ending. Its loop collapses when it first encloses less than half of its area at the
-release; `bounces_before_collapse` says in which bounce, counted from 1. A chain that touched itself in an earlier
-bounce had folded there, and walked on.
+release; `bounces_before_collapse` says in which bounce, counted from 1. A loop whose strands met in an earlier bounce
+had folded there, and walked on. Strands are links 16 or more apart along the chain; creases of fewer do not count.
 """
 
 from collections.abc import Mapping
@@ -48,10 +48,10 @@ _MEANINGS: Final[dict[Ending, str]] = {
     Ending.IN_FLIGHT: "collapsed in flight",
     Ending.FIRST: "collapsed in its first bounce",
     Ending.SECOND: "collapsed in its second bounce",
-    Ending.LATER: "collapsed in a later bounce, untouched before it",
-    Ending.FOLDED_AT_FIRST: "touched itself by its first bounce, collapsed in the third or later",
-    Ending.FOLDED_AT_SECOND: "touched itself in its second bounce, collapsed in the third or later",
-    Ending.FOLDED_LATER: "touched itself in a later bounce than the second, collapsed in one after that",
+    Ending.LATER: "collapsed in a later bounce, its strands apart before it",
+    Ending.FOLDED_AT_FIRST: "strands met by its first bounce, it collapsed in the third or later",
+    Ending.FOLDED_AT_SECOND: "strands met in its second bounce, it collapsed in the third or later",
+    Ending.FOLDED_LATER: "strands met in a later bounce than the second, it collapsed in one after that",
 }
 
 
@@ -60,12 +60,12 @@ def endings(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.int8]:
 
     Args:
         columns: of a sweep by name, such as those of a block: `status`, `collapsed_at`, `bounces_before_collapse`,
-            `flight_before_collapse` and `bounces_before_self_contact`, of one shape.
+            `flight_before_collapse` and `bounces_before_strands_met`, of one shape.
 
     Returns:
         Codes of the shape of the columns.
     """
-    collapse, contact = columns["bounces_before_collapse"], columns["bounces_before_self_contact"]
+    collapse, contact = columns["bounces_before_collapse"], columns["bounces_before_strands_met"]
     touched = contact >= 0
     cases = (
         (columns["status"] != Status.AT_REST, Ending.UNKNOWN),

@@ -13,7 +13,7 @@ from studies.phase_diagram.endings import Ending
 
 Array = NDArray[Any]
 
-FEW: Final = 100
+FEW: Final = 20
 """Walks that each of two groups has in a cell in which they are compared, at least."""
 
 
@@ -92,7 +92,7 @@ def table_of_endings(cells: Mapping[str, Array]) -> str:
     text = f"{counts.sum():,.0f} walks of which this is known; a collapse in flight is known of {flights:,} of them."
     early = over_others(cells, [Ending.FOLDED_AT_FIRST, Ending.FOLDED_AT_SECOND], [Ending.FOLDED_LATER])
     touched = (
-        "Walks that touched themselves by their second bounce, over those that first did so in a later one: "
+        "Walks whose strands met by their second bounce, over those whose strands first met in a later one: "
         f"{text_of_ratios(early[inside]) or 'too few'} in the paper's range, "
         f"{text_of_ratios(early[~inside]) or 'too few'} elsewhere."
     )
@@ -123,7 +123,6 @@ def span(values: Array) -> str:
 TABLES: Final[Mapping[str, Callable[[Mapping[str, Array]], str]]] = {
     "cells": table_of_cells,
     "failures": table_of_failures,
-    "endings": table_of_endings,
     "scaling": laws.table,
 }
-"""Tables of the page by the names of their markers."""
+"""Tables of the page that are of the cells alone, by the names of their markers."""

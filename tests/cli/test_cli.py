@@ -25,7 +25,7 @@ command = command_line.command
 QUICK = "--links 32 --preset soft --method dp5 --start ellipse --frequency 5".split()
 """A walk of half a simulated second."""
 
-WALK_MODULE = import_module("warpchain.run.single_walk")
+WALK_MODULE = import_module("warpchain.walks.one_walk")
 
 
 @pytest.fixture(scope="module")

@@ -2,20 +2,26 @@
 
 import json
 import os
+import re
 import time
 from pathlib import Path
 
+import h5py
 import pytest
 import yaml
 
 from tests.run.test_sweep_run import TINY
 from tests.support import synthetic_sweep
 from tests.support.synthetic_sweep import SWEEP, synthetic_rows, write
-from warpchain.cli import sweep_commands
 from warpchain.cli.main import main
 from warpchain.engine.batch import Batch
+from warpchain.run import progress_bar, sweep_run
+from warpchain.run.estimate import estimate_sweep
 from warpchain.run.single_walk import walk
 from warpchain.store.folder import SweepFolder
+from warpchain.store.sweep_result import load
+from warpchain.sweeps.plan import load_sweep
+from warpchain.walks.rows import row_type
 
 
 def run(*arguments: str) -> None:
@@ -28,15 +34,45 @@ def run(*arguments: str) -> None:
 def test_without_a_terminal_lines_of_progress_are_printed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Every so often a plain line says how many walks are done, how fast, and what is left; a short sweep has none."""
+    """Every so often a plain line says how many walks are over, how fast, and what is left; a short sweep has none."""
     (tmp_path / "tiny.yaml").write_text(yaml.safe_dump(TINY, sort_keys=False))
-    for name, every in (("short", sweep_commands.LOG_EVERY), ("long", 0.0)):
-        monkeypatch.setattr(sweep_commands, "LOG_EVERY", every)
+    for name, every in (("short", progress_bar.LINE_EVERY), ("long", 0.0)):
+        monkeypatch.setattr(progress_bar, "LINE_EVERY", every)
         with pytest.raises(SystemExit):
             main(["sweep", str(tmp_path / "tiny.yaml"), "-o", str(tmp_path / name), "--workers", "1"])
         lines = [line for line in capsys.readouterr().err.splitlines() if " of 80 walks" in line]
         assert bool(lines) == (every == 0.0)
     assert lines[-1].startswith("80 of 80 walks   ") and " a second   0 s left   80 time_limit" in lines[-1]
+
+
+def test_walks_are_counted_before_their_shard_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """While the only shard is under way, walks that are over count."""
+    monkeypatch.setattr(sweep_run, "POLL", 0.01)
+    monkeypatch.setattr(sweep_run, "SHARDS", 1)
+    seen: list[int] = []
+    given = TINY | {"grid": {"links": [30]}, "samples": 16}
+    sweep_run.sweep(given, tmp_path / "one", workers=1, on_progress=lambda progress: seen.append(progress.done))
+    assert len(list((tmp_path / "one/shards").iterdir())) == 1
+    assert seen == sorted(seen) and seen[-1] == 16 and any(0 < done < 16 for done in seen)
+
+
+def test_an_estimate_says_time_and_size(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A few walks are run, nothing is written; the size is that of what the sweep then writes, but for its headers."""
+    recorded = TINY | {"samples": 40, "record": {"series": {"samples": [0]}}}
+    (tmp_path / "tiny.yaml").write_text(yaml.safe_dump(recorded, sort_keys=False))
+    before = set(tmp_path.iterdir())
+    run("sweep", str(tmp_path / "tiny.yaml"), "--estimate", "--workers", "1")
+    assert re.fullmatch(
+        r"160 walks: about \S.* with 1 at once .*MB on disk \(16 walks tried\)\n", capsys.readouterr().out
+    )
+    assert set(tmp_path.iterdir()) == before
+    found = estimate_sweep(recorded, workers=1)
+    sweep_run.sweep(recorded, tmp_path / "all", workers=1)
+    with h5py.File(tmp_path / "all/shards/0-000000-motion.h5") as file:
+        arrays: list[int] = []
+        file["0"].visititems(lambda name, item: arrays.append(getattr(item, "nbytes", 0)))
+    rows = load(tmp_path / "all").walk_count * row_type(load_sweep(recorded).blocks[0].drawn).itemsize
+    assert found.bytes == pytest.approx(rows + 4 * sum(arrays), rel=0.05)
 
 
 def test_info_tells_rate_and_time_left_of_a_running_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

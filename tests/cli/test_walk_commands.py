@@ -127,7 +127,7 @@ def test_a_method_beside_like_brings_its_settings(
         seen.append(setup)
         raise InputError("enough")
 
-    monkeypatch.setattr("warpchain.run.single_walk.run_walk", run_walk)
+    monkeypatch.setattr("warpchain.walks.one_walk.run_walk", run_walk)
     assert command("walk", "--like", str(saved), *line.split()).err == "error: enough\n"
     assert seen[0].options == Options.model_validate(expected)
 

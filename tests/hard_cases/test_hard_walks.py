@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from tests.hard_cases.starts import METHODS, SOFT, UNDISSIPATIVE, every_method, ledger_error, quick_with
+from tests.support.setups import setup_walk
 from warpchain import Status, WalkResult
 from warpchain.inputs.methods import METHODS_BY_NEED
-from warpchain.run.single_walk import run_walk, setup_walk
+from warpchain.walks.one_walk import run_walk
 
 every_method_walks = quick_with("rkf78", "dp5", "hybrid")
 """Walks need a kernel more than short runs: no other quick test uses those of bs32 and os32."""

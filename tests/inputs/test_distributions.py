@@ -72,21 +72,6 @@ def test_draw_order() -> None:
     ]
 
 
-def test_redraw_takes_the_next_number_of_the_stream() -> None:
-    """A draw out of bounds is followed by the next one of the same stream."""
-    base = preset("paper").with_values({"floor_friction": 0.0})
-    rejections = 0
-    for sample in range(20):
-        drawn = sample_parameters(base, random_generator(5, 0, sample))
-        numbers = iter(random_generator(5, 0, sample).standard_normal(100))
-        for _ in range(9):
-            next(numbers)
-        while (value := 0.02 * float(next(numbers))) < 0:
-            rejections += 1
-        assert drawn.floor_friction == value
-    assert rejections > 5
-
-
 def test_hopeless_draw_is_an_error() -> None:
     """A mean far outside the bounds ends in a clear error after a limited number of draws."""
     base = Parameters.model_construct(**{**preset("paper").model_dump(), "inner_mass": -1.0})

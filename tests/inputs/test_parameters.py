@@ -1,9 +1,7 @@
-"""Values of Table 1, presets, warnings of units, and what a chain on its sprocket needs."""
+"""Values of Table 1, presets, slips of units, and what a chain on its sprocket needs."""
 
 import math
-import warnings
 from collections.abc import Mapping
-from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
@@ -11,12 +9,10 @@ from pydantic import ValidationError
 import warpchain
 from tests.support.table_1 import TABLE_1
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import PRESETS, Parameters, preset, warn_of_units
+from warpchain.inputs.parameters import PRESETS, Parameters, preset
 from warpchain.inputs.scene import Scene, check_scene, contact_radius, fewest_links, joint_radius
 from warpchain.inputs.setup import resolve
-from warpchain.inputs.validation import InputError, InputWarning
-
-QUICK = {"start": "ellipse", "preset": "soft", "links": 32, "method": "dp5", "walk_limit": 1e-6}
+from warpchain.inputs.validation import InputError
 
 
 @pytest.mark.parametrize("name", TABLE_1)
@@ -33,7 +29,7 @@ def test_table_complete() -> None:
     """The table holds the paper's quantities and what it leaves out; every field says what it is."""
     quantities = Parameters.quantities()
     assert set(quantities) == {*TABLE_1, "circle_radius", "half_width"} == set(Parameters.model_fields)
-    assert [name for name, q in quantities.items() if q.source == "assumed"] == ["circle_radius", "half_width"]
+    assert [name for name, q in quantities.items() if q.source == "chosen here"] == ["circle_radius", "half_width"]
     for model in (Parameters, Scene, Options):
         for field in model.model_fields.values():
             assert field.description
@@ -55,49 +51,15 @@ def test_presets() -> None:
 @pytest.mark.parametrize(
     ("values", "line"),
     [
-        ({"ell": 12.68, "r": 5e-3}, "link_length: 12.68 m is 1000 times Table 1's 0.01268 m; did you mean 1.268e-2?"),
-        ({"r": 4.2e-6}, "circle_radius: 4.2e-6 m is 1/1000 of the preset's 0.0042 m; did you mean 4.2e-3?"),
-        ({"k": 1e12}, "joint_stiffness: 1e12 N/m is 1000 times Table 1's 1e9 N/m; did you mean 1e9?"),
+        ({"ell": 12.68, "r": 5e-3}, "link_length: 12.68 m is 1000 times Table 1's; give 0.01268"),
+        ({"m_inner": 3.7}, "inner_mass: 3.7 kg is 1000 times Table 1's; give 0.0037"),
     ],
 )
-def test_a_value_in_another_unit_draws_a_warning(values: Mapping[str, float], line: str) -> None:
-    """A value far from Table 1's is taken, with one warning that names its unit and points at the caller."""
-    with pytest.warns(InputWarning) as caught:
-        warpchain.walk(**QUICK, **values)
-    assert [(str(each.message), each.filename) for each in caught] == [(f"parameters.{line}", __file__)]
-
-
-def test_other_values_draw_none() -> None:
-    """Values near those of a preset, zeros and pure numbers; the least number of a computer is far off."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        for name, value in (
-            ("joint_stiffness", 1e7),
-            ("link_length", 0.36),
-            ("gravity", 0.0),
-            ("chain_friction", 1e-6),
-        ):
-            warn_of_units([(name, name, value)])
-    with pytest.warns(InputWarning, match="did you mean"):
-        warn_of_units([("parameters.gravity", "gravity", 5e-324)])
-
-
-@pytest.mark.parametrize(
-    ("change", "where"),
-    [
-        ({"parameters": {"ell": 12.68}}, "parameters.link_length"),
-        ({"grid": {"link_length": [0.013, 12.68, 13.0]}}, "grid.link_length[1]"),
-        ({"distributions": {"link_length": {"uniform": [11, 12.68]}}}, "distributions.link_length.uniform[1]"),
-    ],
-)
-def test_a_sweep_warns_once(tmp_path: Path, change: Mapping[str, object], where: str) -> None:
-    """Of many walks with a value in another unit one warning comes, with the path of the first such value."""
-    content = {"version": 1, "name": "far", "seed": 1, "preset": "soft", "samples": 2}
-    content |= {"scene": {"links": 32, "start": "ellipse", "walk_limit": 1e-6}, "options": {"method": "dp5"}}
-    with pytest.warns(InputWarning) as caught:
-        warpchain.sweep(content | change, tmp_path / "far", workers=1)
-    text = "12.68 m is 1000 times Table 1's 0.01268 m; did you mean 1.268e-2?"
-    assert [(str(each.message), each.filename) for each in caught] == [(f"sweep.{where}: {text}", __file__)]
+def test_mm_and_g_are_refused(values: Mapping[str, float], line: str) -> None:
+    """A length or a mass of Table 1 in thousandths is a slip; nothing is run."""
+    with pytest.raises(InputError) as caught:
+        warpchain.walk(**values)
+    assert str(caught.value) == f"parameters.{line}"
 
 
 def test_contact_and_pitch_radius() -> None:

@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 
 import warpchain
+from tests.support.setups import setup_walk
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters, preset
 from warpchain.inputs.scene import Scene
 from warpchain.inputs.sections import NAME_OF_SYMBOL, SECTION_OF, SYMBOL_OF
 from warpchain.inputs.setup import Setup, read_setup, resolve
 from warpchain.inputs.validation import InputError
-from warpchain.run.single_walk import setup_walk
 
 SYMBOLS = {
     "links": "n", "frequency": "nu", "link_length": "ell", "sprocket_radius": "R", "inner_mass": "m_inner",

@@ -14,8 +14,8 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.validation import InputError
 from warpchain.loop.before_release import FIELDS, BeforeRelease
-from warpchain.run.single_walk import run_walk
 from warpchain.status import Status
+from warpchain.walks.one_walk import run_walk
 from warpchain.walks.walk_result import WalkResult
 
 BRIEF = {

@@ -6,7 +6,9 @@ Conventions of all functions:
   of mass, and `velocity` (n, 3): their time derivatives (m/s, rad/s). Even indices are inner links.
 - u_i = (cos θ_i, sin θ_i) points from the left to the right end of link i, t_i = ẑ × u_i, a = ℓ/2. Joint i joins
   the right end of link i to the left end of link i+1 (mod n).
-- `parameters` gives the values by the names of `warpchain.inputs.parameters.Parameters`. SI units, y upwards.
+- `parameters` gives the values by the names of `warpchain.inputs.parameters.Parameters`. SI units, y upwards. If it
+  has `masses` and `inertias`, (n,), these are the links' own, whose number may be odd; the friction of joint i is then
+  element i of its `viscous_friction` and `coulomb_friction`, see `tests.support.unlike_links`.
 
 Source: "A walking roller chain", section 2.1.
 """
@@ -24,13 +26,15 @@ Array = NDArray[np.float64]
 
 
 def link_masses(n: int, parameters: Parameters) -> Array:
-    """Mass of each link, (n,), kg. Raises ValueError unless n is even and at least 4."""
-    return _alternating(n, parameters.inner_mass, parameters.outer_mass)
+    """Mass of each link, (n,), kg. Raises ValueError for two kinds of links unless n is even and at least 4."""
+    own: Array | None = getattr(parameters, "masses", None)
+    return own if own is not None else _alternating(n, parameters.inner_mass, parameters.outer_mass)
 
 
 def link_inertias(n: int, parameters: Parameters) -> Array:
     """Moment of inertia of each link about its centre, (n,), kg m². Raises ValueError as `link_masses`."""
-    return _alternating(n, parameters.inner_inertia, parameters.outer_inertia)
+    own: Array | None = getattr(parameters, "inertias", None)
+    return own if own is not None else _alternating(n, parameters.inner_inertia, parameters.outer_inertia)
 
 
 def link_ends(position: Array, parameters: Parameters) -> tuple[Array, Array]:
@@ -78,8 +82,8 @@ def acceleration(position: Array, velocity: Array, parameters: Parameters, *, gr
     spin = velocity[:, 2]
     lever = parameters.link_length / 2 * turned(direction(position[:, 2]))
     torque = np.sum(lever * (here + before), axis=1)
-    torque -= friction_torque(spin - np.roll(spin, 1), parameters)
-    torque -= friction_torque(spin - np.roll(spin, -1), parameters)
+    friction = friction_torque(spin - np.roll(spin, -1), parameters)
+    torque += np.roll(friction, 1) - friction
     result = np.empty((n, 3), dtype=torque.dtype)  # complex steps differentiate these equations
     result[:, :2] = (here - before) / link_masses(n, parameters)[:, None]
     result[:, 2] = torque / link_inertias(n, parameters)

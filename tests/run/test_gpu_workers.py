@@ -15,9 +15,9 @@ from tests.support.killed_processes import kill_often
 from warpchain.cli.main import main
 from warpchain.inputs.validation import InputError
 from warpchain.run.gpu_workers import gpu_workers, visible_gpus
-from warpchain.run.lost_workers import LostWorkersError
 from warpchain.run.progress_bar import SweepProgress
 from warpchain.run.sweep_run import sweep
+from warpchain.run.workers import LostWorkersError
 
 GPU_OF_WORKER = "__import__('time').sleep(0.5) or __import__('os').environ['CUDA_VISIBLE_DEVICES']"
 """Takes a while, so that other workers have to take the next ones; text, for workers cannot import tests."""
@@ -97,18 +97,6 @@ def test_a_missing_gpu_leaves_no_folder(
     assert caught.value.code == 2
     assert said == "error: options.device: there is no cuda on this machine; give one of cpu\n"
     assert not (tmp_path / "sweep").exists()
-
-
-def test_more_gpus_than_there_are_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """The line says how many there are; no process is started."""
-    monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
-    monkeypatch.setattr("warpchain.engine.devices.gpu_count", lambda: 2)
-    with pytest.raises(SystemExit) as caught:
-        main(["sweep", "quickstart", "-o", str(tmp_path / "sweep"), "--gpus", "99999"])
-    assert caught.value.code == 2
-    assert capfd.readouterr().err == "error: --gpus: 99999 wanted, but this machine has 2; give at most 2\n"
 
 
 def test_a_worker_that_is_killed_ends_the_sweep_in_one_line(tmp_path: Path) -> None:

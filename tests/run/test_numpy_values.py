@@ -1,13 +1,11 @@
 """NumPy's numbers, arrays, ranges and tuples mean what Python's numbers and lists mean, to the bit."""
 
 import numpy as np
-import pytest
 
 import warpchain
 from tests.oracle_model.circular_loop import circular_loop
+from tests.support.setups import setup_walk
 from warpchain.inputs.sections import SECTION_OF
-from warpchain.inputs.validation import InputError, plain
-from warpchain.run.single_walk import setup_walk
 from warpchain.sweeps.plan import load_sweep
 
 PLAIN = {"version": 1, "name": "grid", "seed": 3, "preset": "soft", "samples": 2}
@@ -20,7 +18,7 @@ def of_numpy(value):
 
 def test_every_setting_takes_a_numpy_value():
     """Each field of parameters, scene and options has the same value, and the same type, either way."""
-    setup = setup_walk("soft", {"load_factor": 2.0, "steady_time": 0.5, "settle_time": 0.2}, 5)
+    setup = setup_walk("soft", {"load_factor": 2.0, "steady_time": 0.5, "settle_time": 0.2, "walk_until": 1.0}, 5)
     given = {**setup.parameters.model_dump(), **setup.scene.model_dump(), **setup.options.model_dump()}
     assert given.keys() == SECTION_OF.keys() and None not in given.values()
     again = setup_walk("soft", {name: of_numpy(value) for name, value in given.items()}, None)
@@ -28,26 +26,6 @@ def test_every_setting_takes_a_numpy_value():
     for model in (again.parameters, again.scene, again.options):
         for name, value in model.model_dump().items():
             assert type(value) is type(given[name]), name
-
-
-@pytest.mark.parametrize(
-    ("of_numpy", "of_python"),
-    [
-        (np.float32(0.1), float(np.float32(0.1))),
-        (np.longdouble(0.5), 0.5),
-        (np.array(3), 3),
-        (range(4, 10, 2), [4, 6, 8]),
-        ((1, np.uint8(2)), [1, 2]),
-        (np.array([[True]]), [[True]]),
-        ({"a": [np.float64(1.0)]}, {"a": [1.0]}),
-        (None, None),
-        ("12", "12"),
-    ],
-    ids=repr,
-)
-def test_plain_values(of_numpy, of_python):
-    """A value becomes that of Python; its type, too."""
-    assert repr(plain(of_numpy)) == repr(of_python)
 
 
 def test_a_sweep_of_arrays_is_that_of_lists():
@@ -104,16 +82,3 @@ def test_a_walk_and_a_trajectory_of_numpy_numbers():
         for real, truth, times in ((float, bool, [0.0, 0.01]), (np.float64, np.bool_, (np.float64(0.0), 0.01)))
     ]
     assert np.array_equal(runs[0].position, runs[1].position)
-
-
-def test_what_is_no_number_is_still_refused():
-    """An array is no number, whole numbers have no fractions, and messages show Python's numbers."""
-    for settings, message in (
-        ({"links": np.array([30])}, r"scene\.links: .*; given \[30\]"),
-        ({"links": np.float64(30.0)}, r"scene\.links: .*; given 30.0"),
-        ({"frequency": np.float64("nan")}, r"scene\.frequency: .*; given nan"),
-        ({"seed": np.float64(1.0)}, r"seed: 1.0 is no whole number .*"),
-        ({"frame_interval": np.bool_(True)}, r"frame_interval: True is no positive time .*"),
-    ):
-        with pytest.raises(InputError, match=message):
-            warpchain.walk(**settings)

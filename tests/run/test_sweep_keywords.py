@@ -1,11 +1,13 @@
 """A sweep by keywords is that of a file; everything that is wrong is told at once; a bar where somebody looks."""
 
+import inspect
 import io
 import re
 import sys
 import types
 
 import numpy as np
+import pandas
 import pytest
 
 import warpchain
@@ -69,6 +71,62 @@ def test_keywords_say_what_a_file_says(tmp_path):
     assert (named.name, named.seed, named.blocks[0].preset) == ("other", 3, "soft")
 
 
+def test_settings_of_a_walk_are_those_of_a_sweep(tmp_path):
+    """A list, an array, a range or a column of a table is an axis; other values hold for all walks."""
+    words = {"n": pandas.Series([30, 40]), "frequency": {"from": 5, "to": 15, "step": 5}}
+    others = {key: KEYWORDS[key] for key in ("samples", "sampler", "distributions", "record", "same_samples_along")}
+    settings = {**words, **SHORT, "tolerance": np.float64(1e-3), "g": 9.8}
+    assert sweep_of_keywords(others | settings, "speeds").digest() == sweep_of_keywords(KEYWORDS, "speeds").digest()
+    presets = sweep_of_keywords({"samples": 1, "preset": ["soft", "paper"]}, "presets")
+    assert presets.blocks[0].axes == {"preset": ("soft", "paper")}
+    assert refused(samples=1, links=[60], grid={"links": [60]}, out=tmp_path) == [
+        "links: given twice, also in grid; leave one out"
+    ]
+    assert refused(samples=1, linsk=60, out=tmp_path) == ["'linsk': unknown name; did you mean scene.links?"]
+
+
+def test_notebooks_complete_the_names():
+    """The signatures of walk, sweep and simulate name every field that they take."""
+    for function, name, missing in (
+        (warpchain.walk, "floor_friction", "soften"),
+        (warpchain.sweep, "walk_until", "soften"),
+        (warpchain.simulate, "skin", "links"),
+    ):
+        names = inspect.signature(function).parameters
+        assert name in names and missing not in names
+
+
+def test_parameter_sets(tmp_path):
+    """A table of sets is one axis beside the grid; its columns go with the results, and with what was drawn."""
+    table = pandas.DataFrame({"mu_fc": [0.1, 0.3, 0.2], "phase": [0.0, 0.5, 0.25]})
+    result = warpchain.sweep(points=table, links=[30, 32], samples=2, preset="soft", **SHORT, out=tmp_path / "sets")
+    assert result.dims == ("point", "links", "sample") and result.shape == (3, 2, 2)
+    design = result.design()
+    assert list(design.quantity.values)[:2] == ["floor_friction", "phase"]
+    assert (design.sel(quantity="phase").values == table["phase"].values[:, None, None]).all()
+    assert (design.sel(quantity="inner_mass").values == result.inner_mass_drawn).all()
+    data = result.to_xarray()
+    assert data.floor_friction.dims == ("point",) and (data.floor_friction == table["mu_fc"]).all()
+    for place, index in np.ndenumerate(result.index):
+        setup = result.origin.sweeps[0].planned(int(index)).setup
+        assert setup.parameters.floor_friction == table["mu_fc"][place[0]]
+    lines = refused(points={"mu_fc": [0.1, 0.2], "R": [0.05]}, mu_fc=0.2, samples=1, out=tmp_path)
+    assert lines == ["sweep.points.floor_friction: also given in parameters; leave one out"]
+    lines = refused(points={"mu_fc": [0.1, 0.2], "R": [0.05]}, samples=1, out=tmp_path)
+    assert lines[0].startswith("sweep.points.sprocket_radius: 1 values, but floor_friction has 2;")
+
+
+def test_a_planned_end_is_no_failure(tmp_path):
+    """A walk that goes on when its time is over is finished, without Δx, and in the means of what it has."""
+    result = warpchain.sweep(
+        links=30, start="ellipse", walk_until=0.02, preset="soft", samples=2, out=tmp_path / "until", progress=False
+    )
+    assert result.summary() == {"at_rest": 0, "finished": 2, "missing": 0} and np.isnan(result.dx).all()
+    times = result.statistics("walk_time")
+    assert (times.mean, times.count, times.failed) == (pytest.approx(0.02), 2, 0)
+    assert result.statistics("dx").absent == 2
+
+
 def test_a_sweep_runs_from_keywords(tmp_path, capfd):
     """It goes on where it was, the preset may be an axis, and nothing is printed without a terminal."""
     keywords = {"grid": {"preset": ["soft"], "links": range(30, 34, 2)}, "samples": 1, "scene": SHORT}
@@ -115,7 +173,8 @@ def test_all_errors_are_told_at_once(tmp_path):
         ({}, "sweep.samples: missing"),
         ({"samples": 1, "grid": {"links": [28]}}, "sweep.grid.links[0]: 28 links of 0.01268 m do not reach round"),
         ({"samples": 1, "same_samples_along": ["links"]}, "sweep.same_samples_along: 'links' is no axis"),
-        ({"samples": 1, "source": {"version": 1}}, "samples: given together with a source"),
+        ({"preset": "soft", "links": 60, "source": {"version": 1}}, "preset, links: given together with a source"),
+        ({"samples": 1, "part": "3/2"}, "part: '3/2' is no part; give k/N"),
         ({"samples": 1, "grid": {"device": ["cpu", "cuda"]}, "device": "cpu"}, "sweep.grid: method is "),
     ],
     ids=str,
@@ -135,7 +194,7 @@ def test_a_terminal_shows_a_bar(tmp_path, monkeypatch):
         assert screen.getvalue() == ""
     warpchain.sweep(**keywords, out=tmp_path / "shown")
     text = re.sub(r"\x1b\[[\d?;]*\w", "", screen.getvalue())
-    assert "1/1 walks" in text and "1 time_limit" in text
+    assert "1 of 1 walks" in text and "1 time_limit" in text
 
 
 def test_a_notebook_shows_a_bar(tmp_path, monkeypatch):
@@ -154,6 +213,6 @@ def test_a_notebook_shows_a_bar(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "IPython", types.SimpleNamespace(get_ipython=lambda: kernel))
     monkeypatch.setitem(sys.modules, "IPython.display", types.SimpleNamespace(display=display))
     warpchain.sweep(grid={"links": [30]}, samples=1, scene=SHORT, preset="soft", out=tmp_path / "shown")
-    assert shown[0]["text/plain"] == "0 of 1 walks  compiling kernels"
-    assert shown[-1]["text/plain"] == "1 of 1 walks  1 time_limit"
+    assert shown[0]["text/plain"].startswith("compiling kernels")
+    assert shown[-1]["text/plain"].startswith("1 of 1 walks") and shown[-1]["text/plain"].endswith("1 time_limit")
     assert '<progress value="1" max="1">' in shown[-1]["text/html"]

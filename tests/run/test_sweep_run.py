@@ -16,9 +16,9 @@ import pytest
 import yaml
 
 import warpchain
+from tests.support.setups import setup_walk
 from warpchain.cli.main import main
 from warpchain.inputs.setup import Setup
-from warpchain.run.single_walk import setup_walk
 from warpchain.run.sweep_run import run_shards, sweep
 from warpchain.status import Status
 from warpchain.walks.scheduler import run_setups

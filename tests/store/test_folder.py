@@ -21,7 +21,7 @@ import yaml
 
 from tests.support import synthetic_sweep
 from tests.support.synthetic_sweep import LONG_SWEEP, SHARD_SIZE, SWEEP, content, run, synthetic_rows, write
-from warpchain.inputs.validation import DamagedFileError, InputError, InputWarning
+from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.store import folder
 from warpchain.store.folder import SweepFolder, read_rows
 from warpchain.store.manifest import Manifest, read_manifest
@@ -76,7 +76,8 @@ def test_a_sweep_is_written_and_read(tmp_path: Path) -> None:
     """All rows come back to the bit; nothing is missing, and nothing else is in the folder."""
     with open_folder(tmp_path / "new" / "folder") as opened:
         folder = opened.directory
-        assert [shard.walks.tolist() for shard in opened.missing()] == [[*range(i, i + 20)] for i in range(0, 160, 20)]
+        walks = np.concatenate([shard.walks for shard in opened.missing()])
+        assert walks.tolist() == SWEEP.indices.tolist() and {len(shard) for shard in opened.missing()} == {20}
         assert len(read_rows(folder, opened.manifest)) == 0
         for shard in reversed(opened.missing()):
             write(opened, shard, synthetic_rows(SWEEP, shard))
@@ -182,18 +183,6 @@ def test_a_second_process_is_refused(tmp_path: Path) -> None:
             os.kill(worker, signal.SIGKILL)
 
 
-def test_a_second_store_of_one_process_is_refused(tmp_path: Path) -> None:
-    """The lock counts within a process, too; closing twice does no harm, and an error lets go of the lock."""
-    first = open_folder(tmp_path)
-    with refused(InputError, tmp_path, "in use by process"):
-        open_folder(tmp_path)
-    first.close()
-    first.close()
-    with refused(InputError, tmp_path, "another sweep"):
-        open_folder(tmp_path, CHANGED)
-    open_folder(tmp_path).close()
-
-
 def test_workers_may_write_the_same_shard(tmp_path: Path) -> None:
     """Processes, and threads, that write one shard at the same time leave it whole, with the same bytes."""
     assert play("race", tmp_path / "race") == [0, 0, 0, 0]
@@ -210,7 +199,7 @@ def test_workers_may_write_the_same_shard(tmp_path: Path) -> None:
 def test_a_changed_sweep_is_refused(tmp_path: Path) -> None:
     """Another sweep is refused in a folder unless it may start anew; another name of the same sweep is not."""
     run(tmp_path)
-    with refused(InputError, tmp_path, f"{tmp_path.name}: holds another sweep (synthetic)", "--fresh"):
+    with refused(InputError, tmp_path, f"{tmp_path.name}: holds another sweep (synthetic)", "start anew with fresh"):
         open_folder(tmp_path, CHANGED)
     open_folder(tmp_path, replace(SWEEP, name="renamed")).close()
     with open_folder(tmp_path, CHANGED, fresh=True) as opened:
@@ -258,28 +247,11 @@ def test_a_shard_of_another_sweep_is_refused(tmp_path: Path) -> None:
         open_folder(tmp_path / "one").close()
 
 
-@pytest.mark.parametrize("part", [0.0, 0.1, 0.999])
-def test_a_truncated_shard_is_computed_again(tmp_path: Path, part: float) -> None:
-    """A shard cut short is refused to a reader; a run names it, and computes its walks and no others again."""
-    run(tmp_path)
-    before, path = content(tmp_path), tmp_path / "shards" / FIRST
-    os.truncate(path, int(part * path.stat().st_size))
-    with refused(DamagedFileError, tmp_path, f"{path}: damaged or cut short", "delete it"):
-        read_rows(tmp_path, read_manifest(tmp_path))
-    with pytest.warns(InputWarning, match=rf"^{path}: damaged or cut short; its walks are computed again$"):
-        opened = open_folder(tmp_path)
-    with opened:
-        (shard,) = opened.missing()
-        write(opened, shard, synthetic_rows(SWEEP, shard))
-    assert content(tmp_path) == before
-    assert f"{path}: damaged or cut short" in (tmp_path / "log.txt").read_text()
-
-
 def test_a_folder_of_an_older_version_names_it(tmp_path: Path) -> None:
     """Refused in one line, with the version that reads it."""
     run(tmp_path)
     path = tmp_path / "sweep.json"
-    path.write_text(path.read_text().replace('"format_version": 7', '"format_version": 5'))
+    path.write_text(re.sub('"format_version": [0-9]+', '"format_version": 5', path.read_text()))
     with refused(
         InputError, tmp_path, f"{path}: format version 5 of warpchain 0.1, which reads it; run the sweep again"
     ):

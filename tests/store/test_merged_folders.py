@@ -1,5 +1,6 @@
 """One file of several folders: samples of sweeps with different seeds one behind the other."""
 
+import itertools
 import json
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import yaml
 
 from tests.run.test_sweep_run import BRIEF, TINY
 from tests.support.made_sweeps import make_sweep
+from tests.support.made_walks import assert_same
 from tests.support.sweep_content import blocks, content
 from warpchain.cli.main import main
 from warpchain.inputs.validation import InputError
@@ -55,7 +57,7 @@ def test_samples_of_several_folders_are_put_together(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (content(samples=5), "has seed 7, as "),
+        (content(samples=5), "has walks that a has, of seed 7"),
         (content(seed=8, grid={"links": [60, 90], "frequency": [5, 12]}), "is not the sweep of"),
         (content(seed=8, options={"tolerance": 1e-5}), "is not the sweep of"),
         (blocks({"grid": {"links": [60, 90]}}, {"grid": {"frequency": [5, 10]}}, seed=8), "is not the sweep of"),
@@ -90,3 +92,28 @@ def test_a_folder_given_twice_is_refused(tmp_path: Path, monkeypatch: pytest.Mon
         with pytest.raises(InputError, match=f"^{again}: given twice; give each folder once$"):
             merge_folders([folder, again], "both.h5")
     assert not Path("both.h5").exists()
+
+
+def test_parts_of_one_grid_are_the_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run in parts by the command, of one file with other seed and samples, and merged, a sweep is as if run whole."""
+    monkeypatch.chdir(tmp_path)
+    given = TINY | {"record": {"series": {"samples": [0, 7]}}}
+    Path("tiny.yaml").write_text(yaml.safe_dump(given, sort_keys=False), encoding="utf-8")
+    numbers = ["--seed", "11", "--samples", "9"]
+    names = [f"part-{number}" for number in (1, 2, 3)]
+    for number, name in enumerate(names, 1):
+        with pytest.raises(SystemExit) as done:
+            main(["sweep", "tiny.yaml", "-o", name, "--part", f"{number}/3", "--workers", "1", *numbers])
+        assert done.value.code == 1  # all walks end at their time limit
+    whole = sweep("tiny.yaml", "whole", seed=11, samples=9, workers=1, progress=False)
+    assert [load(name).summary()["missing"] for name in names] == [24, 24, 24]
+    assert merge(*map(Path, names), Path("all.h5")) in (None, 0)
+    both = load("all.h5")
+    for name, column in whole.columns.items():
+        assert both.columns[name].tobytes() == column.tobytes(), name
+    for links, frequency, sample in itertools.product((30, 44), (5, 15), (0, 7)):
+        at = {"links": links, "frequency": frequency, "sample": sample}
+        assert_same(both.series(**at), whole.series(**at))
+    assert merge(Path("part-1"), Path("all.h5"), Path("twice.h5")) == 2
+    with pytest.raises(InputError, match=r"holds part 1/3 of its sweep, not 2/3"):
+        sweep("tiny.yaml", "part-1", seed=11, samples=9, part="2/3")

@@ -58,7 +58,7 @@ def test_null_is_nan_in_data_sets_and_a_name_in_figures(tmp_path: Path, command:
             np.testing.assert_array_equal(data.load_factor, [np.nan, 1.0])
             np.testing.assert_array_equal(data.dx.sel(load_factor=np.nan), result.dx[:, 0])
     np.testing.assert_array_equal(result.to_pandas().load_factor, np.tile([np.nan, np.nan, 1.0, 1.0], 2))
-    with pytest.raises(InputError, match=r"^the motion of walk 1 is not there"):
+    with pytest.raises(InputError, match=r"^the motion of walk 4 is not there"):
         result.series(links=30, load_factor=None, sample=1)
     assert [text.get_text() for text in result.plot().legends[0].get_texts()][:2] == ["null", "1"]
     assert all(picture.figure for picture in figures(result))

@@ -155,7 +155,7 @@ def test_the_page_is_made_of_the_committed_numbers(tmp_path: Path) -> None:
     page = (run.FOLDER / run.PAGE).read_text(encoding="utf-8")
     assert (tmp_path / run.PAGE).read_text(encoding="utf-8") == page, "run python -m studies.paper.run"
     drawn = {path.stem for path in (tmp_path / "figures").iterdir()}
-    assert drawn == {"distances", "effects", "friction", "self_contacts"}
+    assert drawn == {"distances", "effects", "friction", "strands"}
     with pytest.raises((InputError, OSError)):
         run.make([tmp_path], tmp_path)
 

@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.support.setups import setup_walk
 from warpchain.engine.batch import Batch
+from warpchain.inputs.link_values import LinkValues
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import contact_radius, loop_speed
 from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
-from warpchain.run.single_walk import setup_walk
 from warpchain.status import Status
 from warpchain.walks.walk_phases import Phase, WalkRun
 
@@ -88,12 +89,14 @@ def released_loop(preset: str = "soft", drive: dict[str, float] | None = None, *
     )
 
 
-def hold(loop: Loop, parameters: Parameters, duration: float, load_factor: float = 1.0) -> Array:
+def hold(
+    loop: Loop, parameters: Parameters, duration: float, load_factor: float = 1.0, own: LinkValues | None = None
+) -> Array:
     """Hold a loop on for a time [s] with other parameters; `Loop.shape` of the end and its `bottom_curvature`, (5,)."""
     setup = loop.setup
     scene = setup.scene
     batch = Batch(1, scene.links, setup.options, keeps_samples=True, frame_every=1)
-    batch.set_chain(0, parameters, scene.links, contact_radius(scene, parameters))
+    batch.set_chain(0, parameters, scene.links, contact_radius(scene, parameters), own)
     softness = 1.0 if setup.options.soften_drive else 0.0
     batch.load(0, loop.position, loop.velocity, stop_time=duration, stop_status=Status.NOT_STEADY, softness=softness)
     batch.set_drive(

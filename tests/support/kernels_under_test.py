@@ -12,28 +12,29 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from tests.support.unlike_links import UnlikeLinks
+from warpchain.engine.batch import Batch
 from warpchain.engine.devices import start_device
+from warpchain.engine.ground import cells_of, faces_of
+from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.list_layout import list_layout
+from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.neighbour_list import greatest_displacement, list_slack, neighbour_list
-from warpchain.kernels.cpu.contacts.proximity import (
-    floor_gap,
-    greatest_opening,
-    resolve_floor,
-    resolve_sprocket,
-    sprocket_gap,
-)
+from warpchain.kernels.cpu.contacts.proximity import fixed_contacts, greatest_opening
 from warpchain.kernels.cpu.contacts.self_contacts import self_contacts
 from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.loop import load_state
 from warpchain.kernels.features import COMPILER_FLAGS
-from warpchain.kernels.types import Model, State, read_chain
+from warpchain.kernels.types import Model, State, read_ground
 
 Array = NDArray[np.float64]
 
 DEVICE = start_device("cpu").warp
 POISONED_JOINT = 2**30
+LEVEL = np.array([[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]])
+"""Points of a level profile."""
 
 compiled = functools.partial(
     wp.kernel, module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS}
@@ -45,19 +46,21 @@ def poisoned(*shape: int) -> wp.array:
     return wp.full(shape, np.nan, dtype=wp.float64, device=DEVICE)
 
 
-def model_of(chains: Sequence[tuple[int, Parameters]]) -> Model:
+def model_of(chains: Sequence[tuple[int, Parameters | UnlikeLinks]]) -> Model:
     """Constants of chains of so many links each."""
-    model = Model()
-    model.link_count = wp.array([links for links, _ in chains], dtype=wp.int32, device=DEVICE)
-    for name in Parameters.model_fields:
-        values = [getattr(parameters, name) for _, parameters in chains]
-        setattr(model, name, wp.array(values, dtype=wp.float64, device=DEVICE))
-    return model
+    batch = Batch(len(chains), max(links for links, _ in chains), Options())
+    for world, (links, chain) in enumerate(chains):
+        if isinstance(chain, UnlikeLinks):
+            batch.set_chain(world, chain.parameters, links, own=chain.own)
+        else:
+            batch.set_chain(world, chain, links)
+    return batch.model
 
 
-def chain_on_cpu(position: Array, velocity: Array, parameters: Parameters) -> tuple[Model, State]:
-    """Structs of one chain; of its state only the links are set."""
+def chain_on_cpu(position: Array, velocity: Array, parameters: Parameters | UnlikeLinks) -> tuple[Model, State]:
+    """Structs of one chain; of its state only the links and the factor of its loads are set."""
     state = State()
+    state.load_factor = wp.ones(1, dtype=wp.float64, device=DEVICE)
     state.links = wp.array(np.hstack([position, velocity]).T[None], dtype=wp.float64, device=DEVICE)
     return model_of([(len(position), parameters)]), state
 
@@ -67,12 +70,12 @@ def chain_on_cpu(position: Array, velocity: Array, parameters: Parameters) -> tu
 
 # --- the contact pass ---
 
-LIST, FLOOR, SPROCKET, SELF = 1, 2, 4, 8
+LIST, FLOOR, SPROCKET, SELF, TERRAIN = 1, 2, 4, 8, 16
 """Parts of a pass, to be added up: make the neighbour list; resolve contacts."""
 
 RESULTS = (
     *("opening", "floor_gap", "sprocket_gap", "fits", "displacement", "slack"),
-    *("floor", "sprocket", "self", "self_loss", "self_depth"),
+    *("floor", "sprocket", "self", "self_loss", "self_depth", "strands", "terrain_gap", "terrain"),
 )
 
 
@@ -80,6 +83,9 @@ RESULTS = (
 def _contact_pass(columns: int) -> wp.Kernel:
     build_list = neighbour_list(columns)
     resolve_self_contacts = self_contacts(columns)
+    floor_gap, resolve_floor = fixed_contacts("floor")
+    sprocket_gap, resolve_sprocket = fixed_contacts("sprocket")
+    terrain_gap, resolve_terrain = fixed_contacts("terrain")
     size = list_layout(columns).size
 
     @compiled
@@ -95,31 +101,41 @@ def _contact_pass(columns: int) -> wp.Kernel:
         results: wp.array2d(dtype=wp.float64),
     ):
         world = wp.tid()
-        chain = read_chain(model, world)
+        chain = model.chains[world]
         chain.push_rate = push_rate
         block = scratch[world]
         row = lists[world]
         pairs = wp.array(ptr=row.ptr, shape=(wp.static(size),), dtype=wp.int32)
-        load_state(block, state, chain, world)
+        load_state(block, model, state, chain, world)
         place_ends(block, chain)
         opening = greatest_opening(block, chain)
         results[world, 0] = opening
-        results[world, 1] = floor_gap(block, chain)
-        results[world, 2] = sprocket_gap(block, chain)
+        face = Face()
+        ground = read_ground(model, world)
+        face.turning = sprocket_speed
+        face.push_rate = push_rate
+        results[world, 1] = floor_gap(block, chain, ground, face)
+        results[world, 2] = sprocket_gap(block, chain, ground, face)
         if (parts & 1) != 0:
             fits = build_list(block, pairs, chain, skin, opening)
             results[world, 3] = wp.where(fits, wp.float64(1.0), wp.float64(0.0))
         results[world, 4] = greatest_displacement(block, chain)
         results[world, 5] = list_slack(block, chain, skin, opening)
         if (parts & 2) != 0:
-            results[world, 6] = wp.float64(resolve_floor(block, chain, sprocket_speed, push_rate))
+            results[world, 1] = floor_gap(block, chain, ground, face)
+            results[world, 6] = wp.float64(resolve_floor(block, chain, ground, face))
         if (parts & 4) != 0:
-            results[world, 7] = wp.float64(resolve_sprocket(block, chain, sprocket_speed, push_rate))
+            results[world, 2] = sprocket_gap(block, chain, ground, face)
+            results[world, 7] = wp.float64(resolve_sprocket(block, chain, ground, face))
         if (parts & 8) != 0:
-            hits, lost, depth = resolve_self_contacts(block, pairs, chain, opening)
+            hits, strands, lost, depth = resolve_self_contacts(block, pairs, chain, opening)
             results[world, 8] = wp.float64(hits)
             results[world, 9] = lost
             results[world, 10] = depth
+            results[world, 11] = wp.float64(strands)
+        if (parts & 16) != 0:
+            results[world, 12] = terrain_gap(block, chain, ground, face)
+            results[world, 13] = wp.float64(resolve_terrain(block, chain, ground, face))
 
     return contact_pass
 
@@ -130,22 +146,33 @@ class Placed:
 
     position: Array
     velocity: Array
-    parameters: Parameters
+    parameters: Parameters | UnlikeLinks
 
 
 class ContactPass:
     """Many chains, one after the other, on which parts of the contact pass are run."""
 
     def __init__(
-        self, chains: Sequence[Placed], *, skin: float = 2e-3, sprocket_speed: float = 0.0, push_rate: float = 0.0
+        self,
+        chains: Sequence[Placed],
+        *,
+        skin: float = 2e-3,
+        sprocket_speed: float = 0.0,
+        push_rate: float = 0.0,
+        profile: Array = LEVEL,
     ) -> None:
         """Make room for chains and place them; the sprocket about the origin has their sprocket_radius."""
         self.links = [len(chain.position) for chain in chains]
         self.columns = layout.padded_width(max(self.links))
         self.skin, self.sprocket_speed, self.push_rate = skin, sprocket_speed, push_rate
         self.model = model_of([(len(chain.position), chain.parameters) for chain in chains])
+        sizes = chains[0].parameters.link_length, chains[0].parameters.circle_radius
+        for name, rows_of in (("faces", faces_of(profile)), ("cells", cells_of(profile, *sizes))):
+            same = np.repeat(rows_of[None], len(chains), axis=0)
+            setattr(self.model, name, wp.array(same, dtype=wp.float64, device=DEVICE))
         worlds, rows, size = len(chains), layout.scratch_rows(0), list_layout(self.columns).size
         self.state = State()
+        self.state.load_factor = wp.ones(worlds, dtype=wp.float64, device=DEVICE)
         self.state.links = poisoned(worlds, 6, max(self.links))
         self.scratch = poisoned(worlds, rows, self.columns)
         self.lists = wp.full((worlds, size), POISONED_JOINT, dtype=wp.int32, device=DEVICE)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -94,11 +95,15 @@ def make_sweep(
     outcome: Outcome = distance,
     columns: Callable[[PlannedWalk], Mapping[str, float]] = lambda walk: {},
 ) -> SweepResult:
-    """A folder in which every walk has its outcome and columns; in shards of one walk, if some are not to be there."""
+    """A folder in which every walk has its outcome and columns; in shards of one walk, if some are not to be there.
+
+    To these two the walks are numbered cell by cell.
+    """
     sweep = load_sweep(content)
-    walks = [sweep.planned(index) for index in range(sweep.walk_count)]
-    outcomes = [outcome(walk) for walk in walks]
-    with SweepFolder.open(folder, sweep, shard_size=1 if None in outcomes else len(walks)) as store:
+    indices = sweep.indices.tolist()
+    walks = {index: replace(sweep.planned(index), index=number) for number, index in enumerate(indices)}
+    outcomes = {index: outcome(walk) for index, walk in walks.items()}
+    with SweepFolder.open(folder, sweep, shard_size=1 if None in outcomes.values() else len(walks)) as store:
         for shard in store.missing():
             rows = missing_rows(shard.kind, shard.keys)
             for row, index in enumerate(shard.walks.tolist()):

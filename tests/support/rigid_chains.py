@@ -17,7 +17,7 @@ from warpchain.kernels import layout
 from warpchain.kernels.cpu.functions import rigid_flight
 from warpchain.kernels.cpu.loop import load_state
 from warpchain.kernels.cpu.rows import scratch_rows
-from warpchain.kernels.types import Model, State, read_chain
+from warpchain.kernels.types import Model, State
 
 Array = NDArray[np.float64]
 
@@ -177,10 +177,10 @@ def _visit(columns: int) -> wp.Kernel:
         opens: int,
         results: wp.array(dtype=wp.float64),
     ):
-        chain = read_chain(model, 0)
+        chain = model.chains[0]
         block = scratch[0]
         rows_of_chain = wp.array(ptr=block.ptr, shape=(wp.static(rows), wp.static(columns)), dtype=wp.float64)
-        load_state(rows_of_chain, state, chain, 0)
+        load_state(rows_of_chain, model, state, chain, 0)
         closed, lost = close_joints(rows_of_chain, chain)
         results[0] = wp.where(closed, wp.float64(1.0), wp.float64(0.0))
         results[1] = lost

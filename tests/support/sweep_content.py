@@ -33,5 +33,5 @@ def blocks(*given: Mapping[str, Any], **changes: Any) -> dict[str, Any]:
 
 
 def drawn(sweep: Sweep, walks: int) -> np.ndarray:
-    """What the first walks drew, shape (walks, drawn quantities)."""
-    return np.array([list(sweep.planned(index).drawn.values()) for index in range(walks)])
+    """What the first walks drew, cell by cell, shape (walks, drawn quantities)."""
+    return np.array([list(sweep.planned(index).drawn.values()) for index in sweep.indices[:walks].tolist()])

@@ -18,7 +18,7 @@ from warpchain.kernels.cpu.explicit import place_ends
 from warpchain.kernels.cpu.loop import load_state
 from warpchain.kernels.cpu.tilting import resolve_tilting_floor, tilting_gap, write_plane_sums
 from warpchain.kernels.physics.plane import on_plane
-from warpchain.kernels.types import Model, State, read_chain
+from warpchain.kernels.types import Model, State
 from warpchain.status import Status
 
 Array = NDArray[np.float64]
@@ -133,11 +133,11 @@ def _floor_pass(columns: int) -> wp.Kernel:
         push_rate: wp.float64,
         results: wp.array(dtype=wp.float64),
     ):
-        chain = read_chain(model, 0)
+        chain = model.chains[0]
         chain.push_rate = push_rate
         block = scratch[0]
         row = planes[0]
-        load_state(block, state, chain, 0)
+        load_state(block, model, state, chain, 0)
         place_ends(block, chain)
         write_plane_sums(block, row, chain)
         results[0] = tilting_gap(block, on_plane(chain, row, 0))

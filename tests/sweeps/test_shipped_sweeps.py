@@ -6,9 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.sweep_content import TABLE_1
-from warpchain.inputs.distributions import Uniform
-from warpchain.inputs.parameters import Parameters, preset
+from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError
 from warpchain.inputs.yaml_files import parse_yaml, read_yaml
 from warpchain.sweeps.plan import load_sweep
@@ -47,7 +45,7 @@ def test_shipped_sweeps(name: str, shapes: dict[str, tuple[int, ...]]) -> None:
         preset = "paper" if name in ("figure6", "quickstart", "tilt") else "soft"
         walks = math.prod(block.shape)
         for index in {0, walks // 2, walks - 1}:
-            assert sweep.planned(block.first + index).setup.preset == preset
+            assert sweep.planned(block.indices.flat[index]).setup.preset == preset
 
 
 def test_shipped_sweeps_have_bare_names() -> None:
@@ -78,43 +76,11 @@ def test_the_examples_of_a_new_sweep_are_possible(tmp_path: Path) -> None:
     assert keys == set(SweepFile.model_fields)
 
 
-def test_figure6_follows_the_paper() -> None:
-    """Figure 6: n = 60 … 180, ν = 5 … 30 Hz, 12 samples; rest everywhere, ellipses for n = 150 and 180."""
-    rest, ellipse = load_sweep(SWEEPS / "figure6.yaml").blocks
-    assert rest.axes == {"links": (60, 90, 120, 150, 180), "frequency": (5.0, 10.0, 15.0, 20.0, 25.0, 30.0)}
-    assert ellipse.axes == {"links": (150, 180), "frequency": rest.axes["frequency"]}
-    for block, start in ((rest, "rest"), (ellipse, "ellipse")):
-        assert load_sweep(SWEEPS / "figure6.yaml").planned(block.first).setup.scene.start == start
-        assert block.drawn == (*TABLE_1, "phase", "clearance")
-
-
 def test_tolerance_repeats_the_same_samples() -> None:
     """In `tolerance` walks that differ in the tolerance alone share everything else."""
     sweep = load_sweep(SWEEPS / "tolerance.yaml")
     for cell in range(4):
         for sample in (0, 11):
-            loose, tight = (sweep.planned(24 * cell + 12 * place + sample).setup for place in (0, 1))
+            loose, tight = (sweep.planned(sweep.indices[24 * cell + 12 * place + sample]).setup for place in (0, 1))
             assert (loose.options.tolerance, tight.options.tolerance) == (1e-6, 1e-9)
             assert (loose.scene, loose.parameters) == (tight.scene, tight.parameters)
-
-
-def test_sensitivity_varies_every_quantity() -> None:
-    """In `sensitivity` each parameter has a block around its Table-1 value with the same releases at every value."""
-    sweep = load_sweep(SWEEPS / "sensitivity.yaml")
-    by_name = {block.name: block for block in sweep.blocks}
-    assert by_name["measured"].drawn == (*TABLE_1, "phase", "clearance")
-    assert set(by_name["ranges"].drawn) == {
-        name for name, q in Parameters.quantities().items() if q.source in ("measured", "looked up")
-    } | {"phase", "clearance"}
-    for name in PLANAR:
-        quantity = Parameters.quantities()[name]
-        block = by_name[name]
-        assert block.axes.keys() == {name} and block.drawn == ("phase", "clearance")
-        assert getattr(preset("soft"), name) in block.axes[name]
-        walks = [sweep.planned(block.first + 8 * place) for place in range(3)]
-        assert len({walk.setup.scene for walk in walks}) == 1
-        assert [getattr(walk.setup.parameters, name) for walk in walks] == list(block.axes[name])
-        if name in by_name["ranges"].drawn:
-            ends = by_name["ranges"].distributions[name]
-            assert isinstance(ends, Uniform)
-            assert (ends.lower, ends.upper) == pytest.approx((0.8 * quantity.value, 1.2 * quantity.value))

@@ -1,6 +1,5 @@
 """What the walks of a sweep draw: random numbers, distributions, designed samples."""
 
-import itertools
 import math
 import time
 import tracemalloc
@@ -10,13 +9,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from tests.support.setups import setup_walk
 from tests.support.sweep_content import TABLE_1, UNIFORM, blocks, content, drawn
 from warpchain.inputs.distributions import Gaussian, random_generator, sampled
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import check_scene, fewest_links
 from warpchain.inputs.setup import resolve
 from warpchain.inputs.validation import Bounds, InputError
-from warpchain.run.single_walk import setup_walk
 from warpchain.sweeps.designs import design_points, saltelli_outputs, sobol_indices
 from warpchain.sweeps.plan import Sweep, load_sweep
 
@@ -28,36 +27,34 @@ def test_walks_depend_on_their_index_only(sampler: str) -> None:
     """A planned walk is the same whatever was planned before it, and all walks differ."""
     given = content(sampler=sampler, samples=4)
     sweep = load_sweep(given)
-    walks = [sweep.planned(index) for index in range(sweep.walk_count)]
-    order = np.random.default_rng(1).permutation(sweep.walk_count).tolist()
+    walks = [sweep.planned(index) for index in sweep.indices.tolist()]
+    order = np.random.default_rng(1).permutation(sweep.indices).tolist()
     design_points.cache_clear()
     other = load_sweep(given)
-    assert {index: other.planned(index) for index in order} == dict(enumerate(walks))
+    assert {index: other.planned(index) for index in order} == {walk.index: walk for walk in walks}
     assert len({tuple(walk.drawn.values()) for walk in walks}) == len(walks)
 
 
-def test_more_samples_and_more_blocks_change_nothing_before() -> None:
+def test_an_index_stays_when_samples_are_added() -> None:
+    """The walk of an index is the same in a sweep with more samples, of any block; new samples have new indices."""
+    grid = {"links": [60, 90]}
+    few = load_sweep(blocks({"grid": grid}, {"samples": 2}, {"sampler": "saltelli", "samples": 2}))
+    many = load_sweep(blocks({"grid": grid, "samples": 5}, {"samples": 8}, {"sampler": "saltelli", "samples": 4}))
+    for index in few.indices.tolist():
+        one, other = few.planned(index), many.planned(index)
+        assert (one.block, one.cell, one.sample, one.setup.scene) == (
+            other.block,
+            other.cell,
+            other.sample,
+            other.setup.scene,
+        )
+    assert len(set(many.indices.tolist())) == many.walk_count
+
+
+def test_more_blocks_change_nothing_before() -> None:
     """A sample stays what it is when its cell gets more samples and when blocks are added behind."""
     few, many = load_sweep(blocks({})), load_sweep(blocks({"samples": 50}, {}))
-    assert [few.planned(index).drawn for index in range(3)] == [many.planned(index).drawn for index in range(3)]
-
-
-def test_undrawn_walks_are_those_drawn_but_for_what_is_drawn() -> None:
-    """Place, links and options are those of the walk, in any order of asking; nothing is drawn."""
-    sweep = load_sweep(blocks({"grid": {"links": [60, 90], "tolerance": [1e-5, 1e-6]}}, {"samples": 2}))
-    indices = [*range(sweep.walk_count), *reversed(range(sweep.walk_count))]
-    for index, undrawn in zip(indices, sweep.undrawn(indices), strict=True):
-        walk = sweep.planned(index)
-        assert undrawn.drawn == {} != walk.drawn
-        assert (undrawn.index, undrawn.block, undrawn.cell, undrawn.sample) == (
-            walk.index,
-            walk.block,
-            walk.cell,
-            walk.sample,
-        )
-        assert (undrawn.setup.options, undrawn.setup.scene.links) == (walk.setup.options, walk.setup.scene.links)
-    with pytest.raises(IndexError):
-        list(sweep.undrawn([sweep.walk_count]))
+    assert (drawn(few, 3) == drawn(many, 3)).all()
 
 
 def test_first_sample_is_that_of_a_single_walk() -> None:
@@ -79,7 +76,9 @@ def test_first_sample_is_that_of_a_single_walk() -> None:
             options={"tolerance": 1e-7},
             parameters={"floor_friction": 0.1},
         )
-        assert sweep.planned(5).setup == sampled(base, random_generator(seed, 1, 2), kept={"floor_friction"})
+        assert sweep.planned(sweep.indices[5]).setup == sampled(
+            base, random_generator(seed, 1, 2), kept={"floor_friction"}
+        )
 
 
 def test_large_sweeps_cost_nothing() -> None:
@@ -90,7 +89,7 @@ def test_large_sweeps_cost_nothing() -> None:
         sweep = load_sweep(content(samples=2**17, grid={"frequency": {"from": 1, "to": 100, "step": 1}}))
         assert sweep.walk_count == 100 * 2**17
         for index in (0, 10**6, sweep.walk_count - 1):
-            assert sweep.planned(index).sample == index % 2**17
+            assert sweep.planned(index).sample == index // 100
         assert tracemalloc.get_traced_memory()[1] < 2e6
     finally:
         tracemalloc.stop()
@@ -112,16 +111,6 @@ def test_same_samples_along_axes() -> None:
     assert all(len(set(column)) == 24 for column in apart.T)
 
 
-def test_same_samples_about_different_means() -> None:
-    """Along an axis of means, the same standard normal numbers are drawn about each."""
-    given = content(grid={"floor_friction": [0.3, 0.5]}, distributions={"floor_friction": "table"})
-    sweep = load_sweep(given | {"same_samples_along": ["floor_friction"]})
-    values = drawn(sweep, 6).reshape(2, 3, -1)
-    friction = sweep.blocks[0].drawn.index("floor_friction")
-    assert values[1, :, friction] - values[0, :, friction] == pytest.approx(np.full(3, 0.2), rel=1e-12)
-    assert (np.delete(values[0], friction, axis=1) == np.delete(values[1], friction, axis=1)).all()
-
-
 # Distributions
 
 
@@ -132,12 +121,15 @@ def test_values_on_an_axis_are_exact_unless_scatter_is_asked_for(name: str, othe
     value = Parameters.quantities()[name].value
     given = content(samples=20, grid={name: [1.1 * value, 1.2 * value]})
     exact = load_sweep(given | {"distributions": others})
-    found = [getattr(exact.planned(index).setup.parameters, name) for index in range(40)]
+    found = [getattr(exact.planned(index).setup.parameters, name) for index in exact.indices[:40].tolist()]
     assert found == [1.1 * value] * 20 + [1.2 * value] * 20
     assert list(exact.blocks[0].drawn) == [*(other for other in TABLE_1 if other != name), "phase", "clearance"]
     scattered = load_sweep(given | {"distributions": {**others, name: "table"}})
     assert scattered.blocks[0].drawn == (*TABLE_1, "phase", "clearance") and scattered.digest() != exact.digest()
-    assert len({getattr(scattered.planned(index).setup.parameters, name) for index in range(40)}) == 40
+    assert (
+        len({getattr(scattered.planned(index).setup.parameters, name) for index in scattered.indices[:40].tolist()})
+        == 40
+    )
 
 
 def test_a_grid_from_zero_simulates_zero() -> None:
@@ -145,7 +137,7 @@ def test_a_grid_from_zero_simulates_zero() -> None:
     given = content(samples=200, grid={"floor_friction": [0, 0.01]})
     for distributions, means in (({}, [0.0, 0.01]), ({"floor_friction": "table"}, [0.016, 0.019])):
         sweep = load_sweep(given | {"distributions": distributions})
-        values = [sweep.planned(index).setup.parameters.floor_friction for index in range(400)]
+        values = [sweep.planned(index).setup.parameters.floor_friction for index in sweep.indices[:400].tolist()]
         tolerance = 0.0 if not distributions else 0.0015
         assert np.mean(np.reshape(values, (2, 200)), axis=1) == pytest.approx(means, rel=1e-12, abs=tolerance)
 
@@ -250,7 +242,7 @@ def test_every_planned_walk_is_possible(sampler: str) -> None:
             same_samples_along=["links"],
         )
     )
-    walks = [sweep.planned(index) for index in range(sweep.walk_count)]
+    walks = [sweep.planned(index) for index in sweep.indices.tolist()]
     for walk in walks:
         check_scene(walk.setup.scene, walk.setup.parameters)
     per_sample = 4 if sampler == "saltelli" else 1
@@ -291,25 +283,6 @@ def unit_cube(names: list[str], sampler: str, samples: int, seed: int = 7) -> Sw
 
 
 FRACTIONS = ["floor_restitution", "floor_friction", "chain_restitution", "chain_friction"]
-
-
-def test_sobol_points_are_even() -> None:
-    """Scrambled Sobol points have a discrepancy far below that of random ones, and another for each cell and seed."""
-    discrepancy = {
-        sampler: stats.qmc.discrepancy(drawn(unit_cube(FRACTIONS, sampler, 256), 256))
-        for sampler in ("random", "sobol")
-    }
-    assert discrepancy["sobol"] < 0.1 * discrepancy["random"]
-    others = [unit_cube(FRACTIONS, "sobol", 8, seed) for seed in (7, 8)]
-    assert (drawn(others[0], 8) != drawn(others[1], 8)).all()
-    cells = drawn(load_sweep(content(sampler="sobol", samples=8)), 32).reshape(4, 8, -1)
-    assert all((a != b).all() for a, b in itertools.combinations(cells, 2))
-
-
-def test_latin_hypercube_has_one_point_in_each_stratum() -> None:
-    """Each of N equal parts of every quantity holds exactly one of N samples."""
-    points = drawn(unit_cube(FRACTIONS, "latin_hypercube", 50), 50)
-    assert (np.sort((points * 50).astype(int), axis=0) == np.arange(50)[:, None]).all()
 
 
 def ishigami(points: np.ndarray) -> np.ndarray:

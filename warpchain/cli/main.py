@@ -60,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 def _refuse_for(error: Exception) -> None:
     """Print what was refused or failed, and exit; return if the error is a defect of the program."""
     from warpchain.inputs.validation import DamagedFileError, InputError
-    from warpchain.run.lost_workers import LostWorkersError
+    from warpchain.run.workers import LostWorkersError
 
     if isinstance(error, typer.TyperException):
         context = getattr(error, "ctx", None)

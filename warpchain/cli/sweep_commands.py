@@ -14,11 +14,8 @@ from warpchain.cli.walk_commands import FAILED
 from warpchain.cli.words import JSON, argument, option, output, output_path
 
 if TYPE_CHECKING:
-    from warpchain.run.sweep_run import DaskClient, Executor
+    from warpchain.run.workers import DaskClient, Executor
     from warpchain.store.sweep_result import SweepResult
-
-LOG_EVERY: Final = 30.0
-"""Time [s] between two lines of progress where there is no terminal."""
 
 _FILE: Final = "The sweep, or the bare name of one that comes with warpchain, such as figure6."
 _DEVICE: Final = "cpu, cuda (the first GPU) or cuda:N, instead of what the sweep says."
@@ -39,6 +36,15 @@ def sweep(
     gpus: Annotated[
         int | None, option("N", "Run on the first N GPUs of this machine, a process for each.", min=1)
     ] = None,
+    part: Annotated[
+        str | None,
+        option("K/N", "Run only the K-th of N parts; merge puts them together."),
+    ] = None,
+    seed: Annotated[int | None, option("S", "Seed instead of the file's.", min=0)] = None,
+    samples: Annotated[int | None, option("N", "Samples of each cell instead of the file's.", min=1)] = None,
+    estimate: Annotated[
+        bool, typer.Option("--estimate", help="Try a few walks; say how long all take, and their size.")
+    ] = False,
     fresh: Annotated[bool, typer.Option("--fresh", help="Discard what another sweep left in the folder.")] = False,
     new: Annotated[
         Path | None,
@@ -58,9 +64,18 @@ def sweep(
         return
     if source is None:
         raise InputError("FILE.yaml: missing; give a sweep file, or --new FILE.yaml to have one written")
+    if estimate:
+        if gpus is not None or scheduler is not None:
+            raise InputError("--estimate: tries walks in this process; leave out --gpus and --scheduler")
+        _print_estimate(source, device=device, workers=workers, part=part, seed=seed, samples=samples)
+        return
     if folder is None:
         raise InputError("--output: missing; give a folder for the results with -o DIR")
-    from warpchain.cli.terminal import print_sweep, status_line, sweep_progress_text
+    if device is not None and gpus is None and scheduler is None:
+        from warpchain.engine.devices import start_early
+
+        start_early(device)
+    from warpchain.cli.terminal import print_sweep
     from warpchain.run.sweep_run import sweep as run
 
     if gpus is not None:
@@ -70,7 +85,7 @@ def sweep(
         if device not in (None, "cuda"):
             raise InputError(f"--device: {device} is given together with --gpus; give cuda, or leave one out")
         device = "cuda"
-    with status_line(LOG_EVERY) as show, _executor(gpus, scheduler) as executor:
+    with _executor(gpus, scheduler) as executor:
         result = run(
             source,
             folder,
@@ -78,7 +93,9 @@ def sweep(
             executor=executor,
             workers=workers or gpus,
             fresh=fresh,
-            on_progress=lambda progress: show(sweep_progress_text(progress)),
+            part=part,
+            seed=seed,
+            samples=samples,
         )
     print_sweep(result, as_json)
     _note_failures(result)
@@ -193,6 +210,18 @@ def merge(
     print(printable(str(path)))
 
 
+def _print_estimate(source: Path, **given: Any) -> None:
+    """Say how long a sweep would take on this machine, and how much of the disk."""
+    from warpchain.run.estimate import estimate_sweep
+    from warpchain.run.progress_bar import duration_text
+
+    found = estimate_sweep(source, **given)
+    print(
+        f"{found.walks:,} walks: about {duration_text(found.seconds)} with {found.workers} at once on this machine, "
+        f"{found.bytes / 1e6:,.1f} MB on disk ({found.pilots} walks tried)"
+    )
+
+
 @contextlib.contextmanager
 def _executor(gpus: int | None, scheduler: str | None) -> "Iterator[Executor | DaskClient | None]":
     """Workers on GPUs, or the client of a Dask cluster; None if neither is asked for.
@@ -244,8 +273,9 @@ def _note_failures(result: "SweepResult") -> None:
     """Say which walks failed and leave with exit status 1 if any did."""
     from warpchain.status import Status
 
-    failed = {label: n for label, n in result.summary().items() if n and label not in ("at_rest", "missing")}
+    ended = {status.label: status for status in Status if not status.ok}
+    failed = {label: n for label, n in result.summary().items() if n and label in ended}
     for label, count in failed.items():
-        print(f"{count} {label}: {Status[label.upper()].sentence}", file=sys.stderr)
+        print(f"{count} {label}: {ended[label].sentence}", file=sys.stderr)
     if failed:
         raise typer.Exit(FAILED)

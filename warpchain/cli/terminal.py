@@ -4,7 +4,6 @@ import itertools
 import json
 import math
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
@@ -13,34 +12,23 @@ import numpy as np
 
 from warpchain.engine.tallies import LOST
 from warpchain.inputs.validation import printable
-from warpchain.run.progress_bar import counts_text
+from warpchain.run.progress_bar import COMPILING, duration_text
 from warpchain.walks.rows import fault_remedies
 from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
-    from warpchain.run.progress_bar import SweepProgress
-    from warpchain.run.single_walk import Progress
     from warpchain.store.sweep_result import SweepResult
+    from warpchain.walks.one_walk import Progress
 
 _MOST_CELLS: Final = 1000
 """Most cells of a sweep that a table lists; one of 100,000 would take minutes to lay out."""
 
-COMPILING: Final = "compiling kernels; later runs find them ready"
-
 
 @contextmanager
-def status_line(every: float = math.inf) -> Iterator[Callable[[str], None]]:
-    """Yield a function that shows a changing line on a terminal; without one it prints a line every so many seconds."""
+def status_line() -> Iterator[Callable[[str], None]]:
+    """Yield a function that shows a changing line on a terminal; without one it shows nothing."""
     if not sys.stderr.isatty():
-        last = time.monotonic()
-
-        def print_now_and_then(text: str) -> None:
-            nonlocal last
-            if time.monotonic() - last >= every:
-                print(text, file=sys.stderr, flush=True)
-                last = time.monotonic()
-
-        yield print_now_and_then
+        yield lambda text: None
         return
     from rich.console import Console
 
@@ -54,22 +42,6 @@ def progress_text(progress: "Progress") -> str:
         return COMPILING
     where, speed = f"{progress.phase:8}{progress.time:8.3f} s", f"{progress.speed:9.3f} m/s"
     return f"{where}{speed}{progress.attempts:14,} steps"
-
-
-def sweep_progress_text(progress: "SweepProgress") -> str:
-    """How far a sweep is, in columns."""
-    if progress.compiling:
-        return COMPILING
-    left = "" if progress.time_left is None else f"   {_duration(progress.time_left)} left"
-    rate = f"{progress.rate:.2f} a second{left}"
-    return f"{progress.done:,} of {progress.walks:,} walks   {rate}   {counts_text(progress)}"
-
-
-def _duration(seconds: float) -> str:
-    """Hours, minutes and seconds, as far as needed."""
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s" if minutes else f"{rest} s"
 
 
 def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None) -> None:
@@ -103,7 +75,7 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
     for remedy_of_fault, number in fault_remedies(block.faults for block in result.blocks.values()).items():
         console.print(f"{number:,} inaccurate: {remedy_of_fault}")
     if rate is not None:
-        left = "" if time_left is None else f", {_duration(time_left)} left"
+        left = "" if time_left is None else f", {duration_text(time_left)} left"
         console.print(f"running: {rate:.2f} walks a second{left}")
     room = _MOST_CELLS
     for name, cells in statistics.items():

@@ -35,10 +35,10 @@ _SET: Final = (
 _SEED: Final = "Draw what is not given at random, one sample for each whole number. Without it: means, phase 0."
 _CONFIG: Final = "Read preset, scene, options and parameters from a file; what the command line gives counts more."
 _LIKE: Final = (
-    "Take setup and seed of a saved walk, its file or folder, which repeats it to the bit; other options change single "
-    "values. Not with "
-    "--config, --preset or --seed."
+    "Take setup and seed of a saved walk, its file or folder, or with --index of a walk of a sweep: its folder or a "
+    "merged file. That repeats it to the bit; other options change single values. Not with --config, --preset, --seed."
 )
+_INDEX: Final = "Number of the walk in the sweep that --like names, as in the column index of its results."
 _OUTPUT: Final = (
     "Write walk.h5 and film_strip.png to this folder; figures of an earlier walk there are deleted. `warpchain plot` "
     "draws the others, `warpchain animate` a film."
@@ -69,6 +69,7 @@ def walk(
     seed: Annotated[_Text, option("S", _SEED)] = None,
     config: Annotated[Path | None, option("FILE.yaml", _CONFIG)] = None,
     like: Annotated[Path | None, option("PATH", _LIKE)] = None,
+    index: Annotated[_Text, option("I", _INDEX)] = None,
     folder: Annotated[Path | None, output("DIR", _OUTPUT)] = None,
     animation: Annotated[
         Literal["gif", "mp4", "html"] | None,
@@ -82,10 +83,10 @@ def walk(
     from warpchain.cli.terminal import print_walk, progress_text, status_line
     from warpchain.cli.walk_files import try_walk_folder, write_walk
     from warpchain.inputs.distributions import LARGEST_SEED
-    from warpchain.inputs.setup import DEFAULT_PRESET, read_setup
+    from warpchain.inputs.setup import DEFAULT_PRESET, continued, read_setup
     from warpchain.inputs.validation import InputError, checked_whole, printable
     from warpchain.inputs.yaml_files import parse_yaml
-    from warpchain.run.single_walk import run_walk
+    from warpchain.walks.one_walk import run_walk
 
     named = {"links": links, "frequency": frequency, "start": start}
     given = _given_values(named | {"method": method, "tolerance": tolerance, "device": device}, assignments or [])
@@ -95,13 +96,19 @@ def walk(
         for name, value in (("--config", config), ("--preset", preset), ("--seed", seed)):
             if value is not None:
                 raise InputError(f"{name}: given together with --like, and a saved walk has its own; leave one out")
-        preset, own, number = _saved_values(like, given["options"])
+        saved, number = _saved(like, index)
+        preset, own = saved.preset, _without_replaced(saved, given["options"])
     elif config is not None:
         file_preset, own = read_setup(config)
         preset = preset or file_preset
         if preset is None:
             raise InputError("preset: missing; name the parameters to start from, such as preset: paper")
-    setup = _setup(preset or DEFAULT_PRESET, own, given, number, record_loads)
+    elif index is not None:
+        raise InputError("--index: names a walk of a sweep, but --like is missing; give --like DIR, the sweep")
+    if like is not None and saved.start is not None:
+        setup = continued(saved.start, given)
+    else:
+        setup = _setup(preset or DEFAULT_PRESET, own, given, number, record_loads)
     interval = _frame_interval(folder, animation, frame_interval, record_loads)
     if folder is not None:
         try_walk_folder(folder, animation)
@@ -173,38 +180,48 @@ def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -
 
 
 def _setup(preset: str, own: Mapping[str, Any], given: Sections, seed: int | None, records_loads: bool) -> "Setup":
-    """The setup of a walk: the command line's values over those of a file or a saved walk, and the sample of the seed.
-
-    A parameter that looks like one in another unit brings a warning.
-    """
-    from warpchain.inputs.parameters import warn_of_units
+    """The setup of a walk: values of the command line over those of a file or a saved walk, and the drawn sample."""
     from warpchain.run.single_walk import complete_setup
 
     sections = {section: own.get(section, {}) for section in given}
     for section, values in given.items():
         if isinstance(sections[section], Mapping):  # `complete_setup` refuses anything else
             sections[section] = {**sections[section], **values}
-    setup = complete_setup(preset, sections, seed, records_loads)
-    warn_of_units((f"parameters.{name}", name, value) for name, value in sections["parameters"].items())
-    return setup
+    return complete_setup(preset, sections, seed, records_loads)
 
 
-def _saved_values(path: Path, options: Mapping[str, object]) -> tuple[str, dict[str, Any], int | None]:
-    """Preset, values by section, and seed of a saved walk, without those that some given options bring anew.
+def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
+    """Setup and seed of a saved walk, or of the walk with a number of a sweep.
 
-    A method brings its own settings, and a tolerance also holds where joints are soft, as in a new walk.
+    Raises:
+        InputError: there is no such walk, or the number is missing.
+        OSError: the file or folder cannot be read.
     """
     from warpchain.cli.walk_files import record_of
-    from warpchain.inputs.methods import METHODS_BY_NEED
-    from warpchain.inputs.sections import SECTIONS
+    from warpchain.hdf5_files import kind_of_hdf5
+    from warpchain.inputs.validation import InputError
+    from warpchain.inputs.yaml_files import parse_yaml
+    from warpchain.store.sweep_result import KIND, load
     from warpchain.walks.walk_result import load_walk
 
-    saved = load_walk(record_of(path))
-    replaced = {"soft_tolerance"} if "tolerance" in options else set()
-    if "method" in options:
-        replaced |= {"tolerance", "soft_tolerance"}.union(*METHODS_BY_NEED.values())
-    sections = {section: getattr(saved.setup, section).model_dump(exclude=replaced) for section in SECTIONS}
-    return saved.setup.preset, sections, saved.seed
+    wanted = "give a saved walk, or the folder or merged file of a sweep and --index"
+    record = record_of(path)
+    if index is None and not record.is_dir() and kind_of_hdf5(record, wanted) != KIND:
+        walk = load_walk(record)
+        return walk.setup, walk.seed
+    if index is None:
+        raise InputError(f"--like: {path} has many walks; give --index, the number of one, as well")
+    block, place = load(path).located(parse_yaml(index, "--index"))
+    return block.setup_at(place), block.sweep_at(place).seed
+
+
+def _without_replaced(setup: "Setup", options: Mapping[str, object]) -> dict[str, Any]:
+    """Values of a setup by section, without those that some given options bring anew."""
+    from warpchain.inputs.options import replaced_by
+    from warpchain.inputs.sections import SECTIONS
+
+    replaced = replaced_by(options)
+    return {section: getattr(setup, section).model_dump(exclude=replaced) for section in SECTIONS}
 
 
 def _frame_interval(folder: Path | None, animation: str | None, text: str | None, records_loads: bool) -> Any:

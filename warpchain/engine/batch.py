@@ -11,12 +11,15 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpchain.engine.constants import constants_of, rows_of
 from warpchain.engine.control import control_of
 from warpchain.engine.devices import Gpu, start_device
+from warpchain.engine.ground import cells_of, faces_of
 from warpchain.engine.kernel_choice import block_threads, features_of, load_kernels, step_kernel
 from warpchain.engine.memory import CAPACITY_FRAMES, CAPACITY_SAMPLES, scratch_rows
 from warpchain.engine.mirror import Mirror
 from warpchain.engine.tallies import COUNTS, EXTREMES, LOSSES
+from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
@@ -36,6 +39,7 @@ UNSET_WATCHES = (
     *(layout.REST_SINCE, layout.SOFTENED_AT, layout.FELL_AT),
     *(layout.SELF_CONTACT_AT, layout.SELF_CONTACT_BOUNCES, layout.SELF_CONTACT_FLIGHT),
     *(layout.COLLAPSED_AT, layout.COLLAPSE_BOUNCES, layout.COLLAPSE_FLIGHT),
+    *(layout.STRANDS_MET_AT, layout.STRANDS_MET_BOUNCES, layout.STRANDS_MET_FLIGHT),
 )
 """Entries of :attr:`State.watch` that are −1 until set."""
 
@@ -57,6 +61,7 @@ class Batch:
         frame_interval: float = 0.0,
         keeps_loads: bool = False,
         tilts: bool = False,
+        faces: int = 1,
         threads: int | None = None,
     ) -> None:
         """Allocate a batch. All worlds are idle (status FINISHED) until a chain is loaded.
@@ -70,6 +75,7 @@ class Batch:
             frame_interval: Time [s] between the frames of chains that are loaded with frame marks of their own.
             keeps_loads: Keep force and moment of every joint with each frame.
             tilts: Keep the plane of the chain with samples and frames.
+            faces: Most faces of a floor that is not flat.
             threads: Threads of every block on a GPU, at least as many as links; None: as many as each chain needs.
         """
         self.options = options
@@ -84,11 +90,13 @@ class Batch:
         self.columns = layout.padded_width(longest)
         rows = scratch_rows(options, longest, self.device, threads)
 
-        self.model = self._arrays(Model)
-        self.drive = self._arrays(Drive)
+        cells = (layout.GROUND_CELLS + 1) * (faces > 1)
+        shapes = {"faces": (faces, layout.FACE_VALUES), "cells": (cells, layout.CELL_VALUES)}
+        self.model = self._arrays(Model, links=(layout.LINK_ROWS, longest), **shapes)
+        self.drive = self._arrays(Drive, motion=(layout.MOTION_ROWS, layout.MOTION_VALUES))
         self._constant = set(self._mirrors)
         if self._gpu:
-            self._order = Mirror(np.zeros(worlds, dtype=np.int32), self._gpu, self._stream)
+            self._order = Mirror((worlds,), wp.int32, self._gpu, self._stream)
         self.state = self._arrays(
             State,
             links=(6, longest),
@@ -123,15 +131,14 @@ class Batch:
         """A struct of arrays of zeros; ``shapes``: further axes of an array, after that of the worlds."""
         filled = struct()
         for name, field in struct.vars.items():
-            dtype = wp.dtype_to_numpy(field.type.dtype)
-            setattr(filled, name, self._array(np.zeros((len(self.links), *shapes.get(name, ())), dtype=dtype)))
+            setattr(filled, name, self._array((len(self.links), *shapes.get(name, ())), field.type.dtype))
         return filled
 
-    def _array(self, values: NDArray[np.generic]) -> wp.array:
-        """An array on the device that the host will read or write."""
-        if self._gpu is None or values.size == 0:
-            return wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device=self.device.warp)
-        mirror = Mirror(values, self._gpu, self._stream)
+    def _array(self, shape: tuple[int, ...], dtype: Any) -> wp.array:
+        """An array of zeros on the device that the host will read or write."""
+        if self._gpu is None or math.prod(shape) == 0:
+            return wp.zeros(shape, dtype=dtype, device=self.device.warp)
+        mirror = Mirror(shape, dtype, self._gpu, self._stream)
         self._mirrors[mirror.array.ptr] = mirror
         return mirror.array
 
@@ -145,21 +152,28 @@ class Batch:
         values: NDArray[Any] = self._mirrors[array.ptr].edit() if array.ptr in self._mirrors else array.numpy()
         return values
 
-    def set_chain(self, world: int, parameters: Parameters, links: int, sprocket_radius: float | None = None) -> None:
-        """Set parameters and length of a world's chain.
+    def set_chain(
+        self, world: int, parameters: Parameters, links: int, radius: float | None = None, own: LinkValues | None = None
+    ) -> None:
+        """Set parameters and number of links of a world's chain.
 
         Args:
             world: Index.
             parameters: The chain's parameters.
             links: Number of links.
-            sprocket_radius: Radius [m] at which circles touch the sprocket; None: the parameter's.
+            radius: Radius [m] at which circles touch the sprocket; None: the parameter's.
+            own: What each link and joint has of its own; None: inner and outer links alternate.
         """
+        own = own or alternating(parameters, links)
         self.links[world] = links
-        self._edit(self.model.link_count)[world] = links
-        for name, value in parameters:
-            self._edit(getattr(self.model, name))[world] = value
-        if sprocket_radius is not None:
-            self._edit(self.model.sprocket_radius)[world] = sprocket_radius
+        self._edit(self.model.chains)[world] = constants_of(parameters, own, radius)
+        self._edit(self.model.links)[world, :, :links] = rows_of(own)
+
+    def set_floor(self, world: int, points: Array, parameters: Parameters) -> None:
+        """Set the floor of a world's chain, by the points of its profile (p, 2), if it is not flat."""
+        self._edit(self.model.faces)[world, : len(points) - 1] = faces_of(points)
+        if len(points) > 2:
+            self._edit(self.model.cells)[world] = cells_of(points, parameters.link_length, parameters.circle_radius)
 
     def load(
         self,
@@ -237,14 +251,14 @@ class Batch:
         """The plane of a world's chain, if it tilts: (PLANE_VALUES,), see :mod:`warpchain.kernels.layout`."""
         return np.array(self._view(self.state.plane)[world, : layout.PLANE_VALUES])
 
-    def set_drive(self, world: int, **values: float) -> None:
+    def set_drive(self, world: int, **values: float | Array) -> None:
         """Set fields of :class:`Drive` of a world."""
         for name, value in values.items():
             self._edit(getattr(self.drive, name))[world] = value
 
-    def features(self, *, fixed_body: str, tilts: bool = False) -> Features:
-        """Kernel features for these worlds."""
-        return features_of(self.options, self.columns, fixed_body=fixed_body, tilts=tilts)
+    def features(self, **wanted: Any) -> Features:
+        """Kernel features for these worlds, see `features_of`."""
+        return features_of(self.options, self.columns, **wanted)
 
     def run(self, worlds: Sequence[int], features: Features, after_launch: Callable[[], None] | None = None) -> None:
         """Carry worlds on until none of them is running. Results do not depend on how a run is cut into launches.
@@ -284,31 +298,23 @@ class Batch:
 
     def launch(self, worlds: Sequence[int], features: Features, attempts: int) -> float:
         """Carry worlds on by at most this many attempts each; returns the wall time [s]."""
-        return self.launch_together({features: worlds}, attempts)
-
-    def launch_together(self, groups: Mapping[Features, Sequence[int]], attempts: int) -> float:
-        """Carry groups of worlds on together, each with its own features; returns the wall time [s]."""
         before = time.perf_counter()
-        self.start(groups, attempts)
+        self.start({features: worlds}, attempts)
         self.finish()
         return time.perf_counter() - before
 
     def start(self, groups: Mapping[Features, Sequence[int]], attempts: int) -> None:
-        """Begin a launch like :meth:`launch_together`; until :meth:`finish` the host may not read the worlds.
+        """Begin to carry on groups of worlds, each with its own features, by at most this many attempts.
 
-        On a GPU this returns at once, and launches of other batches go on at the same time.
+        Until :meth:`finish` the host may not read the worlds. On a GPU this returns at once.
         """
         self.control.attempts = attempts
         arrays = [self.model, self.drive, self.state, self.record, self.scratch, self.lists, self.control]
         if self._gpu is None:
             for features, worlds in groups.items():
-                inputs = [
-                    wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device.warp),
-                    *arrays,
-                ]
-                wp.launch(
-                    step_kernel(self.device, features, 1), dim=len(worlds), inputs=inputs, device=self.device.warp
-                )
+                numbers = wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device.warp)
+                kernel = step_kernel(self.device, features, 1)
+                wp.launch(kernel, dim=len(worlds), inputs=[numbers, *arrays], device=self.device.warp)
             return
         blocks: dict[tuple[Features, int], list[int]] = defaultdict(list)
         for features, worlds in groups.items():
@@ -428,8 +434,7 @@ class Batch:
 
     def frame_planes(self, world: int) -> Array:
         """The plane in the frames kept so far: (f, PLANE_VALUES); (f, 0) if the batch does not keep planes."""
-        count = int(self._view(self.record.frame_count)[world])
-        first = 2 * self.state.links.shape[2]
+        count, first = int(self._view(self.record.frame_count)[world]), 2 * self.state.links.shape[2]
         return self._view(self.record.frames)[world, :count, first:].copy()
 
     def greatest_tilt(self, world: int) -> float:

@@ -2,9 +2,9 @@
 
 import math
 
+from warpchain.inputs.link_values import LinkValues
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters, preset
-from warpchain.inputs.scene import greatest_load
 from warpchain.kernels.types import Control
 
 SOFT = preset("soft")
@@ -48,21 +48,17 @@ to 30 Hz) it lowered the 99th percentile of the greatest depth from 2.25 to 0.30
 """
 
 
-def line_density(parameters: Parameters) -> float:
-    """Mass of the chain per length [kg/m]."""
-    return (parameters.inner_mass + parameters.outer_mass) / 2 / parameters.link_length
-
-
-def mean_weight(parameters: Parameters, links: int, radius: float) -> float:
+def mean_weight(parameters: Parameters, density: float, links: int, radius: float) -> float:
     """Tension [N] that the weight of a loop causes in the middle of its sides.
 
     Args:
         parameters: The chain's parameters.
+        density: Its mass per length [kg/m].
         links: Number of links.
         radius: Distance from the sprocket's centre at which joints ride [m].
     """
     side = max(0.0, links * parameters.link_length / 2 - math.pi * radius)
-    return line_density(parameters) * parameters.gravity * side / 2
+    return density * parameters.gravity * side / 2
 
 
 def hold_softness(parameters: Parameters, tension: float, strain: float) -> float:
@@ -81,11 +77,12 @@ def hold_softness(parameters: Parameters, tension: float, strain: float) -> floa
     return 1.0 + max(0.0, math.log(soft / max(wanted, softest)) / math.log(soft / softest))
 
 
-def suitable_load(parameters: Parameters, options: Options, weight: float) -> float:
+def suitable_load(parameters: Parameters, links: LinkValues, options: Options, weight: float) -> float:
     """Factor by which loads are multiplied while a loop becomes stationary, unless the scene gives one.
 
     Args:
         parameters: The chain's parameters.
+        links: What each of its links has; unless they alternate, the loop under load is another, and it is 1.
         options: They say whether joints are softened on the sprocket.
         weight: Mean tension by the loop's weight [N].
     """
@@ -93,7 +90,9 @@ def suitable_load(parameters: Parameters, options: Options, weight: float) -> fl
     if options.soften_drive:
         stiffness = min(stiffness, SOFT.joint_stiffness)
     bearable = LOADED_STRAIN * stiffness * parameters.link_length
-    limit = min(GREATEST_LOAD, greatest_load(parameters))
+    if not links.alternates:
+        return 1.0
+    limit = min(GREATEST_LOAD, links.greatest_load(parameters.link_length))
     return max(1.0, min(limit, bearable / weight) if weight > 0 else limit)
 
 

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import warp as wp
-from numpy.typing import NDArray
 
 from warpchain.engine.fibers import HeldStream
 from warpchain.engine.kernel_cache import cache_refusal, load_checked
@@ -44,9 +43,9 @@ class Device:
     def prepare(self) -> None:
         """Make what the first use would make, before several threads use it at once."""
 
-    def host_array(self, values: NDArray[Any]) -> wp.array:
-        """A copy of values on the host, from and to which the device can copy."""
-        return wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device="cpu")
+    def host_array(self, shape: tuple[int, ...], dtype: Any) -> wp.array:
+        """An array of zeros on the host, from and to which the device can copy."""
+        return wp.zeros(shape, dtype=dtype, device="cpu")
 
     def load(self, entry: wp.Kernel, make: Callable[[], wp.Module]) -> None:
         """Load the kernel of an entry; it is made and compiled if the cache does not have it."""
@@ -58,7 +57,8 @@ class Gpu(Device):
 
     def prepare(self) -> None:
         """Make Warp's streams of the device."""
-        _ = self.warp.stream
+        with _start_lock:
+            _ = self.warp.stream
 
     @property
     def multiprocessors(self) -> int:
@@ -75,9 +75,9 @@ class Gpu(Device):
         """The stream in which new arrays are filled."""
         return self.warp.stream
 
-    def host_array(self, values: NDArray[Any]) -> wp.array:
+    def host_array(self, shape: tuple[int, ...], dtype: Any) -> wp.array:
         """As on a CPU, but in pinned memory, so that copies wait in streams as well."""
-        return wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device="cpu", pinned=True)
+        return wp.zeros(shape, dtype=dtype, device="cpu", pinned=True)
 
     def stream(self) -> Any:
         """A new stream."""
@@ -114,9 +114,9 @@ class Fibers(Gpu):
     def prepare(self) -> None:
         """There is nothing to make."""
 
-    def host_array(self, values: NDArray[Any]) -> wp.array:
+    def host_array(self, shape: tuple[int, ...], dtype: Any) -> wp.array:
         """As on a CPU: memory cannot be pinned without CUDA."""
-        return Device.host_array(self, values)
+        return Device.host_array(self, shape, dtype)
 
     def stream(self) -> HeldStream:
         """A new stream."""
@@ -144,6 +144,20 @@ def start_device(device: str) -> Device:
     """
     with _start_lock:
         return _started(device)
+
+
+def start_early(device: str) -> None:
+    """Let a GPU start in a thread of its own, which takes half a second, while this one imports libraries.
+
+    Whoever uses the device waits for it, and is told if there is none.
+    """
+
+    def start() -> None:
+        with contextlib.suppress(InputError):
+            start_device(device).prepare()
+
+    if on_gpu(device):
+        threading.Thread(target=start).start()
 
 
 @functools.cache

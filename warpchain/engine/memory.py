@@ -3,11 +3,11 @@
 from warpchain.engine.devices import Device, Gpu, start_device
 from warpchain.engine.kernel_choice import block_threads, resident_blocks
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.cpu import rows as cpu_rows
 from warpchain.kernels.gpu import functions as gpu_functions
+from warpchain.kernels.types import CHAIN_DOUBLES
 
 WORLDS_OF_BLOCK = 2
 """Chains under way for each block that a GPU holds: while some are with the host, the others fill it.
@@ -36,6 +36,7 @@ def world_bytes(
     device: Device,
     keeps_loads: bool = False,
     tilts: bool = False,
+    faces: int = 1,
 ) -> int:
     """Memory [B] that a batch takes on a device for each of its worlds.
 
@@ -47,10 +48,13 @@ def world_bytes(
         device: Device of the batch.
         keeps_loads: Whether loads of joints are kept with the frames.
         tilts: Whether the plane of the chain is kept with samples and frames.
+        faces: Most faces of a floor.
     """
     columns = layout.padded_width(longest)
-    few = len(Parameters.model_fields) + 139 + layout.PLANE_ROWS  # numbers of a world in model, drive and state
-    numbers = columns * scratch_rows(options, longest, device) + 6 * longest + few
+    few = CHAIN_DOUBLES + 139  # numbers of a world in model, drive and state, beside these tables
+    few += layout.PLANE_ROWS + layout.MOTION_ROWS * layout.MOTION_VALUES
+    numbers = columns * scratch_rows(options, longest, device) + (6 + layout.LINK_ROWS) * longest + few
+    numbers += faces * layout.FACE_VALUES + (faces > 1) * (layout.GROUND_CELLS + 1) * layout.CELL_VALUES
     numbers += samples * (layout.ALL_COLUMNS if tilts else layout.SAMPLE_COLUMNS)
     numbers += frames * ((2 + 3 * keeps_loads) * longest + layout.PLANE_VALUES * tilts + 1)
     return 8 * numbers + 4 * list_layout(columns).size
@@ -64,6 +68,7 @@ def most_worlds(
     keeps_frames: bool,
     keeps_loads: bool = False,
     tilts: bool = False,
+    faces: int = 1,
     threads: int | None = None,
 ) -> int:
     """Chains that a GPU should carry on together: enough to fill it that fit into half of the free memory.
@@ -73,6 +78,7 @@ def most_worlds(
     device = start_device(options.device)
     assert isinstance(device, Gpu)
     samples, frames = CAPACITY_SAMPLES * keeps_samples, CAPACITY_FRAMES * keeps_frames
-    fitting = device.free_memory // 2 // world_bytes(longest, options, samples, frames, device, keeps_loads, tilts)
+    taken = world_bytes(longest, options, samples, frames, device, keeps_loads, tilts, faces)
+    fitting = device.free_memory // 2 // taken
     filling = WORLDS_OF_BLOCK * resident_blocks(threads or block_threads(longest)) * device.multiprocessors
     return max(1, min(filling, fitting))

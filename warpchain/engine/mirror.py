@@ -6,7 +6,6 @@ So the host waits for one thing only, the end of the launch.
 
 from typing import Any
 
-import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
@@ -20,10 +19,10 @@ class Mirror:
         array: The array on the device.
     """
 
-    def __init__(self, values: NDArray[np.generic], device: Gpu, stream: Any) -> None:
-        """Copy values to a device; later copies wait in this stream."""
-        self.array = wp.array(values, dtype=wp.dtype_from_numpy(values.dtype), device=device.warp)
-        self._host = device.host_array(values)
+    def __init__(self, shape: tuple[int, ...], dtype: Any, device: Gpu, stream: Any) -> None:
+        """Begin with zeros, of a type of Warp's or structs of them; copies wait in this stream."""
+        self.array = wp.zeros(shape, dtype=dtype, device=device.warp)
+        self._host = device.host_array(shape, dtype)
         self._values: NDArray[Any] = self._host.numpy()
         self._device = device
         self._stream = stream

@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from warpchain.inputs.methods import BURST_TOLERANCE, FORMER_METHODS, METHODS, METHODS_BY_NEED
-from warpchain.inputs.validation import InputError, Section, number_field, shown, suggestion
+from warpchain.inputs.validation import InputError, Section, Whole, number_field, shown, suggestion
 from warpchain.kernels.methods.explicit_tableaus import HYBRID
 from warpchain.kernels.methods.method import find_method, method_names
 
@@ -23,6 +23,17 @@ FIBERS: Final = "fibers"
 def on_gpu(device: str) -> bool:
     """Whether a device runs a GPU's kernels."""
     return device != "cpu"
+
+
+def replaced_by(options: Mapping[str, object]) -> set[str]:
+    """Options of a walk that some given ones bring anew.
+
+    A method brings its own settings, and a tolerance also holds where joints are soft, as in a new walk.
+    """
+    replaced = {"soft_tolerance"} if "tolerance" in options else set()
+    if "method" in options:
+        replaced |= {"tolerance", "soft_tolerance"}.union(*METHODS_BY_NEED.values())
+    return replaced
 
 
 def _known_method(method: str) -> str:
@@ -91,7 +102,7 @@ class Options(Section):
     skin: float = number_field(
         2e-3, "m", "margin of the neighbour list, which is built anew when a joint has moved half of it", gt=0
     )
-    step_limit: int = number_field(2_000_000_000, "1", "most steps attempted in one walk", ge=1, le=10**15)
+    step_limit: Whole = number_field(2_000_000_000, "1", "most steps attempted in one walk", ge=1, le=10**15)
     smallest_step: float = number_field(1e-12, "s", "the walk ends if a step must be shorter than this", gt=0)
     self_contact: bool = Field(default=True, description="whether links of the chain can touch one another")
     rest_speed: float = number_field(

@@ -7,11 +7,8 @@ Source: "A walking roller chain", Table 1, unless a quantity says otherwise.
 """
 
 import math
-import sys
-import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from decimal import Decimal
 from typing import Any, Final, Literal, Self
 
 from pydantic import model_validator
@@ -20,22 +17,22 @@ from warpchain.inputs.validation import (
     DIMENSIONLESS,
     Bounds,
     InputError,
-    InputWarning,
     Section,
     by_name,
     field_bounds,
-    field_unit,
     number_field,
     short,
     shown,
     validated,
 )
 
-Source = Literal["measured", "looked up", "adjusted", "assumed"]
+Source = Literal["measured", "looked up", "adjusted", "chosen here"]
 
 Limits = Mapping[str, float]
 
 FRACTION: Final[Limits] = {"ge": 0.0, "le": 1.0}
+FRICTION: Final[Limits] = {"ge": 0.0, "le": 10.0}
+"""Rubber has more than 1."""
 SIGNED_FRACTION: Final[Limits] = {"ge": -1.0, "le": 1.0}
 LENGTH: Final[Limits] = {"ge": 1e-9, "le": 1e3}
 """From a few atoms to a kilometre: like the next ones far beyond any chain, and small enough for squares and ratios."""
@@ -51,9 +48,6 @@ DAMPING: Final[Limits] = {"ge": 0.0, "le": 1e12}
 TURNING: Final[Limits] = {"gt": 0.0, "le": 1e6}
 """Up to a speed that no joint reaches at the highest frequency of a scene."""
 
-FAR: Final = 30.0
-"""A value so many times that of every preset, or so small a part of it, is probably in another unit."""
-
 
 @dataclass(frozen=True)
 class Quantity:
@@ -64,7 +58,7 @@ class Quantity:
         unit: SI unit, `DIMENSIONLESS` for pure numbers.
         value: value in Table 1, in `unit`.
         sigma: standard deviation in Table 1, in `unit`; 0 when the table gives none.
-        source: how the value was obtained; "assumed" when it is not in the paper.
+        source: how the value was obtained; "chosen here" when it is not in the paper.
         bounds: the physical values, in `unit`.
         meaning: one line saying what the quantity is.
     """
@@ -112,7 +106,7 @@ class Parameters(Section):
         "e_fc", DIMENSIONLESS, 0.018, 0.004, FRACTION, "measured", "normal restitution, floor and chain"
     )
     floor_friction: float = _row(
-        "μ_fc", DIMENSIONLESS, 0.27, 0.02, FRACTION, "measured", "friction coefficient, floor and chain"
+        "μ_fc", DIMENSIONLESS, 0.27, 0.02, FRICTION, "measured", "friction coefficient, floor and chain"
     )
     gravity: float = _row("g", "m/s²", 9.809, 0.0, GRAVITY, "looked up", "gravitational acceleration, along −y")
     chain_restitution: float = _row(
@@ -135,9 +129,9 @@ class Parameters(Section):
     tangential_restitution: float = _row(
         "e_t", DIMENSIONLESS, 0.0, 0.0, SIGNED_FRACTION, "adjusted", "tangential restitution, all pairs"
     )
-    circle_radius: float = _row("r", "m", 4.2e-3, 0.0, LENGTH, "assumed", "radius of the circle at a link end")
+    circle_radius: float = _row("r", "m", 4.2e-3, 0.0, LENGTH, "chosen here", "radius of the circle at a link end")
     """Not in the paper: between the roller (3.9 mm) and the plates (about 5 mm) of a half-inch chain."""
-    half_width: float = _row("h", "m", 4e-3, 0.0, WIDTH, "assumed", "half width of a link, of a plane that tilts")
+    half_width: float = _row("h", "m", 4e-3, 0.0, WIDTH, "chosen here", "half width of a link, of a plane that tilts")
     """Not in the paper: a half-inch chain is about 8 mm wide over its pins."""
 
     @model_validator(mode="after")
@@ -164,10 +158,21 @@ class Parameters(Section):
             values: name or symbol, in ASCII or as printed → new value, in the units of the table.
 
         Raises:
-            InputError: a name is unknown, a value is given twice, or the new set is not physical.
+            InputError: a name is unknown, a value is given twice, the new set is not physical, or a length or mass is
+                1000 times Table 1's: in mm or g.
         """
-        return validated(type(self), {**vars(self), **by_name(values, "parameters")}, "parameters")
+        named = by_name(values, "parameters")
+        changed = validated(type(self), {**vars(self), **named}, "parameters")
+        for name, (usual, unit) in _SLIPS.items():
+            if name in named and math.isclose(getattr(changed, name), 1000 * usual, rel_tol=1e-9):
+                raise InputError(
+                    f"parameters.{name}: {short(1000 * usual)} {unit} is 1000 times Table 1's; give {short(usual)}"
+                )
+        return changed
 
+
+_SLIPS: Final = {name: (q.value, q.unit) for name, q in Parameters.quantities().items() if q.unit in ("m", "kg")}
+"""Quantities that are easily given in mm or g: name → value in Table 1, unit."""
 
 _TABLE_1: Final = Parameters.model_validate({name: q.value for name, q in Parameters.quantities().items()})
 
@@ -178,38 +183,6 @@ PRESETS: Final[dict[str, Parameters]] = {
 """Named sets of parameters. `paper` is Table 1 as it is. `soft` has softer joints and a smoother joint
 friction, which take far fewer steps with `reference`, not with `standard`; the paper found that these adjusted
 values matter little, but they make another model."""
-
-
-def warn_of_units(given: Iterable[tuple[str, str, Any]]) -> None:
-    """Warn of values that look like values in another unit, once for each parameter, where the caller was called.
-
-    Args:
-        given: path where a value was given, name of the parameter, value.
-    """
-    named = set()
-    for path, name, value in given:
-        problem = None if name in named else _unit_problem(name, value)
-        if problem is not None:
-            named.add(name)
-            warnings.warn(f"{path}: {problem}", InputWarning, stacklevel=3)
-
-
-def _unit_problem(name: str, value: float) -> str | None:
-    """What makes a value look like one in another unit: it is `FAR` from the parameter's value in every preset.
-
-    Zero is never taken for that, and neither is a pure number, which has no unit.
-    """
-    unit = field_unit(Parameters.model_fields[name])
-    usual = [getattr(parameters, name) for parameters in PRESETS.values()]
-    if unit == DIMENSIONLESS or value == 0 or any(1 / FAR <= value / each <= FAR for each in usual):
-        return None
-    quantity = Parameters.quantities()[name]
-    ratio = max(value / quantity.value, sys.float_info.min)  # which has a reciprocal
-    times = f"{short(ratio)} times" if ratio > 1 else f"1/{short(1 / ratio)} of"
-    whose = "the preset's" if quantity.source == "assumed" else "Table 1's"
-    meant = Decimal(repr(value)).scaleb(-round(math.log10(ratio))).normalize()
-    suggested = f"{meant:e}".replace("+", "")
-    return f"{short(value)} {unit} is {times} {whose} {short(quantity.value)} {unit}; did you mean {suggested}?"
 
 
 def preset(name: str) -> Parameters:

@@ -1,13 +1,17 @@
 """What happens in a walk: how long the chain is, how fast it is spun, from which height it is released."""
 
 import math
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
 
+from warpchain.inputs.floor import Array, Points, checked_profile, slope_points
+from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import on_gpu
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.validation import InputError, Section, number_field
+from warpchain.inputs.sprocket_motion import Motion, checked_motion
+from warpchain.inputs.validation import InputError, Section, Whole, number_field, shown
 
 MOST_LINKS: Final = 100_000
 """A chain of so many links takes 0.4 GB, and kernels of its own."""
@@ -15,44 +19,56 @@ MOST_LINKS_ON_GPU: Final = 1024
 """A chain is a block of threads there, one for each link, and CUDA has no larger blocks."""
 HIGHEST_FREQUENCY: Final = 1e4
 """There Table 1's chain moves at 3.8 km/s, under a tension that stretches its joints by a third of a link [Hz]."""
+LIKELY_FREQUENCY: Final = 300.0
+"""Greatest frequency of a sprocket, far above what any loop holds [Hz]; a greater one is in turns a minute."""
 LEAST_SPROCKET: Final = 1e-3
 """Least distance of the joints from the sprocket's centre, in link lengths; far smaller ones are lost in rounding."""
 HIGHEST: Final = 1e6
 """Greatest height, where numbers still tell a nanometre [m]."""
 HIGHEST_LOAD: Final = 1e4
 """Greatest factor by which loads are multiplied; more than some hundred make joints stretch and steps short."""
-LEAST_INERTIA: Final = 0.5
-"""Part of its rotary inertia that a link must keep under multiplied loads."""
 FASTEST_TAP: Final = 1e3
 """Greatest speed [m/s] and rate [rad/s] of the plane at the release, far beyond that of any loop."""
 LONGEST: Final = 1e6
 """Greatest time, in which numbers still tell a nanosecond, a short step [s]."""
 
 
+STEEPEST: Final = 80.0
+"""Greatest angle of a slope [°]."""
 RIGHT_ANGLE: Final = math.pi / 2
+OF_LINKS: Final = ("link_masses", "link_inertias", "viscous_frictions", "coulomb_frictions")
+"""Fields with a number for each link or joint."""
 TAP: Final = ("lateral_speed", "tilt", "tilt_rate", "yaw_rate")
 """What a release may give to a plane that tilts. Each is 0 by default: an upright plane that nothing disturbs stays
 upright, so that a scene with a tilting plane alone is the paper's."""
 
 
-def _even(links: int) -> int:
-    if links % 2:
-        raise ValueError(f"{links} is odd; a chain alternates inner and outer links, so give an even number")
-    return links
+def _as_tuple(given: Any) -> Any:
+    if given is not None and not isinstance(given, list | tuple):
+        raise ValueError(f"{shown(given)} is no list; give a number for each link, or null")
+    return None if given is None else tuple(given)
+
+
+_Numbers = Annotated[
+    tuple[Annotated[float, Field(ge=0, le=1e12)], ...] | None,
+    BeforeValidator(_as_tuple),
+]
+"""A number for each link or joint; null: what the parameters say."""
 
 
 class Scene(Section):
     """What happens in one walk, from hanging on the sprocket to the end.
 
     Raises:
-        pydantic.ValidationError: a value is unknown or out of bounds, `links` is odd, the clearance is that of a
-            hanging chain although the chain never hangs, or the release disturbs a plane that is fixed.
+        pydantic.ValidationError: a value is unknown or out of bounds, the clearance is that of a hanging chain although
+            the chain never hangs, the release disturbs a plane that is fixed, a plane that tilts has no flat floor, or
+            a link or joint is none of the chain.
     """
 
-    links: Annotated[int, AfterValidator(_even)] = number_field(
+    links: Whole = number_field(
         60,
         "1",
-        "number of links around the loop, even: inner and outer links alternate",
+        "number of links around the loop, even where inner and outer links alternate",
         symbol="n",
         ge=4,
         le=MOST_LINKS,
@@ -118,6 +134,36 @@ class Scene(Section):
     walk_limit: float = number_field(
         20.0, "s", "longest time from the release to rest; then the walk ends as time_limit", gt=0, le=LONGEST
     )
+    release: Annotated[Motion | None, BeforeValidator(checked_motion)] = Field(
+        default=None,
+        description="motion of the sprocket from the release on, rows [time in s, x and y in m from its place, "
+        "frequency in Hz], after whose last it vanishes; null: it vanishes at once",
+    )
+    floor: Annotated[Literal["flat"] | Points, BeforeValidator(checked_profile)] = Field(
+        default="flat",
+        description="flat, or a profile [[x, y], …] in m, whose ends go on straight",
+    )
+    slope: float = number_field(
+        0.0,
+        "°",
+        "of an endless floor; positive: it falls the way the chain walks",
+        ge=-STEEPEST,
+        le=STEEPEST,
+    )
+    distance_limit: float | None = number_field(
+        None,
+        "m",
+        "distance along the floor at which a walk ends as distance_limit; null: none",
+        gt=0,
+        le=HIGHEST,
+    )
+    walk_until: float | None = number_field(
+        None,
+        "s",
+        "time from the release after which a walk that is not at rest is finished, as planned, without Δx; null: none",
+        gt=0,
+        le=LONGEST,
+    )
     plane: Literal["fixed", "tilting"] = Field(
         default="fixed",
         description="whether the chain stays in an upright plane, or walks in one that moves, turns and may fall over",
@@ -146,6 +192,55 @@ class Scene(Section):
         ge=-FASTEST_TAP,
         le=FASTEST_TAP,
     )
+    charm_link: int = number_field(0, "1", "link that carries a charm", ge=0, le=MOST_LINKS - 1)
+    charm_mass: float = number_field(0.0, "kg", "mass at the centre of charm_link, added to its own", ge=0, le=1e6)
+    charm_inertia: float = number_field(
+        0.0, "kg m²", "moment of inertia of the charm about that centre, added likewise", ge=0, le=1e12
+    )
+    stiff_joint: int = number_field(
+        0,
+        "1",
+        "joint that is stiff: the one at the end of this link",
+        ge=0,
+        le=MOST_LINKS - 1,
+    )
+    stiff_joint_factor: float = number_field(
+        1.0, "1", "by which viscous and Coulomb friction of stiff_joint are multiplied", ge=0, le=1e6
+    )
+    mass_gradient: float = number_field(
+        0.0,
+        "1",
+        "mass and inertia of links grow evenly along the chain, from 1 − this times their own to 1 + this times",
+        gt=-1,
+        lt=1,
+    )
+    link_masses: _Numbers = number_field(None, "kg", "mass of each link; null: of its kind")
+    link_inertias: _Numbers = number_field(None, "kg m²", "moment of inertia of each link; null: of its kind")
+    viscous_frictions: _Numbers = number_field(None, "N m s", "viscous_friction of each joint; null: the same for all")
+    coulomb_frictions: _Numbers = number_field(None, "N m", "coulomb_friction of each joint; null: the same for all")
+
+    @model_validator(mode="after")
+    def _links_are_there(self) -> Self:
+        for name in ("charm_link", "stiff_joint"):
+            if getattr(self, name) >= self.links:
+                raise InputError(
+                    f"{name}: {getattr(self, name)} is not among {self.links} links; give 0 to {self.links - 1}"
+                )
+        for name in OF_LINKS:
+            values = getattr(self, name)
+            if values is not None and len(values) != self.links:
+                raise InputError(f"{name}: {len(values)} numbers for {self.links} links; give one for each")
+            if values is not None and name.startswith("link") and min(values) == 0:
+                raise InputError(f"{name}[{values.index(0)}]: 0 is no {name[5:-2]}; give more")
+        return self
+
+    @model_validator(mode="after")
+    def _one_floor(self) -> Self:
+        if self.slope != 0 and self.floor != "flat":
+            raise InputError(f"slope: {self.slope} of a floor that is a profile; give slope: 0, or floor: flat")
+        if self.plane == "tilting" and floor_points(self) is not None:
+            raise InputError("plane: 'tilting' needs a flat floor; give plane: fixed, or floor: flat and slope: 0")
+        return self
 
     @model_validator(mode="after")
     def _tap_needs_tilting_plane(self) -> Self:
@@ -157,6 +252,13 @@ class Scene(Section):
         return self
 
     @model_validator(mode="after")
+    def _motion_needs_sprocket(self) -> Self:
+        if self.release is not None and (self.start == "ellipse" or self.plane == "tilting"):
+            word = "start: ellipse" if self.start == "ellipse" else "plane: tilting"
+            raise InputError(f"release: a motion of the sprocket, which {word} does not go with; leave one out")
+        return self
+
+    @model_validator(mode="after")
     def _hanging_needs_rest(self) -> Self:
         if self.clearance_of == "hanging" and self.start != "rest":
             raise InputError(
@@ -164,6 +266,46 @@ class Scene(Section):
                 "give 'spinning' here, or start: rest"
             )
         return self
+
+
+def floor_points(scene: Scene) -> Array | None:
+    """Points of the floor's profile [m], shape (p, 2); None if it is flat."""
+    if scene.floor != "flat":
+        return np.array(scene.floor)
+    return slope_points(scene.slope) if scene.slope != 0 else None
+
+
+def link_values(scene: Scene, parameters: Parameters) -> LinkValues:
+    """What each link and joint of the chain of a walk has of its own."""
+    values = alternating(parameters, scene.links)
+    given = (scene.link_masses, scene.link_inertias, scene.viscous_frictions, scene.coulomb_frictions)
+    rows = (values.mass, values.inertia, values.viscous_friction, values.coulomb_friction)
+    for row, own in zip(rows, given, strict=True):
+        if own is not None:
+            row[:] = own
+    if scene.mass_gradient:
+        growth = 1 + scene.mass_gradient * np.linspace(-1.0, 1.0, scene.links)
+        values.mass[:] *= growth
+        values.inertia[:] *= growth
+    values.mass[scene.charm_link] += scene.charm_mass
+    values.inertia[scene.charm_link] += scene.charm_inertia
+    values.viscous_friction[scene.stiff_joint] *= scene.stiff_joint_factor
+    values.coulomb_friction[scene.stiff_joint] *= scene.stiff_joint_factor
+    return values
+
+
+def check_parity(scene: Scene, parameters: Parameters) -> None:
+    """Check that the links of a chain can alternate between two kinds, if they do.
+
+    Raises:
+        InputError: their number is odd.
+    """
+    is_one_kind = (parameters.inner_mass, parameters.inner_inertia) == (parameters.outer_mass, parameters.outer_inertia)
+    if scene.links % 2 and not is_one_kind and (scene.link_masses is None or scene.link_inertias is None):
+        raise InputError(
+            f"scene.links: {scene.links} is odd; inner and outer links alternate: give an even number, "
+            "link_masses and link_inertias, or equal inner and outer links"
+        )
 
 
 def settling_time(scene: Scene) -> float:
@@ -189,22 +331,6 @@ def loop_speed(scene: Scene, parameters: Parameters) -> float:
     """
     half = math.asin(min(1.0, parameters.link_length / (2 * joint_radius(scene, parameters))))
     return math.pi * scene.frequency * parameters.link_length / half
-
-
-def greatest_load(parameters: Parameters) -> float:
-    """Greatest `Scene.load_factor` that leaves every link `LEAST_INERTIA` of its rotary inertia.
-
-    It is I − mℓ²/6 that is multiplied: point-like links lose inertia. Infinite where I ≥ mℓ²/6.
-    """
-    limit = math.inf
-    for mass, inertia in (
-        (parameters.inner_mass, parameters.inner_inertia),
-        (parameters.outer_mass, parameters.outer_inertia),
-    ):
-        missing = mass * parameters.link_length**2 / 6 - inertia
-        if missing > 0:
-            limit = min(limit, 1 + (1 - LEAST_INERTIA) * inertia / missing)
-    return limit
 
 
 def contact_radius(scene: Scene, parameters: Parameters) -> float:
@@ -251,25 +377,34 @@ def check_links_on_gpu(links: int, device: str, field: str) -> None:
 def check_scene(scene: Scene, parameters: Parameters) -> None:
     """Check what a scene and its parameters must fulfil together.
 
-    A scene that starts as an ellipse has no sprocket, so nothing is asked of it.
+    A scene that starts as an ellipse has no sprocket, so nothing is asked of that.
 
     Raises:
-        InputError: the chain is too short for its sprocket, or the sprocket too small, or `contact_radius` finds none,
-            or the links are too point-like for the load factor that is given.
+        InputError: links of two kinds are odd in number, the chain is too short for its sprocket, or the sprocket too
+            small, or `contact_radius` finds none, or the links are too point-like for the load factor that is given, or
+            the frequency is one of minutes.
     """
+    check_parity(scene, parameters)
     if scene.start == "ellipse":
         return
+    if scene.frequency > LIKELY_FREQUENCY:
+        raise InputError(
+            f"scene.frequency: {scene.frequency:g} Hz is far above what a loop holds, 35 Hz with 60 links; if that is "
+            f"in turns a minute, give {scene.frequency / 60:g}"
+        )
     contact_radius(scene, parameters)
     if joint_radius(scene, parameters) < LEAST_SPROCKET * parameters.link_length:
         raise InputError(
             f"parameters.sprocket_radius: {parameters.sprocket_radius} m is nothing beside links of "
             f"{parameters.link_length} m; give a larger radius, or start: ellipse, which needs none"
         )
-    if scene.load_factor is not None and scene.load_factor > greatest_load(parameters):
-        raise InputError(
-            f"scene.load_factor: {scene.load_factor:g} is too much for links of so little rotary inertia; "
-            f"give at most {greatest_load(parameters):.6g}, or null"
-        )
+    if scene.load_factor is not None:
+        greatest = link_values(scene, parameters).greatest_load(parameters.link_length)
+        if scene.load_factor > greatest:
+            raise InputError(
+                f"scene.load_factor: {scene.load_factor:g} is too much for links of so little rotary inertia; "
+                f"give at most {greatest:.6g}, or null"
+            )
     fewest = fewest_links(scene, parameters)
     if scene.links < fewest:
         raise InputError(

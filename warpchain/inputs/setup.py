@@ -6,54 +6,23 @@ Keyword arguments, the command line and YAML files (`read_setup`) all go through
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any, Final
 
-from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options
+from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options, replaced_by
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
 from warpchain.inputs.scene import Scene, check_links_on_gpu, check_scene
-from warpchain.inputs.sections import SECTION_OF, SECTIONS
+from warpchain.inputs.sections import SECTIONS
+from warpchain.inputs.state import DEFAULT_PRESET, Setup, State
 from warpchain.inputs.validation import InputError, by_name, path_of, shown, suggestion, validated
 from warpchain.inputs.yaml_files import read_yaml
 from warpchain.kernels.methods.method import find_method
 
-DEFAULT_PRESET: Final = "paper"
-"""Preset of a walk or a sweep that names none."""
+__all__ = ["DEFAULT_PRESET", "Setup", "combined", "continued", "options_beside", "read_setup", "resolve"]
 
-
-@dataclass(frozen=True)
-class Setup:
-    """Everything that says what one walk is, checked and complete.
-
-    Attributes:
-        preset: name of the parameter preset that it started from.
-        parameters: of the chain, its sprocket and the floor.
-        scene: what happens.
-        options: how it is computed.
-    """
-
-    preset: str
-    parameters: Parameters
-    scene: Scene
-    options: Options
-
-    def with_drawn(self, drawn: Mapping[str, float]) -> "Setup":
-        """A copy with drawn values in place of its own.
-
-        Args:
-            drawn: fields of `Parameters` or `Scene` → value.
-
-        Raises:
-            InputError: the values together make no possible walk.
-        """
-        sections: dict[str, dict[str, float]] = {"parameters": {}, "scene": {}}
-        for name, value in drawn.items():
-            sections[SECTION_OF[name]][name] = value
-        parameters = validated(Parameters, {**vars(self.parameters), **sections["parameters"]}, "parameters")
-        scene = validated(Scene, {**vars(self.scene), **sections["scene"]}, "scene")
-        check_scene(scene, parameters)
-        return Setup(self.preset, parameters, scene, self.options)
+OF_THE_WALK: Final = ("walk_limit", "walk_until", "distance_limit", "floor", "slope")
+"""Fields of the scene that matter after the release."""
 
 
 def resolve(
@@ -167,3 +136,29 @@ def read_setup(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
             values = by_name(values, section)
         sections[section] = {} if values is None else values  # what has nothing under it changes nothing
     return content.get("preset"), sections
+
+
+def continued(state: State, sections: Mapping[str, Mapping[str, object]]) -> Setup:
+    """The setup of a walk from a state, with other parameters, options or limit of the walk.
+
+    Raises:
+        InputError: a value is refused, or is one of what comes before the release.
+    """
+    if early := [name for name in sections["scene"] if name not in OF_THE_WALK]:
+        raise InputError(f"{', '.join(early)}: given together with a state, which lies after the release; leave it out")
+    before, given = state.setup, sections["options"]
+    options = validated(Options, {**before.options.model_dump(exclude=replaced_by(given)), **given}, "options")
+    scene = validated(Scene, {**vars(before.scene), **sections["scene"]}, "scene")
+    parameters = before.parameters.with_values(sections["parameters"]) if sections["parameters"] else before.parameters
+    if scene.plane == "tilting":
+        check_can_tilt(options)
+    check_links_on_gpu(scene.links, options.device, "start")
+    for name in OF_THE_WALK[:2]:
+        if (end := getattr(scene, name)) is not None and end < state.time:
+            raise InputError(f"{name}: {end:g} s is before the state at {state.time:g} s; give a later time")
+    setup = Setup(before.preset, parameters, scene, options)
+    memory = state.memory
+    floors = [(each.floor, each.slope) for each in (scene, before.scene)]
+    if (parameters, options, floors[0]) != (before.parameters, before.options, floors[1]):
+        memory = {name: values for name, values in memory.items() if "/" in name}  # caches are of the former ones
+    return replace(setup, start=replace(state, setup=setup, memory=memory))

@@ -19,9 +19,9 @@ class CurvePoints:
     """Points of a family of closed curves P(s, size), clockwise in s.
 
     Attributes:
-        point: P, shape (m, 2) [m].
-        along: ∂P/∂s, shape (m, 2).
-        growth: ∂P/∂size at fixed s, shape (m, 2).
+        point: P, shape (2, m) [m].
+        along: ∂P/∂s, shape (2, m).
+        growth: ∂P/∂size at fixed s, shape (2, m).
     """
 
     point: Array
@@ -57,17 +57,17 @@ def stadium(radius: float) -> Curve:
     def points(s: Array, size: float) -> CurvePoints:
         turn = 4 * quarter + 2 * size
         laps, s = np.divmod(s, turn)
-        down = np.clip(s - quarter, 0.0, size)  # distances along the two straights
-        up = np.clip(s - 3 * quarter - size, 0.0, size)
+        down = np.minimum(np.maximum(s - quarter, 0.0), size)  # distances along the two straights
+        up = np.minimum(np.maximum(s - 3 * quarter - size, 0.0), size)
         angle = (s - down - up) / radius
         sine, cosine = np.sin(angle), np.cos(angle)
-        along = np.stack([cosine, -sine], axis=1)
+        along = np.array([cosine, -sine])
         # A longer straight moves points at the same s: past its end on the right, past its start and end on the left.
         down_growth = np.where(s > quarter + size, 1.0, 0.0)
         up_growth = np.where(s > 3 * quarter + size, np.where(s > turn - quarter, 1.0, -1.0), 0.0)
-        growth = -(down_growth + up_growth + 2 * laps)[:, None] * along  # every lap before grows as well
-        growth[:, 1] += up_growth - down_growth
-        point = np.stack([radius * sine, radius * cosine - down + up], axis=1)
+        growth = -(down_growth + up_growth + 2 * laps) * along  # every lap before grows as well
+        growth[1] += up_growth - down_growth
+        point = np.array([radius * sine, radius * cosine - down + up])
         return CurvePoints(point=point, along=along, growth=growth)
 
     return Curve(
@@ -88,8 +88,9 @@ def ellipse(aspect: float) -> Curve:
     wide, high = 1 / np.sqrt(aspect), np.sqrt(aspect)
 
     def points(s: Array, size: float) -> CurvePoints:
-        unit = np.stack([wide * np.sin(s), high * np.cos(s)], axis=1)
-        along = np.stack([wide * np.cos(s), -high * np.sin(s)], axis=1)
+        sine, cosine = np.sin(s), np.cos(s)
+        unit = np.array([wide * sine, high * cosine])
+        along = np.array([wide * cosine, -high * sine])
         return CurvePoints(point=size * unit, along=size * along, growth=unit)
 
     angles = np.linspace(0, 2 * np.pi, 4096, endpoint=False)
@@ -123,12 +124,12 @@ def lay_chain(
     for _ in range(50):
         period, period_growth = curve.period(size)
         s[0] = phase * period
-        here, following = _chord_ends(curve.points(np.append(s, s[0] + period), size))
-        chord = following.point - here.point
-        residual = np.sum(chord**2, axis=1) - link_length**2
-        to_here = -2 * np.sum(chord * here.along, axis=1)
-        to_following = 2 * np.sum(chord * following.along, axis=1)
-        to_size = 2 * np.sum(chord * (following.growth - here.growth), axis=1)
+        ends = curve.points(np.concatenate([s, [s[0] + period]]), size)
+        chord = ends.point[:, 1:] - ends.point[:, :-1]
+        residual = np.sum(chord**2, axis=0) - link_length**2
+        to_here = -2 * np.sum(chord * ends.along[:, :-1], axis=0)
+        to_following = 2 * np.sum(chord * ends.along[:, 1:], axis=0)
+        to_size = 2 * np.sum(chord * (ends.growth[:, 1:] - ends.growth[:, :-1]), axis=0)
         # The first joint moves with the period; the last chord ends on it one period later.
         to_size[0] += to_here[0] * phase * period_growth
         to_size[-1] += to_following[-1] * (1 + phase) * period_growth
@@ -141,7 +142,7 @@ def lay_chain(
         s[1:] += change[:-1]
         size = max(size + float(change[-1]), 0.0)
     joints = curve.points(s, size)
-    closed = np.linalg.norm(joints.point - np.roll(joints.point, 1, axis=0), axis=1)
+    closed = np.hypot(*(joints.point - np.roll(joints.point, 1, axis=1)))
     if not np.allclose(closed, link_length, rtol=1e-9, atol=0.0):
         raise ValueError(f"a closed chain of {links} links of {link_length} m does not fit this curve")
     # Rigid motion along the curve: s[0] moves at unit rate, the chords keep their lengths.
@@ -150,9 +151,9 @@ def lay_chain(
     drive[-1] -= to_following[-1]
     rates = _solve_loop(to_here, to_following, to_size, drive)
     first_rate = 1.0 + phase * period_growth * rates[-1]
-    joint_rate = np.append(first_rate, rates[:-1])[:, None] * joints.along + rates[-1] * joints.growth
-    joint_rate *= speed / np.mean(np.linalg.norm(joint_rate, axis=1))
-    return links_between(joints.point, joint_rate)
+    joint_rate = np.append(first_rate, rates[:-1]) * joints.along + rates[-1] * joints.growth
+    joint_rate *= speed / np.mean(np.sqrt(np.sum(joint_rate**2, axis=0)))
+    return links_between(joints.point.T, joint_rate.T)
 
 
 def _solve_loop(to_here: Array, to_following: Array, to_size: Array, right: Array) -> Array:
@@ -162,21 +163,11 @@ def _solve_loop(to_here: Array, to_following: Array, to_size: Array, right: Arra
     From the first chord on, each gives the next δs as a + b δsize; the last one then gives δsize.
     """
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a singular loop gives no finite change
-        scale = np.cumprod(np.append(1.0, -to_here[:-1] / to_following[:-1]))  # of each δs per first δs
-        constant, slope = (
-            scale * np.append(0.0, np.cumsum(side[:-1] / (to_following[:-1] * scale[1:]))) for side in (right, -to_size)
-        )
+        scale = np.cumprod(-to_here[:-1] / to_following[:-1])  # of each δs per first δs
+        divisor = to_following[:-1] * scale
+        constant, slope = (scale * np.cumsum(side[:-1] / divisor) for side in (right, -to_size))
         size = (right[-1] - to_here[-1] * constant[-1]) / (to_size[-1] + to_here[-1] * slope[-1])
-        return np.append(constant[1:] + slope[1:] * size, size)
-
-
-def _chord_ends(points: CurvePoints) -> tuple[CurvePoints, CurvePoints]:
-    """First and second ends of the chords between points that follow one another."""
-    first, second = (
-        CurvePoints(points.point[part], points.along[part], points.growth[part])
-        for part in (slice(None, -1), slice(1, None))
-    )
-    return first, second
+        return np.append(constant + slope * size, size)
 
 
 def links_between(joints: Array, joint_rate: Array) -> tuple[Array, Array]:
@@ -201,7 +192,7 @@ def links_between(joints: Array, joint_rate: Array) -> tuple[Array, Array]:
 def _spread_evenly(curve: Curve, size: float, s: Array) -> Array:
     """Parameters at equal arc lengths, starting at s[0]."""
     fine = s[0] + np.linspace(0.0, curve.period(size)[0], 1024)
-    speed = np.linalg.norm(curve.points(fine, size).along, axis=1)
+    speed = np.sqrt(np.sum(curve.points(fine, size).along ** 2, axis=0))
     arc = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(fine))])
     spread: Array = np.interp(arc[-1] * np.arange(len(s)) / len(s), arc, fine)
     return spread

@@ -14,10 +14,10 @@ import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Annotated, Any, Final, TypeVar, get_args
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 
 STRICT: Final = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -101,6 +101,11 @@ def number_field(default: Any, unit: str, description: str, **more: Any) -> Any:
     return Field(default, description=description, json_schema_extra={"unit": unit, **more}, **limits)
 
 
+WHOLE: Final = BeforeValidator(lambda given: int(given) if isinstance(given, float) and given.is_integer() else given)
+"""Of whole numbers: 60.0 is sixty."""
+Whole = Annotated[int, WHOLE]
+
+
 def field_unit(field: FieldInfo) -> str:
     """Unit of a field that `number_field` made; `DIMENSIONLESS` for any other."""
     extra = field.json_schema_extra
@@ -113,6 +118,13 @@ def field_limits(field: FieldInfo) -> dict[str, float]:
     for limit in field.metadata:
         limits |= {name: float(getattr(limit, name)) for name in ("ge", "gt", "le", "lt") if hasattr(limit, name)}
     return limits
+
+
+def field_choices(field: FieldInfo) -> tuple[Any, ...]:
+    """The words or truth values that a field may have; none for numbers and other texts."""
+    extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+    words: Any = extra.get("enum", [word for word in get_args(field.annotation) if isinstance(word, str)])
+    return (True, False) if field.annotation is bool else tuple(words)
 
 
 def field_bounds(field: FieldInfo) -> Bounds:
@@ -248,8 +260,9 @@ def refusals(error: ValidationError, path: str, keys: Iterable[str] = ()) -> lis
 def plain(value: object, path: str = "value") -> Any:
     """A user's value in Python's own types, as a YAML file gives it; what is none of these is left as it is.
 
-    NumPy's numbers, truth values and texts become Python's; arrays, ranges and tuples become lists, also inside of
-    lists and mappings. NumPy's times become texts, which no number can be.
+    NumPy's numbers, truth values and texts become Python's; arrays, ranges, tuples and what pandas and xarray have for
+    them become lists, tables mappings of lists, also inside of lists and mappings. NumPy's times become texts, which no
+    number can be.
 
     Raises:
         InputError: there are more than `MOST_VALUES` of them, or deeper than `DEEPEST`; the message begins with `path`.
@@ -263,6 +276,10 @@ def plain(value: object, path: str = "value") -> Any:
             raise InputError(f"{path}: more than {MOST_VALUES} values; give fewer")
         if type(value) in _OWN:
             return value
+        if hasattr(value, "to_dict") and hasattr(value, "columns"):
+            value = value.to_dict("list")
+        elif hasattr(value, "to_numpy"):
+            value = value.to_numpy()
         if isinstance(value, np.ndarray) and value.ndim == 0:
             value = value[()]
         if isinstance(value, np.generic):
@@ -288,6 +305,7 @@ def checked_whole(value: object, path: str, least: int, most: int) -> int:
     Raises:
         InputError: it is not; the message begins with `path`.
     """
+    value = int(value) if isinstance(value, float) and value.is_integer() else value
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
         limit = f"2**{most.bit_length()} - 1" if most > 2**64 else str(most)
         raise InputError(f"{path}: {shown(value)} is no whole number from {least} to {limit}; give one")

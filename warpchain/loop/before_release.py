@@ -10,6 +10,9 @@ from warpchain.hdf5_files import Stored, check_fields, stored_fields
 
 Array = NDArray[np.float64]
 
+BEFORE: Final = "before_release"
+"""Name of the motion before the release, among the arrays of a walk and in its file."""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class BeforeRelease:

@@ -17,8 +17,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.inputs.link_values import LinkValues, alternating, mean_value
 from warpchain.inputs.parameters import Parameters, preset
-from warpchain.inputs.scene import joint_radius
+from warpchain.inputs.scene import joint_radius, link_values
 from warpchain.inputs.setup import Setup
 from warpchain.loop.before_release import BeforeRelease
 from warpchain.loop.catenary import Catenary, catenary_between
@@ -69,18 +70,22 @@ class LoopParameters:
         return self.viscous_friction * spin + coulomb
 
     @classmethod
-    def of(cls, parameters: Parameters, friction_smoothing: float | None = None) -> "LoopParameters":
-        """Take them from the parameters of a chain; `friction_smoothing` replaces the chain's own."""
-        mass = (parameters.inner_mass + parameters.outer_mass) / 2
-        inertia = (parameters.inner_inertia + parameters.outer_inertia) / 2
-        length = parameters.link_length
+    def of(
+        cls, parameters: Parameters, links: LinkValues | None = None, friction_smoothing: float | None = None
+    ) -> "LoopParameters":
+        """Take them from the parameters of a chain and means over its links, which else are of two kinds in turn.
+
+        `friction_smoothing` replaces the chain's own.
+        """
+        links = links or alternating(parameters, 2)
+        mass, inertia, length = mean_value(links.mass), mean_value(links.inertia), parameters.link_length
         return cls(
             link_length=length,
             density=mass / length,
             inertia=(inertia - mass * length**2 / 6) / length,
             gravity=parameters.gravity,
-            viscous_friction=parameters.viscous_friction,
-            coulomb_friction=parameters.coulomb_friction,
+            viscous_friction=mean_value(links.viscous_friction),
+            coulomb_friction=mean_value(links.coulomb_friction),
             friction_smoothing=friction_smoothing or parameters.friction_smoothing,
         )
 
@@ -186,7 +191,7 @@ def average_loop(setup: Setup, before: BeforeRelease | None, center: Array | Non
     smoothing = setup.parameters.friction_smoothing
     if setup.options.soften_drive:
         smoothing = max(smoothing, preset("soft").friction_smoothing)  # of joints that are softened on the sprocket
-    parameters = LoopParameters.of(setup.parameters, smoothing)
+    parameters = LoopParameters.of(setup.parameters, link_values(setup.scene, setup.parameters), smoothing)
     return average_frames(before, parameters, center, joint_radius(setup.scene, setup.parameters))
 
 

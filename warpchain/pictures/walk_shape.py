@@ -46,7 +46,7 @@ def center_in_room(walk: "WalkResult") -> Array:
 
 def setting(walk: "WalkResult") -> str:
     """Links and frequency, as a title."""
-    return f"{walk.setup.scene.links} links, {walk.setup.scene.frequency:g} Hz"
+    return walk.setup.described.replace(" at ", ", ", 1)
 
 
 def headline(walk: "WalkResult") -> str:

@@ -56,8 +56,9 @@ def write_report(
     """
     result = load(directory)
     checked_output(path, REPORTS)
-    if animation_of is not None and not 0 <= animation_of < result.walk_count:
-        raise InputError(f"--walk: there is no walk {animation_of}; give 0 … {result.walk_count - 1}")
+    known = result.origin.sweeps[0].indices
+    if animation_of is not None and animation_of not in known:
+        raise InputError(f"--walk: there is no walk {animation_of}; give 0 … {known.max()}")
     sections = {
         "Figures": _figures(result),
         "Cells": _cells(result),
@@ -170,8 +171,8 @@ def _walk_table(
 
 def _walk(result: SweepResult, index: int, device: str | None) -> str:
     """One walk, as kept or else run again: its numbers, a player, and its pictures."""
-    from warpchain.run.single_walk import run_walk
     from warpchain.run.sweep_run import on_device
+    from warpchain.walks.one_walk import run_walk
 
     sweep = load_sweep(result.sweep)
     planned = (sweep if device is None else on_device(sweep, device)).planned(index)
@@ -250,7 +251,8 @@ def _value(block: Mapping[str, Any], section: str, name: str) -> str:
         values = [_plain(value) for value in block["grid"][name]]
         return ", ".join(values) if len(values) <= 12 else f"{values[0]} … {values[-1]} ({len(values)} values)"
     own = block if name == "preset" else block[section]
-    plain = _plain(own[name]) if name in own else "of the preset"
+    default = SECTIONS["scene"].model_fields[name].default if section == "scene" else "of the preset"
+    plain = _plain(own.get(name, default))
     distribution = block["distributions"].get(name, {})
     if "gaussian" in distribution:
         gaussian = distribution["gaussian"]

@@ -4,10 +4,15 @@ import contextlib
 import html
 import importlib
 import sys
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
+
+LINE_EVERY = 60.0
+"""Time [s] between two lines of progress where there is neither a terminal nor a notebook."""
+COMPILING = "compiling kernels; later runs find them ready"
 
 
 @dataclass
@@ -16,7 +21,8 @@ class SweepProgress:
 
     Attributes:
         walks: Walks of the sweep.
-        done: Walks whose results are on disk, those of earlier runs included.
+        done: Walks that are over, those of earlier runs included. Threads of this process count each walk, other
+            workers only those in files that are written.
         before: Walks that were on disk when this run began.
         seconds: Wall time [s] of this run so far.
         statuses: Number of walks of this run by status label.
@@ -39,7 +45,7 @@ class SweepProgress:
 
     @property
     def time_left(self) -> float | None:
-        """Seconds to go at this rate; None before the first shard."""
+        """Seconds to go at this rate; None before the first walk is over."""
         return (self.walks - self.done) / self.rate if self.rate > 0 else None
 
 
@@ -54,14 +60,43 @@ def counts_text(progress: SweepProgress) -> str:
 
 @contextlib.contextmanager
 def progress_bar() -> Iterator[OnProgress]:
-    """Yield a function that shows progress as a bar; without a terminal and a notebook it shows nothing."""
+    """Yield a function that shows progress as a bar; without a terminal and a notebook it prints a line a minute."""
     if _in_notebook():
         yield _notebook_bar()
     elif sys.stderr.isatty():
         with _terminal_bar() as show:
             yield show
     else:
-        yield lambda progress: None
+        yield _lines()
+
+
+def progress_text(progress: SweepProgress) -> str:
+    """How far a sweep is, in one line."""
+    if progress.compiling:
+        return COMPILING
+    left = "" if progress.time_left is None else f"   {duration_text(progress.time_left)} left"
+    rate = f"{progress.rate:.2f} a second{left}"
+    return f"{progress.done:,} of {progress.walks:,} walks   {rate}   {counts_text(progress)}"
+
+
+def duration_text(seconds: float) -> str:
+    """Hours, minutes and seconds, as far as needed."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s" if minutes else f"{rest} s"
+
+
+def _lines() -> OnProgress:
+    """A line on standard error now and then, for the logs of schedulers."""
+    last = time.monotonic()
+
+    def show(progress: SweepProgress) -> None:
+        nonlocal last
+        if time.monotonic() - last >= LINE_EVERY:
+            print(progress_text(progress), file=sys.stderr, flush=True)
+            last = time.monotonic()
+
+    return show
 
 
 def _in_notebook() -> bool:
@@ -93,20 +128,13 @@ def walk_in_notebook() -> Callable[[Any], None] | None:
 def _terminal_bar() -> Iterator[OnProgress]:
     """A bar on standard error."""
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress, TextColumn
 
-    columns = (
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("walks"),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[text]}"),
-    )
-    with Progress(*columns, console=Console(stderr=True)) as bar:
+    with Progress(BarColumn(), TextColumn("{task.fields[text]}"), console=Console(stderr=True)) as bar:
         task = bar.add_task("", total=None, text="")
 
         def show(progress: SweepProgress) -> None:
-            bar.update(task, total=progress.walks, completed=progress.done, text=_text(progress))
+            bar.update(task, total=progress.walks, completed=progress.done, text=progress_text(progress))
 
         yield show
 
@@ -118,7 +146,7 @@ def _notebook_bar() -> OnProgress:
 
     def show(progress: SweepProgress) -> None:
         nonlocal handle
-        text = f"{progress.done} of {progress.walks} walks  {_text(progress)}"
+        text = progress_text(progress)
         bar = f'<progress value="{progress.done}" max="{progress.walks}"></progress> {html.escape(text)}'
         content = {"text/plain": text, "text/html": bar}
         if handle is None:
@@ -127,7 +155,3 @@ def _notebook_bar() -> OnProgress:
             handle.update(content, raw=True)
 
     return show
-
-
-def _text(progress: SweepProgress) -> str:
-    return "compiling kernels" if progress.compiling else counts_text(progress)

@@ -1,7 +1,7 @@
 """The motion of any given chain: what tests and analysts use."""
 
 from collections.abc import Sequence
-from typing import Unpack
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.tallies import LOST
-from warpchain.inputs.keywords import Method, Number, OtherOptions, Preset, Truth
+from warpchain.inputs.floor import body_of, checked_profile, circles_of, distances
 from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import Parameters, preset
-from warpchain.inputs.scene import MOST_LINKS, check_links_on_gpu
+from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.scene import check_links_on_gpu
+from warpchain.inputs.sections import takes_fields
+from warpchain.inputs.state import State, real_array
 from warpchain.inputs.validation import InputError, plain, shown, validated
 from warpchain.status import Status
 from warpchain.walks.trajectory import Trajectory
@@ -27,32 +29,33 @@ _UNSOFTENED = {"soften_pile": False, "soften_drive": False}
 """A given chain has no phases in which joints soften."""
 
 
+@takes_fields("options", without=("soften_pile", "soften_drive"))
 def simulate(
-    parameters: Parameters | Preset,
-    position: Array,
-    velocity: Array,
-    duration: Number,
+    parameters: State | Parameters | str,
+    position: Array | None = None,
+    velocity: Array | None = None,
+    duration: float | None = None,
     *,
-    times: Sequence[Number] | Array | None = None,
-    floor: Truth = True,
-    gravity: Truth = True,
-    self_contact: Truth = True,
-    method: Method = "rkf78",
-    tolerance: Number | None = None,
+    times: Sequence[float] | Array | None = None,
+    floor: bool | Sequence[Sequence[float]] | Array = True,
+    gravity: bool = True,
+    self_contact: bool = True,
+    method: str = "rkf78",
+    tolerance: float | None = None,
     device: str = "cpu",
-    **settings: Unpack[OtherOptions],
+    **settings: Any,
 ) -> Trajectory:
     """Integrate a given chain, without sprocket.
 
     Args:
-        parameters: Of the chain, or the name of a preset.
+        parameters: Of the chain, or the name of a preset; or a :class:`State`, which has positions and velocities, too.
         position: (n, 3): x, y [m] and θ [rad] of each link's centre; n even, at least 4. Link i's right end meets
             link i + 1's left end, the last link's the first one's. Links 0, 2, … are inner ones.
         velocity: (n, 3): their rates [m/s, m/s, rad/s].
-        duration: Simulated time [s], from time 0.
+        duration: Simulated time [s], from time 0, which is that of the state.
         times: Instants of the trajectory [s], rising, in [0, duration]; steps land on them exactly. Default: 101
             instants evenly spread.
-        floor: Whether there is a floor at y = 0.
+        floor: Whether there is a floor at y = 0, or one like ``floor`` of a scene: points [[x, y], …] [m].
         gravity: Whether gravity acts.
         self_contact: Whether links touch one another.
         method: A key of ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
@@ -75,38 +78,151 @@ def simulate(
     for name in _UNSOFTENED:
         if getattr(options, name):
             raise InputError(f"options.{name}: only a walk has phases in which joints soften; leave it out")
-    for name, switch in (("floor", floor), ("gravity", gravity)):
-        if not isinstance(switch, bool):
-            raise InputError(f"{name}: {shown(switch)} is not a truth value; give True or False")
-    chain = parameters if isinstance(parameters, Parameters) else preset(parameters)
-    if not gravity:
-        chain = chain.with_values({"gravity": 0.0})
-    start, rates = _checked_state("position", position), _checked_state("velocity", velocity)
-    if len(rates) != len(start):
-        raise InputError(f"velocity: {len(rates)} rows, but position has {len(start)}; give one row per link each")
-    if len(start) < 4 or len(start) % 2:
-        raise InputError(f"position: {len(start)} links; a closed chain has an even number of at least 4")
-    if len(start) > MOST_LINKS:
-        raise InputError(f"position: {len(start)} links; give at most {MOST_LINKS}")
-    check_links_on_gpu(len(start), options.device, "position")
+    if not isinstance(gravity, bool):
+        raise InputError(f"gravity: {shown(gravity)} is not a truth value; give True or False")
+    points = _checked_floor(floor)
+    state = _checked_state(parameters, position, velocity)
+    chain = state.parameters if gravity else state.parameters.with_values({"gravity": 0.0})
+    check_links_on_gpu(state.links, options.device, "position")
     instants = _checked_times(end, times)
-    if len(instants) * len(start) > MOST_PLACES:
+    if len(instants) * state.links > MOST_PLACES:
         raise InputError(
-            f"times: {len(instants)} instants of {len(start)} links are too many; "
-            f"give at most {MOST_PLACES // len(start)}"
+            f"times: {len(instants)} instants of {state.links} links are too many; "
+            f"give at most {MOST_PLACES // state.links}"
         )
+    if points is not None:
+        _check_above(points, state.position, chain)
     with gpu_turn([options.device]):
-        return _follow(options, chain, start, rates, instants, end, bool(floor))
+        body = "none" if floor is False else body_of(points)
+        return _follow(options, chain, state.position, state.velocity, instants, end, body, points)
+
+
+def _checked_state(given: State | Parameters | str, position: Array | None, velocity: Array | None) -> State:
+    """The state of the chain, or an `InputError`."""
+    if not isinstance(given, State):
+        return State.of_links(position, velocity, given)
+    if position is not None or velocity is not None:
+        raise InputError("position: given together with a state, which has positions and velocities; leave them out")
+    if given.axes is not None:
+        raise InputError(
+            "parameters: the plane of this state tilts, and simulate keeps it fixed; give walk(start=…) it"
+        )
+    if given.memory and given.memory["state/softness"] > 0:
+        raise InputError(
+            "parameters: joints of this state are softened, which only a walk goes on with; give walk(start=…) it"
+        )
+    return given
+
+
+class Chains:
+    """Many given chains of n links, side by side on a device, whose velocities may be changed between runs.
+
+    For experiments, such as a drag or a push at any time. There is no sprocket; loops that collapse soften as those of
+    walks do.
+
+    Attributes:
+        time: To which the chains were last carried on [s], from 0.
+    """
+
+    def __init__(
+        self,
+        parameters: Sequence[Parameters],
+        position: Array,
+        velocity: Array,
+        *,
+        floor: bool = True,
+        method: str = "explicit",
+        device: str = "cpu",
+        **settings: Any,
+    ) -> None:
+        """Place the chains.
+
+        Args:
+            parameters: Of each of the W chains.
+            position: (W, n, 3), as those of :func:`simulate`.
+            velocity: (W, n, 3): their rates.
+            floor: Whether there is a floor at y = 0.
+            method: See :func:`simulate`.
+            device: See :func:`simulate`.
+            settings: Any other field of :class:`Options` by its name.
+
+        Raises:
+            InputError: A value is refused.
+        """
+        options = validated(Options, {"soften_drive": False, **settings, "method": method, "device": device}, "options")
+        if options.soften_drive:
+            raise InputError("options.soften_drive: there is no sprocket; leave it out")
+        shape = (len(parameters), *np.shape(position)[1:2], 3)
+        for name, given in (("position", position), ("velocity", velocity)):
+            if np.shape(given) != shape or len(shape) != 3 or not np.all(np.isfinite(given)):
+                raise InputError(f"{name}: its shape is {np.shape(given)}; give finite numbers of shape (W, n, 3)")
+        worlds, links, _ = shape
+        if worlds < 1 or links < 4 or links % 2:
+            raise InputError(f"position: {worlds} chains of {links} links; give chains of an even number of at least 4")
+        check_links_on_gpu(links, options.device, "position")
+        self.time, self._links = 0.0, links
+        with gpu_turn([options.device]):
+            self._batch = Batch(worlds, links, options)
+            for world, chain in enumerate(parameters):
+                self._batch.set_chain(world, chain, links)
+                self._batch.load(world, position[world], velocity[world], stop_time=0.0, stop_status=Status.FINISHED)
+            self._features = self._batch.features(fixed_body="floor" if floor else "none")
+            self._batch.run(range(worlds), self._features)
+
+    @property
+    def status(self) -> NDArray[np.int32]:
+        """Codes of `Status`, (W,): FINISHED of a chain that can go on."""
+        return self._batch.statuses().copy()
+
+    def motions(self, chains: Sequence[int] | NDArray[np.integer[Any]] | None = None) -> tuple[Array, Array]:
+        """Place and angle of the links of all chains, or of some numbers, (W, n, 3); and their rates."""
+        return self._batch.motions(range(len(self.status)) if chains is None else list(chains), self._links)
+
+    def set_velocity(self, chains: Sequence[int] | NDArray[np.integer[Any]], velocity: Array) -> None:
+        """Give some chains, by their numbers, other velocities, (chains, n, 3)."""
+        if len(chains):
+            self._batch.set_velocities(list(chains), velocity)
+
+    def run(
+        self,
+        until: float,
+        chains: Sequence[int] | NDArray[np.integer[Any]] | None = None,
+        *,
+        to_rest: bool = False,
+    ) -> None:
+        """Carry on all chains that can go on, or those of some numbers.
+
+        Args:
+            until: Time [s].
+            chains: Numbers of the chains; None: all.
+            to_rest: Whether a chain that comes to rest on the floor stays there, AT_REST; others end with TIME_LIMIT.
+        """
+        status, wanted = self.status, range(len(self.status)) if chains is None else chains
+        going = [int(world) for world in wanted if status[world] == Status.FINISHED]
+        if going:
+            with gpu_turn([self._batch.options.device]):
+                self._batch.resume(going, until, Status.TIME_LIMIT if to_rest else Status.FINISHED)
+                self._batch.run(going, self._features)
+        self.time = until
 
 
 def _follow(
-    options: Options, chain: Parameters, start: Array, rates: Array, instants: Array, end: float, floor: bool
+    options: Options,
+    chain: Parameters,
+    start: Array,
+    rates: Array,
+    instants: Array,
+    end: float,
+    body: str,
+    points: Array | None,
 ) -> Trajectory:
     """Integrate a chain whose values are checked, see `simulate`."""
-    batch = Batch(1, len(start), options)
+    batch = Batch(1, len(start), options, faces=1 if points is None else len(points) - 1)
     batch.set_chain(0, chain, len(start))
+    if points is not None:
+        batch.set_floor(0, points, chain)
     batch.load(0, start, rates, stop_time=instants[0], stop_status=Status.FINISHED)
-    features = batch.features(fixed_body="floor" if floor else "none")
+    features = batch.features(fixed_body=body)
     reached, positions, velocities = [], [], []
     for instant in instants:
         batch.resume(0, instant, Status.FINISHED)
@@ -135,17 +251,32 @@ def _follow(
     )
 
 
-def _checked_state(name: str, given: Array) -> Array:
-    """Positions or velocities as a float64 array of shape (n, 3), or an `InputError`."""
-    array = _real_array(name, given, "shape (n, 3)")
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise InputError(f"{name}: its shape is {array.shape}; give (n, 3), one row x, y, θ per link")
-    if not np.all(np.isfinite(array)):
-        raise InputError(f"{name}: holds a number that is not finite; give finite numbers")
-    return array
+def _checked_floor(floor: Any) -> Array | None:
+    """Points of the floor [m], None if it is flat or there is none, or an `InputError`."""
+    if isinstance(floor, bool):
+        return None
+    try:
+        profile = checked_profile(floor)
+    except ValueError as problem:
+        raise InputError(f"floor: {problem}") from None
+    return None if profile == "flat" else np.array(profile)
 
 
-def _checked_times(duration: float, times: Sequence[Number] | Array | None) -> Array:
+def _check_above(points: Array, start: Array, chain: Parameters) -> None:
+    """Check that the middle of no circle is below the floor, where it would never come out.
+
+    Raises:
+        InputError: one is.
+    """
+    depth = -distances(points, circles_of(start, chain.link_length))
+    if depth.max() > 0:
+        raise InputError(
+            f"position: link {int(depth.argmax()) % len(start)} starts {depth.max():.3g} m inside the floor; "
+            "raise the chain, or lower the floor"
+        )
+
+
+def _checked_times(duration: object, times: Sequence[float] | Array | None) -> Array:
     """Instants of a trajectory, which rise within the duration, or an `InputError`."""
     if isinstance(duration, bool) or not isinstance(duration, int | float):
         raise InputError(f"duration: {shown(duration)} is not a number; give seconds")
@@ -153,19 +284,9 @@ def _checked_times(duration: float, times: Sequence[Number] | Array | None) -> A
         raise InputError(f"duration: {shown(duration)} is not a time; give a number of seconds, at least 0")
     if times is None:
         return np.linspace(0.0, float(duration), 101)
-    instants = _real_array("times", times, "rising instants in s")
+    instants = real_array("times", times, "rising instants in s")
     if instants.ndim != 1 or len(instants) == 0:
         raise InputError(f"times: its shape is {instants.shape}; give a row of at least one instant")
     if not np.all((instants >= 0) & (instants <= duration)) or np.any(np.diff(instants) <= 0):
         raise InputError(f"times: give rising instants between 0 and the duration of {duration} s")
     return instants
-
-
-def _real_array(name: str, given: object, remedy: str) -> Array:
-    """Anything like an array of real numbers as a new float64 array, or an `InputError`."""
-    try:
-        if np.array(given).dtype.kind in "cSU":  # complex numbers and text would be converted without a word
-            raise TypeError
-        return np.array(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: not an array of numbers; give {remedy}") from None

@@ -1,65 +1,34 @@
 """One walk, from a user's few words to its result."""
 
-import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Literal, Unpack
+from collections.abc import Mapping
+from typing import Any, Literal
 
-from warpchain.engine.devices import gpu_turn, versions
 from warpchain.inputs.distributions import LARGEST_SEED, random_generator, sampled
-from warpchain.inputs.keywords import Method, Number, Preset, Truth, WalkSettings, Whole
-from warpchain.inputs.options import Options
-from warpchain.inputs.parameters import warn_of_units
-from warpchain.inputs.sections import by_section
-from warpchain.inputs.setup import DEFAULT_PRESET, Setup, check_has_joint_forces, resolve
-from warpchain.inputs.validation import InputError, checked_positive, checked_whole, full_name, plain, shown
+from warpchain.inputs.sections import by_section, takes_fields
+from warpchain.inputs.setup import DEFAULT_PRESET, Setup, continued, resolve
+from warpchain.inputs.state import State
+from warpchain.inputs.validation import InputError, checked_whole, full_name, plain, shown
 from warpchain.run.progress_bar import walk_in_notebook
-from warpchain.walks.motion import LONGEST_INTERVAL, Keep
-from warpchain.walks.scheduler import run_setups
-from warpchain.walks.walk_phases import WalkRun
+from warpchain.walks.one_walk import OnProgress, run_walk
 from warpchain.walks.walk_result import WalkResult
 
-SHORTEST_INTERVAL = 1e-6
-"""Least time [s] between two frames, as between two samples."""
-RECORD_BEFORE = 0.5
-"""Time [s] before the release that is kept if frames are, unless told otherwise."""
 
-
-@dataclass(frozen=True)
-class Progress:
-    """Where a walk is.
-
-    Attributes:
-        phase: ``"compile"``, ``"settle"``, ``"spin up"``, ``"hold"`` or ``"walk"``.
-        time: Simulated time [s] since the start, in phase ``"walk"`` since the release.
-        speed: Speed [m/s] along the loop, in phase ``"walk"`` of the centre of mass.
-        attempts: Attempted steps so far.
-    """
-
-    phase: str
-    time: float
-    speed: float
-    attempts: int
-
-
-OnProgress = Callable[[Progress], None]
-
-
+@takes_fields("parameters", "scene", "options")
 def walk(
     *,
-    links: Whole | None = None,
-    frequency: Number | None = None,
-    preset: Preset | None = None,
-    method: Method | None = None,
-    tolerance: Number | None = None,
-    start: Literal["rest", "spinning", "ellipse"] | None = None,
+    links: int | None = None,
+    frequency: float | None = None,
+    preset: str | None = None,
+    method: str | None = None,
+    tolerance: float | None = None,
+    start: Literal["rest", "spinning", "ellipse"] | State | None = None,
     setup: Setup | None = None,
-    seed: Whole | None = None,
-    frame_interval: Number | None = 2e-3,
-    record_before: Number | None = None,
-    record_loads: Truth = False,
+    seed: int | None = None,
+    frame_interval: float | None = 2e-3,
+    record_before: float | None = None,
+    record_loads: bool = False,
     on_progress: OnProgress | None = None,
-    **settings: Unpack[WalkSettings],
+    **settings: Any,
 ) -> WalkResult:
     """Simulate one walk: hang a chain on its sprocket, spin it up, release it and follow it to rest.
 
@@ -74,7 +43,9 @@ def walk(
             ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
         tolerance: Error allowed in a step, absolute (SI units) and relative alike; None: the method's, 1e-6 for an
             integrator, 1e-4 for ``"hybrid"``, and of ``"standard"`` and ``"explicit"`` 3e-3 while joints are soft.
-        start: None or ``"rest"``, ``"spinning"`` or ``"ellipse"``.
+        start: None or ``"rest"``, ``"spinning"`` or ``"ellipse"``; or a :class:`State`, from which the walk goes on to
+            its end, by itself the rest of the same walk to the bit. Beside a state only parameters, options and
+            ``walk_limit`` are taken, and nothing is drawn.
         setup: ``setup`` of another walk, which is repeated to the bit, whatever was drawn for it. It is complete: no
             other setting is taken beside it, nothing is drawn, and ``seed`` is only noted in the result.
         seed: Draw those parameters, phase and clearance that are not given from their distributions; None: Table 1's
@@ -98,9 +69,6 @@ def walk(
 
     Raises:
         InputError: A value is refused; nothing has been computed. It is a ``ValueError``.
-
-    Warns:
-        InputWarning: A parameter looks like one in another unit.
     """
     named = {"links": links, "frequency": frequency, "method": method, "tolerance": tolerance, "start": start}
     for symbol in settings:
@@ -110,11 +78,14 @@ def walk(
     given: dict[str, object] = {name: value for name, value in named.items() if value is not None}
     given.update(settings)
     loads = _truth(record_loads, "record_loads")
-    if setup is None:
-        sections = by_section(given)
-        setup = complete_setup(DEFAULT_PRESET if preset is None else preset, sections, seed, loads)
-        parameters = plain(sections["parameters"], "parameters")
-        warn_of_units((f"parameters.{name}", name, value) for name, value in parameters.items())
+    if isinstance(start, State) and setup is None:
+        for name, value in (("preset", preset), ("seed", seed)):
+            if value is not None:
+                raise InputError(f"{name}: given together with a state, for which nothing is drawn; leave it out")
+        del given["start"]
+        setup = continued(start, by_section(given))
+    elif setup is None:
+        setup = complete_setup(DEFAULT_PRESET if preset is None else preset, by_section(given), seed, loads)
     else:
         _check_repeated(setup, given if preset is None else {"preset": preset, **given}, seed)
     return run_walk(
@@ -127,7 +98,7 @@ def walk(
     )
 
 
-def _check_repeated(setup: object, others: Mapping[str, object], seed: Whole | None) -> None:
+def _check_repeated(setup: object, others: Mapping[str, object], seed: int | None) -> None:
     """Refuse what is no complete setup, settings beside one, and what is no seed, by an `InputError`."""
     if not isinstance(setup, Setup):
         raise InputError(
@@ -139,13 +110,8 @@ def _check_repeated(setup: object, others: Mapping[str, object], seed: Whole | N
         checked_whole(plain(seed, "seed"), "seed", 0, LARGEST_SEED)
 
 
-def setup_walk(preset: str, settings: Mapping[str, object], seed: Whole | None, records_loads: bool = False) -> Setup:
-    """The setup of settings by name or symbol; arguments and errors as of `complete_setup`."""
-    return complete_setup(preset, by_section(settings), seed, records_loads)
-
-
 def complete_setup(
-    preset: str, sections: Mapping[str, Mapping[str, object]], seed: Whole | None, records_loads: bool = False
+    preset: str, sections: Mapping[str, Mapping[str, object]], seed: int | None, records_loads: bool = False
 ) -> Setup:
     """Check values by section, complete them, and draw the sample of a seed.
 
@@ -158,75 +124,6 @@ def complete_setup(
     setup = resolve(preset, **sections, records_loads=records_loads)
     kept = {*sections["scene"], *sections["parameters"]}
     return setup if seed is None else sampled(setup, random_generator(plain(seed, "seed")), kept=kept)
-
-
-def run_walk(
-    setup: Setup,
-    *,
-    seed: Whole | None = None,
-    frame_interval: Number | None = 2e-3,
-    record_before: Number | None = None,
-    record_loads: bool = False,
-    on_progress: OnProgress | None = None,
-) -> WalkResult:
-    """Run a walk whose setup is complete, samples drawn; the seed is only noted. The rest is as of :func:`walk`."""
-    started = time.perf_counter()
-    frame_every, between = _frame_marks(plain(frame_interval, "frame_interval"), setup.options)
-    before = _time_before(plain(record_before, "record_before"), frame_every) if setup.scene.start != "ellipse" else 0.0
-
-    if record_loads:
-        check_has_joint_forces(setup.options)
-        if frame_every is None:
-            raise InputError("record_loads: loads are kept with frames, but frame_interval is None; give one")
-
-    def watch(run: WalkRun, compiling: bool) -> None:
-        if on_progress is not None:
-            phase = "compile" if compiling else run.phase.value
-            on_progress(Progress(phase, run.walk_time or run.simulated_time, run.speed, run.attempts))
-
-    keep = Keep(series_every=1, frame_every=frame_every, frame_interval=between, loads=record_loads, before=before)
-    with gpu_turn([setup.options.device]):
-        ((_, run),) = run_setups([setup], keeps=[keep], watch=watch)
-        return WalkResult(
-            **run.outcome(),
-            **run.recorder.motion(),
-            setup=setup,
-            seed=plain(seed),
-            versions=versions(),
-            wall_time=time.perf_counter() - started - run.compile_time,
-        )
-
-
-def _frame_marks(frame_interval: object, options: Options) -> tuple[int | None, float]:
-    """Whole samples between two kept frames, None for no frames, and their time if it is less than a sample, else 0.
-
-    Raises:
-        InputError: it is no such time.
-    """
-    if frame_interval is None:
-        return None, 0.0
-    interval = checked_positive(frame_interval, "frame_interval", "time in s")
-    if not SHORTEST_INTERVAL <= interval < LONGEST_INTERVAL:
-        raise InputError(
-            f"frame_interval: {shown(interval)} is not between {SHORTEST_INTERVAL} s and {LONGEST_INTERVAL} s; "
-            "give a time between, or None"
-        )
-    samples = interval / options.record_interval
-    return (round(samples), 0.0) if samples > 0.999 else (1, float(interval))
-
-
-def _time_before(record_before: float | None, frame_every: int | None) -> float:
-    """Time [s] before the release that is kept, or an `InputError`."""
-    if record_before is None:
-        return RECORD_BEFORE if frame_every is not None else 0.0
-    is_number = isinstance(record_before, int | float) and not isinstance(record_before, bool)
-    if not (is_number and 0 <= record_before <= LONGEST_INTERVAL):
-        raise InputError(
-            f"record_before: {shown(record_before)} is not a time in s from 0 to {LONGEST_INTERVAL}; give one, or None"
-        )
-    if record_before > 0 and frame_every is None:
-        raise InputError("record_before: a time is given, but frame_interval is None; give a frame_interval as well")
-    return float(record_before)
 
 
 def _truth(value: object, name: str) -> bool:

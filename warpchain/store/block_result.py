@@ -1,8 +1,8 @@
 """One block of a sweep as arrays with named axes."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -10,15 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError, plain, shown, suggestion
 from warpchain.status import Status
 from warpchain.store.cell_statistics import CellStatistics
+from warpchain.store.repeated import place_of_index, repeat
+from warpchain.sweeps.block import POINT
 from warpchain.sweeps.plan import Sweep
 from warpchain.walks.rows import (
     COLUMNS,
     LENGTHS,
     MISSING,
     Column,
+    drawn_column,
     faults_of_columns,
     field_column,
     numbers_of,
@@ -117,11 +121,30 @@ class BlockResult:
         return self._column(name).meaning
 
     def _column(self, name: str) -> Column:
-        if name == "sample":
-            return Column("<i8", "1", "number of the sample in its cell")
-        if name not in self.columns and name not in self.axes:
+        if name in ("sample", POINT):
+            of = "sample in its cell" if name == "sample" else "parameter set"
+            return Column("<i8", "1", f"number of the {of}")
+        points = self.origin.sweeps[0].blocks[self.number].points
+        if not any(name in known for known in (self.columns, self.axes, points)):
             raise KeyError(f"{shown(name)}: {suggestion(name, (*self.columns, *self.axes))}")
         return COLUMNS[name] if name in COLUMNS else field_column(name)
+
+    @property
+    def is_there(self) -> NDArray[np.bool_]:
+        """Whether a walk has been computed, shape `shape`."""
+        there: NDArray[np.bool_] = self.columns["status"] != MISSING
+        return there
+
+    def filled_from(self, other: "BlockResult") -> "BlockResult":
+        """The same block with the walks that only another result of it has."""
+
+        def kept_motions(places: Iterable[int]) -> "Iterator[tuple[int, h5py.Group]]":
+            wanted, there = np.array(list(places), np.int64), self.is_there.ravel()
+            for block, own in ((self, there[wanted]), (other, ~there[wanted])):
+                yield from block.kept_motions(wanted[own])
+
+        columns = {name: np.where(self.is_there, values, other.columns[name]) for name, values in self.columns.items()}
+        return replace(self, columns=columns, kept_motions=kept_motions)
 
     @cached_property
     def kept(self) -> NDArray[np.bool_]:
@@ -131,7 +154,7 @@ class BlockResult:
             (choice := series[number]) is not None and choice.includes(sample)
             for number, sample in self.origin.samples(self.number)
         ]
-        kept: NDArray[np.bool_] = np.array(chosen) & (self.columns["status"] != MISSING)
+        kept: NDArray[np.bool_] = np.array(chosen) & self.is_there
         return kept
 
     def series(self, *, sample: int = 0, **at: float | str | None) -> WalkResult:
@@ -145,6 +168,10 @@ class BlockResult:
             InputError: there is no such walk, or its motion was not kept or is not there yet.
             OSError: its file cannot be read.
         """
+        return self.walk_motion(self.place(sample, at))
+
+    def place(self, sample: int, at: Mapping[str, float | str | None]) -> tuple[int, ...]:
+        """Place along the axes and samples of a walk, see `series`."""
         if unknown := [name for name in at if name not in self.axes]:
             known = suggestion(unknown[0], tuple(self.axes)) if self.axes else "there are no axes"
             raise InputError(f"{unknown[0]}: no axis of block {self.name}; {known}")
@@ -157,7 +184,55 @@ class BlockResult:
             place.append(int(found[0]))
         if type(plain(sample)) is not int or not 0 <= sample < self.shape[-1]:
             raise InputError(f"sample: there is no sample {shown(sample)}; give 0 to {self.shape[-1] - 1}")
-        return self.walk_motion((*place, sample))
+        return (*place, sample)
+
+    def sweep_at(self, place: tuple[int, ...]) -> Sweep:
+        """The sweep that has the walk at a place along the axes and samples."""
+        return self.origin.sweeps[self.origin.samples(self.number)[place[-1]][0]]
+
+    def setup_at(self, place: tuple[int, ...]) -> Setup:
+        """Everything that says what the walk at a place is, its draws included."""
+        return self.sweep_at(place).planned(int(self.columns["index"][place])).setup
+
+    def walk(
+        self,
+        index: int | None = None,
+        *,
+        sample: int = 0,
+        frame_interval: float | None = 2e-3,
+        record_before: float | None = None,
+        record_loads: bool = False,
+        **at: Any,
+    ) -> WalkResult:
+        """Run one walk again, with series and frames: `walk(17)`, or `walk(links=60, frequency=15, sample=2)`.
+
+        The same version on the same kind of processor repeats it to the bit.
+
+        Args:
+            index: number of the walk, as in the column `index`; more samples change no number. None: the walk is that
+                of the other values.
+            sample: number of the sample.
+            frame_interval: as of `warpchain.walk`, like the next two.
+            record_before: see there.
+            record_loads: see there.
+            at: value of each axis; of an axis with just one value it may be left out.
+
+        Raises:
+            InputError: there is no such walk, several have this number (of merged sweeps with other seeds), or a value
+                is refused.
+
+        Warns:
+            InputWarning: the sweep has another Δx or status of this walk.
+        """
+        if index is None:
+            place = self.place(sample, at)
+        elif at:
+            raise InputError(f"{', '.join(at)}: given together with index; leave one out")
+        else:
+            _, place = place_of_index([self.columns["index"]], index)
+        recording = {"frame_interval": frame_interval, "record_before": record_before, "record_loads": record_loads}
+        row = {name: values[place] for name, values in self.columns.items()}
+        return repeat(self.setup_at(place), self.sweep_at(place).seed, row, **recording)
 
     def walk_motion(self, place: tuple[int, ...]) -> WalkResult:
         """The walk at a place along the axes and samples, if its motion was kept; errors as of `series`."""
@@ -167,8 +242,7 @@ class BlockResult:
             remedy = f"give one of the samples {samples}" if samples else "a sweep with record: {series: true} keeps it"
             raise InputError(f"the motion of walk {self.columns['index'][place]} is not there; {remedy}")
         values = {name: column[place] for name, column in self.columns.items()}
-        sweep = self.origin.sweeps[self.origin.samples(self.number)[place[-1]][0]]
-        setup = sweep.planned(int(values["index"])).setup
+        setup = self.setup_at(place)
         ((_, motion),) = (
             (at, read_motion(group, setup.scene.links))
             for at, group in self.kept_motions([int(np.ravel_multi_index(place, self.shape))])
@@ -179,7 +253,7 @@ class BlockResult:
             **motion,
             wall_time=math.nan,
             setup=setup,
-            seed=sweep.seed,
+            seed=self.sweep_at(place).seed,
             versions=self.origin.provenance["versions"],
         )
 
@@ -210,6 +284,23 @@ class BlockResult:
         """
         return CellStatistics.of(self.axes, self.unit(name), self.columns[name], self.columns["status"])
 
+    def design(self) -> "xarray.DataArray":
+        """What differs between the walks beside the axes, as one array with the names along its last axis, `quantity`.
+
+        Values of parameter sets (`points`) and those that samples drew; NaN of a walk that is not there.
+        """
+        import xarray
+
+        points = self.origin.sweeps[0].blocks[self.number].points
+        values = {name: self._along_points(given) for name, given in points.items()}
+        values |= {name: self.columns[drawn_column(name)] for name in self.drawn}
+        whole = np.stack([np.broadcast_to(each, self.shape).astype(float) for each in values.values()], axis=-1)
+        return xarray.DataArray(whole, {**self.axes, "quantity": list(values)}, (*self.dims, "quantity"))
+
+    def _along_points(self, values: Sequence[Any]) -> Array:
+        """Values of the parameter sets as an array that goes with the columns."""
+        return np.reshape(np.array(values), [len(values) if dim == POINT else 1 for dim in self.dims])
+
     def to_xarray(self) -> "xarray.Dataset":
         """The block as a data set with named coordinates, units and meanings."""
         import xarray
@@ -218,12 +309,21 @@ class BlockResult:
         return xarray.Dataset(variables, coordinates, {"block": self.name})
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """The block as a table with one row for each walk: values of the axes, sample, columns."""
-        return self.to_xarray().to_dataframe().reset_index()
+        """The block as a table with one row for each walk: values of the axes, sample, columns; statuses by label."""
+        table = self.to_xarray().to_dataframe().reset_index()
+        labels = {MISSING: "missing"} | {int(status): status.label for status in Status}
+        return table.assign(status=table["status"].map(labels))
 
     def variables(self) -> tuple[_Variables, _Variables]:
         """Coordinates and variables."""
         coordinates: _Variables = {name: ((name,), values, self.notes(name)) for name, values in self._places().items()}
+        for name, values in self.origin.sweeps[0].blocks[self.number].points.items():
+            numbers = np.array(values)
+            coordinates[name] = (
+                (POINT,),
+                numbers.astype(float) if numbers.dtype.kind == "O" else numbers,
+                self.notes(name),
+            )
         return coordinates, {name: (self.dims, values, self.notes(name)) for name, values in self.columns.items()}
 
     def _places(self) -> dict[str, Array]:

@@ -14,7 +14,7 @@ Array = NDArray[Any]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CellStatistics:
-    """Statistics of a quantity over the walks of each cell that came to rest and have it; arrays over the grid's axes.
+    """Statistics of a quantity over the walks of each cell that ended as planned and have it; arrays over the axes.
 
     A walk that never collapsed, say, has no `collapsed_at`: it is in no mean of that, and `count` is what was averaged.
 
@@ -23,8 +23,8 @@ class CellStatistics:
         unit: unit of `mean` and `sd`.
         mean: mean; NaN without such a walk.
         sd: standard deviation of a sample (divisor count − 1); NaN with fewer than two.
-        count: number of walks that came to rest and have the quantity: those in the mean.
-        absent: number of walks that came to rest and have none, NaN or −1 in their column.
+        count: number of walks that ended as planned and have the quantity: those in the mean.
+        absent: number of walks that ended as planned and have none, NaN or −1 in their column.
         failed: number of walks that ended otherwise.
         missing: number of walks not computed yet.
     """
@@ -41,7 +41,7 @@ class CellStatistics:
     @classmethod
     def of(cls, axes: dict[str, Array], unit: str, column: Array, status: Array) -> "CellStatistics":
         """Statistics of a column over its last axis, that of the samples; ``status`` of the same walks."""
-        rested = status == Status.AT_REST
+        rested = np.isin(status, [code for code in Status if code.ok])
         had = rested & (column != MISSING if column.dtype.kind == "i" else ~np.isnan(column))
         count = had.sum(axis=-1)
         values = np.where(had, column, 0.0)

@@ -74,7 +74,9 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         return stamp(self.directory)
 
     @classmethod
-    def open(cls, directory: Folder, sweep: Sweep, *, fresh: bool = False, shard_size: int) -> Self:
+    def open(
+        cls, directory: Folder, sweep: Sweep, *, fresh: bool = False, shard_size: int, part: tuple[int, int] = (1, 1)
+    ) -> Self:
         """Begin a sweep in a folder, or go on with it, with more samples if the sweep has more than the folder.
 
         Args:
@@ -83,6 +85,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             fresh: delete what a sweep has left in the folder, and begin.
             shard_size: number of walks in a shard of a new folder, or of the walks that are added to a folder; the
                 shards that a folder has keep their size.
+            part: see `Manifest.part`; a folder keeps the part that it was begun with.
 
         Raises:
             OSError: the folder cannot be made, locked, read or written.
@@ -97,7 +100,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
         _refuse_strangers(path)
         lock = _locked(path)
         try:
-            folder = cls(path, _prepared(path, sweep, Manifest.of(sweep, shard_size), fresh), lock)
+            folder = cls(path, _prepared(path, sweep, Manifest.of(sweep, shard_size, part), fresh), lock)
             folder._check()
             folder._describe()
         except BaseException:
@@ -115,7 +118,7 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
     def missing(self) -> list[Shard]:
         """The shards that are not there yet, in order; errors as of `present_shards`."""
         present = {shard.name for shard in present_shards(self.directory, self.manifest)}
-        return [shard for shard in self.manifest.shards if shard.name not in present]
+        return [shard for shard in self.manifest.wanted if shard.name not in present]
 
     def close(self) -> None:
         """Let other processes have the folder."""
@@ -144,27 +147,31 @@ class SweepFolder(AbstractContextManager["SweepFolder"]):
             warnings.warn(f"{problem}; its walks are computed again", InputWarning, stacklevel=4)
 
     def _describe(self) -> None:
-        """Write what the folder says of its sweep, if that is new; sweep.yaml is never older than sweep.json."""
+        """Write what the folder says of its sweep, if that is new; sweep.yaml is never older than sweep.json.
+
+        Lines of comments that somebody has added to sweep.yaml stay, at its head.
+        """
         description = self.directory / "sweep.yaml"
+        old = description.read_text("utf-8", "replace").splitlines() if description.is_file() else []
+        comments = [line + "\n" for line in old if line.startswith("#") and line not in _YAML_HEAD]
         if read_manifest(self.directory).growth != self.manifest.growth:
             remove_output(description)
             write_whole(self.directory / "sweep.json", self.manifest.text())
         if not description.exists():
             sweep = self.manifest.sweep.canonical()
             text = yaml.safe_dump(sweep, sort_keys=False, allow_unicode=True)
-            write_whole(description, _YAML_HEAD + text)
+            write_whole(description, _YAML_HEAD + "".join(comments) + text)
 
 
 def read_rows(directory: Folder, manifest: Manifest) -> Rows:
-    """Rows of all walks that are in a folder, by number, shape (walks,); needs no lock, at any moment.
+    """Rows of all walks that are in a folder, shape (walks,); needs no lock, at any moment.
 
     Raises:
         OSError: the folder or a shard cannot be read.
         InputError: a shard is damaged or foreign.
     """
     shards = present_shards(directory, manifest)
-    rows = np.concatenate([np.empty(0, manifest.row_type), *(read_shard(directory, shard) for shard in shards)])
-    return rows[np.argsort(manifest.numbers(rows))]
+    return np.concatenate([np.empty(0, manifest.row_type), *(read_shard(directory, shard) for shard in shards)])
 
 
 def running_rate(directory: Folder) -> float | None:
@@ -184,7 +191,8 @@ def running_rate(directory: Folder) -> float | None:
     except BlockingIOError:
         folder = Path(directory) / "shards"
         done = sum(len(shard) for shard in present if (folder / shard.name).stat().st_mtime >= began)
-        return done / max(time.time() - began, 1e-3)
+        seconds = time.time() - began  # negative if the clock was set back
+        return done / seconds if seconds > 0 else 0.0
     except FileNotFoundError:
         pass
     return None
@@ -222,15 +230,21 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
     if found.numerics_version != NUMERICS_VERSION:
         raise InputError(
             f"{folder}: its walks are of numerics {found.numerics_version}, but this warpchain has "
-            f"{NUMERICS_VERSION}; use the version that began it, give another folder, or start anew with --fresh"
+            f"{NUMERICS_VERSION}; use the version that began it, give another folder, or start anew with fresh"
         )
-    if found.digest == manifest.digest:
+    if found.part != manifest.part:
+        raise InputError(
+            f"{folder}: holds part {found.part[0]}/{found.part[1]} of its sweep, not {manifest.part[0]}/"
+            f"{manifest.part[1]}; give another folder"
+        )
+    digest = found.sweep.digest()  # by this version, which may know of more fields than that which began the folder
+    if digest == manifest.digest:
         return found
     there = list(found.growth[-1].samples)
-    if len(there) != len(sweep.blocks) or sweep.digest(there) != found.digest:
+    if len(there) != len(sweep.blocks) or sweep.digest(there) != digest:
         raise InputError(
             f"{folder}: holds another sweep ({found.sweep.name}), or this one before it was changed; "
-            "give another folder, or start anew with --fresh, which deletes what is there"
+            "give another folder, or start anew with fresh, which deletes what is there"
         )
     for count, block in zip(there, sweep.blocks, strict=True):
         name, asked, sampler = block.name, block.samples_given, block.sampler

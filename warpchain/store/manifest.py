@@ -5,6 +5,7 @@ samples gets further shards for the added ones: `growth` says how many samples t
 """
 
 import hashlib
+import itertools
 import json
 import math
 import os
@@ -31,6 +32,9 @@ OWN: Final = ("sweep.json", "sweep.yaml", "shards", "log.txt")
 MOST_BYTES: Final = 2**24
 """Size of the largest sweep.json that is read; 12 axes of 10,000 values take 3 MB."""
 
+FIRST_SHARDS: Final = 32
+"""Most walks in each of the first four shards."""
+
 _HEAD: Final = re.compile(rb'\{\s*"format": "warpchain sweep",\s*"format_version": (\d{1,9}),')
 _CHECKED: Final = re.compile(rb'(.*),\n "sha256": "([0-9a-f]{64})"\n\}\n', re.DOTALL)
 
@@ -42,7 +46,7 @@ class Growth:
     Attributes:
         digest: `Sweep.digest` of the sweep with these samples.
         samples: samples of each block, as the sweep file says.
-        shard_size: number of walks in a shard of the samples that were added; the last has what is left.
+        shard_size: most walks in a shard of the samples that were added; the first shards have fewer, see `_bounds`.
     """
 
     digest: str
@@ -94,18 +98,20 @@ class Manifest:
         numerics_version: version of the numbers of its walks.
         growth: what it was given, the present sweep last.
         versions: the software that began the sweep.
+        part: (k, N), if the folder is only to have the k-th of N parts of the shards, 1 ≤ k ≤ N.
     """
 
     sweep: Sweep
     numerics_version: int
     growth: tuple[Growth, ...]
     versions: dict[str, str]
+    part: tuple[int, int] = (1, 1)
 
     @classmethod
-    def of(cls, sweep: Sweep, shard_size: int) -> Self:
+    def of(cls, sweep: Sweep, shard_size: int, part: tuple[int, int] = (1, 1)) -> Self:
         """The manifest of a new folder."""
         growth = Growth(sweep.digest(), tuple(block.samples_given for block in sweep.blocks), shard_size)
-        return cls(sweep, NUMERICS_VERSION, (growth,), package_versions())
+        return cls(sweep, NUMERICS_VERSION, (growth,), package_versions(), part)
 
     @property
     def digest(self) -> str:
@@ -120,8 +126,8 @@ class Manifest:
     def numbers(self, keys: Rows) -> NDArray[np.int64]:
         """Numbers of walks in the sweep, given their keys."""
         blocks = self.sweep.blocks
-        firsts, samples = (np.array([getattr(block, name) for block in blocks]) for name in ("first", "samples"))
-        numbers: NDArray[np.int64] = firsts[keys["block"]] + keys["cell"] * samples[keys["block"]] + keys["sample"]
+        firsts = np.array([block.first_cell for block in blocks])
+        numbers: NDArray[np.int64] = firsts[keys["block"]] + keys["cell"] + blocks[0].stride * keys["sample"]
         return numbers
 
     @cached_property
@@ -141,16 +147,22 @@ class Manifest:
                 ]
             )
             walks, before = self.numbers(keys), upto
-            for place, start in enumerate(range(0, len(keys), growth.shard_size)):
-                part = slice(start, start + growth.shard_size)
+            for place, (start, stop) in enumerate(itertools.pairwise(_bounds(len(keys), growth.shard_size))):
+                part = slice(start, stop)
                 keeps = series is not None and any(map(series.includes, keys["sample"][part].tolist()))
                 name = f"{step}-{place:06d}.h5"
                 found.append(Shard(name, growth.digest, self.row_type, keys[part], walks[part], keeps))
         return tuple(found)
 
+    @property
+    def wanted(self) -> tuple[Shard, ...]:
+        """The shards that are computed in this folder: all, or those of its part."""
+        number, parts = self.part
+        return self.shards[number - 1 :: parts]
+
     def grown_from(self, found: "Manifest") -> "Manifest":
         """This manifest for the folder of another one, which has fewer samples of the same walks."""
-        return replace(self, growth=(*found.growth, *self.growth), versions=found.versions)
+        return replace(self, growth=(*found.growth, *self.growth), versions=found.versions, part=found.part)
 
     def text(self) -> str:
         """Content of sweep.json; its last line has the SHA-256 of the text before the comma in front of it."""
@@ -158,12 +170,25 @@ class Manifest:
             "format": "warpchain sweep",
             "format_version": FORMAT_VERSION,
             "numerics_version": self.numerics_version,
+            "part": self.part,
             "growth": [vars(growth) for growth in self.growth],
             "versions": self.versions,
             "sweep": self.sweep.canonical(),
         }
         text = json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False).removesuffix("\n}")
         return f'{text},\n "sha256": "{hashlib.sha256(text.encode()).hexdigest()}"\n}}\n'
+
+
+def _bounds(walks: int, most: int) -> list[int]:
+    """Where the shards of some walks begin, and their end.
+
+    The first four have `FIRST_SHARDS` at most, and every four twice as many as those before: a sweep that is stopped in
+    its first minute has lost seconds.
+    """
+    bounds = [0]
+    while bounds[-1] < walks:
+        bounds.append(min(walks, bounds[-1] + min(most, FIRST_SHARDS << (len(bounds) - 1) // 4)))
+    return bounds
 
 
 def _keys(block: int, cells: int, samples: Sequence[int]) -> Rows:
@@ -195,7 +220,8 @@ def read_manifest(directory: Folder) -> Manifest:
         with open_regular(path) as file:
             text = file.read(MOST_BYTES + 1)
     except (FileNotFoundError, NotADirectoryError):
-        raise InputError(f"{directory}: no sweep in this folder; give the folder of one, or a merged file") from None
+        there = "a saved walk, no sweep" if (Path(directory) / "walk.h5").exists() else "no sweep"
+        raise InputError(f"{directory}: {there} in this folder; give the folder of one, or a merged file") from None
     if len(text) > MOST_BYTES:
         raise InputError(f"{path}: over {MOST_BYTES} bytes, the limit of a sweep.json; give the folder of a sweep")
     head, checked = _HEAD.match(text), _CHECKED.fullmatch(text)
@@ -207,4 +233,10 @@ def read_manifest(directory: Folder) -> Manifest:
         )
     content = json.loads(text)
     growth = tuple(Growth(**{**each, "samples": tuple(each["samples"])}) for each in content["growth"])
-    return Manifest(stored_sweep(path, content["sweep"]), content["numerics_version"], growth, content["versions"])
+    return Manifest(
+        stored_sweep(path, content["sweep"]),
+        content["numerics_version"],
+        growth,
+        content["versions"],
+        tuple(content["part"]),
+    )

@@ -7,8 +7,8 @@ versions and counts by status those of the file. A single block is in the root g
 The kept motions of a block are in its group `motion`, those of each walk in a group named by the place of the walk in a
 flat column, as in a saved walk.
 
-Samples of several sweeps stand one behind the other along `sample`; `seed` has the seed of each, and `index` the number
-of a walk in its own sweep.
+Folders of one seed are parts of one sweep: each fills in the walks that the others lack. Samples of several seeds stand
+one behind the other along `sample`; `seed` has the seed of each, and `index` the number of a walk in its own sweep.
 """
 
 import os
@@ -39,7 +39,7 @@ def merge(sources: Folder | Sequence[Folder], path: str | os.PathLike[str]) -> N
 
     Args:
         sources: the folder of the sweep, or several, or merged files, whose sweeps differ in nothing but seed, samples
-            and names; their samples are put together.
+            and names; their samples are put together. Those of the same seed have different walks of one sweep.
         path: the file.
 
     Raises:
@@ -49,42 +49,62 @@ def merge(sources: Folder | Sequence[Folder], path: str | os.PathLike[str]) -> N
     folders = [sources] if isinstance(sources, str | os.PathLike) else list(sources)
     target = given_path(path)
     checked_output(target, _MERGED)
-    results = [load(folder) for folder in folders]
+    results = _overlaid(folders, [load(folder) for folder in folders])
     if len(results) > 1:
-        _check_fit(folders, results)
-    image = hdf5_image(KIND, partial(_fill, results=results))
+        _check_fit(results)
+    image = hdf5_image(KIND, partial(_fill, results=list(results.values())))
     write_whole(target, image, _MERGED)
 
 
-def _check_fit(folders: Sequence[Folder], results: Sequence[SweepResult]) -> None:
+def _overlaid(folders: Sequence[Folder], results: Sequence[SweepResult]) -> dict[Folder, SweepResult]:
+    """Results by the folder of each, those of one sweep put together by the first of their folders.
+
+    Raises:
+        InputError: walks of one sweep are in two of the folders, or sweeps of one seed differ.
+    """
+    whole: dict[Folder, SweepResult] = {}
+    for folder, result in zip(folders, results, strict=True):
+        seeds = {sweep.seed for sweep in result.origin.sweeps}
+        other = next((one for one in whole if seeds & {sweep.seed for sweep in whole[one].origin.sweeps}), None)
+        if other is None:
+            whole[folder] = result
+            continue
+        first = whole[other]
+        digests = [[sweep.digest() for sweep in each.origin.sweeps] for each in (first, result)]
+        pairs = list(zip(first.blocks.values(), result.blocks.values(), strict=False))
+        if os.path.samefile(other, folder):
+            raise InputError(f"{folder}: given twice; give each folder once")
+        if digests[0] != digests[1] or any((a.is_there & b.is_there).any() for a, b in pairs):
+            raise InputError(
+                f"{folder}: has walks that {other} has, of seed {result.seed}; give each folder once, parts of one "
+                "sweep, or sweeps with different seeds"
+            )
+        blocks = {a.name: a.filled_from(b) for a, b in pairs}
+        whole[other] = replace(first, blocks=blocks)
+    return whole
+
+
+def _check_fit(results: Mapping[Folder, SweepResult]) -> None:
     """Refuse results whose samples are not independent samples of the same cells.
 
     Raises:
-        InputError: sweeps differ in more than seed, samples and names, or some of their walks are the same.
+        InputError: sweeps differ in more than seed, samples and names, or draw nothing.
     """
-    seeds: dict[int, Folder] = {}
     expected = None
-    for folder, result in zip(folders, results, strict=True):
+    first = next(iter(results))
+    for folder, result in results.items():
         for sweep in result.origin.sweeps:
-            if (other := seeds.get(sweep.seed)) is not None:
-                if os.path.samefile(other, folder):
-                    raise InputError(f"{folder}: given twice; give each folder once")
-                raise InputError(
-                    f"{folder}: has seed {sweep.seed}, as {other} has, so that walks are the same; "
-                    "give sweeps with different seeds"
-                )
-            seeds[sweep.seed] = folder
             for block in sweep.blocks:
                 if not block.drawn:
                     raise InputError(
                         f"{folder}: block {block.name} draws nothing, so that more samples are the same walks"
                     )
-            digest = replace(sweep, seed=0).digest([1] * len(sweep.blocks))
-            expected = expected or (digest, results[0].provenance["numerics_version"])
-            if (digest, result.provenance["numerics_version"]) != expected:
+            digest = replace(sweep, seed=0).digest([1] * len(sweep.blocks)), result.provenance["numerics_version"]
+            expected = expected or digest
+            if digest != expected:
                 raise InputError(
-                    f"{folder}: is not the sweep of {folders[0]} with another seed; give folders that differ in "
-                    "nothing but seed, samples and names"
+                    f"{folder}: is not the sweep of {first} with another seed; give folders that differ in nothing "
+                    "but seed, samples and names"
                 )
 
 
@@ -115,7 +135,9 @@ def _joined(results: Sequence[SweepResult]) -> SweepResult:
         blocks[first.name] = replace(first, columns=columns)
     sweeps = tuple(sweep for result in results for sweep in result.origin.sweeps)
     digests = ", ".join(result.provenance["digest"] for result in results)
-    origin = Origin(sweeps, results[0].provenance | {"digest": digests})
+    software = [result.provenance["versions"] for result in results]
+    versions = {name: ", ".join(dict.fromkeys(each[name] for each in software)) for name in software[0]}
+    origin = Origin(sweeps, results[0].provenance | {"digest": digests, "versions": versions})
     return SweepResult(blocks={name: replace(block, origin=origin) for name, block in blocks.items()}, origin=origin)
 
 
@@ -127,12 +149,14 @@ def _fill(file: "h5py.File", results: Sequence[SweepResult]) -> None:
         group = file if len(whole.blocks) == 1 else file.create_group(name, track_order=True)
         group.attrs["block"] = name
         coordinates, variables = block.variables()
+        if further := [name for name, (dims, _, _) in coordinates.items() if dims != (name,)]:
+            group.attrs["coordinates"] = " ".join(further)  # as xarray has it
         if len(whole.origin.sweeps) > 1:
             seeds = [str(whole.origin.sweeps[number].seed) for number, _ in whole.origin.samples(block.number)]
             notes = {"units": "1", "description": "seed of the sweep that the sample belongs to"}
             variables["seed"] = (("sample",), np.array(seeds, object), notes)
         for name, (dims, values, notes) in {**coordinates, **variables}.items():
-            _put(group, name, values, notes, () if name in coordinates else dims)
+            _put(group, name, values, notes, () if dims == (name,) else dims)
         first = 0
         for result in results:
             part = list(result.blocks.values())[block.number]

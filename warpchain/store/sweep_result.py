@@ -20,9 +20,11 @@ from warpchain.store.block_result import BlockResult, KeptMotions, Origin, count
 from warpchain.store.cell_statistics import CellStatistics
 from warpchain.store.folder import read_rows
 from warpchain.store.manifest import Folder, Manifest, read_manifest, stored_sweep
-from warpchain.store.shards import opened_motions
+from warpchain.store.repeated import place_of_index
+from warpchain.store.shards import opened_motions, stamp
 from warpchain.sweeps.block import Block
-from warpchain.walks.rows import COLUMNS, MISSING, STORED_COLUMNS, derived_columns, drawn_column, quantity_of
+from warpchain.walks.rows import COLUMNS, MISSING, STORED_COLUMNS, Rows, derived_columns, drawn_column, quantity_of
+from warpchain.walks.walk_result import WalkResult
 
 if TYPE_CHECKING:
     import h5py
@@ -35,7 +37,7 @@ Array = NDArray[Any]
 
 KIND: Final = "warpchain sweep result"
 REMEDY: Final = "merge the folders again, or fetch another copy of the file"
-WANTED: Final = "give a folder of a sweep, or a file that warpchain merge wrote"
+WANTED: Final = "give a folder of a sweep or a merged file; a saved walk is for plot, animate and load_walk"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -144,6 +146,23 @@ class SweepResult:
         blocks = self.blocks.items()
         return {name: block.statistics(quantity) for name, block in blocks if quantity in block.columns}
 
+    def walk(self, index: int | None = None, **words: Any) -> WalkResult:
+        """Run one walk of any block again by its number; arguments and errors are those of `BlockResult.walk`.
+
+        Its other arguments, without a number, say which walk of the only block it is.
+        """
+        if index is None:
+            walk: WalkResult = self.__getattr__("walk")(**words)
+            return walk
+        block, _ = self.located(index)
+        return block.walk(index, **words)
+
+    def located(self, index: object) -> tuple[BlockResult, tuple[int, ...]]:
+        """Block and place of the walk with a number; an `InputError` if there is none."""
+        blocks = list(self.blocks.values())
+        number, place = place_of_index([block.columns["index"] for block in blocks], index)
+        return blocks[number], place
+
     def plot(
         self,
         kind: Literal["lines", "map"] | None = None,
@@ -217,35 +236,49 @@ def load(path: Folder) -> SweepResult:
 
 
 def _load_folder(directory: Folder) -> SweepResult:
-    manifest, folder = read_manifest(directory), Path(directory).absolute()
-    present = read_rows(directory, manifest)
-    numbers = manifest.numbers(present)
+    folder = Path(directory).absolute()
+    while True:
+        manifest, begun = read_manifest(directory), stamp(directory)
+        try:
+            present = read_rows(directory, manifest)
+            break
+        except (OSError, InputError):
+            if stamp(directory) == begun:  # else a run has begun anew or added samples meanwhile
+                raise
 
     def columns(block: Block) -> dict[str, Array]:
-        stop = block.first + block.walk_count
-        here = slice(*np.searchsorted(numbers, [block.first, stop]))
-        found = {"index": np.arange(block.first, stop)}
+        rows = present[present["block"] == manifest.sweep.blocks.index(block)]
+        places = _places(rows, block)
+        found = {"index": block.indices}
         for name in ("status", *STORED_COLUMNS, *map(drawn_column, block.drawn)):
             kind = present.dtype[name]
-            found[name] = np.full(stop - block.first, np.nan if kind.kind == "f" else MISSING, kind)
-            found[name][numbers[here] - block.first] = present[name][here]
-        return {name: values.reshape(block.shape) for name, values in found.items()}
+            values = np.full(block.walk_count, np.nan if kind.kind == "f" else MISSING, kind)
+            values[places] = rows[name]
+            found[name] = values.reshape(block.shape)
+        return found
 
     provenance = {name: getattr(manifest, name) for name in ("digest", "numerics_version", "versions")}
     origin = Origin((manifest.sweep,), provenance)
-    return _result(origin, columns, lambda block: partial(_motions_in_folder, folder, manifest, block.first))
+    return _result(origin, columns, lambda block: partial(_motions_in_folder, folder, manifest, block))
+
+
+def _places(keys: Rows, block: Block) -> NDArray[np.int64]:
+    """Places of some walks of a block in a flat column, given their keys."""
+    places: NDArray[np.int64] = keys["cell"].astype(np.int64) * block.samples + keys["sample"]
+    return places
 
 
 def _motions_in_folder(
-    folder: Path, manifest: Manifest, first: int, places: Iterable[int]
+    folder: Path, manifest: Manifest, block: Block, places: Iterable[int]
 ) -> "Iterator[tuple[int, h5py.Group]]":
-    """`BlockResult.kept_motions` of a block of a folder, given the number of its first walk."""
-    wanted = first + np.array(list(places), np.int64)
-    for shard in manifest.shards:
-        rows = np.flatnonzero(np.isin(shard.walks, wanted)) if shard.keeps_motion else ()
+    """`BlockResult.kept_motions` of a block of a folder."""
+    number, wanted = manifest.sweep.blocks.index(block), list(places)
+    for shard in manifest.shards if wanted else ():
+        there = _places(shard.keys, block)
+        rows = np.flatnonzero((shard.keys["block"] == number) & np.isin(there, wanted)) if shard.keeps_motion else ()
         if len(rows):
             with opened_motions(folder, shard) as file:
-                yield from ((int(shard.walks[row]) - first, file[str(row)]) for row in rows)
+                yield from ((int(there[row]), file[str(row)]) for row in rows)
 
 
 def _load_merged(path: Folder) -> SweepResult:

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.inputs.distributions import Distribution, Gaussian, Uniform, placed
+from warpchain.inputs.distributions import Distribution, Gaussian, placed
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
@@ -19,8 +19,10 @@ from warpchain.inputs.setup import Setup, combined, options_beside
 from warpchain.inputs.validation import InputError, validated
 from warpchain.sweeps.designs import walks_per_sample
 
-Value = float | int | str | None
+Value = float | int | str | tuple[float, ...] | None
 """A value of a field; truth values are integers to Python, and None is null."""
+POINT: Final = "point"
+"""Name of the axis of parameter sets."""
 _Place = tuple[tuple[str, Value], ...]
 """Names and values of the axes of one section in a cell."""
 
@@ -37,11 +39,13 @@ class Block:
         name: its name, unique in the sweep.
         preset: name of the parameter preset; None when the preset is an axis.
         sections: `scene`, `options` and `parameters` → values that differ from the defaults or the preset, axes apart.
-        axes: name of each axis, a field or `preset` → its values; the last one varies fastest.
+        axes: name of each axis, a field, `preset` or `point` → its values; the last one varies fastest.
+        points: name of each quantity that parameter sets have → its value in each, along the axis `point`.
         distributions: name → distribution, in the order of drawing.
         sampler: one of `warpchain.sweeps.designs.SAMPLERS`.
         samples_given: samples per cell, as the file says.
-        first: index of the block's first walk.
+        first_cell: number of the block's first cell among all cells of the sweep.
+        stride: number of all cells of the sweep.
         first_stream: number of the block's first stream of random numbers.
     """
 
@@ -50,10 +54,12 @@ class Block:
     preset: str | None
     sections: Mapping[str, Mapping[str, Value]]
     axes: dict[str, tuple[Value, ...]]
+    points: Mapping[str, tuple[Value, ...]]
     distributions: Mapping[str, Distribution]
     sampler: str
     samples_given: int
-    first: int = 0
+    first_cell: int = 0
+    stride: int = 0
     first_stream: int = 0
 
     @property
@@ -76,6 +82,12 @@ class Block:
         """Number of walks."""
         return math.prod(self.shape)
 
+    @property
+    def indices(self) -> NDArray[np.int64]:
+        """Numbers of the walks in the sweep, shape `shape`; samples that are added later change none of them."""
+        cells = np.arange(math.prod(self.shape[:-1])).reshape((*self.shape[:-1], 1))
+        return self.first_cell + cells + self.stride * np.arange(self.samples)
+
     def fixed(self, cell: tuple[int, ...]) -> Setup:
         """The setup of a cell before anything is drawn: the values that Gaussians are centred on.
 
@@ -86,19 +98,19 @@ class Block:
 
     def fixed_in(self, cells: Iterable[tuple[int, ...]]) -> Iterator[Setup]:
         """The `fixed` setups of some cells; those that are alike in a section share its checked values."""
-        given = self.sections
+        sections = self.sections
 
         @lru_cache(_KEPT)
         def parameters(preset: str, at: _Place) -> Parameters:
-            return parameter_preset(preset).with_values({**given["parameters"], **dict(at)})
+            return parameter_preset(preset).with_values({**sections["parameters"], **dict(at)})
 
         @lru_cache(_KEPT)
         def scene(at: _Place) -> Scene:
-            return validated(Scene, {**given["scene"], **dict(at)}, "scene")
+            return validated(Scene, {**sections["scene"], **dict(at)}, "scene")
 
         @lru_cache(_KEPT)
         def options(plane: str, at: _Place) -> Options:
-            return options_beside(plane, {**given["options"], **dict(at)})
+            return options_beside(plane, {**sections["options"], **dict(at)})
 
         for cell in cells:
             at: dict[str, _Place] = dict.fromkeys(SECTIONS, ())
@@ -106,8 +118,10 @@ class Block:
             for (name, values), place in zip(self.axes.items(), cell, strict=True):
                 if name == "preset":
                     preset = str(values[place])
-                else:
-                    at[SECTION_OF[name]] += ((name, values[place]),)
+                    continue
+                given = self.points if name == POINT else {name: values}
+                for field, column in given.items():
+                    at[SECTION_OF[field]] += ((field, column[place]),)
             try:
                 checked = scene(at["scene"])
                 changed = parameters(preset, at["parameters"])
@@ -124,6 +138,8 @@ class Block:
         where, _, problem = str(error).partition(": ")
         name = where.rpartition(".")[2]
         at = dict(zip(self.axes, cell, strict=True))
+        if name in self.points:
+            return f"{self.path}.points.{name}[{at[POINT]}]: {problem}"
         if name in at:
             return f"{self.path}.grid.{name}[{at[name]}]: {problem}"
         place = ", ".join(f"{name} {self.axes[name][number]}" for name, number in at.items())
@@ -131,7 +147,7 @@ class Block:
 
     def parameter(self, name: str) -> NDArray[Any]:
         """Values of a parameter before anything is drawn, along the axes and one for all samples, shape (…, 1)."""
-        along, values = name, self.axes.get(name)
+        along, values = (POINT, self.points[name]) if name in self.points else (name, self.axes.get(name))
         if values is None and name in self.sections["parameters"]:
             values = (self.sections["parameters"][name],)
         if values is None:
@@ -139,20 +155,6 @@ class Block:
             along, values = "preset", tuple(getattr(parameter_preset(str(preset)), name) for preset in presets)
         sizes = [len(values) if axis == along else 1 for axis in self.axes]
         return np.broadcast_to(np.reshape(np.array(values), (*sizes, 1)), (*self.shape[:-1], 1))
-
-    def given_parameters(self) -> Iterator[tuple[str, str, float]]:
-        """Path, name and value of every parameter that is given; of a distribution the mean or the upper end."""
-        given = [(f"parameters.{name}", name, value) for name, value in self.sections["parameters"].items()]
-        for name, values in self.axes.items():
-            given += [(f"grid.{name}[{number}]", name, value) for number, value in enumerate(values)]
-        for name, distribution in self.distributions.items():
-            if isinstance(distribution, Uniform):
-                given.append((f"distributions.{name}.uniform[1]", name, distribution.upper))
-            elif distribution.mean is not None:
-                given.append((f"distributions.{name}.gaussian.mean", name, distribution.mean))
-        for where, name, value in given:
-            if name in Parameters.model_fields and value is not None:
-                yield f"{self.path}.{where}", name, float(value)
 
     def placed(self, fixed: Setup) -> dict[str, Distribution]:
         """The distributions of a cell, given its `fixed` setup."""
@@ -169,7 +171,7 @@ class Block:
             name
             for name, distribution in self.distributions.items()
             if not (isinstance(distribution, Gaussian) and distribution.mean is None)
-        } | self.axes.keys()
+        } | {*self.axes, *self.points}
         if self.preset is None:
             replaced |= first.parameters.model_dump().keys() - self.sections["parameters"].keys()
         return {
@@ -184,5 +186,6 @@ class Block:
                 for section in SECTIONS
             },
             "distributions": {"all": "fixed"} | {name: each.canonical() for name, each in self.distributions.items()},
-            "grid": {name: list(values) for name, values in self.axes.items()},
+            **({"points": {name: list(values) for name, values in self.points.items()}} if self.points else {}),
+            "grid": {name: list(values) for name, values in self.axes.items() if name != POINT},
         }

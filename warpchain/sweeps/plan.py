@@ -1,8 +1,9 @@
 """Sweeps: many walks from one file, each planned by its index when it is asked for.
 
-A sweep is a list of blocks, a block a grid of cells, a cell a number of samples. Walks are numbered through all of
-them, the sample fastest. Walk `index` depends on the sweep and the index only: no table of walks exists, and a walk is
-the same whoever asks for it, in any order.
+A sweep is a list of blocks, a block a grid of cells, a cell a number of samples. Walks are numbered through the cells
+of all blocks, sample by sample: index = sample × number of cells + cell. So an index means the same walk when samples
+are added; where blocks have different numbers of samples, some indices have no walk. Walk `index` depends on the sweep
+and the index only: no table of walks exists, and a walk is the same whoever asks for it, in any order.
 
 `warpchain.sweeps.sweep_file` defines the keys of a file, `warpchain.sweeps.designs` the designed samples.
 """
@@ -11,7 +12,7 @@ import bisect
 import hashlib
 import json
 import os
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
@@ -22,6 +23,8 @@ from numpy.typing import NDArray
 from warpchain.inputs.distributions import DRAW_LIMIT, Distribution, draw, random_generator
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS
+from warpchain.inputs.scene import Scene
+from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.validation import InputError
 from warpchain.sweeps.block import Block
@@ -77,29 +80,25 @@ class Sweep:
     recording: Recording
 
     @classmethod
-    def of(cls, source: "str | os.PathLike[str] | Mapping[str, object]") -> "Sweep":
-        """The sweep of a file, or of the content of one, whose cells were checked before; errors as of `read_sweep`."""
-        return cls(*read_sweep(source))
+    def of(cls, source: "str | os.PathLike[str] | Mapping[str, object]", **replaced: object) -> "Sweep":
+        """The sweep of a file, or of the content of one, whose cells were checked before, see `read_sweep`."""
+        return cls(*read_sweep(source, **replaced))
 
     @cached_property
     def walk_count(self) -> int:
         """Number of walks."""
         return sum(block.walk_count for block in self.blocks)
 
-    def part(self, indices: Collection[int] | NDArray[np.int64]) -> "Sweep":
-        """The sweep with the blocks of some walks only: all that a task needs, and less to be sent than the whole.
-
-        The walks keep their numbers; name, `walk_count` and `digest` of a part mean nothing.
-        """
-        firsts = [block.first for block in self.blocks]
-        numbers = np.unique(np.searchsorted(firsts, np.asarray(indices), side="right") - 1)
-        return replace(self, blocks=tuple(self.blocks[number] for number in numbers))
+    @property
+    def indices(self) -> NDArray[np.int64]:
+        """Numbers of all walks, block by block."""
+        return np.concatenate([block.indices.ravel() for block in self.blocks])
 
     def planned(self, index: int) -> PlannedWalk:
         """The walk with a number.
 
         Args:
-            index: number of the walk, 0 … `walk_count` − 1.
+            index: number of the walk, one of `indices`.
 
         Raises:
             IndexError: there is no such walk.
@@ -133,7 +132,7 @@ class Sweep:
             IndexError: there is no such walk.
         """
         before: tuple[int, tuple[int, ...]] | None = None
-        for index in indices:
+        for index in map(int, indices):
             number, cell, sample = self._located(index)
             if (number, cell) != before:
                 before, fixed = (number, cell), self.blocks[number].fixed(cell)
@@ -141,12 +140,12 @@ class Sweep:
 
     def _located(self, index: int) -> tuple[int, tuple[int, ...], int]:
         """Number of a walk's block, its cell and its sample."""
-        number = bisect.bisect_right(self.blocks, index, key=lambda block: block.first) - 1
+        sample, cell = divmod(index, self.blocks[0].stride)
+        number = bisect.bisect_right(self.blocks, cell, key=lambda block: block.first_cell) - 1
         block = self.blocks[number]
-        if not 0 <= index - block.first < block.walk_count:
+        if not 0 <= sample < block.samples:
             raise IndexError(f"walk {index} of a sweep of {self.walk_count} walks")
-        *cell, sample = (int(place) for place in np.unravel_index(index - block.first, block.shape))
-        return number, tuple(cell), sample
+        return number, tuple(map(int, np.unravel_index(cell - block.first_cell, block.shape[:-1]))), sample
 
     def keep(self, walk: PlannedWalk) -> Keep:
         """What is kept of the motion of a walk."""
@@ -269,7 +268,10 @@ class Sweep:
         }
 
     def digest(self, samples: Sequence[int] | None = None) -> str:
-        """SHA-256 of everything that decides the numbers and their order: the canonical form without names.
+        """SHA-256 of all that decides the numbers and their order: the canonical form without names and defaults.
+
+        Without defaults, so that a field that a later version adds changes no digest; `NUMERICS_VERSION` tells of
+        defaults and presets that changed.
 
         Args:
             samples: samples of each block, in place of the sweep's own.
@@ -279,27 +281,30 @@ class Sweep:
             del block["name"]
             if samples is not None:
                 block["samples"] = samples[number]
-            for name in block["grid"].get("preset", ()):
-                block.setdefault("presets", {})[name] = PRESETS[name].model_dump()
+            usual = {name: field.default for model in (Scene, Options) for name, field in model.model_fields.items()}
+            usual |= vars(PRESETS[block["preset"]]) if "preset" in block else {}
+            for section in SECTIONS:
+                block[section] = {n: value for n, value in block[section].items() if value != usual.get(n, ...)}
         text = json.dumps(content, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-def load_sweep(source: "str | os.PathLike[str] | Mapping[str, object] | Sweep") -> Sweep:
+def load_sweep(source: "str | os.PathLike[str] | Mapping[str, object] | Sweep", **replaced: object) -> Sweep:
     """Load and check a sweep.
 
     Every cell is checked, see `Sweep.check`.
 
     Args:
         source: path of a YAML file, the content of one, or a sweep.
+        replaced: `seed` and `samples` instead of those at the top of the file.
 
     Raises:
         InputError: the file cannot be read, or something in it is refused; one line that begins with the path of
             the offending value.
     """
-    if isinstance(source, Sweep):
+    if isinstance(source, Sweep) and not replaced:
         return source
-    sweep = Sweep.of(source)
+    sweep = Sweep.of(source.canonical() if isinstance(source, Sweep) else source, **replaced)
     sweep.check()
     return sweep
 

@@ -6,10 +6,8 @@ that begins with the path of the offending value, such as `sweep.blocks[0].grid.
 
 import math
 import os
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from decimal import Decimal
 from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import (
@@ -22,22 +20,23 @@ from pydantic import (
     Tag,
     ValidationError,
     ValidationInfo,
-    WrapValidator,
     create_model,
     model_validator,
 )
 
 from warpchain.inputs.distributions import DRAWABLE, LARGEST_SEED, TABLE, Distribution, Gaussian, Uniform
-from warpchain.inputs.keywords import Preset, Sampler
+from warpchain.inputs.parameters import PRESETS
+from warpchain.inputs.scene import OF_LINKS
 from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.validation import (
     FIELDS,
     LONGEST_NAME,
-    MOST_VALUES,
     SECTION_OF,
     STRICT,
     SYMBOL_OF,
+    WHOLE,
     InputError,
+    Whole,
     by_name,
     field_bounds,
     full_name,
@@ -47,23 +46,23 @@ from warpchain.inputs.validation import (
     suggestion,
 )
 from warpchain.inputs.yaml_files import read_yaml
-from warpchain.sweeps.block import Block, Value
-from warpchain.sweeps.designs import check_design
+from warpchain.sweeps.axes import AXIS_LIMIT, CELL_LIMIT, axis
+from warpchain.sweeps.block import POINT, Block, Value
+from warpchain.sweeps.designs import SAMPLERS, check_design
 from warpchain.sweeps.recording import Frames, Recording
 from warpchain.sweeps.shipped import sweep_path
 
 VERSION: Final = 1
 """Version of the file format."""
 
-AXIS_LIMIT: Final = 10_000
-"""Most values of one axis."""
-CELL_LIMIT: Final = 100_000
-"""Most cells of a sweep, because each is checked when the sweep is loaded."""
 WALK_LIMIT: Final = 2**24
 """Most walks of a sweep, 17 million: results are read as a whole, some 700 bytes a walk, and have to fit into memory.
 
 A power of two, because numbers of designed samples are.
 """
+
+_Preset = Literal[*PRESETS]  # type: ignore[valid-type]
+_Sampler = Literal[*SAMPLERS]  # type: ignore[valid-type]
 
 # Fields by name or symbol
 
@@ -101,6 +100,9 @@ _TYPES: Final[Mapping[str, Any]] = {
 }
 
 
+_AXES: Final = {name: kind for name, kind in _TYPES.items() if name not in OF_LINKS}
+
+
 def _mapping_of(title: str, types: Mapping[str, Any]) -> Any:
     """Annotation of a mapping of names with values of these types."""
     fields: dict[str, Any] = {name: (kind, None) for name, kind in types.items()}
@@ -111,61 +113,6 @@ def _mapping_of(title: str, types: Mapping[str, Any]) -> Any:
 def _section(name: str) -> Any:
     """Annotation of the values of a section."""
     return _mapping_of(name, {field: _TYPES[field] for field in SECTIONS[name].model_fields})
-
-
-# Grid
-
-
-class _Range(BaseModel):
-    """Values from one to another, both included, in steps or of a number."""
-
-    model_config = STRICT
-    first: float = Field(alias="from")
-    last: float = Field(alias="to")
-    step: float | None = Field(None, gt=0)
-    count: int | None = Field(None, ge=2, le=AXIS_LIMIT)
-
-    def values(self) -> list[int | float]:
-        """All values, computed in decimals, so that three steps of 0.1 from 0 lead to 0.3 and to no other number."""
-        first, last = Decimal(str(self.first)), Decimal(str(self.last))
-        if first >= last:
-            raise InputError(f"to: {self.last} is not greater than from: {self.first}; give a greater value")
-        if (self.step is None) == (self.count is None):
-            raise InputError("step: a range needs either step or count; give one of them")
-        step = (last - first) / (self.count - 1) if self.count else Decimal(str(self.step))
-        if (last - first) / step >= AXIS_LIMIT:
-            raise InputError(f"step: gives more than {AXIS_LIMIT} values; give a larger step")
-        intervals = int((last - first) / step) if self.count is None else self.count - 1
-        below = first + intervals * step
-        if self.count is None and below != last:
-            raise InputError(
-                f"to: steps of {step} from {first} miss {last}; give {below} or {below + step}, or a count"
-            )
-        values = [first + number * step for number in range(intervals)] + [last]
-        return [int(value) if value == int(value) and abs(value) < 2**53 else float(value) for value in values]
-
-
-def _expanded(values: Any, check: Callable[[Any], list[Any]], info: ValidationInfo) -> list[Any]:
-    """The values of an axis, those of a range written out; together no more than sweeps of `CELL_LIMIT` cells have."""
-    if isinstance(values, Mapping):
-        if info.context["expanded"] > CELL_LIMIT + MOST_VALUES:  # type: ignore[index]
-            raise ValueError(f"more than {CELL_LIMIT} values in the ranges of all axes; give fewer")
-        try:
-            values = _Range.model_validate(values).values()
-        except ValidationError as error:
-            raise InputError(refusals(error, "", _KEYS)[0]) from None
-        info.context["expanded"] += len(values)  # type: ignore[index]
-    checked = check(values)
-    value, count = Counter(checked).most_common(1)[0]
-    if count > 1:
-        raise ValueError(f"{shown(value)} is given twice; leave one out")
-    return checked
-
-
-def _axis(kind: Any) -> Any:
-    """Annotation of the values of an axis, a list or a range."""
-    listed = Annotated[list[kind], Field(min_length=1, max_length=AXIS_LIMIT)]
-    return Annotated[listed, WrapValidator(_expanded, json_schema_input_type=listed | _Range)]
 
 
 # Distributions
@@ -234,9 +181,11 @@ class BlockKeys(BaseModel):
 
     model_config = STRICT
 
-    preset: Preset | None = Field(None, description="parameters to start from; may also be an axis of the grid")
-    samples: int | None = Field(None, ge=1, le=2**30, description="samples in each cell of the grid")
-    sampler: Sampler | None = Field(None, description="how samples are drawn, see below; default: random")
+    preset: _Preset | None = Field(None, description="parameters to start from; may also be an axis of the grid")
+    samples: Annotated[int, Field(ge=1, le=2**30), WHOLE] | None = Field(
+        None, description="samples in each cell of the grid"
+    )
+    sampler: _Sampler | None = Field(None, description="how samples are drawn, see below; default: random")
     scene: Annotated[dict[str, Value], _section("scene")] = Field(
         {}, description="fields of the [scene](scene.md) that differ from their defaults"
     )
@@ -251,8 +200,19 @@ class BlockKeys(BaseModel):
     ] = Field({}, description="what samples draw, see below")
     grid: Annotated[
         dict[str, list[Value]],
-        _mapping_of("grid", {"preset": _axis(Preset), **{name: _axis(kind) for name, kind in _TYPES.items()}}),
+        _mapping_of("grid", {"preset": axis(_Preset), **{name: axis(kind) for name, kind in _AXES.items()}}),
     ] = Field({}, description="axes of the grid, see below; not in a file with blocks")
+
+    points: Annotated[
+        dict[str, list[Value]],
+        _mapping_of(
+            "points",
+            {name: Annotated[list[kind], Field(min_length=1, max_length=AXIS_LIMIT)] for name, kind in _TYPES.items()},
+        ),
+    ] = Field(
+        {},
+        description="parameter sets: quantity → its value in each; one more axis, `point`; not in a file with blocks",
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -261,10 +221,19 @@ class BlockKeys(BaseModel):
 
     @model_validator(mode="after")
     def _axes_have_no_other_value(self) -> Self:
-        for name in self.grid:
+        for key, name in [("grid", name) for name in self.grid] + [("points", name) for name in self.points]:
             home = SECTION_OF.get(name, name)
             if self.preset is not None if name == "preset" else name in getattr(self, home):
-                raise InputError(f"grid.{name}: also given in {home}; leave one out")
+                raise InputError(f"{key}.{name}: also given in {home}; leave one out")
+            if key == "points" and name in self.grid:
+                raise InputError(f"points.{name}: also given in grid; leave one out")
+        first = next(iter(self.points), "")
+        for name, values in self.points.items():
+            if len(values) != len(self.points[first]):
+                raise InputError(
+                    f"points.{name}: {len(values)} values, but {first} has {len(self.points[first])}; give a value of "
+                    "each for every set"
+                )
         return self
 
 
@@ -285,7 +254,7 @@ class SweepFile(BlockKeys):
     name: Annotated[str, AfterValidator(_printable)] = Field(
         max_length=LONGEST_NAME, description="name of the sweep, in figures and pages; of a block, unique in its sweep"
     )
-    seed: int = Field(ge=0, le=LARGEST_SEED, description="whole number from which all random numbers follow")
+    seed: Whole = Field(ge=0, le=LARGEST_SEED, description="whole number from which all random numbers follow")
     blocks: list[BlockOfFile] | None = Field(
         None, min_length=1, description="list of blocks; what a block does not say is taken from the file"
     )
@@ -297,8 +266,9 @@ class SweepFile(BlockKeys):
     @model_validator(mode="after")
     def _one_grid_or_blocks(self) -> Self:
         names = [block.name for block in self.blocks or ()]
-        if names and self.grid:
-            raise InputError("grid: given together with blocks; move it into a block")
+        for key in ("grid", "points"):
+            if names and getattr(self, key):
+                raise InputError(f"{key}: given together with blocks; move it into a block")
         for number, name in enumerate(names):
             if name in names[:number]:
                 raise InputError(f"blocks[{number}].name: {shown(name)} is given twice; give another name")
@@ -326,9 +296,14 @@ def sweep_schema() -> dict[str, Any]:
 
 
 def read_sweep(
-    source: str | os.PathLike[str] | Mapping[str, object],
+    source: str | os.PathLike[str] | Mapping[str, object], **replaced: object
 ) -> tuple[str, int, tuple[str, ...], tuple[Block, ...], Recording]:
     """Read a sweep file, or one that comes with the package by its bare name, or take its content as a mapping.
+
+    Args:
+        source: the file or its content.
+        replaced: `seed` and `samples` instead of those at the top of the file; blocks with samples of their own keep
+            these.
 
     Returns:
         Name, seed, axes of equal samples, blocks and recording: the fields of `warpchain.sweeps.plan.Sweep`.
@@ -339,6 +314,9 @@ def read_sweep(
     content = plain(source, "sweep") if isinstance(source, Mapping) else read_yaml(sweep_path(source))
     if not isinstance(content, dict):
         raise InputError(f"{source}: no mapping at the top; give the keys {', '.join(SweepFile.model_fields)}")
+    if replaced.get("samples") is not None and content.get("samples") is None:
+        raise InputError("samples: each block of the sweep has its own; change the file")
+    content = content | {key: value for key, value in replaced.items() if value is not None}
     try:
         file = SweepFile.model_validate(content, context={"expanded": 0})
     except ValidationError as error:
@@ -360,20 +338,25 @@ def _block(name: str, path: str, outer: BlockKeys | None, inner: BlockKeys) -> B
     def merged(key: str) -> dict[str, Any]:
         return {**(getattr(outer, key) if outer else {}), **getattr(inner, key)}
 
+    points = {name: tuple(values) for name, values in inner.points.items()}
     axes = {axis: tuple(values) for axis, values in inner.grid.items()}
-    sections = {key: {name: value for name, value in merged(key).items() if name not in axes} for key in SECTIONS}
+    if points:
+        axes = {POINT: tuple(range(len(next(iter(points.values()))))), **axes}
+    varied = {*axes, *points}
+    sections = {key: {name: value for name, value in merged(key).items() if name not in varied} for key in SECTIONS}
     preset, samples, sampler = (either(key) for key in ("preset", "samples", "sampler"))
     if preset is None and "preset" not in axes:
         raise InputError(f"{path}.preset: missing; name the parameters to start from, such as preset: paper")
     if samples is None:
         raise InputError(f"{path}.samples: missing; give the number of samples per cell")
-    drawn = _drawn(merged("distributions"), sections, axes, f"{path}.distributions")
+    drawn = _drawn(merged("distributions"), sections, varied, f"{path}.distributions")
     check_design(sampler or "random", samples, len(drawn), path)
-    return Block(path, name, None if "preset" in axes else preset, sections, axes, drawn, sampler or "random", samples)
+    fixed = None if "preset" in axes else preset
+    return Block(path, name, fixed, sections, axes, points, drawn, sampler or "random", samples)
 
 
 def _drawn(
-    given: Mapping[str, Any], sections: Mapping[str, Mapping[str, Value]], axes: Mapping[str, object], path: str
+    given: Mapping[str, Any], sections: Mapping[str, Mapping[str, Value]], varied: set[str], path: str
 ) -> dict[str, Distribution]:
     """What a block draws, in the order of drawing.
 
@@ -382,7 +365,7 @@ def _drawn(
     """
     drawn: dict[str, Distribution] = {}
     for name in DRAWABLE:
-        home = "grid" if name in axes else SECTION_OF[name] if name in sections[SECTION_OF[name]] else None
+        home = "grid" if name in varied else SECTION_OF[name] if name in sections[SECTION_OF[name]] else None
         usual = TABLE.get(name) if home is None and given.get("all", "table") == "table" else None
         distribution = given.get(name, usual)
         if distribution is None:
@@ -409,15 +392,16 @@ def _numbered(blocks: list[Block], same_samples_along: tuple[str, ...]) -> Itera
     Raises:
         InputError: there are too many cells or walks.
     """
-    first = first_stream = cells = 0
+    walks = first_stream = cells = 0
+    stride = sum(math.prod(block.shape[:-1]) for block in blocks)
     for block in blocks:
-        yield replace(block, first=first, first_stream=first_stream)
+        yield replace(block, first_cell=cells, stride=stride, first_stream=first_stream)
         cells += math.prod(block.shape[:-1])
-        first += block.walk_count
+        walks += block.walk_count
         if cells > CELL_LIMIT:
             raise InputError(f"{block.path}.grid: {cells:.6g} cells; give fewer values, for {CELL_LIMIT} cells at most")
-        if first > WALK_LIMIT:
+        if walks > WALK_LIMIT:
             raise InputError(
-                f"{block.path}.samples: {first:.6g} walks; give fewer samples, for {WALK_LIMIT} walks at most"
+                f"{block.path}.samples: {walks:.6g} walks; give fewer samples, for {WALK_LIMIT} walks at most"
             )
         first_stream += math.prod(len(values) for name, values in block.axes.items() if name not in same_samples_along)

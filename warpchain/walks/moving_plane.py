@@ -6,20 +6,17 @@ way that the chain walks.
 """
 
 import math
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.scene import link_values
 from warpchain.inputs.setup import Setup
+from warpchain.inputs.state import State
 from warpchain.kernels import layout
 
 Array = NDArray[np.float64]
-
-
-UPRIGHT: Final = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
-"""A plane at rest whose axes are the room's X and Y."""
 
 
 def released_plane(setup: Setup, position: Array) -> Array:
@@ -33,7 +30,7 @@ def released_plane(setup: Setup, position: Array) -> Array:
         position: x, y [m], θ [rad] of the links in the upright plane, shape (n, 3).
     """
     scene, parameters = setup.scene, setup.parameters
-    masses = np.resize([parameters.inner_mass, parameters.outer_mass], len(position))
+    masses = link_values(scene, parameters).mass
     center_x, center_y, _ = masses @ position / masses.sum()
     lowest = lowest_point(position, parameters)
     sine, cosine = math.sin(scene.tilt), math.cos(scene.tilt)
@@ -66,6 +63,23 @@ def frame_axes(planes: Array) -> Array:
     ahead, up = (planes[:, first : first + 3] for first in (layout.AHEAD, layout.UP))
     axes = np.stack([ahead, up, np.cross(ahead, up)], axis=1)  # room axes along axis 1, components along axis 2
     return np.ascontiguousarray(axes[:, :, :2].transpose(0, 2, 1))
+
+
+def state_of_plane(plane: Array) -> dict[str, Array]:
+    """The fields of a `State` that tell its plane, (PLANE_VALUES,)."""
+    return {
+        "origin": plane[layout.ORIGIN : layout.ORIGIN + 3],
+        "axes": frame_axes(plane[None])[0],
+        "plane_rates": plane[:3],
+    }
+
+
+def plane_of_state(state: State) -> Array:
+    """The plane of a state, (PLANE_VALUES,), which must have one."""
+    assert state.origin is not None and state.axes is not None and state.plane_rates is not None
+    first, second = state.axes
+    axes = np.stack([first, second, np.cross(first, second)])  # the plane's axes along axis 0
+    return np.concatenate([state.plane_rates, axes[:, 0], axes[:, 1], state.origin])
 
 
 def in_room(joints: Array, origin: Array, axes: Array) -> Array:

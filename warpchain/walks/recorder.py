@@ -1,19 +1,31 @@
 """Takes the time series and frames of a walk out of its world, between launches."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.engine.batch import Batch
 from warpchain.kernels import layout
-from warpchain.loop.before_release import BeforeRelease
+from warpchain.loop.before_release import BEFORE, BeforeRelease
+from warpchain.walks.even_clock import EvenClock
 from warpchain.walks.motion import Keep
 from warpchain.walks.moving_plane import angles, frame_axes
-from warpchain.walks.walk_result import BEFORE, MOTION
 
 Array = NDArray[np.float64]
+
+SERIES: Final[dict[str, int | list[int]]] = {
+    "time": layout.TIME,
+    "center": [layout.CENTER_X, layout.CENTER_Y],
+    "center_velocity": [layout.CENTER_U, layout.CENTER_V],
+    "kinetic_energy": layout.KINETIC,
+    "gravitational_energy": layout.GRAVITATIONAL,
+    "spring_energy": layout.SPRING,
+    "lowest": layout.LOWEST,
+    "rms_speed": layout.RMS_SPEED,
+}
+"""Arrays of a `WalkResult` that are columns of the samples."""
 
 
 @dataclass(kw_only=True)
@@ -55,9 +67,8 @@ class Recorder:
         self.before: BeforeRelease | None = None
         self._batch, self._world, self.keep = batch, world, keep
         self._has_samples, self._has_frames = batch.record.samples.size > 0, batch.record.frames.size > 0
-        self._place = -1.0
         self._width = batch.record.samples.shape[2]
-        self._last: Array = np.empty((0, self._width))
+        self._clock = EvenClock((keep.series_every or 1) * batch.options.record_interval, self._width)
         self._tilts = tilts
         self._drive: list[_Piece] = []
         self._pieces: list[_Piece] = []
@@ -80,8 +91,8 @@ class Recorder:
             samples = batch.drain_samples(world)
             if not released:
                 piece.samples = samples
-            elif keep.series_every is not None and len(samples):
-                piece.samples, self._last = self._thinned(samples, keep.series_every), samples[-1:]
+            elif keep.series_every is not None:
+                piece.samples = self._clock.rows(samples)
         if self._has_frames:
             if self._tilts and released:
                 piece.planes = batch.frame_planes(world)
@@ -127,25 +138,21 @@ class Recorder:
             frame_moments=loads[wanted, :, 2],
         )
 
-    def _thinned(self, samples: Array, every: int) -> Array:
-        """The first of the samples in each interval; a step may be longer than the time between two sample marks."""
-        if every == 1:
-            return samples
-        places = np.floor(samples[:, layout.TIME] / (every * self._batch.options.record_interval))
-        is_first = np.diff(places, prepend=self._place) > 0
-        self._place = places[-1]
-        return samples[is_first]
+    def go_on(self, last: Array, time: float) -> None:
+        """Begin within a walk at a time [s], with the sample before, (columns,)."""
+        if last[layout.TIME] >= 0:
+            self._clock.go_on(last, time)
 
     def motion(self) -> dict[str, Any]:
         """The arrays of a `WalkResult` by name, and its `before_release`."""
         names = ("samples", "times", "frames", "loads", "planes")
         samples, frame_time, joints, loads, planes = self._joined(self._pieces, *names)
-        if len(samples) and samples[-1, layout.TIME] != self._last[0, layout.TIME]:
-            samples = np.concatenate([samples, self._last])
+        last = self._clock.last
+        samples = np.concatenate([samples, last[~np.isin(last[:, layout.TIME], samples[-1:, layout.TIME])]])
         tilting = samples if self._tilts else np.empty((0, layout.ALL_COLUMNS))
         tilt, yaw = angles(tilting[:, layout.PLANE_COLUMN :])
         return {
-            **{name: samples[:, stored.sample] for name, stored in MOTION.items() if stored.sample is not None},
+            **{name: samples[:, columns] for name, columns in SERIES.items()},
             "center_z": tilting[:, layout.CENTER_Z],
             "tilt": tilt,
             "yaw": np.unwrap(yaw),

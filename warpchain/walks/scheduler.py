@@ -4,14 +4,16 @@ import threading
 import time
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn, start_device
 from warpchain.engine.kernel_choice import block_threads, features_of, load_kernels
 from warpchain.engine.memory import most_worlds
+from warpchain.inputs.floor import body_of
 from warpchain.inputs.options import Options, on_gpu
+from warpchain.inputs.scene import floor_points
 from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
@@ -78,8 +80,9 @@ def run_setups(
         links = [setups[place].scene.links for place in places]
         wanted = [] if keeps is None else [keeps[place] for place in places]
         tilts = any(setups[place].scene.plane == "tilting" for place in places)
+        faces = max(len(setups[place].scene.floor) - 1 for place in places)  # "flat": room for a slope
         waiting = deque(places)
-        batches, capacity = _batches(setups[places[0]].options, links, wanted, slots, threads, tilts)
+        batches, capacity = _batches(setups[places[0]].options, links, wanted, slots, threads, tilts, faces)
         return Group(waiting, [BatchRun(batch, waiting, begin, watch) for batch in batches], capacity)
 
     # long chains take longest: they begin first, so that the run does not wait for them in the end
@@ -94,6 +97,7 @@ def _batches(
     slots: int | None,
     threads: int | None,
     tilts: bool,
+    faces: int,
 ) -> tuple[list[Batch], int]:
     """Batches for walks, and how many chains would fill the device.
 
@@ -113,6 +117,7 @@ def _batches(
             keeps_frames=frames,
             keeps_loads=loads,
             tilts=tilts,
+            faces=faces,
             threads=threads,
         )
     capacity = slots = slots or 1
@@ -125,7 +130,7 @@ def _batches(
         raise ValueError(f"keeps: frame intervals {sorted(intervals)} s; walks that run together have one")
     kept["frame_interval"] = max(intervals, default=0.0)
     batches = [
-        Batch(min(worlds, slots - first), longest, options, threads=threads, **kept)
+        Batch(min(worlds, slots - first), longest, options, faces=faces, threads=threads, **kept)
         for first in range(0, slots, worlds)
     ]
     return batches, capacity
@@ -141,11 +146,14 @@ def compile_kernels(setups: Iterable[Setup], threads: int | None = None) -> None
     wanted: set[tuple[str, Features, int]] = set()
     for setup in setups:
         columns = layout.padded_width(setup.scene.links)
-        for fixed_body in ["floor"] + ["sprocket"] * (setup.scene.start != "ellipse"):
-            tilts = fixed_body == "floor" and setup.scene.plane == "tilting"
+        floor = body_of(floor_points(setup.scene))
+        for fixed_body in [floor] + ["sprocket"] * setup.has_drive:
+            tilts = fixed_body == floor and setup.scene.plane == "tilting"
             features = features_of(setup.options, columns, fixed_body=fixed_body, tilts=tilts)
             size = (threads or block_threads(setup.scene.links)) if on_gpu(setup.options.device) else 1
             wanted.add((setup.options.device, features, size))
+            if setup.has_drive and setup.scene.release is not None and fixed_body == floor:
+                wanted.add((setup.options.device, replace(features, moving_sprocket=True), size))
     with gpu_turn(device for device, _, _ in wanted):
         load_kernels((start_device(device), features, size) for device, features, size in wanted)
 

@@ -17,21 +17,25 @@ from warpchain.engine.control import (
     HOLD_STRAIN,
     LOADED_STRAIN,
     hold_softness,
-    line_density,
     mean_weight,
     push_rate,
     suitable_load,
 )
+from warpchain.engine.snapshot import change, restore, set_first_area, set_frame_marks, take_snapshot
+from warpchain.engine.sprocket_motion import motion_rows
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
-from warpchain.inputs.scene import contact_radius, joint_radius, loop_speed, settling_time
+from warpchain.inputs.floor import body_of, circles_of, raised_by
+from warpchain.inputs.link_values import mean_value
+from warpchain.inputs.scene import contact_radius, floor_points, joint_radius, link_values, loop_speed, settling_time
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
+from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
 from warpchain.walks.motion import NOTHING, Keep
-from warpchain.walks.moving_plane import angles, lowest_point, released_plane
+from warpchain.walks.moving_plane import angles, lowest_point, plane_of_state, released_plane, state_of_plane
 from warpchain.walks.recorder import Recorder
 
 Array = NDArray[np.float64]
@@ -39,10 +43,15 @@ Array = NDArray[np.float64]
 STILL_PERIOD = 0.25
 """Loop period [s] that is assumed when the sprocket stands still."""
 SHORTEST_WINDOW, LONGEST_WINDOW = 0.05, 0.25
-"""Bounds of the time [s] over which a loop under its own loads is averaged; between them half a loop period."""
+"""Bounds of the time [s] over which a loop under its own loads is averaged; between them half a loop period.
+
+Loops whose links do not alternate are averaged over whole periods, no more than the lower bound needs."""
 BY_ITSELF = -1.0
 """As `steady_time` means: the kernel chooses how long to watch, see :mod:`warpchain.kernels.events.release`."""
 
+
+_OF_THE_RUN = ("raised", "drive_time", "drift", "_at_full_speed", "_has_sprocket")
+"""What a run knows of the time before its release."""
 
 PLANE_OUTCOME = ("lateral_drift", "final_tilt", "final_yaw", "greatest_tilt", "fell_at")
 """Numbers of a walk's outcome that only a plane that tilts has."""
@@ -85,17 +94,26 @@ class WalkRun:
         self.drive_counts = dict.fromkeys(COUNTS, 0)
         self.drive_extremes = dict.fromkeys(EXTREMES, 0.0)
         self._batch, self._world = batch, world
-        self._hanging_lowest = math.nan
+        self._hanging_raise = math.nan
         self._released = False
         self._hold_softness = 0.0
+        self._at_full_speed = math.nan
+        self._first_area: float | None = None
+        self._moves_sprocket = False
 
         scene, parameters = setup.scene, setup.parameters
-        self._has_sprocket = scene.start != "ellipse"
+        self._links = link_values(scene, parameters)
+        self._has_sprocket = setup.has_drive
         self._tilts = scene.plane == "tilting"
+        self._floor = floor_points(scene)
+        self._level = math.cos(math.radians(scene.slope))  # of a distance along the floor
+        if setup.start is not None:
+            self._go_on(setup.start)
+            return
         from_rest = scene.start == "rest"
         speed = 2 * math.pi * scene.frequency * joint_radius(scene, parameters)
         if not self._has_sprocket:
-            batch.set_chain(world, parameters, scene.links)
+            batch.set_chain(world, parameters, scene.links, own=self._links)
             try:
                 position, velocity = lay_chain(
                     ellipse(scene.ellipse_aspect), scene.links, parameters.link_length, speed, scene.phase
@@ -108,15 +126,19 @@ class WalkRun:
             self._release(position, velocity)
             return
         radius = joint_radius(scene, parameters)
-        tension = line_density(parameters) * speed**2
-        weight = mean_weight(parameters, scene.links, radius)
-        load_factor = scene.load_factor or suitable_load(parameters, setup.options, weight)
+        density = mean_value(self._links.mass) / parameters.link_length
+        tension = density * speed**2
+        weight = mean_weight(parameters, density, scene.links, radius)
+        load_factor = scene.load_factor or suitable_load(parameters, self._links, setup.options, weight)
         loaded_softness = 0.0
         if setup.options.soften_drive:
             self._hold_softness = hold_softness(parameters, tension, HOLD_STRAIN)
             loaded_softness = hold_softness(parameters, tension + load_factor * weight, LOADED_STRAIN)
         period = scene.links * parameters.link_length / speed if speed > 0 else STILL_PERIOD
-        batch.set_chain(world, parameters, scene.links, contact_radius(scene, parameters))
+        window = min(max(period / 2, SHORTEST_WINDOW), LONGEST_WINDOW)
+        if not self._links.alternates:  # the loop swings as it turns: only over whole turns does its mean stay
+            window = period * math.ceil(SHORTEST_WINDOW / period)
+        batch.set_chain(world, parameters, scene.links, contact_radius(scene, parameters), self._links)
         self._settled = settling_time(scene)
         spin_up = scene.spin_up_time if from_rest and speed > 0 else 0.0
         self._at_full_speed = self._settled + spin_up
@@ -133,7 +155,7 @@ class WalkRun:
             loop_speed=loop_speed(scene, parameters),
             loop_period=period,
             load_factor=load_factor,
-            steady_window=min(max(period / 2, SHORTEST_WINDOW), LONGEST_WINDOW),
+            steady_window=window,
             steady_time=BY_ITSELF if scene.steady_time is None else scene.steady_time,
             steady_tolerance=scene.steady_tolerance,
             further_hold=scene.further_hold,
@@ -156,10 +178,22 @@ class WalkRun:
         return Phase.SPIN_UP if now < self._at_full_speed else Phase.HOLD
 
     @property
+    def is_released(self) -> bool:
+        """Whether the chain walks without a sprocket, and all that its start brings has been done."""
+        return self._released and self._first_area is None and not self._moves_sprocket
+
+    @property
+    def _walk_end(self) -> float:
+        """Time [s] since the release at which a walk ends that is not at rest."""
+        scene = self.setup.scene
+        return min(scene.walk_limit, scene.walk_until or math.inf)
+
+    @property
     def features(self) -> Features:
         """What the kernel that carries the world on must be compiled for."""
         if self._released:
-            return self._batch.features(fixed_body="floor", tilts=self._tilts)
+            body = body_of(self._floor)
+            return self._batch.features(fixed_body=body, tilts=self._tilts, moving_sprocket=self._moves_sprocket)
         return self._batch.features(fixed_body="sprocket")
 
     @property
@@ -241,7 +275,7 @@ class WalkRun:
         }
 
     def _ending(self, moment: str, event: str, first: int) -> dict[str, Any]:
-        """When self-contact or collapse came, after how many bounces and how long after the last floor impulse.
+        """When an event came, after how many bounces begun, and how long after the last impulse on the floor.
 
         Args:
             moment: name of the field that says when.
@@ -261,10 +295,12 @@ class WalkRun:
         """Results of the walk apart from its motion, by the names of the fields of `WalkResult`."""
         counts, extremes = self.counts, self.extremes
         is_at_rest = self.status == Status.AT_REST
-        # Δx is x of the centre of mass, because the sprocket's centre is at x = 0
+        # Δx is x of the centre of mass, because the sprocket's centre is at x = 0; on a slope, along the floor
         return {
             "status": self.status,
-            "dx": float(self._batch.last_sample(self._world)[layout.CENTER_X]) if is_at_rest else math.nan,
+            "dx": float(self._batch.last_sample(self._world)[layout.CENTER_X]) / self._level
+            if is_at_rest
+            else math.nan,
             "walk_time": self.walk_time,
             "simulated_time": self.simulated_time,
             "hold_time": self.hold_time,
@@ -279,6 +315,7 @@ class WalkRun:
             "energy": self.energy(),
             **self._fall(is_at_rest),
             **self._ending("self_contact_at", "self_contact", layout.SELF_CONTACT_AT),
+            **self._ending("strands_met_at", "strands_met", layout.STRANDS_MET_AT),
             **self._ending("collapsed_at", "collapse", layout.COLLAPSED_AT),
             "sprocket_height": self.raised if self._has_sprocket else math.nan,
         }
@@ -292,12 +329,22 @@ class WalkRun:
         status = self._batch.status(self._world)
         if not self._released:
             self.drift = self._batch.watched(self._world, layout.DRIFT)
+        if self._first_area is not None and status == Status.FINISHED:
+            set_first_area(self._batch, self._world, self._first_area)
+            self._first_area = None
+            self._batch.resume(self._world, self._walk_end, Status.TIME_LIMIT)
+            return True
+        if self._moves_sprocket and status == Status.FINISHED:
+            self._moves_sprocket = False
+            self._batch.resume(self._world, self._walk_end, Status.TIME_LIMIT)
+            return True
         if self._released or status != Status.FINISHED:
-            self.status = status
+            until, limit = self.setup.scene.walk_until, self.setup.scene.walk_limit
+            is_planned = status == Status.TIME_LIMIT and until is not None and until <= limit
+            self.status = Status.FINISHED if is_planned else status
             return False
-        if self._batch.time(self._world) <= self._settled and math.isnan(self._hanging_lowest):
-            position = self._batch.position(self._world)
-            self._hanging_lowest = lowest_point(position, self.setup.parameters)
+        if self._batch.time(self._world) <= self._settled and math.isnan(self._hanging_raise):
+            self._hanging_raise = self._raise(self._batch.position(self._world))
             self._start_drive()
         else:
             self.drive_time = self._batch.time(self._world)
@@ -308,27 +355,96 @@ class WalkRun:
             self.recorder.release(self.drive_time, self.raised, free_since)
         return True
 
+    def memory(self) -> dict[str, NDArray[Any]]:
+        """All that the rest of a walk, or of its outcome, depends on: a `State.memory`."""
+        return {
+            **take_snapshot(self._batch, self._world),
+            **{f"run/{name}": np.array(getattr(self, name)) for name in _OF_THE_RUN},
+            "run/counts": np.array([self.drive_counts[name] for name in COUNTS]),
+            "run/extremes": np.array([self.drive_extremes[name] for name in EXTREMES]),
+        }
+
+    def _go_on(self, start: State) -> None:
+        """Place a chain as a state has it; if that was taken from a walk, go on with the walk."""
+        batch, world, memory, interval = self._batch, self._world, start.memory, self.recorder.keep.frame_interval
+        batch.set_chain(world, self.setup.parameters, start.links, own=self._links)
+        self._released = True
+        if not memory:
+            self._load(start.position, start.velocity)
+            return
+        for name in _OF_THE_RUN:
+            setattr(self, name, memory[f"run/{name}"].item())
+        self.drive_counts = dict(zip(COUNTS, memory["run/counts"].tolist(), strict=True))
+        self.drive_extremes = dict(zip(EXTREMES, memory["run/extremes"].tolist(), strict=True))
+        restore(batch, world, memory)
+        self._set_floor()
+        set_frame_marks(batch, world, interval)
+        if "scratch" in memory and self._is_at(start):
+            batch.resume(world, self._walk_end, Status.TIME_LIMIT)
+            self.recorder.go_on(memory["state/last_sample"], start.time)
+            return
+        if self._tilts:
+            batch.set_plane(world, plane_of_state(start))
+        # it stops at once, and so makes the sample with which its new ledger begins
+        change(batch, world, start.position, start.velocity)
+        batch.resume(world, batch.time(world), Status.FINISHED)
+        self._first_area = float(memory["state/first_area"])
+
+    def _is_at(self, start: State) -> bool:
+        """Whether the world has the places and velocities of a state, to the bit."""
+        batch, world = self._batch, self._world
+        pairs = [(batch.position(world), start.position), (batch.velocity(world), start.velocity)]
+        if self._tilts:
+            ours = state_of_plane(batch.plane(world))
+            pairs += [(values, getattr(start, name)) for name, values in ours.items()]
+        return all(here.tobytes() == there.tobytes() for here, there in pairs)
+
     def _start_drive(self) -> None:
         limit = self._at_full_speed + self.setup.scene.hold_limit
         self._batch.resume(self._world, limit, Status.NOT_STEADY)
 
+    def _raise(self, position: Array) -> float:
+        """How far a chain at this position must be raised to its clearance [m]."""
+        clearance, parameters = self.setup.scene.clearance, self.setup.parameters
+        if self._floor is None:
+            return clearance - lowest_point(position, parameters)
+        circles = circles_of(position, parameters.link_length)
+        return raised_by(self._floor, circles, parameters.circle_radius, clearance)
+
+    def _set_floor(self) -> None:
+        """Set the floor, and how far the chain may walk on it."""
+        scene = self.setup.scene
+        self._batch.set_drive(self._world, farthest=(scene.distance_limit or 0.0) * self._level)
+        if self._floor is not None:
+            self._batch.set_floor(self._world, self._floor, self.setup.parameters)
+
     def _release(self, position: Array, velocity: Array) -> None:
         scene = self.setup.scene
-        lowest = lowest_point(position, self.setup.parameters)
-        measured = self._hanging_lowest if scene.clearance_of == "hanging" else lowest
-        self.raised = scene.clearance - measured
+        self.raised = self._hanging_raise if scene.clearance_of == "hanging" else self._raise(position)
         position[:, 1] += self.raised
-        self._batch.set_chain(self._world, self.setup.parameters, scene.links)
+        self._batch.set_chain(self._world, self.setup.parameters, scene.links, own=self._links)
+        self._load(position, velocity)
+        if self._tilts:
+            self._batch.set_plane(self._world, released_plane(self.setup, position))
+        if scene.release is not None:
+            self._batch.set_chain(
+                self._world, self.setup.parameters, scene.links, contact_radius(scene, self.setup.parameters)
+            )
+            self._batch.set_drive(self._world, motion=motion_rows(scene.release, scene.frequency, self.raised))
+            self._batch.resume(self._world, min(scene.release[-1][0], self._walk_end), Status.FINISHED)
+            self._moves_sprocket = True
+        self._released = True
+
+    def _load(self, position: Array, velocity: Array) -> None:
+        """Begin the walk of a chain whose parameters are set."""
+        self._set_floor()
         self._batch.load(
             self._world,
             position,
             velocity,
-            stop_time=scene.walk_limit,
+            stop_time=self._walk_end,
             stop_status=Status.TIME_LIMIT,
             attempts_before=self.drive_counts["accepted"] + self.drive_counts["rejected"],
             softness=self._hold_softness,
             has_frame_marks=self.recorder.keep.frame_interval > 0,
         )
-        if self._tilts:
-            self._batch.set_plane(self._world, released_plane(self.setup, position))
-        self._released = True

@@ -12,7 +12,7 @@ reference derive from them.
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -36,13 +36,15 @@ from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, contact_radius
 from warpchain.inputs.setup import Setup
+from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, validated
 from warpchain.kernels import layout
-from warpchain.loop.before_release import FIELDS, BeforeRelease
+from warpchain.loop.before_release import BEFORE, FIELDS, BeforeRelease
 from warpchain.pictures.walk_shape import Kind
 from warpchain.status import Status
 from warpchain.walks.faults import FAULTS, MOST_ENERGY_ERROR, energy_error, faults
 from warpchain.walks.moving_plane import in_room
+from warpchain.walks.stored_state import read_state, write_state
 
 if TYPE_CHECKING:
     import h5py
@@ -54,9 +56,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 KIND: Final = "warpchain walk"
-BEFORE: Final = "before_release"
 
-_SINCE_FLOOR: Final = "time since the last impulse on the floor; NaN if there was none before, or never such a sample"
+_SINCE_FLOOR: Final = "time since the last impulse on the floor; NaN if there was none"
 _FIXED: Final = "if the plane is fixed"
 
 ENERGIES: Final = {
@@ -85,7 +86,10 @@ class WalkResult:
     """
 
     status: Status
-    dx: Annotated[float, Stored("m", "x of the centre of mass less x of the sprocket; NaN unless at rest")]
+    dx: Annotated[
+        float,
+        Stored("m", "x of the centre of mass less x of the sprocket, on a slope along the floor; NaN unless at rest"),
+    ]
     walk_time: Annotated[float, Stored("s", "from the release to the end")]
     simulated_time: Annotated[float, Stored("s", "simulated, the phases before the release included")]
     hold_time: Annotated[float, Stored("s", "for which the loop was held at full frequency; NaN without a sprocket")]
@@ -118,20 +122,25 @@ class WalkResult:
         float,
         Stored("s", "from the release to the sample after the first impulse between links; or NaN"),
     ]
-    bounces_before_self_contact: Annotated[
-        int, Stored("1", "bounces begun when links first touched one another; −1 if they never did")
-    ]
+    bounces_before_self_contact: Annotated[int, Stored("1", "bounces begun at self_contact_at; −1 if it never came")]
     flight_before_self_contact: Annotated[
         float,
         Stored("s", f"at self_contact_at, {_SINCE_FLOOR}"),
     ]
+    strands_met_at: Annotated[
+        float,
+        Stored(
+            "s",
+            f"as self_contact_at, of links {layout.STRANDS_APART} or more apart along the chain: strands of the loop",
+        ),
+    ]
+    bounces_before_strands_met: Annotated[int, Stored("1", "bounces begun at strands_met_at; −1 if it never came")]
+    flight_before_strands_met: Annotated[float, Stored("s", f"at strands_met_at, {_SINCE_FLOOR}")]
     collapsed_at: Annotated[
         float,
         Stored("s", "from the release until the loop enclosed less than half of its area; NaN if it never did"),
     ]
-    bounces_before_collapse: Annotated[
-        int, Stored("1", "bounces begun when the loop collapsed, see collapsed_at; −1 if it never did")
-    ]
+    bounces_before_collapse: Annotated[int, Stored("1", "bounces begun at collapsed_at; −1 if it never came")]
     flight_before_collapse: Annotated[float, Stored("s", f"at collapsed_at, {_SINCE_FLOOR}")]
     softened_at: Annotated[float, Stored("s", "from the release to the softening of the joints; NaN if they were not")]
     wall_time: Annotated[float, Stored("s", "that the computer took, without the compilation of kernels")]
@@ -148,18 +157,14 @@ class WalkResult:
     setup: Setup
     seed: int | None
     versions: dict[str, str]
-    time: Annotated[Array, Stored("s", "time since the release", "t", sample=layout.TIME)]
-    center: Annotated[Array, Stored("m", "centre of mass x, y", "t 2", sample=[layout.CENTER_X, layout.CENTER_Y])]
-    center_velocity: Annotated[
-        Array, Stored("m/s", "velocity of the centre of mass x, y", "t 2", sample=[layout.CENTER_U, layout.CENTER_V])
-    ]
-    kinetic_energy: Annotated[Array, Stored("J", "kinetic energy", "t", sample=layout.KINETIC)]
-    gravitational_energy: Annotated[
-        Array, Stored("J", "energy in the field of gravity", "t", sample=layout.GRAVITATIONAL)
-    ]
-    spring_energy: Annotated[Array, Stored("J", "energy of the joint springs", "t", sample=layout.SPRING)]
-    lowest: Annotated[Array, Stored("m", "height of the lowest point of all circles", "t", sample=layout.LOWEST)]
-    rms_speed: Annotated[Array, Stored("m/s", "root mean square speed of the links", "t", sample=layout.RMS_SPEED)]
+    time: Annotated[Array, Stored("s", "time since the release", "t")]
+    center: Annotated[Array, Stored("m", "centre of mass x, y", "t 2")]
+    center_velocity: Annotated[Array, Stored("m/s", "velocity of the centre of mass x, y", "t 2")]
+    kinetic_energy: Annotated[Array, Stored("J", "kinetic energy", "t")]
+    gravitational_energy: Annotated[Array, Stored("J", "energy in the field of gravity", "t")]
+    spring_energy: Annotated[Array, Stored("J", "energy of the joint springs", "t")]
+    lowest: Annotated[Array, Stored("m", "height of the lowest point of all circles", "t")]
+    rms_speed: Annotated[Array, Stored("m/s", "root mean square speed of the links", "t")]
     frame_time: Annotated[Array, Stored("s", "time since the release", "f")]
     frame_joints: Annotated[Array, Stored("m", "joints x, y; joint i ends link i, even links inner", "f n 2")]
     frame_forces: Annotated[
@@ -191,8 +196,8 @@ class WalkResult:
     @property
     def sprocket_radius(self) -> float:
         """Radius of the sprocket that links touch [m]; NaN without one."""
-        scene = self.setup.scene
-        return np.nan if scene.start == "ellipse" else contact_radius(scene, self.setup.parameters)
+        scene, had_none = self.setup.scene, self.setup.start is not None and np.isnan(self.sprocket_height)
+        return np.nan if had_none or scene.start == "ellipse" else contact_radius(scene, self.setup.parameters)
 
     @property
     def joints_in_room(self) -> Array | None:
@@ -215,11 +220,11 @@ class WalkResult:
 
     def __repr__(self) -> str:
         """One line with the most important numbers."""
-        scene, error = self.setup.scene, self.energy_error
+        error = self.energy_error
         warning = f", energy error {error:.1e}" if error > MOST_ENERGY_ERROR else ", inaccurate" * bool(self.warnings())
         return (
             f"<WalkResult {self.status.label}: dx {self.dx:.4g} m in {self.walk_time:.4g} s, "
-            f"{self.bounces} bounces, {scene.links} links at {scene.frequency:g} Hz, {self.setup.preset}{warning}>"
+            f"{self.bounces} bounces, {self.setup.described}, {self.setup.preset}{warning}>"
         )
 
     @property
@@ -236,11 +241,10 @@ class WalkResult:
 
     def facts(self) -> list[tuple[str, str]]:
         """Names and values that a notebook shows beside the picture."""
-        scene = self.setup.scene
         return [
             ("status", self.status.label if self.status.ok else f"{self.status.label}: {self.status.sentence}"),
             ("distance Δx", f"{self.dx:.4g} m"),
-            ("chain", f"{scene.links} links at {scene.frequency:g} Hz, preset {self.setup.preset}"),
+            ("chain", f"{self.setup.described}, preset {self.setup.preset}"),
             ("walk time", f"{self.walk_time:.4g} s"),
             ("seed", "none, nothing was drawn" if self.seed is None else str(self.seed)),
             ("bounces", str(self.bounces)),
@@ -249,6 +253,23 @@ class WalkResult:
             *(("warning", remedy) for remedy in self.warnings()),
             *([] if np.isnan(self.wall_time) else [("computed in", f"{self.wall_time:.1f} s")]),
         ]
+
+    def state(self, t: float) -> State:
+        """The chain at the end of its first step at or after a time, as samples and frames are taken.
+
+        The walk is run again until then, which takes as long as it took the first time. `warpchain.walk(start=state)`
+        goes on with it, `dataclasses.replace` perturbs it.
+
+        Args:
+            t: time since the release [s], at most `walk_time`.
+
+        Raises:
+            InputError: `t` is no such time, the chain was never released, or the device of the walk is not here.
+        """
+        from warpchain.walks.revisit import state_at
+
+        is_released = not np.isnan(self.energy["kinetic_at_release"])
+        return state_at(self.setup, t, self.walk_time if is_released else np.nan)
 
     def plot(
         self,
@@ -356,6 +377,8 @@ class WalkResult:
         file.attrs["seed"], file.attrs["versions"] = json.dumps(self.seed), json.dumps(self.versions)
         write_fields(file, vars(self), NUMBERS)
         write_motion(file, vars(self))
+        if self.setup.start is not None:
+            write_state(file, self.setup.start)
         for name, quantity in Parameters.quantities().items():
             value = getattr(self.setup.parameters, name)
             put(file, f"parameters/{name}", value, quantity.unit, quantity.meaning).attrs["symbol"] = quantity.symbol
@@ -389,13 +412,15 @@ def read_motion(group: "h5py.Group", links: int) -> dict[str, Any]:
 
 
 def load_walk(path: str | os.PathLike[str]) -> WalkResult:
-    """Read a walk that `WalkResult.save` wrote; every number comes back to the bit.
+    """Read a walk that `WalkResult.save` wrote, or the `walk.h5` of a folder; every number comes back to the bit.
 
     Raises:
         OSError: the file cannot be read.
         InputError: the file is no walk, or belongs to another version of warpchain. It is a `ValueError`.
         DamagedFileError: the file is damaged or cut short. It is an `InputError`.
     """
+    if os.path.isdir(path):
+        path = os.path.join(path, "walk.h5")
     remedy = "run the walk again, or fetch another copy of the file"
     with reading_hdf5(path, KIND, remedy, "give a file written by WalkResult.save") as file:
         given = json.loads(file.attrs["setup"])
@@ -406,6 +431,7 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
                 scene=validated(Scene, given["scene"], "scene"),
                 options=validated(Options, given["options"], "options"),
             )
+            setup = replace(setup, start=read_state(file, setup))
         except InputError as error:
             raise InputError(f"{path}: {error}; read it with the version that wrote it") from None
         return WalkResult(

@@ -8,16 +8,25 @@ sequence in about as many parallel rounds as the busiest link has contacts.
 
 The geometry of contacts does not depend on velocities. :func:`circles_of_links` evaluates it for all contacts first,
 which leaves little for :func:`collide` to do one after the other. That is a vectorised loop over pairs of joints, whose
-circles are copied side by side before; gathers in that loop took twice as long.
+circles are copied side by side before; gathers in that loop took twice as long. Masses copied as well took longer by
+half in a dense heap than dividing for each contact.
 """
 
 import functools
 
 import warp as wp
 
-from warpchain.kernels.contacts.link_pair import are_neighbours, circles_of_links, collide, links_of, natural
+from warpchain.kernels.contacts.link_pair import (
+    are_neighbours,
+    are_strands,
+    circles_of_links,
+    collide,
+    divisors,
+    links_of,
+    natural,
+)
 from warpchain.kernels.contacts.list_layout import GEOMETRY_COLUMNS, GEOMETRY_ROWS, list_layout
-from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y, X, Y
+from warpchain.kernels.layout import LEFT_X, LEFT_Y, RIGHT_X, RIGHT_Y, X, Y
 from warpchain.kernels.physics.elementary import TWO, ZERO, order_bits
 from warpchain.kernels.types import Chain
 
@@ -28,8 +37,8 @@ wp.set_module_options({"enable_backward": False})
 P_LEFT_HAND, P_RIGHT_HAND, Q_LEFT_HAND, Q_RIGHT_HAND = 0, 4, 8, 12
 END_X, END_Y, CENTER_X, CENTER_Y = range(4)
 # Then the two contacts of a half, each with the numbers that circles_of_links returns.
-FIRST_CONTACT, SECOND_CONTACT = 16, 25
-DEPTH, NORMAL_X, NORMAL_Y, A_N, A_T, B_N, B_T, INVERSE_NN, INVERSE_DETERMINANT = range(9)
+FIRST_CONTACT, SECOND_CONTACT = 16, 23
+DEPTH, NORMAL_X, NORMAL_Y, A_N, A_T, B_N, B_T = range(7)
 
 
 @wp.func
@@ -109,19 +118,12 @@ def self_contacts(columns: int):
         a = wp.where(second == 0, P_LEFT_HAND, P_RIGHT_HAND)
         b = wp.where(second == half, Q_LEFT_HAND, Q_RIGHT_HAND)
         row = wp.where(second == 0, FIRST_CONTACT, SECOND_CONTACT)
-        # links alternate: 0 is an inner one, 1 an outer one
-        inner_mass = K[INVERSE_MASS, 0]
-        outer_mass = K[INVERSE_MASS, 1]
-        inner_inertia = K[INVERSE_INERTIA, 0]
-        outer_inertia = K[INVERSE_INERTIA, 1]
         k = int(0)
         while k < count:
             p = L[wp.static(lists.found_first) + first + k]
             q = L[wp.static(lists.found_second) + first + k]
             link_a, link_b = links_of(p, q, half, second, chain.link_count)
-            is_inner_a = (link_a & 1) == 0
-            is_inner_b = (link_b & 1) == 0
-            depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = circles_of_links(
+            depth, nx, ny, a_n, a_t, b_n, b_t = circles_of_links(
                 chain.circle_radius,
                 G[a + END_X, k],
                 G[a + END_Y, k],
@@ -131,9 +133,6 @@ def self_contacts(columns: int):
                 G[a + CENTER_Y, k],
                 G[b + CENTER_X, k],
                 G[b + CENTER_Y, k],
-                wp.where(is_inner_a, inner_mass, outer_mass) + wp.where(is_inner_b, inner_mass, outer_mass),
-                wp.where(is_inner_a, inner_inertia, outer_inertia),
-                wp.where(is_inner_b, inner_inertia, outer_inertia),
             )
             G[row + DEPTH, k] = wp.where(are_neighbours(link_a, link_b, chain.link_count), ZERO, depth)
             G[row + NORMAL_X, k] = nx
@@ -142,15 +141,17 @@ def self_contacts(columns: int):
             G[row + A_T, k] = a_t
             G[row + B_N, k] = b_n
             G[row + B_T, k] = b_t
-            G[row + INVERSE_NN, k] = inverse_nn
-            G[row + INVERSE_DETERMINANT, k] = inverse_determinant
             k += 1
 
     @wp.func
     def resolve_self_contacts(
         K: wp.array2d(dtype=wp.float64), L: wp.array(dtype=wp.int32), chain: Chain, opening: wp.float64
     ):
-        """Returns the number of impulses, energy lost [J], greatest depth [m]; ``opening``: greatest |C| [m]."""
+        """Resolves all contacts of a chain whose list is made; ``opening``: greatest |C| [m].
+
+        Returns:
+            Number of impulses, number of those between strands, energy lost [J], greatest depth [m].
+        """
         G = wp.array(
             ptr=L.ptr + wp.uint64(wp.static(4 * lists.geometry)),
             shape=(GEOMETRY_ROWS, GEOMETRY_COLUMNS),
@@ -158,6 +159,7 @@ def self_contacts(columns: int):
         )
         touching = list_touching(K, L, chain, opening)
         impulses = wp.int64(0)
+        strands = wp.int64(0)
         lost = ZERO
         deepest = wp.int64(0)
         half = int(0)
@@ -182,6 +184,15 @@ def self_contacts(columns: int):
                         if depth > ZERO:
                             deepest = wp.max(deepest, order_bits(depth))
                             link_a, link_b = links_of(p, q, half, second, chain.link_count)
+                            inverse_nn, inverse_determinant = divisors(
+                                K,
+                                link_a,
+                                link_b,
+                                G[row + A_N, k],
+                                G[row + A_T, k],
+                                G[row + B_N, k],
+                                G[row + B_T, k],
+                            )
                             energy, hits = collide(
                                 K,
                                 chain,
@@ -193,16 +204,18 @@ def self_contacts(columns: int):
                                 G[row + A_T, k],
                                 G[row + B_N, k],
                                 G[row + B_T, k],
-                                G[row + INVERSE_NN, k],
-                                G[row + INVERSE_DETERMINANT, k],
+                                inverse_nn,
+                                inverse_determinant,
                                 depth,
                             )
                             lost += energy
                             impulses += hits
+                            if are_strands(link_a, link_b, chain.link_count):
+                                strands += hits
                         second += 1
                     k += 1
                 first += GEOMETRY_COLUMNS
             half += 1
-        return impulses, lost, wp.cast(deepest, wp.float64)
+        return impulses, strands, lost, wp.cast(deepest, wp.float64)
 
     return resolve_self_contacts

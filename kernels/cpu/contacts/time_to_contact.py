@@ -1,7 +1,7 @@
 """The longest step that cannot miss a contact.
 
 On springs it follows from a margin and the greatest speed. Steps on rigid joints are long and are bounded by actual
-distances: of each circle from the floor at the speed at which it falls, of each listed pair at its relative speed.
+distances: of each circle from the floor at its speed of approach, of each listed pair at its relative speed.
 Acceleration within a step adds some hundredths of a millimetre, which the contact step bounds.
 """
 
@@ -9,11 +9,13 @@ import functools
 
 import warp as wp
 
+from warpchain.kernels.contacts.fixed_body import BODIES
 from warpchain.kernels.contacts.list_layout import list_layout
+from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.cpu.contacts.proximity import greatest_speed
 from warpchain.kernels.cpu.tilting import greatest_tilting_speed
 from warpchain.kernels.features import Features
-from warpchain.kernels.layout import COSINE, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, SINE, U, V
+from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, OMEGA, RIGHT_X, RIGHT_Y, SINE, U, V
 from warpchain.kernels.physics.elementary import HALF, ONE, TWO, ZERO, order_bits
 from warpchain.kernels.types import Chain, Control
 
@@ -30,17 +32,6 @@ SMALLEST_GAP = wp.constant(wp.float64(1e-9))
 
 
 @wp.func
-def falling(
-    chain: Chain, v: wp.float64, omega: wp.float64, cosine: wp.float64, left_y: wp.float64, right_y: wp.float64
-):
-    """(Falling speed) / (height above the floor) [1/s] of a link's left and right circle; 0 if it rises."""
-    turn = chain.half_length * omega * cosine
-    left = wp.max(turn - v, ZERO) / wp.max(left_y - chain.circle_radius, SMALLEST_GAP)
-    right = wp.max(-turn - v, ZERO) / wp.max(right_y - chain.circle_radius, SMALLEST_GAP)
-    return left, right
-
-
-@wp.func
 def meeting_of(K: wp.array2d(dtype=wp.float64), chain: Chain, p: int, q: int):
     """(Relative speed) / (distance) [1/s] of the circles of two joints."""
     a = chain.half_length
@@ -54,16 +45,31 @@ def meeting_of(K: wp.array2d(dtype=wp.float64), chain: Chain, p: int, q: int):
     return wp.sqrt(du * du + dv * dv) / gap
 
 
-@wp.func
-def fastest_fall(K: wp.array2d(dtype=wp.float64), chain: Chain):
-    """Greatest (falling speed) / (height above the floor) [1/s] of all circles; 0 if none falls."""
-    greatest = wp.int64(0)
-    i = int(0)
-    while i < chain.link_count:
-        left, right = falling(chain, K[V, i], K[OMEGA, i], K[COSINE, i], K[LEFT_Y, i], K[RIGHT_Y, i])
-        greatest = wp.max(greatest, wp.max(order_bits(left), order_bits(right)))
-        i += 1
-    return wp.cast(greatest, wp.float64)
+@functools.cache
+def fastest_approach(fixed_body: str):
+    """Warp function: greatest (speed of approach) / (gap to the body) [1/s] of all circles; 0 if none approaches."""
+    surface = BODIES[fixed_body].surface
+
+    @wp.func
+    def approach(chain: Chain, face: Face, x: wp.float64, y: wp.float64, u: wp.float64, v: wp.float64):
+        gap, nx, ny, _u, _v, _e, _mu = surface(chain, face, x, y)
+        return wp.max(-(nx * u + ny * v), ZERO) / wp.max(gap, SMALLEST_GAP)
+
+    @wp.func
+    def fastest(K: wp.array2d(dtype=wp.float64), chain: Chain, face: Face):
+        greatest = wp.int64(0)
+        i = int(0)
+        while i < chain.link_count:
+            turn = chain.half_length * K[OMEGA, i]
+            u = turn * K[SINE, i]
+            v = turn * K[COSINE, i]
+            left = approach(chain, face, K[LEFT_X, i], K[LEFT_Y, i], K[U, i] + u, K[V, i] - v)
+            right = approach(chain, face, K[RIGHT_X, i], K[RIGHT_Y, i], K[U, i] - u, K[V, i] + v)
+            greatest = wp.max(greatest, wp.max(order_bits(left), order_bits(right)))
+            i += 1
+        return wp.cast(greatest, wp.float64)
+
+    return fastest
 
 
 @functools.cache
@@ -89,13 +95,15 @@ def fastest_meeting(columns: int):
 def step_bound(features: Features, has_flight: bool):
     """Warp function: longest step [s] from a placed state that cannot miss a contact; ∞ if there are none.
 
-    ``bound(K, L, chain, control, is_rigid, gap, slack, longest)``; ``longest`` [s] bounds steps near a contact.
+    ``bound(K, L, chain, face, control, is_rigid, gap, slack, longest)``; ``longest`` [s] bounds steps near a contact.
     """
-    has_floor = features.fixed_body == "floor"
     has_fixed = features.fixed_body != "none"
     has_self = features.self_contact
     count = list_layout(features.columns).count
     meeting = fastest_meeting(features.columns)
+    has_fixed_approach = has_fixed and not BODIES[features.fixed_body].in_cells
+    if has_fixed_approach:
+        approaching = fastest_approach(features.fixed_body)
     speed_bound = greatest_tilting_speed if features.tilts else greatest_speed
 
     @wp.func
@@ -103,6 +111,7 @@ def step_bound(features: Features, has_flight: bool):
         K: wp.array2d(dtype=wp.float64),
         L: wp.array(dtype=wp.int32),
         chain: Chain,
+        face: Face,
         control: Control,
         is_rigid: bool,
         gap: wp.float64,
@@ -114,8 +123,11 @@ def step_bound(features: Features, has_flight: bool):
         if wp.static(has_flight):
             if is_rigid:
                 approach = ZERO
-                if wp.static(has_floor):
-                    approach = fastest_fall(K, chain)
+                if wp.static(has_fixed_approach):
+                    approach = approaching(K, chain, face)
+                elif wp.static(has_fixed):
+                    # what a circle approaches may be another face than that which is nearest to it
+                    approach = greatest_speed(K, chain) / wp.max(gap, SMALLEST_GAP)
                 if wp.static(has_self):
                     approach = wp.max(approach, meeting(K, L, chain))
                     approach = wp.max(approach, greatest_speed(K, chain) / wp.max(slack, SMALLEST_GAP))

@@ -20,10 +20,12 @@ from typing import Any
 
 import warp as wp
 
+from warpchain.kernels import layout
 from warpchain.kernels.cpu.implicit.rigid_layout import (
     BASE,
     BASE_RATE,
     COSINE,
+    COULOMB,
     COUNTED,
     FORCE,
     FREE,
@@ -37,6 +39,7 @@ from warpchain.kernels.cpu.implicit.rigid_layout import (
     SINE,
     SPIN,
     TORQUE,
+    VISCOUS,
     force_layout,
     pad_behind,
     pad_joints,
@@ -44,7 +47,7 @@ from warpchain.kernels.cpu.implicit.rigid_layout import (
 from warpchain.kernels.cpu.implicit.solver import LANES, cyclic_solver, link_at, place_column, row_at, segment_places
 from warpchain.kernels.layout import STAGES, X
 from warpchain.kernels.physics.elementary import HALF, ONE, ZERO, cos_sin, order_bits
-from warpchain.kernels.physics.joint import smoothed_torque
+from warpchain.kernels.physics.joint import friction_torque
 from warpchain.kernels.physics.rigid_joint import inward_pull, opening_rate_of, pushed, turning_share
 from warpchain.kernels.types import Chain
 
@@ -53,6 +56,9 @@ wp.set_module_options({"enable_backward": False})
 CLOSED = wp.constant(wp.float64(1e-11))
 """Opening [m] below which a joint counts as closed; a spring of 1e9 N/m has 1e-2 N there."""
 MOST_CORRECTIONS = 5
+LINK_CONSTANTS = (MASS, INERTIA, INVERSE_MASS, INVERSE_INERTIA, VISCOUS, COULOMB)
+CONSTANTS_OF_LINK = tuple(range(layout.MASS, layout.MASS + len(LINK_CONSTANTS)))
+"""Rows of :mod:`layout` that hold the same."""
 GREATEST_RINGING = wp.constant(wp.float64(1e-5))
 """Part of the kinetic energy that the projection may take; more means that springs still oscillate.
 
@@ -129,13 +135,8 @@ def rigid_joints(columns: int) -> RigidJoints:
                 c = 8 * p + 8 + s
                 for k in range(6):
                     S[wp.static(BASE + k), c] = K[wp.static(X + k), i]
-                inner = i % 2 == 0
-                mass = wp.where(inner, chain.inner_mass, chain.outer_mass)
-                inertia = wp.where(inner, chain.inner_inertia, chain.outer_inertia)
-                S[MASS, c] = mass
-                S[INERTIA, c] = inertia
-                S[INVERSE_MASS, c] = ONE / mass
-                S[INVERSE_INERTIA, c] = ONE / inertia
+                for k in range(wp.static(len(LINK_CONSTANTS))):
+                    S[wp.static(LINK_CONSTANTS[k]), c] = K[wp.static(CONSTANTS_OF_LINK[k]), i]
                 repeats = (p == 0 and s >= full) or row_at(p, s, places, full) >= n
                 S[COUNTED, c] = wp.where(repeats, ZERO, ONE)
                 s += 1
@@ -221,7 +222,8 @@ def rigid_joints(columns: int) -> RigidJoints:
         end = place_column(places + 1)
         c = int(8)
         while c < end:
-            S[TORQUE, c] = smoothed_torque(chain, S[SPIN, c] - S[SPIN, c + 8], S[INVERSE_SMOOTHING, c])
+            spin = S[SPIN, c] - S[SPIN, c + 8]
+            S[TORQUE, c] = friction_torque(S[VISCOUS, c], S[COULOMB, c], spin, S[INVERSE_SMOOTHING, c])
             c += 1
         pad_torques(S, places, full)
         c = int(8)

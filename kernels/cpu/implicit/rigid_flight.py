@@ -27,6 +27,7 @@ from warpchain.kernels.cpu.implicit.rigid_layout import (
     BASE,
     BASE_RATE,
     COSINE,
+    COULOMB,
     COUNTED,
     COUPLED,
     DRAG,
@@ -45,6 +46,7 @@ from warpchain.kernels.cpu.implicit.rigid_layout import (
     STAGE_V,
     TARGET,
     TORQUE,
+    VISCOUS,
     force_layout,
     friction_layout,
     pad_behind,
@@ -136,7 +138,7 @@ def flight_method(columns: int, first_row: int):
         while c < end:
             inverse = switch_smoothing(chain, h, S[TARGET, c] - S[TARGET, c + 8])
             S[INVERSE_SMOOTHING, c] = inverse
-            S[SLOPE, c] = g * steepness(chain, S[SPIN, c] - S[SPIN, c + 8], inverse)
+            S[SLOPE, c] = g * steepness(S[VISCOUS, c], S[COULOMB, c], S[SPIN, c] - S[SPIN, c + 8], inverse)
             S[POWER, c] = ZERO
             c += 1
         pad_slopes(S, places, full)

@@ -13,19 +13,19 @@ from warpchain.kernels.methods.w_tableaus import ROS34PW2
 
 wp.set_module_options({"enable_backward": False})
 
-# Rows in segment order. The state; constants of the links.
+# Rows in segment order. The state; constants of the links and joints.
 BASE = 0
-INVERSE_MASS, INVERSE_INERTIA, MASS, INERTIA, COUNTED = range(6, 11)
+INVERSE_MASS, INVERSE_INERTIA, MASS, INERTIA, VISCOUS, COULOMB, COUNTED = range(6, 13)
 # A stage: rates, directions; joints' inverse smoothing and torques, α; accelerations.
-STAGE_U, STAGE_V, SPIN = 11, 12, 13
-COSINE, SINE = 14, 15
-INVERSE_SMOOTHING, TORQUE, FREE = 16, 17, 18
-RATE = 19
+STAGE_U, STAGE_V, SPIN = 13, 14, 15
+COSINE, SINE = 16, 17
+INVERSE_SMOOTHING, TORQUE, FREE = 18, 19, 20
+RATE = 21
 # Joint forces of the state and the accelerations that belong to it.
-FORCE = 22
-BASE_RATE = 24
+FORCE = 24
+BASE_RATE = 26
 # The system S F = r.
-SYSTEM = 27
+SYSTEM = 29
 ROWS_OF_RIGID = SYSTEM + 22
 # A flight: slopes; the θ of r, Σ γ_ij k_j of the rates; power; the new state.
 SLOPE, TARGET, COUPLED = ROWS_OF_RIGID, ROWS_OF_RIGID + 1, ROWS_OF_RIGID + 2

@@ -1,20 +1,20 @@
-"""Proximity of a chain on a GPU, the longest step that follows from it, and contacts with floor and sprocket."""
+"""Proximity of a chain on a GPU, the longest step that follows from it, and contacts with fixed bodies."""
 
 import functools
 
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.contacts.fixed_body import meet_floor, meet_sprocket, sprocket_turning
+from warpchain.kernels.contacts.fixed_body import BODIES, link_and_body
 from warpchain.kernels.contacts.tilting_floor import greatest_across_speed, middle_height, steepness
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import ends_of
-from warpchain.kernels.gpu.stage import Link, Place, Proximity, felt_plane, read_link, vec5d
+from warpchain.kernels.gpu.stage import Link, Place, Proximity, constants, felt_plane, read_link, vec5d
 from warpchain.kernels.gpu.threads import block_maxima, vec4i
-from warpchain.kernels.layout import INVERSE_INERTIA, INVERSE_MASS, OMEGA, U, V
+from warpchain.kernels.layout import COSINE, INVERSE_INERTIA, INVERSE_MASS, OMEGA, SINE, U, V
 from warpchain.kernels.methods.controller import quick_quotient, quick_root
 from warpchain.kernels.physics.elementary import TWO, from_order_key_single, order_bits_single, order_key_single
-from warpchain.kernels.types import Chain, Control, Drive
+from warpchain.kernels.types import Chain, Control, Drive, Ground, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -31,13 +31,13 @@ def upper_bound(opening: wp.float32):
 def block_proximity(features: Features, block_dim: int):
     """Warp functions (write_proximity, read_proximity, time_to_contact, meet_fixed_body) for these features."""
     has_floor = features.fixed_body == "floor"
-    has_sprocket = features.fixed_body == "sprocket"
-    has_fixed = has_floor or has_sprocket
+    has_fixed = features.fixed_body != "none"
     has_self = features.self_contact
     has_contacts = has_fixed or has_self
-    meet = meet_sprocket if has_sprocket else meet_floor
+    if has_fixed:
+        gap_of, _meet = link_and_body(features.fixed_body)
+        face_of = BODIES[features.fixed_body].face
     tilts = features.tilts
-    chain_values = layout.BOARD_VALUES
     _maximum, write_maxima, read_maxima = block_maxima(block_dim)
 
     @wp.func
@@ -45,6 +45,7 @@ def block_proximity(features: Features, block_dim: int):
         K: wp.array2d(dtype=wp.float64),
         memory: wp.uint64,
         place: Place,
+        ground: Ground,
         link: Link,
         next_end: vec5d,
     ):
@@ -56,25 +57,28 @@ def block_proximity(features: Features, block_dim: int):
             cy = next_end[1] - right_y
             values[0] = order_bits_single(wp.float32(cx * cx + cy * cy))
             if wp.static(tilts):
-                own = Chain()
-                own.circle_radius = K[chain_values, layout.VALUE_CIRCLE_RADIUS]
-                felt = felt_plane(K, own, wp.static(layout.VALUE_PLANE))
+                felt = felt_plane(K, constants(K), wp.static(layout.VALUE_PLANE))
             if wp.static(has_floor and tilts):
                 slope = steepness(felt)
                 lowest = wp.min(
                     middle_height(felt, slope, left_x, left_y), middle_height(felt, slope, right_x, right_y)
                 )
-                gap = lowest - K[chain_values, layout.VALUE_HALF_WIDTH] * wp.abs(felt.up_z)
+                gap = lowest - felt.half_width * wp.abs(felt.up_z)
                 values[1] = order_key_single(wp.float32(-gap))
-            elif wp.static(has_floor):
-                gap = wp.min(left_y, right_y) - K[chain_values, layout.VALUE_CIRCLE_RADIUS]
-                values[1] = order_key_single(wp.float32(-gap))
-            if wp.static(has_sprocket):
-                square = wp.min(left_x * left_x + left_y * left_y, right_x * right_x + right_y * right_y)
-                gap = (
-                    wp.sqrt(square)
-                    - K[chain_values, layout.VALUE_SPROCKET_RADIUS]
-                    - K[chain_values, layout.VALUE_CIRCLE_RADIUS]
+            elif wp.static(has_fixed):
+                own = constants(K)
+                gap = gap_of(
+                    own,
+                    ground,
+                    face_of(ground),
+                    left_x,
+                    left_y,
+                    right_x,
+                    right_y,
+                    link.x,
+                    link.y,
+                    link.arm_x / own.half_length,
+                    link.arm_y / own.half_length,
                 )
                 values[1] = order_key_single(wp.float32(-gap))
             if wp.static(has_self):
@@ -82,20 +86,18 @@ def block_proximity(features: Features, block_dim: int):
                 dy = right_y - K[layout.BOARD_LISTED_Y, place.lane]
                 values[2] = order_bits_single(wp.float32(dx * dx + dy * dy))
             if wp.static(has_contacts):
-                turn = K[chain_values, layout.VALUE_HALF_LENGTH] * link.omega
+                turn = constants(K).half_length * link.omega
                 speed = TWO * (link.u * link.u + link.v * link.v + turn * turn)
                 if wp.static(tilts):
-                    felt.half_length = K[chain_values, layout.VALUE_HALF_LENGTH]
-                    felt.half_width = K[chain_values, layout.VALUE_HALF_WIDTH]
                     across = greatest_across_speed(felt, link.x, link.y)
                     speed += across * across
                 values[3] = order_bits_single(wp.float32(speed))
         write_maxima(memory, place.lane, values)
 
     @wp.func
-    def read_proximity(memory: wp.uint64) -> Proximity:
+    def read_proximity(memory: wp.uint64, links: int) -> Proximity:
         """Maxima over all links, after a barrier."""
-        values = read_maxima(memory)
+        values = read_maxima(memory, links)
         proximity = Proximity()
         proximity.opening = quick_root(wp.cast(values[0], wp.float32))
         proximity.gap = -from_order_key_single(values[1])
@@ -106,7 +108,7 @@ def block_proximity(features: Features, block_dim: int):
     @wp.func
     def time_to_contact(control: Control, pairs: int, gap: wp.float32, slack: wp.float32, speed: wp.float32):
         """Longest step [s] that cannot miss a contact; 0 near contacts, where the contact step is the bound."""
-        is_near = pairs > 0
+        is_near = pairs > 0 or wp.static(features.moving_sprocket)  # which may come nearer by itself
         distance = wp.float32(control.skin)
         if wp.static(has_fixed):
             is_near = is_near or gap < distance
@@ -115,38 +117,75 @@ def block_proximity(features: Features, block_dim: int):
             distance = wp.min(distance, slack)
         return wp.where(is_near, wp.float32(0.0), quick_quotient(distance, speed))
 
+    meet_fixed_body = block_contact(features.fixed_body) if has_fixed else None
+    return write_proximity, read_proximity, time_to_contact, meet_fixed_body
+
+
+@functools.cache
+def block_contact(fixed_body: str):
+    """Warp function: applies the impulses between a body and this link on the board; returns their number."""
+    _gap_of, meet = link_and_body(fixed_body)
+    face_of, face_at = BODIES[fixed_body].face, BODIES[fixed_body].motion
+
     @wp.func
-    def meet_fixed_body(
+    def meet_body(
         K: wp.array2d(dtype=wp.float64),
         place: Place,
+        ground: Ground,
         chain: Chain,
         drive: Drive,
         world: int,
         time: wp.float64,
     ):
-        """Applies the impulses between floor or sprocket and this link on the board; returns their number."""
         link = read_link(K, place.lane)
         left_x, left_y, right_x, right_y = ends_of(link)
-        u, v, omega, lost_left, lost_right, hits = meet(
+        u, v, omega, lost, hits = meet(
             chain,
-            sprocket_turning(drive, world, time),
-            drive.push_rate[world],
+            ground,
+            face_at(face_of(ground), drive, world, time),
             left_x,
             left_y,
             right_x,
             right_y,
             link.x,
             link.y,
+            K[COSINE, place.lane],
+            K[SINE, place.lane],
             K[INVERSE_MASS, place.column],
             K[INVERSE_INERTIA, place.column],
             link.u,
             link.v,
             link.omega,
+            K[layout.BOARD_LOST_FIXED, place.lane],
         )
         K[U, place.lane] = u
         K[V, place.lane] = v
         K[OMEGA, place.lane] = omega
-        K[layout.BOARD_LOST_FIXED, place.lane] = K[layout.BOARD_LOST_FIXED, place.lane] + lost_left + lost_right
+        K[layout.BOARD_LOST_FIXED, place.lane] = lost
         return int(hits)
 
-    return write_proximity, read_proximity, time_to_contact, meet_fixed_body
+    return meet_body
+
+
+@functools.cache
+def moving_sprocket_contact():
+    """Warp function: as that of `block_contact` for the moving sprocket; it counts the impulses itself."""
+    meet_sprocket = block_contact("moving sprocket")
+
+    @wp.func
+    def meet_and_count(
+        K: wp.array2d(dtype=wp.float64),
+        place: Place,
+        ground: Ground,
+        chain: Chain,
+        drive: Drive,
+        state: State,
+        world: int,
+        time: wp.float64,
+    ):
+        hits = meet_sprocket(K, place, ground, chain, drive, world, time)
+        if hits > 0:
+            wp.atomic_add(state.counts, world, wp.static(layout.SPROCKET_IMPULSES), wp.int64(hits))
+        return hits
+
+    return meet_and_count

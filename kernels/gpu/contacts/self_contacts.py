@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from warpchain.kernels.contacts.link_pair import collide, links_of, natural, touching_circles
+from warpchain.kernels.contacts.link_pair import are_strands, collide, links_of, natural, touching_circles
 from warpchain.kernels.contacts.list_layout import list_layout
 from warpchain.kernels.gpu.threads import barrier, barrier_if_any
 from warpchain.kernels.layout import BOARD_LOST_SELF, RIGHT_X, RIGHT_Y, consecutive_offsets
@@ -45,6 +45,7 @@ class TouchLayout:
         votes: See :func:`gpu.threads.barrier_if_any`.
         fixed_hits: Impulses with floor or sprocket in this launch.
         self_hits: Impulses between links in this launch.
+        strand_hits: Those between strands of the loop.
         mailbox: A status from one thread to all.
         deepest: Greatest depth of a contact in this launch [m], bits of a single-precision number.
         is_late: 1 when the launch has lasted long enough.
@@ -59,6 +60,7 @@ class TouchLayout:
     votes: int
     fixed_hits: int
     self_hits: int
+    strand_hits: int
     mailbox: int
     deepest: int
     is_late: int
@@ -69,7 +71,7 @@ class TouchLayout:
 def touch_layout(columns: int, block_dim: int, in_lists: bool) -> TouchLayout:
     """Layout for shared memory of its own, a pair per thread, or inside the scratch parts of the list's row."""
     width, shared_pairs = (columns, 0) if in_lists else (block_dim, block_dim)
-    single = ("touching", "votes", "fixed_hits", "self_hits", "mailbox", "deepest", "is_late")
+    single = ("touching", "votes", "fixed_hits", "self_hits", "strand_hits", "mailbox", "deepest", "is_late")
     integers = consecutive_offsets(
         list_layout(columns).owners if in_lists else 0,
         **{"owners": 3 * width, "pairs": shared_pairs} | dict.fromkeys(single, 1),
@@ -134,8 +136,8 @@ def owns_links(T: wp.array(dtype=wp.int32), owners: int, link_a: int, link_b: in
 
 
 @functools.cache
-def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
-    """Warp functions (clear, find, resolve) for scratch of this width and blocks of this size."""
+def block_self_contacts(columns: int, touch: TouchLayout):
+    """Warp functions (clear, find, resolve) for scratch of this width and ``threads`` that stay in a block."""
     lists = list_layout(columns)
 
     @wp.func
@@ -158,7 +160,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         return pair
 
     @wp.func
-    def order(L: wp.array(dtype=wp.int32), T: wp.array(dtype=wp.int32), lane: int, touching: int):
+    def order(L: wp.array(dtype=wp.int32), T: wp.array(dtype=wp.int32), lane: int, threads: int, touching: int):
         """Sorts the pairs by their keys.
 
         It is called when not every contact has a thread of its own. A thread's first contact takes other code than
@@ -173,7 +175,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
                 rank += wp.where(pair_at(L, T, other) < pair, 1, 0)
                 other += 1
             L[wp.static(lists.pending) + rank] = pair
-            k += wp.static(block_dim)
+            k += threads
         barrier()
         k = lane
         while k < touching:
@@ -182,7 +184,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
                 T[wp.static(touch.pairs) + k] = pair
             else:
                 L[wp.static(lists.touching) + k] = pair
-            k += wp.static(block_dim)
+            k += threads
         barrier()
 
     @wp.func
@@ -192,6 +194,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         T: wp.array(dtype=wp.int32),
         chain: Chain,
         lane: int,
+        threads: int,
         pairs: int,
         opening: wp.float64,
     ):
@@ -210,16 +213,21 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
                     T[wp.static(touch.pairs) + slot] = pair_key(p, q)
                 else:
                     L[wp.static(lists.touching) + slot] = pair_key(p, q)
-            k += wp.static(block_dim)
+            k += threads
         barrier()
         touching = T[wp.static(touch.touching)]
-        if 2 * touching > wp.static(block_dim):
-            order(L, T, lane, touching)
+        if 2 * touching > threads:
+            order(L, T, lane, threads, touching)
         return touching
 
     @wp.func
     def raise_depth(T: wp.array(dtype=wp.int32), depth: wp.float64):
         wp.atomic_max(T, wp.static(touch.deepest), wp.cast(wp.float32(depth), wp.int32))
+
+    @wp.func
+    def count_strands(T: wp.array(dtype=wp.int32), chain: Chain, link_a: int, link_b: int, hits: wp.int64):
+        if are_strands(link_a, link_b, chain.link_count):
+            wp.atomic_add(T, wp.static(touch.strand_hits), int(hits))
 
     @wp.func
     def prepare(
@@ -258,6 +266,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
     @wp.func
     def resolve_prepared(
         K: wp.array2d(dtype=wp.float64),
+        T: wp.array(dtype=wp.int32),
         E: wp.array2d(dtype=wp.float64),
         F: wp.array2d(dtype=wp.float64),
         chain: Chain,
@@ -284,6 +293,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
             depth,
         )
         K[BOARD_LOST_SELF, link_a] = lost_before + lost
+        count_strands(T, chain, link_a, link_b, hits)
         return int(hits)
 
     @wp.func
@@ -298,7 +308,9 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         return wp.where(depth > ZERO, 1, 0)
 
     @wp.func
-    def resolve_further(K: wp.array2d(dtype=wp.float64), chain: Chain, key: int, link_a: int, link_b: int):
+    def resolve_further(
+        K: wp.array2d(dtype=wp.float64), T: wp.array(dtype=wp.int32), chain: Chain, key: int, link_a: int, link_b: int
+    ):
         """Resolves a further contact; returns the number of impulses."""
         depth, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant = touching_circles(
             K, chain, first_joint(pair_of(key)), second_joint(pair_of(key)), half_of(key), key & 1
@@ -307,6 +319,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
             K, chain, link_a, link_b, nx, ny, a_n, a_t, b_n, b_t, inverse_nn, inverse_determinant, depth
         )
         K[BOARD_LOST_SELF, link_a] = K[BOARD_LOST_SELF, link_a] + lost
+        count_strands(T, chain, link_a, link_b, hits)
         return int(hits)
 
     @wp.func
@@ -318,6 +331,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         F: wp.array2d(dtype=wp.float64),
         chain: Chain,
         lane: int,
+        threads: int,
         touching: int,
     ):
         """Resolves all contacts; the board is written. Returns this thread's impulses and ends with a barrier.
@@ -332,7 +346,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
         # both halves at once if there is a thread for each contact; contacts of one half have neighbouring threads, so
         # that those resolved in one round are in few warps
         contacts = 2 * touching
-        in_turn = 4 * touching > wp.static(block_dim)
+        in_turn = 4 * touching > threads
         if not in_turn:
             contacts = 4 * touching
         turn = int(0)
@@ -347,7 +361,7 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
             left = wp.where(own_key == DONE, 0, 1)
             if own_key != DONE:
                 claim(T, owners, own_a, own_b, own_key)
-            k = lane + wp.static(block_dim)
+            k = lane + threads
             while k < contacts:
                 pair = pair_at(L, T, k >> 1)
                 touches = overlaps(K, T, chain, pair, turn, k & 1)
@@ -357,27 +371,27 @@ def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
                     key = contact_key(pair, turn, k & 1)
                     link_a, link_b = links_at(key, chain.link_count)
                     claim(T, owners, link_a, link_b, key)
-                k += wp.static(block_dim)
+                k += threads
             while barrier_if_any(T, wp.static(touch.votes), left > 0):
                 if own_key != DONE:
                     if owns_links(T, owners, own_a, own_b, own_key):
-                        impulses += resolve_prepared(K, E, F, chain, own_a, own_b, lane, own_depth)
+                        impulses += resolve_prepared(K, T, E, F, chain, own_a, own_b, lane, own_depth)
                         left -= 1
                         own_key = DONE
                     else:
                         claim(T, next_owners, own_a, own_b, own_key)
-                k = lane + wp.static(block_dim)
+                k = lane + threads
                 while k < contacts:
                     if L[wp.static(lists.pending) + k] != 0:
                         key = contact_key(pair_at(L, T, k >> 1), turn, k & 1)
                         link_a, link_b = links_at(key, chain.link_count)
                         if owns_links(T, owners, link_a, link_b, key):
-                            impulses += resolve_further(K, chain, key, link_a, link_b)
+                            impulses += resolve_further(K, T, chain, key, link_a, link_b)
                             left -= 1
                             L[wp.static(lists.pending) + k] = 0
                         else:
                             claim(T, next_owners, link_a, link_b, key)
-                    k += wp.static(block_dim)
+                    k += threads
                 if lane < chain.link_count:
                     T[natural(last_owners + lane)] = FREE
                 used = owners

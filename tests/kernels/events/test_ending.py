@@ -1,4 +1,4 @@
-"""When a walk first touches itself and when its loop collapses, after how many bounces."""
+"""When a walk first touches itself, when strands of its loop meet and when it collapses, after how many bounces."""
 
 import math
 
@@ -8,11 +8,7 @@ import pytest
 import warpchain
 from tests.kernels.events.test_softening import shoelace
 from warpchain import Status
-
-# --- the watch, fed with made-up samples ---
-
-
-# --- a walk ---
+from warpchain.kernels import layout
 
 
 @pytest.fixture(scope="module", params=["hybrid", "os32", "tilting"])
@@ -45,6 +41,22 @@ def test_self_contact_is_seen_in_the_frames(walk: warpchain.WalkResult) -> None:
     assert walk.impulses["self"] > 0
 
 
+@pytest.mark.parametrize("method", ["hybrid", "os32"])
+def test_strands_meet_after_the_first_crease(method: str) -> None:
+    """Strands of a long loop meet when the frames say so, long after its first crease."""
+    walk = warpchain.walk(
+        links=120, frequency=20.0, preset="soft", start="ellipse", method=method, frame_interval=1e-3, walk_limit=1.2
+    )
+    joints, n, radius = walk.frame_joints, 120, walk.setup.parameters.circle_radius
+    steps = np.arange(n)[:, None] - np.arange(n)
+    far = np.minimum(steps % n, -steps % n) >= layout.STRANDS_APART
+    least = np.array([np.hypot(*np.moveaxis(frame[:, None] - frame, -1, 0))[far].min() for frame in joints])
+    at = int(np.flatnonzero(walk.frame_time == walk.strands_met_at)[0])
+    assert walk.self_contact_at + 0.1 < walk.strands_met_at
+    assert np.all(least[:at] > 2 * radius - 1e-4)
+    assert least[at - 1 : at + 1].min() < 2 * radius + 2e-3
+
+
 def test_bounces_before_are_those_of_the_heights(walk: warpchain.WalkResult) -> None:
     """Bounces begun are counted by hand: lowest points below the floor after 10 ms without one."""
     low = walk.time[walk.lowest < 0]
@@ -62,6 +74,7 @@ def test_a_walk_that_is_cut_short_has_neither() -> None:
     """A chain that is still in the air has not touched itself; its counts are −1."""
     walk = warpchain.walk(links=30, preset="soft", start="ellipse", method="os32", walk_limit=0.005)
     assert walk.status == Status.TIME_LIMIT
-    assert math.isnan(walk.self_contact_at) and math.isnan(walk.collapsed_at)
-    assert walk.bounces_before_self_contact == walk.bounces_before_collapse == -1
-    assert math.isnan(walk.flight_before_self_contact) and math.isnan(walk.flight_before_collapse)
+    assert math.isnan(walk.self_contact_at) and math.isnan(walk.strands_met_at) and math.isnan(walk.collapsed_at)
+    bounces = (walk.bounces_before_self_contact, walk.bounces_before_strands_met, walk.bounces_before_collapse)
+    assert bounces == (-1, -1, -1)
+    assert math.isnan(walk.flight_before_strands_met) and math.isnan(walk.flight_before_collapse)

@@ -8,10 +8,11 @@ import pytest
 
 import warpchain
 from tests.support.driven_loops import Loop, released_loop
+from tests.support.setups import setup_walk
 from warpchain import InputError, Status, preset
+from warpchain.inputs.link_values import alternating
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL
-from warpchain.inputs.scene import Scene, fewest_links, greatest_load
-from warpchain.run.single_walk import setup_walk
+from warpchain.inputs.scene import Scene, fewest_links
 from warpchain.walks import scheduler
 
 SOFT = preset("soft")
@@ -157,7 +158,7 @@ def test_factors_that_cannot_be_are_refused(load_factor: Any) -> None:
 
 def test_factors_that_links_cannot_bear_are_refused() -> None:
     """Point-like links may be given as much as leaves them half of their inertia; an ellipse is never loaded."""
-    most = greatest_load(SOFT.with_values(TENTH))
+    most = alternating(SOFT.with_values(TENTH), 4).greatest_load(SOFT.link_length)
     setup_walk("soft", TENTH | {"load_factor": 0.999 * most}, None)
     with pytest.raises(
         InputError, match=r"^scene\.load_factor: 15 is too much for links .*; give at most 1\.\d+, or null$"

@@ -25,7 +25,7 @@ from warpchain.kernels.events.release import (
 )
 from warpchain.kernels.events.summary import Summary
 from warpchain.kernels.physics.scaled_loads import under_load
-from warpchain.kernels.types import Drive, Model, State, read_chain
+from warpchain.kernels.types import Drive, Model, State
 
 Array = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ def _watch(
         summary.center_x = samples[i, 3]
         summary.center_y = samples[i, 4]
         summary.loop_speed = samples[i, 5]
-        chain = under_load(read_chain(model, 0), state.load_factor[0])
+        chain = under_load(model.chains[0], state.load_factor[0])
         watch_steadiness(chain, state, drive, 0, time, summary)
         state.load_factor[0] = load_at(state, drive, 0, time)
         loads[i] = state.load_factor[0]

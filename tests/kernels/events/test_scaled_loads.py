@@ -12,19 +12,11 @@ from tests.support.driven_loops import hold, released_loop
 from warpchain import preset
 from warpchain.engine.devices import start_device
 from warpchain.kernels.physics.scaled_loads import crossing_time
-from warpchain.kernels.types import Chain
 
 Array = NDArray[np.float64]
 
 PAPER, SOFT = preset("paper"), preset("soft")
-FIELDS = tuple(Chain.vars)
 CPU = start_device("cpu").warp
-
-
-# --- what is multiplied ---
-
-
-"""Links of two kinds, one with less and one with more rotary inertia than m ℓ²/6."""
 
 
 # --- the loop stays ---

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import warpchain
+from tests.support.setups import setup_walk
 from warpchain import Status, preset
 from warpchain.engine.batch import Batch
 from warpchain.engine.control import STIFFENING_TIME
-from warpchain.run.single_walk import setup_walk
 from warpchain.walks.walk_phases import Phase, WalkRun
 
 PAPER = preset("paper")

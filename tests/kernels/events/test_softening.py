@@ -5,10 +5,10 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import warpchain
+from tests.support.setups import setup_walk
 from warpchain import InputError, Status, preset
 from warpchain.engine.control import SOFTEST
 from warpchain.inputs.start_shapes import ellipse, lay_chain
-from warpchain.run.single_walk import setup_walk
 
 PAPER = preset("paper")
 SERIES = ("time", "center", "center_velocity", "kinetic_energy", "spring_energy", "lowest", "rms_speed")

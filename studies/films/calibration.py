@@ -1,0 +1,105 @@
+"""How well the posterior of a bank knows chains that the bank does not have, filmed by cameras with errors."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain import InputError, films
+
+Array = NDArray[np.float64]
+Wanted = Mapping[tuple[int, float], int]
+"""Links and frequency of an experiment → number of films of it."""
+
+CAMERA: Final = films.Camera()
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Errors of the posterior means of hidden chains.
+
+    Attributes:
+        names: of the parameters.
+        errors: mean less truth, (films answered, p).
+        sigmas: standard deviations that the posterior says, (films answered, p).
+        values: truths, (films answered, p).
+        refused: share of sets of films that were refused as outside of the bank.
+    """
+
+    names: tuple[str, ...]
+    errors: Array
+    sigmas: Array
+    values: Array
+    refused: float
+
+    @property
+    def width(self) -> Array:
+        """Standard deviation relative to the parameter."""
+        return np.asarray((self.sigmas / self.values).mean(axis=0))
+
+    @property
+    def bias(self) -> Array:
+        """Mean error in standard deviations."""
+        return np.asarray((self.errors / self.sigmas).mean(axis=0))
+
+    def coverage(self, size: float) -> Array:
+        """Share of truths within so many standard deviations."""
+        return np.asarray((np.abs(self.errors) < size * self.sigmas).mean(axis=0))
+
+
+def set_of_films(
+    bank: films.Bank, chain: int, wanted: Wanted, camera: films.Camera, errors: Array, random: np.random.Generator
+) -> list[films.Film]:
+    """Films of a chain of a bank by one camera, whose errors they share."""
+    at = {(int(links), float(frequency)): k for k, (links, frequency) in enumerate(bank.experiments)}
+    return [
+        bank.film(chain, at[experiment], number).seen(camera, errors, random)
+        for experiment, count in wanted.items()
+        for number in range(count)
+    ]
+
+
+def calibrate(
+    bank: films.Bank,
+    truths: films.Bank,
+    wanted: Wanted,
+    *,
+    believed: films.Camera = CAMERA,
+    shared: Array | None = None,
+    delay: float = 0.0,
+    measured: Mapping[str, float] | None = None,
+    seed: int = 1,
+) -> Calibration:
+    """Film every hidden chain once and ask the bank for it.
+
+    Args:
+        bank: simulated chains.
+        truths: hidden chains.
+        wanted: which films.
+        believed: the camera that the posterior believes in; films are made by `CAMERA`.
+        shared: errors of the camera in all films, in place of random ones.
+        delay: by which the release was set too late in all films [s].
+        measured: standard error of parameters that were measured by other means.
+        seed: of the errors.
+    """
+    random, found, refused = np.random.default_rng(seed), [], 0
+    for chain, values in enumerate(truths.values):
+        errors = CAMERA.errors(random) if shared is None else shared
+        seen = set_of_films(truths, chain, wanted, CAMERA, errors, random)
+        if delay:
+            seen = [films.Film(**(vars(film) | {"time": film.time - delay})) for film in seen]
+        try:
+            answer = bank.posterior(seen, believed)
+        except InputError:
+            refused += 1
+            continue
+        known = {
+            name: (values[answer.names.index(name)] + random.normal() * error, error)
+            for name, error in (measured or {}).items()
+        }
+        answer = answer.given(**known)
+        found.append((answer.mean - values, answer.sigma, values))
+    errors, sigmas, values = (np.array(each) for each in zip(*found, strict=True))
+    return Calibration(tuple(bank.names), errors, sigmas, values, refused / len(truths.values))

@@ -1,0 +1,50 @@
+"""Makes the two films of a hidden chain that come with the study: do not read on if you want to find it yourself.
+
+    python -m studies.films.hidden
+
+The errors of the camera are drawn once for both films. Tables are written as Tracker exports them, in mm.
+"""
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+import warpchain
+from studies.common import run_study
+from warpchain import films
+
+FOLDER: Final = Path(__file__).parent / "hidden"
+CHAIN: Final = {
+    "floor_friction": 0.231,
+    "viscous_friction": 1.06e-4,
+    "coulomb_friction": 9.4e-5,
+    "sprocket_radius": 0.0569,
+    "circle_radius": 4.05e-3,
+    "floor_restitution": 0.04,
+}
+
+
+def main() -> None:
+    """Walk, film and write."""
+    camera, random = films.Camera(), np.random.default_rng(34)
+    errors = camera.errors(random)
+    for frequency in (5.0, 20.0):
+        walk = warpchain.walk(
+            links=60, frequency=frequency, start="spinning", preset="soft", walk_limit=0.45, phase=0.3, **CHAIN
+        )
+        film = films.Film.of(walk).seen(camera, errors, random)
+        assert film.outline is not None and film.speed is not None
+        delay, mm = 0.35 + random.uniform(0, 0.1), 1e3
+        rows = [
+            f"{t + delay:.6E}\t{mm * x:.4E}\t{mm * y:.4E}\t" for t, (x, y) in zip(film.time, film.center, strict=True)
+        ]
+        FOLDER.mkdir(exist_ok=True)
+        text = "\n".join(["cm_A", "t\tx\ty\t", *rows, ""])
+        (FOLDER / f"60_links_{frequency:g}_Hz.txt").write_text(text, encoding="utf-8")
+        edges = ", ".join(f"{mm * edge:.1f}" for edge in film.outline)
+        print(f"{frequency:g} Hz: outline {edges} mm, speed {film.speed:.3f} m/s")
+
+
+if __name__ == "__main__":
+    run_study(main)

@@ -1,0 +1,186 @@
+"""Fills in the tables of studies/films/README.md and draws its figures, from the banks that `reduce` wrote.
+
+    python -m studies.films.run film-banks
+
+Six minutes on one core; the numbers are printed, too.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.common import run_study, save_figure, table, write_tables
+from studies.films.calibration import CAMERA, Calibration, Wanted, calibrate, set_of_films
+from studies.films.drawing import SYMBOLS, corner, coverage_figure
+from warpchain import films
+
+FOLDER: Final = Path(__file__).parent
+FIVE, TWENTY = (60, 5.0), (60, 20.0)
+SETS: Final[dict[str, Wanted]] = {
+    "1 film: 20 Hz": {TWENTY: 1},
+    "2 films: 5, 20 Hz": {FIVE: 1, TWENTY: 1},
+    "8 films: 4 of each": {FIVE: 4, TWENTY: 4},
+}
+PAIR: Final = SETS["2 films: 5, 20 Hz"]
+CALIPERS: Final = 5e-5
+"""Standard error of a roller's radius that was measured with calipers [m]."""
+EXACT: Final = replace(CAMERA, scale=1e-6, floor=1e-6, origin=1e-6, roll=1e-6, outline=1e-6, release=1e-6)
+"""A camera without errors other than noise, and those of the loop's speed."""
+
+
+def beside(bank: films.Bank, other: films.Bank) -> films.Bank:
+    """The chains that two banks have in common, with the experiments of both."""
+    known = {tuple(values): chain for chain, values in enumerate(other.values)}
+    pairs = [(chain, known[tuple(values)]) for chain, values in enumerate(bank.values) if tuple(values) in known]
+    first, second = np.array(pairs).T
+    join = {
+        name: np.concatenate([getattr(bank, name)[first], getattr(other, name)[second]], axis=1)
+        for name in ("center", "outline", "speed")
+    }
+    experiments = np.concatenate([bank.experiments, other.experiments])
+    return replace(bank, values=bank.values[first], experiments=experiments, **join)
+
+
+def answer_for(bank: films.Bank, wanted: Wanted, camera: films.Camera = CAMERA, chain: int = 0) -> films.Posterior:
+    """The posterior for films of one of the bank's chains; its width is the same for all chains."""
+    random = np.random.default_rng(chain)
+    return bank.posterior(set_of_films(bank, chain, wanted, camera, np.zeros(8), random), camera)
+
+
+def percent(share: float) -> str:
+    """Two digits."""
+    return f"{100 * share:.2g} %"
+
+
+def experiments_table(bank: films.Bank) -> str:
+    """Widths for each film and each pair of films: μ, β, R, and R if r was measured."""
+    every = [(int(n), float(f)) for n, f in bank.experiments]
+    sets: list[Wanted] = [*({one: 1} for one in every), *({one: 1, two: 1} for one, two in combinations(every, 2))]
+    middle = bank.values.mean(axis=0)
+
+    def widths(wanted: Wanted) -> list[float]:
+        alone = answer_for(bank, wanted)
+        measured = alone.given(circle_radius=(middle[alone.names.index("circle_radius")], CALIPERS))
+        return [*(alone.sigma / middle), (measured.sigma / middle)[alone.names.index("sprocket_radius")]]
+
+    found = [(wanted, widths(wanted)) for wanted in sets]
+    singles, pairs = found[: len(every)], sorted(found[len(every) :], key=lambda each: each[1][1])
+    name = lambda wanted: " + ".join(f"{n}/{f:g}" for n, f in wanted)  # noqa: E731
+    rows = ((name(wanted), *map(percent, numbers)) for wanted, numbers in [*singles, *pairs[:8]])
+    return table(("links/Hz", *SYMBOLS.values(), "R, r by calipers"), rows)
+
+
+def calibration_rows(found: Calibration) -> Iterator[str]:
+    """Of each parameter width, bias in standard deviations, and coverage of 68 and 95 %."""
+    sizes = zip(found.width, found.bias, found.coverage(1), found.coverage(1.96), strict=True)
+    return (f"{percent(width)}, {bias:+.1f}, {100 * a:.0f}, {100 * z:.0f}" for width, bias, a, z in sizes)
+
+
+def pitfalls_table(bank: films.Bank, truths: films.Bank) -> str:
+    """Coverage of 95 % intervals with one error of the camera at twice its σ, allowed for or not."""
+
+    def one(place: int, size: float) -> NDArray[np.float64]:
+        return np.eye(8)[place] * size
+
+    errors = {
+        "none": (np.zeros(8), 0.0),
+        "floor 1 mm too low": (one(1, 1e-3), 0.0),
+        "scale 0.5 %": (one(0, 5e-3), 0.0),
+        "axis of the sprocket 1 mm off": (one(2, 1e-3), 0.0),
+        "camera rolled by 0.3°": (one(3, 5.2e-3), 0.0),
+        "release 4 ms off": (np.zeros(8), 4e-3),
+    }
+    rows = []
+    for name, (shared, delay) in errors.items():
+        for believed, which in ((CAMERA, "allowed for"), (EXACT, "not")):
+            found = calibrate(bank, truths, PAIR, shared=shared, delay=delay, believed=believed)
+            cells = (f"{100 * share:.0f}" for share in found.coverage(1.96))
+            rows.append((name, which, *cells, percent(found.refused)))
+    return table(("error", "errors of the camera", *SYMBOLS.values(), "refused"), rows)
+
+
+def lines_table(banks: Mapping[str, films.Bank]) -> str:
+    """Friction lines of chains of some banks, each filmed once."""
+    rows, random = [], np.random.default_rng(2)
+    for name, bank in banks.items():
+        for at, (links, frequency) in enumerate(bank.experiments):
+            found = []
+            for chain, values in enumerate(bank.values[:256]):
+                film = bank.film(chain, at, chain % 4).seen(CAMERA, CAMERA.errors(random), random)
+                line = films.friction_line(film, CAMERA)
+                found.append((line.friction - values[0], line.error, values[0]))
+            error, sigma, friction = np.array(found).T
+            inside = [f"{100 * (np.abs(error) < size * sigma).mean():.0f}" for size in (1, 1.96)]
+            width = float(np.median(sigma / friction))
+            rows.append((name, f"{links:g}/{frequency:g}", percent(width), f"{np.median(error / sigma):+.2f}", *inside))
+    return table(("chains", "links/Hz", "σ of μ", "bias / σ", "within σ / %", "within 1.96 σ / %"), rows)
+
+
+def main(banks: Path) -> None:
+    """Calibrate, compare, draw."""
+    bank, long = (films.Bank.load(banks / f"{name}_main.npz") for name in ("film_bank", "film_bank_90"))
+    truths = {
+        "same": films.Bank.load(banks / "film_truths_same.npz"),
+        "e_t = 0.3": films.Bank.load(banks / "film_truths_tangential.npz"),
+        "links 5 % heavier": films.Bank.load(banks / "film_truths_heavier.npz"),
+        "paper's joints": films.Bank.load(banks / "film_truths_paper_main.npz"),
+    }
+    found = {
+        (kind, name): calibrate(bank, hidden, wanted)
+        for kind, hidden in truths.items()
+        for name, wanted in SETS.items()
+    }
+    head = ("films", *SYMBOLS.values(), "refused")
+    tables = {
+        "experiments": experiments_table(beside(bank, long)),
+        "calibration": table(
+            head,
+            [(name, *calibration_rows(found["same", name]), percent(found["same", name].refused)) for name in SETS],
+        ),
+        "other chains": table(
+            ("truth", *head),
+            [
+                (kind, name, *calibration_rows(each), percent(each.refused))
+                for (kind, name), each in found.items()
+                if kind != "same"
+            ],
+        ),
+        "pitfalls": pitfalls_table(bank, truths["same"]),
+        "lines": lines_table(
+            {"film_bank": bank, "film_bank_90": long} | {kind: each for kind, each in truths.items() if kind != "same"}
+        ),
+    }
+    write_tables(FOLDER / "README.md", tables)
+    save_figure(
+        coverage_figure({name: found["same", name] for name in SETS}),
+        FOLDER / "figures" / "coverage.png",
+        dpi=130,
+    )
+    hidden = [
+        films.read(
+            FOLDER / "hidden" / f"60_links_{frequency}_Hz.txt",
+            links=60,
+            frequency=frequency,
+            unit="mm",
+            outline=outline,
+            speed=speed,
+        )
+        for frequency, outline, speed in (
+            (5, (-59.9, 62.1, 13.4, 335.8), 1.906),
+            (20, (-68.7, 62.1, 13.4, 330.0), 7.648),
+        )
+    ]
+    answer = bank.posterior(hidden)
+    print(f"\nthe hidden chain\n{answer}\n{films.friction_line(hidden[1])}")
+    print(f"with r by calipers\n{answer.given(circle_radius=(4.05e-3, 5e-5))}")
+    save_figure(corner(answer), FOLDER / "figures" / "corner.png", dpi=110)
+    save_figure(films.friction_line(hidden[1]).plot(), FOLDER / "figures" / "line.png")
+
+
+if __name__ == "__main__":
+    run_study(main)

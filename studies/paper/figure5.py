@@ -1,0 +1,84 @@
+"""Whether curves of other numbers of links and frequencies have the shape of the paper's Figure 5.
+
+python -m studies.paper.figure5     # a minute → results/figure5.csv
+"""
+
+import csv
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+import warpchain
+from studies.common import table, write_text
+
+RESULTS: Final = Path(__file__).parent / "results" / "figure5.csv"
+CELLS: Final = tuple((links, frequency) for links in (60, 90, 120, 150, 180) for frequency in (10.0, 15.0, 20.0, 30.0))
+NEAR: Final = 1e-3
+"""A chain whose lowest circle is nearer to the floor [m] is in an impact."""
+APART: Final = 0.01
+"""Impacts [s] less apart are one."""
+
+
+def shape(links: int, frequency: float) -> dict[str, object]:
+    """Numbers of one walk's curves.
+
+    A curve has that shape if it rises between impacts, if nearly all changes of v_x are in impacts, and if v_x ends
+    without turning back.
+    """
+    walk = warpchain.walk(links=links, frequency=frequency, start="spinning", preset="soft")
+    near = walk.lowest < NEAR
+    change = np.abs(np.diff(walk.center_velocity[:, 0]))
+    impacts = near[1:] | near[:-1]
+    begins = np.flatnonzero(impacts & ~np.r_[False, impacts[:-1]])
+    begins = begins[np.r_[True, np.diff(walk.time[begins]) > APART]]
+    height = walk.center[:, 1]
+    maxima = [height[a : b + 1].max() > max(height[a], height[b]) + 1e-3 for a, b in pairwise(begins)]
+    speed = walk.center_velocity[:, 0]
+    return {
+        "links": links,
+        "frequency": frequency,
+        "bounces": walk.bounces,
+        "rises": sum(maxima),
+        "changes_in_impacts": f"{change[impacts].sum() / change.sum():.3f}",
+        "fastest": f"{speed.max():.3g}",
+        "backwards": f"{-speed.min() / speed.max():.3f}",
+        "last_slide": f"{(walk.walk_time - walk.collapsed_at) / walk.walk_time:.2f}",
+    }
+
+
+def rows() -> Sequence[dict[str, str]]:
+    """The rows of the committed file."""
+    with RESULTS.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def figure5_table() -> str:
+    """The numbers of all walks, in Markdown."""
+    head = (
+        *("cell", "bounces", "times it rises between them", "share of the changes of v_x in impacts"),
+        *("greatest v_x / m/s", "greatest backward v_x over it", "time from collapse to rest, over the walk's"),
+    )
+    return table(
+        head,
+        (
+            (
+                f"{row['links']} × {float(row['frequency']):g} Hz",
+                *(row[name] for name in list(row)[2:]),
+            )
+            for row in rows()
+        ),
+    )
+
+
+def main() -> None:
+    """Let all chains walk, and write the file."""
+    found = [shape(*cell) for cell in CELLS]
+    lines = [",".join(found[0]), *(",".join(map(str, row.values())) for row in found)]
+    write_text(RESULTS, "\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()

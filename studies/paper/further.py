@@ -1,0 +1,284 @@
+"""Numbers of further sweeps: strands, what the paper leaves open, rest against long holds, its last sentences."""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2, ks_2samp
+
+from studies.paper.statistics import Effect, mean, paired, spread, unpaired
+from warpchain import Status
+
+Array = NDArray[np.float64]
+Numbers = dict[str, Any]
+Block = Any
+
+EVENTS: Final = {
+    "crease": "bounces_before_self_contact",
+    "strands": "bounces_before_strands_met",
+    "collapse": "bounces_before_collapse",
+}
+"""What happens to a loop: name → column with the number of bounces begun before it, −1 if it never does."""
+CELLS: Final = ("links", "frequency")
+
+
+def at_rest(block: Block, quantity: str = "dx") -> Array:
+    """A column with the cells in front and the samples behind, NaN for walks that did not come to rest."""
+    order = [block.dims.index(name) for name in CELLS]
+    others = [number for number in range(len(block.dims)) if number not in order]
+    values = np.where(block.columns["status"] == Status.AT_REST, block.columns[quantity], np.nan)
+    return np.transpose(values, order + others)
+
+
+def plain(effect: Effect) -> Numbers:
+    """An effect as plain numbers."""
+    return {
+        "relative": effect.relative.tolist(),
+        "half_width": effect.half_width.tolist(),
+        "sign": effect.sign.tolist(),
+        "pairs": effect.pairs.tolist(),
+        "lost": effect.lost,
+    }
+
+
+# --- when strands meet ---
+
+
+def endings_by_links(block: Block, start: int) -> list[Numbers]:
+    """Of each number of links: after how many bounces loops crease, their strands meet, they collapse; early over late.
+
+    Early is a walk whose strands met before its third bounce; walks are taken relative to the means of their cells.
+    """
+    counts = {event: at_rest(block, column)[:, :, start] for event, column in EVENTS.items()}
+    distance = at_rest(block)[:, :, start]
+    relative = distance / mean(distance)[..., np.newaxis]
+    found = []
+    for links in range(len(distance)):
+        there = {event: values[links] for event, values in counts.items()}
+        content: Numbers = {event: histogram(values) for event, values in there.items()}
+        met = there["strands"]
+        early = (met >= 0) & (met <= 2)
+        both = [relative[links][np.isfinite(relative[links]) & chosen] for chosen in (early, ~early)]
+        content |= {"early": len(both[0]), "late": len(both[1])}
+        if min(map(len, both)) > 1:
+            content["early_over_late"] = plain(unpaired(*both))
+        second = [float((cell[np.isfinite(cell)] == 2).mean()) for cell in met]
+        content["second_by_cell"] = second
+        content["most_frequent"] = [histogram(cell).index(max(histogram(cell))) for cell in met]
+        found.append(content)
+    return found
+
+
+def histogram(bounces: Array) -> list[int]:
+    """Numbers of walks with 0, 1, 2, 3 and more bounces before an event, and of those without the event."""
+    known = bounces[np.isfinite(bounces)]
+    counts = [int((known == number).sum()) for number in range(4)]
+    return [*counts, int((known > 3).sum()), int((known < 0).sum())]
+
+
+def strands(block: Block) -> Numbers:
+    """When loops crease, their strands meet and they collapse, by start; how gradually they lose their area."""
+    values = block.axes["start"].tolist()
+    met = np.where((counts := at_rest(block, EVENTS["strands"])) < 0, np.nan, counts)
+    begin, end = (at_rest(block, name) for name in ("softened_at", "collapsed_at"))
+    lasts = end - begin
+    duration = at_rest(block, "walk_time")
+    return {
+        "starts": {start: endings_by_links(block, number) for number, start in enumerate(values)},
+        "delay": plain(paired(met[:, :, values.index("ellipse")], met[:, :, values.index("rest")])),
+        "loss_of_shape": {
+            start: {
+                "seconds": np.nanquantile(lasts[:, :, number], [0.1, 0.5, 0.9]).tolist(),
+                "of_the_walk": np.nanquantile((lasts / duration)[:, :, number], [0.1, 0.5, 0.9]).tolist(),
+            }
+            for number, start in enumerate(values)
+        },
+        "explained": {start: explained(block, number) for number, start in enumerate(values)},
+    }
+
+
+DRAWN: Final = "_drawn"
+"""End of the names of columns with what a sample has drawn."""
+
+
+def explained(block: Block, start: int) -> Numbers:
+    """Share of the variance of Δx within the cells that linear and quadratic terms of all that is drawn explain.
+
+    Walks are taken relative to their cells. The terms are fitted to one half of the samples and judged by the other.
+    """
+    distance = at_rest(block)[:, :, start]
+    relative = distance / mean(distance)[..., np.newaxis] - 1
+    names = [name for name in block.columns if name.endswith(DRAWN)]
+    drawn = np.stack([at_rest(block, name)[:, :, start] for name in names], axis=-1)
+    drawn = drawn[..., np.nanstd(drawn, axis=(0, 1, 2)) > 0]
+    middle, scale = np.nanmean(drawn, axis=2, keepdims=True), np.nanstd(drawn, axis=2, keepdims=True)
+    standard = (drawn - middle) / scale
+    phase = next((k for k, name in enumerate(names) if name == f"phase{DRAWN}"), None)
+    kept = np.isfinite(relative)
+    half = np.broadcast_to(np.arange(relative.shape[2]) % 2 == 0, relative.shape)
+    count = standard.shape[-1]
+    squares = [standard[..., i] * standard[..., j] for i in range(count) for j in range(i, count)]
+    turning = [] if phase is None else [f(2 * np.pi * drawn[..., phase]) for f in (np.sin, np.cos)]
+    linear = [standard[..., k] for k in range(count)]
+    shares: Numbers = {"walks": int(kept.sum()), "terms": {}}
+    for name, terms in (
+        ("linear", linear),
+        ("with squares", linear + squares),
+        ("with sine of phase", linear + turning),
+    ):
+        design = np.stack([np.ones(relative.shape), *terms], axis=-1)
+        scores = []
+        for fitted, judged in ((half, ~half), (~half, half)):
+            weights = np.linalg.lstsq(design[kept & fitted], relative[kept & fitted], rcond=None)[0]
+            left = relative[kept & judged] - design[kept & judged] @ weights
+            scores.append(1 - np.sum(left**2) / np.sum((relative[kept & judged]) ** 2))
+        shares["terms"][name] = float(np.mean(scores))
+    return shares
+
+
+# --- links that pass through one another ---
+
+
+def through(block: Block) -> Numbers:
+    """What it does to Δx, by start, if links pass through one another; cells in front."""
+    table = at_rest(block)
+    touching = block.axes["self_contact"].tolist()
+    on, off = touching.index(True), touching.index(False)
+    return {
+        start: plain(paired(table[:, :, number, off], table[:, :, number, on]))
+        for number, start in enumerate(block.axes["start"].tolist())
+    }
+
+
+# --- what the paper leaves open ---
+
+REFERENCES: Final = {
+    "sprocket_radius_is": "contact",
+    "circle_radius": 4.2e-3,
+    "clearance": 0.01,
+    "clearance_of": "spinning",
+    "phase": 0.0,
+    "ellipse_aspect": 1.5,
+}
+"""What is chosen here."""
+
+
+def left_open(blocks: Mapping[str, Block]) -> Numbers:
+    """What each other choice does to Δx, cell by cell, beside the spread of a walk."""
+    found: Numbers = {}
+    for block in blocks.values():
+        (name,) = (axis for axis in block.axes if axis not in CELLS)
+        table, values = at_rest(block), block.axes[name].tolist()
+        here = values.index(REFERENCES[name])
+        found[name] = {
+            "reference": REFERENCES[name],
+            "spread": float(np.nanmedian(spread(table[:, :, here]))),
+            "values": [
+                {"value": value, **plain(paired(table[:, :, number], table[:, :, here]))}
+                for number, value in enumerate(values)
+                if number != here
+            ],
+        }
+    return found
+
+
+# --- from rest and after a long hold ---
+
+
+def rest_and_hold(block: Block) -> Numbers:
+    """Differences of Δx between starts, and between holds, over the cells, with χ² of no difference at all."""
+    table = at_rest(block)
+    starts, holds = (block.axes[name].tolist() for name in ("start", "further_hold"))
+    order = [name for name in block.dims if name not in CELLS][:2]
+    if order != ["start", "further_hold"]:
+        raise ValueError(f"axes are {order}; the sweep has start and further_hold")
+    rest, spinning = starts.index("rest"), starts.index("spinning")
+    least, most = int(np.argmin(holds)), int(np.argmax(holds))
+    pairs = {
+        "rest over spinning, released at once": (table[:, :, rest, least], table[:, :, spinning, least]),
+        f"rest over spinning, both {holds[most]:g} s later": (table[:, :, rest, most], table[:, :, spinning, most]),
+        f"{holds[most]:g} s later over at once, rest": (table[:, :, rest, most], table[:, :, rest, least]),
+        f"{holds[most]:g} s later over at once, spinning": (table[:, :, spinning, most], table[:, :, spinning, least]),
+    }
+    return {name: compared(paired(*each)) for name, each in pairs.items()}
+
+
+def compared(effect: Effect) -> Numbers:
+    """Weighted mean of the relative effects with its standard error, and χ² of no effect in any cell."""
+    known = effect.known
+    error = effect.half_width[known] / 1.96
+    relative = effect.relative[known]
+    weight = 1 / error**2
+    value = float(np.sum((relative / error) ** 2))
+    return {
+        **plain(effect),
+        "mean": float(np.sum(weight * relative) / weight.sum()),
+        "error": float(weight.sum() ** -0.5),
+        "chi2": value,
+        "cells": len(relative),
+        "p": float(chi2.sf(value, len(relative))),
+    }
+
+
+# --- further sentences ---
+
+OWN_LENGTH: Final = "links_of_12_7_mm"
+LENGTHS: Final = {"links_of_11_mm": 11.0, "links_of_15_mm": 15.0, "links_of_18_mm": 18.0}
+"""Blocks with links of other lengths [mm], with the masses and inertias of their length."""
+
+
+def more(blocks: Mapping[str, Block]) -> Numbers:
+    """Longer links of their mass, sliding with less friction, undamped joints, distributions at both tolerances."""
+    content: Numbers = {"lengths": {}, "sliding": {}, "undamped": {}}
+    for quantity in ("dx", "until_collapse"):
+        own = until_collapse(blocks[OWN_LENGTH]) if quantity != "dx" else at_rest(blocks[OWN_LENGTH])
+        for name, length in LENGTHS.items():
+            other = until_collapse(blocks[name]) if quantity != "dx" else at_rest(blocks[name])
+            content["lengths"].setdefault(f"{length:g}", {})[quantity] = plain(unpaired(other, own))
+    block = blocks["sliding"]
+    values = block.axes["floor_friction"].tolist()
+    slid = at_rest(block, "walk_time") - at_rest(block, "collapsed_at")
+    for number, value in enumerate(values):
+        if value != 0.27:
+            content["sliding"][f"{value:g}"] = {
+                "time": plain(paired(slid[:, :, number], slid[:, :, values.index(0.27)])),
+                "dx": plain(paired(at_rest(block)[:, :, number], at_rest(block)[:, :, values.index(0.27)])),
+            }
+    block = blocks["undamped_joints"]
+    values = block.axes["joint_damping"].tolist()
+    for number, value in enumerate(values):
+        if value != 1000:
+            effect = paired(at_rest(block)[:, :, number], at_rest(block)[:, :, values.index(1000)])
+            content["undamped"][f"{value:g}"] = plain(effect)
+    content["distributions"] = distributions(blocks["tolerances"])
+    return content
+
+
+def until_collapse(block: Block) -> Array:
+    """Number of bounces before the loop collapses, or all bounces of a loop that never does."""
+    collapse, every = at_rest(block, EVENTS["collapse"]), at_rest(block, "bounces")
+    return np.where(collapse < 0, every, collapse)
+
+
+def distributions(block: Block) -> list[Numbers]:
+    """Of each cell: Δx at both tolerances, and whether it is of one distribution (Kolmogorov and Smirnov)."""
+    table, values = at_rest(block), block.axes["tolerance"]
+    loose, tight = int(np.argmax(values)), int(np.argmin(values))
+    found = []
+    for i, links in enumerate(block.axes["links"].tolist()):
+        for j, frequency in enumerate(block.axes["frequency"].tolist()):
+            one, two = (each[np.isfinite(each)] for each in (table[i, j, loose], table[i, j, tight]))
+            test = ks_2samp(one, two)
+            found.append(
+                {
+                    "links": links,
+                    "frequency": frequency,
+                    "distance": float(test.statistic),
+                    "p": float(test.pvalue),
+                    "means": [float(one.mean()), float(two.mean())],
+                    "sds": [float(one.std(ddof=1)), float(two.std(ddof=1))],
+                    "walks": [len(one), len(two)],
+                }
+            )
+    return found

@@ -1,0 +1,180 @@
+"""Tables of the page whose numbers are those of `studies.paper.further`."""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from studies.common import table
+from studies.paper.findings import percent
+from studies.paper.reduction import effect_of
+from studies.paper.statistics import Effect, summary
+
+Numbers = Mapping[str, Any]
+
+NAMES: Final = {
+    "sprocket_radius_is": "the sprocket's radius is that of",
+    "circle_radius": "radius of the circles of links / m",
+    "clearance": "height of the release / m",
+    "clearance_of": "height is that of the chain",
+    "phase": "moment of the release, in loop periods",
+    "ellipse_aspect": "aspect of the ellipse",
+}
+"""What the paper leaves open, by field."""
+WORDS: Final = {"pitch": "where joints ride", "contact": "where circles touch"}
+
+
+def strands_table(numbers: Numbers) -> str:
+    """When loops crease, their strands meet and they collapse, by start and links."""
+    content = numbers["paper_strands"]
+    head = ["start", "links", "", "before", "after 1", "after 2", "after 3", "later", "never", "early over late"]
+    rows = []
+    for start in ("rest", "ellipse"):
+        for links, each in zip(content["cells"]["links"], content["strands"]["starts"][start], strict=True):
+            ratio = "—"
+            if "early_over_late" in each:
+                effect = effect_of(each["early_over_late"])
+                ratio = percent(float(effect.relative), float(effect.half_width))
+            for event, text, last in (
+                ("crease", "first crease", ""),
+                ("strands", "strands meet", ratio),
+                ("collapse", "collapse", ""),
+            ):
+                shares = (f"{100 * count / max(1, sum(each[event])):.0f} %" for count in each[event])
+                rows.append([start, str(links), text, *shares, last])
+    return table(head, rows)
+
+
+def through_table(numbers: Numbers) -> str:
+    """What it does to Δx if links pass through one another, by start and links: means over the frequencies."""
+    content = numbers["paper_through"]
+    rows = []
+    for start, found in content["through"].items():
+        effect = effect_of(found)
+        row = [start]
+        for place in range(len(content["cells"]["links"])):
+            part = summary(_rows(effect, slice(place, place + 1)))
+            row.append(percent(part.mean, part.half_width))
+        rows.append(row)
+    return table(["start", *(f"{links} links" for links in content["cells"]["links"])], rows)
+
+
+def open_table(numbers: Numbers) -> str:
+    """What each other choice of what the paper leaves open does to Δx, over the cells, beside the spread of a walk."""
+    content = numbers["paper_open"]
+    rows = []
+    for name, found in content["left_open"].items():
+        first, walk = NAMES[name], percent(found["spread"], sign=False)
+        for each in found["values"]:
+            effect = effect_of(each)
+            total = summary(effect)
+            value, reference = (_text(other) for other in (each["value"], found["reference"]))
+            ends = [percent(float(end(effect.relative[effect.known]))) for end in (np.min, np.max)]
+            rows.append(
+                [
+                    first,
+                    f"{value} for {reference}",
+                    percent(total.mean, total.half_width),
+                    percent(total.typical, sign=False),
+                    f"{ends[0]}, {ends[1]}",
+                    walk,
+                ]
+            )
+            first = walk = ""
+    head = ["left open", "value", "Δx, mean of cells", "typical", "least and greatest cell", "spread of a walk"]
+    return table(head, rows)
+
+
+def rest_table(numbers: Numbers) -> str:
+    """Released from rest and spinning, at once and later."""
+    content = numbers["paper_rest"]
+    links = np.array(content["cells"]["links"])
+    rows = []
+    for name, found in content["rest_and_hold"].items():
+        effect = effect_of(found)
+        error = effect.half_width / 1.96
+        long, short = (_weighted(effect.relative[chosen], error[chosen]) for chosen in (links >= 150, links < 150))
+        rows.append(
+            [
+                name,
+                _with_error(found["mean"], found["error"]),
+                _with_error(*short),
+                _with_error(*long),
+                f"{found['chi2']:.1f} of {found['cells']}, {found['p']:.2g}",
+            ]
+        )
+    return table(["Δx", "all cells", "60 and 120 links", "150 and 180 links", "χ² of no difference, p"], rows)
+
+
+def lengths_table(numbers: Numbers) -> str:
+    """Links of other lengths with the masses and inertias of their length, and with those of Table 1."""
+    rows = []
+    alone = {
+        quantity: {
+            f"{1000 * each['value']:g}": summary(effect_of(each))
+            for each in numbers["paper_claims"]["collapse" if quantity == "until_collapse" else "effects"]["values"]
+        }
+        if quantity == "until_collapse"
+        else {
+            f"{1000 * each['value']:g}": summary(effect_of(each))
+            for each in numbers["paper_claims"]["effects"]["link_length"]["values"]
+        }
+        for quantity in ("dx", "until_collapse")
+    }
+    for length, found in numbers["paper_more"]["more"]["lengths"].items():
+        cells = [f"{length} mm"]
+        for quantity in ("dx", "until_collapse"):
+            own, fixed = summary(effect_of(found[quantity])), alone[quantity].get(length)
+            cells.append(percent(own.mean, own.half_width))
+            cells.append("—" if fixed is None else percent(fixed.mean, fixed.half_width))
+        rows.append(cells)
+    return table(["ℓ", "Δx, bars of that length", "ℓ alone", "bounces until the collapse, bars", "ℓ alone"], rows)
+
+
+def sliding_table(numbers: Numbers) -> str:
+    """Time from the collapse to rest, and Δx, with other frictions of the floor."""
+    rows = []
+    for value, found in numbers["paper_more"]["more"]["sliding"].items():
+        time, distance = (summary(effect_of(found[name])) for name in ("time", "dx"))
+        rows.append(
+            [
+                value,
+                percent(time.mean, time.half_width),
+                f"{time.rises}, {time.falls}",
+                percent(distance.mean, distance.half_width),
+            ]
+        )
+    return table(["μ_fc", "time from collapse to rest", "cells that rise, fall", "Δx"], rows)
+
+
+def distributions_table(numbers: Numbers) -> str:
+    """Distributions of Δx at both tolerances."""
+    rows = [
+        [
+            f"{each['links']} × {each['frequency']:g} Hz",
+            *(f"{mean:.4f} ± {sd:.4f}" for mean, sd in zip(each["means"], each["sds"], strict=True)),
+            f"{each['distance']:.2f}",
+            f"{each['p']:.2f}",
+        ]
+        for each in numbers["paper_more"]["more"]["distributions"]
+    ]
+    return table(["cell", "Δx at 1e-6 / m", "at 1e-9 / m", "greatest distance", "p"], rows)
+
+
+def _rows(effect: Effect, rows: slice) -> Effect:
+    return Effect(effect.relative[rows], effect.half_width[rows], effect.sign[rows], effect.pairs[rows], effect.lost)
+
+
+def _text(value: object) -> str:
+    return WORDS.get(value, value) if isinstance(value, str) else f"{value:g}"
+
+
+def _weighted(values: Any, error: Any) -> tuple[float, float]:
+    """Weighted mean and its standard error."""
+    known = np.isfinite(values) & np.isfinite(error)
+    weight = 1 / error[known] ** 2
+    return float(np.sum(weight * values[known]) / weight.sum()), float(weight.sum() ** -0.5)
+
+
+def _with_error(value: float, error: float) -> str:
+    return f"{100 * value:+.2f} ± {100 * error:.2f} %".replace("-", "−")

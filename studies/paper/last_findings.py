@@ -1,0 +1,81 @@
+"""What came out for the paper's last sentences, see `studies.paper.findings`."""
+
+import numpy as np
+
+from studies.paper.figure5 import rows as figure5_rows
+from studies.paper.findings import Finding, Numbers, percent
+from studies.paper.reduction import effect_of
+from studies.paper.statistics import summary
+from studies.paper.verdicts import Verdict, bounds, direction, share, together
+
+
+def gradual(numbers: Numbers) -> Finding:
+    """A loop loses its shape gradually: nine of ten take longer than an impact lasts."""
+    found = numbers["paper_strands"]["strands"]["loss_of_shape"]["rest"]
+    low, median, high = found["seconds"]
+    impact = float(np.nanmedian(np.array(numbers["paper_shapes"]["impacts"]["duration"], np.float64)))
+    text = (
+        f"from 90 to 50 % of its area a loop takes {median:.2f} s in the median, {low:.2f} to {high:.2f} s in eight of "
+        f"ten walks, {percent(found['of_the_walk'][1], sign=False)} of the walk's time; a first impact lasts "
+        f"{impact:.2f} s in the median"
+    )
+    return Finding(text, Verdict.AGREES if low > impact else Verdict.PART if median > impact else Verdict.DIFFERS)
+
+
+def nonlinear(numbers: Numbers) -> Finding:
+    """Linear propagation of the uncertainties fails: linear terms explain less than half of the variance."""
+    found = {start: numbers["paper_strands"]["strands"]["explained"][start]["terms"] for start in ("rest", "ellipse")}
+    texts = [
+        f"{percent(terms['linear'], sign=False)} {name}, with all squares and products "
+        f"{percent(terms['with squares'], sign=False)}"
+        for name, terms in zip(("from rest", "as an ellipse"), found.values(), strict=True)
+    ]
+    text = (
+        f"linear terms of all that is drawn explain {'; '.join(texts)} of the variance in a cell (fitted to one half "
+        "of the samples, judged by the other)"
+    )
+    fails = [Verdict.AGREES if terms["linear"] < bounds().most else Verdict.DIFFERS for terms in found.values()]
+    return Finding(text, together(fails))
+
+
+def figure5_shape(numbers: Numbers) -> Finding:
+    """Curves of other cells bounce, change v_x in impacts only, and do not turn back."""
+    found = figure5_rows()
+    alike = [
+        int(row["rises"]) > 0 and float(row["changes_in_impacts"]) > 0.9 and float(row["backwards"]) < 0.1
+        for row in found
+    ]
+    without = [f"{row['links']} × {float(row['frequency']):g} Hz" for row in found if row["rises"] == "0"]
+    text = f"{sum(alike)} of {len(found)} cells have it; not visibly rising between impacts: {', '.join(without)}"
+    return Finding(text, share(sum(alike), len(found)))
+
+
+def sliding(numbers: Numbers) -> Finding:
+    """Less friction of the floor lets a chain slide for longer after its collapse."""
+    found = numbers["paper_more"]["more"]["sliding"]
+    agreeing = against = cells = 0
+    texts = []
+    for value, each in found.items():
+        effect = summary(effect_of(each["time"]))
+        less = float(value) < 0.27
+        agreeing += effect.rises if less else effect.falls
+        against += effect.falls if less else effect.rises
+        cells += effect.cells
+        texts.append(f"{value}: {percent(effect.mean, effect.half_width)}")
+    text = (
+        f"time from the collapse to rest at {'; '.join(texts)}; {agreeing} of {cells} comparisons as claimed, "
+        f"{against} the other way"
+    )
+    return Finding(text, direction(agreeing, against, cells))
+
+
+def same_distributions(numbers: Numbers) -> Finding:
+    """Δx is distributed alike at both tolerances."""
+    found = numbers["paper_more"]["more"]["distributions"]
+    alike = sum(each["p"] > 0.05 for each in found)
+    least = min(each["p"] for each in found)
+    text = (
+        f"in {alike} of {len(found)} cells of 100 walks Kolmogorov's and Smirnov's test tells no difference at 5 %, "
+        f"the least p is {least:.2f}; means and standard deviations in the [table](#the-last-sentences)"
+    )
+    return Finding(text, share(alike, len(found)))

@@ -1,0 +1,109 @@
+"""How far apart along the chain links are that touch: creases of one strand, and two strands of the loop.
+
+    python -m studies.paper.separations     # five minutes → results/separations.csv
+
+Walks from the sprocket, frames 0.5 ms apart; touches before the collapse, of joints at least 2 links apart, that are no
+growth of an older one: no joint within 4 links of either has touched one within 4 of the other in a frame before.
+"""
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import warpchain
+from studies.common import table, write_text
+
+RESULTS: Final = Path(__file__).parent / "results" / "separations.csv"
+LINKS: Final = (60, 90, 120, 150, 180)
+FREQUENCIES: Final = (10.0, 15.0, 20.0, 25.0, 30.0)
+RELEASES: Final = ((0.0, 0.008), (0.4, 0.0096))
+"""Phase and clearance [m]."""
+AROUND: Final = 4
+HIGH: Final = 0.04
+"""Height above the lowest joint [m] from which a touch is not one on the floor."""
+BINS: Final = ((2, 3), (4, 8), (9, 12), (13, 16), (17, 21), (22, 28), (29, 35), (36, 90))
+LEAST: Final = (2, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 30, 40)
+"""Values of m."""
+
+
+def touches(walk: warpchain.WalkResult) -> Iterator[tuple[float, int, float]]:
+    """Time [s] over that of the collapse, links apart, and height [m] of each new touch."""
+    links = walk.setup.scene.links
+    reach = 2 * walk.setup.parameters.circle_radius
+    number = np.arange(links)
+    apart = np.abs(number[:, None] - number)
+    apart = np.minimum(apart, links - apart)
+    end = walk.collapsed_at if np.isfinite(walk.collapsed_at) else walk.walk_time
+    old: NDArray[np.bool_] = np.zeros((links, links), dtype=bool)
+    for time, joints in zip(walk.frame_time, walk.frame_joints, strict=True):
+        if time > end:
+            return
+        x, y = joints.T
+        now = ((x[:, None] - x) ** 2 + (y[:, None] - y) ** 2 < reach**2) & (apart >= 2)
+        for i, j in zip(*np.nonzero(np.triu(now & ~old)), strict=True):
+            yield float(time / end), int(apart[i, j]), float(max(y[i], y[j]) - y.min())
+        shifts = range(-AROUND, AROUND + 1)
+        for first in shifts:
+            rolled = np.roll(now, first, axis=0)
+            for second in shifts:
+                old |= np.roll(rolled, second, axis=1)
+
+
+def main() -> None:
+    """Let all chains walk, and write each new touch."""
+    rows = []
+    for links in LINKS:
+        for frequency in FREQUENCIES:
+            for phase, clearance in RELEASES:
+                walk = warpchain.walk(
+                    links=links,
+                    frequency=frequency,
+                    preset="soft",
+                    start="spinning",
+                    phase=phase,
+                    clearance=clearance,
+                    frame_interval=5e-4,
+                    walk_limit=2.5,
+                )
+                rows += [f"{links},{frequency:g},{phase:g},{t:.4f},{a},{h:.3f}" for t, a, h in touches(walk)]
+        print(f"{links} links", flush=True)
+    write_text(RESULTS, "\n".join(["links,frequency,phase,time,apart,height", *rows]) + "\n")
+
+
+def separations_tables() -> str:
+    """New touches by links apart and height; and when links at least m apart first touch."""
+    with RESULTS.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    links, apart, height, time = (
+        np.array([float(row[name]) for row in rows]) for name in ("links", "apart", "height", "time")
+    )
+    groups = {
+        f"at most {100 * HIGH:g} cm high": height <= HIGH,
+        "higher, 60 and 90 links": (height > HIGH) & (links < 120),
+        "higher, 120 to 180 links": (height > HIGH) & (links >= 120),
+    }
+    lines = []
+    for name, chosen in groups.items():
+        counts = (np.sum(chosen & (apart >= low) & (apart <= high)) / (high - low + 1) for low, high in BINS)
+        lines.append((name, *(f"{count:.1f}" for count in counts)))
+    first = table(["new touches per link apart", *(f"{low} to {high}" for low, high in BINS)], lines)
+    walks = np.array([f"{row['links']} {row['frequency']} {row['phase']}" for row in rows])
+    lines = []
+    for number in LINKS:
+        texts = []
+        for least in LEAST:
+            chosen = (links == number) & (apart >= least)
+            firsts = [time[chosen & (walks == walk)].min() for walk in np.unique(walks[chosen])]
+            most = len(firsts) > len(FREQUENCIES) * len(RELEASES) / 2
+            texts.append(f"{np.median(firsts):.2f} ({len(firsts)})" if most else f"({len(firsts)})")
+        lines.append((f"{number} links", *texts))
+    second = table(["first touch at least m apart", *(f"m = {least}" for least in LEAST)], lines)
+    return f"{first}\n\n{second}"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,104 @@
+"""A drag on the waves of a free loop that leaves its momenta and its run along itself.
+
+A loop that runs along itself, however fast, has no velocity across its path, seen from its centre of mass. A wave has:
+it moves the path. (So does a path that turns as a whole.) Of the two waves that a push starts, the fast one, which runs
+at about twice the links' speed in the room, has twice the velocity across that it has in the frame of the links; the
+slow one nearly stands still in the room and has nearly none. So a drag on the velocity across the path takes the fast
+wave and hardly touches the slow one, which is a lasting change of the loop's shape.
+
+The drag is an experiment, no physics of the chain: with it one asks whether the waves matter for how far a chain walks.
+"""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+TWELFTH: Final = 1.0 / 12.0
+"""A link is a chord: its direction is that of the path at its middle less this share of the second difference of θ."""
+
+RUNNING: Final = [0, 1, 3]
+"""Motions of `loop_motions` that leave the path in its shape and direction."""
+RIGID: Final = [0, 1, 2]
+"""Motions of `loop_motions` that hold momentum and angular momentum."""
+
+
+def loop_motions(position: Array, link_length: Array) -> tuple[Array, Array]:
+    """Motions of W loops of n links that are no waves, and the normals of their paths.
+
+    Args:
+        position: (W, n, 3): x, y [m], θ [rad] of each link's centre.
+        link_length: (W,) [m].
+
+    Returns:
+        (W, 4, n, 3): velocities x, y and angular velocity of each link in a translation along x and along y, a rotation
+        about the origin at 1 rad/s, and a run along the path at 1 m/s towards links of higher number; and (W, n, 2).
+    """
+    x, y, angle = np.moveaxis(position, -1, 0)
+    ahead = _wrapped(np.roll(angle, -1, axis=1) - angle)
+    behind = _wrapped(angle - np.roll(angle, 1, axis=1))
+    direction = angle - TWELFTH * (ahead - behind)
+    along = np.stack([np.cos(direction), np.sin(direction)], axis=-1)
+    normal = np.stack([-along[..., 1], along[..., 0]], axis=-1)
+    one, zero = np.ones_like(x), np.zeros_like(x)
+    turning = (ahead + behind) / (2 * link_length[:, None])
+    motions = [(one, zero, zero), (zero, one, zero), (-y, x, one), (along[..., 0], along[..., 1], turning)]
+    return np.stack([np.stack(motion, axis=-1) for motion in motions], axis=1), normal
+
+
+def wave_motion(motions: Array, velocity: Array, inertia: Array) -> tuple[Array, Array]:
+    """What of the velocities of W loops is none of some motions.
+
+    Args:
+        motions: some of `loop_motions`, (W, j, n, 3).
+        velocity: (W, n, 3) [m/s, m/s, rad/s].
+        inertia: (W, n, 3): mass, mass [kg] and moment of inertia [kg m²] of each link.
+
+    Returns:
+        Amounts of the motions, (W, j), those nearest to the velocities in kinetic energy; and the rest, (W, n, 3).
+    """
+    weighted = motions * inertia[:, None]
+    squares = np.einsum("wjnc,wknc->wjk", weighted, motions, optimize=True)
+    products = np.einsum("wjnc,wnc->wj", weighted, velocity, optimize=True)
+    amounts = np.linalg.solve(squares, products[..., None])[..., 0]
+    return amounts, velocity - np.einsum("wj,wjnc->wnc", amounts, motions, optimize=True)
+
+
+def drag_waves(
+    position: Array, velocity: Array, inertia: Array, link_length: Array, share: Array, least_mode: Array
+) -> tuple[Array, Array, Array]:
+    """Take a share of the waves out of the velocities of W loops of n links.
+
+    Momentum and angular momentum stay, and very nearly the speed along the path. What goes is the velocity across the
+    path, as seen from the centre of mass, with the rotation of the links that belongs to it.
+
+    Args:
+        position: (W, n, 3): x, y [m], θ [rad] of each link's centre.
+        velocity: (W, n, 3), their rates.
+        inertia: (W, n, 3): mass, mass [kg] and moment of inertia [kg m²] of each link.
+        link_length: (W,) [m].
+        share: (W,), of the velocity across the path that goes.
+        least_mode: (W,): waves with fewer crests around the loop are left alone.
+
+    Returns:
+        The new velocities, (W, n, 3); the kinetic energy of all velocities across the path [J], (W,), before; and the
+        speed along the path [m/s], (W,).
+    """
+    motions, normal = loop_motions(position, link_length)
+    amounts, rest = wave_motion(motions[:, RUNNING], velocity, inertia)
+    across = np.einsum("wnc,wnc->wn", rest[..., :2], normal)
+    energy = 0.5 * np.einsum("wn,wn,wn->w", inertia[..., 0], across, across)
+    modes = np.fft.rfft(across, axis=1)
+    modes[np.arange(modes.shape[1]) < least_mode[:, None]] = 0.0
+    taken = share[:, None] * np.fft.irfft(modes, across.shape[1], axis=1)
+    turning = (np.roll(taken, -1, axis=1) - np.roll(taken, 1, axis=1)) / (2 * link_length[:, None])
+    change = -np.concatenate([taken[..., None] * normal, turning[..., None]], axis=-1)
+    _, change = wave_motion(motions[:, RIGID], change, inertia)
+    return velocity + change, energy, amounts[:, -1]
+
+
+def _wrapped(angle: Array) -> Array:
+    """Angles [rad] within half a turn of zero."""
+    return np.asarray(angle - 2 * np.pi * np.round(angle / (2 * np.pi)))

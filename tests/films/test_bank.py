@@ -1,0 +1,166 @@
+"""What a bank says of a chain: intervals hold, what films share does not average out, strangers are refused."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import warpchain
+from tests.support.made_films import films_of, made_bank, motion
+from warpchain import InputError, films
+
+CAMERA = films.Camera()
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_intervals_hold_of_chains_that_the_bank_does_not_have(count: int) -> None:
+    """Of 150 hidden chains 68 and 95 % lie inside, within three standard deviations of such a count."""
+    bank, hidden = made_bank(160, seed=1), made_bank(150, seed=2)
+    inside = np.zeros((2, 3))
+    refused = 0
+    for chain, truth in enumerate(hidden.values):
+        try:
+            answer = bank.posterior(films_of(hidden, chain, count, CAMERA, chain), CAMERA)
+        except InputError:
+            refused += 1
+            continue
+        inside += np.abs(answer.mean - truth) < np.outer([1, 1.96], answer.sigma)
+    assert refused < 12
+    share = inside / (150 - refused)
+    assert (share[0] > 0.56).all() and (share[0] < 0.8).all()
+    assert (share[1] > 0.89).all()
+    assert ((answer.coverage[1] > 0.9) & (answer.coverage[0] > 0.6)).all()
+
+
+def test_what_nothing_shows_is_as_before_the_film() -> None:
+    """Restitution leaves no trace in these motions: its error is that of the bank, and the answer says so."""
+    bank = made_bank(160, seed=1)
+    answer = bank.posterior(films_of(bank, 3, 2, CAMERA, 0), CAMERA)
+    assert answer.sigma[2] == pytest.approx(bank.values[:, 2].std(), rel=0.15)
+    lines = str(answer).splitlines()
+    assert lines[0].startswith("2 films, a bank of 160 chains")
+    assert ["as before the film" in line for line in lines[1:]] == [False, False, True]
+
+
+def test_errors_that_films_share_do_not_average_out() -> None:
+    """With an error of the scale alone eight times the films are no better; with noise alone they are."""
+    bank = made_bank(160, seed=1, repetitions=8)
+    still = films.Camera(
+        noise=1e-6, release=1e-6, speed=1e-3, scale=1e-9, floor=1e-9, origin=1e-9, roll=1e-9, outline=1e-9
+    )
+    shared = dataclasses.replace(still, outline=2e-3, speed=0.1)
+    noisy = dataclasses.replace(still, noise=3e-3)
+
+    def sigma(camera: films.Camera, count: int, parameter: int) -> float:
+        return float(bank.posterior(films_of(bank, 0, count, camera, 0), camera).sigma[parameter])
+
+    assert sigma(shared, 8, 1) > 0.85 * sigma(shared, 1, 1)
+    assert sigma(noisy, 8, 0) < 0.6 * sigma(noisy, 1, 0)
+
+
+def test_a_film_without_outline_or_speed_says_less() -> None:
+    """The bank is then asked for what the film has."""
+    bank = made_bank(160, seed=1)
+    (film,) = films_of(bank, 5, 1, CAMERA, 0)
+    bare = dataclasses.replace(film, outline=None, speed=None)
+    assert bank.posterior([bare]).sigma[1] > 2 * bank.posterior([film]).sigma[1]
+
+
+def test_other_measurements_condition_the_gaussian() -> None:
+    """`given` is Bayes' rule, here against precisions that are added."""
+    answer = films.Posterior(
+        names=("circle_radius", "sprocket_radius"),
+        mean=np.array([4.0, 56.0]),
+        covariance=np.array([[0.09, -0.05], [-0.05, 0.04]]),
+        prior_sigma=np.ones(2),
+        coverage=np.zeros((2, 2)),
+        films=1,
+        chains=1,
+    )
+    after = answer.given(circle_radius=(4.2, 0.05))
+    precision = np.linalg.inv(answer.covariance)
+    covariance = np.linalg.inv(precision + np.diag([400.0, 0]))
+    assert after.covariance == pytest.approx(covariance)
+    assert after.mean == pytest.approx(covariance @ (precision @ answer.mean + [400 * 4.2, 0]))
+    with pytest.raises(InputError, match="mass: not in the posterior; give one of circle_radius"):
+        answer.given(mass=(1.0, 0.1))
+
+
+def test_films_outside_of_the_bank_are_refused() -> None:
+    """Too slippery a floor, another experiment, more films than repetitions, and none."""
+    bank = made_bank(160, seed=1)
+    slippery = motion(0.75).seen(CAMERA, np.zeros(8), np.random.default_rng(0))
+    with pytest.raises(InputError, match="films: outside of the bank"):
+        bank.posterior([slippery])
+    (film,) = films_of(bank, 0, 1, CAMERA, 0)
+    with pytest.raises(InputError, match="films: 60 links at 15 Hz, but the bank has 4 of each of 60 links at 20 Hz"):
+        bank.posterior([dataclasses.replace(film, frequency=15.0)])
+    with pytest.raises(InputError, match="the bank has 4 of each"):
+        bank.posterior([film] * 5)
+    with pytest.raises(InputError, match="films: 0 films"):
+        bank.posterior([])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sweep of chains, run with two samples and then with a third."""
+    path = tmp_path_factory.mktemp("bank") / "sweep"
+    for samples in (2, 3):
+        warpchain.sweep(
+            grid={"links": [40, 60], "frequency": [15, 20], "phase": [0.1, 0.6]},
+            samples=samples,
+            preset="soft",
+            scene={"start": "spinning", "walk_limit": 0.4},
+            record={"series": {"interval": 0.004}, "frames": {"interval": 0.4}},
+            same_samples_along=["links", "frequency", "phase"],
+            out=path,
+            progress=False,
+        )
+    return path
+
+
+def test_a_bank_has_the_walks_of_its_sweep(folder: Path, tmp_path: Path) -> None:
+    """Each motion is that of the walk of this chain, experiment and repetition; a saved bank is the same."""
+    result = warpchain.load(folder)
+    films.Bank.of(result).save(tmp_path / "bank.npz")
+    bank = films.Bank.load(tmp_path / "bank.npz")
+    with pytest.raises(InputError, match=r"bank\.txt: no bank; give a file"):
+        (tmp_path / "bank.txt").write_text("no bank", encoding="utf-8")
+        films.Bank.load(tmp_path / "bank.txt")
+    assert bank.center.shape[:3] == (3, 4, 2)
+    for chain, experiment, repetition in np.ndindex(3, 4, 2):
+        links, frequency = bank.experiments[experiment]
+        phase = result.axes["phase"][repetition]
+        walk = result.series(links=links, frequency=frequency, phase=phase, sample=chain)
+        film = bank.film(chain, experiment, repetition)
+        expected = [np.interp(bank.time, walk.time, walk.center[:, k]) for k in (0, 1)]
+        assert film.center.T == pytest.approx(np.array(expected), abs=1e-7)
+        assert film.outline == pytest.approx(films.Film.of(walk).outline, abs=1e-6)
+        assert film.speed == pytest.approx(walk.rms_speed[0], rel=1e-6)
+        place = list(bank.names).index("floor_friction")
+        assert bank.values[chain, place] == walk.setup.parameters.floor_friction
+
+
+def test_a_sweep_that_is_no_bank_is_refused(tmp_path: Path) -> None:
+    """Chains must be the same in all experiments, and the axes links and frequency."""
+    settings = {
+        "samples": 2,
+        "preset": "soft",
+        "scene": {"start": "spinning", "walk_limit": 0.01},
+        "record": {"series": True, "frames": True},
+        "progress": False,
+    }
+    other = warpchain.sweep(grid={"links": [40], "frequency": [15, 20]}, out=tmp_path / "a", **settings)
+    with pytest.raises(InputError, match=r"same_samples_along: \[links, frequency\]"):
+        films.Bank.of(other)
+    phases = warpchain.sweep(
+        grid={"links": [40], "frequency": [15], "phase": [0.1, 0.2]},
+        out=tmp_path / "c",
+        same_samples_along=["links", "frequency"],
+        **settings,
+    )
+    with pytest.raises(InputError, match=r"same_samples_along: \[links, frequency, phase\]"):
+        films.Bank.of(phases)
+    with pytest.raises(InputError, match="grid: its axes are frequency"):
+        films.Bank.of(warpchain.sweep(grid={"frequency": [15]}, out=tmp_path / "b", **settings))

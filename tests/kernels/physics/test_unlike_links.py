@@ -1,0 +1,175 @@
+"""Chains whose links and joints all differ: flights against SciPy, impulses, invariants, multiplied loads."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from numpy.typing import NDArray
+
+from tests.oracle_model import contact_equations, motion_equations
+from tests.support.driven_loops import hold, released_loop
+from tests.support.folded_chains import folded_chain
+from tests.support.kernels_under_test import FLOOR, LIST, SELF, SPROCKET, ContactPass, Placed
+from tests.support.rigid_chains import exact_rigid_flight, loop, visit
+from tests.support.unlike_links import UnlikeLinks, unlike_links
+from warpchain import Status, preset
+from warpchain.engine.batch import Batch
+from warpchain.inputs.link_values import LinkValues, alternating
+from warpchain.inputs.options import Options
+from warpchain.inputs.start_shapes import ellipse, lay_chain
+from warpchain.kernels import layout
+
+Array = NDArray[np.float64]
+
+PAPER, SOFT = preset("paper"), preset("soft")
+FRICTIONLESS = {"joint_damping": 0.0, "viscous_friction": 0.0, "coulomb_friction": 0.0}
+
+
+def fly(chain: UnlikeLinks, start: tuple[Array, Array], duration: float, fixed_body: str, **options: Any) -> Batch:
+    """Carry a chain on; a batch of one world."""
+    links = len(start[0])
+    batch = Batch(1, links, Options(**options))
+    batch.set_chain(0, chain.parameters, links, own=chain.own)
+    batch.load(0, *start, stop_time=duration, stop_status=Status.FINISHED)
+    batch.run([0], batch.features(fixed_body=fixed_body))
+    assert batch.status(0) == Status.FINISHED
+    return batch
+
+
+# --- flights ---
+
+
+@pytest.mark.parametrize("links", [12, 13])
+def test_flights_agree_with_scipy(links: int) -> None:
+    """With springs, joints that damp and rub, and gravity, DOP853 at 1e-12 has the same flight to 1e-8."""
+    chain, duration = unlike_links(links, SOFT), 5e-3
+    position, velocity = lay_chain(ellipse(1.5), links, SOFT.link_length, 2.0, 0.1)
+    velocity[:, 2] += np.random.default_rng(1).normal(size=links)
+    batch = fly(chain, (position, velocity), duration, "none", method="dp5", tolerance=1e-10)
+    places, speeds, _ = motion_equations.solve_flight(position, velocity, [0.0, duration], chain)
+    assert_allclose(batch.position(0), places[-1], atol=1e-8 * np.abs(places[-1]).max())
+    assert_allclose(batch.velocity(0), speeds[-1], atol=1e-8 * np.abs(speeds[-1]).max())
+    before = motion_equations.total_energy(position, velocity, chain)
+    after = motion_equations.total_energy(batch.position(0), batch.velocity(0), chain)
+    assert before - after == pytest.approx(sum(batch.losses(0).values()), rel=1e-7)
+
+
+@pytest.mark.parametrize("links", [7, 16, 61])
+def test_flights_on_rigid_joints_agree_with_scipy(links: int) -> None:
+    """Rigid joints of unlike links move as the dense equations do, by DOP853 at 1e-12, to the method's 1e-6."""
+    smooth = PAPER.with_values({"friction_smoothing": 50.0})
+    chain = unlike_links(links, smooth)
+    position, velocity = loop(links, chain)
+    duration, steps = 2e-4, 100
+    flight = visit(position, velocity, chain, h=duration / steps, steps=steps)
+    places, speeds = exact_rigid_flight(position, velocity, chain, duration)
+    assert flight.closed
+    assert np.abs(flight.position - places).max() < 1e-6 * np.abs(places).max()
+    assert np.abs(flight.velocity - speeds).max() < 1e-6 * np.abs(speeds).max()
+
+
+@pytest.mark.parametrize("method", ["dp5", "hybrid"])
+def test_collisions_keep_momentum_and_the_ledger_of_energy(method: str) -> None:
+    """A chain folded into itself keeps its momentum but for gravity, to 1e-12, and books what it loses, to 1e-3."""
+    chain = unlike_links(60, SOFT)
+    position, velocity = folded_chain(60, 3, SOFT.link_length, tilt=0.3, opening=0.0)
+    velocity += [1.0, 0.5, 0.0]
+    batch = fly(chain, (position, velocity), 2e-2, "none", method=method, tolerance=1e-5)
+    assert batch.counts(0)["self"] > 100
+    gained = motion_equations.linear_momentum(batch.velocity(0), chain) - motion_equations.linear_momentum(
+        velocity, chain
+    )
+    gained[1] += chain.masses.sum() * SOFT.gravity * batch.time(0)
+    assert_allclose(gained, 0, atol=1e-12)
+    before = motion_equations.total_energy(position, velocity, chain)
+    after = motion_equations.total_energy(batch.position(0), batch.velocity(0), chain)
+    assert before - after == pytest.approx(sum(batch.losses(0).values()), rel=1e-3)
+
+
+def test_free_flight_keeps_energy_and_angular_momentum() -> None:
+    """Without friction, damping and gravity both stay, to 1e-8 and 1e-10."""
+    chain = unlike_links(14, SOFT.with_values({**FRICTIONLESS, "gravity": 0.0}))
+    position, velocity = lay_chain(ellipse(1.5), 14, SOFT.link_length, 2.0, 0.1)
+    batch = fly(chain, (position, velocity), 5e-3, "none", method="rkf78", tolerance=1e-11)
+    end = batch.position(0), batch.velocity(0)
+    energies = [motion_equations.total_energy(*state, chain) for state in ((position, velocity), end)]
+    spins = [motion_equations.angular_momentum(*state, chain) for state in ((position, velocity), end)]
+    assert energies[1] == pytest.approx(energies[0], rel=1e-8)
+    assert spins[1] == pytest.approx(spins[0], rel=1e-10)
+
+
+# --- impulses ---
+
+
+@pytest.mark.parametrize(("links", "tilt"), [(8, np.pi), (60, 0.2), (150, np.pi)])
+def test_a_contact_pass_equals_reference(links: int, tilt: float) -> None:
+    """Floor, turning sprocket and links of unlike masses leave the reference's velocities, to 1e-12, and counts."""
+    chain = unlike_links(links, PAPER)
+    position, velocity = folded_chain(links, links, PAPER.link_length, tilt=tilt)
+    contact_pass = ContactPass([Placed(position, velocity, chain)], sprocket_speed=-90.0)
+    (result,) = contact_pass.run(LIST | FLOOR | SPROCKET | SELF)
+    hub = (np.zeros(2), PAPER.sprocket_radius, -90.0)
+    expected, counts = contact_equations.resolve_contacts(position, velocity, chain, sprocket=hub)
+    assert {kind: result[kind] for kind in counts} == counts and counts["self"] > 0
+    assert_allclose((contact_pass.velocity(0) - expected) / np.abs(expected).max(axis=0), 0, atol=1e-12)
+
+
+def test_links_that_meet_head_on_part_by_the_formula() -> None:
+    """Two links on one line, m₁ with u, m₂ at rest: the impulse is (1 + e) u m₁ m₂ / (m₁ + m₂), whatever the others."""
+    chain = unlike_links(8, PAPER)
+    m, length, radius = chain.masses, PAPER.link_length, PAPER.circle_radius
+    # links 1 and 5 lie on the x axis, end to end but for 0.1 mm; all others are far away
+    position = np.column_stack([np.zeros(8), 1.0 + np.arange(8), np.zeros(8)])
+    position[1] = [-length / 2 - radius + 5e-5, 0.0, 0.0]
+    position[5] = [length / 2 + radius - 5e-5, 0.0, 0.0]
+    velocity = np.zeros((8, 3))
+    velocity[1, 0] = 2.0
+    contact_pass = ContactPass([Placed(position, velocity, chain)], skin=20.0)
+    (result,) = contact_pass.run(LIST | SELF)
+    assert result["self"] == 1
+    impulse = (1 + PAPER.chain_restitution) * 2.0 * m[1] * m[5] / (m[1] + m[5])
+    after = contact_pass.velocity(0)
+    assert after[1, 0] == pytest.approx(2.0 - impulse / m[1], rel=1e-12)
+    assert after[5, 0] == pytest.approx(impulse / m[5], rel=1e-12)
+    assert result["self_loss"] == pytest.approx(
+        (m[1] * 2.0**2 - m[1] * after[1, 0] ** 2 - m[5] * after[5, 0] ** 2) / 2, rel=1e-10
+    )
+
+
+# --- multiplied loads ---
+
+
+def test_a_stationary_loop_of_unlike_inertias_stays_as_it_is_under_load() -> None:
+    """Every third link has 1.6 times the inertia, others 0.7: 15 times the loads leave height, width and place."""
+    loop_on_sprocket = released_loop(links=60, frequency=20.0, start="spinning")
+    usual = alternating(SOFT, 60)
+    own = LinkValues(
+        usual.mass, usual.inertia * np.resize([1.6, 0.7, 0.7], 60), usual.viscous_friction, usual.coulomb_friction
+    )
+    free, loaded = (
+        hold(loop_on_sprocket, SOFT, duration, load_factor=factor, own=own)
+        for duration, factor in ((0.5, 1.0), (1.0, 15.0))
+    )
+    height, width = free[[0, 1]]
+    change = np.abs(loaded - free)[:4] / [height, width, width, height]
+    assert np.all(change < [0.002, 0.005, 0.003, 0.002]), change
+
+
+def test_loads_multiply_what_each_link_has() -> None:
+    """I − mℓ²/6 of each link and β, τ_c of each joint are multiplied, masses are not."""
+    factor, links = 7.0, 8
+    chain = unlike_links(links, SOFT)
+    batch = Batch(1, links, Options(method="dp5"))
+    batch.set_chain(0, SOFT, links, own=chain.own)
+    position, velocity = lay_chain(ellipse(1.2), links, SOFT.link_length)
+    batch.load(0, position, velocity, stop_time=1e-5, stop_status=Status.FINISHED)
+    batch.state.load_factor.numpy()[0] = factor
+    batch.launch([0], batch.features(fixed_body="none"), 1)
+    rows = batch.scratch.numpy()[0, :, :links]
+    shift = chain.masses * SOFT.link_length**2 / 6
+    assert_allclose(rows[layout.MASS], chain.masses, rtol=0)
+    assert_allclose(rows[layout.INERTIA], shift + factor * (chain.inertias - shift), rtol=1e-12)
+    assert_allclose(rows[layout.INVERSE_INERTIA] * rows[layout.INERTIA], 1.0, rtol=1e-15)
+    assert_allclose(rows[layout.VISCOUS], factor * chain.viscous_friction, rtol=1e-15)
+    assert_allclose(rows[layout.COULOMB], factor * chain.coulomb_friction, rtol=1e-15)

@@ -1,0 +1,81 @@
+"""Many given chains side by side: they move as each alone, and may be given other velocities between runs."""
+
+import numpy as np
+import pytest
+
+import warpchain
+from tests.support.folded_chains import folded_chain
+from warpchain.inputs.start_shapes import ellipse, lay_chain
+
+SOFT = warpchain.preset("soft")
+LINKS = 12
+
+
+def loops(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Ellipses that run along themselves at different speeds, high above the floor."""
+    both = [lay_chain(ellipse(1.3), LINKS, SOFT.link_length, 1.0 + speed) for speed in range(count)]
+    position, velocity = (np.array(each) for each in zip(*both, strict=True))
+    position[..., 1] += 0.3
+    return position, velocity
+
+
+@pytest.mark.parametrize("device", ["cpu", "fibers"])
+def test_chains_move_as_each_alone(device: str) -> None:
+    """In one run or in several, chains end where `simulate` takes each of them."""
+    position, velocity = loops(2)
+    chains = warpchain.Chains([SOFT, SOFT], position, velocity, method="dp5", tolerance=1e-8, device=device)
+    chains.run(2e-4)
+    chains.run(5e-4)
+    places, rates = chains.motions()
+    for number in range(2):
+        alone = warpchain.simulate("soft", position[number], velocity[number], 5e-4, method="dp5", tolerance=1e-8)
+        assert np.abs(places[number] - alone.position[-1]).max() < 1e-9
+        assert np.abs(rates[number] - alone.velocity[-1]).max() < 1e-4
+    assert list(chains.status) == [warpchain.Status.FINISHED] * 2
+
+
+def test_a_push_moves_one_chain_and_no_other() -> None:
+    """A velocity added to all links of a loop in flight carries it on at that speed."""
+    position, velocity = loops(2)
+    chains, same = (warpchain.Chains([SOFT, SOFT], position, velocity, floor=False) for _ in range(2))
+    for each in (chains, same):
+        each.run(1e-3)
+    pushed = chains.motions([1])[1] + [0.5, 0.0, 0.0]
+    chains.set_velocity([1], pushed)
+    for each in (chains, same):
+        each.run(3e-3)
+    moved = chains.motions()[0] - same.motions()[0]
+    assert np.all(moved[0] == 0)
+    assert moved[1, :, 0].mean() == pytest.approx(0.5 * 2e-3, rel=1e-4)
+
+
+def test_a_heap_comes_to_rest() -> None:
+    """With `to_rest` a heap on the floor ends AT_REST and stays there; a loop in the air runs into the limit."""
+    heap = np.array(folded_chain(LINKS, 3, SOFT.link_length, tilt=0.2))
+    loop = np.array(loops(1))[:, 0]
+    heap[0][:, 1] += 0.02 - heap[0][:, 1].min()
+    position, velocity = np.stack([heap, loop], axis=1)
+    chains = warpchain.Chains([SOFT, SOFT], position, velocity)
+    chains.run(0.2, [1])
+    chains.run(3.0, [0], to_rest=True)
+    assert list(chains.status) == [warpchain.Status.AT_REST, warpchain.Status.FINISHED]
+    before = chains.motions([0])[0]
+    chains.run(4.0, [0])
+    assert np.all(chains.motions([0])[0] == before)
+
+
+@pytest.mark.parametrize(
+    ("changes", "names"),
+    [
+        ({"velocity": np.zeros((2, LINKS, 2))}, "velocity"),
+        ({"position": np.full((2, LINKS, 3), np.nan)}, "position"),
+        ({"parameters": [SOFT]}, "position"),
+        ({"soften_drive": True}, "soften_drive"),
+    ],
+)
+def test_wrong_input_is_one_line(changes: dict, names: str) -> None:
+    """What does not fit is refused by its name."""
+    position, velocity = loops(2)
+    given = {"parameters": [SOFT, SOFT], "position": position, "velocity": velocity} | changes
+    with pytest.raises(warpchain.InputError, match=names):
+        warpchain.Chains(**given)

@@ -1,0 +1,62 @@
+"""The study of films makes its tables and figures of made banks, whose chains nobody simulated."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studies.common import save_figure
+from studies.films import calibration, drawing, hidden, run
+from tests.support.made_films import films_of, made_bank
+from warpchain import films
+
+EXPERIMENTS = ((60, 5.0), (60, 20.0))
+
+
+@pytest.fixture(scope="module")
+def banks() -> tuple[films.Bank, films.Bank]:
+    """A bank, and hidden chains."""
+    return made_bank(80, 1, experiments=EXPERIMENTS), made_bank(40, 2, experiments=EXPERIMENTS)
+
+
+def test_banks_are_joined_by_their_chains(banks: tuple[films.Bank, films.Bank]) -> None:
+    """Chains that only one of them has are left out, whatever their order."""
+    bank, _ = banks
+    order = np.random.default_rng(0).permutation(80)[:50]
+    arrays = {name: getattr(bank, name)[order] for name in ("values", "center", "outline", "speed")}
+    other = dataclasses.replace(bank, experiments=bank.experiments + np.array([30, 0]), **arrays)
+    both = run.beside(bank, other)
+    assert both.experiments.tolist() == [[60, 5], [60, 20], [90, 5], [90, 20]]
+    assert len(both.values) == 50 and (both.center[:, :2] == both.center[:, 2:]).all()
+
+
+def test_calibration_tells_a_bank_that_knows_from_one_that_does_not(banks: tuple[films.Bank, films.Bank]) -> None:
+    """Hidden chains as the bank's are covered; if the floor was 5 mm lower than any camera's error, they are not."""
+    bank, truths = banks
+    good = calibration.calibrate(bank, truths, run.PAIR)
+    assert good.refused < 0.2 and (good.coverage(1.96) > 0.8).all() and (np.abs(good.bias) < 0.6).all()
+    wide = calibration.calibrate(bank, truths, run.PAIR, shared=np.array([0, 0, 0, 0, -0.004, 0.004, 0, 0]))
+    assert wide.coverage(1.96)[1] < 0.5 or wide.refused > 0.5
+    assert "2 films: 5, 20 Hz" in run.SETS and len(list(run.calibration_rows(good))) == 3
+
+
+def test_tables_and_figures_are_made(banks: tuple[films.Bank, films.Bank], tmp_path: Path) -> None:
+    """Of both experiments, of the friction lines, of the coverage and of a posterior."""
+    bank, truths = banks
+    assert [line[:16] for line in run.lines_table({"made": bank}).splitlines()[2:]] == [
+        "| made | 60/5 | ",
+        "| made | 60/20 |",
+    ]
+    found = calibration.calibrate(bank, truths, run.SETS["1 film: 20 Hz"])
+    save_figure(drawing.coverage_figure({"1 film": found}), tmp_path / "coverage.png")
+    answer = bank.posterior(films_of(bank, 0, 1, films.Camera(), 0)[:1])
+    save_figure(drawing.corner(answer, dict(zip(answer.names, answer.mean, strict=True))), tmp_path / "corner.png")
+    assert min(path.stat().st_size for path in tmp_path.iterdir()) > 10_000
+
+
+def test_the_hidden_chain_is_in_its_films() -> None:
+    """The committed films are read, their friction line is that of the hidden chain."""
+    path = hidden.FOLDER / "60_links_20_Hz.txt"
+    line = films.friction_line(films.read(path, links=60, frequency=20.0, unit="mm", speed=7.648))
+    assert abs(line.friction - hidden.CHAIN["floor_friction"]) < 3 * line.error < 0.02

@@ -1,0 +1,144 @@
+"""A film of a walk, real or of a simulated walk, and the camera that made it."""
+
+from dataclasses import dataclass, replace
+from typing import Final, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.inputs.validation import InputError
+from warpchain.walks.walk_result import WalkResult
+
+Array = NDArray[np.float64]
+
+GRAVITY: Final = 9.809
+"""As of Table 1 [m/s²]."""
+BEFORE: Final = 0.1
+"""Time before the release that a film shows [s]."""
+CLOCK: Final = np.arange(0.02, 0.361, 0.02)
+"""Times since the release [s] at which films are compared, each a mean over 20 ms."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Camera:
+    """A camera, and the standard deviations of its errors; the lower five are the same in all films of a chain.
+
+    Attributes:
+        fps: frames a second.
+        noise: of each coordinate in each frame [m].
+        release: of the moment of the release [s].
+        speed: of the loop's speed, relative.
+        scale: of the scale, relative.
+        floor: of the height of the floor [m].
+        origin: of the place of the sprocket's axis along the floor [m].
+        roll: of the plumb line in the picture [rad].
+        outline: of each edge of the outline [m].
+    """
+
+    fps: float = 240.0
+    noise: float = 5e-4
+    release: float = 2e-3
+    speed: float = 2e-3
+    scale: float = 2.5e-3
+    floor: float = 5e-4
+    origin: float = 5e-4
+    roll: float = 2.6e-3
+    outline: float = 5e-4
+
+    def errors(self, random: np.random.Generator) -> Array:
+        """Errors that all films of a chain have: scale, floor, origin, roll, four edges."""
+        sigma = [self.scale, self.floor, self.origin, self.roll, *[self.outline] * 4]
+        return random.normal(size=8) * sigma
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Film:
+    """What was measured of a walk: x forwards from the axis of the sprocket, y up from the floor.
+
+    Attributes:
+        time: since the release [s], ascending; negative before it.
+        center: centre of mass x, y [m], shape (t, 2).
+        links: number of links.
+        frequency: of the sprocket [Hz].
+        outline: x of the leftmost and rightmost, y of the lowest and highest joint at the release [m]; None: unknown.
+        speed: of the links along the loop before the release [m/s]; None: unknown.
+    """
+
+    time: Array
+    center: Array
+    links: int
+    frequency: float
+    outline: Array | None = None
+    speed: float | None = None
+
+    @classmethod
+    def of(cls, walk: WalkResult) -> Self:
+        """A simulated walk with series and frames, without errors; it begins at the release."""
+        if not len(walk.time) or not len(walk.frame_time):
+            raise InputError("walk: it has no series or no frames; record both")
+        scene, speed = walk.setup.scene, float(walk.rms_speed[0])
+        return cls(
+            time=walk.time,
+            center=walk.center,
+            links=scene.links,
+            frequency=scene.frequency,
+            outline=edges(walk.frame_joints[0]),
+            speed=speed,
+        )
+
+    def seen(self, camera: Camera, errors: Array, random: np.random.Generator) -> Self:
+        """A film without errors as a camera shows it, given the errors that other films of the chain share."""
+        scale, floor, origin, roll = errors[:4]
+        time = np.arange(-BEFORE + random.uniform() / camera.fps, self.time[-1], 1 / camera.fps)
+        center = np.column_stack([np.interp(time, self.time, self.center[:, k]) for k in (0, 1)])
+        turned = roll * np.column_stack([center[:, 1] - center[0, 1], -center[:, 0]])
+        shift, noise = np.array([origin, floor]), random.normal(size=center.shape) * camera.noise
+        delay, slip = random.normal(size=2) * [camera.release, camera.speed]
+        return replace(
+            self,
+            time=time + delay,
+            center=(1 + scale) * (center + turned) + noise + shift,
+            outline=None if self.outline is None else (1 + scale) * self.outline + np.repeat(shift, 2) + errors[4:],
+            speed=None if self.speed is None else self.speed * (1 + slip),
+        )
+
+    @property
+    def noise(self) -> float:
+        """Scatter of a coordinate before the release [m]."""
+        return float(np.sqrt(self.center[self.time < 0].var(axis=0, ddof=1).mean()))
+
+    def check(self, camera: Camera) -> None:
+        """Refuse a film that is too short, or not as the camera says."""
+        first, last, rate = self.time[0], self.time[-1], 1 / float(np.median(np.diff(self.time)))
+        if first > 0.01 - BEFORE or last < CLOCK[-1] + 0.01:
+            needed = f"−{BEFORE:g} to {CLOCK[-1] + 0.02:g} s"
+            raise InputError(f"film: it shows {first:.3f} to {last:.3f} s after the release; give {needed}")
+        if abs(rate / camera.fps - 1) > 0.05:
+            raise InputError(f"camera.fps: {camera.fps:g}, but the film has {rate:.4g} frames a second; give that")
+        if self.noise > 1.5 * camera.noise:
+            raise InputError(f"camera.noise: {camera.noise} m, but the film scatters by {self.noise:.2g} m; give that")
+
+
+def film_of(walk: WalkResult, camera: Camera | None = None, seed: int = 0) -> Film:
+    """A film of a simulated walk with series and frames, with the errors of a camera."""
+    camera, random = camera or Camera(), np.random.default_rng(seed)
+    return Film.of(walk).seen(camera, camera.errors(random), random)
+
+
+def edges(joints: Array) -> Array:
+    """Outline of joints, (n, 2)."""
+    x, y = joints.T
+    return np.array([x.min(), x.max(), y.min(), y.max()])
+
+
+def summary(film: Film, outline: bool, speed: bool) -> Array:
+    """What films are compared by.
+
+    Place before the release, way since then on `CLOCK`, slopes of the friction line, and outline and speed if wanted.
+    """
+    start = film.center[film.time < 0].mean(axis=0)
+    fine = np.add.outer(CLOCK, np.arange(-0.0095, 0.01, 1e-3))
+    way = np.stack([np.interp(fine, film.time, film.center[:, k]).mean(axis=1) for k in (0, 1)]) - start[:, None]
+    lift = way[1] + GRAVITY * CLOCK**2 / 2
+    slopes = [way[0, :stop] @ lift[:stop] / (lift[:stop] @ lift[:stop]) for stop in (5, 7, 10)]
+    return np.concatenate([start, way.ravel(), slopes, film.outline if outline else [], [film.speed] if speed else []])

@@ -1,0 +1,98 @@
+"""The friction of a floor from a film, without any simulation."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from warpchain.films.film import CLOCK, GRAVITY, Array, Camera, Film
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+RELEASE_SPEED: Final = 2e-3
+"""Standard deviation of either speed of the centre of mass at the release [m/s]: links pass the sprocket one by one."""
+FALLS: Final = 0.03
+"""Time for which a chain falls freely at least, and within 10 ms of the truth: 5 mm or more above the floor [s]."""
+SLIDES: Final = 0.08
+"""All that touches the floor slides for this many v/(μ g), v the speed of the loop, since it fell for 40 ms."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FrictionLine:
+    """The floor's friction from the slope of way against lift, x and y + g t²/2 since the release.
+
+    Attributes:
+        friction: μ.
+        error: its standard error, that of the camera included.
+        end: of the fit, time since the release [s].
+        time: of frames since the release [s].
+        lift: of these frames [m].
+        way: of these frames [m].
+    """
+
+    friction: float
+    error: float
+    end: float
+    time: Array
+    lift: Array
+    way: Array
+
+    def __str__(self) -> str:
+        """One line."""
+        return f"floor_friction {self.friction:.4f} ± {self.error:.4f}, to {self.end:.3f} s after the release"
+
+    def plot(self) -> "Figure":
+        """Way against lift, with the line; crosses were not fitted."""
+        from warpchain.pictures.inline import InlineFigure
+        from warpchain.pictures.style import tidy
+
+        figure, used = InlineFigure(figsize=(5.2, 3.4), layout="constrained"), self.time <= self.end
+        axes = figure.subplots()
+        for chosen, style in ((used, "o"), (~used, "x")):
+            axes.plot(1e3 * self.lift[chosen], 1e3 * self.way[chosen], style, color="#0072B2", markersize=3.5)
+        ends = 1e3 * np.array([0, self.lift[used].max()])
+        axes.plot(ends, self.friction * ends, color="#D55E00", label=f"$μ$ = {self.friction:.4f} ± {self.error:.4f}")
+        axes.set(xlabel="lift $y - y_0 + g t^2/2$ / mm", ylabel="way $x - x_0$ / mm")
+        axes.legend(frameon=False)
+        tidy(axes, grid="both")
+        return figure
+
+
+def friction_line(film: Film, camera: Camera | None = None) -> FrictionLine:
+    """The friction of the floor while all that touches it slides: m x″ = μ m (y″ + g), whatever happens in the chain.
+
+    Friction, place, height, moment of the release, speed at the release and roll of the camera are fitted together,
+    the last four within their errors. The fit ends early for slow loops, whose links soon stick, and its error grows.
+
+    Raises:
+        InputError: the film is too short, or not as the camera says.
+    """
+    camera = camera or Camera()
+    film.check(camera)
+    x, y = (film.center - film.center[film.time < -2 * camera.release].mean(axis=0)).T
+    time, noise = np.maximum(film.time, 0), film.noise
+    lift, one, none = y + GRAVITY * time**2 / 2, np.ones_like(y), np.zeros_like(y)
+    speed = film.speed or 2 * np.pi * film.frequency * 0.06  # by default that on Table 1's sprocket
+    # columns: friction, place, height, delay of the release, speeds at the release, roll
+    prior = np.array([1e3, 1, 1, camera.release, RELEASE_SPEED, RELEASE_SPEED, camera.roll])
+    vertical = np.column_stack([none, none, one, GRAVITY * time, none, time, none])
+    forward = np.column_stack([none, one, none, none, time, none, y])
+    friction, falls = 0.3, film.time < FALLS
+    for _ in range(8):
+        end = min(FALLS + 0.01 + SLIDES * speed / (max(friction, 0.05) * GRAVITY), CLOCK[-1])
+        slides, size = film.time <= end, np.hypot(1, friction)
+        along = (forward - friction * vertical + np.outer(lift, np.eye(7)[0])) / size
+        matrix = np.vstack([vertical[falls], along[slides]]) / noise
+        covariance = np.linalg.inv(matrix.T @ matrix + np.diag(prior**-2.0))
+        found = covariance @ (matrix.T @ np.concatenate([lift[falls], x[slides] / size])) / noise
+        friction = float(found[0])
+    after = film.time > 0
+    return FrictionLine(
+        friction=friction,
+        error=float(np.hypot(np.sqrt(covariance[0, 0]), friction * camera.scale)),
+        end=float(end),
+        time=time[after],
+        lift=(lift - vertical @ found)[after],
+        way=(x - forward @ found)[after],
+    )

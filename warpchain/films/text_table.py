@@ -1,0 +1,98 @@
+"""Films out of text tables, as Tracker and other programs that follow points in videos export them."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final, Literal
+
+import numpy as np
+
+from warpchain.films.film import BEFORE, GRAVITY, Array, Film
+from warpchain.inputs.validation import InputError, shown
+
+UNITS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+
+
+def read(
+    path: str | os.PathLike[str],
+    *,
+    links: int,
+    frequency: float,
+    unit: Literal["m", "cm", "mm"] = "m",
+    direction: Literal["right", "left"] = "right",
+    origin: tuple[float, float] = (0.0, 0.0),
+    fps: float | None = None,
+    release: float | None = None,
+    outline: Sequence[float] | None = None,
+    speed: float | None = None,
+) -> Film:
+    """Read a film: a text table with columns t, x and y of the centre of mass, as Tracker exports it.
+
+    Lines above the heads of the columns and other columns are passed over. Columns are parted by tabs, semicolons or
+    commas; by the first two, a comma is a decimal point.
+
+    Args:
+        path: the file.
+        links: number of links.
+        frequency: of the sprocket [Hz].
+        unit: of lengths in the file, and of `origin` and `outline`.
+        direction: to which side the chain walks in the picture.
+        origin: x of the sprocket's axis and y of the floor in the file.
+        fps: true frames a second, if the times of the file are those of slow motion.
+        release: time of the release in the file, with `fps` since the first frame [s]; None: it is fitted to the fall.
+        outline: leftmost, rightmost x, lowest and highest y of joints at the release, as in the file; None: unknown.
+        speed: of the loop before the release [m/s], such as n ℓ over the period of a painted link; None: unknown.
+
+    Raises:
+        OSError: the file cannot be read.
+        InputError: it has no such columns, or a line that is not numbers.
+    """
+    if unit not in UNITS or direction not in ("right", "left"):
+        raise InputError(f"unit: {shown(unit)}, direction: {shown(direction)}; give m, cm or mm, and right or left")
+    lines = Path(path).read_text(encoding="utf-8-sig", errors="replace").splitlines()
+    marks = [next((mark for mark in "\t;" if mark in line), ",") for line in lines]
+    heads = [[name.strip() for name in line.split(mark)] for line, mark in zip(lines, marks, strict=True)]
+    first = next((number for number, names in enumerate(heads) if {"t", "x", "y"} <= set(names)), None)
+    if first is None:
+        raise InputError(f"{path}: no line with the column heads t, x and y; export these of the centre of mass")
+    names, mark = heads[first], marks[first]
+    if names.count("x") > 1:
+        raise InputError(f"{path}: several columns x; export one track, the centre of mass")
+    rows = []
+    for number, line in enumerate(lines[first + 1 :], first + 2):
+        cells = (line if mark == "," else line.replace(",", ".")).split(mark)
+        chosen = [cell for name, cell in zip(names, cells, strict=False) if name in ("t", "x", "y") and cell.strip()]
+        if len(chosen) == 3:  # Tracker leaves cells empty where nothing was marked
+            try:
+                rows.append([float(cell) for cell in chosen])
+            except ValueError:
+                raise InputError(f"{path}: line {number} is not numbers; correct or delete it") from None
+    columns = dict(
+        zip([name for name in names if name in ("t", "x", "y")], np.array(rows).reshape(-1, 3).T, strict=True)
+    )
+    time, forward = columns["t"], UNITS[unit] * (1 if direction == "right" else -1)
+    center = np.column_stack([(columns["x"] - origin[0]) * forward, (columns["y"] - origin[1]) * UNITS[unit]])
+    if len(time) < 20 or np.any(np.diff(time) <= 0):
+        raise InputError(f"{path}: {len(time)} frames; give at least 20, in order of time")
+    if fps is not None:
+        time = np.round((time - time[0]) / np.median(np.diff(time))) / fps
+    edges = None
+    if outline is not None:
+        x, y = (np.reshape(outline, (2, 2)) - np.array(origin)[:, None]) * [[forward], [UNITS[unit]]]
+        edges = np.array([*sorted(x), *y])
+    release = _fitted_release(time, center[:, 1]) if release is None else release
+    return Film(time=time - release, center=center, links=links, frequency=frequency, outline=edges, speed=speed)
+
+
+def _fitted_release(time: Array, y: Array) -> float:
+    """When a height that was constant begins to fall freely, for at least 30 ms."""
+
+    def misfit(start: float) -> float:
+        near = (time > start - BEFORE) & (time < start + 0.03)
+        fall = y[near] + GRAVITY / 2 * np.maximum(time[near] - start, 0) ** 2
+        return float(fall.var())
+
+    starts = np.arange(time[0] + BEFORE / 2, time[-1] - 0.1, 2.5e-4)
+    if not len(starts):
+        raise InputError("release: the film is too short to fit it; give it")
+    return float(starts[np.argmin([misfit(start) for start in starts])])

@@ -1,0 +1,115 @@
+"""The floor of a scene: flat, an endless slope, or a profile of heights given by points.
+
+Points are joined by straight lines; beyond the first and the last point these go on. Nothing hangs over.
+"""
+
+import itertools
+import math
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.inputs.validation import shown
+
+Array = NDArray[np.float64]
+Points = tuple[tuple[float, float], ...]
+
+MOST_POINTS: Final = 256
+"""Most points of a profile; each takes time where a chain is near it."""
+SHORTEST: Final = 1e-5
+"""Least length of a face [m], a thousandth of a link of Table 1."""
+FARTHEST: Final = 1e4
+"""Greatest coordinate of a point, where numbers still tell a thousandth of a nanometre [m]."""
+ENDLESS: Final = 1e7
+"""How far the first and the last face are followed [m], on the host."""
+
+
+def checked_profile(given: Any) -> Any:
+    """A profile as a tuple of points x, y [m]; `flat` stays as it is.
+
+    Raises:
+        ValueError: it is neither that nor a list of points that make a floor.
+    """
+    if given == "flat":
+        return given
+    if not isinstance(given, list | tuple):
+        raise ValueError(f"{shown(given)} is no floor; give flat, or points [[x, y], …] in m")
+    points: list[tuple[float, float]] = []
+    for number, point in enumerate(given):
+        pair = list(point) if isinstance(point, list | tuple) else []
+        if len(pair) != 2 or not all(isinstance(each, int | float) and not isinstance(each, bool) for each in pair):
+            raise ValueError(f"point {number}, {shown(point)}, is no pair of numbers; give [x, y] in m")
+        if not all(abs(each) <= FARTHEST for each in pair):
+            raise ValueError(f"point {number}, {shown(point)}, is not within {FARTHEST:g} m; give a nearer one")
+        points.append((float(pair[0]), float(pair[1])))
+    if not 2 <= len(points) <= MOST_POINTS:
+        raise ValueError(
+            f"{len(points)} points; give 2 to {MOST_POINTS}, such as [[0, 0], [1, 0], [1, -0.1], [2, -0.1]]"
+        )
+    for number, ((x, y), (next_x, next_y)) in enumerate(itertools.pairwise(points), start=1):
+        if next_x < x:
+            raise ValueError(f"point {number} lies behind the one before it; let x rise from point to point")
+        if math.hypot(next_x - x, next_y - y) < SHORTEST:
+            raise ValueError(f"point {number} is less than {SHORTEST} m from the one before it; leave one out")
+        if next_x == x and number in (1, len(points) - 1):
+            raise ValueError("the first and the last face go on without end; let x rise along them")
+        if number > 1 and points[number - 2][0] == next_x:
+            raise ValueError(f"point {number} is the third above one another; leave the middle one out")
+    return tuple(points)
+
+
+def slope_points(degrees: float) -> Array:
+    """Two points of a slope through the origin that falls towards +x."""
+    angle = math.radians(degrees)
+    return np.array([[0.0, 0.0], [math.cos(angle), -math.sin(angle)]])
+
+
+def body_of(points: Array | None) -> str:
+    """Name of the body that carries a chain on these points, see `warpchain.kernels.contacts.fixed_body`."""
+    if points is None:
+        return "floor"
+    return "slope" if len(points) == 2 else "terrain"
+
+
+def along_ends(points: Array) -> Array:
+    """The points, and one far away along the first and along the last face."""
+    first, last = points[0] - points[1], points[-1] - points[-2]
+    far = [each[0] + ENDLESS * each[1] / np.hypot(*each[1]) for each in ((points[0], first), (points[-1], last))]
+    return np.concatenate([far[:1], points, far[1:]])
+
+
+def heights(points: Array, x: Array) -> Array:
+    """Height [m] of the floor at x; at an upright face that of one of its ends."""
+    ends = along_ends(points)
+    return np.interp(x, ends[:, 0], ends[:, 1])
+
+
+def distances(points: Array, places: Array) -> Array:
+    """Distance [m] of places (p, 2) from the floor, negative below it."""
+    begin, step = along_ends(points)[:-1], np.diff(along_ends(points), axis=0)
+    to = places[:, None] - begin
+    share = np.clip((to * step).sum(axis=2) / (step**2).sum(axis=1), 0, 1)
+    least: Array = np.linalg.norm(to - share[..., None] * step, axis=2).min(axis=1)
+    return np.where(places[:, 1] >= heights(points, places[:, 0]), least, -least)
+
+
+def circles_of(position: Array, link_length: float) -> Array:
+    """Centres of the circles of links (n, 3), (2 n, 2): the left ones, then the right ones."""
+    arms = link_length / 2 * np.stack([np.cos(position[:, 2]), np.sin(position[:, 2])], axis=1)
+    return np.concatenate([position[:, :2] - arms, position[:, :2] + arms])
+
+
+def raised_by(points: Array, circles: Array, radius: float, clearance: float) -> float:
+    """How far circles about these places (p, 2) must be raised for the nearest to be so far from the floor [m]."""
+    wanted, (left, bottom), (right, _) = clearance + radius, circles.min(axis=0), circles.max(axis=0)
+    beside = points[(points[:, 0] >= left - wanted) & (points[:, 0] <= right + wanted), 1]
+    high = max([*beside, *heights(points, np.array([left - wanted, right + wanted]))]) + wanted - bottom
+    low = (heights(points, circles[:, 0]) - circles[:, 1]).max()  # one circle lies on the floor
+    for _ in range(60):  # no higher place is nearer to the floor
+        middle = (low + high) / 2
+        if distances(points, circles + np.array([0.0, middle])).min() < wanted:
+            low = middle
+        else:
+            high = middle
+    return float(high)

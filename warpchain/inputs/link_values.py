@@ -1,0 +1,75 @@
+"""What each link and joint of a chain has of its own: two kinds of links in turn, values for each, or a rule.
+
+A link of a chain of two kinds has its kind's mass and inertia, and all joints have the same friction. `Scene` may give
+values for each link instead (`link_masses` …), let masses grow along the chain, hang a charm on one link and make one
+joint stiff.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.inputs.parameters import Parameters
+
+Array = NDArray[np.float64]
+
+LEAST_INERTIA: Final = 0.5
+"""Part of its rotary inertia that a link must keep under multiplied loads."""
+
+
+@dataclass(frozen=True)
+class LinkValues:
+    """Values of the n links of a chain and of its n joints, shape (n,) each; joint i is at the end of link i.
+
+    Attributes:
+        mass: of each link [kg].
+        inertia: moment of inertia of each link about its centre [kg m²].
+        viscous_friction: β of each joint [N m s].
+        coulomb_friction: τ_c of each joint [N m].
+    """
+
+    mass: Array
+    inertia: Array
+    viscous_friction: Array
+    coulomb_friction: Array
+
+    @property
+    def alternates(self) -> bool:
+        """Whether each link is like the next but one, as in a chain of two kinds, and each joint likewise."""
+        rows = (self.mass, self.inertia, self.viscous_friction, self.coulomb_friction)
+        return all(np.array_equal(row[2:], row[:-2]) for row in rows)
+
+    @property
+    def total_mass(self) -> float:
+        """Mass of the chain [kg]; of two kinds of links as many times the rounded sum of a pair as there are pairs."""
+        return math.fsum(np.add.reduceat(self.mass, range(0, len(self.mass), 2)))
+
+    def greatest_load(self, link_length: float) -> float:
+        """Greatest `Scene.load_factor` that leaves every link `LEAST_INERTIA` of its rotary inertia.
+
+        It is I − mℓ²/6 that is multiplied: point-like links lose inertia. Infinite where I ≥ mℓ²/6.
+        """
+        missing = self.mass * link_length**2 / 6 - self.inertia
+        short = missing > 0
+        return float(np.min(1 + (1 - LEAST_INERTIA) * self.inertia[short] / missing[short], initial=math.inf))
+
+
+def mean_value(values: Array) -> float:
+    """Mean of values of links or joints; of two kinds in turn half of the rounded sum of a pair."""
+    if len(values) % 2:
+        return math.fsum(values) / len(values)
+    pairs = values[::2] + values[1::2]
+    return float(pairs[0] + math.fsum(pairs - pairs[0]) / len(pairs)) / 2
+
+
+def alternating(parameters: Parameters, links: int) -> LinkValues:
+    """A chain of inner links 0, 2, 4, … and outer links 1, 3, 5, …, whose joints are alike."""
+    return LinkValues(
+        mass=np.resize([parameters.inner_mass, parameters.outer_mass], links),
+        inertia=np.resize([parameters.inner_inertia, parameters.outer_inertia], links),
+        viscous_friction=np.full(links, parameters.viscous_friction),
+        coulomb_friction=np.full(links, parameters.coulomb_friction),
+    )

@@ -1,0 +1,274 @@
+"""What one walk is: its `Setup`, and the `State` of a chain that it may begin from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpchain.inputs.options import Options
+from warpchain.inputs.parameters import Parameters, preset
+from warpchain.inputs.scene import MOST_LINKS, Scene, check_scene
+from warpchain.inputs.sections import SECTION_OF
+from warpchain.inputs.start_shapes import links_between
+from warpchain.inputs.validation import InputError, validated
+
+Array = NDArray[np.float64]
+
+DEFAULT_PRESET: Final = "paper"
+"""Preset of a walk or a sweep that names none."""
+WIDEST_OPENING: Final = 0.1
+"""Greatest distance of two joined link ends, in link lengths; a loop whose ends are farther apart is not closed."""
+WIDEST_MISFIT: Final = 0.5
+"""Greatest difference of the distance of two given joints from a link length, in link lengths."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Everything that says what one walk is, checked and complete.
+
+    Attributes:
+        preset: name of the parameter preset that it started from.
+        parameters: of the chain, its sprocket and the floor.
+        scene: what happens.
+        options: how it is computed.
+        start: state that the walk begins from; None: it begins as the scene says. With a state, those values of the
+            scene that matter before the release are those of the walk that the state was taken from.
+    """
+
+    preset: str
+    parameters: Parameters
+    scene: Scene
+    options: Options
+    start: "State | None" = None
+
+    @property
+    def has_drive(self) -> bool:
+        """Whether the walk begins on a sprocket."""
+        return self.start is None and self.scene.start != "ellipse"
+
+    @property
+    def described(self) -> str:
+        """The chain and how it was spun, in a few words."""
+        links, start = f"{self.scene.links} links", self.start
+        if start is not None and not start.memory:
+            return f"{links} from a given state"
+        spun = f"{links} at {self.scene.frequency:g} Hz"
+        return spun if start is None else f"{spun}, from its state at {start.time:.4g} s"
+
+    def with_drawn(self, drawn: Mapping[str, float]) -> "Setup":
+        """A copy with drawn values in place of its own.
+
+        Args:
+            drawn: fields of `Parameters` or `Scene` → value.
+
+        Raises:
+            InputError: the values together make no possible walk.
+        """
+        sections: dict[str, dict[str, float]] = {"parameters": {}, "scene": {}}
+        for name, value in drawn.items():
+            sections[SECTION_OF[name]][name] = value
+        parameters = validated(Parameters, {**vars(self.parameters), **sections["parameters"]}, "parameters")
+        scene = validated(Scene, {**vars(self.scene), **sections["scene"]}, "scene")
+        check_scene(scene, parameters)
+        return replace(self, parameters=parameters, scene=scene)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class State:
+    """A chain of n links at one instant, which `walk(start=…)` and `simulate` go on from.
+
+    `WalkResult.state` takes one from a walk, `State.of_joints` makes one of a measured outline, `State.of_links` of any
+    motion. `dataclasses.replace(state, velocity=1.001 * state.velocity)` is a perturbed one. While nothing is changed
+    the walk that begins from it is the rest of the first one to the bit. With another position, velocity or plane the
+    chain goes on with the clock, the softness of the joints, the counters and the noted events of its walk; its energy
+    ledger begins anew.
+
+    Attributes:
+        position: x, y [m] and θ [rad] of each link's centre, (n, 3). Link i's right end meets link i + 1's left end,
+            the last link's the first one's. Links 0, 2, … are inner ones. If the plane tilts, places are in the plane.
+        velocity: their rates [m/s, m/s, rad/s], (n, 3).
+        setup: of its walk: parameters of the chain, scene, options.
+        time: since the release [s].
+        origin: origin of the plane's coordinates in the room [m], (3,); None if the plane is fixed, like the next two.
+        axes: directions of x and y of the plane in the room, (2, 3).
+        plane_rates: speed [m/s] across the plane at its origin, and its turning rates [rad/s] about x and y, (3,).
+        memory: what else the walk had at that instant; only the package reads it.
+
+    Raises:
+        InputError: an array has another shape or holds no finite numbers, or the loop is not closed.
+    """
+
+    position: Array
+    velocity: Array
+    setup: Setup
+    time: float = 0.0
+    origin: Array | None = None
+    axes: Array | None = None
+    plane_rates: Array | None = None
+    memory: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check the arrays, and that the loop is closed."""
+        shapes: dict[str, tuple[int, ...]] = {"position": (self.links, 3), "velocity": (self.links, 3)}
+        if self.setup.scene.plane == "tilting":
+            shapes |= {"origin": (3,), "axes": (2, 3), "plane_rates": (3,)}
+        for name, shape in shapes.items():
+            array = real_array(name, getattr(self, name), f"shape {shape}")
+            if array.shape != shape:
+                raise InputError(f"{name}: its shape is {array.shape}; give {shape}")
+            if not np.all(np.isfinite(array)):
+                raise InputError(f"{name}: holds a number that is not finite; give finite numbers")
+            object.__setattr__(self, name, array)
+        if self.axes is not None and not np.allclose(self.axes @ self.axes.T, np.eye(2), atol=1e-9):
+            raise InputError("axes: not two directions at right angles; give unit vectors")
+        self._check_closed()
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<State of {self.links} links at {self.time:.6g} s>"
+
+    @classmethod
+    def of_links(
+        cls, position: ArrayLike | None, velocity: ArrayLike | None, parameters: Parameters | str = DEFAULT_PRESET
+    ) -> "State":
+        """The state of links whose centres, angles and rates are known, see the attributes.
+
+        Args:
+            position: (n, 3); n even, at least 4.
+            velocity: (n, 3).
+            parameters: of the chain, or the name of a preset.
+
+        Raises:
+            InputError: as of the class; or the number of links is refused.
+        """
+        places, rates = (rows_of_links(name, given) for name, given in (("position", position), ("velocity", velocity)))
+        links = len(places)
+        if len(rates) != links:
+            raise InputError(f"velocity: {len(rates)} rows, but position has {links}; give one row per link each")
+        return cls(position=places, velocity=rates, setup=_setup(links, parameters, "position"))
+
+    @classmethod
+    def of_joints(
+        cls, joints: ArrayLike, velocity: ArrayLike | None = None, parameters: Parameters | str = DEFAULT_PRESET
+    ) -> "State":
+        """The state of a chain whose joints were measured; they move as little as fits links of one length.
+
+        Args:
+            joints: x, y of each joint in order around the loop [m], (n, 2); joint i ends link i, and links 0, 2, … are
+                inner ones. y = 0 is the floor. n is even, at least 4.
+            velocity: their rates [m/s], (n, 2); None: at rest.
+            parameters: of the chain, or the name of a preset.
+
+        Raises:
+            InputError: two neighbours are not about a link length apart: the loop is not closed, or lengths are in
+                another unit; or an array or the number of links is refused.
+        """
+        places = real_array("joints", joints, "shape (n, 2)")
+        if places.ndim != 2 or places.shape[1] != 2:
+            raise InputError(f"joints: its shape is {places.shape}; give (n, 2), one row x, y per joint")
+        rates = np.zeros_like(places) if velocity is None else real_array("velocity", velocity, "shape (n, 2)")
+        if rates.shape != places.shape:
+            raise InputError(f"velocity: its shape is {rates.shape}; give {places.shape}, one row per joint")
+        if not (np.all(np.isfinite(places)) and np.all(np.isfinite(rates))):
+            raise InputError("joints: they or their rates hold a number that is not finite; give finite numbers")
+        setup = _setup(len(places), parameters, "joints")
+        position, rate = links_between(*_fitted(places, rates, setup.parameters.link_length))
+        return cls(position=position, velocity=rate, setup=setup)
+
+    @property
+    def links(self) -> int:
+        """Number of links n."""
+        return self.setup.scene.links
+
+    @property
+    def parameters(self) -> Parameters:
+        """Physical parameters of the chain and the floor."""
+        return self.setup.parameters
+
+    @property
+    def joints(self) -> Array:
+        """Joints x, y [m], (n, 2), as the end of link i; if the plane tilts, in the plane."""
+        return self.position[:, :2] + self._arms()
+
+    def _arms(self) -> Array:
+        """From the centres of the links to their right ends [m], (n, 2)."""
+        angle = self.position[:, 2]
+        return self.parameters.link_length / 2 * np.column_stack([np.cos(angle), np.sin(angle)])
+
+    def _check_closed(self) -> None:
+        left = np.roll(self.position[:, :2] - self._arms(), -1, axis=0)
+        opening = np.linalg.norm(left - self.joints, axis=1)
+        if (widest := float(opening.max())) > WIDEST_OPENING * self.parameters.link_length:
+            link = int(opening.argmax())
+            raise InputError(
+                f"position: the loop is not closed: the ends of links {link} and {(link + 1) % self.links} are "
+                f"{widest:.3g} m apart, and links are {self.parameters.link_length:g} m long; give links that join"
+            )
+
+
+def rows_of_links(name: str, given: object) -> Array:
+    """Positions or velocities as a float64 array of shape (n, 3), or an `InputError`."""
+    array = real_array(name, given, "shape (n, 3)")
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise InputError(f"{name}: its shape is {array.shape}; give (n, 3), one row x, y, θ per link")
+    return array
+
+
+def real_array(name: str, given: object, remedy: str) -> Array:
+    """Anything like an array of real numbers as a new float64 array, or an `InputError`."""
+    try:
+        if np.array(given).dtype.kind in "cSU":  # complex numbers and text would be converted without a word
+            raise TypeError
+        return np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: not an array of numbers; give {remedy}") from None
+
+
+def _setup(links: int, parameters: Parameters | str, field_name: str) -> Setup:
+    """The setup of a chain that no sprocket has moved."""
+    if links < 4 or links % 2:
+        raise InputError(f"{field_name}: {links} links; a closed chain has an even number of at least 4")
+    if links > MOST_LINKS:
+        raise InputError(f"{field_name}: {links} links; give at most {MOST_LINKS}")
+    name = DEFAULT_PRESET if isinstance(parameters, Parameters) else parameters
+    chain = parameters if isinstance(parameters, Parameters) else preset(parameters)
+    return Setup(name, chain, Scene(links=links, frequency=0.0, start="ellipse"), Options())
+
+
+def _fitted(joints: Array, rates: Array, length: float) -> tuple[Array, Array]:
+    """Joints that are a link length apart, and their rates that keep it so, near given ones; both (n, 2)."""
+    n = len(joints)
+    apart = np.linalg.norm(joints - np.roll(joints, 1, axis=0), axis=1)
+    worst = int(np.abs(apart - length).argmax())
+    if abs(apart[worst] - length) > WIDEST_MISFIT * length:
+        raise InputError(
+            f"joints: the loop is not closed, or lengths are not in m: joints {(worst - 1) % n} and {worst} are "
+            f"{apart[worst]:.3g} m apart, and links are {length:g} m long; give every joint, in order"
+        )
+    places = joints.copy()
+    for _ in range(50):
+        span = places - np.roll(places, 1, axis=0)
+        misfit = (np.sum(span**2, axis=1) - length**2) / 2
+        if np.abs(misfit).max() <= 1e-13 * length**2:
+            return places, rates - _pull(span, np.sum(span * (rates - np.roll(rates, 1, axis=0)), axis=1))
+        places -= _pull(span, misfit)
+    raise InputError(f"joints: no closed chain of {n} links of {length:g} m lies near them; measure them anew")
+
+
+def _pull(span: Array, change: Array) -> Array:
+    """The least motion of the joints, (n, 2), that changes half the squares of the spans by so much, (n,)."""
+    n = len(span)
+    along = np.arange(n)
+    before = np.roll(along, 1)
+    matrix = np.zeros((n, n))
+    matrix[along, along] = 2 * np.sum(span**2, axis=1)
+    product = -np.sum(span * np.roll(span, 1, axis=0), axis=1)
+    matrix[along, before] += product
+    matrix[before, along] += product
+    try:
+        pulls = np.linalg.solve(matrix, change)[:, None] * span
+    except np.linalg.LinAlgError:
+        raise InputError("joints: all of them lie on one line; give a loop") from None
+    return pulls - np.roll(pulls, -1, axis=0)
