@@ -69,7 +69,8 @@ def values_of(field: FieldInfo) -> str:
     kinds = [field.annotation, *get_args(field.annotation)]
     names = next((get_args(kind) for kind in kinds if get_origin(kind) is Literal), (True, False) * (bool in kinds))
     if names:
-        return ", or " + ", ".join(f"`{shown(name)}`" for name in names if name != field.default)
+        others = ", ".join(f"`{shown(name)}`" for name in names if name != field.default)
+        return f", or {others}" if others else ""
     if str in kinds:
         return ""
     limits = {
@@ -78,10 +79,12 @@ def values_of(field: FieldInfo) -> str:
         for name in ("ge", "gt", "le", "lt")
         if (limit := getattr(item, name, None)) is not None
     }
-    lower = "[" + limits["ge"] if "ge" in limits else "(" + limits["gt"]
-    upper = limits["le"] + "]" if "le" in limits else limits.get("lt", "∞") + ")"
     extra = field.json_schema_extra
     unit = str(extra.get("unit", "1")) if isinstance(extra, dict) else "1"
+    if not limits:
+        return f", or a list of numbers in {unit}"
+    lower = "[" + limits["ge"] if "ge" in limits else "(" + limits["gt"]
+    upper = limits["le"] + "]" if "le" in limits else limits.get("lt", "∞") + ")"
     return (", whole, " if int in kinds else ", ") + in_unit(f"{lower}, {upper}", unit)
 
 

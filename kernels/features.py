@@ -18,6 +18,7 @@ class Features:
         fixed_body: A key of :data:`contacts.fixed_body.BODIES`, or ``"none"``.
         self_contact: Contacts between a chain's own links.
         tilts: Whether the plane of the chain may move, see :mod:`physics.plane`; with an explicit method only.
+        moving_sprocket: Whether the sprocket is there as well, above a floor, and moves.
     """
 
     method: str
@@ -25,6 +26,7 @@ class Features:
     fixed_body: str
     self_contact: bool
     tilts: bool = False
+    moving_sprocket: bool = False
 
     @property
     def is_driven(self) -> bool:

@@ -114,6 +114,10 @@ ALL_COLUMNS = 27
 # is convex and 0 otherwise, and where along it it begins and ends: infinite for the first and the last face.
 FACE_X, FACE_Y, ALONG_X, ALONG_Y, BEFORE_X, BEFORE_Y, FACE_BEGIN, FACE_END = range(8)
 FACE_VALUES = 8
+# Drive.motion: time [s], place x, y [m] of the sprocket, its velocity u, v [m/s], angular velocity [rad/s].
+MOTION_TIME, MOTION_X, MOTION_Y, MOTION_U, MOTION_V, MOTION_TURNING = range(6)
+MOTION_VALUES, MOTION_ROWS = 6, 17
+
 # Model.cells: the first and the last face near a cell, and the height that they stay below. The last row: x of the
 # first cell, cells per metre, and how far beyond a link faces are near.
 FIRST_FACE, LAST_FACE, TOP = range(3)

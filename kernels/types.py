@@ -85,6 +85,7 @@ class Drive:
     hold_softness: wp.array(dtype=wp.float64)  # of the joints from the hold to the release, 1 to 2; 0: own values
     loaded_softness: wp.array(dtype=wp.float64)  # of the joints under load
     push_rate: wp.array(dtype=wp.float64)  # speed at which the sprocket pushes out sunken circles, per depth [1/s]
+    motion: wp.array3d(dtype=wp.float64)  # (W, MOTION_ROWS, MOTION_VALUES): of the sprocket above a floor
     farthest: wp.array(dtype=wp.float64)  # |x| of the centre of mass at which a walk ends [m]; 0: at none
 
 

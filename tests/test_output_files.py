@@ -1,18 +1,16 @@
 """Files that are written whole or not at all, and what they may replace."""
 
 import os
-import signal
 import socket
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 
 from tests.support.made_walks import make_walk
 from tests.support.synthetic_sweep import run
-from warpchain.files import DEAD_AFTER, NotReplaceable, given_path, replacing, write_whole
+from warpchain.files import NotReplaceable, given_path, replacing, write_whole
 from warpchain.store.merged_file import merge
 
 
@@ -79,33 +77,6 @@ def test_no_part_is_left_after_any_exception(tmp_path: Path, error: BaseExceptio
         part.write_text("half")
         raise error
     assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
-
-
-def killed(program: str, *arguments: object) -> None:
-    """A process that kills itself by the function `die`."""
-    head = "import os, signal, sys\ndef die(*_): os.kill(os.getpid(), signal.SIGKILL)\n"
-    done = subprocess.run([sys.executable, "-c", head + program, *map(str, arguments)], check=False)
-    assert done.returncode == -signal.SIGKILL
-
-
-def test_the_part_of_a_killed_walk_goes(tmp_path: Path) -> None:
-    """A writer of the same file deletes what a killed one left an hour ago, and nothing else."""
-    path = tmp_path / "walk.h5"
-    others = [".walk.0123.part.h5", ".other.01234567.part.h5", ".walk.01234567.part.png", ".walk.h5"]
-    long_ago = time.time() - 2 * DEAD_AFTER
-    for name in others:
-        (tmp_path / name).write_text("mine")
-        os.utime(tmp_path / name, (long_ago, long_ago))
-    (tmp_path / ".walk.89abcdef.part.h5").mkdir()
-    others.append(".walk.89abcdef.part.h5")
-    make_walk().save(path)
-    killed("import warpchain\nos.fsync = die\nwarpchain.load_walk(sys.argv[1]).save(sys.argv[1])", path)
-    (left,) = set(parts(tmp_path)) - set(others)
-    make_walk().save(path)
-    assert left in parts(tmp_path), "it may be of a living writer"
-    os.utime(tmp_path / left, (long_ago, long_ago))
-    make_walk().save(path)
-    assert parts(tmp_path) == sorted(others)
 
 
 def test_the_part_of_a_living_writer_stays(tmp_path: Path) -> None:

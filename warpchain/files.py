@@ -4,17 +4,14 @@ A file takes the place of nothing or of a regular file, never of a folder, devic
 is refused, not followed: a folder of unknown origin could point it at any file. Links among the folders of a path are
 followed.
 
-Content is written to a part beside the file, `.NAME.01234567.part.SUFFIX`. A later writer of the file deletes the part
-that a killed one left, once nothing has been written to it for `DEAD_AFTER`. An unnamed file (O_TMPFILE) was rejected:
-it cannot replace another one.
+Content is written to a part beside the file, `.NAME.01234567.part.SUFFIX`; a killed writer leaves it. An unnamed file
+(O_TMPFILE) was rejected: it cannot replace another one.
 """
 
 import errno
 import os
-import re
 import secrets
 import stat
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -22,9 +19,6 @@ from typing import Final, NamedTuple
 
 DISK_FAILURES: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
 """Numbers (errno) of an `OSError` that no other path or permission would have avoided."""
-
-DEAD_AFTER: Final = 3600.0
-"""Time [s] after which a part to which nothing was written is one of a killed writer."""
 
 
 class NotReplaceable(OSError):  # noqa: N818 - the path is refused, nothing went wrong
@@ -102,7 +96,7 @@ def checked_output(path: str | os.PathLike[str], only: Kind | None = None) -> Pa
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str], only: Kind | None = None, *, clear: bool = True) -> Iterator[Path]:
+def replacing(path: str | os.PathLike[str], only: Kind | None = None) -> Iterator[Path]:
     """Yield the path of an empty part beside `path`, which becomes `path` if the block ends without an error.
 
     The data reach the disk before the part is renamed. So `path` is at any moment, even after a power cut, either the
@@ -111,16 +105,12 @@ def replacing(path: str | os.PathLike[str], only: Kind | None = None, *, clear: 
     Args:
         path: the file.
         only: see `checked_output`.
-        clear: whether to delete the parts that killed writers of the same file left, which takes a look at all names
-            in the folder.
 
     Raises:
         NotReplaceable: see `checked_output`.
         OSError: the file cannot be written; one line that names it, with the number of the cause. No part is left.
     """
     target = checked_output(path, only)
-    if clear:
-        _clear_parts(target)
     part = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.part{target.suffix}")
     with naming(target):
         descriptor = os.open(part, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o666)
@@ -143,12 +133,10 @@ def replacing(path: str | os.PathLike[str], only: Kind | None = None, *, clear: 
         os.close(descriptor)
 
 
-def write_whole(
-    path: str | os.PathLike[str], content: bytes | str, only: Kind | None = None, *, clear: bool = True
-) -> None:
+def write_whole(path: str | os.PathLike[str], content: bytes | str, only: Kind | None = None) -> None:
     """Write a file, see `replacing`; text in UTF-8."""
     data = content.encode() if isinstance(content, str) else content
-    with replacing(path, only, clear=clear) as part:
+    with replacing(path, only) as part:
         part.write_bytes(data)
 
 
@@ -177,16 +165,6 @@ def naming(target: Path) -> Iterator[None]:
     except OSError as error:
         number = error.errno or errno.EIO  # without a number: a library that writes a format failed
         raise failure(number, f"{target}: cannot be written ({reason(error)}); {remedy(number)}") from error
-
-
-def _clear_parts(target: Path) -> None:
-    """Delete the parts of a file that killed writers left; what cannot be deleted stays and does no harm."""
-    named = re.compile(rf"\.{re.escape(target.stem)}\.[0-9a-f]{{8}}\.part{re.escape(target.suffix)}")
-    with suppress(OSError):  # a folder that can be written but not read, a part that is gone or of another user
-        for entry in os.scandir(target.parent):
-            is_part = named.fullmatch(entry.name) and entry.is_file(follow_symlinks=False)
-            if is_part and time.time() - entry.stat().st_mtime > DEAD_AFTER:
-                os.unlink(entry)
 
 
 _REMEDIES: Final = {

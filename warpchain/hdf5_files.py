@@ -165,13 +165,13 @@ def hdf5_image(kind: str, fill: "Callable[[h5py.File], None]") -> bytes:
 
 @contextmanager
 def reading_hdf5(
-    path: str | os.PathLike[str], kind: str, remedy: str, wanted: str | None = None
+    path: str | os.PathLike[str], kind: str | None, remedy: str, wanted: str | None = None
 ) -> "Iterator[h5py.File]":
     """An HDF5 file that `hdf5_image` made, undamaged and of the right kind.
 
     Args:
         path: the file.
-        kind: its kind.
+        kind: its kind; None for any.
         remedy: what to do about a damaged or an older file.
         wanted: which file to give instead of one of another kind; None if a sweep has it in its folder.
 
@@ -184,7 +184,7 @@ def reading_hdf5(
 
     _compare(path, remedy, wanted)
     with h5py.File(path, "r", locking=False) as file:
-        if file.attrs["format"] != kind:
+        if kind is not None and file.attrs["format"] != kind:
             raise InputError(
                 f"{path}: a {file.attrs['format']}, not a {kind}; {wanted or 'move it out of this folder'}"
             )
@@ -195,10 +195,7 @@ def reading_hdf5(
 
 def kind_of_hdf5(path: str | os.PathLike[str], wanted: str) -> str:
     """The kind of an HDF5 file that `hdf5_image` made; errors as of `reading_hdf5`."""
-    import h5py
-
-    _compare(path, "fetch another copy of it", wanted)
-    with h5py.File(path, "r", locking=False) as file:
+    with reading_hdf5(path, None, "fetch another copy of it", wanted) as file:
         return str(file.attrs["format"])
 
 

@@ -42,7 +42,7 @@ _SENTENCES: Final[dict[Status, str]] = {
     Status.FINISHED: "The run reached its planned end.",
     Status.TIME_LIMIT: (
         "The chain was still moving at the time limit of the walk; raise scene.walk_limit, "
-        "give the floor more friction if the chain slides without end, or scene.distance_limit on a steep slope."
+        "give more floor_friction if it slides without end, or scene.distance_limit on a steep slope."
     ),
     Status.STEP_LIMIT: (
         "The walk used up its steps; raise options.step_limit, loosen options.tolerance or soften the joints."

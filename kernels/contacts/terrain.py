@@ -37,6 +37,8 @@ class Face:
     before_y: wp.float64
     begin: wp.float64  # from its place to its ends [m]
     end: wp.float64
+    u: wp.float64  # velocity of the sprocket's centre [m/s]
+    v: wp.float64
     turning: wp.float64  # angular velocity of the sprocket [rad/s]
     push_rate: wp.float64  # speed at which it pushes out sunken circles, per depth [1/s]
 

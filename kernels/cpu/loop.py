@@ -135,6 +135,10 @@ def make_advance(features: Features):
     if has_fixed:
         fixed_gap, resolve_fixed = fixed_contacts(features.fixed_body)
         face_of, face_at = BODIES[features.fixed_body].face, BODIES[features.fixed_body].motion
+    moves = features.moving_sprocket
+    if moves:
+        sprocket_gap, resolve_sprocket = fixed_contacts("moving sprocket")
+        sprocket_at = BODIES["moving sprocket"].motion
     fixed_loss, fixed_depth, fixed_count = of_fixed_body(features.fixed_body)
     reuses_last = method.reuses_last
     is_driven = features.is_driven
@@ -143,7 +147,7 @@ def make_advance(features: Features):
     first_stage, attempt, commit = method.first_stage, method.attempt, method.commit
     growth, shrinkage = method.growth, method.shrinkage
     # on the sprocket the pauses between impulses are too short for a flight
-    flight = None if is_driven else rigid_flight(features.method, columns)
+    flight = None if is_driven or moves else rigid_flight(features.method, columns)
     has_flight = flight is not None
     if flight is not None:
         attempt_flight, commit_flight = flight.attempt, flight.commit
@@ -327,6 +331,15 @@ def make_advance(features: Features):
                             if impulses > wp.int64(0):
                                 count_bounce(state, world, time, state.watch[world, layout.LAST_FLOOR_IMPULSE])
                                 state.watch[world, layout.LAST_FLOOR_IMPULSE] = time
+                if wp.static(moves):
+                    moved = sprocket_at(Face(), drive, world, time)
+                    overlap = -sprocket_gap(K, chain, ground, moved)
+                    if overlap > ZERO:
+                        raise_extreme(state, world, layout.SPROCKET_DEPTH, overlap)
+                        on_sprocket = resolve_sprocket(K, chain, ground, moved)
+                        add_count(state, world, layout.SPROCKET_IMPULSES, on_sprocket)
+                        impulses += on_sprocket
+                    gap = wp.min(gap, ZERO)  # the sprocket may come nearer by itself: steps stay short
                 if wp.static(has_self):
                     skin = control.skin
                     least_slack = ZERO

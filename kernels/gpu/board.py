@@ -4,6 +4,7 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.gpu.stage import Link, Place, read_link
+from warpchain.kernels.gpu.threads import busy_threads
 from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, MASS, RIGHT_X, RIGHT_Y, SINE, THETA, X
 from warpchain.kernels.physics.elementary import ZERO, cos_sin
 from warpchain.kernels.physics.geometry import end_positions
@@ -13,10 +14,11 @@ wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def place_of(chain: Chain, lane: int) -> Place:
-    """A thread's link and its neighbours."""
+def place_of(chain: Chain, lane: int, block_dim: int, tilts: bool) -> Place:
+    """A thread's link and its neighbours; sums for a plane that tilts need all threads."""
     n = chain.link_count
     place = Place()
+    place.threads = wp.where(tilts, block_dim, busy_threads(n, block_dim))
     place.lane = lane
     place.links = n
     place.column = wp.min(lane, n - 1)
@@ -46,6 +48,28 @@ def store_link(K: wp.array2d(dtype=wp.float64), state: State, world: int, lane: 
     """Stores the state of a thread's link."""
     for k in range(6):
         state.links[world, X + k, lane] = K[X + k, lane]
+
+
+@wp.func
+def load_extremes(K: wp.array2d(dtype=wp.float64), state: State, world: int, fixed_depth: int):
+    """Writes what is greatest or latest so far on the board; for one thread."""
+    K[layout.BOARD_VALUES, layout.VALUE_OPENING] = state.extremes[world, layout.OPENING]
+    K[layout.BOARD_VALUES, layout.VALUE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
+    K[layout.BOARD_VALUES, layout.VALUE_LAST_IMPULSE] = state.watch[world, layout.LAST_FLOOR_IMPULSE]
+
+
+@wp.func
+def raise_value(K: wp.array2d(dtype=wp.float64), value: int, x: wp.float32):
+    """Raises one of the chain's values on the board to x; for one thread."""
+    K[layout.BOARD_VALUES, value] = wp.max(K[layout.BOARD_VALUES, value], wp.float64(x))
+
+
+@wp.func
+def store_extremes(K: wp.array2d(dtype=wp.float64), state: State, world: int, fixed_depth: int):
+    """Stores what :func:`load_extremes` has written; for one thread."""
+    state.extremes[world, layout.OPENING] = K[layout.BOARD_VALUES, layout.VALUE_OPENING]
+    state.extremes[world, fixed_depth] = K[layout.BOARD_VALUES, layout.VALUE_FIXED_DEPTH]
+    state.watch[world, layout.LAST_FLOOR_IMPULSE] = K[layout.BOARD_VALUES, layout.VALUE_LAST_IMPULSE]
 
 
 @wp.func

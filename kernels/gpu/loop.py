@@ -23,14 +23,17 @@ from warpchain.kernels.events.tilting import in_room, write_tilting_sample
 from warpchain.kernels.features import COMPILER_FLAGS, Features
 from warpchain.kernels.gpu.board import (
     link_is_finite,
+    load_extremes,
     load_link,
     place_of,
     publish,
+    raise_value,
+    store_extremes,
     store_link,
     store_losses,
 )
 from warpchain.kernels.gpu.contacts.neighbour_list import block_list
-from warpchain.kernels.gpu.contacts.proximity import block_proximity, upper_bound
+from warpchain.kernels.gpu.contacts.proximity import block_proximity, moving_sprocket_contact, upper_bound
 from warpchain.kernels.gpu.contacts.self_contacts import block_self_contacts, touch_layout
 from warpchain.kernels.gpu.explicit import explicit_attempt
 from warpchain.kernels.gpu.functions import board_size, shares_board
@@ -68,12 +71,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     Args:
         features: What the kernel is compiled for.
         block_dim: Threads in a block, at least the number of links of every chain; on a GPU a multiple of 32.
-        registers: Greatest number of registers a thread may take on a GPU; None: as many as a block of this size can
-            have.
+        registers: Most registers of a thread on a GPU; None: as many as a block of this size can have.
 
     Arrays of the kernel:
-        scratch: (W, ≥ :func:`gpu.functions.board_rows`, columns) float64.
-        lists: As on a CPU.
+        scratch: (W, ≥ :func:`gpu.functions.board_rows`, columns) float64; lists are as on a CPU.
     """
     available = REGISTERS_OF_MULTIPROCESSOR // block_dim // 8 * 8
     if available < 255:
@@ -86,6 +87,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     has_self = features.self_contact
     tilts = features.tilts
     has_contacts = has_fixed or has_self
+    meet_sprocket = moving_sprocket_contact()
     fixed_loss, fixed_depth, fixed_count = of_fixed_body(features.fixed_body)
     reuses_last = method.reuses_last
     needs_first_power = TABLEAUS[method.tableau].velocity_weights[0] != 0.0
@@ -107,8 +109,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     attempt = explicit_attempt(method.tableau, block_dim, write_proximity, read_proximity, tilts)
     begin_step, sum_up, meet_tilting_floor = block_tilting(block_dim)
     growth, shrinkage = step_controller(method.order, method.error_order, wp.float32)
-    build_list = block_list(columns, block_dim)
-    clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, block_dim, touch)
+    build_list = block_list(columns)
+    clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, touch)
     chain_values = layout.BOARD_VALUES
     is_driven = features.is_driven
     present = present_chain(is_driven)
@@ -144,7 +146,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         next_end = exchange_ends(ends, place, link)
         write_proximity(K, maxima, place, ground, link, next_end)
         barrier()
-        return next_end, read_proximity(maxima)
+        return next_end, read_proximity(maxima, place.links)
 
     @wp.kernel(
         name="advance",
@@ -200,7 +202,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
 
         chain = model.chains[world]
         n = chain.link_count
-        place = place_of(chain, lane)
+        place = place_of(chain, lane, wp.static(block_dim), wp.static(tilts))
+        if lane >= place.threads:
+            return
         ground = read_ground(model, world)
         load_link(K, state, world, lane, n)
         is_fresh = state.is_fresh[world] != 0
@@ -216,9 +220,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 copy_plane(P, state.plane[world])
                 write_felt_plane(K, P)
             write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
-            K[chain_values, layout.VALUE_OPENING] = state.extremes[world, layout.OPENING]
-            K[chain_values, layout.VALUE_FIXED_DEPTH] = state.extremes[world, fixed_depth]
-            K[chain_values, layout.VALUE_LAST_IMPULSE] = state.watch[world, layout.LAST_FLOOR_IMPULSE]
+            load_extremes(K, state, world, fixed_depth)
             write_marks(K, state, control, world)
             T[wp.static(touch.fixed_hits)] = 0
             T[wp.static(touch.self_hits)] = 0
@@ -237,7 +239,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         slack = wp.float32(0.5) * wp.float32(control.skin) - opening
         if is_fresh:
             if wp.static(has_self):
-                pairs = build_list(K, L, chain, lane, control.skin, upper_bound(opening))
+                pairs = build_list(K, L, chain, lane, place.threads, control.skin, upper_bound(opening))
                 if pairs > wp.static(lists.capacity):
                     status = int(LIST_OVERFLOW)
             if wp.static(tilts):
@@ -278,6 +280,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 pauses = record_is_full(record, world) or T[wp.static(touch.is_late)] != 0
                 barrier()
                 if has_changed(state, world, softness, load_factor):
+                    if wp.static(is_driven) and lane < n:
+                        write_link(K, model, world, lane, state.load_factor[world])
                     next_end = exchange_ends(ends, place, read_link(K, lane))
                     evaluate_first_stage(forces, K, place, next_end)
                 if pauses or status != RUNNING:
@@ -301,7 +305,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             own_error = int(0)
             if lane < n:
                 own_error = error_of(result, tolerance)
-            error = wp.cast(greatest(errors, lane, own_error), wp.float32)
+            error = wp.cast(greatest(errors, lane, n, own_error), wp.float32)
             attempts += 1
             if not (error <= wp.float32(1.0)):
                 if wp.isfinite(error):
@@ -310,7 +314,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     step = h * LEAST_SHRINKAGE
                     broken = wp.where(lane >= n or link_is_finite(K, lane), 0, 1)
                     barrier()  # all have read the errors
-                    if greatest(errors, lane, broken) > 0:
+                    if greatest(errors, lane, n, broken) > 0:
                         status = int(NOT_FINITE)
                 if status == RUNNING and step < control.smallest_step:
                     status = int(STEP_TOO_SMALL)
@@ -339,9 +343,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                 opening = proximity.opening
                 gap = proximity.gap
                 if lane == 0:
-                    K[chain_values, layout.VALUE_OPENING] = wp.max(
-                        K[chain_values, layout.VALUE_OPENING], wp.float64(opening)
-                    )
+                    raise_value(K, layout.VALUE_OPENING, opening)
                 if wp.static(tilts):
                     sum_up(K, P, M, place)
                     if lane == 0:
@@ -359,6 +361,10 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                             hits = meet_fixed_body(K, place, ground, constants(K), drive, world, time)
                         if hits > 0:
                             wp.atomic_add(T, wp.static(touch.fixed_hits), hits)
+                if wp.static(features.moving_sprocket):
+                    is_near = bool(True)
+                    if lane < n:
+                        hits += meet_sprocket(K, place, ground, constants(K), drive, state, world, time)
                 if wp.static(has_self):
                     slack = wp.float32(0.5) * wp.float32(control.skin) - opening - proximity.displacement
                     is_stale = not slack > wp.float32(0.0)
@@ -370,9 +376,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     is_hit = barrier_if_any(T, wp.static(touch.votes), hits > 0)
                 if wp.static(has_fixed):
                     if gap < wp.float32(0.0) and lane == 0:
-                        K[chain_values, layout.VALUE_FIXED_DEPTH] = wp.max(
-                            K[chain_values, layout.VALUE_FIXED_DEPTH], wp.float64(-gap)
-                        )
+                        raise_value(K, layout.VALUE_FIXED_DEPTH, -gap)
                         if wp.static(has_floor):
                             if is_hit:
                                 count_bounce(state, world, time, K[chain_values, layout.VALUE_LAST_IMPULSE])
@@ -381,16 +385,16 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if is_stale:
                         if lane == 0:
                             add_count(state, world, layout.LIST_BUILDS, wp.int64(1))
-                        pairs = build_list(K, L, constants(K), lane, control.skin, upper_bound(opening))
+                        pairs = build_list(K, L, constants(K), lane, place.threads, control.skin, upper_bound(opening))
                         if pairs > wp.static(lists.capacity):
                             status = int(LIST_OVERFLOW)
                             pairs = int(wp.static(lists.capacity))
                         slack = wp.float32(0.5) * wp.float32(control.skin) - opening
                     if pairs > 0:
                         touched = constants(K)
-                        touching = find_contacts(K, L, T, touched, lane, pairs, upper_bound(opening))
+                        touching = find_contacts(K, L, T, touched, lane, place.threads, pairs, upper_bound(opening))
                         if touching > 0:
-                            hits = resolve_contacts(K, L, T, E, F, touched, lane, touching)
+                            hits = resolve_contacts(K, L, T, E, F, touched, lane, place.threads, touching)
                             if hits > 0:
                                 wp.atomic_add(T, wp.static(touch.self_hits), hits)
                             if not is_hit:
@@ -432,11 +436,9 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             add_count(state, world, fixed_count, wp.int64(T[wp.static(touch.fixed_hits)]))
             add_count(state, world, layout.SELF_IMPULSES, wp.int64(T[wp.static(touch.self_hits)]))
             add_count(state, world, layout.STRAND_IMPULSES, wp.int64(T[wp.static(touch.strand_hits)]))
-            state.extremes[world, layout.OPENING] = K[chain_values, layout.VALUE_OPENING]
+            store_extremes(K, state, world, fixed_depth)
             deepest = wp.cast(T[wp.static(touch.deepest)], wp.float32)
             raise_extreme(state, world, layout.SELF_DEPTH, wp.float64(deepest))
-            state.extremes[world, fixed_depth] = K[chain_values, layout.VALUE_FIXED_DEPTH]
-            state.watch[world, layout.LAST_FLOOR_IMPULSE] = K[chain_values, layout.VALUE_LAST_IMPULSE]
             state.is_fresh[world] = 0
             state.has_first_stage[world] = 1
             state.time_to_contact[world] = wp.float64(reach)

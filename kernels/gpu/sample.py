@@ -22,7 +22,6 @@ from warpchain.kernels.layout import (
     VALUE_STOP_TIME,
     VALUE_TOLERANCE,
 )
-from warpchain.kernels.physics.scaled_loads import write_links
 from warpchain.kernels.types import Control, Drive, Model, Record, State
 
 wp.set_module_options({"enable_backward": False})
@@ -49,7 +48,8 @@ def block_sample(features: Features, touch: TouchLayout):
     """Warp function ``take_sample(K, T, model, drive, state, record, control, world, time)`` for one thread of a block.
 
     The board's rows of ends must be written, and a barrier passed; the caller has a barrier afterwards. The status goes
-    to the mailbox, and ``is_late`` is set when the launch has lasted long enough.
+    to the mailbox, and ``is_late`` is set when the launch has lasted long enough. If the loads of a driven chain have
+    changed, each thread has to write the constants of its link.
     """
     is_driven = features.is_driven
     sample = sampling(features.fixed_body, features.tilts)
@@ -80,8 +80,6 @@ def block_sample(features: Features, touch: TouchLayout):
             after = present(model, state, control, world)
             book_softening(chain, after, state, world)
             write_constants(K, after)
-            if wp.static(is_driven):
-                write_links(K, model, world, state.load_factor[world])
         write_step_bounds(K, drive, state, control, world, wp.static(is_driven))
         write_marks(K, state, control, world)
         if clock() > K[BOARD_VALUES, VALUE_DEADLINE]:

@@ -104,10 +104,10 @@ def reduced(result: SweepResult) -> Numbers:
 
 def content_digest(sweep: Mapping[str, Any]) -> str:
     """SHA-256 of what a sweep varies and draws, whatever computes it and however many samples it has."""
-    content = dict(sweep)
+    kept = ("name", "preset", "sampler", "distributions", "grid")
+    content = {name: sweep[name] for name in ("seed", "same_samples_along")}
     content["blocks"] = [
-        {name: value for name, value in block.items() if name not in ("options", "samples")}
-        for block in sweep["blocks"]
+        {name: block.get(name) for name in kept} | {"start": block["scene"].get("start")} for block in sweep["blocks"]
     ]
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 

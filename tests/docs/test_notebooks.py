@@ -1,4 +1,4 @@
-"""The notebooks in docs/notebooks/ run, and what is committed of them is small and of no particular machine."""
+"""The notebooks of docs/ and studies/ run, and what is committed of them is small and of no particular machine."""
 
 import json
 import re
@@ -9,7 +9,7 @@ import pytest
 
 from tests.docs.code_blocks import ROOT
 
-NOTEBOOKS = sorted((ROOT / "docs/notebooks").glob("*.ipynb"))
+NOTEBOOKS = [*sorted((ROOT / "docs/notebooks").glob("*.ipynb")), *sorted((ROOT / "studies").glob("*/*.ipynb"))]
 MOST_BYTES = 600_000
 MOST_LINES = 25
 """Most lines of Python in the notebook of the sweep."""
@@ -49,8 +49,8 @@ def test_committed_notebook_was_run(notebook: Path) -> None:
 
 
 def test_notebooks_are_small() -> None:
-    """Both are there, and together they do not weigh on a clone; the study takes few lines of Python."""
-    assert [path.name for path in NOTEBOOKS] == ["first_walk.ipynb", "sweep_with_xarray.ipynb"]
+    """All are there, and together they do not weigh on a clone; the sweep takes few lines of Python."""
+    assert [path.name for path in NOTEBOOKS] == ["first_walk.ipynb", "sweep_with_xarray.ipynb", "which_chain.ipynb"]
     assert sum(path.stat().st_size for path in NOTEBOOKS) <= MOST_BYTES
     lines = [line for cell in code_cells(NOTEBOOKS[1]) for line in "".join(cell["source"]).splitlines() if line.strip()]
     assert len(lines) <= MOST_LINES

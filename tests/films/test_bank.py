@@ -98,7 +98,7 @@ def test_films_outside_of_the_bank_are_refused() -> None:
         bank.posterior([dataclasses.replace(film, frequency=15.0)])
     with pytest.raises(InputError, match="the bank has 4 of each"):
         bank.posterior([film] * 5)
-    with pytest.raises(InputError, match="films: none"):
+    with pytest.raises(InputError, match="films: 0 films"):
         bank.posterior([])
 
 
@@ -125,6 +125,9 @@ def test_a_bank_has_the_walks_of_its_sweep(folder: Path, tmp_path: Path) -> None
     result = warpchain.load(folder)
     films.Bank.of(result).save(tmp_path / "bank.npz")
     bank = films.Bank.load(tmp_path / "bank.npz")
+    with pytest.raises(InputError, match=r"bank\.txt: no bank; give a file"):
+        (tmp_path / "bank.txt").write_text("no bank", encoding="utf-8")
+        films.Bank.load(tmp_path / "bank.txt")
     assert bank.center.shape[:3] == (3, 4, 2)
     for chain, experiment, repetition in np.ndindex(3, 4, 2):
         links, frequency = bank.experiments[experiment]
@@ -151,5 +154,13 @@ def test_a_sweep_that_is_no_bank_is_refused(tmp_path: Path) -> None:
     other = warpchain.sweep(grid={"links": [40], "frequency": [15, 20]}, out=tmp_path / "a", **settings)
     with pytest.raises(InputError, match=r"same_samples_along: \[links, frequency\]"):
         films.Bank.of(other)
+    phases = warpchain.sweep(
+        grid={"links": [40], "frequency": [15], "phase": [0.1, 0.2]},
+        out=tmp_path / "c",
+        same_samples_along=["links", "frequency"],
+        **settings,
+    )
+    with pytest.raises(InputError, match=r"same_samples_along: \[links, frequency, phase\]"):
+        films.Bank.of(phases)
     with pytest.raises(InputError, match="grid: its axes are frequency"):
         films.Bank.of(warpchain.sweep(grid={"frequency": [15]}, out=tmp_path / "b", **settings))

@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import warpchain
+from tests.hard_cases.starts import dropped
 from tests.support.setups import setup_walk
 from warpchain.inputs.sections import SECTION_OF, SECTIONS
 from warpchain.inputs.setup import read_setup, resolve
@@ -84,6 +85,17 @@ def test_what_is_no_value_is_refused_by_name(name: str, value: object) -> None:
         ("frequency", "15 Hz", "scene.frequency: Input should be a valid number, in Hz; given '15 Hz'"),
         ("frequency", None, "scene.frequency: Input should be a valid number, in Hz; given None"),
         ("start", "elipse", "scene.start: Input should be 'rest', 'spinning' or 'ellipse'; given 'elipse'"),
+        ("floor", "hilly", "scene.floor: 'hilly' is no floor; give flat, or points [[x, y], …] in m"),
+        ("floor", [[0, 0], [1]], "scene.floor: point 1, [1], is no pair of numbers; give [x, y] in m"),
+        ("floor", [[0, 0], [1, True]], "scene.floor: point 1, [1, True], is no pair of numbers; give [x, y] in m"),
+        ("floor", [[0, 0], [1, math.nan]], "scene.floor: point 1, [1, nan], is not within 10000 m; give a nearer one"),
+        ("floor", [[0, 0]], "scene.floor: 1 points; give 2 to 256, such as [[0, 0], [1, 0], [1, -0.1], [2, -0.1]]"),
+        ("floor", [[0, 0], [1, 0], [0.9, 1]], "scene.floor: point 2 lies behind the one before it; let x rise"),
+        ("floor", [[0, 0], [1, 0], [1, 1e-6], [2, 0]], "scene.floor: point 2 is less than 1e-05 m from the one before"),
+        ("floor", [[0, 0], [0, 1], [1, 1]], "scene.floor: the first and the last face go on without end; let x rise"),
+        ("floor", [[0, 0], [1, 0], [1, 1], [1, 0.5], [2, 0]], "scene.floor: point 3 is the third above one another; "),
+        ("slope", 81.0, "scene.slope: Input should be less than or equal to 80, in °; given 81.0"),
+        ("distance_limit", 0.0, "scene.distance_limit: Input should be greater than 0, in m; given 0.0"),
         ("tilt", 0.1, "scene.tilt: 0.1 moves the plane of the chain, which is fixed; give plane: tilting"),
         ("circle_radius", 0.007, "parameters.circle_radius: 0.007 is not smaller than half the link length 0.00634; "),
         ("self_contact", 1, "options.self_contact: Input should be a valid boolean; given 1"),
@@ -96,6 +108,24 @@ def test_what_is_no_value_is_refused_by_name(name: str, value: object) -> None:
 def test_refusals_say_what_to_give(name: str, value: object, message: str) -> None:
     """The field's path, what it should be with its unit, and what was given."""
     assert refused(name, value).startswith(message)
+
+
+def test_a_scene_has_one_floor_and_tilts_on_a_flat_one_only() -> None:
+    """A profile beside a slope, and a tilting plane on either, are refused in a line each."""
+    step = [[-1, 0], [0.5, 0], [0.5, -0.1], [1, -0.1]]
+    for scene, message in (
+        ({"slope": 5.0, "floor": step}, "scene.slope: 5.0 of a floor that is a profile; give slope: 0, or floor: flat"),
+        ({"slope": 5.0, "plane": "tilting"}, "scene.plane: 'tilting' needs a flat floor; give plane: fixed, or "),
+        ({"floor": step, "plane": "tilting"}, "scene.plane: 'tilting' needs a flat floor; give plane: fixed, or "),
+    ):
+        assert refusal(lambda scene=scene: setup_walk("soft", scene, None)).startswith(message)
+
+
+def test_a_chain_that_starts_inside_the_floor_is_refused() -> None:
+    """A given chain must lie above the profile that it is given with."""
+    position, velocity = dropped()
+    with pytest.raises(InputError, match=r"position: link \d+ starts [\d.]+ m inside the floor; raise the chain, or"):
+        warpchain.simulate("soft", position, velocity, 0.1, floor=[[-1, 0.02], [1, 0.02]])
 
 
 @pytest.mark.parametrize("method", [name for name in method_names() if not find_method(name).runs_on_gpus])

@@ -145,9 +145,9 @@ def test_failed_walks(page: str) -> None:
     document = Document(page)
     assert document.rows["failed-walks"] == [
         ["walk", "block", "cell", "sample"],
-        ["3", "rest", "n = 60, ν = 20 Hz", "0"],
+        ["1", "rest", "n = 60, ν = 20 Hz", "0"],
         ["walk", "block", "cell", "sample"],
-        ["13", "ellipse", "n = 120, ν = 10 Hz", "1"],
+        ["10", "ellipse", "n = 120, ν = 10 Hz", "1"],
     ]
     for status in (Status.TIME_LIMIT, Status.NOT_FINITE):
         assert f"{status.label}: 1" in document.texts["failed-walks"]
@@ -188,11 +188,11 @@ def test_walk_is_run_again(folder: Path, tmp_path: Path, monkeypatch: pytest.Mon
     result = load(folder)
     dx = float(result.blocks["ellipse"].dx[0, 1, 0])
     asked = with_walk(monkeypatch, make_walk, dx=dx)
-    write_report(folder, tmp_path / "report.html", animation_of=15)
+    write_report(folder, tmp_path / "report.html", animation_of=5)
     document = Document((tmp_path / "report.html").read_text(encoding="utf-8"))
-    assert asked == [load_sweep(result.sweep).planned(15).setup]
+    assert asked == [load_sweep(result.sweep).planned(5).setup]
     text = document.texts["one-walk"]
-    assert f"Walk 15 (block ellipse, n = 120, ν = 20 Hz, sample 0), run again for this page: Δx = {dx:.4f} m" in text
+    assert f"Walk 5 (block ellipse, n = 120, ν = 20 Hz, sample 0), run again for this page: Δx = {dx:.4f} m" in text
     assert "The sweep has the same, to the bit." in text
     assert len(document.images) == 2
     (player,) = document.frames
@@ -205,7 +205,7 @@ def test_walk_is_run_again(folder: Path, tmp_path: Path, monkeypatch: pytest.Mon
     ("index", "dx", "text"),
     [
         (0, 9.0, "another result, Δx = "),
-        (3, 9.0, "another result, time_limit"),
+        (1, 9.0, "another result, time_limit"),
         (17, 9.0, "has not run it yet"),
         (0, math.nan, "at_rest. The sweep has the same"),
     ],

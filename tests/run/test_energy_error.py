@@ -61,33 +61,6 @@ def test_a_walk_warns_of_joints_that_came_apart_and_circles_that_sank_in(
     assert ("inaccurate" in repr(walk)) == warned
 
 
-@pytest.mark.filterwarnings("ignore::warpchain.inputs.validation.InputWarning")
-def test_a_sweep_counts_walks_that_came_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Joints of links of 10⁶ kg open by more than their length: log, `info` and report say so, of them only.
-
-    Their lengths are drawn, and it is those that the openings are held against.
-    """
-    content = {
-        "grid": {"outer_mass": [6.1e-4, 1e6], "joint_stiffness": [1e6]},
-        "samples": 1,
-        "preset": "soft",
-        "scene": {"start": "ellipse", "walk_limit": 0.3, "links": 20, "frequency": 8.0},
-        "options": {"method": "os32", "tolerance": 1e-3},
-        "distributions": {"link_length": {"uniform": [0.0126, 0.0128]}},
-    }
-    seen: list[SweepProgress] = []
-    result = sweep(**content, out=tmp_path / "sweep", workers=1, on_progress=seen.append)
-    apart = result.greatest_opening > result.link_length_drawn
-    assert apart.ravel().tolist() == [False, True]
-    assert result.faults["opening"].tolist() == apart.tolist() and result.inaccurate.tolist() == apart.tolist()
-    assert seen[-1].inaccurate == 1 and "1 inaccurate" in (tmp_path / "sweep/log.txt").read_text()
-    for name in ("info", "report"):
-        with pytest.raises(SystemExit):
-            main([name, str(tmp_path / "sweep")])
-    assert f"1 inaccurate: {FAULTS['opening']}" in " ".join(capsys.readouterr().out.split())
-    assert f"1: {FAULTS['opening']}" in (tmp_path / "sweep/report.html").read_text()
-
-
 def test_a_sweep_counts_inaccurate_walks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Column, progress, log, `info` and report tell of the walk with a coarse tolerance, and of no other."""
     seen: list[SweepProgress] = []

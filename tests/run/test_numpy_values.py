@@ -1,13 +1,11 @@
 """NumPy's numbers, arrays, ranges and tuples mean what Python's numbers and lists mean, to the bit."""
 
 import numpy as np
-import pytest
 
 import warpchain
 from tests.oracle_model.circular_loop import circular_loop
 from tests.support.setups import setup_walk
 from warpchain.inputs.sections import SECTION_OF
-from warpchain.inputs.validation import plain
 from warpchain.sweeps.plan import load_sweep
 
 PLAIN = {"version": 1, "name": "grid", "seed": 3, "preset": "soft", "samples": 2}
@@ -28,26 +26,6 @@ def test_every_setting_takes_a_numpy_value():
     for model in (again.parameters, again.scene, again.options):
         for name, value in model.model_dump().items():
             assert type(value) is type(given[name]), name
-
-
-@pytest.mark.parametrize(
-    ("of_numpy", "of_python"),
-    [
-        (np.float32(0.1), float(np.float32(0.1))),
-        (np.longdouble(0.5), 0.5),
-        (np.array(3), 3),
-        (range(4, 10, 2), [4, 6, 8]),
-        ((1, np.uint8(2)), [1, 2]),
-        (np.array([[True]]), [[True]]),
-        ({"a": [np.float64(1.0)]}, {"a": [1.0]}),
-        (None, None),
-        ("12", "12"),
-    ],
-    ids=repr,
-)
-def test_plain_values(of_numpy, of_python):
-    """A value becomes that of Python; its type, too."""
-    assert repr(plain(of_numpy)) == repr(of_python)
 
 
 def test_a_sweep_of_arrays_is_that_of_lists():

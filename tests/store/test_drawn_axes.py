@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray
+from matplotlib.text import Text
 
 from tests.support.made_sweeps import distance, make_sweep
 from warpchain.inputs.parameters import preset
@@ -14,7 +15,7 @@ from warpchain.inputs.scene import TAP, Scene
 from warpchain.reports.sweep_figures import figures
 from warpchain.reports.sweep_page import write_report
 from warpchain.store.merged_file import merge
-from warpchain.store.sweep_result import SweepResult
+from warpchain.store.sweep_result import SweepResult, load
 
 
 def value_of(name: str) -> float:
@@ -70,3 +71,19 @@ def test_an_axis_over_a_drawn_quantity_is_exported(name: str, tmp_path: Path) ->
     assert all(picture.name and picture.figure for picture in figures(result))
     write_report(tmp_path / "sweep", tmp_path / "report.html")
     assert name in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_parameter_sets_are_an_axis_with_columns(tmp_path: Path) -> None:
+    """Figures, xarray and the merged file have the sets along `point`, and what stands in each beside it."""
+    points = {"floor_friction": [0.1, 0.2, 0.3], "load_factor": [None, 1.0, 2.0]}
+    content = {"version": 1, "name": "sets", "seed": 4, "preset": "soft", "samples": 2, "points": points}
+    result = make_sweep(tmp_path / "sets", content | {"grid": {"links": [60, 90]}}, distance)
+    assert "parameter set" in {text.get_text() for text in result.plot().findobj(Text)}
+    merge(tmp_path / "sets", tmp_path / "sets.h5")
+    assert load(tmp_path / "sets.h5").design().equals(result.design())
+    with xarray.open_dataset(tmp_path / "sets.h5", engine="h5netcdf") as merged:
+        for data in (merged, result.to_xarray()):
+            assert set(data.coords) == {"point", "links", "sample", *points}
+            np.testing.assert_array_equal(data.floor_friction, points["floor_friction"])
+            np.testing.assert_array_equal(data.load_factor, [np.nan, 1.0, 2.0])
+            assert data.floor_friction.attrs["symbol"] == "μ_fc"

@@ -21,7 +21,7 @@ import yaml
 
 from tests.support import synthetic_sweep
 from tests.support.synthetic_sweep import LONG_SWEEP, SHARD_SIZE, SWEEP, content, run, synthetic_rows, write
-from warpchain.inputs.validation import DamagedFileError, InputError, InputWarning
+from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.store import folder
 from warpchain.store.folder import SweepFolder, read_rows
 from warpchain.store.manifest import Manifest, read_manifest
@@ -245,23 +245,6 @@ def test_a_shard_of_another_sweep_is_refused(tmp_path: Path) -> None:
     first.write_bytes(kept)
     with pytest.warns(InputWarning):
         open_folder(tmp_path / "one").close()
-
-
-@pytest.mark.parametrize("part", [0.0, 0.1, 0.999])
-def test_a_truncated_shard_is_computed_again(tmp_path: Path, part: float) -> None:
-    """A shard cut short is refused to a reader; a run names it, and computes its walks and no others again."""
-    run(tmp_path)
-    before, path = content(tmp_path), tmp_path / "shards" / FIRST
-    os.truncate(path, int(part * path.stat().st_size))
-    with refused(DamagedFileError, tmp_path, f"{path}: damaged or cut short", "delete it"):
-        read_rows(tmp_path, read_manifest(tmp_path))
-    with pytest.warns(InputWarning, match=rf"^{path}: damaged or cut short; its walks are computed again$"):
-        opened = open_folder(tmp_path)
-    with opened:
-        (shard,) = opened.missing()
-        write(opened, shard, synthetic_rows(SWEEP, shard))
-    assert content(tmp_path) == before
-    assert f"{path}: damaged or cut short" in (tmp_path / "log.txt").read_text()
 
 
 def test_a_folder_of_an_older_version_names_it(tmp_path: Path) -> None:

@@ -54,13 +54,15 @@ def test_a_grown_sweep_is_the_larger_one(tmp_path: Path, sampler: str) -> None:
     for counts in ((2, 4), (8, 4), (16, 8)):
         given = two_blocks(*counts, sampler=sampler, **drawn)
         grown = make_sweep(tmp_path / "grown", given, drawn_distance)
+        description = tmp_path / "grown/sweep.yaml"
+        description.write_text("# mine\n" + description.read_text().replace("# mine\n", ""))
         after = shards(tmp_path / "grown")
         assert before.items() < after.items()
         before = after
     fresh = make_sweep(tmp_path / "fresh", given, drawn_distance)
     assert grown.missing_count == 0 and columns(grown) == columns(fresh)
     assert grown.sweep == fresh.sweep and grown.provenance["digest"] == fresh.provenance["digest"]
-    assert yaml.safe_load((tmp_path / "grown/sweep.yaml").read_text()) == fresh.sweep
+    assert yaml.safe_load(description.read_text()) == fresh.sweep and description.read_text().count("# mine\n") == 1
     for name in ("grown", "fresh"):
         merge(tmp_path / name, tmp_path / f"{name}.h5")
     assert (tmp_path / "grown.h5").read_bytes() == (tmp_path / "fresh.h5").read_bytes()

@@ -206,8 +206,6 @@ def test_a_merged_file_has_the_motions(kept: Path, tmp_path: Path) -> None:
         assert data.dx.shape == (2, 2, 5)
 
 
-
-
 def test_report_and_pictures_use_kept_frames(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A walk with frames is shown without running it again; one without is run again, as ever."""
 

@@ -115,18 +115,6 @@ def test_the_layout_is_that_of_the_sweep(tmp_path: Path) -> None:
         assert data.preset.values.tolist() == ["soft", "paper"]
 
 
-def test_units_and_meanings(folder: Path) -> None:
-    """Columns, drawn quantities and axes of any block have units; an unknown name gets a suggestion."""
-    result = load(folder)
-    assert [
-        result.unit(name) for name in ("dx", "links", "frequency", "phase_drawn", "link_length_drawn", "gravity")
-    ] == [*("m", "1", "Hz", "1", "m", "m/s²")]
-    assert result.unit("sample") == "1" and result.unit("loss_floor") == "J"
-    assert result.blocks["ellipse"].meaning("gravity") == "gravitational acceleration, along −y"
-    with pytest.raises(KeyError, match="did you mean walk_time"):
-        result.unit("walktime")
-
-
 def test_missing_walks_are_counted(single: Path) -> None:
     """Walks that are not there have status −1 and NaN; the attributes of an only block are those of the result."""
     result = load(single)

@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 
 SOFT = preset("soft")
 FIXED_STEP = 2e-6  # s
+HILLS = np.array([[-1.0, -0.002], [-0.02, 0.003], [0.0, -0.001], [0.015, 0.002], [0.03, -0.01], [1.0, -0.01]])
+"""Points of a floor with corners of both kinds, which heaps cut."""
 
 
 @contextmanager
@@ -74,7 +76,7 @@ def batch_of(
     longest = max(len(position) for position, _ in chains)
     options = Options(method=method, tolerance=0.1 if fixed_step else tolerance, self_contact=self_contact)
     kept = {"keeps_samples": keeps, "frame_every": 2 if keeps else None, "keeps_loads": keeps}
-    batch = Batch(len(chains), longest, options, **kept)
+    batch = Batch(len(chains), longest, options, faces=len(HILLS) - 1, **kept)
     batch.control.launch_time = 1e9  # attempts alone end a launch, however busy the machine is
     if fixed_step:
         batch.control.skin = 1e-9

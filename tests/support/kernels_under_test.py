@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tests.support.unlike_links import UnlikeLinks
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import start_device
+from warpchain.engine.ground import cells_of, faces_of
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
 from warpchain.kernels import layout
@@ -32,6 +33,8 @@ Array = NDArray[np.float64]
 
 DEVICE = start_device("cpu").warp
 POISONED_JOINT = 2**30
+LEVEL = np.array([[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]])
+"""Points of a level profile."""
 
 compiled = functools.partial(
     wp.kernel, module="unique", enable_backward=False, module_options={"cpu_compiler_flags": COMPILER_FLAGS}
@@ -67,12 +70,12 @@ def chain_on_cpu(position: Array, velocity: Array, parameters: Parameters | Unli
 
 # --- the contact pass ---
 
-LIST, FLOOR, SPROCKET, SELF = 1, 2, 4, 8
+LIST, FLOOR, SPROCKET, SELF, TERRAIN = 1, 2, 4, 8, 16
 """Parts of a pass, to be added up: make the neighbour list; resolve contacts."""
 
 RESULTS = (
     *("opening", "floor_gap", "sprocket_gap", "fits", "displacement", "slack"),
-    *("floor", "sprocket", "self", "self_loss", "self_depth", "strands"),
+    *("floor", "sprocket", "self", "self_loss", "self_depth", "strands", "terrain_gap", "terrain"),
 )
 
 
@@ -82,6 +85,7 @@ def _contact_pass(columns: int) -> wp.Kernel:
     resolve_self_contacts = self_contacts(columns)
     floor_gap, resolve_floor = fixed_contacts("floor")
     sprocket_gap, resolve_sprocket = fixed_contacts("sprocket")
+    terrain_gap, resolve_terrain = fixed_contacts("terrain")
     size = list_layout(columns).size
 
     @compiled
@@ -129,6 +133,9 @@ def _contact_pass(columns: int) -> wp.Kernel:
             results[world, 9] = lost
             results[world, 10] = depth
             results[world, 11] = wp.float64(strands)
+        if (parts & 16) != 0:
+            results[world, 12] = terrain_gap(block, chain, ground, face)
+            results[world, 13] = wp.float64(resolve_terrain(block, chain, ground, face))
 
     return contact_pass
 
@@ -146,13 +153,23 @@ class ContactPass:
     """Many chains, one after the other, on which parts of the contact pass are run."""
 
     def __init__(
-        self, chains: Sequence[Placed], *, skin: float = 2e-3, sprocket_speed: float = 0.0, push_rate: float = 0.0
+        self,
+        chains: Sequence[Placed],
+        *,
+        skin: float = 2e-3,
+        sprocket_speed: float = 0.0,
+        push_rate: float = 0.0,
+        profile: Array = LEVEL,
     ) -> None:
         """Make room for chains and place them; the sprocket about the origin has their sprocket_radius."""
         self.links = [len(chain.position) for chain in chains]
         self.columns = layout.padded_width(max(self.links))
         self.skin, self.sprocket_speed, self.push_rate = skin, sprocket_speed, push_rate
         self.model = model_of([(len(chain.position), chain.parameters) for chain in chains])
+        sizes = chains[0].parameters.link_length, chains[0].parameters.circle_radius
+        for name, rows_of in (("faces", faces_of(profile)), ("cells", cells_of(profile, *sizes))):
+            same = np.repeat(rows_of[None], len(chains), axis=0)
+            setattr(self.model, name, wp.array(same, dtype=wp.float64, device=DEVICE))
         worlds, rows, size = len(chains), layout.scratch_rows(0), list_layout(self.columns).size
         self.state = State()
         self.state.load_factor = wp.ones(worlds, dtype=wp.float64, device=DEVICE)

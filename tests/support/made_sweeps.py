@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -94,9 +95,13 @@ def make_sweep(
     outcome: Outcome = distance,
     columns: Callable[[PlannedWalk], Mapping[str, float]] = lambda walk: {},
 ) -> SweepResult:
-    """A folder in which every walk has its outcome and columns; in shards of one walk, if some are not to be there."""
+    """A folder in which every walk has its outcome and columns; in shards of one walk, if some are not to be there.
+
+    To these two the walks are numbered cell by cell.
+    """
     sweep = load_sweep(content)
-    walks = {index: sweep.planned(index) for index in sweep.indices.tolist()}
+    indices = sweep.indices.tolist()
+    walks = {index: replace(sweep.planned(index), index=number) for number, index in enumerate(indices)}
     outcomes = {index: outcome(walk) for index, walk in walks.items()}
     with SweepFolder.open(folder, sweep, shard_size=1 if None in outcomes.values() else len(walks)) as store:
         for shard in store.missing():

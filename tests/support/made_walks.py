@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from warpchain.engine.tallies import CONTACTS
 from warpchain.inputs.setup import resolve
 from warpchain.loop.before_release import BeforeRelease
 from warpchain.status import Status
-from warpchain.walks.walk_result import ENERGIES, MOTION, WalkResult
+from warpchain.walks.walk_result import ENERGIES, MOTION, NUMBERS, WalkResult
 
 
 def make_walk(links: int = 30, **changes: Any) -> WalkResult:
@@ -33,22 +33,12 @@ def make_walk(links: int = 30, **changes: Any) -> WalkResult:
         "simulated_time": 3.3,
         "hold_time": 0.4,
         "drift": 0.002,
-        "lateral_drift": math.nan,
-        "final_tilt": math.nan,
-        "final_yaw": math.nan,
-        "greatest_tilt": math.nan,
-        "fell_at": math.nan,
-        "fell_over": -1,
-        "fell_before_collapse": -1,
         "self_contact_at": 0.45,
         "bounces_before_self_contact": 2,
         "flight_before_self_contact": 0.003,
         "strands_met_at": 0.46,
         "bounces_before_strands_met": 2,
         "flight_before_strands_met": 0.013,
-        "collapsed_at": math.nan,
-        "bounces_before_collapse": -1,
-        "flight_before_collapse": math.nan,
         "softened_at": 0.4,
         "wall_time": 1.23456789012345678,
         "bounces": 3,
@@ -72,15 +62,15 @@ def make_walk(links: int = 30, **changes: Any) -> WalkResult:
         "rms_speed": rng.random(801),
         "frame_time": frame_time,
         "frame_joints": offset + middle[:, None],
-        "frame_forces": np.empty((0, links, 2)),
-        "frame_moments": np.empty((0, links)),
-        "center_z": np.empty(0),
-        "tilt": np.empty(0),
-        "yaw": np.empty(0),
-        "frame_origin": np.empty((0, 3)),
-        "frame_axes": np.empty((0, 2, 3)),
     }
-    return WalkResult(**(values | changes))
+    return WalkResult(**(_unset(links) | values | changes))
+
+
+def _unset(links: int) -> dict[str, Any]:
+    """Every number and array of a walk that has none of them."""
+    empty = {name: np.empty(stored.sizes({"t": 0, "f": 0, "n": links})) for name, stored in MOTION.items()}
+    types = {item.name: get_args(item.type) for item in dataclasses.fields(WalkResult)}
+    return empty | {name: -1 if types[name][0] is int else math.nan for name in NUMBERS}
 
 
 def make_unreleased() -> WalkResult:

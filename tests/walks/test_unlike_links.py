@@ -8,7 +8,8 @@ import pytest
 
 import warpchain
 from warpchain import InputError, Status, preset
-from warpchain.inputs.link_values import alternating, link_values
+from warpchain.inputs.link_values import alternating
+from warpchain.inputs.scene import link_values
 from warpchain.run.single_walk import setup_walk
 from warpchain.sweeps.plan import load_sweep
 
@@ -94,7 +95,7 @@ def test_means_and_sums_of_two_kinds_are_those_of_a_pair() -> None:
 def test_an_odd_number_of_links_needs_links_of_one_kind_or_values_of_each() -> None:
     """61 links alike, or given one by one, make a chain, which walks."""
     for start in ("rest", "ellipse"):
-        with pytest.raises(InputError, match=r"^scene\.links: 61 is odd, but inner and outer links alternate; give "):
+        with pytest.raises(InputError, match=r"^scene\.links: 61 is odd; inner and outer links alternate: give "):
             setup_walk("paper", {"links": 61, "start": start}, None)
     alike = {"outer_mass": SOFT.inner_mass, "outer_inertia": SOFT.inner_inertia}
     walk = warpchain.walk(start="ellipse", **{**BRIEF, "links": 37}, **alike)

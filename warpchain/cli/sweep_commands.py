@@ -65,7 +65,9 @@ def sweep(
     if source is None:
         raise InputError("FILE.yaml: missing; give a sweep file, or --new FILE.yaml to have one written")
     if estimate:
-        _print_estimate(source, device, workers, seed, samples)
+        if gpus is not None or scheduler is not None:
+            raise InputError("--estimate: tries walks in this process; leave out --gpus and --scheduler")
+        _print_estimate(source, device=device, workers=workers, part=part, seed=seed, samples=samples)
         return
     if folder is None:
         raise InputError("--output: missing; give a folder for the results with -o DIR")
@@ -206,14 +208,12 @@ def merge(
     print(printable(str(path)))
 
 
-def _print_estimate(
-    source: Path, device: str | None, workers: int | None, seed: int | None, samples: int | None
-) -> None:
+def _print_estimate(source: Path, **given: Any) -> None:
     """Say how long a sweep would take on this machine, and how much of the disk."""
     from warpchain.run.estimate import estimate_sweep
     from warpchain.run.progress_bar import duration_text
 
-    found = estimate_sweep(source, device=device, workers=workers, seed=seed, samples=samples)
+    found = estimate_sweep(source, **given)
     print(
         f"{found.walks:,} walks: about {duration_text(found.seconds)} with {found.workers} at once on this machine, "
         f"{found.bytes / 1e6:,.1f} MB on disk ({found.pilots} walks tried)"

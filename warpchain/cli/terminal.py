@@ -9,8 +9,6 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from warpchain.engine.tallies import LOST
 from warpchain.inputs.validation import printable
@@ -32,6 +30,8 @@ def status_line() -> Iterator[Callable[[str], None]]:
     if not sys.stderr.isatty():
         yield lambda text: None
         return
+    from rich.console import Console
+
     with Console(stderr=True).status("starting") as line:
         yield line.update
 
@@ -66,6 +66,9 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
         whole |= {"inaccurate": result.inaccurate_count, "rate": rate, "time_left": time_left, "blocks": blocks}
         print(json.dumps(whole, indent=2, allow_nan=False))
         return
+    from rich.console import Console
+    from rich.table import Table
+
     console = Console(highlight=False, markup=False)
     counts = ", ".join(f"{count:,} {label}" for label, count in summary.items() if count or label == "at_rest")
     console.print(f"{printable(result.name)}: {result.walk_count:,} walks, {counts}")
@@ -104,12 +107,10 @@ def json_value(given: Any) -> Any:
 
 def print_walk(result: WalkResult) -> None:
     """Print the results of a walk on standard output."""
-    table = Table(box=None, show_header=False, pad_edge=False)
-    table.add_column(style="bold", no_wrap=True)
-    table.add_column()
-    for row in _walk_rows(result):
-        table.add_row(*row)
-    Console(highlight=False, markup=False).print(table)
+    rows = list(_walk_rows(result))
+    width = max(len(name) for name, _ in rows)
+    for name, value in rows:
+        print(f"{name:<{width}}  {value}")
 
 
 def _walk_rows(result: WalkResult) -> Iterator[tuple[str, str]]:

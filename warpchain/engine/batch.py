@@ -93,7 +93,7 @@ class Batch:
         cells = (layout.GROUND_CELLS + 1) * (faces > 1)
         shapes = {"faces": (faces, layout.FACE_VALUES), "cells": (cells, layout.CELL_VALUES)}
         self.model = self._arrays(Model, links=(layout.LINK_ROWS, longest), **shapes)
-        self.drive = self._arrays(Drive)
+        self.drive = self._arrays(Drive, motion=(layout.MOTION_ROWS, layout.MOTION_VALUES))
         self._constant = set(self._mirrors)
         if self._gpu:
             self._order = Mirror((worlds,), wp.int32, self._gpu, self._stream)
@@ -171,9 +171,8 @@ class Batch:
 
     def set_floor(self, world: int, points: Array, parameters: Parameters) -> None:
         """Set the floor of a world's chain, by the points of its profile (p, 2), if it is not flat."""
-        faces = faces_of(points)
-        self._edit(self.model.faces)[world, : len(faces)] = faces
-        if len(faces) > 1:
+        self._edit(self.model.faces)[world, : len(points) - 1] = faces_of(points)
+        if len(points) > 2:
             self._edit(self.model.cells)[world] = cells_of(points, parameters.link_length, parameters.circle_radius)
 
     def load(
@@ -252,14 +251,14 @@ class Batch:
         """The plane of a world's chain, if it tilts: (PLANE_VALUES,), see :mod:`warpchain.kernels.layout`."""
         return np.array(self._view(self.state.plane)[world, : layout.PLANE_VALUES])
 
-    def set_drive(self, world: int, **values: float) -> None:
+    def set_drive(self, world: int, **values: float | Array) -> None:
         """Set fields of :class:`Drive` of a world."""
         for name, value in values.items():
             self._edit(getattr(self.drive, name))[world] = value
 
-    def features(self, *, fixed_body: str, tilts: bool = False) -> Features:
-        """Kernel features for these worlds."""
-        return features_of(self.options, self.columns, fixed_body=fixed_body, tilts=tilts)
+    def features(self, **wanted: Any) -> Features:
+        """Kernel features for these worlds, see `features_of`."""
+        return features_of(self.options, self.columns, **wanted)
 
     def run(self, worlds: Sequence[int], features: Features, after_launch: Callable[[], None] | None = None) -> None:
         """Carry worlds on until none of them is running. Results do not depend on how a run is cut into launches.
@@ -299,31 +298,23 @@ class Batch:
 
     def launch(self, worlds: Sequence[int], features: Features, attempts: int) -> float:
         """Carry worlds on by at most this many attempts each; returns the wall time [s]."""
-        return self.launch_together({features: worlds}, attempts)
-
-    def launch_together(self, groups: Mapping[Features, Sequence[int]], attempts: int) -> float:
-        """Carry groups of worlds on together, each with its own features; returns the wall time [s]."""
         before = time.perf_counter()
-        self.start(groups, attempts)
+        self.start({features: worlds}, attempts)
         self.finish()
         return time.perf_counter() - before
 
     def start(self, groups: Mapping[Features, Sequence[int]], attempts: int) -> None:
-        """Begin a launch like :meth:`launch_together`; until :meth:`finish` the host may not read the worlds.
+        """Begin to carry on groups of worlds, each with its own features, by at most this many attempts.
 
-        On a GPU this returns at once, and launches of other batches go on at the same time.
+        Until :meth:`finish` the host may not read the worlds. On a GPU this returns at once.
         """
         self.control.attempts = attempts
         arrays = [self.model, self.drive, self.state, self.record, self.scratch, self.lists, self.control]
         if self._gpu is None:
             for features, worlds in groups.items():
-                inputs = [
-                    wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device.warp),
-                    *arrays,
-                ]
-                wp.launch(
-                    step_kernel(self.device, features, 1), dim=len(worlds), inputs=inputs, device=self.device.warp
-                )
+                numbers = wp.array(np.asarray(worlds, dtype=np.int32), dtype=wp.int32, device=self.device.warp)
+                kernel = step_kernel(self.device, features, 1)
+                wp.launch(kernel, dim=len(worlds), inputs=[numbers, *arrays], device=self.device.warp)
             return
         blocks: dict[tuple[Features, int], list[int]] = defaultdict(list)
         for features, worlds in groups.items():
@@ -443,8 +434,7 @@ class Batch:
 
     def frame_planes(self, world: int) -> Array:
         """The plane in the frames kept so far: (f, PLANE_VALUES); (f, 0) if the batch does not keep planes."""
-        count = int(self._view(self.record.frame_count)[world])
-        first = 2 * self.state.links.shape[2]
+        count, first = int(self._view(self.record.frame_count)[world]), 2 * self.state.links.shape[2]
         return self._view(self.record.frames)[world, :count, first:].copy()
 
     def greatest_tilt(self, world: int) -> float:

@@ -72,7 +72,9 @@ def shared_threads(method: str, links: Iterable[int], walks: int) -> int | None:
     return max(sizes)
 
 
-def features_of(options: Options, columns: int, *, fixed_body: str, tilts: bool = False) -> Features:
+def features_of(
+    options: Options, columns: int, *, fixed_body: str, tilts: bool = False, moving_sprocket: bool = False
+) -> Features:
     """Kernel features for chains with these options in scratch of this width."""
     return Features(
         method=options.method,
@@ -80,6 +82,7 @@ def features_of(options: Options, columns: int, *, fixed_body: str, tilts: bool 
         fixed_body=fixed_body,
         self_contact=options.self_contact,
         tilts=tilts,
+        moving_sprocket=moving_sprocket,
     )
 
 

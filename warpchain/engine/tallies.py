@@ -26,7 +26,7 @@ EXTREMES: Final = {"opening": "greatest distance between two joined link ends", 
 LOSSES: Final = {
     "joint_friction": "energy lost to joint friction, viscous and Coulomb",
     "joint_damping": "energy lost to the damping of the joint springs",
-    "floor": "energy lost in impacts on the floor",
+    "floor": "energy lost in impacts on the floor, and to a sprocket that moves after the release",
     "sprocket": "energy lost in impacts on the sprocket",
     "self_contact": "energy lost in impacts of links on one another",
     "softening": "energy taken out of the joint springs by softening them in the pile",

@@ -7,7 +7,9 @@ not fitted to are the errors. So what films have in common, errors of the camera
 counts as common: more films do not make it smaller.
 """
 
+import io
 import os
+import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -16,6 +18,7 @@ from typing import Any, Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from warpchain.files import write_whole
 from warpchain.films.film import CLOCK, Array, Camera, Film, edges, summary
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError
@@ -64,38 +67,48 @@ class Bank:
     def of(cls, result: SweepResult | BlockResult) -> Self:
         """The bank of a sweep, or a block, over links, frequency and repetitions, such as `phase`.
 
-        Its samples are the chains; those of which a walk failed are left out.
+        Its samples are the chains; those of which a walk failed, or lasted for less than 0.4 s, are left out.
 
         Raises:
-            InputError: walks are missing, axes are others, or the chains differ along them.
+            InputError: walks or motions are missing, axes are others, or the chains differ along them.
         """
-        axes, columns, shape = list(result.axes), result.columns, result.shape
+        axes, shape = list(result.axes), result.shape
         if axes[:2] != ["links", "frequency"]:
             raise InputError(f"grid: its axes are {', '.join(axes)}; give links, frequency and then repetitions")
         names = [name for name in FOUND if name in result.drawn]
-        drawn = np.stack([columns[f"{name}_drawn"] for name in names], axis=-1)
-        if np.any(columns["status"] == MISSING) or not np.array_equal(drawn, np.broadcast_to(drawn[0, 0], drawn.shape)):
-            raise InputError(f"bank: walks are missing, or chains differ; give same_samples_along: [{', '.join(axes)}]")
-        found: list[Any] = [None] * columns["index"].size
-        for place, group in result.kept_motions(range(len(found))):  # in the order of the files
-            series, joints = group["series"], group["frames/joints"][0].astype(float)
-            found[place] = series["time"][()], series["center"][()], edges(joints), series["rms_speed"][0]
-        time = np.arange(0.0, CLOCK[-1] + 0.03, round(float(np.median(np.diff(found[0][0]))), 4))
-        whole = np.array([each[0][-1] >= time[-1] for each in found]).reshape(shape).all(axis=tuple(range(len(axes))))
-        center = [np.column_stack([np.interp(time, each[0], each[1][:, k]) for k in (0, 1)]) for each in found]
+        if not names or np.any(result.columns["status"] == MISSING):
+            raise InputError("bank: walks are missing, or their chains are all the same; run the sweep to its end")
+        drawn = np.stack([result.columns[f"{name}_drawn"] for name in names], axis=-1).reshape(
+            -1, shape[-1], len(names)
+        )
+        if np.any(drawn != drawn[0]):
+            raise InputError(f"bank: its chains differ along the axes; give same_samples_along: [{', '.join(axes)}]")
+        found: dict[int, tuple[Array, ...]] = {}
+        for place, group in result.kept_motions(np.flatnonzero(result.kept)):  # in the order of the files
+            if "series/time" in group and "frames/joints" in group:  # a walk that failed early has none
+                parts = (group[f"series/{name}"][()] for name in ("time", "center", "rms_speed"))
+                found[place] = *parts, edges(group["frames/joints"][0].astype(float))
+        if not found:
+            raise InputError("bank: no motion was recorded; give record: {series: true, frames: true}")
+        step = round(float(np.median(np.diff(next(iter(found.values()))[0]))), 4)
+        time = np.arange(0.0, CLOCK[-1] + 0.03, step)
+        motions = {place: each for place, each in found.items() if each[0][-1] >= time[-1]}
+        cells = np.arange(result.columns["index"].size).reshape(shape[0] * shape[1], -1, shape[-1])
+        chains = np.flatnonzero(np.isin(cells, list(motions)).all(axis=(0, 1)))
+        places = np.moveaxis(cells[..., chains], 2, 0)
 
-        def by_chain(values: Any, *more: int) -> Array:
-            cells = np.reshape(values, (shape[0] * shape[1], -1, shape[-1], *more))
-            return np.moveaxis(cells, 2, 0)[whole]
+        def by_chain(value: Callable[[Array, Array, Array, Array], Any]) -> Array:
+            values = np.array([value(*motions[place]) for place in places.ravel().tolist()])
+            return values.reshape(*places.shape, *values.shape[1:])
 
         return cls(
             names=np.array(names),
-            values=drawn.reshape(-1, shape[-1], len(names))[0][whole],
+            values=drawn[0, chains],
             experiments=np.array([(n, f) for n in result.axes["links"] for f in result.axes["frequency"]], float),
             time=time,
-            center=by_chain(center, len(time), 2),
-            outline=by_chain([each[2] for each in found], 4),
-            speed=by_chain([each[3] for each in found]),
+            center=by_chain(lambda t, center, *_: np.column_stack([np.interp(time, t, x) for x in center.T])),
+            outline=by_chain(lambda *motion: motion[3]),
+            speed=by_chain(lambda *motion: motion[2][0]),
         )
 
     def film(self, chain: int, experiment: int, repetition: int) -> Film:
@@ -131,8 +144,9 @@ class Bank:
                 wrong = f"{film.links} links at {film.frequency:g} Hz"
                 raise InputError(f"films: {wrong}, but the bank has {most} of each of {known}; give these, or a bank")
             groups[int(at[0])].append(film)
-        if not groups:
-            raise InputError("films: none; give at least one")
+        if not groups or len(self.values) < 4 * FOLDS:
+            wrong = f"{len(films)} films, a bank of {len(self.values)} chains"
+            raise InputError(f"films: {wrong}; give at least one film, and {4 * FOLDS} chains")
         design = tuple(
             (at, len(group), all(film.outline is not None for film in group), all(film.speed for film in group))
             for at, group in groups.items()
@@ -155,14 +169,19 @@ class Bank:
         )
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the bank to a .npz file, motions in single precision."""
-        np.savez_compressed(path, **{k: v.astype("f4") if v.ndim > 2 else v for k, v in vars(self).items()})
+        """Write the bank to a file, whole or not at all, motions in single precision."""
+        image = io.BytesIO()
+        np.savez_compressed(image, **{k: v.astype("f4") if v.ndim > 2 else v for k, v in vars(self).items()})
+        write_whole(path, image.getvalue())
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read what `save` wrote."""
-        with np.load(path) as file:
-            return cls(**{name: file[name] if name == "names" else file[name].astype(float) for name in file.files})
+        """Read what `save` wrote; an `InputError` for another file."""
+        try:
+            with np.load(path) as file:
+                return cls(**{name: file[name] if name == "names" else file[name].astype(float) for name in file.files})
+        except (AttributeError, TypeError, ValueError, zipfile.BadZipFile):
+            raise InputError(f"{os.fspath(path)}: no bank; give a file that Bank.save wrote") from None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

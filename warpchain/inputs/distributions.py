@@ -214,9 +214,9 @@ def random_generator(seed: int, cell: int = 0, sample: int = 0) -> np.random.Gen
     Raises:
         InputError: a number is no integer or out of range.
     """
-    for name, number, largest in (("seed", seed, LARGEST_SEED), ("cell", cell, _LARGEST), ("sample", sample, _LARGEST)):
-        checked_whole(number, name, 0, largest)
-    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(cell, sample)))
+    given = (("seed", seed, LARGEST_SEED), ("cell", cell, _LARGEST), ("sample", sample, _LARGEST))
+    entropy, *key = (checked_whole(number, name, 0, largest) for name, number, largest in given)
+    return np.random.default_rng(np.random.SeedSequence(entropy, spawn_key=key))
 
 
 def sampled(setup: Setup, rng: np.random.Generator, kept: Container[str] = ()) -> Setup:

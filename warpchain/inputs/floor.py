@@ -26,13 +26,15 @@ ENDLESS: Final = 1e7
 
 
 def checked_profile(given: Any) -> Any:
-    """A profile as a tuple of points x, y [m]; what is no list of points is left to the field's other types.
+    """A profile as a tuple of points x, y [m]; `flat` stays as it is.
 
     Raises:
-        ValueError: it is a list, but not of points that make a floor.
+        ValueError: it is neither that nor a list of points that make a floor.
     """
-    if not isinstance(given, list | tuple):
+    if given == "flat":
         return given
+    if not isinstance(given, list | tuple):
+        raise ValueError(f"{shown(given)} is no floor; give flat, or points [[x, y], …] in m")
     points: list[tuple[float, float]] = []
     for number, point in enumerate(given):
         pair = list(point) if isinstance(point, list | tuple) else []

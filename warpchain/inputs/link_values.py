@@ -7,16 +7,12 @@ joint stiff.
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.validation import InputError
-
-if TYPE_CHECKING:
-    from warpchain.inputs.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -77,36 +73,3 @@ def alternating(parameters: Parameters, links: int) -> LinkValues:
         viscous_friction=np.full(links, parameters.viscous_friction),
         coulomb_friction=np.full(links, parameters.coulomb_friction),
     )
-
-
-def link_values(scene: "Scene", parameters: Parameters) -> LinkValues:
-    """What each link and joint of the chain of a walk has of its own."""
-    values = alternating(parameters, scene.links)
-    given = (scene.link_masses, scene.link_inertias, scene.viscous_frictions, scene.coulomb_frictions)
-    rows = (values.mass, values.inertia, values.viscous_friction, values.coulomb_friction)
-    for row, own in zip(rows, given, strict=True):
-        if own is not None:
-            row[:] = own
-    if scene.mass_gradient:
-        growth = 1 + scene.mass_gradient * np.linspace(-1.0, 1.0, scene.links)
-        values.mass[:] *= growth
-        values.inertia[:] *= growth
-    values.mass[scene.charm_link] += scene.charm_mass
-    values.inertia[scene.charm_link] += scene.charm_inertia
-    values.viscous_friction[scene.stiff_joint] *= scene.stiff_joint_factor
-    values.coulomb_friction[scene.stiff_joint] *= scene.stiff_joint_factor
-    return values
-
-
-def check_parity(scene: "Scene", parameters: Parameters) -> None:
-    """Check that the links of a chain can alternate between two kinds, if they do.
-
-    Raises:
-        InputError: their number is odd.
-    """
-    is_one_kind = (parameters.inner_mass, parameters.inner_inertia) == (parameters.outer_mass, parameters.outer_inertia)
-    if scene.links % 2 and not is_one_kind and (scene.link_masses is None or scene.link_inertias is None):
-        raise InputError(
-            f"scene.links: {scene.links} is odd, but inner and outer links alternate; give an even number, "
-            "link_masses and link_inertias, or equal inner and outer links"
-        )

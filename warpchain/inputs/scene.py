@@ -7,9 +7,10 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from warpchain.inputs.floor import Array, Points, checked_profile, slope_points
-from warpchain.inputs.link_values import check_parity, link_values
+from warpchain.inputs.link_values import LinkValues, alternating
 from warpchain.inputs.options import on_gpu
 from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.sprocket_motion import Motion, checked_motion
 from warpchain.inputs.validation import InputError, Section, Whole, number_field, shown
 
 MOST_LINKS: Final = 100_000
@@ -133,21 +134,26 @@ class Scene(Section):
     walk_limit: float = number_field(
         20.0, "s", "longest time from the release to rest; then the walk ends as time_limit", gt=0, le=LONGEST
     )
+    release: Annotated[Motion | None, BeforeValidator(checked_motion)] = Field(
+        default=None,
+        description="motion of the sprocket from the release on, rows [time in s, x and y in m from its place, "
+        "frequency in Hz], after whose last it vanishes; null: it vanishes at once",
+    )
     floor: Annotated[Literal["flat"] | Points, BeforeValidator(checked_profile)] = Field(
         default="flat",
-        description="flat, or a profile of points [[x, y], …] in m; its first and last face go on without end",
+        description="flat, or a profile [[x, y], …] in m, whose ends go on straight",
     )
     slope: float = number_field(
         0.0,
         "°",
-        "of a flat floor; positive: it falls the way the chain walks",
+        "of an endless floor; positive: it falls the way the chain walks",
         ge=-STEEPEST,
         le=STEEPEST,
     )
     distance_limit: float | None = number_field(
         None,
         "m",
-        "distance along the floor from the release at which a walk ends as distance_limit; null: none",
+        "distance along the floor at which a walk ends as distance_limit; null: none",
         gt=0,
         le=HIGHEST,
     )
@@ -186,15 +192,17 @@ class Scene(Section):
         ge=-FASTEST_TAP,
         le=FASTEST_TAP,
     )
-    charm_link: int = number_field(0, "1", "link that carries a charm", ge=0, lt=MOST_LINKS)
-    charm_mass: float = number_field(
-        0.0, "kg", "mass at the centre of charm_link, added to its own", ge=0, le=1e6
-    )
+    charm_link: int = number_field(0, "1", "link that carries a charm", ge=0, le=MOST_LINKS - 1)
+    charm_mass: float = number_field(0.0, "kg", "mass at the centre of charm_link, added to its own", ge=0, le=1e6)
     charm_inertia: float = number_field(
         0.0, "kg m²", "moment of inertia of the charm about that centre, added likewise", ge=0, le=1e12
     )
     stiff_joint: int = number_field(
-        0, "1", "joint at the end of this link, between it and the next, that is stiff", ge=0, lt=MOST_LINKS
+        0,
+        "1",
+        "joint that is stiff: the one at the end of this link",
+        ge=0,
+        le=MOST_LINKS - 1,
     )
     stiff_joint_factor: float = number_field(
         1.0, "1", "by which viscous and Coulomb friction of stiff_joint are multiplied", ge=0, le=1e6
@@ -207,15 +215,9 @@ class Scene(Section):
         lt=1,
     )
     link_masses: _Numbers = number_field(None, "kg", "mass of each link; null: of its kind")
-    link_inertias: _Numbers = number_field(
-        None, "kg m²", "moment of inertia of each link; null: of its kind"
-    )
-    viscous_frictions: _Numbers = number_field(
-        None, "N m s", "viscous_friction of each joint; null: the same for all"
-    )
-    coulomb_frictions: _Numbers = number_field(
-        None, "N m", "coulomb_friction of each joint; null: the same for all"
-    )
+    link_inertias: _Numbers = number_field(None, "kg m²", "moment of inertia of each link; null: of its kind")
+    viscous_frictions: _Numbers = number_field(None, "N m s", "viscous_friction of each joint; null: the same for all")
+    coulomb_frictions: _Numbers = number_field(None, "N m", "coulomb_friction of each joint; null: the same for all")
 
     @model_validator(mode="after")
     def _links_are_there(self) -> Self:
@@ -250,6 +252,13 @@ class Scene(Section):
         return self
 
     @model_validator(mode="after")
+    def _motion_needs_sprocket(self) -> Self:
+        if self.release is not None and (self.start == "ellipse" or self.plane == "tilting"):
+            word = "start: ellipse" if self.start == "ellipse" else "plane: tilting"
+            raise InputError(f"release: a motion of the sprocket, which {word} does not go with; leave one out")
+        return self
+
+    @model_validator(mode="after")
     def _hanging_needs_rest(self) -> Self:
         if self.clearance_of == "hanging" and self.start != "rest":
             raise InputError(
@@ -264,6 +273,39 @@ def floor_points(scene: Scene) -> Array | None:
     if scene.floor != "flat":
         return np.array(scene.floor)
     return slope_points(scene.slope) if scene.slope != 0 else None
+
+
+def link_values(scene: Scene, parameters: Parameters) -> LinkValues:
+    """What each link and joint of the chain of a walk has of its own."""
+    values = alternating(parameters, scene.links)
+    given = (scene.link_masses, scene.link_inertias, scene.viscous_frictions, scene.coulomb_frictions)
+    rows = (values.mass, values.inertia, values.viscous_friction, values.coulomb_friction)
+    for row, own in zip(rows, given, strict=True):
+        if own is not None:
+            row[:] = own
+    if scene.mass_gradient:
+        growth = 1 + scene.mass_gradient * np.linspace(-1.0, 1.0, scene.links)
+        values.mass[:] *= growth
+        values.inertia[:] *= growth
+    values.mass[scene.charm_link] += scene.charm_mass
+    values.inertia[scene.charm_link] += scene.charm_inertia
+    values.viscous_friction[scene.stiff_joint] *= scene.stiff_joint_factor
+    values.coulomb_friction[scene.stiff_joint] *= scene.stiff_joint_factor
+    return values
+
+
+def check_parity(scene: Scene, parameters: Parameters) -> None:
+    """Check that the links of a chain can alternate between two kinds, if they do.
+
+    Raises:
+        InputError: their number is odd.
+    """
+    is_one_kind = (parameters.inner_mass, parameters.inner_inertia) == (parameters.outer_mass, parameters.outer_inertia)
+    if scene.links % 2 and not is_one_kind and (scene.link_masses is None or scene.link_inertias is None):
+        raise InputError(
+            f"scene.links: {scene.links} is odd; inner and outer links alternate: give an even number, "
+            "link_masses and link_inertias, or equal inner and outer links"
+        )
 
 
 def settling_time(scene: Scene) -> float:

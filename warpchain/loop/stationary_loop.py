@@ -17,9 +17,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.inputs.link_values import LinkValues, alternating, link_values, mean_value
+from warpchain.inputs.link_values import LinkValues, alternating, mean_value
 from warpchain.inputs.parameters import Parameters, preset
-from warpchain.inputs.scene import joint_radius
+from warpchain.inputs.scene import joint_radius, link_values
 from warpchain.inputs.setup import Setup
 from warpchain.loop.before_release import BeforeRelease
 from warpchain.loop.catenary import Catenary, catenary_between

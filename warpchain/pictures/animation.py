@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.files import checked_output, replacing, write_whole
+from warpchain.pictures.chain import floor_height, floor_line
 from warpchain.pictures.film import DPI, EDGE, INNER, OUTER, Film, floor_marks, side_box
 from warpchain.pictures.walk_shape import checked_joints, headline
 
@@ -132,6 +133,7 @@ def player(walk: "WalkResult", slow: float = 4.0) -> str:
     count = min(len(walk.frame_time), _PLAYER_FRAMES)
     frames = np.rint(np.linspace(0, len(walk.frame_time) - 1, count)).astype(int)
     times, box = walk.frame_time[frames], side_box(walk, joints)
+    marks = floor_marks(*box[0])
     center = np.stack([np.interp(times, walk.time, walk.center[:, axis]) for axis in (0, 1)], axis=1)
     data = {
         "time": _whole(times, 1e6),
@@ -140,7 +142,9 @@ def player(walk: "WalkResult", slow: float = 4.0) -> str:
         "radius": walk.setup.parameters.circle_radius * 1e4,
         "sprocket": None if sprocket is None else _whole(np.array([*sprocket, walk.sprocket_radius])),
         "view": _whole(box.ravel()),
-        "marks": floor_marks(*box[0]),
+        "marks": marks,
+        "heights": _whole(np.array(floor_height(walk, np.array(marks)))),
+        "floor": _whole(floor_line(walk, *(box[0] + np.array([-3, 3]) * np.ptp(box[0])))),
         "slow": slow,
         "colors": {"inner": INNER, "outer": OUTER, "edge": EDGE},
     }

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
-from matplotlib.patches import Rectangle
+from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
+from warpchain.inputs.floor import distances, heights
+from warpchain.inputs.scene import floor_points
 from warpchain.pictures.style import GROUND, INK
 
 if TYPE_CHECKING:
@@ -113,11 +115,32 @@ def walk_box(walk: "WalkResult", joints: Array) -> tuple[Array, Array]:
     circle = sprocket_circle(walk)
     if circle is not None:
         low, high = np.minimum(low, circle.min(axis=0)), np.maximum(high, circle.max(axis=0))
-    low[1] = 0.0
+    low[1] = floor_line(walk, low[0], high[0])[:, 1].min()
     return low, high
 
 
-def draw_ground(axes: Axes, left: float, right: float, bottom: float) -> None:
-    """The floor at height 0, from the side, down to `bottom` [m]."""
-    axes.add_patch(Rectangle((left, bottom), right - left, -bottom, facecolor=GROUND, zorder=3))
-    axes.plot([left, right], [0.0, 0.0], color=INK, linewidth=1.0, zorder=3)
+def floor_line(walk: "WalkResult", left: float, right: float) -> Array:
+    """The floor's profile from one x to another [m], shape (p, 2)."""
+    points = floor_points(walk.setup.scene)
+    inner = np.empty((0, 2)) if points is None else points[(points[:, 0] > left) & (points[:, 0] < right)]
+    ends = np.array([left, right])
+    first, last = np.column_stack([ends, floor_height(walk, ends)])
+    return np.vstack([first, inner, last])
+
+
+def floor_height(walk: "WalkResult", x: Any) -> Any:
+    """Height of the floor at x [m]."""
+    points = floor_points(walk.setup.scene)
+    return 0.0 * x if points is None else heights(points, x)
+
+
+def from_floor(walk: "WalkResult", joints: Array) -> Array:
+    """Distance of joints x, y from the floor [m], shape (…, n, 2) → (…, n)."""
+    points = floor_points(walk.setup.scene)
+    return joints[..., 1] if points is None else distances(points, joints.reshape(-1, 2)).reshape(joints.shape[:-1])
+
+
+def draw_ground(axes: Axes, line: Array, bottom: float) -> None:
+    """The floor along a line from left to right, from the side, down to `bottom` [m]."""
+    axes.add_patch(Polygon([(line[0, 0], bottom), *line, (line[-1, 0], bottom)], facecolor=GROUND, zorder=3))
+    axes.plot(*line.T, color=INK, linewidth=1.0, zorder=3)

@@ -8,7 +8,16 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from warpchain.pictures.chain import SIDE, draw_chain, draw_ground, sprocket_circle, view_from, walk_box
+from warpchain.pictures.chain import (
+    SIDE,
+    draw_chain,
+    draw_ground,
+    floor_height,
+    floor_line,
+    sprocket_circle,
+    view_from,
+    walk_box,
+)
 from warpchain.pictures.style import BLUE, FAINT, GROUND, INK, tidy
 from warpchain.pictures.walk_shape import center_in_room, checked_joints, headline
 
@@ -39,7 +48,7 @@ def floor_marks(low: float, high: float, most: int = 9) -> list[float]:
 def side_box(walk: "WalkResult", joints: Array) -> Array:
     """Left and right, bottom and top of what is shown from the side [m], shape (2, 2), with some of the floor."""
     low, high = walk_box(walk, joints)
-    return np.array([[low[0], -0.045 * max(high[:2] - low[:2])], high[:2]]).T
+    return np.array([[low[0], low[1] - 0.045 * max(high[:2] - low[:2])], high[:2]]).T
 
 
 class Film:
@@ -74,7 +83,7 @@ class Film:
         share = _PADDING / size
         self._axes = self.figure.add_axes((*share[0], *(1 - share.sum(axis=0))), xlim=box[0], ylim=box[1])
         if self._view is SIDE:
-            draw_ground(self._axes, box[0, 0], box[0, 1], box[1, 0])
+            draw_ground(self._axes, floor_line(walk, *box[0]), box[1, 0])
             self._axes.set(xlabel="$x$ / m", yticks=[], xticks=floor_marks(*box[0]))
             tidy(self._axes)
             self._axes.spines[["left", "bottom"]].set_visible(False)
@@ -84,7 +93,8 @@ class Film:
         circle = sprocket_circle(walk)
         if circle is not None:
             center = circle[:-1].mean(axis=0)
-            for path in (circle, np.stack([center, center * (1.0, 0.0, 1.0)])):
+            foot = np.array([center[0], floor_height(walk, center[0]), center[2]])
+            for path in (circle, np.stack([center, foot])):
                 self._axes.plot(*self._project(path), color=FAINT, linewidth=0.8)
         self.figure.text(0.015, 0.975, headline(walk), va="top", fontsize=11, color=INK)
         self._moving: list[Any] = []

@@ -16,7 +16,18 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from warpchain.pictures.chain import ABOVE, FRONT, SIDE, draw_chain, draw_ground, sprocket_circle, walk_box
+from warpchain.pictures.chain import (
+    ABOVE,
+    FRONT,
+    SIDE,
+    draw_chain,
+    draw_ground,
+    floor_height,
+    floor_line,
+    from_floor,
+    sprocket_circle,
+    walk_box,
+)
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.style import DASHES, DOTS, FAINT, GROUND, INK, tidy
 from warpchain.pictures.walk_shape import center_in_room, checked_joints, setting
@@ -88,10 +99,10 @@ def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure |
     left = _LEFT + (across - scale * (size[0] + broad)) / 2
     bottom = _FOOT + lower + _BELOW
     side = panel(left, bottom, width, height)
-    side.set(xlim=(low[0], high[0]), ylim=(-depth, high[1] + top), xlabel="x / m", ylabel="y / m")
+    side.set(xlim=(low[0], high[0]), ylim=(low[1] - depth, high[1] + top), xlabel="x / m", ylabel="y / m")
     views = [(f"{setting(walk)}{', from the side' * tilts}", side, SIDE)]
-    draw_ground(side, low[0], high[0], -depth)
-    _draw_distance(side, walk, -0.5 * depth)
+    draw_ground(side, floor_line(walk, low[0], high[0]), low[1] - depth)
+    _draw_distance(side, walk, low[1], 0.5 * depth)
     if tilts:
         z = (low[2] + high[2]) / 2 + np.array([0.5, -0.5]) * broad
         front = panel(left + width + _BETWEEN, bottom, scale * broad, height)
@@ -99,7 +110,7 @@ def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure |
         front.xaxis.set_major_locator(MaxNLocator(4))
         above = panel(left, _FOOT + 0.5, width, scale * broad)
         above.set(xlim=(low[0], high[0]), ylim=z, xlabel="x / m", ylabel="z / m", facecolor=GROUND)
-        draw_ground(front, z[0], z[1], -depth)
+        draw_ground(front, np.array([[z[0], 0.0], [z[1], 0.0]]), -depth)
         views += [("from the front", front, FRONT), ("from above", above, ABOVE)]
     # viridis without its palest end, which can hardly be seen on white paper
     colors = colormaps["viridis"](0.9 * walk.frame_time / (walk.frame_time[-1] or 1.0))[:, :3]
@@ -117,7 +128,7 @@ def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure |
     for number, close_up in enumerate(close_ups):
         axes = panel(_LEFT + number * close_up_width, _FOOT, close_up_width - 0.1, lower)
         draw_chain(axes, joints[close_up.frame], radius, SIDE, _link_colors(colors[close_up.frame]), edge=0.6)
-        _frame_close_up(axes, side, close_up, "abcd"[number], walk.frame_time[close_up.frame])
+        _frame_close_up(axes, side, walk, close_up, "abcd"[number], walk.frame_time[close_up.frame])
     style: dict[str, Any] = {"frameon": False, "ncols": 2, "borderaxespad": 0.0, "fontsize": "small"}
     place = (1 - _RIGHT / paper[0], 1 - 0.08 / paper[1])
     figure.legend(*side.get_legend_handles_labels(), loc="upper right", bbox_to_anchor=place, **style)
@@ -172,26 +183,27 @@ def _draw_way(axes: Axes, walk: "WalkResult", center: Array, view: Array) -> Non
     if circle is not None:
         style: dict[str, Any] = {"color": FAINT, "linewidth": 1.0, "linestyle": DASHES, "zorder": 1.5}
         middle = circle[:-1].mean(axis=0)
-        upright = np.stack([middle, middle * (1.0, 0.0, 1.0)])
+        upright = np.stack([middle, [middle[0], floor_height(walk, middle[0]), middle[2]]])
         ends = np.stack([circle.min(axis=0), circle.max(axis=0)])  # from its edge the circle is a line
         for part, label in ((circle if view is SIDE else ends, "sprocket until release"), (upright, "_")):
             axes.plot(*(view @ part.T)[:2], label=label, **style)
     axes.plot(*(view @ center.T)[:2], color=INK, linewidth=1.4, linestyle=DOTS, label="centre of mass", zorder=4)
 
 
-def _draw_distance(axes: Axes, walk: "WalkResult", depth: float) -> None:
-    """The distance walked, if there is one, at height `depth` [m]."""
+def _draw_distance(axes: Axes, walk: "WalkResult", low: float, depth: float) -> None:
+    """The distance walked, if there is one, so far [m] below a slope, or below the lowest place of another floor."""
     if not np.isfinite(walk.dx):
         return
-    end = float(walk.center[-1, 0])
-    start = end - walk.dx
+    slope = walk.setup.scene.slope
+    x = walk.center[-1, 0] - np.array([walk.dx * np.cos(np.radians(slope)), 0.0])
+    floor = floor_height(walk, x)
+    y = (floor if slope != 0 else low) - depth + 0 * x
     arrow = {"arrowstyle": "<|-|>", "color": INK, "shrinkA": 0, "shrinkB": 0}
-    axes.annotate("", (end, depth), (start, depth), arrowprops=arrow, zorder=4)
-    for x in (start, end):
-        axes.plot([x, x], [0.0, 1.6 * depth], color=INK, linewidth=0.8, zorder=4)
+    axes.annotate("", (x[1], y[1]), (x[0], y[0]), arrowprops=arrow, zorder=4)
+    axes.plot([x, x], [floor, y - 0.6 * depth], color=INK, linewidth=0.8, zorder=4)
     box = {"facecolor": GROUND, "edgecolor": "none", "pad": 2.0}
     text = f"Δx = {walk.dx:.3f} m"
-    axes.text((start + end) / 2, depth, text, ha="center", va="center", bbox=box, zorder=4)
+    axes.text(x.mean(), y.mean(), text, rotation=-slope, ha="center", va="center", bbox=box, zorder=4)
 
 
 @dataclass(frozen=True)
@@ -204,10 +216,13 @@ class _CloseUp:
     high: Array
 
 
-def _frame_close_up(axes: Axes, strip: Axes, close_up: _CloseUp, letter: str, moment: float) -> None:
+def _frame_close_up(
+    axes: Axes, strip: Axes, walk: "WalkResult", close_up: _CloseUp, letter: str, moment: float
+) -> None:
     """The floor and the title of a close-up, and its box with a letter in the strip."""
     (x, y), (right, top) = close_up.low, close_up.high
-    draw_ground(axes, x, right, min(y, 0.0))
+    line = floor_line(walk, x, right)
+    draw_ground(axes, line, min(y, line[:, 1].min()))
     axes.set(xlim=(x, right), ylim=(y, top), xticks=[], yticks=[])
     axes.set_title(f"{close_up.title}, {moment:.3f} s", fontsize="medium", loc="left", x=0.07)
     axes.annotate(
@@ -224,25 +239,28 @@ def _close_ups(walk: "WalkResult") -> list[_CloseUp]:
     collapse is the last time at which the top of the chain is half as high as at the release.
     """
     joints, radius = walk.frame_joints, walk.setup.parameters.circle_radius
-    height, last = joints[:, :, 1].max(axis=1), len(joints) - 1
+    above = from_floor(walk, joints)
+    height, last = above.max(axis=1), len(joints) - 1
     found: dict[int, tuple[str, Array]] = {}
-    touching = np.flatnonzero(joints[:, :, 1].min(axis=1) < 1.02 * radius)
+    touching = np.flatnonzero(above.min(axis=1) < 1.02 * radius)
     if touching.size:
         frame = int(touching[0])
-        found[frame] = "first touch", joints[frame, np.argmin(joints[frame, :, 1])]
+        found[frame] = "first touch", joints[frame, np.argmin(above[frame])]
     meeting = _first_meeting(joints, 2.02 * radius)
     if meeting is not None:
         found[meeting[0]] = "first self-contact", meeting[1]
     frame = int(np.flatnonzero(height >= 0.5 * height[0])[-1])
     found[frame] = "collapse", joints[frame, _sharpest_bend(joints[frame])]
+    middle = np.median(joints[last, :, 0])
     found[last] = (
         "rest" if walk.status is Status.AT_REST else "end",
-        np.array([np.median(joints[last, :, 0]), 0.0]),
+        np.array([middle, floor_height(walk, middle)]),
     )
     size = np.array([1.0, 1.0 / _CLOSE_UP_ASPECT]) * _CLOSE_UP_LINKS * walk.setup.parameters.link_length
     close_ups = []
     for frame, (title, spot) in sorted(found.items()):
-        low = np.maximum(spot - size / 2, (-np.inf, -0.1 * size[1]))
+        deepest = floor_line(walk, spot[0] - size[0] / 2, spot[0] + size[0] / 2)[:, 1].min() - 0.1 * size[1]
+        low = np.maximum(spot - size / 2, (-np.inf, deepest))
         close_ups.append(_CloseUp(title, frame, low, low + size))
     return _side_by_side(close_ups)
 

@@ -14,7 +14,12 @@ from warpchain.inputs.validation import DIMENSIONLESS, field_unit
 _SYMBOLS: Final = {"dx": "Δx", "links": "n", "frequency": "ν"}
 """The paper's symbols of what is not in Table 1."""
 
-_NAMES: Final = {"dx": "distance walked", "links": "number of links", "frequency": "frequency of the sprocket"}
+_NAMES: Final = {
+    "dx": "distance walked",
+    "links": "number of links",
+    "frequency": "frequency of the sprocket",
+    "point": "parameter set",
+}
 """Names that say more than those of the fields."""
 
 COUNTS: Final = ("count", "absent", "failed", "missing")
@@ -55,8 +60,8 @@ def short_texts(values: Sequence[Any] | NDArray[Any]) -> list[str]:
 
 
 def unit_text(name: str) -> str:
-    """Unit of a field of `Parameters`, `Scene` or `Options`; empty for pure numbers and `preset`."""
-    if name == "preset":
+    """Unit of a field of `Parameters`, `Scene` or `Options`; empty for pure numbers, `preset` and `point`."""
+    if name not in SECTION_OF:
         return ""
     unit = field_unit(SECTIONS[SECTION_OF[name]].model_fields[name])
     return "" if unit == DIMENSIONLESS else unit

@@ -74,7 +74,7 @@ def save_figure(figure: "Figure", path: str | os.PathLike[str]) -> None:
 
     figure.set_dpi(PICTURE_DPI)
     with replacing(path) as part:
-        FigureCanvasAgg(figure).print_png(part)  # type: ignore[no-untyped-call]
+        FigureCanvasAgg(figure).print_png(part, pil_kwargs={"compress_level": 3})  # type: ignore[no-untyped-call]
 
 
 def tidy(axes: "Axes", *, grid: Literal["x", "y", "both"] | None = None) -> None:

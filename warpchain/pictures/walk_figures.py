@@ -9,6 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
+from warpchain.inputs.scene import floor_points
+from warpchain.pictures.chain import floor_height
 from warpchain.pictures.film_strip import film_strip
 from warpchain.pictures.inline import InlineFigure
 from warpchain.pictures.loop_figure import loop_figure
@@ -37,14 +39,20 @@ def draw(walk: "WalkResult", kind: Kind, *, figure: Figure | None = None, ax: Ax
 
 
 def height_and_speed(walk: "WalkResult", *, figure: Figure | None = None) -> Figure:
-    """Height and horizontal speed of the centre of mass against time since the release, as in Figure 5."""
+    """Height and horizontal speed of the centre of mass against time since the release, as in Figure 5.
+
+    A thin line is the height of a floor that is not flat, below the centre of mass.
+    """
     figure = InlineFigure(figsize=(6.4, 5.0), layout="constrained") if figure is None else figure
     height, speed = figure.subplots(2, 1, sharex=True)
     height.plot(walk.time, walk.center[:, 1], color=BLUE, linewidth=1.4)
     speed.plot(walk.time, walk.center_velocity[:, 0], color=BLUE, linewidth=1.4)
     height.set_ylabel("height $y^\\mathrm{cm}$ / m")
     speed.set_ylabel("speed $v_x^\\mathrm{cm}$ / (m/s)")
-    height.set_ylim(bottom=0.0)
+    if floor_points(walk.setup.scene) is None:
+        height.set_ylim(bottom=0.0)
+    else:
+        height.plot(walk.time, floor_height(walk, walk.center[:, 0]), color=FAINT, linewidth=0.8)
     _finish(walk, height, speed)
     return figure
 

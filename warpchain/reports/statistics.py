@@ -4,8 +4,7 @@ Only walks that came to rest are used; the number of the others is given with ev
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,14 +26,11 @@ CONFIDENCE: Final = 0.95
 _RESAMPLES: Final = 1000
 
 
-@dataclass(frozen=True)
-class PairedCell:
+class PairedCell(NamedTuple):
     """A cell at two tolerances.
 
-    Attributes:
-        cell: description of the cell, such as ``n = 60, ν = 15 Hz``.
-        distances: Δx [m] of the same walks at the loose and at the tight tolerance, shape (2, pairs).
-        lost: number of pairs left out, because one of the two walks failed or has not been run yet.
+    `distances` are Δx [m] of the same walks at the loose and at the tight one, shape (2, pairs); `lost` is the number
+    of pairs left out, because one of the two walks failed or has not been run yet.
     """
 
     cell: str
@@ -62,16 +58,8 @@ class PairedCell:
         return float((loose - tight).std(ddof=1) / len(loose) ** 0.5 / tight.mean())
 
 
-@dataclass(frozen=True)
-class ToleranceAgreement:
-    """How well the distances of the same walks agree at the greatest and the least tolerance of a sweep.
-
-    Attributes:
-        loose: the greatest.
-        tight: the least.
-        cells: the cells that have pairs.
-        lost: number of pairs left out, see `PairedCell`.
-    """
+class ToleranceAgreement(NamedTuple):
+    """The distances of the same walks at the greatest and the least tolerance of a sweep, in cells that have pairs."""
 
     loose: float
     tight: float
@@ -95,19 +83,12 @@ class ToleranceAgreement:
         return text + (f" {self.lost} more pairs are not complete." if self.lost else "")
 
 
-@dataclass(frozen=True)
-class Sensitivity:
+class Sensitivity(NamedTuple):
     """Sobol' indices of the distance in one cell, for d drawn quantities, the greatest total index first.
 
-    Attributes:
-        cell: description of the cell.
-        names: names of the quantities.
-        first_order: share of the variance that a quantity causes by itself, shape (d,).
-        total_order: share that it causes by itself and together with others, shape (d,).
-        first_order_interval: bootstrap interval of `first_order`, shape (d, 2).
-        total_order_interval: bootstrap interval of `total_order`, shape (d, 2).
-        samples: number of samples, of d + 2 walks each.
-        lost: number of samples left out, because one of their walks failed or has not been run yet.
+    The share of the variance that a quantity causes by itself, shape (d,), and together with others, each with its
+    bootstrap interval, shape (d, 2). There are so many samples, of d + 2 walks each; `lost` are those left out, because
+    one of their walks failed or has not been run yet.
     """
 
     cell: str

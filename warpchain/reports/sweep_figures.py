@@ -135,7 +135,7 @@ def tolerance(result: SweepResult) -> Picture:
     left.fill_between(ends, 0.9 * ends, 1.1 * ends, color=GROUND, linewidth=0, label="within 10 %")
     left.plot(ends, ends, color=FAINT, linewidth=1.0)
     dots: dict[str, Any] = {"color": BLUE, "linewidth": 0, "zorder": 3}
-    left.scatter(distances[1], distances[0], s=16, alpha=0.65, label="one walk", **dots)
+    left.scatter(distances[1], distances[0], s=16, alpha=0.65, **dots)
     left.set(xlim=ends, ylim=ends, aspect="equal")
     left.set_xlabel(f"$Δx$ at tolerance {tight} / m")
     left.set_ylabel(f"$Δx$ at tolerance {loose} / m")

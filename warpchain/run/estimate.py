@@ -12,7 +12,7 @@ import numpy as np
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.processors import processors
 from warpchain.inputs.options import on_gpu
-from warpchain.run.sweep_run import on_device, prepare
+from warpchain.run.sweep_run import checked_part, on_device, prepare
 from warpchain.sweeps.plan import PlannedWalk, Sweep, load_sweep
 from warpchain.walks.rows import row_type
 from warpchain.walks.scheduler import run_setups
@@ -48,6 +48,7 @@ def estimate_sweep(
     *,
     device: str | None = None,
     workers: int | None = None,
+    part: str | None = None,
     seed: int | None = None,
     samples: int | None = None,
 ) -> Estimate:
@@ -56,6 +57,7 @@ def estimate_sweep(
     planned = load_sweep(source, **replaced)
     planned = planned if device is None else on_device(planned, device)
     indices = planned.indices
+    walks = len(indices) if part is None else -(-len(indices) // checked_part(part)[1])
     uses_gpu = any(on_gpu(walk.setup.options.device) for walk in planned.undrawn(indices[:1].tolist()))
     at_once = 1 if uses_gpu else workers or processors()
     count = min(len(indices), GPU_PILOTS if uses_gpu else max(PILOTS, 2 * at_once))
@@ -68,7 +70,7 @@ def estimate_sweep(
     kept = {name: _chosen(planned, name) for name in ("series", "frames")}
     row = row_type([name for block in planned.blocks for name in block.drawn]).itemsize
     size = row * len(indices) + series * kept["series"] + frames * kept["frames"]
-    return Estimate(len(indices), count, at_once, seconds * len(indices) / at_once, size)
+    return Estimate(walks, count, at_once, seconds * walks / at_once, size * walks / len(indices))
 
 
 def _tried(planned: Sweep, pilots: Sequence[PlannedWalk]) -> tuple[float, float, float]:

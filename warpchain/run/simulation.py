@@ -55,8 +55,7 @@ def simulate(
         duration: Simulated time [s], from time 0, which is that of the state.
         times: Instants of the trajectory [s], rising, in [0, duration]; steps land on them exactly. Default: 101
             instants evenly spread.
-        floor: Whether there is a floor at y = 0, or the points [[x, y], …] [m] of one that is not flat, as ``floor`` of
-            a scene.
+        floor: Whether there is a floor at y = 0, or one like ``floor`` of a scene: points [[x, y], …] [m].
         gravity: Whether gravity acts.
         self_contact: Whether links touch one another.
         method: A key of ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
@@ -256,12 +255,11 @@ def _checked_floor(floor: Any) -> Array | None:
     """Points of the floor [m], None if it is flat or there is none, or an `InputError`."""
     if isinstance(floor, bool):
         return None
-    if not isinstance(floor, list):
-        raise InputError(f"floor: {shown(floor)} is no floor; give True, False, or points [[x, y], …] in m")
     try:
-        return np.array(checked_profile(floor))
+        profile = checked_profile(floor)
     except ValueError as problem:
         raise InputError(f"floor: {problem}") from None
+    return None if profile == "flat" else np.array(profile)
 
 
 def _check_above(points: Array, start: Array, chain: Parameters) -> None:

@@ -149,6 +149,8 @@ def _fill(file: "h5py.File", results: Sequence[SweepResult]) -> None:
         group = file if len(whole.blocks) == 1 else file.create_group(name, track_order=True)
         group.attrs["block"] = name
         coordinates, variables = block.variables()
+        if further := [name for name, (dims, _, _) in coordinates.items() if dims != (name,)]:
+            group.attrs["coordinates"] = " ".join(further)  # as xarray has it
         if len(whole.origin.sweeps) > 1:
             seeds = [str(whole.origin.sweeps[number].seed) for number, _ in whole.origin.samples(block.number)]
             notes = {"units": "1", "description": "seed of the sweep that the sample belongs to"}

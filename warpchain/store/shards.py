@@ -82,8 +82,8 @@ def write_shard(
 
     folder = Path(directory) / "shards"
     if shard.keeps_motion:
-        write_whole(folder / shard.motion_name, hdf5_image(MOTION_KIND, fill_motions), clear=False)
-    write_whole(folder / shard.name, hdf5_image(KIND, fill), clear=False)  # parts go when the folder is opened
+        write_whole(folder / shard.motion_name, hdf5_image(MOTION_KIND, fill_motions))
+    write_whole(folder / shard.name, hdf5_image(KIND, fill))
 
 
 def read_shard(directory: Folder, shard: Shard) -> Rows:

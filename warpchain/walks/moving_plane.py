@@ -6,22 +6,17 @@ way that the chain walks.
 """
 
 import math
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.inputs.link_values import link_values
 from warpchain.inputs.parameters import Parameters
+from warpchain.inputs.scene import link_values
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.state import State
 from warpchain.kernels import layout
 
 Array = NDArray[np.float64]
-
-
-UPRIGHT: Final = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
-"""A plane at rest whose axes are the room's X and Y."""
 
 
 def released_plane(setup: Setup, position: Array) -> Array:

@@ -37,7 +37,9 @@ def state_at(setup: Setup, t: object, end: float) -> State:
     time = plain(t, "t")
     if isinstance(time, bool) or not isinstance(time, int | float):
         raise InputError(f"t: {shown(time)} is not a time; give a number of seconds")
-    first = 0.0 if setup.start is None else setup.start.time
+    first = setup.scene.release[-1][0] if setup.scene.release is not None else 0.0  # then the sprocket vanishes
+    if setup.start is not None:
+        first = setup.start.time
     if np.isnan(end):
         raise InputError("t: the walk ended before its release, and has no such time; see its status")
     if not first <= time <= end:

@@ -4,7 +4,7 @@ import threading
 import time
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from warpchain.engine.batch import Batch
@@ -152,6 +152,8 @@ def compile_kernels(setups: Iterable[Setup], threads: int | None = None) -> None
             features = features_of(setup.options, columns, fixed_body=fixed_body, tilts=tilts)
             size = (threads or block_threads(setup.scene.links)) if on_gpu(setup.options.device) else 1
             wanted.add((setup.options.device, features, size))
+            if setup.has_drive and setup.scene.release is not None and fixed_body == floor:
+                wanted.add((setup.options.device, replace(features, moving_sprocket=True), size))
     with gpu_turn(device for device, _, _ in wanted):
         load_kernels((start_device(device), features, size) for device, features, size in wanted)
 

@@ -22,10 +22,11 @@ from warpchain.engine.control import (
     suitable_load,
 )
 from warpchain.engine.snapshot import change, restore, set_first_area, set_frame_marks, take_snapshot
+from warpchain.engine.sprocket_motion import motion_rows
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
 from warpchain.inputs.floor import body_of, circles_of, raised_by
-from warpchain.inputs.link_values import link_values, mean_value
-from warpchain.inputs.scene import contact_radius, floor_points, joint_radius, loop_speed, settling_time
+from warpchain.inputs.link_values import mean_value
+from warpchain.inputs.scene import contact_radius, floor_points, joint_radius, link_values, loop_speed, settling_time
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.start_shapes import ellipse, lay_chain, stadium
 from warpchain.inputs.state import State
@@ -98,6 +99,7 @@ class WalkRun:
         self._hold_softness = 0.0
         self._at_full_speed = math.nan
         self._first_area: float | None = None
+        self._moves_sprocket = False
 
         scene, parameters = setup.scene, setup.parameters
         self._links = link_values(scene, parameters)
@@ -177,8 +179,8 @@ class WalkRun:
 
     @property
     def is_released(self) -> bool:
-        """Whether the chain walks, and all that its start brings has been done."""
-        return self._released and self._first_area is None
+        """Whether the chain walks without a sprocket, and all that its start brings has been done."""
+        return self._released and self._first_area is None and not self._moves_sprocket
 
     @property
     def _walk_end(self) -> float:
@@ -190,7 +192,8 @@ class WalkRun:
     def features(self) -> Features:
         """What the kernel that carries the world on must be compiled for."""
         if self._released:
-            return self._batch.features(fixed_body=body_of(self._floor), tilts=self._tilts)
+            body = body_of(self._floor)
+            return self._batch.features(fixed_body=body, tilts=self._tilts, moving_sprocket=self._moves_sprocket)
         return self._batch.features(fixed_body="sprocket")
 
     @property
@@ -331,6 +334,10 @@ class WalkRun:
             self._first_area = None
             self._batch.resume(self._world, self._walk_end, Status.TIME_LIMIT)
             return True
+        if self._moves_sprocket and status == Status.FINISHED:
+            self._moves_sprocket = False
+            self._batch.resume(self._world, self._walk_end, Status.TIME_LIMIT)
+            return True
         if self._released or status != Status.FINISHED:
             until, limit = self.setup.scene.walk_until, self.setup.scene.walk_limit
             is_planned = status == Status.TIME_LIMIT and until is not None and until <= limit
@@ -419,6 +426,13 @@ class WalkRun:
         self._load(position, velocity)
         if self._tilts:
             self._batch.set_plane(self._world, released_plane(self.setup, position))
+        if scene.release is not None:
+            self._batch.set_chain(
+                self._world, self.setup.parameters, scene.links, contact_radius(scene, self.setup.parameters)
+            )
+            self._batch.set_drive(self._world, motion=motion_rows(scene.release, scene.frequency, self.raised))
+            self._batch.resume(self._world, min(scene.release[-1][0], self._walk_end), Status.FINISHED)
+            self._moves_sprocket = True
         self._released = True
 
     def _load(self, position: Array, velocity: Array) -> None:

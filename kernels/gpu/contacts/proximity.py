@@ -14,7 +14,7 @@ from warpchain.kernels.gpu.threads import block_maxima, vec4i
 from warpchain.kernels.layout import COSINE, INVERSE_INERTIA, INVERSE_MASS, OMEGA, SINE, U, V
 from warpchain.kernels.methods.controller import quick_quotient, quick_root
 from warpchain.kernels.physics.elementary import TWO, from_order_key_single, order_bits_single, order_key_single
-from warpchain.kernels.types import Chain, Control, Drive, Ground
+from warpchain.kernels.types import Chain, Control, Drive, Ground, State
 
 wp.set_module_options({"enable_backward": False})
 
@@ -35,8 +35,8 @@ def block_proximity(features: Features, block_dim: int):
     has_self = features.self_contact
     has_contacts = has_fixed or has_self
     if has_fixed:
-        gap_of, meet = link_and_body(features.fixed_body)
-        face_of, face_at = BODIES[features.fixed_body].face, BODIES[features.fixed_body].motion
+        gap_of, _meet = link_and_body(features.fixed_body)
+        face_of = BODIES[features.fixed_body].face
     tilts = features.tilts
     _maximum, write_maxima, read_maxima = block_maxima(block_dim)
 
@@ -95,9 +95,9 @@ def block_proximity(features: Features, block_dim: int):
         write_maxima(memory, place.lane, values)
 
     @wp.func
-    def read_proximity(memory: wp.uint64) -> Proximity:
+    def read_proximity(memory: wp.uint64, links: int) -> Proximity:
         """Maxima over all links, after a barrier."""
-        values = read_maxima(memory)
+        values = read_maxima(memory, links)
         proximity = Proximity()
         proximity.opening = quick_root(wp.cast(values[0], wp.float32))
         proximity.gap = -from_order_key_single(values[1])
@@ -108,7 +108,7 @@ def block_proximity(features: Features, block_dim: int):
     @wp.func
     def time_to_contact(control: Control, pairs: int, gap: wp.float32, slack: wp.float32, speed: wp.float32):
         """Longest step [s] that cannot miss a contact; 0 near contacts, where the contact step is the bound."""
-        is_near = pairs > 0
+        is_near = pairs > 0 or wp.static(features.moving_sprocket)  # which may come nearer by itself
         distance = wp.float32(control.skin)
         if wp.static(has_fixed):
             is_near = is_near or gap < distance
@@ -117,8 +117,18 @@ def block_proximity(features: Features, block_dim: int):
             distance = wp.min(distance, slack)
         return wp.where(is_near, wp.float32(0.0), quick_quotient(distance, speed))
 
+    meet_fixed_body = block_contact(features.fixed_body) if has_fixed else None
+    return write_proximity, read_proximity, time_to_contact, meet_fixed_body
+
+
+@functools.cache
+def block_contact(fixed_body: str):
+    """Warp function: applies the impulses between a body and this link on the board; returns their number."""
+    _gap_of, meet = link_and_body(fixed_body)
+    face_of, face_at = BODIES[fixed_body].face, BODIES[fixed_body].motion
+
     @wp.func
-    def meet_fixed_body(
+    def meet_body(
         K: wp.array2d(dtype=wp.float64),
         place: Place,
         ground: Ground,
@@ -127,7 +137,6 @@ def block_proximity(features: Features, block_dim: int):
         world: int,
         time: wp.float64,
     ):
-        """Applies the impulses between the body and this link on the board; returns their number."""
         link = read_link(K, place.lane)
         left_x, left_y, right_x, right_y = ends_of(link)
         u, v, omega, lost, hits = meet(
@@ -155,4 +164,28 @@ def block_proximity(features: Features, block_dim: int):
         K[layout.BOARD_LOST_FIXED, place.lane] = lost
         return int(hits)
 
-    return write_proximity, read_proximity, time_to_contact, meet_fixed_body
+    return meet_body
+
+
+@functools.cache
+def moving_sprocket_contact():
+    """Warp function: as that of `block_contact` for the moving sprocket; it counts the impulses itself."""
+    meet_sprocket = block_contact("moving sprocket")
+
+    @wp.func
+    def meet_and_count(
+        K: wp.array2d(dtype=wp.float64),
+        place: Place,
+        ground: Ground,
+        chain: Chain,
+        drive: Drive,
+        state: State,
+        world: int,
+        time: wp.float64,
+    ):
+        hits = meet_sprocket(K, place, ground, chain, drive, world, time)
+        if hits > 0:
+            wp.atomic_add(state.counts, world, wp.static(layout.SPROCKET_IMPULSES), wp.int64(hits))
+        return hits
+
+    return meet_and_count

@@ -14,6 +14,7 @@ import warp as wp
 
 from tests.support.blocks_under_test import (
     FIXED_STEP,
+    HILLS,
     SOFT,
     assert_same,
     batch_of,
@@ -42,6 +43,7 @@ pytestmark = pytest.mark.usefixtures("without_fused_operations")
     [
         ("bs32", "floor", False, LINKS),
         ("os32", "sprocket", True, 5 * LINKS),
+        ("os32", "terrain", False, LINKS),
     ],
 )
 def test_fixed_steps_equal_a_cpu_kernel(method: str, fixed_body: str, self_contact: bool, block_dim: int) -> None:
@@ -49,12 +51,15 @@ def test_fixed_steps_equal_a_cpu_kernel(method: str, fixed_body: str, self_conta
     raised = 0.9 * SOFT.sprocket_radius if fixed_body == "sprocket" else 0.0
     chains = [heap(LINKS, 3, raised=raised), heap(min(40, block_dim), 18, tilt=np.pi, raised=raised)]
     ours, theirs = (batch_of(chains, method=method, self_contact=self_contact) for _ in range(2))
+    for batch in (ours, theirs):
+        for world in range(2):
+            batch.set_floor(world, HILLS, SOFT)
     features = ours.features(fixed_body=fixed_body)
     launch_blocks(ours, features, 40, block_dim=block_dim)
     launch_chains(theirs, features, 40)
     for counts in map(theirs.counts, range(2)):
         assert counts["accepted"] == 40
-        assert counts[fixed_body] > 10
+        assert counts["sprocket" if fixed_body == "sprocket" else "floor"] > 10
         assert (counts["self"] > 10) == self_contact
     assert (theirs.counts(1)["strands"] > 0) == self_contact
     assert_same(ours, theirs)
@@ -215,7 +220,8 @@ def compiles_for_gpus(folder: Path, features: Features, block_dim: int) -> None:
     assert 0 < max(shared) <= SHARED_MEMORY
 
 
-def test_a_kernel_compiles_for_gpus(tmp_path: Path) -> None:
-    """The kernel of the drive compiles for sm_80 and sm_90."""
-    features = Features("os32", layout.padded_width(60), "sprocket", True)
+@pytest.mark.parametrize("fixed_body", ["sprocket", "terrain"])
+def test_a_kernel_compiles_for_gpus(tmp_path: Path, fixed_body: str) -> None:
+    """The kernels of the drive and of a profile compile for sm_80 and sm_90."""
+    features = Features("os32", layout.padded_width(60), fixed_body, True)
     compiles_for_gpus(tmp_path, features, 64)

@@ -1,0 +1,87 @@
+"""Walks on floors that are not flat: energy, release, end, files, sweeps and pictures."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import warpchain
+from tests.kernels.contacts.test_terrain import BOX, SOFT
+from warpchain import Status
+from warpchain.inputs.floor import distances
+from warpchain.pictures.animation import player
+from warpchain.pictures.chain import floor_line
+from warpchain.sweeps.plan import load_sweep
+
+STEP = [[-1.0, 0.0], [0.1, 0.0], [0.1, -0.05], [1.0, -0.05]]
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        {"slope": 8.0},
+        {"slope": -5.0},
+        {"floor": [[-1, 0], [0.1, 0], [0.1, -0.02], [0.2, -0.02], [0.2, 0.01], [1, 0.01]]},
+    ],
+    ids=["down", "up", "pit and step"],
+)
+def test_energy_is_accounted_for_on_every_floor(scene):
+    """What a walk begins with is what it ends with and what was lost, to a thousandth."""
+    walk = warpchain.walk(links=24, start="ellipse", preset="soft", method="explicit", frame_interval=None, **scene)
+    at_release = walk.energy["kinetic_at_release"]
+    assert walk.status == Status.AT_REST and walk.impulses["floor"] > 100
+    assert abs(walk.energy["residual"]) < 1e-3 * at_release
+    assert walk.greatest_penetration["floor"] < 2e-4
+
+
+def test_a_walk_down_a_steep_slope_ends_by_its_distance():
+    """It ends where its centre has gone the limit along the slope, and Δx is that of no chain at rest."""
+    walk = warpchain.walk(links=24, start="ellipse", preset="soft", method="explicit", slope=30.0, distance_limit=0.5)
+    assert walk.status == Status.DISTANCE_LIMIT and walk.status.ok and np.isnan(walk.dx)
+    assert walk.center[-1, 0] / np.cos(np.radians(30)) == pytest.approx(0.5, abs=0.01)
+    assert walk.center[-1, 0] >= 0.5 * np.cos(np.radians(30)) > walk.center[-2, 0]
+
+
+def test_the_release_is_at_its_clearance_from_the_profile():
+    """The nearest circle of the first frame is at the clearance from the floor, whatever is below the chain."""
+    for scene in ({"slope": 20.0}, {"floor": BOX.tolist()}):
+        walk = warpchain.walk(
+            links=24, start="ellipse", preset="soft", method="explicit", clearance=0.02, distance_limit=1e-3, **scene
+        )
+        points = BOX if "floor" in scene else np.array([[0, 0], [np.cos(np.radians(20)), -np.sin(np.radians(20))]])
+        first = distances(points, walk.frame_joints[0]).min() - SOFT.circle_radius
+        assert first == pytest.approx(0.02, abs=1e-4)
+
+
+def test_a_profile_survives_files_and_is_drawn(tmp_path: Path) -> None:
+    """A saved walk has its floor; film strip and player draw the profile, the player in tenths of a millimetre."""
+    walk = warpchain.walk(links=24, start="ellipse", preset="soft", method="explicit", floor=STEP)
+    walk.save(tmp_path / "walk.h5")
+    loaded = warpchain.load_walk(tmp_path / "walk.h5")
+    assert loaded.setup == walk.setup and [list(point) for point in loaded.setup.scene.floor] == STEP
+    assert loaded.dx == loaded.center[-1, 0]
+    line = [[-0.5, 0.0], [0.1, 0.0], [0.1, -0.05], [0.5, -0.05]]
+    assert np.allclose(floor_line(loaded, -0.5, 0.5), line)
+    drawn = json.loads(re.search(r"const walk = (.*);", player(loaded))[1])["floor"]
+    assert drawn[1:4] == [[-10000, 0], [1000, 0], [1000, -500]]
+    low = loaded.plot("film_strip").axes[0].get_ylim()[0]
+    assert low < -0.05
+
+
+def test_a_slope_is_an_axis_and_is_drawn_at_random_and_a_profile_is_a_value_of_a_sweep() -> None:
+    """Every walk has the slope of its cell or its draw; a sweep with a profile is that of its canonical form."""
+    content = {"version": 1, "name": "floors", "seed": 1, "preset": "soft", "samples": 2}
+    blocks = [
+        {"name": "axis", "grid": {"slope": [-5, 0, 5]}},
+        {"name": "draw", "distributions": {"slope": {"uniform": [1, 2]}}},
+        {"name": "step", "scene": {"floor": STEP}},
+    ]
+    sweep = load_sweep(content | {"blocks": blocks})
+    slopes = [sweep.planned(index).setup.scene.slope for index in range(8)]
+    assert slopes[:6] == [-5, -5, 0, 0, 5, 5] and all(1 < slope < 2 for slope in slopes[6:])
+    again = load_sweep(json.loads(json.dumps(sweep.canonical())))
+    assert again.digest() == sweep.digest() and again.planned(8).setup == sweep.planned(8).setup
+    flat = load_sweep(content | {"blocks": blocks[:2]}).canonical()
+    assert "floor" not in flat["blocks"][0]["scene"] and "distance_limit" not in flat["blocks"][0]["scene"]

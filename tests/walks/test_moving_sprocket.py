@@ -1,0 +1,113 @@
+"""A release by a given motion of the sprocket, with the floor present."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import warp as wp
+from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+
+import warpchain
+from tests.walks.test_states import assert_rest_of
+from warpchain import InputError
+from warpchain.engine.sprocket_motion import motion_rows
+from warpchain.kernels.contacts.fixed_body import moved_sprocket
+from warpchain.kernels.contacts.terrain import Face
+from warpchain.kernels.types import Drive
+
+SPUN: dict[str, Any] = {"links": 36, "frequency": 20.0, "start": "spinning", "preset": "soft", "method": "dp5"}
+MOTION = ((0.02, 0.0, -0.01, 20.0), (0.05, 0.1, -0.01, 5.0), (0.06, 0.1, 0.02, 0.0))
+
+
+@wp.kernel(enable_backward=False)
+def places(times: wp.array(dtype=wp.float64), drive: Drive, found: wp.array2d(dtype=wp.float64)):
+    """Place, velocity and angular velocity of the sprocket at some times."""
+    i = wp.tid()
+    face = moved_sprocket(Face(), drive, 0, times[i])
+    found[i, 0] = face.x
+    found[i, 1] = face.y
+    found[i, 2] = face.u
+    found[i, 3] = face.v
+    found[i, 4] = face.turning
+
+
+def test_the_sprocket_is_where_scipy_has_it() -> None:
+    """Between its rows it goes on SciPy's monotone cubics, from rest; its rate of turning changes evenly."""
+    height, frequency = 0.08, 20.0
+    times = np.sort(np.append(np.random.default_rng(1).uniform(0, 0.06, 200), [0.0, 0.02, 0.05, 0.06]))
+    drive, found = Drive(), wp.zeros((len(times), 5), dtype=wp.float64, device="cpu")
+    drive.motion = wp.array(motion_rows(MOTION, frequency, height)[None], dtype=wp.float64, device="cpu")
+    drive.push_rate = wp.zeros(1, dtype=wp.float64, device="cpu")
+    wp.launch(places, len(times), [wp.array(times, dtype=wp.float64, device="cpu"), drive, found], device="cpu")
+    rows = np.array([(0.0, 0.0, 0.0, frequency), *MOTION])
+    place = rows[:, 1:3] + [0.0, height]
+    slopes = PchipInterpolator(rows[:, 0], place).derivative()(rows[:, 0])
+    slopes[0] = 0.0
+    curve = CubicHermiteSpline(rows[:, 0], place, slopes)
+    ours = found.numpy()
+    np.testing.assert_allclose(ours[:, :2], curve(times), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(ours[:, 2:4], curve.derivative()(times), rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(ours[:, 4], -2 * np.pi * np.interp(times, rows[:, 0], rows[:, 3]), rtol=1e-12)
+    assert (np.abs(ours[:, 0] - 0.05) <= 0.05 + 1e-15).all()  # no overshoot
+
+
+def test_a_sprocket_that_goes_on_as_it_was_keeps_the_loop() -> None:
+    """The loop stays where and as fast as it was; when the sprocket vanishes, its centre falls on a parabola."""
+    walk = warpchain.walk(**SPUN, release=[[0.2, 0.0, 0.0, 20.0]], clearance=1.0, walk_until=0.4)
+    held = walk.time <= 0.2
+    assert np.ptp(walk.center[held], axis=0).max() < 2e-3
+    assert np.ptp(walk.kinetic_energy[held]) < 0.02 * walk.kinetic_energy[0]
+    free = walk.time >= 0.2
+    since = walk.time[free] - 0.2
+    start, speed = walk.center[free][0], walk.center_velocity[free][0]
+    fall = start + speed * since[:, None] - [0.0, walk.setup.parameters.gravity / 2] * since[:, None] ** 2
+    np.testing.assert_allclose(walk.center[free], fall, atol=1e-7)
+    assert walk.impulses["floor"] == walk.bounces == 0 and walk.impulses["sprocket"] > 1000
+
+
+def test_a_throw_gives_the_chain_the_speed_of_the_sprocket() -> None:
+    """A sprocket that is moved along takes the chain with it; what it does is in the ledger, which closes."""
+    usual = warpchain.walk(**SPUN)
+    thrown = warpchain.walk(**SPUN, release=[[0.1, 0.2, 0.0, 20.0]])
+    at = np.searchsorted(thrown.time, 0.1)
+    moved = thrown.center[at] - thrown.center[0]
+    assert moved[0] == pytest.approx(0.2, abs=0.03)
+    speed = thrown.center_velocity[at : at + 20].mean(axis=0)
+    assert 1.5 < speed[0] < 4.0  # the motion ends at 2 m/s, and the loop swings forward
+    assert thrown.status.label == "at_rest" and thrown.dx > usual.dx + 1
+    assert thrown.energy["floor"] < usual.energy["floor"] and thrown.energy_error < 1e-3
+    assert thrown.greatest_penetration["sprocket"] < 1e-3
+
+
+@pytest.mark.parametrize(
+    "settings", [SPUN, {"links": 36, "frequency": 15.0, "start": "spinning"}], ids=["explicit", "hybrid"]
+)
+def test_a_walk_goes_on_when_the_sprocket_has_vanished(settings: dict[str, Any]) -> None:
+    """Lowered onto the floor and stopped, a loop walks less far; from then on its states go on to the bit."""
+    lowered = warpchain.walk(**settings, release=[[0.05, 0.0, -0.012, 0.0], [0.07, 0.0, -0.012, 0.0]])
+    assert lowered.status.label == "at_rest" and lowered.dx < warpchain.walk(**settings).dx
+    assert lowered.energy_error < 1e-2 and lowered.bounces > 0
+    with pytest.raises(InputError, match=r"t: 0.05 s is not in the walk; give a time from 0.07"):
+        lowered.state(0.05)
+    state = lowered.state(0.1)
+    assert_rest_of(warpchain.walk(start=state), lowered, state.time)
+
+
+@pytest.mark.parametrize(
+    ("release", "more", "problem"),
+    [
+        ([[0.1, 0, 0, 0]], {"start": "ellipse"}, "release: a motion of the sprocket, which start: ellipse"),
+        ([[0.1, 0, 0, 0]], {"plane": "tilting"}, "release: a motion of the sprocket, which plane: tilting"),
+        ([[0.1, 0, 0]], {}, r"row 0, \[0.1, 0, 0\], is not four numbers"),
+        ([[0.1, 0, 0, 0], [0.1, 0, 0, 0]], {}, "row 1: 0.1 s is not after 0.1 s"),
+        ([[0.0, 0, 0, 0]], {}, "row 0: 0 s is not after 0 s"),
+        ([[0.1, 1e9, 0, 0]], {}, "is not within"),
+        ([], {}, "0 rows; give 1 to 16"),
+        ("lift", {}, "release"),
+    ],
+)
+def test_motions_that_are_none_are_refused(release: Any, more: dict[str, Any], problem: str) -> None:
+    """A motion needs a sprocket in a fixed plane, and rows of numbers in the order of their times."""
+    with pytest.raises(InputError, match=problem) as caught:
+        warpchain.walk(**{**SPUN, **more}, release=release)
+    assert "\n" not in str(caught.value)

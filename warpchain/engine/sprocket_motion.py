@@ -1,0 +1,39 @@
+"""The sprocket's motion after the release, as kernels read it."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpchain.inputs.sprocket_motion import Motion
+from warpchain.kernels import layout
+
+Array = NDArray[np.float64]
+
+BEYOND: Final = 1e30
+"""Time [s] of the rows behind the last."""
+
+
+def motion_rows(motion: Motion, frequency: float, height: float) -> Array:
+    """The rows of `Drive.motion`, (MOTION_ROWS, MOTION_VALUES).
+
+    The sprocket starts at rest; between rows it goes on monotone cubics (PCHIP), without overshoot.
+
+    Args:
+        motion: rows of time [s], place relative to that at the release [m], turns per second as in the drive [Hz].
+        frequency: at the release [Hz].
+        height: of the sprocket's centre at the release [m].
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    given = np.array([(0.0, 0.0, 0.0, frequency), *motion])
+    rows = np.zeros((layout.MOTION_ROWS, layout.MOTION_VALUES))
+    known = rows[: len(given)]
+    known[:, layout.MOTION_TIME] = given[:, 0]
+    known[:, layout.MOTION_X : layout.MOTION_Y + 1] = given[:, 1:3] + [0.0, height]
+    speeds = PchipInterpolator(given[:, 0], given[:, 1:3]).derivative()(given[:, 0])
+    known[1:, layout.MOTION_U : layout.MOTION_V + 1] = speeds[1:]
+    known[:, layout.MOTION_TURNING] = -2 * np.pi * given[:, 3]
+    rows[len(given) :] = known[-1]
+    rows[len(given) :, layout.MOTION_TIME] = BEYOND * np.arange(1, len(rows) - len(given) + 1)
+    return rows
