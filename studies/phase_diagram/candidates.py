@@ -152,7 +152,7 @@ def table(cells: Mapping[str, Array], varied: scales.Cells) -> str:
 def errors(known: Mapping[str, Points]) -> list[str]:
     """Markdown: numbers of three laws with errors from blocks of links and of frequencies."""
     rows = []
-    for candidate in (CANDIDATES[0], CANDIDATES[1], CANDIDATES[4]):
+    for candidate in (CANDIDATES[0], CANDIDATES[1], CANDIDATES[3], CANDIDATES[4]):
         for name, points in known.items():
             numbers = candidate.fit(points)[0]
             of_blocks = [block_errors(points, candidate, block) for block in BLOCKS]
@@ -161,6 +161,8 @@ def errors(known: Mapping[str, Points]) -> list[str]:
             ]
             if candidate is CANDIDATES[0]:
                 texts[2] = "2"
+            if candidate is CANDIDATES[3]:
+                texts[1] = "1"
             rows.append((candidate.name, name, ", ".join(texts)))
     return [markdown(("law of Δx", "cells", "a, b, p or c, d ± over links ± over frequencies"), rows)]
 

@@ -8,9 +8,10 @@ python -m studies.tilting_plane.taps          # that file → tables of the page
 import csv
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
+import typer
 
 import warpchain
 from studies import common
@@ -59,7 +60,7 @@ def _of_cells(columns: Mapping[str, Any], fixed: Any, rows: slice) -> dict[str, 
     found: dict[str, object] = {
         "walks": int(rest.sum()),
         "fell": f"{100 * columns['fell_over'][rows].mean():.3g}",
-        "early": f"{100 * columns['fell_before_collapse'][rows].mean():.2g}",
+        "early": f"{100 * columns['fell_before_collapse'][rows].mean():.3g}",
         "ratio": f"{ratio.mean():.3f}",
         "error": f"{np.sqrt(np.sum((ratio * errors) ** 2)) / ratio.size:.3f}",
         "least": f"{ratio.min():.2f}",
@@ -95,8 +96,7 @@ def table(rows: Sequence[Mapping[str, str]]) -> str:
             f"{row['early']} %",
             f"{row['ratio']} ± {row['error']} ({row['least']} to {row['greatest']})",
             row["drift"],
-            f"{row['straight_0.1']} %, {row['kept_0.1']}",
-            f"{row['straight_0.2']} %, {row['kept_0.2']}",
+            *(f"{row[f'straight_{bound:g}']} %, {row[f'kept_{bound:g}']}".replace("nan", "—") for bound in STRAIGHT),
         )
         for row in rows
         if row["links"] == "all"
@@ -116,7 +116,7 @@ def by_links(rows: Sequence[Mapping[str, str]]) -> str:
     )
 
 
-def main(folder: str | None = None) -> None:
+def main(folder: Annotated[str | None, typer.Argument()] = None) -> None:
     """Reduce a folder if it is given; write the tables."""
     if folder is not None:
         result = warpchain.load(folder)

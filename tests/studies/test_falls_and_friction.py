@@ -8,6 +8,7 @@ import warpchain
 from studies.floor_friction import run as friction
 from studies.slopes import run as slopes
 from studies.tilting_plane import run as falls
+from studies.tilting_plane import taps
 from tests.support.made_sweeps import make_sweep
 from warpchain.inputs.yaml_files import read_yaml
 from warpchain.sweeps.plan import PlannedWalk
@@ -80,3 +81,36 @@ def test_walks_without_end_are_counted_beside_the_distances_of_the_others(
     assert "| 60 | 10 | 5 | 2.501 | 0.001 | 0% | – |" in page
     assert "| 120 | 25 | 20 | – | – | 100% |" in page
     assert slopes.FIGURE.stat().st_size > 10_000
+
+
+def test_taps_are_compared_with_fixed_planes_and_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Made walks go a tenth further with a push; the tap has its value and unit, and that of its block."""
+    monkeypatch.setattr(taps, "FOLDER", tmp_path)
+    monkeypatch.setattr(taps, "RESULTS", tmp_path / "taps.csv")
+    marks = ("taps", "taps by links")
+    (tmp_path / "README.md").write_text(
+        "".join(f"<!-- {m} -->\n<!-- end of {m} -->\n" for m in marks), encoding="utf-8"
+    )
+
+    def outcome(walk: PlannedWalk) -> float:
+        return (1.1 if walk.setup.scene.lateral_speed else 1.0) * (1 + 0.01 * walk.sample)
+
+    grid = {"links": [60, 120], "frequency": [10, 20]}
+    content = {
+        "version": 1,
+        "name": "taps",
+        "seed": 1,
+        "preset": "soft",
+        "samples": 4,
+        "scene": {"plane": "tilting"},
+        "blocks": [
+            {"name": "fixed", "scene": {"plane": "fixed"}, "grid": grid},
+            {"name": "lateral_speed", "scene": {"tilt": 0.1}, "grid": grid | {"lateral_speed": [0.3]}},
+        ],
+    }
+    make_sweep(tmp_path / "sweep", content, outcome)
+    taps.main(str(tmp_path / "sweep"))
+    rows = taps.read()
+    assert [row["links"] for row in rows] == ["all", "60", "120"]
+    assert rows[0]["tap"] == "tilt 0.1 rad, lateral speed 0.3 m/s" and rows[0]["ratio"] == "1.100"
+    assert "1.100 ± 0.005 (1.10 to 1.10)" in (tmp_path / "README.md").read_text(encoding="utf-8")
