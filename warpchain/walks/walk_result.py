@@ -124,16 +124,10 @@ class WalkResult:
         Stored("s", "from the release to the sample after the first impulse between links; or NaN"),
     ]
     bounces_before_self_contact: Annotated[int, Stored("1", "bounces begun at self_contact_at; −1 if it never came")]
-    flight_before_self_contact: Annotated[
-        float,
-        Stored("s", f"at self_contact_at, {_SINCE_FLOOR}"),
-    ]
+    flight_before_self_contact: Annotated[float, Stored("s", f"at self_contact_at, {_SINCE_FLOOR}")]
     strands_met_at: Annotated[
         float,
-        Stored(
-            "s",
-            f"as self_contact_at, of links {layout.STRANDS_APART} or more apart along the chain: strands of the loop",
-        ),
+        Stored("s", f"the same of strands of the loop: links {layout.STRANDS_APART} or more apart along the chain"),
     ]
     bounces_before_strands_met: Annotated[int, Stored("1", "bounces begun at strands_met_at; −1 if it never came")]
     flight_before_strands_met: Annotated[float, Stored("s", f"at strands_met_at, {_SINCE_FLOOR}")]
