@@ -12,7 +12,7 @@ from warpchain.engine.tallies import LOST
 from warpchain.inputs.floor import body_of, check_above, checked_profile
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import check_links_on_gpu
+from warpchain.inputs.scene import check_links_on_gpu, link_values
 from warpchain.inputs.sections import takes_fields
 from warpchain.inputs.state import State, real_array
 from warpchain.inputs.validation import InputError, plain, shown, validated
@@ -94,7 +94,7 @@ def simulate(
         check_above(points, state.position, chain.link_length, "position")
     with gpu_turn([options.device]):
         body = "none" if floor is False else body_of(points)
-        return _follow(options, chain, state.position, state.velocity, instants, end, body, points)
+        return _follow(options, state, chain, instants, end, body, points)
 
 
 def _checked_state(given: State | Parameters | str, position: Array | None, velocity: Array | None) -> State:
@@ -207,21 +207,14 @@ class Chains:
 
 
 def _follow(
-    options: Options,
-    chain: Parameters,
-    start: Array,
-    rates: Array,
-    instants: Array,
-    end: float,
-    body: str,
-    points: Array | None,
+    options: Options, state: State, chain: Parameters, instants: Array, end: float, body: str, points: Array | None
 ) -> Trajectory:
-    """Integrate a chain whose values are checked, see `simulate`."""
-    batch = Batch(1, len(start), options, faces=1 if points is None else len(points) - 1)
-    batch.set_chain(0, chain, len(start))
+    """Integrate a chain whose values are checked, see `simulate`; ``chain``: the state's parameters, or weightless."""
+    batch = Batch(1, state.links, options, faces=1 if points is None else len(points) - 1)
+    batch.set_chain(0, chain, state.links, own=link_values(state.setup.scene, state.parameters))
     if points is not None:
         batch.set_floor(0, points, chain)
-    batch.load(0, start, rates, stop_time=instants[0], stop_status=Status.FINISHED)
+    batch.load(0, state.position, state.velocity, stop_time=instants[0], stop_status=Status.FINISHED)
     features = batch.features(fixed_body=body)
     reached, positions, velocities = [], [], []
     for instant in instants:
