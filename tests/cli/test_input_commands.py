@@ -42,7 +42,7 @@ def test_parameters_lists_everything(command: Command) -> None:
         ends = {"lower": bounds.lower, "lower_included": bounds.lower_included}
         assert entry["bounds"] == ends | {"upper": bounds.upper, "upper_included": True}
     assert listed["parameters"]["gravity"]["source"].startswith("Table 1, ")
-    assert {name: entry["value"] for name, entry in listed["scene"].items()} == Scene().model_dump()
+    assert {name: entry["value"] for name, entry in listed["scene"].items()} == dict(Scene())
     options = {name: entry["value"] for name, entry in listed["options"].items()}
     assert options == Options().model_dump() | {"method": "standard"}
     assert listed["options"]["method"]["choices"] == [*METHODS_BY_NEED, *METHODS]

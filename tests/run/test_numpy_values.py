@@ -20,13 +20,13 @@ def of_numpy(value):
 
 def test_every_setting_takes_a_numpy_value():
     """Each field of parameters, scene and options has the same value, and the same type, either way."""
-    setup = setup_walk("soft", {"load_factor": 2.0, "steady_time": 0.5, "settle_time": 0.2}, 5)
-    given = {**setup.parameters.model_dump(), **setup.scene.model_dump(), **setup.options.model_dump()}
+    setup = setup_walk("soft", {"load_factor": 2.0, "steady_time": 0.5, "settle_time": 0.2, "distance_limit": 9.0}, 5)
+    given = {**setup.parameters.model_dump(), **dict(setup.scene), **setup.options.model_dump()}
     assert given.keys() == SECTION_OF.keys() and None not in given.values()
     again = setup_walk("soft", {name: of_numpy(value) for name, value in given.items()}, None)
     assert again == setup
     for model in (again.parameters, again.scene, again.options):
-        for name, value in model.model_dump().items():
+        for name, value in model:
             assert type(value) is type(given[name]), name
 
 
