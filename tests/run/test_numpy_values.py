@@ -27,7 +27,7 @@ def test_every_setting_takes_a_numpy_value():
     again = setup_walk("soft", {name: of_numpy(value) for name, value in given.items()}, None)
     assert again == setup
     for model in (again.parameters, again.scene, again.options):
-        for name, value in model.model_dump().items():
+        for name, value in model:
             assert type(value) is type(given[name]), name
 
 
