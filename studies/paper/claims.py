@@ -152,7 +152,7 @@ CLAIMS: Final = (
     ),
     Claim(
         "Δx has the same distribution at both tolerances",
-        "`paper_more`",
+        "`paper_distributions`",
         last_findings.same_distributions,
     ),
     Claim(

@@ -184,9 +184,9 @@ def self_collision(numbers: Numbers) -> Finding:
 
 
 def cause(numbers: Numbers) -> Finding:
-    """Long chains from rest walk further if their links pass through one another, an ellipse less so."""
-    found = {start: part(effect_of(each), long_chains(numbers)) for start, each in _through(numbers).items()}
-    rest, ellipse = (summary(found[start]) for start in ("spinning", "ellipse"))
+    """Long chains walk further if their links pass through one another."""
+    effect = effect_of(numbers["paper_through"]["through"])
+    rest = summary(effect)
     early = [
         f"{links} links {percent(float(effect.relative), float(effect.half_width))}"
         for links, effect in (
@@ -196,21 +196,14 @@ def cause(numbers: Numbers) -> Finding:
                 numbers["paper_strands"]["strands"]["starts"]["rest"],
                 strict=True,
             )
-            if "early_over_late" in each
+            if "early_over_late" in each and links >= LONG - 30
         )
     ]
     text = (
-        f"with links that pass through one another 150 and 180 links walk {percent(rest.mean, rest.half_width)} "
-        f"further from the sprocket ({rest.rises} of {rest.cells} cells rise, {rest.falls} fall), "
-        f"{percent(ellipse.mean, ellipse.half_width)} as an ellipse; within a cell, strands met by the second bounce "
-        f"against later: {', '.join(early)}"
+        f"with links that pass through one another 150 and 180 links walk {counted(effect)}; within a cell of 120, 150 "
+        f"and 180 links, strands met by the second bounce against later: {', '.join(early)}"
     )
     return Finding(text, direction(rest.rises, rest.falls, rest.cells))
-
-
-def _through(numbers: Numbers) -> Mapping[str, Any]:
-    found: Mapping[str, Any] = numbers["paper_through"]["through"]
-    return found
 
 
 def losses(numbers: Numbers) -> Finding:
