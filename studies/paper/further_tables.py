@@ -162,6 +162,13 @@ def distributions_table(numbers: Numbers) -> str:
     return table(["cell", "Δx at 1e-6 / m", "at 1e-9 / m", "greatest distance", "p"], rows)
 
 
+def undamped_text(numbers: Numbers) -> str:
+    """What little or no damping of the joints does to Δx, in words."""
+    found = numbers["paper_more"]["more"]["undamped"]
+    effects = {value: summary(effect_of(each)) for value, each in found.items()}
+    return ", ".join(f"b = {value}: {percent(each.mean, each.half_width)}" for value, each in effects.items())
+
+
 def _rows(effect: Effect, rows: slice) -> Effect:
     return Effect(effect.relative[rows], effect.half_width[rows], effect.sign[rows], effect.pairs[rows], effect.lost)
 
