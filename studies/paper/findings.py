@@ -184,9 +184,11 @@ def self_collision(numbers: Numbers) -> Finding:
 
 
 def cause(numbers: Numbers) -> Finding:
-    """Long chains walk further if their links pass through one another."""
-    effect = effect_of(numbers["paper_through"]["through"])
-    rest = summary(effect)
+    """Long chains whose links pass through one another walk further, and nearly as far as an ellipse."""
+    rest, control = (
+        summary(effect_of(numbers[name]["through"])) for name in ("paper_through", "paper_through_ellipse")
+    )
+    gap = summary(part(_ellipse(numbers), long_chains(numbers))).mean
     early = [
         f"{links} links {percent(float(effect.relative), float(effect.half_width))}"
         for links, effect in (
@@ -200,10 +202,13 @@ def cause(numbers: Numbers) -> Finding:
         )
     ]
     text = (
-        f"with links that pass through one another 150 and 180 links walk {counted(effect)}; within a cell of 120, 150 "
-        f"and 180 links, strands met by the second bounce against later: {', '.join(early)}"
+        f"with links that pass through one another 150 and 180 links walk {percent(rest.mean, rest.half_width)} "
+        f"further from the sprocket, in {rest.rises} of {rest.cells} cells, as an ellipse "
+        f"{percent(control.mean, control.half_width)}; but an ellipse walks {percent(gap)} further than they do; "
+        f"within a cell, strands met by the second bounce against later: {', '.join(early)}"
     )
-    return Finding(text, direction(rest.rises, rest.falls, rest.cells))
+    closes = Verdict.AGREES if rest.mean - control.mean >= bounds().most * gap else Verdict.PART
+    return Finding(text, together([direction(rest.rises, rest.falls, rest.cells), closes]))
 
 
 def losses(numbers: Numbers) -> Finding:

@@ -47,16 +47,13 @@ def strands_table(numbers: Numbers) -> str:
 
 def through_table(numbers: Numbers) -> str:
     """What it does to Δx if links pass through one another, cell by cell."""
-    content = numbers["paper_through"]
-    effect, cells = effect_of(content["through"]), content["cells"]
-    rows = [
-        [
-            f"{links} links",
-            *(percent(float(value), float(width)) for value, width in zip(*row, strict=True)),
-        ]
-        for links, *row in zip(cells["links"], effect.relative, effect.half_width, strict=True)
-    ]
-    return table(["", *(f"{frequency:g} Hz" for frequency in cells["frequency"])], rows)
+    cells, rows = numbers["paper_through"]["cells"], []
+    for start, name in (("sprocket", "paper_through"), ("ellipse", "paper_through_ellipse")):
+        effect = effect_of(numbers[name]["through"])
+        for links, values, widths in zip(cells["links"], effect.relative, effect.half_width, strict=True):
+            texts = (percent(float(value), float(width)) for value, width in zip(values, widths, strict=True))
+            rows.append([start, f"{links} links", *texts])
+    return table(["from", "", *(f"{frequency:g} Hz" for frequency in cells["frequency"])], rows)
 
 
 def open_table(numbers: Numbers) -> str:

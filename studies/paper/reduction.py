@@ -37,6 +37,7 @@ DIGITS: Final = 4
 WHOLE: Final[dict[str, tuple[str, Callable[[Mapping[str, Block]], Any]]]] = {
     "paper_strands": ("strands", lambda blocks: strands(blocks["start"])),
     "paper_through": ("through", lambda blocks: through(blocks["main"])),
+    "paper_through_ellipse": ("through", lambda blocks: through(blocks["main"])),
     "paper_open": ("left_open", left_open),
     "paper_rest": ("rest_and_hold", lambda blocks: rest_and_hold(blocks["main"])),
     "paper_more": ("more", more),
