@@ -3,6 +3,7 @@
 Run ``python docs/generate_reference.py`` after a change of any of these; a test compares the pages with the code.
 """
 
+import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final, Literal, get_args, get_origin
@@ -247,7 +248,7 @@ def bracketed(unit: str) -> str:
 def commands_page() -> str:
     """Every command with its options; those that are fields of the scene or of the options by their names only."""
     parts = [
-        "# Commands\n\nWhat `--help` of each command says. Options that set a field have the meaning, values and "
+        "# Commands\n\n`--help` of each command says more. Options that set a field have the meaning, values and "
         f"default of that field. `{JSON}`, where a command has it, prints one JSON object instead of tables.\n"
     ]
     group: Any = typer.main.get_command(app)
@@ -257,7 +258,8 @@ def commands_page() -> str:
         for one in command.params:
             words = one.metavar if one.param_type_name == "argument" else one.get_help_record(context)[0]
             if one.opts != [JSON]:
-                rows[one.name] = f"`{words}`", " ".join((one.help or "").split())
+                first, *others = re.split(r"(?<=\.) ", " ".join((one.help or "").split()))
+                rows[one.name] = f"`{words}`", " ".join([first, *(each for each in others if each[:8] == "Default:")])
         lines: list[tuple[str, str]] = []
         for page, model in (("scene", Scene), ("options", Options)):
             fields = [rows.pop(field)[0] for field in list(rows) if name == "walk" and field in model.model_fields]

@@ -28,7 +28,7 @@ def in_site(path: str) -> str:
     """Where a file of the repository is in the site."""
     if path == "README.md":
         return "index.md"
-    path = re.sub(r"^(docs/notebooks/.*)\.ipynb$", r"\1.md", path)
+    path = re.sub(r"\.ipynb$", ".md", path)
     return path.removeprefix("docs/") if path.startswith(("docs/", "studies/")) else f"repository/{path}"
 
 
@@ -74,8 +74,11 @@ def on_config(config: Any) -> Any:
 
 def on_files(files: Files, config: Any) -> Files:
     """Add the notebooks, the pages of the studies, and all that pages link to."""
-    for path in sorted((ROOT / "docs/notebooks").glob("*.ipynb")):
-        files.append(File.generated(config, f"notebooks/{path.stem}.md", content=notebook_page(path)))
+    for path in sorted([*ROOT.glob("docs/notebooks/*.ipynb"), *ROOT.glob("studies/*/*.ipynb")]):
+        page = in_site(path.relative_to(ROOT).as_posix())
+        files.append(File.generated(config, page, content=notebook_page(path)))
+        if path.is_relative_to(ROOT / "studies"):
+            files.append(File.generated(config, page.removesuffix("md") + "ipynb", abs_src_path=str(path)))
     waiting = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob("studies/**/README.md"))
     waiting += [
         linked(in_repository(page.src_uri), match[1])

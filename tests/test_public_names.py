@@ -3,10 +3,7 @@
 import re
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
-
-import pytest
 
 import warpchain
 
@@ -32,30 +29,6 @@ def test_public_names_are_described() -> None:
     """The module's documentation has a line for each public name."""
     described = re.findall(r"^    (\w+)(?:\(.*?\))?  +\S", warpchain.__doc__ or "", re.MULTILINE)
     assert sorted(described) == sorted(warpchain.__all__)
-
-
-def test_the_version_stands_once() -> None:
-    """Packaging reads it from the code; no other file of the package repeats it."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    assert "version" not in project["project"] and project["project"]["dynamic"] == ["version"]
-    assert project["tool"]["setuptools"]["dynamic"]["version"]["attr"] == "warpchain.version.VERSION"
-    found = [
-        path.relative_to(ROOT).as_posix()
-        for path in (ROOT / "warpchain").rglob("*.py")
-        if f'"{warpchain.__version__}"' in path.read_text(encoding="utf-8")
-    ]
-    assert found == ["warpchain/version.py"]
-
-
-def test_packaging_reads_the_version() -> None:
-    """setuptools finds the number that the package shows, without importing it."""
-    pytest.importorskip("setuptools")
-    program = (
-        "from setuptools.config.expand import read_attr\n"
-        f"print(read_attr('warpchain.version.VERSION', {{'warpchain': 'warpchain'}}, {str(ROOT)!r}))\n"
-        "print('warpchain' in sys.modules)\n"
-    )
-    assert run_python(program, "-W", "ignore").split() == [warpchain.__version__, "False"]
 
 
 def test_a_checkout_without_metadata_runs() -> None:

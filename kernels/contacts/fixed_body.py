@@ -159,209 +159,137 @@ BODIES = {
 """Every body by its name."""
 
 
+@wp.struct
+class Touching:
+    """A link as a fixed body meets it."""
+
+    left_x: wp.float64  # places of its circles [m]
+    left_y: wp.float64
+    right_x: wp.float64
+    right_y: wp.float64
+    x: wp.float64  # centre of mass [m]
+    y: wp.float64
+    cosine: wp.float64  # direction
+    sine: wp.float64
+    inverse_mass: wp.float64  # [1/kg]
+    inverse_inertia: wp.float64  # [1/(kg m²)]
+    u: wp.float64  # velocity [m/s]
+    v: wp.float64
+    omega: wp.float64  # [rad/s]
+    lost: wp.float64  # energy so far [J]
+    hits: wp.int64  # impulses so far
+
+
+@wp.func
+def struck(
+    chain: Chain,
+    before: Touching,
+    gap: wp.float64,
+    normal_x: wp.float64,
+    normal_y: wp.float64,
+    lever_x: wp.float64,
+    lever_y: wp.float64,
+    surface_u: wp.float64,
+    surface_v: wp.float64,
+    restitution: wp.float64,
+    friction: wp.float64,
+) -> Touching:
+    """A link after a contact, see :func:`contacts.impulse.fixed_contact`."""
+    u, v, omega, lost, hit = fixed_contact(
+        chain,
+        gap,
+        normal_x,
+        normal_y,
+        lever_x,
+        lever_y,
+        surface_u,
+        surface_v,
+        before.inverse_mass,
+        before.inverse_inertia,
+        restitution,
+        friction,
+        before.u,
+        before.v,
+        before.omega,
+    )
+    after = before
+    after.u = u
+    after.v = v
+    after.omega = omega
+    after.lost = before.lost + lost
+    after.hits = before.hits + hit
+    return after
+
+
 @functools.cache
 def link_and_body(name: str):
-    """Warp functions of one link and a body: (gap, meet). Both take the body, the link's circles, centre and direction.
+    """Warp functions of one link and a body.
 
-    ``gap(chain, ground, face, left_x, left_y, right_x, right_y, x, y, cosine, sine)``: the least gap [m] of the link.
-    ``meet(… the same …, 1/m, 1/I, u, v, ω, lost)``: an impulse for each circle that overlaps and approaches, the left
-    one first; then for its sides. u, v, ω, the energy lost so far [J], and the number of impulses.
+    ``gap(chain, ground, face, link)``: the least gap [m] of the link. ``meet(chain, ground, face, link)`` → Touching:
+    the link after an impulse for each circle that overlaps and approaches, the left one first, and then for its sides.
     """
     surface, in_cells, lesser_gap = BODIES[name].surface, BODIES[name].in_cells, BODIES[name].lesser_gap
     has_lesser_gap = lesser_gap is not None
 
     @wp.func
-    def gap_to_face(
-        chain: Chain,
-        _ground: Ground,
-        face: Face,
-        left_x: wp.float64,
-        left_y: wp.float64,
-        right_x: wp.float64,
-        right_y: wp.float64,
-        x: wp.float64,
-        y: wp.float64,
-        cosine: wp.float64,
-        sine: wp.float64,
-    ):
+    def gap_to_face(chain: Chain, _ground: Ground, face: Face, link: Touching):
         least = ZERO
         if wp.static(has_lesser_gap):
-            least = lesser_gap(chain, left_x, left_y, right_x, right_y)
+            least = lesser_gap(chain, link.left_x, link.left_y, link.right_x, link.right_y)
         else:
-            left, _nx, _ny, _u, _v, _e, _mu = surface(chain, face, left_x, left_y)
-            right, _nx, _ny, _u, _v, _e, _mu = surface(chain, face, right_x, right_y)
+            left, _nx, _ny, _u, _v, _e, _mu = surface(chain, face, link.left_x, link.left_y)
+            right, _nx, _ny, _u, _v, _e, _mu = surface(chain, face, link.right_x, link.right_y)
             least = wp.min(left, right)
         if wp.static(in_cells):
-            side, _nx, _ny = corner_and_side(chain, face, x, y, cosine, sine)
+            side, _nx, _ny = corner_and_side(chain, face, link.x, link.y, link.cosine, link.sine)
             least = wp.min(least, side)
         return least
 
     @wp.func
-    def meet_circle(
-        chain: Chain,
-        face: Face,
-        circle_x: wp.float64,
-        circle_y: wp.float64,
-        x: wp.float64,
-        y: wp.float64,
-        inverse_mass: wp.float64,
-        inverse_inertia: wp.float64,
-        u: wp.float64,
-        v: wp.float64,
-        omega: wp.float64,
-    ):
-        gap, nx, ny, surface_u, surface_v, restitution, friction = surface(chain, face, circle_x, circle_y)
+    def meet_circle(chain: Chain, face: Face, link: Touching, x: wp.float64, y: wp.float64) -> Touching:
+        gap, nx, ny, u, v, restitution, friction = surface(chain, face, x, y)
         r = chain.circle_radius
-        return fixed_contact(
-            chain,
-            gap,
-            nx,
-            ny,
-            circle_x - x - r * nx,
-            circle_y - y - r * ny,
-            surface_u,
-            surface_v,
-            inverse_mass,
-            inverse_inertia,
-            restitution,
-            friction,
-            u,
-            v,
-            omega,
-        )
+        return struck(chain, link, gap, nx, ny, x - link.x - r * nx, y - link.y - r * ny, u, v, restitution, friction)
 
     @wp.func
-    def meet_face(
-        chain: Chain,
-        _ground: Ground,
-        face: Face,
-        left_x: wp.float64,
-        left_y: wp.float64,
-        right_x: wp.float64,
-        right_y: wp.float64,
-        x: wp.float64,
-        y: wp.float64,
-        cosine: wp.float64,
-        sine: wp.float64,
-        inverse_mass: wp.float64,
-        inverse_inertia: wp.float64,
-        u: wp.float64,
-        v: wp.float64,
-        omega: wp.float64,
-        lost: wp.float64,
-    ):
-        u, v, omega, lost_left, hit_left = meet_circle(
-            chain, face, left_x, left_y, x, y, inverse_mass, inverse_inertia, u, v, omega
-        )
-        u, v, omega, lost_right, hit_right = meet_circle(
-            chain, face, right_x, right_y, x, y, inverse_mass, inverse_inertia, u, v, omega
-        )
-        lost = lost + lost_left + lost_right
-        hits = hit_left + hit_right
+    def meet_face(chain: Chain, _ground: Ground, face: Face, before: Touching) -> Touching:
+        link = meet_circle(chain, face, before, before.left_x, before.left_y)
+        link = meet_circle(chain, face, link, link.right_x, link.right_y)
         if wp.static(in_cells):
-            gap, nx, ny = corner_and_side(chain, face, x, y, cosine, sine)
+            gap, nx, ny = corner_and_side(chain, face, link.x, link.y, link.cosine, link.sine)
             push = chain.push_rate * wp.max(ZERO, -gap)
-            u, v, omega, lost_side, hit_side = fixed_contact(
-                chain,
-                gap,
-                nx,
-                ny,
-                face.x - x,
-                face.y - y,
-                push * nx,
-                push * ny,
-                inverse_mass,
-                inverse_inertia,
-                chain.floor_restitution,
-                chain.floor_friction,
-                u,
-                v,
-                omega,
-            )
-            lost += lost_side
-            hits += hit_side
-        return u, v, omega, lost, hits
+            lever_x = face.x - link.x
+            lever_y = face.y - link.y
+            e = chain.floor_restitution
+            mu = chain.floor_friction
+            link = struck(chain, link, gap, nx, ny, lever_x, lever_y, push * nx, push * ny, e, mu)
+        return link
 
     if not in_cells:
         return gap_to_face, meet_face
 
     @wp.func
-    def gap(
-        chain: Chain,
-        ground: Ground,
-        _face: Face,
-        left_x: wp.float64,
-        left_y: wp.float64,
-        right_x: wp.float64,
-        right_y: wp.float64,
-        x: wp.float64,
-        y: wp.float64,
-        cosine: wp.float64,
-        sine: wp.float64,
-    ):
+    def gap(chain: Chain, ground: Ground, _face: Face, link: Touching):
         least = ground.cells[layout.GROUND_CELLS, layout.GROUND_MARGIN]
-        cell = cell_at(ground, x)
-        if wp.min(left_y, right_y) - chain.circle_radius - ground.cells[cell, layout.TOP] < least:
+        cell = cell_at(ground, link.x)
+        height = wp.min(link.left_y, link.right_y) - chain.circle_radius - ground.cells[cell, layout.TOP]
+        if height < least:
             last = int(ground.cells[cell, layout.LAST_FACE])
             k = int(ground.cells[cell, layout.FIRST_FACE])
             while k <= last:
-                face = read_face(ground, k)
-                to_face = gap_to_face(chain, ground, face, left_x, left_y, right_x, right_y, x, y, cosine, sine)
-                least = wp.min(least, to_face)
+                least = wp.min(least, gap_to_face(chain, ground, read_face(ground, k), link))
                 k += 1
         return least
 
     @wp.func
-    def meet(
-        chain: Chain,
-        ground: Ground,
-        _face: Face,
-        left_x: wp.float64,
-        left_y: wp.float64,
-        right_x: wp.float64,
-        right_y: wp.float64,
-        x: wp.float64,
-        y: wp.float64,
-        cosine: wp.float64,
-        sine: wp.float64,
-        inverse_mass: wp.float64,
-        inverse_inertia: wp.float64,
-        first_u: wp.float64,
-        first_v: wp.float64,
-        first_omega: wp.float64,
-        lost_before: wp.float64,
-    ):
-        u = first_u + ZERO
-        v = first_v + ZERO
-        omega = first_omega + ZERO
-        lost = lost_before + ZERO
-        hits = wp.int64(0)
-        cell = cell_at(ground, x)
+    def meet(chain: Chain, ground: Ground, _face: Face, before: Touching) -> Touching:
+        link = before
+        cell = cell_at(ground, link.x)
         last = int(ground.cells[cell, layout.LAST_FACE])
         k = int(ground.cells[cell, layout.FIRST_FACE])
         while k <= last:
-            face = read_face(ground, k)
-            u, v, omega, lost, hits_here = meet_face(
-                chain,
-                ground,
-                face,
-                left_x,
-                left_y,
-                right_x,
-                right_y,
-                x,
-                y,
-                cosine,
-                sine,
-                inverse_mass,
-                inverse_inertia,
-                u,
-                v,
-                omega,
-                lost,
-            )
-            hits += hits_here
+            link = meet_face(chain, ground, read_face(ground, k), link)
             k += 1
-        return u, v, omega, lost, hits
+        return link
 
     return gap, meet

@@ -4,7 +4,6 @@ import warp as wp
 
 from warpchain.kernels import layout
 from warpchain.kernels.gpu.stage import Link, Place, read_link
-from warpchain.kernels.gpu.threads import busy_threads
 from warpchain.kernels.layout import COSINE, LEFT_X, LEFT_Y, MASS, RIGHT_X, RIGHT_Y, SINE, THETA, X
 from warpchain.kernels.physics.elementary import ZERO, cos_sin
 from warpchain.kernels.physics.geometry import end_positions
@@ -14,11 +13,10 @@ wp.set_module_options({"enable_backward": False})
 
 
 @wp.func
-def place_of(chain: Chain, lane: int, block_dim: int, tilts: bool) -> Place:
-    """A thread's link and its neighbours; sums for a plane that tilts need all threads."""
+def place_of(chain: Chain, lane: int) -> Place:
+    """A thread's link and its neighbours."""
     n = chain.link_count
     place = Place()
-    place.threads = wp.where(tilts, block_dim, busy_threads(n, block_dim))
     place.lane = lane
     place.links = n
     place.column = wp.min(lane, n - 1)

@@ -174,7 +174,7 @@ def explicit_attempt(name: str, block_dim: int, write_proximity: Any, read_proxi
                     write_proximity(K, maxima, place, ground, there, next_end)
             rates = stage(forces, K, place, next_end, there, inverse_mass, inverse_inertia)
             if wp.static(s == last and reuses_last):
-                result.proximity = read_proximity(maxima, place.links)
+                result.proximity = read_proximity(maxima)
             ax[s] = rates.x
             ay[s] = rates.y
             at[s] = rates.theta

@@ -109,8 +109,8 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
     attempt = explicit_attempt(method.tableau, block_dim, write_proximity, read_proximity, tilts)
     begin_step, sum_up, meet_tilting_floor = block_tilting(block_dim)
     growth, shrinkage = step_controller(method.order, method.error_order, wp.float32)
-    build_list = block_list(columns)
-    clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, touch)
+    build_list = block_list(columns, block_dim)
+    clear_contacts, find_contacts, resolve_contacts = block_self_contacts(columns, block_dim, touch)
     chain_values = layout.BOARD_VALUES
     is_driven = features.is_driven
     present = present_chain(is_driven)
@@ -146,7 +146,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         next_end = exchange_ends(ends, place, link)
         write_proximity(K, maxima, place, ground, link, next_end)
         barrier()
-        return next_end, read_proximity(maxima, place.links)
+        return next_end, read_proximity(maxima)
 
     @wp.kernel(
         name="advance",
@@ -202,9 +202,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
 
         chain = model.chains[world]
         n = chain.link_count
-        place = place_of(chain, lane, wp.static(block_dim), wp.static(tilts))
-        if lane >= place.threads:
-            return
+        place = place_of(chain, lane)
         ground = read_ground(model, world)
         load_link(K, state, world, lane, n)
         is_fresh = state.is_fresh[world] != 0
@@ -239,7 +237,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
         slack = wp.float32(0.5) * wp.float32(control.skin) - opening
         if is_fresh:
             if wp.static(has_self):
-                pairs = build_list(K, L, chain, lane, place.threads, control.skin, upper_bound(opening))
+                pairs = build_list(K, L, chain, lane, control.skin, upper_bound(opening))
                 if pairs > wp.static(lists.capacity):
                     status = int(LIST_OVERFLOW)
             if wp.static(tilts):
@@ -305,7 +303,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
             own_error = int(0)
             if lane < n:
                 own_error = error_of(result, tolerance)
-            error = wp.cast(greatest(errors, lane, n, own_error), wp.float32)
+            error = wp.cast(greatest(errors, lane, own_error), wp.float32)
             attempts += 1
             if not (error <= wp.float32(1.0)):
                 if wp.isfinite(error):
@@ -314,7 +312,7 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     step = h * LEAST_SHRINKAGE
                     broken = wp.where(lane >= n or link_is_finite(K, lane), 0, 1)
                     barrier()  # all have read the errors
-                    if greatest(errors, lane, n, broken) > 0:
+                    if greatest(errors, lane, broken) > 0:
                         status = int(NOT_FINITE)
                 if status == RUNNING and step < control.smallest_step:
                     status = int(STEP_TOO_SMALL)
@@ -385,16 +383,16 @@ def make_advance_block(features: Features, block_dim: int, registers: int | None
                     if is_stale:
                         if lane == 0:
                             add_count(state, world, layout.LIST_BUILDS, wp.int64(1))
-                        pairs = build_list(K, L, constants(K), lane, place.threads, control.skin, upper_bound(opening))
+                        pairs = build_list(K, L, constants(K), lane, control.skin, upper_bound(opening))
                         if pairs > wp.static(lists.capacity):
                             status = int(LIST_OVERFLOW)
                             pairs = int(wp.static(lists.capacity))
                         slack = wp.float32(0.5) * wp.float32(control.skin) - opening
                     if pairs > 0:
                         touched = constants(K)
-                        touching = find_contacts(K, L, T, touched, lane, place.threads, pairs, upper_bound(opening))
+                        touching = find_contacts(K, L, T, touched, lane, pairs, upper_bound(opening))
                         if touching > 0:
-                            hits = resolve_contacts(K, L, T, E, F, touched, lane, place.threads, touching)
+                            hits = resolve_contacts(K, L, T, E, F, touched, lane, touching)
                             if hits > 0:
                                 wp.atomic_add(T, wp.static(touch.self_hits), hits)
                             if not is_hit:

@@ -51,7 +51,6 @@ class Place:
     before: wp.int32  # the link to the left
     after: wp.int32  # the link to the right
     links: wp.int32  # number of links of the chain
-    threads: wp.int32  # number of threads of the block that stay, see threads.busy_threads
 
 
 @wp.struct

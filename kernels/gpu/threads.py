@@ -71,15 +71,6 @@ def warp_width() -> int:
     ...
 
 
-@wp.func
-def busy_threads(links: int, block_dim: int):
-    """Threads of the hardware warps that carry links: the others end at once, and no barrier waits for them.
-
-    So a short chain takes as few instructions in the block of a long one as in its own. All fibers stay.
-    """
-    return wp.where(warp_width() == 1, block_dim, (links + warp_width() - 1) // warp_width() * warp_width())
-
-
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
     unsigned long long now;
@@ -140,17 +131,17 @@ def block_maxima(block_dim: int):
     """Warp functions for maxima over the threads of a block.
 
     Returns:
-        ``greatest(tile, lane, links, value)`` → the greatest value; ``write_maxima(memory, lane, values)``, then a
-        barrier of the caller, then ``read_maxima(memory, links)`` → the greatest of each of four values. Those of
-        hardware warps without a link do not count. Tile and memory may be used again after the next barrier.
+        ``greatest(tile, lane, value)`` → the greatest value; ``write_maxima(memory, lane, values)``, then a barrier of
+        the caller, then ``read_maxima(memory)`` → the greatest of each of four values. Tile and memory may be used
+        again after the next barrier.
     """
 
     @wp.func
-    def greatest(tile: wp.tile[wp.int32, block_dim], lane: int, links: int, value: wp.int32):
+    def greatest(tile: wp.tile[wp.int32, block_dim], lane: int, value: wp.int32):
         tile[lane // warp_width()] = warp_greatest(value)
         top = tile[0]
         i = int(1)
-        while i * warp_width() < links:
+        while i < wp.static(block_dim) // warp_width():
             top = wp.max(top, tile[i])
             i += 1
         return top
@@ -163,10 +154,10 @@ def block_maxima(block_dim: int):
         write_four(memory, lane // warp_width(), of_warp)
 
     @wp.func
-    def read_maxima(memory: wp.uint64, links: int):
+    def read_maxima(memory: wp.uint64):
         top = read_four(memory, 0)
         i = int(1)
-        while i * warp_width() < links:
+        while i < wp.static(block_dim) // warp_width():
             other = read_four(memory, i)
             top = vec4i(
                 wp.max(top[0], other[0]), wp.max(top[1], other[1]), wp.max(top[2], other[2]), wp.max(top[3], other[3])

@@ -10,16 +10,14 @@ from tests.oracle_model import motion_equations
 from tests.support import command_line
 from tests.support.command_line import Command
 from warpchain.bench import flights, numpy_model, walk_rate
-from warpchain.bench.machine import machine
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain
-from warpchain.kernels.methods.method import find_method, method_names
+from warpchain.kernels.methods.method import method_names
 from warpchain.run.simulation import simulate
 
 command = command_line.command
 
 PAPER = preset("paper")
-ON_GPUS = [name for name in method_names() if find_method(name).runs_on_gpus]
 SHORT_WALK = walk_rate.SWEEP | {"scene": {"links": 20, "frequency": 5.0, "start": "ellipse"}}
 
 
@@ -40,8 +38,8 @@ def test_scipy_ends_where_the_engine_does() -> None:
     start = flights.flying(8)
     flight = numpy_model.fly(*start, 1e-4, PAPER, 1e-11)
     ours = simulate(PAPER, *start, 1e-4, times=[1e-4], method="dp5", tolerance=1e-11)
-    position, velocity = flights.errors((flight.position, flight.velocity), (ours.position[-1], ours.velocity[-1]))
-    assert position < 1e-12 and velocity < 1e-8
+    assert np.abs(flight.position - ours.position[-1])[:, :2].max() < 1e-12
+    assert np.abs(flight.velocity - ours.velocity[-1])[:, :2].max() < 1e-8
     assert flight.attempts > 10 and flight.seconds > 0
 
 
@@ -61,40 +59,20 @@ def test_steps_are_those_of_a_flight(device: str, monkeypatch: pytest.MonkeyPatc
     assert flight.rejected == whole.steps_rejected - first.steps_rejected
 
 
-def test_a_rate_is_walks_by_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The default method walks; every walk is counted, and its folder is gone."""
-    monkeypatch.setattr(walk_rate, "SWEEP", SHORT_WALK)
-    lines: list[str] = []
-    rate = walk_rate.walk_rate("cpu", 3, lines.append)
-    assert (rate.method, rate.tolerance, rate.walks, rate.at_rest) == ("hybrid", 3e-3, 3, 3)
-    assert rate.walks_per_second == pytest.approx(3 / rate.seconds)
-    assert lines[0] == "compiling kernels" and lines[-1] == "3 of 3 walks"
-
-
-def test_the_machine_has_a_processor_and_versions() -> None:
-    """Nothing of it is empty."""
-    about = machine("cpu")
-    assert all(about.values()) and {"processor", "system", "warpchain", "warp-lang", "numpy", "scipy"} <= set(about)
-
-
-@pytest.mark.parametrize(
-    ("words", "methods"), [([], list(method_names())), (["--device", "fibers"], ON_GPUS)], ids=["cpu", "fibers"]
-)
-def test_the_command_prints_tables_and_writes_a_record(
-    words: list[str], methods: list[str], command: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_command_prints_tables_and_writes_a_record(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     """A line for each method and SciPy, one for the sweep; the record has the same, with machine and null for NaN."""
     monkeypatch.setattr(flights, "COMPARED_TIME", 1e-4)
     monkeypatch.setattr(flights, "TIMED", 2e-4)
     monkeypatch.setattr(walk_rate, "SWEEP", SHORT_WALK | {"scene": SHORT_WALK["scene"] | {"walk_limit": 0.01}})
-    answer = command("bench", "--links", "8", "--chains", "2", "--rounds", "1", "--walks", "2", "-o", "b.json", *words)
+    answer = command("bench", "--links", "8", "--chains", "2", "--rounds", "1", "--walks", "2", "-o", "b.json")
     assert (answer.status, answer.err) == (0, "")
     record = json.loads(Path("b.json").read_text())
-    assert [step["method"] for step in record["steps"]] == [*methods, flights.SCIPY]
+    assert [step["method"] for step in record["steps"]] == [*method_names(), flights.SCIPY]
     assert record["steps"][-1]["rejected"] is None and record["machine"]["warp-lang"]
+    assert all(record["machine"].values()) and all(step["microseconds"] > 0 for step in record["steps"])
     assert record["walks"]["walks"] == 2 and record["walks"]["at_rest"] == 0
     lines = answer.out.splitlines()
-    assert [line.split()[1] for line in lines if line.startswith("8 ")] == [*methods, "DOP853"]
+    assert [line.split()[1] for line in lines if line.startswith("8 ")] == [*method_names(), "DOP853"]
     assert lines[-1].split()[:4] == [record["walks"]["method"], "0.003", "2", "0"]
 
 

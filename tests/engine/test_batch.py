@@ -1,8 +1,6 @@
 """Batches side by side, their memory, and the copies of their arrays on the host; what of it needs no GPU."""
 
-import threading
 from collections.abc import Sequence
-from typing import Any
 
 import pytest
 import warp as wp
@@ -13,8 +11,6 @@ from warpchain.engine.devices import start_device
 from warpchain.engine.memory import CAPACITY_FRAMES, CAPACITY_SAMPLES, world_bytes
 from warpchain.inputs.options import Options
 from warpchain.walks import scheduler
-
-"""Content of a sweep of two lengths."""
 
 
 class SlowBatch(Batch):
@@ -41,28 +37,6 @@ def test_walks_do_not_depend_on_the_batches_they_are_spread_over(monkeypatch: py
     alone = outcomes(setups, slots=1)
     monkeypatch.setattr(scheduler, "_batches", several_batches)
     assert outcomes(setups) == alone
-
-
-def test_a_stop_ends_all_batches(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Once stopped, no further walk is begun, and every launch has been waited for."""
-    made: list[Batch] = []
-    finished: list[Batch] = []
-
-    def noted_batches(*how: Any) -> tuple[list[Batch], int]:
-        batches, capacity = several_batches(*how)
-        made.extend(batches)
-        return batches, capacity
-
-    monkeypatch.setattr(scheduler, "_batches", noted_batches)
-    monkeypatch.setattr(SlowBatch, "finish", lambda batch: finished.append(batch))
-    stop = threading.Event()
-    over = []
-    for place, _ in scheduler.run_setups([brief_setup(seed) for seed in range(30)], stop=stop):
-        over.append(place)
-        stop.set()
-    assert 0 < len(over) < 10
-    assert len(made) == 4
-    assert set(finished[-4:]) == set(made)
 
 
 @pytest.mark.parametrize(("keeps_samples", "frame_every"), [(False, None), (True, 2)])

@@ -10,27 +10,9 @@ import warp as wp
 from warpchain.engine import kernel_entries
 from warpchain.engine.kernel_entries import kernel_entry, step_module
 from warpchain.kernels import layout
-from warpchain.kernels.cpu.loop import make_advance
 from warpchain.kernels.features import Features
-from warpchain.kernels.gpu.loop import make_advance_block
 
 FEATURES = Features("dp5", layout.padded_width(60), "floor", True)
-
-
-def test_an_entry_takes_what_its_kernel_takes() -> None:
-    """Key, types of arguments, dimensions and options that a launch reads are those of the step kernels."""
-    for entry, kernel in (
-        (kernel_entry(FEATURES, 1, None), make_advance(FEATURES)),
-        (kernel_entry(FEATURES, 64, 168), make_advance_block(FEATURES, 64, 168)),
-    ):
-        for each in (entry, kernel):
-            each.module.get_module_hash()  # reads the source
-        assert entry.key == kernel.key
-        types = [[str(argument.type) for argument in each.adj.args] for each in (entry, kernel)]
-        assert types[0] == types[1] and len(types[0]) == 8
-        assert entry.adj.kernel_dim == kernel.adj.kernel_dim
-        assert entry.options["enable_backward"] == kernel.options["enable_backward"]
-    assert kernel_entry(FEATURES, 64, 168).options["grid_stride"] == kernel.options["grid_stride"]
 
 
 def test_what_would_be_compiled_anew_has_another_name(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -96,42 +96,34 @@ def turning_joints() -> State:
     return position, velocity
 
 
-def struck_loop(turned: float = 0.0, links: int = 40, parameters: Parameters = PAPER) -> State:
-    """A circular loop that turns clockwise at 60 rad/s, just after it hit the floor at 2 m/s.
+def struck_loop(turned: float) -> State:
+    """A circular loop of 40 links that turns clockwise at 60 rad/s, just after it hit the floor at 2 m/s.
 
     The impulses of the impact have changed the velocities of the lowest links and of no others: joints around them
     reverse many times while their springs ring.
 
     Args:
         turned: Angle by which the loop is turned [rad].
-        links: n.
-        parameters: Of the chain.
     """
-    spin = -60.0
-    position, velocity = circular_loop(links, parameters, spin * parameters.link_length / (2 * np.sin(np.pi / links)))
+    position, velocity = circular_loop(40, PAPER, -60.0 * PAPER.link_length / (2 * np.sin(np.pi / 40)))
     cosine, sine = np.cos(turned), np.sin(turned)
     turn = np.array([[cosine, sine], [-sine, cosine]])
     for state in (position, velocity):
         state[:, :2] = state[:, :2] @ turn
     position[:, 2] += turned
-    position, velocity = set_down(position, -1e-9, parameters), velocity - [0.0, 2.0, 0.0]
-    return position, contact_equations.resolve_contacts(position, velocity, parameters, self_contact=False)[0]
+    position, velocity = set_down(position, -1e-9, PAPER), velocity - [0.0, 2.0, 0.0]
+    return position, contact_equations.resolve_contacts(position, velocity, PAPER, self_contact=False)[0]
 
 
-def reversing_loop(phase: float = 0.0, links: int = 40, parameters: Parameters = PAPER) -> State:
-    """A circular loop that turns anticlockwise at 60 rad/s, its links at ω_i = 60 (1 + 0.2 sin(2 θ_i + phase)) rad/s.
+def reversing_loop() -> State:
+    """A circular loop of 40 links, 10 mm above the floor, that turns at ω_i = 60 (1 + 0.2 sin 2θ_i) rad/s.
 
-    It is 10 mm above the floor. The centres move as those of the turning loop, so that ends of neighbours move apart at
-    up to 0.15 m/s: springs ring, and joints reverse within the first microseconds.
-
-    Args:
-        phase: Of the disturbance [rad].
-        links: n.
-        parameters: Of the chain.
+    The centres move as those of the turning loop, so that ends of neighbours move apart at up to 0.15 m/s: springs
+    ring, and joints reverse within the first microseconds.
     """
-    position, velocity = circular_loop(links, parameters, 60 * parameters.link_length / (2 * np.sin(np.pi / links)))
-    velocity[:, 2] *= 1 + 0.2 * np.sin(2 * position[:, 2] + phase)
-    return set_down(position, 0.01, parameters), velocity
+    position, velocity = circular_loop(40, PAPER, 60 * PAPER.link_length / (2 * np.sin(np.pi / 40)))
+    velocity[:, 2] *= 1 + 0.2 * np.sin(2 * position[:, 2])
+    return set_down(position, 0.01, PAPER), velocity
 
 
 def energy_error(flight: Trajectory, parameters: Parameters, start: State) -> float:

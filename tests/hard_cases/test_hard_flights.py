@@ -202,20 +202,6 @@ def test_flights(check: Check, flight: Flight, within: float, method: str) -> No
 
 
 @every_method
-def test_stiff_joints_hit_alike(method):
-    """Right after an impact the centre of mass moves alike for k = 1e9 and 1e11: the model has a rigid limit."""
-    state = dropped()
-    speeds = []
-    for stiffness in (1e9, 1e11):
-        chain = PAPER.with_values({"joint_stiffness": stiffness})
-        flight = simulate(chain, state, 5e-4, method=method)
-        speeds.append(motion_equations.linear_momentum(flight.velocity[-1], chain))
-    momentum = motion_equations.linear_momentum(state[1], PAPER)
-    assert np.linalg.norm(speeds[0] - momentum) > 0.2 * np.linalg.norm(momentum)
-    assert np.linalg.norm(speeds[0] - speeds[1]) < 0.05 * np.linalg.norm(momentum)
-
-
-@every_method
 def test_hopeless_damping_is_a_status(method):
     """Damping that asks explicit methods for steps of 1e-12 s ends in a limit that says so, where it stood then.
 
@@ -280,20 +266,10 @@ def test_elastic_bouncing_keeps_the_energy_for_a_second(method, tolerance, bound
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("method", "links"),
-    [
-        *((method, 1000) for method in ("rkf78", "os32", "hybrid")),
-        *((method, 198) for method in ("dp5", "bs32")),
-    ],
-)
-def test_long_chains(method, links):
-    """1000 links hit the floor like any other number, with explicit methods and hybrid.
-
-    The other methods differ from one of these in coefficients alone; they have the most links that fit into scratch
-    blocks of the usual width, whose kernels other tests compile as well.
-    """
-    fall = Flight(SOFT, partial(dropped_circle, links), 5e-3)
+@pytest.mark.parametrize("method", ["os32", "hybrid"])
+def test_long_chains(method):
+    """1000 links hit the floor like any other number; other explicit methods differ in coefficients alone."""
+    fall = Flight(SOFT, partial(dropped_circle, 1000), 5e-3)
     flight = fall.simulate(method)
     assert_sound(flight, SOFT, fall.start())
     assert flight.impulses["floor"] > 100

@@ -4,9 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
-import warpchain
 from tests.support.made_walks import make_walk
 from warpchain.inputs.parameters import preset
 from warpchain.inputs.start_shapes import ellipse, lay_chain
@@ -127,19 +125,3 @@ def test_the_catenary_is_one() -> None:
         np.testing.assert_allclose(np.gradient(found.angle, found.s)[1:-1], found.curvature[1:-1], rtol=3e-2)
     with pytest.raises(ValueError, match="does not reach"):
         catenary_between(first, last, 0.1, 2.5)
-
-
-def test_the_figure_of_a_loop() -> None:
-    """Three panels; the line of the mean loop is closed and the loop's own, beside a catenary; it has a kink."""
-    walk = warpchain.walk(frequency=20.0, preset="soft", start="spinning", walk_limit=1e-3)
-    loop = walk.mean_loop()
-    assert loop.kink().dip < -8.0 and loop.kink().dip_at > 0.1  # it stands after the lowest point
-    assert loop.catenary().curvature.max() > 1.8 * loop.bottom_curvature
-    figure = walk.plot("loop")
-    assert isinstance(figure, Figure)
-    shape, bend, pull = figure.axes
-    lines = {tuple(line.get_xydata().shape): line for line in shape.lines}
-    np.testing.assert_allclose(lines[len(loop.s) + 1, 2].get_xydata()[:-1], loop.position - loop.center)
-    assert [text.get_text() for text in bend.get_legend().get_texts()] == ["catenary, as long", "simulation, mean"]
-    assert len(bend.lines) == 3 and len(pull.lines) == 2
-    assert "/ m$^{-1}$" in bend.get_ylabel() and "/ N" in pull.get_ylabel() and "/ m" in pull.get_xlabel()

@@ -90,33 +90,3 @@ def circular_loop_force(n: int, parameters: Parameters, speed: float) -> tuple[f
     dynamic = speed**2 / parameters.link_length
     tangential = (inner + outer) / 2 * dynamic * np.cos(alpha)
     return float(tangential), float((outer - inner) / 2 * dynamic * np.sin(alpha))
-
-
-def tapped_loop(n: int, parameters: Parameters, speed: float, spins: Array) -> tuple[Array, Array]:
-    """The stretched `circular_loop`, whose links have got further angular velocities by a tap.
-
-    The tap opens no joint: velocities of joints are sums of those across the links, less their mean. That closes the
-    ring only if the spins have no part ∝ exp(±2πij/n), so this part, which moves the ring without bending it, is left
-    out.
-
-    Args:
-        n: number of links, as in `circular_loop`.
-        parameters: the chain.
-        speed: of the joints before the tap, m/s; anticlockwise if positive.
-        spins: further angular velocities, (n,), rad/s.
-
-    Returns:
-        position (n, 3), velocity (n, 3).
-
-    Raises:
-        ValueError: as `circular_loop`.
-    """
-    position, velocity = circular_loop(n, parameters, speed, stretched=True)
-    first = np.exp(2j * np.pi * np.arange(n) / n)
-    kept = spins - 2 / n * np.real(np.sum(spins * first.conj()) * first)
-    turning = parameters.link_length * kept[:, None] * turned(direction(position[:, 2]))
-    joints = np.cumsum(turning, axis=0)
-    joints -= joints.mean(axis=0)
-    velocity[:, :2] += joints - turning / 2
-    velocity[:, 2] += kept
-    return position, velocity

@@ -14,7 +14,6 @@ Source: "A walking roller chain", section 2.1.
 """
 
 from collections.abc import Callable
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,17 +114,6 @@ def total_energy(position: Array, velocity: Array, parameters: Parameters, *, gr
     return energy + gravitational_energy(position, parameters) if gravity else energy
 
 
-def friction_power(velocity: Array, parameters: Parameters) -> float:
-    """Power that joint friction dissipates, Σ f(w) w with w = θ̇_i − θ̇_{i+1}, W."""
-    spin = velocity[:, 2] - np.roll(velocity[:, 2], -1)
-    return float(np.sum(friction_torque(spin, parameters) * spin))
-
-
-def damping_power(position: Array, velocity: Array, parameters: Parameters) -> float:
-    """Power that joint damping dissipates, Σ b |Ċ|², W."""
-    return float(parameters.joint_damping * np.sum(joint_opening_rate(position, velocity, parameters) ** 2))
-
-
 def linear_momentum(velocity: Array, parameters: Parameters) -> Array:
     """Σ m Ẋ, (2,), kg m/s."""
     return link_masses(len(velocity), parameters) @ velocity[:, :2]
@@ -146,80 +134,30 @@ def angular_momentum(position: Array, velocity: Array, parameters: Parameters) -
 def solve_flight(
     position: Array,
     velocity: Array,
-    times: Array,
+    duration: float,
     parameters: Parameters,
     *,
-    gravity: bool = True,
     rtol: float = 1e-12,
     atol: float = 1e-12,
-    method: str = "DOP853",
-) -> tuple[Array, Array, int]:
-    """Integrate the free chain with `scipy.integrate.solve_ivp`.
-
-    Every requested time ends an integration, so that no result is interpolated.
-
-    Args:
-        position: start, (n, 3), at `times[0]`.
-        velocity: start, (n, 3), at `times[0]`.
-        times: (t,), s, strictly increasing.
-        parameters: the chain.
-        gravity: whether gravity acts.
-        rtol: relative tolerance of `solve_ivp`.
-        atol: absolute tolerance of `solve_ivp`, for positions (m, rad) and velocities (m/s, rad/s) alike.
-        method: method of `solve_ivp`.
-
-    Returns:
-        positions (t, n, 3), velocities (t, n, 3) and the number of evaluations of the equations.
-
-    Raises:
-        ValueError: `times` is not a strictly increasing sequence, or the start is not finite.
-        RuntimeError: the solver failed.
-    """
+) -> tuple[Array, Array]:
+    """Position and velocity (n, 3) of the free chain after a time [s], by SciPy's DOP853; tolerances in SI units."""
     n = len(position)
 
     def derivative(_: float, state: Array) -> Array:
         x, v = state.reshape(2, n, 3)
-        return np.concatenate([v, acceleration(x, v, parameters, gravity=gravity)]).ravel()
+        return np.concatenate([v, acceleration(x, v, parameters)]).ravel()
 
-    start = np.stack([position, velocity]).ravel()
-    states, evaluations = integrated(derivative, start, times, rtol=rtol, atol=atol, method=method)
-    motion = states.reshape(-1, 2, n, 3)
-    return motion[:, 0], motion[:, 1], evaluations
+    end = integrated(derivative, np.stack([position, velocity]).ravel(), duration, rtol, atol).reshape(2, n, 3)
+    return end[0], end[1]
 
 
 def integrated(
-    derivative: Callable[[float, Array], Array], start: Array, times: Array, *, rtol: float, atol: float, method: str
-) -> tuple[Array, int]:
-    """Integrate any first-order equations with `scipy.integrate.solve_ivp`, as `solve_flight` does.
-
-    Args:
-        derivative: of the state, from time (s) and state (d,).
-        start: state (d,) at `times[0]`.
-        times: (t,), s, strictly increasing. Every one ends an integration, so that no result is interpolated.
-        rtol: relative tolerance of `solve_ivp`.
-        atol: absolute tolerance of `solve_ivp`.
-        method: method of `solve_ivp`.
-
-    Returns:
-        states (t, d) and the number of evaluations of `derivative`.
-
-    Raises:
-        ValueError: `times` is not a strictly increasing sequence, or the start is not finite.
-        RuntimeError: the solver failed.
-    """
-    times = np.asarray(times, dtype=np.float64)
-    if times.ndim != 1 or len(times) == 0 or not np.all(np.diff(times) > 0):
-        raise ValueError("times must be a strictly increasing sequence of at least one time")
-    states = np.empty((len(times), len(start)))
-    states[0] = start
-    evaluations = 0
-    for step, span in enumerate(pairwise(times)):
-        solution = solve_ivp(derivative, span, states[step], method=method, t_eval=[span[1]], rtol=rtol, atol=atol)
-        evaluations += int(solution.nfev)
-        if not solution.success or not np.all(np.isfinite(solution.y)):
-            raise RuntimeError(f"{method} failed between {span[0]} s and {span[1]} s: {solution.message}")
-        states[step + 1] = solution.y[:, -1]
-    return states, evaluations
+    derivative: Callable[[float, Array], Array], start: Array, duration: float, rtol: float, atol: float
+) -> Array:
+    """The state (d,) that first-order equations lead to from another one after a time [s]."""
+    solution = solve_ivp(derivative, (0.0, duration), start, method="DOP853", rtol=rtol, atol=atol)
+    assert solution.success and np.all(np.isfinite(solution.y)), solution.message
+    return np.asarray(solution.y[:, -1])
 
 
 def _alternating(n: int, inner: float, outer: float) -> Array:

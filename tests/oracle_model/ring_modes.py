@@ -11,7 +11,6 @@ Joint friction is linearised where joints do not turn: a viscous friction of β 
 is β.
 """
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -32,29 +31,17 @@ LEAST_RATIO: Final = 3.0
 """Bending and joints count as apart if their rates differ by this factor."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class RingModes:
-    """Rates λ = −γ − iω [1/s] of a circulating ring, in the frame that turns with it.
-
-    Attributes:
-        number: n, whole wavelengths around the ring, shape (k,).
-        bending: rates of bending, by rising ω, shape (k, 4).
-        joints: rates of the joints' springs, by rising |λ|, shape (k, 8).
-    """
-
-    number: Array
-    bending: Complex
-    joints: Complex
-
-
-def ring_modes(n: int, parameters: Parameters, speed: float, numbers: Array) -> RingModes:
+def ring_modes(n: int, parameters: Parameters, speed: float, numbers: Array) -> Complex:
     """Small motions of the stretched circular loop.
 
     Args:
         n: number of links N, even, at least 4.
         parameters: the chain.
         speed: of the joints of the closed loop, m/s; anticlockwise if positive, links are numbered anticlockwise.
-        numbers: mode numbers, shape (k,).
+        numbers: mode numbers, whole wavelengths around the ring, shape (k,).
+
+    Returns:
+        rates λ = −γ − iω of bending, 1/s, in the frame that turns with the ring, by rising ω, shape (k, 4).
 
     Raises:
         ValueError: as `circular_loop`; or bending is as fast as the springs of the joints, which tells neither apart.
@@ -82,9 +69,7 @@ def ring_modes(n: int, parameters: Parameters, speed: float, numbers: Array) -> 
     if np.any(np.abs(joints[:, 0]) < LEAST_RATIO * np.abs(bending[:, -1])):
         raise ValueError("bending is as fast as the springs of the joints; give stiffer joints or less friction")
     order = np.argsort(-bending.imag, axis=1)
-    return RingModes(
-        number=np.asarray(numbers, dtype=np.float64), bending=np.take_along_axis(bending, order, axis=1), joints=joints
-    )
+    return np.take_along_axis(bending, order, axis=1)
 
 
 def _derivatives(n: int, parameters: Parameters, speed: float) -> tuple[Array, Array]:

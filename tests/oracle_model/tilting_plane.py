@@ -152,9 +152,7 @@ def plane_mass_matrix(position: Array, parameters: Parameters, *, half_width: fl
     return matrix
 
 
-def plane_force(
-    position: Array, velocity: Array, plane: Plane, parameters: Parameters, *, gravity: bool = True
-) -> Array:
+def plane_force(position: Array, velocity: Array, plane: Plane, parameters: Parameters) -> Array:
     """Right-hand side B (3,) of the plane's equation of motion A ν̇ = B: N and N m.
 
         B = −Σ a m (2 (ω1 ẏ − ω2 ẋ) + g Ŷ·e3) + (0, −ω2, ω1) Σ I θ̇ + (0, Σ I θ̇ [d (p·ω) + p (d·ω)])
@@ -167,9 +165,7 @@ def plane_force(
     along = direction(position[:, 2])
     across = turned(along)
     spin = link_inertias(n, parameters) * velocity[:, 2]
-    lateral = 2 * (plane.turn[0] * velocity[:, 1] - plane.turn[1] * velocity[:, 0])
-    if gravity:
-        lateral = lateral + parameters.gravity * plane.y[2]
+    lateral = 2 * (plane.turn[0] * velocity[:, 1] - plane.turn[1] * velocity[:, 0]) + parameters.gravity * plane.y[2]
     force: Array = -(link_masses(n, parameters) * lateral) @ at_centre
     force[1:] += spin.sum() * turned(plane.turn)
     force[1:] += spin @ (along * (across @ plane.turn)[:, None] + across * (along @ plane.turn)[:, None])
@@ -183,7 +179,6 @@ def tilting_acceleration(
     parameters: Parameters,
     *,
     half_width: float,
-    gravity: bool = True,
 ) -> tuple[Array, Array]:
     """Equations of motion of the free chain and its plane, not split.
 
@@ -198,19 +193,17 @@ def tilting_acceleration(
         plane: its position and motion.
         parameters: the chain.
         half_width: h, m.
-        gravity: whether gravity acts.
 
     Returns:
         ẍ, ÿ (m/s²), θ̈ (rad/s²) of the links within the plane, (n, 3), and u̇ (m/s²), ω̇1, ω̇2 (rad/s²), (3,).
     """
     result = acceleration(position, velocity, parameters, gravity=False)
-    if gravity:
-        result[:, :2] -= parameters.gravity * plane.y[:2]
+    result[:, :2] -= parameters.gravity * plane.y[:2]
     result[:, :2] += lateral_speed(position, plane)[:, None] * [-plane.turn[1], plane.turn[0]]
     along = direction(position[:, 2])
     result[:, 2] -= (turned(along) @ plane.turn) * (along @ plane.turn)
     matrix = plane_mass_matrix(position, parameters, half_width=half_width)
-    force = plane_force(position, velocity, plane, parameters, gravity=gravity)
+    force = plane_force(position, velocity, plane, parameters)
     return result, np.asarray(np.linalg.solve(matrix, force), dtype=np.float64)
 
 
@@ -269,15 +262,12 @@ def tilting_energy(
     parameters: Parameters,
     *,
     half_width: float,
-    gravity: bool = True,
 ) -> float:
-    """Kinetic and spring energy and, unless `gravity=False`, gravitational energy (zero on the floor), J."""
+    """Kinetic, spring and gravitational energy (zero on the floor), J."""
     energy = tilting_kinetic_energy(position, velocity, plane, parameters, half_width=half_width)
     energy += spring_energy(position, parameters)
-    if gravity:
-        heights = room_position(position, plane)[:, 1]
-        energy += float(parameters.gravity * (link_masses(len(position), parameters) @ heights))
-    return energy
+    heights = room_position(position, plane)[:, 1]
+    return energy + float(parameters.gravity * (link_masses(len(position), parameters) @ heights))
 
 
 def room_momentum(position: Array, velocity: Array, plane: Plane, parameters: Parameters) -> Array:
@@ -305,39 +295,16 @@ def solve_tilting_flight(
     position: Array,
     velocity: Array,
     plane: Plane,
-    times: Array,
+    duration: float,
     parameters: Parameters,
     *,
     half_width: float,
-    gravity: bool = True,
-    rtol: float = 1e-12,
-    atol: float = 1e-12,
-    method: str = "DOP853",
-) -> tuple[Array, Array, list[Plane], int]:
-    """Integrate the free chain and its plane, not split, with `scipy.integrate.solve_ivp`.
+    rtol: float,
+    atol: float,
+) -> tuple[Array, Array, Plane]:
+    """Position and velocity (n, 3) of the free chain, and its plane, after a time [s], not split, by SciPy's DOP853.
 
-    Every requested time ends an integration, so that no result is interpolated. The solver leaves the rows
-    `Plane.x` and `Plane.y` orthonormal to its tolerance; those returned are made so to rounding.
-
-    Args:
-        position: start, (n, 3), at `times[0]`.
-        velocity: start, (n, 3), at `times[0]`.
-        plane: start, at `times[0]`.
-        times: (t,), s, strictly increasing.
-        parameters: the chain.
-        half_width: h, m.
-        gravity: whether gravity acts.
-        rtol: relative tolerance of `solve_ivp`.
-        atol: absolute tolerance of `solve_ivp`, for all parts of the state alike.
-        method: method of `solve_ivp`.
-
-    Returns:
-        positions (t, n, 3), velocities (t, n, 3), t planes and the number of evaluations of the equations.
-
-    Raises:
-        ImportError: SciPy is not installed.
-        ValueError: `times` is not a strictly increasing sequence, or the start is not finite.
-        RuntimeError: the solver failed.
+    The solver leaves the rows `Plane.x` and `Plane.y` orthonormal to its tolerance; they are made so to rounding.
     """
     n = len(position)
 
@@ -348,14 +315,12 @@ def solve_tilting_flight(
 
     def derivative(_: float, state: Array) -> Array:
         x, v, now = unpacked(state)
-        links, rates = tilting_acceleration(x, v, now, parameters, half_width=half_width, gravity=gravity)
+        links, rates = tilting_acceleration(x, v, now, parameters, half_width=half_width)
         return np.concatenate([v.ravel(), links.ravel(), rates, *frame_rates(now)])
 
     start = np.concatenate([position.ravel(), velocity.ravel(), plane.rates, plane.x, plane.y, plane.origin])
-    states, evaluations = integrated(derivative, start, times, rtol=rtol, atol=atol, method=method)
-    motion = states[:, : 6 * n].reshape(-1, 2, n, 3)
-    planes = [_orthonormal(unpacked(state)[2]) for state in states]
-    return motion[:, 0], motion[:, 1], planes, evaluations
+    x, v, moved = unpacked(integrated(derivative, start, duration, rtol, atol))
+    return x, v, _orthonormal(moved)
 
 
 def _orthonormal(plane: Plane) -> Plane:

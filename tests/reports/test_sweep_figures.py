@@ -241,10 +241,10 @@ def test_figures_are_those_that_a_sweep_has_something_for(
     """Each kind of sweep gives its own figures, all of which can be drawn; counts only if walks ended differently."""
     compared = make_sweep(tmp_path / "a", TOLERANCE)
     for result, names in (
-        (sweep6, ["distance", "distance_map"]),
+        (sweep6, ["distance"]),
         (compared, ["tolerance"]),
         (saltelli, ["distance", "sensitivity"]),
-        (flawed6, ["distance", "distance_map", "status_counts"]),
+        (flawed6, ["distance", "status_counts"]),
     ):
         pictures = list(figures(result))
         assert [picture.name for picture in pictures] == names

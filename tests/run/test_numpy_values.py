@@ -5,6 +5,7 @@ import numpy as np
 import warpchain
 from tests.oracle_model.circular_loop import circular_loop
 from tests.support.setups import setup_walk
+from warpchain.inputs.scene import OF_LINKS
 from warpchain.inputs.sections import SECTION_OF
 from warpchain.sweeps.plan import load_sweep
 
@@ -13,12 +14,14 @@ PLAIN = {"version": 1, "name": "grid", "seed": 3, "preset": "soft", "samples": 2
 
 def of_numpy(value):
     """A value of a setting in NumPy's type."""
-    return {bool: np.bool_, int: np.int32, float: np.float64, str: np.str_}[type(value)](value)
+    return {bool: np.bool_, int: np.int32, float: np.float64, str: np.str_, tuple: np.array}[type(value)](value)
 
 
 def test_every_setting_takes_a_numpy_value():
     """Each field of parameters, scene and options has the same value, and the same type, either way."""
-    setup = setup_walk("soft", {"load_factor": 2.0, "steady_time": 0.5, "settle_time": 0.2, "walk_until": 1.0}, 5)
+    each = {name: [1e-3] * 60 for name in OF_LINKS} | {"release": [[0.2, 0.0, 0.1, 0.0]], "distance_limit": 5.0}
+    drive = {"load_factor": 2.0, "steady_time": 0.5, "settle_time": 0.2, "walk_until": 1.0}
+    setup = setup_walk("soft", drive | each, 5)
     given = {**setup.parameters.model_dump(), **setup.scene.model_dump(), **setup.options.model_dump()}
     assert given.keys() == SECTION_OF.keys() and None not in given.values()
     again = setup_walk("soft", {name: of_numpy(value) for name, value in given.items()}, None)

@@ -139,7 +139,7 @@ def test_a_sweep_runs_from_keywords(tmp_path, capfd):
 def test_all_errors_are_told_at_once(tmp_path):
     """One line for each value, with its place in a list, in the order of the keywords."""
     lines = refused(
-        grid={"links": [30, 31, 40, "x"], "frequenzy": [1.0], "frequency": [5.0]},
+        grid={"links": [30, 3, 40, "x"], "frequenzy": [1.0], "frequency": [5.0]},
         samples=0,
         scene={"clearance": -1.0, "start": "flying"},
         parameters={"gravity": "9.8 m/s²"},

@@ -14,11 +14,14 @@ from tests.support.sweep_content import UNIFORM, blocks, content
 from tests.support.synthetic_sweep import content as files
 from warpchain.cli.main import main
 from warpchain.inputs.validation import InputError
-from warpchain.store.manifest import read_manifest
+from warpchain.store import sweep_result
+from warpchain.store.folder import SweepFolder
+from warpchain.store.manifest import Manifest, read_manifest
 from warpchain.store.merged_file import merge
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.designs import EXTENSIBLE, SAMPLERS
-from warpchain.sweeps.plan import PlannedWalk
+from warpchain.sweeps.plan import PlannedWalk, load_sweep
+from warpchain.walks.rows import Rows
 
 
 def two_blocks(first: int, second: int, **changes: Any) -> dict[str, Any]:
@@ -165,3 +168,20 @@ def test_samples_that_do_not_grow_are_refused(
     error = capsys.readouterr().err.strip()
     assert "but a latin_hypercube of 8 samples has other points; give samples: 4" in error and "\n" not in error
     assert files(tmp_path / "sweep") == before
+
+
+def test_a_reader_meets_a_sweep_that_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a folder is begun anew between its list of walks and its shards, the reader gives the new sweep."""
+    make_sweep(tmp_path, content(samples=2), drawn_distance)
+    read = sweep_result.read_rows
+
+    def late(directory: Path, manifest: Manifest) -> Rows:
+        monkeypatch.undo()
+        other = load_sweep(content(samples=2, seed=8))
+        SweepFolder.open(tmp_path, other, fresh=True, shard_size=8).close()
+        make_sweep(tmp_path, content(samples=2, seed=8), drawn_distance)
+        return read(directory, manifest)
+
+    monkeypatch.setattr(sweep_result, "read_rows", late)
+    found = load(tmp_path)
+    assert (found.seed, found.missing_count) == (8, 0)

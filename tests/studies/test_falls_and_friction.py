@@ -1,4 +1,4 @@
-"""The studies of the tilting plane and of the floor's friction make their tables and figures of made sweeps."""
+"""The studies of the tilting plane, the floor's friction and slopes make their tables and figures of made sweeps."""
 
 from pathlib import Path
 
@@ -6,6 +6,7 @@ import pytest
 
 import warpchain
 from studies.floor_friction import run as friction
+from studies.slopes import run as slopes
 from studies.tilting_plane import run as falls
 from studies.tilting_plane import taps
 from tests.support.made_sweeps import make_sweep
@@ -57,6 +58,29 @@ def test_distances_of_falling_chains_are_compared_with_those_of_fixed_planes(
     make_sweep(tmp_path / "other", {name: content[name] for name in content if name != "blocks"} | {"grid": grid})
     with pytest.raises(warpchain.InputError, match="no blocks fixed and tilted"):
         falls.main(str(tmp_path / "other"))
+
+
+def test_walks_without_end_are_counted_beside_the_distances_of_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of made walks those beyond 14° have no end, and no distance; the others go further with the slope."""
+    monkeypatch.setattr(slopes, "PAGE", tmp_path / "README.md")
+    monkeypatch.setattr(slopes, "FIGURE", tmp_path / "slopes.png")
+    names = ("slope", "friction", "stairs")
+    markers = "".join(f"<!-- {name} -->\n<!-- end of {name} -->\n" for name in names)
+    slopes.PAGE.write_text(markers, encoding="utf-8")
+
+    def outcome(walk: PlannedWalk) -> float | warpchain.Status:
+        slope = walk.setup.scene.slope
+        return warpchain.Status.DISTANCE_LIMIT if slope > 14 else 2 + slope / 10 + 0.002 * walk.sample
+
+    content = read_yaml(Path(slopes.__file__).with_name("sweeps") / "slopes.yaml") | {"samples": 2}
+    make_sweep(tmp_path / "sweep", content, outcome)
+    slopes.main(str(tmp_path / "sweep"))
+    page = slopes.PAGE.read_text(encoding="utf-8")
+    assert "| 60 | 10 | 5 | 2.501 | 0.001 | 0% | – |" in page
+    assert "| 120 | 25 | 20 | – | – | 100% |" in page
+    assert slopes.FIGURE.stat().st_size > 10_000
 
 
 def test_taps_are_compared_with_fixed_planes_and_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

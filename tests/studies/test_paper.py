@@ -44,27 +44,6 @@ def test_unpaired_signs_are_those_of_welchs_test() -> None:
     assert effect.sign.tolist() == expected.tolist() and 0 < np.count_nonzero(expected) < 40
 
 
-@pytest.mark.parametrize("name", ["paired", "unpaired"])
-def test_intervals_cover_the_truth(name: str) -> None:
-    """Of 4000 intervals of a ratio of means 95 % hold it, to three standard errors; so do those of means of cells."""
-    cells, ratio = 4000, 1.3
-    before = samples(5, (cells, 16), 1.0)
-    after = ratio * (before if name == "paired" else samples(6, (cells, 16), 1.0)) + samples(7, (cells, 16), 0.0)
-    effect = getattr(statistics, name)(after, before)
-    covered = np.abs(effect.relative - (ratio - 1)) <= effect.half_width
-    assert abs(covered.mean() - 0.95) < 3 * (0.95 * 0.05 / cells) ** 0.5
-    means = [
-        statistics.summary(
-            statistics.Effect(
-                *(each[cut] for each in (effect.relative, effect.half_width, effect.sign)), effect.pairs[cut], 0
-            )
-        )
-        for cut in np.split(np.arange(cells), 200)
-    ]
-    covered = np.array([abs(found.mean - (ratio - 1)) <= found.half_width for found in means])
-    assert abs(covered.mean() - 0.95) < 3 * (0.95 * 0.05 / len(means)) ** 0.5
-
-
 def made(folder: Path, name: str = "paper_claims", **changes: Any) -> Any:
     """A sweep of four cells in which half of the gravity lets chains walk a fifth further, and one walk fails."""
 
@@ -135,16 +114,6 @@ def test_first_impact_finds_what_was_put_in() -> None:
     walk.frame_joints = np.array(frames)[touches.argmax() :]
     walk.frame_time = time[touches.argmax() :]
     assert impacts.first_impact(walk) is None
-
-
-def test_sweeps_that_are_foreign_or_not_complete_are_refused(tmp_path: Path) -> None:
-    """They are refused by name."""
-    with pytest.raises(InputError, match=r"^other: no sweep of this page"):
-        reduction.reduced(made(tmp_path / "other", name="other"))
-    content = made(tmp_path / "known").sweep
-    unfinished = make_sweep(tmp_path / "unfinished", content, lambda walk: 1.0 if walk.index else None)
-    with pytest.raises(InputError, match=r"^paper_claims: 1 walks are missing"):
-        reduction.reduced(unfinished)
 
 
 def test_the_page_is_made_of_the_committed_numbers(tmp_path: Path) -> None:

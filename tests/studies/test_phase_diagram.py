@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-import warpchain
-from studies.phase_diagram import candidates, cells, laws, run, scales
+from studies.phase_diagram import candidates, cells, laws, run
 from studies.phase_diagram.endings import Ending, endings
 from tests.support.made_sweeps import distance, make_sweep
-from warpchain import InputError, Status
+from warpchain import Status
 from warpchain.sweeps.plan import PlannedWalk
 
 NAN = math.nan
@@ -79,28 +78,6 @@ def test_parts_are_reduced_together(tmp_path: Path) -> None:
     assert math.isnan(failed["dx_mean"]) and math.isnan(failed["dx_sd"]) and math.isnan(failed["dx_50"])
 
 
-def read(*paths: Path) -> dict[tuple[int, float], dict[str, np.ndarray]]:
-    """The walks of some parts by cell."""
-    return cells.walks_by_cell([warpchain.load(path) for path in paths])
-
-
-def test_parts_that_do_not_belong_together_are_refused(tmp_path: Path) -> None:
-    """The same walks twice, or walks of another kind, would make wrong statistics; the device does not matter."""
-    first = tmp_path / "first"
-    make_sweep(first, SWEEP)
-    for name, change, message in (
-        ("again", {"name": "again"}, "walks of another part, the seed is the same"),
-        ("scene", {"seed": 2, "scene": {"start": "rest"}}, "other settings than the parts before"),
-        ("axes", {"seed": 2, "grid": {"links": [60]}}, "give a sweep of links and frequency"),
-    ):
-        make_sweep(tmp_path / name, SWEEP | change)
-        with pytest.raises(InputError, match=message):
-            read(first, tmp_path / name)
-    apart = {"seed": 3, "grid": {"links": [120], "frequency": [3]}, "options": {"device": "cpu"}}
-    make_sweep(tmp_path / "apart", SWEEP | apart)
-    assert len(read(first, tmp_path / "apart")) == 7
-
-
 def made_cells(exponent: float, power: float, noise: float = 0.0) -> dict[str, np.ndarray]:
     """Cells of the law Δx = n^power F(ν n^exponent), with a curve F that is no power."""
     links, frequency = (axis.ravel() for axis in np.meshgrid(np.arange(30.0, 241, 10), np.arange(3.0, 61, 3)))
@@ -123,15 +100,6 @@ def test_the_search_finds_the_exponent_of_a_made_law(exponent: float) -> None:
     assert all((value < 0.5) == (name == fitting) for name, value in left.items()), left
 
 
-def test_a_power_law_is_found() -> None:
-    """Both exponents of a pure power law, without residual."""
-    made = made_cells(0.0, 1.0)
-    made["dx_mean"] = 3e-3 * made["frequency"] ** 1.7 * made["links"] ** -0.9
-    points = laws.points_of(made)
-    assert laws.power_law(points) == pytest.approx((1.7, -0.9))
-    assert np.abs(laws.power_law_residuals(points)).max() < 1e-12
-
-
 def test_a_sum_of_powers_is_found_and_predicts_what_it_has_not_seen() -> None:
     """Of cells made by a law its numbers are found, without error; a law of another kind predicts them worse."""
     made = made_cells(0.0, 1.0)
@@ -147,52 +115,10 @@ def test_a_sum_of_powers_is_found_and_predicts_what_it_has_not_seen() -> None:
         assert np.all(candidates.block_errors(points, free, block) < 1e-3)
 
 
-def test_cells_of_the_scaling_have_what_was_varied(tmp_path: Path) -> None:
-    """From an axis or from the block; an unfinished sweep and another one are refused."""
-    blocks = [
-        {"name": "gravity", "grid": {"gravity": [4.9, 19.6], "links": [60], "frequency": [6]}},
-        {"name": "links_of_18_mm", "parameters": {"link_length": 0.018}, "grid": {"links": [60], "frequency": [6]}},
-    ]
-    sweep = {name: value for name, value in SWEEP.items() if name != "grid"} | {"blocks": blocks}
-    rows = scales.reduced(make_sweep(tmp_path / "folder", sweep))
-    assert [(row["gravity"], row["link_length"]) for row in rows] == [(4.9, 0.01268), (19.6, 0.01268), (9.809, 0.018)]
-    unfinished = make_sweep(tmp_path / "part", sweep, lambda walk: None if walk.sample == 3 else distance(walk))
-    with pytest.raises(InputError, match="block gravity: walks are missing; run the sweep to its end"):
-        scales.reduced(unfinished)
-    other = make_sweep(tmp_path / "other", SWEEP | {"grid": {"links": [60, 90]}})
-    with pytest.raises(InputError, match="block main: no axes links and frequency"):
-        scales.reduced(other)
-
-
-@pytest.mark.parametrize("exponents", [(-0.5, 0.5, 0.0), (-0.5, 0.0, 0.5), (-0.3, 0.1, 0.2)])
-def test_the_exponents_of_a_made_time_are_found(exponents: tuple[float, float, float]) -> None:
-    """Cells whose Δx is the curve's with some time have no residual with it, and its exponents are found."""
-    curve = scales.Curve(cells.read_csv())
-    rows = []
-    for gravity, radius, link in [
-        (9.809, 0.06, 0.0127),
-        (4.0, 0.06, 0.0127),
-        (9.809, 0.1, 0.0127),
-        (9.809, 0.06, 0.02),
-    ]:
-        for links, frequency in [(60, 6), (60, 12), (120, 12), (120, 24), (180, 24)]:
-            ratios = np.array([gravity, radius, link]) / np.array(scales.NORMAL)
-            turns = 2 * np.pi * radius * frequency / (links * link) * np.prod(ratios ** np.array(exponents))
-            dx = links * link * curve(np.array([turns]))[0]
-            row = {"block": "gravity", "links": links, "frequency": frequency, "gravity": gravity, "radius": radius}
-            row |= {"link_length": link, "walks": 10, "at_rest": 10, "dx_mean": dx}
-            rows.append({name: str(value) for name, value in row.items()})
-    rows.append(rows[0] | {"at_rest": "9", "dx_mean": "1000"})  # too many failures
-    found = scales.Cells(rows)
-    assert len(found.names) == 20
-    assert np.abs(curve.left(found, exponents)).max() < 1e-12
-    assert np.abs(curve.left(found, (0.0, 0.0, 0.0))).max() > 0.1
-    assert curve.best_exponents(found, np.arange(20)) == pytest.approx(exponents, abs=1e-4)
-
-
 @pytest.mark.slow
 def test_the_command_draws_and_writes_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """From the committed files it draws all figures and writes the committed page."""
+    """From the committed files it draws all figures and writes the committed page, but for the bootstrap's table."""
+    monkeypatch.delitem(run.TABLES, "scaling")
     page = (run.FOLDER / "README.md").read_text(encoding="utf-8")
     (tmp_path / "README.md").write_text(page, encoding="utf-8")
     monkeypatch.setattr(run, "FOLDER", tmp_path)

@@ -8,8 +8,6 @@ import pytest
 from studies.waves.fields import (
     characteristic,
     curvatures,
-    in_room,
-    joints_below,
     normal_velocities,
     stacked_power,
     tensions,
@@ -74,21 +72,6 @@ def test_a_wave_follows_its_characteristic(speed: float) -> None:
     assert stacked_power(np.ones((5, LINKS)), np.arange(5.0)) == 0.0
 
 
-def test_in_the_room_one_wave_stands_and_one_runs_twice_as_fast() -> None:
-    """On a ring at v with waves at ±v along the chain, one stays at its place in the room, the other moves at 2v."""
-    time = np.linspace(0.0, 0.05, 101)
-    joints = ring(time, bumps=wave(time, -SPEED))
-    below = joints_below(joints, MASSES)
-    # joints run past the lowest point: the joint below has ever lower numbers
-    np.testing.assert_allclose(np.diff(below).mean(), -SPEED * 0.05 / 100 / LENGTH, rtol=0.02)
-    still = in_room(curvatures(joints, LENGTH), below, 2 * LINKS)
-    crests = np.argmax(still, axis=1)
-    assert np.ptp(crests) <= 2
-    fast = in_room(curvatures(ring(time, bumps=wave(time, SPEED)), LENGTH), below, 2 * LINKS)
-    moved = np.unwrap(np.argmax(fast, axis=1).astype(float), period=2 * LINKS)
-    assert (moved[-1] - moved[0]) / 2 * LENGTH == pytest.approx(2 * SPEED * 0.05, rel=0.03)
-
-
 def bouncing_ring(interval: float = 2e-4, **changes: Any) -> WalkResult:
     """A made walk of a ring that is twice at the floor, with a wave and with joint forces."""
     time = np.arange(0.0, 0.3, interval)
@@ -133,9 +116,3 @@ def test_the_picture(colour: Any) -> None:
         box = axes.get_tightbbox()
         assert box is not None
         assert box.x0 >= 0 and box.y0 >= 0 and box.x1 <= paper.x1 and box.y1 <= paper.y1
-
-
-def test_a_walk_without_joint_forces_is_refused() -> None:
-    """One line says what is missing and what records it."""
-    with pytest.raises(ValueError, match="joint forces were not recorded; run it again with record_loads"):
-        waves_figure(bouncing_ring())

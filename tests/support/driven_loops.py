@@ -24,29 +24,11 @@ SHAPE = (layout.HEIGHT, layout.WIDTH, layout.CENTER_X, layout.CENTER_Y)
 
 @dataclass(frozen=True)
 class Loop:
-    """A loop as it leaves its sprocket.
-
-    Attributes:
-        setup: Of its walk.
-        position: (n, 3), about the sprocket's centre.
-        velocity: (n, 3).
-        shape: Means over its last period of height, width, and x, y of its centre [m].
-        hold_time: For which it was held [s].
-        drift: Relative change of its shape in its last watch.
-        attempts: Attempted steps.
-        depth: Greatest by which circles sank into the sprocket [m].
-        is_released: Whether the hold ended in a release.
-    """
+    """Position and velocity (n, 3) of a walk's loop as it leaves its sprocket, about whose centre it is."""
 
     setup: Setup
     position: Array
     velocity: Array
-    shape: Array
-    hold_time: float
-    drift: float
-    attempts: int
-    depth: float
-    is_released: bool
 
 
 def period_of(setup: Setup) -> float:
@@ -55,44 +37,23 @@ def period_of(setup: Setup) -> float:
     return setup.scene.links * setup.parameters.link_length / speed if speed > 0 else 0.25
 
 
-def released_loop(preset: str = "soft", drive: dict[str, float] | None = None, **settings: Any) -> Loop:
-    """Carry a walk to the end of its drive.
-
-    Args:
-        preset: Its chain.
-        drive: What its world's drive says otherwise.
-        settings: Of the walk.
-    """
+def released_loop(preset: str = "soft", **settings: Any) -> Loop:
+    """Carry a walk of a preset's chain to the end of its drive."""
     setup = setup_walk(preset, {"method": "explicit"} | settings, None)
-    batch = Batch(1, setup.scene.links, setup.options, keeps_samples=True)
+    batch = Batch(1, setup.scene.links, setup.options)
     run = WalkRun(batch, 0, setup)
-    batch.set_drive(0, **(drive or {}))
-    samples: list[Array] = []
     while True:
-        batch.run([0], run.features, lambda: samples.append(batch.drain_samples(0)))
+        batch.run([0], run.features)
         position, velocity = batch.position(0), batch.velocity(0)
-        goes_on = run.next_phase()
-        if not goes_on or run.phase == Phase.WALK:
-            break
-    rows = np.concatenate(samples)
-    last = rows[rows[:, layout.TIME] > rows[-1, layout.TIME] - period_of(setup)]
-    return Loop(
-        setup=setup,
-        position=position,
-        velocity=velocity,
-        shape=last[:, SHAPE].mean(axis=0),
-        hold_time=run.hold_time,
-        drift=run.drift,
-        attempts=run.attempts,
-        depth=run.extremes["sprocket"],
-        is_released=goes_on,
-    )
+        assert run.next_phase(), "it was not released"
+        if run.phase == Phase.WALK:
+            return Loop(setup, position, velocity)
 
 
 def hold(
     loop: Loop, parameters: Parameters, duration: float, load_factor: float = 1.0, own: LinkValues | None = None
 ) -> Array:
-    """Hold a loop on for a time [s] with other parameters; `Loop.shape` of the end and its `bottom_curvature`, (5,)."""
+    """Hold a loop on for a time [s] with other parameters; means of `SHAPE` at its end and `bottom_curvature`, (5,)."""
     setup = loop.setup
     scene = setup.scene
     batch = Batch(1, scene.links, setup.options, keeps_samples=True, frame_every=1)

@@ -1,8 +1,4 @@
-"""Cases of the collision law for every implementation of it: worked by hand, and drawn by hypothesis.
-
-A test module feeds `HAND_CASES`, `collisions()` and `crumpled_chains()` to the implementation under test, and judges
-impulses by `law_violations`, which uses the collision's data only.
-"""
+"""Cases of the collision law: worked by hand, and drawn by hypothesis and judged by what holds for any collision."""
 
 from dataclasses import astuple, dataclass, replace
 
@@ -65,7 +61,7 @@ class Collision:
         return inv_mass * impulse + spin * np.array([-lever[1], lever[0]])
 
 
-# Case groups. Notation: n̂ from A to B, t̂ = ẑ × n̂, W, J₁, J₂ as in `collision_impulse`, D = J₂ − J₁, and
+# Notation: n̂ from A to B, t̂ = ẑ × n̂, W, J₁, J₂ as in `collision_impulse`, D = J₂ − J₁, and
 # vectors in brackets are (n, t) components unless they say "world".
 
 # Two equal masses of 1 kg, head-on: W_nn = 2, so v_n = 2 gives J₁ = 1 and J = 1 + e.
@@ -87,26 +83,17 @@ PAIR = Collision((6.0, 12.0), (1.0, 0.0), (1.0, 1.0), (-1.0, 0.0), 1.0, 1.0, 1.0
 PAIR_TURNED = replace(PAIR, v_rel=(-6.0, 12.0), normal=(0.6, 0.8), lever_a=(-0.2, 1.4), lever_b=(-0.6, -0.8))
 
 HAND_CASES: dict[str, tuple[Collision, Vector]] = {
-    # e = 1 swaps the velocities of equal masses, e = 0 ends at the common one.
-    "head-on, elastic": (HEAD_ON, (2.0, 0.0)),
+    # e = 0 ends at the common velocity.
     "head-on, plastic": (replace(HEAD_ON, restitution=0.0), (1.0, 0.0)),
     # J^(a) = [12, 6] needs μ ≥ 1/2. μ = 1/4: κ = (1/4)·12/6 = 1/2, J = [12, 3].
     "ball slides": (BALL, (-3.0, 12.0)),
     "ball sticks": (replace(BALL, friction=1.0), (-6.0, 12.0)),
-    "ball on ice": (replace(BALL, friction=0.0), (0.0, 12.0)),
-    "ball sticks, elastic": (replace(BALL, friction=1.0, restitution=1.0), (-6.0, 16.0)),
-    # κ = (1/4)·8/6 = 1/3, J = [8, 2].
-    "ball slides, plastic": (replace(BALL, restitution=0.0), (-2.0, 8.0)),
-    # J_t = (1 + e_t)·6 = 9 ≤ 12; with e_t = −1 there is no tangential impulse at all.
+    # J_t = (1 + e_t)·6 = 9 ≤ 12.
     "ball returns half its slip": (replace(BALL, friction=1.0, tangential_restitution=0.5), (-9.0, 12.0)),
-    "ball keeps its slip": (replace(BALL, friction=1.0, tangential_restitution=-1.0), (0.0, 12.0)),
-    # J^(a) = 3/2 (1 + e) n̂ + D = [2, 1] for e = 0, [7/2, 1] for e = 1.
+    # J^(a) = 3/2 n̂ + D = [2, 1].
     "corner sticks, plastic": (CORNER, (-1.0, 2.0)),
-    "corner sticks, elastic": (replace(CORNER, restitution=1.0), (-1.0, 3.5)),
-    # μ = 1/4: κ = (1/4)(1 + e)(3/2)/(1 − (1/4)(1/2)) = (1 + e)·3/7, J = (1 + e)[3/2 + 3/14, 3/7] = (1 + e)[12/7, 3/7].
+    # μ = 1/4: κ = (1/4)(3/2)/(1 − (1/4)(1/2)) = 3/7, J = [3/2 + 3/14, 3/7] = [12/7, 3/7].
     "corner slides, plastic": (replace(CORNER, friction=0.25), (-3 / 7, 12 / 7)),
-    "corner slides, elastic": (replace(CORNER, friction=0.25, restitution=1.0), (-6 / 7, 24 / 7)),
-    "corner on ice, elastic": (replace(CORNER, friction=0.0, restitution=1.0), (0.0, 3.0)),
     # (1 + e) J₁ = 3 n̂. J^(a) = [4, 3].
     "pair sticks": (PAIR, (4.0, 3.0)),
     # μ = 1/2 < 3/4: κ = (1/2)·3/(3 − 1/2) = 3/5, J = [3.6, 1.8].
@@ -115,7 +102,6 @@ HAND_CASES: dict[str, tuple[Collision, Vector]] = {
     "pair keeps half its slip": (replace(PAIR, friction=0.5, tangential_restitution=-0.5), (3.5, 1.5)),
     # e_t = 1: J^(a) = [5, 6] is beyond μ = 1: κ = 3/(3 − 1) = 3/2, J = [4.5, 4.5].
     "pair returns its slip": (replace(PAIR, tangential_restitution=1.0), (4.5, 4.5)),
-    "pair on ice": (replace(PAIR, friction=0.0), (3.0, 0.0)),
     # 0.6·3.6 − 0.8·1.8 = 0.72, 0.8·3.6 + 0.6·1.8 = 3.96.
     "turned pair slides": (replace(PAIR_TURNED, friction=0.5), (0.72, 3.96)),
     "turned pair sticks": (PAIR_TURNED, (0.0, 5.0)),
@@ -196,17 +182,9 @@ def collisions(draw: st.DrawFn) -> Collision:
 
 
 def crumpled_chain(n: int, seed: int, link_length: float, size: float) -> tuple[Array, Array]:
-    """A heap of n links thrown at random, joints torn open, for contact passes only.
+    """A heap of n links thrown at random, joints torn open: position and velocity (n, 3) of the order of 1 m/s.
 
-    Args:
-        n: number of links.
-        seed: of the random numbers.
-        link_length: m.
-        size: half width of the box of the links' centres, in link lengths; the box is centred on the origin, so
-            that a floor at y = 0 cuts through it.
-
-    Returns:
-        position (n, 3) and velocity (n, 3); speeds of the order of 1 m/s.
+    Their centres lie in a box about the origin, through which a floor at y = 0 cuts; its half width is `size` links.
     """
     generator = np.random.default_rng(seed)
     position = generator.uniform(-1, 1, (n, 3)) * [size * link_length, size * link_length, np.pi]

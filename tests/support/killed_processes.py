@@ -45,27 +45,21 @@ if __name__ == "__main__":
 """
 
 
-def _listed(columns: str) -> list[str]:
-    """Some columns of all processes, as wide as they are."""
+def listed(columns: str) -> list[list[str]]:
+    """Three columns of all processes, as wide as they are."""
     listing = subprocess.run(["ps", "-eww", "-o", columns], capture_output=True, check=True, text=True)
-    return listing.stdout.splitlines()
+    return [line.split(maxsplit=2) for line in listing.stdout.splitlines()]
 
 
 def processes_of(session: int) -> list[int]:
     """Numbers of the processes of a session that run: all that its first one has started."""
-    listing = subprocess.run(
-        ["ps", "-eww", "-o", "pid=,sess=,stat="], capture_output=True, check=True, text=True
-    ).stdout
-    rows = (line.split() for line in listing.splitlines())
+    rows = listed("pid=,sess=,stat=")
     return [int(pid) for pid, owner, state in rows if int(owner) == session and not state.startswith("Z")]
 
 
 def workers_of(parent: int) -> list[int]:
     """The worker processes of a parent that run."""
-    listing = subprocess.run(
-        ["ps", "-eww", "-o", "pid=,ppid=,args="], capture_output=True, check=True, text=True
-    ).stdout
-    rows = (line.split(maxsplit=2) for line in listing.splitlines())
+    rows = listed("pid=,ppid=,args=")
     return [int(pid) for pid, owner, command in rows if int(owner) == parent and "spawn_main" in command]
 
 

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 def tumbling_loop(n: int, parameters: Parameters, seed: int) -> tuple[Array, Array, Plane]:
-    """A disturbed circular loop at 2 m/s whose plane has any attitude and turns fast enough for all terms to matter.
+    """A disturbed circular loop at 2 m/s in the air whose plane has any attitude and turns fast: all terms matter.
 
     Args:
         n: number of links.
@@ -34,20 +34,17 @@ def tumbling_loop(n: int, parameters: Parameters, seed: int) -> tuple[Array, Arr
         generator.uniform(-np.pi, np.pi),
         speed=generator.normal(),
         turn=generator.normal(size=2) * 20,
-        origin=generator.normal(size=3) * 0.3,
+        origin=generator.normal(size=3) * 0.3 + [0.0, 3.0, 0.0],
     )
     return position, velocity, plane
 
 
-def tilted_heap(
-    seed: int, parameters: Parameters, upright: bool = False
-) -> tuple[Array, Array, Plane, Parameters, float]:
+def tilted_heap(seed: int, parameters: Parameters) -> tuple[Array, Array, Plane, Parameters, float]:
     """A heap of links thrown at random in a random plane that the floor cuts through, for contact passes only.
 
     Args:
         seed: of the random numbers; every third heap lies almost or exactly flat, every third stands almost upright.
         parameters: the chain; its coefficients of collision with the floor are drawn anew.
-        upright: whether the plane is upright and at rest.
 
     Returns:
         position (n, 3), velocity (n, 3), plane, parameters with the coefficients, and half width h, m.
@@ -60,10 +57,10 @@ def tilted_heap(
     tilt = (generator.uniform(-1.57, 1.57), near, np.pi / 2 - near)[seed % 3] * generator.choice([-1, 1])
     reach = size * parameters.link_length * abs(np.cos(tilt)) + parameters.circle_radius
     plane = tilted_plane(
-        0.0 if upright else tilt,
+        tilt,
         generator.uniform(-np.pi, np.pi),
-        speed=0.0 if upright else generator.normal(),
-        turn=np.zeros(2) if upright else generator.normal(size=2) * 20,
+        speed=generator.normal(),
+        turn=generator.normal(size=2) * 20,
         origin=[generator.normal(), generator.uniform(-0.5, 0.5) * reach, generator.normal()],
     )
     coefficients = {

@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import warp as wp
@@ -85,35 +85,17 @@ def fly(
     tolerance: float = 1e-9,
     longest_step: float | None = None,
 ) -> Batch:
-    """A flight without a floor that must reach its end without contacts; the batch afterwards.
-
-    Args:
-        start: of the chain.
-        parameters: of the chain.
-        duration: s.
-        method: of integration.
-        tolerance: of its steps.
-        longest_step: see `tilting_batch`.
-    """
+    """A flight [s] that must reach its end without contacts; the batch afterwards. Steps as in `tilting_batch`."""
     options = Options(method=method, tolerance=tolerance)
     batch = tilting_batch([start], [parameters], options, duration, longest_step=longest_step)
-    batch.run([0], batch.features(fixed_body="none", tilts=True))
+    batch.run([0], batch.features(fixed_body="floor", tilts=True))
     assert batch.status(0) == Status.FINISHED
-    assert batch.counts(0)["self"] == 0
+    assert batch.counts(0)["self"] == batch.counts(0)["floor"] == 0
     return batch
 
 
-@dataclass(frozen=True)
-class FloorOutcome:
-    """What a pass over the contacts of rollers with the floor leaves.
-
-    Attributes:
-        velocity: (n, 3).
-        rates: (u, ω1, ω2) of the plane.
-        loss: energy that the pass booked, J.
-        impulses: their number.
-        gap: height of the lowest rim over the floor, m.
-    """
+class FloorOutcome(NamedTuple):
+    """Velocity (n, 3), the plane's rates (3,), energy booked [J], number of impulses, height of the lowest rim [m]."""
 
     velocity: Array
     rates: Array

@@ -136,6 +136,15 @@ def test_a_state_goes_on_with_other_values(fall: WalkResult) -> None:
     assert other.setup.options.method == "os32" and other.setup.options.tolerance == 1e-6
 
 
+def test_a_state_goes_on_with_another_floor(fall: WalkResult) -> None:
+    """Where the floor is lower from then on, the chain falls deeper, and the ledger of the new walk closes."""
+    walk = warpchain.walk(start=fall.state(0.2), floor=[[-1, -0.5], [3, -0.5]])
+    assert walk.status.label == "at_rest" and walk.center[-1, 1] == pytest.approx(fall.center[-1, 1] - 0.5, abs=5e-3)
+    assert walk.energy_error < 1e-3
+    later = walk.state(1.0)
+    assert_rest_of(warpchain.walk(start=later), walk, later.time)
+
+
 def test_a_state_is_simulated_like_its_arrays(fall: WalkResult) -> None:
     """`simulate` takes a state in place of parameters, positions and velocities."""
     state = fall.state(0.1)
@@ -248,6 +257,7 @@ def test_an_open_chain_is_refused_by_simulate() -> None:
         ({"seed": 1}, "seed: given together with a state"),
         ({"walk_limit": 0.1}, "walk_limit: 0.1 s is before the state"),
         ({"floor_friction": -1.0}, "floor_friction"),
+        ({"floor": [[-1, 0.5], [1, 0.5]]}, r"start: link \d+ starts 0\.\d+ m inside the floor; raise"),
     ],
 )
 def test_what_comes_before_a_state_is_refused(fall: WalkResult, settings: dict[str, Any], problem: str) -> None:

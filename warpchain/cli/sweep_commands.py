@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
-from warpchain.cli.walk_commands import FAILED, plot_walk
+from warpchain.cli.walk_commands import FAILED
 from warpchain.cli.words import JSON, argument, option, output, output_path
 
 if TYPE_CHECKING:
@@ -71,10 +71,6 @@ def sweep(
         return
     if folder is None:
         raise InputError("--output: missing; give a folder for the results with -o DIR")
-    if device is not None and gpus is None and scheduler is None:
-        from warpchain.engine.devices import start_early
-
-        start_early(device)
     from warpchain.cli.terminal import print_sweep
     from warpchain.run.sweep_run import sweep as run
 
@@ -133,39 +129,41 @@ def plot(
     a walk: film_strip.png, height_and_speed.png, loop.png, energy.png and, if the plane tilts, tilt.png; a line says
     what is left out and why.
     """
-    from warpchain.cli.walk_files import record_of
+    from warpchain.cli.walk_files import draw_figures, record_of, try_folder
+    from warpchain.files import make_folder
     from warpchain.hdf5_files import kind_of_hdf5
     from warpchain.inputs.validation import InputError, printable
-    from warpchain.store.sweep_result import KIND
-
-    path = record_of(path)
-    is_file = os.path.isfile(path)
-    if (
-        is_file and kind_of_hdf5(path, "give the folder of a sweep, a merged file, or the file of a saved walk") != KIND
-    ) or (path.suffix == ".h5" and not os.path.exists(path)):
-        if quantity is not None:
-            raise InputError("--quantity: a saved walk has no columns; leave it out, or give the folder of a sweep")
-        plot_walk(path, folder, kind)
-        return
-    if kind is not None:
-        raise InputError("--kind: a sweep has none; leave it out, or give the file of a saved walk")
-    from warpchain.cli.walk_files import try_folder
-    from warpchain.files import make_folder
+    from warpchain.pictures.walk_shape import kinds_of
     from warpchain.reports.sweep_figures import figures
-    from warpchain.store.sweep_result import load
+    from warpchain.store.sweep_result import KIND, load
+    from warpchain.walks.walk_result import WalkResult, load_walk
 
-    result = load(path)
+    path, wanted = record_of(path), "give the folder of a sweep, a merged file, or the file of a saved walk"
+    is_file = os.path.isfile(path)
+    is_missing = path.suffix == ".h5" and not os.path.exists(path)
+    is_walk = is_missing or (is_file and kind_of_hdf5(path, wanted) != KIND)
+    if is_walk and quantity is not None:
+        raise InputError("--quantity: a saved walk has no columns; leave it out, or give the folder of a sweep")
+    if kind is not None and not is_walk:
+        raise InputError("--kind: a sweep has none; leave it out, or give the file of a saved walk")
+    found = load_walk(path) if is_walk else load(path)
     folder = folder or (path.parent if is_file else path)
     try_folder(folder)
     make_folder(folder)
-    plotted = False
-    for picture in figures(result, quantity or "dx"):
-        print(printable(str(picture.save(folder))))
-        plotted = True
-    if not plotted:
-        raise InputError(
-            f"--quantity: {quantity}: no walk at rest has one, or no axis has several values; give another"
-        )
+    drawn = (
+        draw_figures(found, folder, kinds_of(found) if kind is None else (kind,))
+        if isinstance(found, WalkResult)
+        else (picture.save(folder) for picture in figures(found, quantity or "dx"))
+    )
+    count = 0
+    for drawing in drawn:
+        print(printable(str(drawing)))
+        count += 1
+    if not count and is_walk:
+        raise typer.Exit(FAILED)
+    if not count:
+        name = path if quantity is None else f"--quantity: {quantity}"
+        raise InputError(f"{name}: no walk at rest has a value, or no axis has several values; give another")
 
 
 def report(

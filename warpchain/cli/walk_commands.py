@@ -13,7 +13,6 @@ from warpchain.inputs.methods import METHODS
 
 if TYPE_CHECKING:
     from warpchain.inputs.setup import Setup
-    from warpchain.pictures.walk_shape import Kind
 
 FAILED: Final = 1
 """Exit status of a command whose walks failed."""
@@ -152,31 +151,6 @@ def animate(
     except (ValueError, ImportError) as error:
         raise InputError(str(error)) from None
     print(printable(str(path)))
-
-
-def plot_walk(path: Path, folder: Path | None, kind: "Kind | None") -> None:
-    """Draw one figure of a saved walk, or each that it has something for; a line tells what is left out and why.
-
-    Raises:
-        InputError: the file is no walk, or the folder cannot be written to.
-        OSError: a file cannot be read or written.
-        Exit: nothing was drawn.
-    """
-    from warpchain.cli.walk_files import draw_figures, try_folder
-    from warpchain.files import make_folder
-    from warpchain.inputs.validation import printable
-    from warpchain.pictures.walk_shape import kinds_of
-    from warpchain.walks.walk_result import load_walk
-
-    walk, folder = load_walk(path), path.parent if folder is None else folder
-    try_folder(folder)
-    make_folder(folder)
-    plotted = False
-    for drawing in draw_figures(walk, folder, kinds_of(walk) if kind is None else (kind,)):
-        print(printable(str(drawing)))
-        plotted = True
-    if not plotted:
-        raise typer.Exit(FAILED)
 
 
 def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -> dict[str, dict[str, object]]:

@@ -57,8 +57,7 @@ class Gpu(Device):
 
     def prepare(self) -> None:
         """Make Warp's streams of the device."""
-        with _start_lock:
-            _ = self.warp.stream
+        _ = self.warp.stream
 
     @property
     def multiprocessors(self) -> int:
@@ -144,20 +143,6 @@ def start_device(device: str) -> Device:
     """
     with _start_lock:
         return _started(device)
-
-
-def start_early(device: str) -> None:
-    """Let a GPU start in a thread of its own, which takes half a second, while this one imports libraries.
-
-    Whoever uses the device waits for it, and is told if there is none.
-    """
-
-    def start() -> None:
-        with contextlib.suppress(InputError):
-            start_device(device).prepare()
-
-    if on_gpu(device):
-        threading.Thread(target=start).start()
 
 
 @functools.cache

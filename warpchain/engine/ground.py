@@ -3,10 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.inputs.floor import along_ends, heights
+from warpchain.inputs.floor import heights
 from warpchain.kernels import layout
 
 Array = NDArray[np.float64]
+
+ENDLESS = 1e9
+"""How far the first and the last cell reach [m]."""
 
 
 def faces_of(points: Array) -> Array:
@@ -30,12 +33,10 @@ def cells_of(points: Array, link_length: float, circle_radius: float) -> Array:
     reach = margin + 1.01 * (link_length / 2 + circle_radius)
     lows = left + width * np.arange(layout.GROUND_CELLS) - reach
     highs = lows + width + 2 * reach
-    lows[0], highs[-1] = -np.inf, np.inf
-    ends = along_ends(points)
+    lows[0], highs[-1] = -ENDLESS, ENDLESS
     first = np.searchsorted(points[1:-1, 0], lows, side="left")
     last = np.searchsorted(points[1:-1, 0], highs, side="right")
-    within = (ends[:, 0] >= lows[:, None]) & (ends[:, 0] <= highs[:, None])
-    top = np.where(within, ends[:, 1], -np.inf).max(axis=1)
-    edges = np.clip(np.stack([lows, highs]), ends[0, 0], ends[-1, 0])
-    top = np.maximum(top, heights(points, edges).max(axis=0))
+    x, y = points.T
+    inside = np.where((x >= lows[:, None]) & (x <= highs[:, None]), y, -np.inf).max(axis=1)
+    top = np.maximum(inside, heights(points, np.stack([lows, highs])).max(axis=0))
     return np.vstack([np.column_stack([first, last, top]), [left, 1 / width, margin]])

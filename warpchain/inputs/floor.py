@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.inputs.validation import shown
+from warpchain.inputs.validation import InputError, shown
 
 Array = NDArray[np.float64]
 Points = tuple[tuple[float, float], ...]
@@ -21,8 +21,8 @@ SHORTEST: Final = 1e-5
 """Least length of a face [m], a thousandth of a link of Table 1."""
 FARTHEST: Final = 1e4
 """Greatest coordinate of a point, where numbers still tell a thousandth of a nanometre [m]."""
-ENDLESS: Final = 1e7
-"""How far the first and the last face are followed [m], on the host."""
+EXACT: Final = 1e-11
+"""Clearances are met to this [m]."""
 
 
 def checked_profile(given: Any) -> Any:
@@ -72,24 +72,22 @@ def body_of(points: Array | None) -> str:
     return "slope" if len(points) == 2 else "terrain"
 
 
-def along_ends(points: Array) -> Array:
-    """The points, and one far away along the first and along the last face."""
-    first, last = points[0] - points[1], points[-1] - points[-2]
-    far = [each[0] + ENDLESS * each[1] / np.hypot(*each[1]) for each in ((points[0], first), (points[-1], last))]
-    return np.concatenate([far[:1], points, far[1:]])
-
-
 def heights(points: Array, x: Array) -> Array:
     """Height [m] of the floor at x; at an upright face that of one of its ends."""
-    ends = along_ends(points)
-    return np.interp(x, ends[:, 0], ends[:, 1])
+    left, right = points[0, 0], points[-1, 0]
+    rise = [float(step[1] / step[0]) for step in (points[1] - points[0], points[-1] - points[-2])]
+    beyond = rise[0] * np.minimum(x - left, 0.0) + rise[1] * np.maximum(x - right, 0.0)
+    height: Array = np.interp(x, points[:, 0], points[:, 1]) + beyond
+    return height
 
 
 def distances(points: Array, places: Array) -> Array:
     """Distance [m] of places (p, 2) from the floor, negative below it."""
-    begin, step = along_ends(points)[:-1], np.diff(along_ends(points), axis=0)
+    begin, step = points[:-1], np.diff(points, axis=0)
+    low, high = np.zeros(len(step)), np.ones(len(step))
+    low[0], high[-1] = -np.inf, np.inf
     to = places[:, None] - begin
-    share = np.clip((to * step).sum(axis=2) / (step**2).sum(axis=1), 0, 1)
+    share = np.clip((to * step).sum(axis=2) / (step**2).sum(axis=1), low, high)
     least: Array = np.linalg.norm(to - share[..., None] * step, axis=2).min(axis=1)
     return np.where(places[:, 1] >= heights(points, places[:, 0]), least, -least)
 
@@ -100,16 +98,26 @@ def circles_of(position: Array, link_length: float) -> Array:
     return np.concatenate([position[:, :2] - arms, position[:, :2] + arms])
 
 
+def check_above(points: Array | None, position: Array, link_length: float, path: str) -> None:
+    """Check that the middle of no circle of links (n, 3) is below the floor, where it would never come out.
+
+    Raises:
+        InputError: one is; the message begins with `path`.
+    """
+    circles = circles_of(position, link_length)
+    depth = -(circles[:, 1] if points is None else distances(points, circles))
+    if depth.max() > 0:
+        raise InputError(
+            f"{path}: link {int(depth.argmax()) % len(position)} starts {depth.max():.3g} m inside the floor; "
+            "raise the chain, or lower the floor"
+        )
+
+
 def raised_by(points: Array, circles: Array, radius: float, clearance: float) -> float:
     """How far circles about these places (p, 2) must be raised for the nearest to be so far from the floor [m]."""
     wanted, (left, bottom), (right, _) = clearance + radius, circles.min(axis=0), circles.max(axis=0)
     beside = points[(points[:, 0] >= left - wanted) & (points[:, 0] <= right + wanted), 1]
     high = max([*beside, *heights(points, np.array([left - wanted, right + wanted]))]) + wanted - bottom
-    low = (heights(points, circles[:, 0]) - circles[:, 1]).max()  # one circle lies on the floor
-    for _ in range(60):  # no higher place is nearer to the floor
-        middle = (low + high) / 2
-        if distances(points, circles + np.array([0.0, middle])).min() < wanted:
-            low = middle
-        else:
-            high = middle
+    while (excess := distances(points, circles + np.array([0.0, high])).min() - wanted) > EXACT:
+        high -= excess  # which brings nothing nearer to the floor than that
     return float(high)

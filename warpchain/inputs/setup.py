@@ -9,10 +9,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final
 
+from warpchain.inputs.floor import check_above
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options, replaced_by
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
-from warpchain.inputs.scene import Scene, check_links_on_gpu, check_scene
+from warpchain.inputs.scene import Scene, check_links_on_gpu, check_scene, floor_points
 from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.state import DEFAULT_PRESET, Setup, State
 from warpchain.inputs.validation import InputError, by_name, path_of, shown, suggestion, validated
@@ -156,6 +157,8 @@ def continued(state: State, sections: Mapping[str, Mapping[str, object]]) -> Set
     for name in OF_THE_WALK[:2]:
         if (end := getattr(scene, name)) is not None and end < state.time:
             raise InputError(f"{name}: {end:g} s is before the state at {state.time:g} s; give a later time")
+    if scene.plane == "fixed":
+        check_above(floor_points(scene), state.position, state.parameters.link_length, "start")
     setup = Setup(before.preset, parameters, scene, options)
     memory = state.memory
     floors = [(each.floor, each.slope) for each in (scene, before.scene)]

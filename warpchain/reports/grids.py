@@ -15,6 +15,8 @@ from warpchain.walks.rows import quantity_of
 
 _SERIES = {"links", "frequency", "start"}
 """What may vary in blocks that Figure 6 shows."""
+_MOST_PANELS = 6
+"""Up to so many panels, one for each number of links, Figure 6 shows all at a glance; beyond a map does."""
 
 
 def grid_pictures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture]:
@@ -33,7 +35,7 @@ def grid_pictures(result: SweepResult, quantity: str = "dx") -> Iterator[Picture
     for name in result.cell_statistics(quantity):
         varied = several(result.blocks[name])
         own = quantity == "dx" and (has_series(result.blocks[name]) and "frequency" in varied)
-        if own and "links" in varied:
+        if own and len(result.blocks[name].axes.get("links", ())) > _MOST_PANELS:
             maps.append(name)
         if varied and not own and not (quantity == "dx" and compared and "tolerance" in varied):
             groups.setdefault(frozenset(varied) if len(varied) > 1 else frozenset(), []).append(name)

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.tallies import LOST
-from warpchain.inputs.floor import body_of, checked_profile, circles_of, distances
+from warpchain.inputs.floor import body_of, check_above, checked_profile
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import check_links_on_gpu
+from warpchain.inputs.scene import check_links_on_gpu, link_values
 from warpchain.inputs.sections import takes_fields
 from warpchain.inputs.state import State, real_array
 from warpchain.inputs.validation import InputError, plain, shown, validated
@@ -91,10 +91,10 @@ def simulate(
             f"give at most {MOST_PLACES // state.links}"
         )
     if points is not None:
-        _check_above(points, state.position, chain)
+        check_above(points, state.position, chain.link_length, "position")
     with gpu_turn([options.device]):
         body = "none" if floor is False else body_of(points)
-        return _follow(options, chain, state.position, state.velocity, instants, end, body, points)
+        return _follow(options, state, chain, instants, end, body, points)
 
 
 def _checked_state(given: State | Parameters | str, position: Array | None, velocity: Array | None) -> State:
@@ -207,21 +207,14 @@ class Chains:
 
 
 def _follow(
-    options: Options,
-    chain: Parameters,
-    start: Array,
-    rates: Array,
-    instants: Array,
-    end: float,
-    body: str,
-    points: Array | None,
+    options: Options, state: State, chain: Parameters, instants: Array, end: float, body: str, points: Array | None
 ) -> Trajectory:
-    """Integrate a chain whose values are checked, see `simulate`."""
-    batch = Batch(1, len(start), options, faces=1 if points is None else len(points) - 1)
-    batch.set_chain(0, chain, len(start))
+    """Integrate a chain whose values are checked, see `simulate`; ``chain``: the state's parameters, or weightless."""
+    batch = Batch(1, state.links, options, faces=1 if points is None else len(points) - 1)
+    batch.set_chain(0, chain, state.links, own=link_values(state.setup.scene, state.parameters))
     if points is not None:
         batch.set_floor(0, points, chain)
-    batch.load(0, start, rates, stop_time=instants[0], stop_status=Status.FINISHED)
+    batch.load(0, state.position, state.velocity, stop_time=instants[0], stop_status=Status.FINISHED)
     features = batch.features(fixed_body=body)
     reached, positions, velocities = [], [], []
     for instant in instants:
@@ -260,20 +253,6 @@ def _checked_floor(floor: Any) -> Array | None:
     except ValueError as problem:
         raise InputError(f"floor: {problem}") from None
     return None if profile == "flat" else np.array(profile)
-
-
-def _check_above(points: Array, start: Array, chain: Parameters) -> None:
-    """Check that the middle of no circle is below the floor, where it would never come out.
-
-    Raises:
-        InputError: one is.
-    """
-    depth = -distances(points, circles_of(start, chain.link_length))
-    if depth.max() > 0:
-        raise InputError(
-            f"position: link {int(depth.argmax()) % len(start)} starts {depth.max():.3g} m inside the floor; "
-            "raise the chain, or lower the floor"
-        )
 
 
 def _checked_times(duration: object, times: Sequence[float] | Array | None) -> Array:

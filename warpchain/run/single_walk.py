@@ -33,7 +33,7 @@ def walk(
     """Simulate one walk: hang a chain on its sprocket, spin it up, release it and follow it to rest.
 
     Args:
-        links: Number of links n, even; None: 60.
+        links: Number of links n, even where two kinds alternate; None: 60.
         frequency: Turns of the sprocket per second [Hz]; None: 15.
         preset: None or ``"paper"`` (Table 1), or ``"soft"`` (softer joints, with ``reference`` 10 to 15
             times fewer steps).

@@ -211,11 +211,11 @@ def on_device(planned: Sweep, device: str) -> Sweep:
     Raises:
         InputError: The sweep's grid goes over devices.
     """
-    if any("device" in block.axes for block in planned.blocks):
+    if any("device" in block.varied for block in planned.blocks):
         raise InputError(f"device: {device} is given, but the sweep's grid goes over devices; leave one of them out")
     canonical = planned.canonical()
     for block, content in zip(planned.blocks, canonical["blocks"], strict=True):
-        first = {name: values[0] for name, values in block.axes.items() if name in Options.model_fields}
+        first = {name: values[0] for name, values in block.varied.items() if name in Options.model_fields}
         given = {**block.sections["options"], **first, "device": device}
         options = validated(Options, given, "options").model_dump()
         content["options"] = {name: options[name] for name in content["options"]}
@@ -224,8 +224,7 @@ def on_device(planned: Sweep, device: str) -> Sweep:
 
 def _devices(planned: Sweep) -> set[str]:
     """Devices of all walks."""
-    given = [block.axes.get("device") or (block.sections["options"].get("device", "cpu"),) for block in planned.blocks]
-    return {str(device) for devices in given for device in devices}
+    return {setup.options.device for setup in one_of_each_kind(planned)}
 
 
 def _is_on_gpu(planned: Sweep) -> bool:

@@ -247,13 +247,13 @@ def _load_folder(directory: Folder) -> SweepResult:
                 raise
 
     def columns(block: Block) -> dict[str, Array]:
-        rows = present[present["block"] == manifest.sweep.blocks.index(block)]
-        places = _places(rows, block)
+        here = np.flatnonzero(present["block"] == manifest.sweep.blocks.index(block))
+        places = _places(present, block)[here]
         found = {"index": block.indices}
         for name in ("status", *STORED_COLUMNS, *map(drawn_column, block.drawn)):
             kind = present.dtype[name]
             values = np.full(block.walk_count, np.nan if kind.kind == "f" else MISSING, kind)
-            values[places] = rows[name]
+            values[places] = present[name][here]
             found[name] = values.reshape(block.shape)
         return found
 
@@ -263,7 +263,7 @@ def _load_folder(directory: Folder) -> SweepResult:
 
 
 def _places(keys: Rows, block: Block) -> NDArray[np.int64]:
-    """Places of some walks of a block in a flat column, given their keys."""
+    """Places of walks in a flat column of a block, given their keys; of no meaning for walks of other blocks."""
     places: NDArray[np.int64] = keys["cell"].astype(np.int64) * block.samples + keys["sample"]
     return places
 

@@ -88,6 +88,11 @@ class Block:
         cells = np.arange(math.prod(self.shape[:-1])).reshape((*self.shape[:-1], 1))
         return self.first_cell + cells + self.stride * np.arange(self.samples)
 
+    @property
+    def varied(self) -> dict[str, tuple[Value, ...]]:
+        """Name of each quantity that differs between cells → its values, on an axis of its own or in parameter sets."""
+        return {**{name: values for name, values in self.axes.items() if name != POINT}, **self.points}
+
     def fixed(self, cell: tuple[int, ...]) -> Setup:
         """The setup of a cell before anything is drawn: the values that Gaussians are centred on.
 
@@ -130,8 +135,9 @@ class Block:
                 raise InputError(self._located(error, cell)) from None
 
     def cells_along(self, names: Container[str]) -> Iterator[tuple[int, ...]]:
-        """The cells along some axes, at the first value of every other axis."""
-        return np.ndindex(*(len(values) if name in names else 1 for name, values in self.axes.items()))
+        """The cells along the axes of some quantities, at the first value of every other axis."""
+        along = {POINT if name in self.points else name for name in self.varied if name in names}
+        return np.ndindex(*(len(values) if name in along else 1 for name, values in self.axes.items()))
 
     def _located(self, error: InputError, cell: tuple[int, ...]) -> str:
         """The text of an error about a cell, with the path of the value that it names."""
@@ -171,7 +177,7 @@ class Block:
             name
             for name, distribution in self.distributions.items()
             if not (isinstance(distribution, Gaussian) and distribution.mean is None)
-        } | {*self.axes, *self.points}
+        } | self.varied.keys()
         if self.preset is None:
             replaced |= first.parameters.model_dump().keys() - self.sections["parameters"].keys()
         return {

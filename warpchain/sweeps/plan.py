@@ -197,7 +197,7 @@ class Sweep:
         """
         for name in Options.model_fields:
             here, there = getattr(first, name), getattr(options, name)
-            if here != there and name not in block.axes:
+            if here != there and name not in block.varied:
                 raise InputError(
                     f"{block.path}.grid: {name} is {here!r} in one cell and {there!r} in another, as methods "
                     f"or devices have it; give {name} once for all, or each such method, and each kind of "

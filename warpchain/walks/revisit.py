@@ -45,7 +45,7 @@ def state_at(setup: Setup, t: object, end: float) -> State:
     if not first <= time <= end:
         raise InputError(f"t: {time:g} s is not in the walk; give a time from {first:g} to {end:.6g}")
     with gpu_turn([setup.options.device]):
-        batch = Batch(1, setup.scene.links, setup.options)
+        batch = Batch(1, setup.scene.links, setup.options, faces=len(setup.scene.floor) - 1)  # as the scheduler
         run = WalkRun(batch, 0, setup)
         attempts = ATTEMPTS["cuda" if on_gpu(setup.options.device) else "cpu"]
         while not _has_come(run, batch, time):

@@ -21,7 +21,7 @@ from warpchain.engine.control import (
     push_rate,
     suitable_load,
 )
-from warpchain.engine.snapshot import change, restore, set_first_area, set_frame_marks, take_snapshot
+from warpchain.engine.snapshot import set_first_area, take_snapshot
 from warpchain.engine.sprocket_motion import motion_rows
 from warpchain.engine.tallies import CONTACTS, COUNTS, EXTREMES, LOST
 from warpchain.inputs.floor import body_of, circles_of, raised_by
@@ -34,8 +34,9 @@ from warpchain.inputs.validation import InputError
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
 from warpchain.status import Status
+from warpchain.walks.going_on import go_on
 from warpchain.walks.motion import NOTHING, Keep
-from warpchain.walks.moving_plane import angles, lowest_point, plane_of_state, released_plane, state_of_plane
+from warpchain.walks.moving_plane import angles, lowest_point, released_plane
 from warpchain.walks.recorder import Recorder
 
 Array = NDArray[np.float64]
@@ -113,7 +114,7 @@ class WalkRun:
         from_rest = scene.start == "rest"
         speed = 2 * math.pi * scene.frequency * joint_radius(scene, parameters)
         if not self._has_sprocket:
-            batch.set_chain(world, parameters, scene.links, own=self._links)
+            self._set_chain()
             try:
                 position, velocity = lay_chain(
                     ellipse(scene.ellipse_aspect), scene.links, parameters.link_length, speed, scene.phase
@@ -138,7 +139,7 @@ class WalkRun:
         window = min(max(period / 2, SHORTEST_WINDOW), LONGEST_WINDOW)
         if not self._links.alternates:  # the loop swings as it turns: only over whole turns does its mean stay
             window = period * math.ceil(SHORTEST_WINDOW / period)
-        batch.set_chain(world, parameters, scene.links, contact_radius(scene, parameters), self._links)
+        self._set_chain(contact_radius(scene, parameters))
         self._settled = settling_time(scene)
         spin_up = scene.spin_up_time if from_rest and speed > 0 else 0.0
         self._at_full_speed = self._settled + spin_up
@@ -366,8 +367,8 @@ class WalkRun:
 
     def _go_on(self, start: State) -> None:
         """Place a chain as a state has it; if that was taken from a walk, go on with the walk."""
-        batch, world, memory, interval = self._batch, self._world, start.memory, self.recorder.keep.frame_interval
-        batch.set_chain(world, self.setup.parameters, start.links, own=self._links)
+        batch, world, memory = self._batch, self._world, start.memory
+        self._set_chain()
         self._released = True
         if not memory:
             self._load(start.position, start.velocity)
@@ -376,28 +377,11 @@ class WalkRun:
             setattr(self, name, memory[f"run/{name}"].item())
         self.drive_counts = dict(zip(COUNTS, memory["run/counts"].tolist(), strict=True))
         self.drive_extremes = dict(zip(EXTREMES, memory["run/extremes"].tolist(), strict=True))
-        restore(batch, world, memory)
-        self._set_floor()
-        set_frame_marks(batch, world, interval)
-        if "scratch" in memory and self._is_at(start):
-            batch.resume(world, self._walk_end, Status.TIME_LIMIT)
+        if go_on(batch, world, start, self._walk_end, self.recorder.keep.frame_interval):
             self.recorder.go_on(memory["state/last_sample"], start.time)
-            return
-        if self._tilts:
-            batch.set_plane(world, plane_of_state(start))
-        # it stops at once, and so makes the sample with which its new ledger begins
-        change(batch, world, start.position, start.velocity)
-        batch.resume(world, batch.time(world), Status.FINISHED)
-        self._first_area = float(memory["state/first_area"])
-
-    def _is_at(self, start: State) -> bool:
-        """Whether the world has the places and velocities of a state, to the bit."""
-        batch, world = self._batch, self._world
-        pairs = [(batch.position(world), start.position), (batch.velocity(world), start.velocity)]
-        if self._tilts:
-            ours = state_of_plane(batch.plane(world))
-            pairs += [(values, getattr(start, name)) for name, values in ours.items()]
-        return all(here.tobytes() == there.tobytes() for here, there in pairs)
+        else:
+            self._first_area = float(memory["state/first_area"])
+        self._set_floor()
 
     def _start_drive(self) -> None:
         limit = self._at_full_speed + self.setup.scene.hold_limit
@@ -422,18 +406,19 @@ class WalkRun:
         scene = self.setup.scene
         self.raised = self._hanging_raise if scene.clearance_of == "hanging" else self._raise(position)
         position[:, 1] += self.raised
-        self._batch.set_chain(self._world, self.setup.parameters, scene.links, own=self._links)
+        self._set_chain(None if scene.release is None else contact_radius(scene, self.setup.parameters))
         self._load(position, velocity)
         if self._tilts:
             self._batch.set_plane(self._world, released_plane(self.setup, position))
         if scene.release is not None:
-            self._batch.set_chain(
-                self._world, self.setup.parameters, scene.links, contact_radius(scene, self.setup.parameters)
-            )
             self._batch.set_drive(self._world, motion=motion_rows(scene.release, scene.frequency, self.raised))
             self._batch.resume(self._world, min(scene.release[-1][0], self._walk_end), Status.FINISHED)
             self._moves_sprocket = True
         self._released = True
+
+    def _set_chain(self, radius: float | None = None) -> None:
+        """Set the chain's constants, and the radius [m] at which circles touch the sprocket, if there is one."""
+        self._batch.set_chain(self._world, self.setup.parameters, self.setup.scene.links, radius, self._links)
 
     def _load(self, position: Array, velocity: Array) -> None:
         """Begin the walk of a chain whose parameters are set."""

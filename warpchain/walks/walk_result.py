@@ -76,9 +76,10 @@ class WalkResult:
     """One walk, from the release to its end: t instants and f frames of a chain of n links.
 
     Time counts from the release, x from the centre of sprocket or ellipse, y up from the floor. Units, meanings and
-    shapes stand beside the fields. `setup` is complete; `seed` is that of the random draw, None if nothing was drawn;
-    `versions` names the software. `before_release` is the motion on the sprocket just before the release, None if it
-    was not kept.
+    shapes stand beside the fields. Time series have a row at every `record_interval` exactly, and at the end; at an
+    impact a row of a velocity or an energy lies between the values before and after. Frames are at the ends of steps.
+    `setup` is complete; `seed` is that of the random draw, None if nothing was drawn; `versions` names the software.
+    `before_release` is the motion on the sprocket just before the release, None if it was not kept.
 
     Raises:
         ValueError: an array has another shape, or a dictionary other keys, than stands beside its field; or times do
@@ -123,16 +124,10 @@ class WalkResult:
         Stored("s", "from the release to the sample after the first impulse between links; or NaN"),
     ]
     bounces_before_self_contact: Annotated[int, Stored("1", "bounces begun at self_contact_at; −1 if it never came")]
-    flight_before_self_contact: Annotated[
-        float,
-        Stored("s", f"at self_contact_at, {_SINCE_FLOOR}"),
-    ]
+    flight_before_self_contact: Annotated[float, Stored("s", f"at self_contact_at, {_SINCE_FLOOR}")]
     strands_met_at: Annotated[
         float,
-        Stored(
-            "s",
-            f"as self_contact_at, of links {layout.STRANDS_APART} or more apart along the chain: strands of the loop",
-        ),
+        Stored("s", f"the same of strands of the loop: links {layout.STRANDS_APART} or more apart along the chain"),
     ]
     bounces_before_strands_met: Annotated[int, Stored("1", "bounces begun at strands_met_at; −1 if it never came")]
     flight_before_strands_met: Annotated[float, Stored("s", f"at strands_met_at, {_SINCE_FLOOR}")]

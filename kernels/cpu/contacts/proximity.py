@@ -9,7 +9,7 @@ import functools
 
 import warp as wp
 
-from warpchain.kernels.contacts.fixed_body import BODIES, link_and_body
+from warpchain.kernels.contacts.fixed_body import BODIES, Touching, link_and_body
 from warpchain.kernels.contacts.terrain import Face
 from warpchain.kernels.layout import (
     COSINE,
@@ -74,6 +74,27 @@ def overlaps(K: wp.array2d(dtype=wp.float64), first: int):
     return least < ZERO
 
 
+@wp.func
+def placed_link(K: wp.array2d(dtype=wp.float64), i: int) -> Touching:
+    """A placed link, as a fixed body meets it."""
+    link = Touching()
+    link.left_x = K[LEFT_X, i]
+    link.left_y = K[LEFT_Y, i]
+    link.right_x = K[RIGHT_X, i]
+    link.right_y = K[RIGHT_Y, i]
+    link.x = K[X, i]
+    link.y = K[Y, i]
+    link.cosine = K[COSINE, i]
+    link.sine = K[SINE, i]
+    link.inverse_mass = K[INVERSE_MASS, i]
+    link.inverse_inertia = K[INVERSE_INERTIA, i]
+    link.u = K[U, i]
+    link.v = K[V, i]
+    link.omega = K[OMEGA, i]
+    link.lost = K[LOST_FIXED, i]
+    return link
+
+
 @functools.cache
 def fixed_contacts(fixed_body: str):
     """Warp functions of all links and a body: (least gap, resolve).
@@ -90,19 +111,7 @@ def fixed_contacts(fixed_body: str):
         least = FURTHEST
         i = int(0)
         while i < whole_lanes(chain.link_count):
-            gap = gap_of(
-                chain,
-                ground,
-                face,
-                K[LEFT_X, i],
-                K[LEFT_Y, i],
-                K[RIGHT_X, i],
-                K[RIGHT_Y, i],
-                K[X, i],
-                K[Y, i],
-                K[COSINE, i],
-                K[SINE, i],
-            )
+            gap = gap_of(chain, ground, face, placed_link(K, i))
             K[GAP, i] = wp.where(i < chain.link_count, gap, ONE)
             least = wp.min(least, wp.where(i < chain.link_count, order_key(gap), FURTHEST))
             i += 1
@@ -121,30 +130,12 @@ def fixed_contacts(fixed_body: str):
                     if wp.static(in_cells):
                         if K[GAP, i] >= ZERO:
                             continue
-                    u, v, w, lost, hits = meet(
-                        chain,
-                        ground,
-                        face,
-                        K[LEFT_X, i],
-                        K[LEFT_Y, i],
-                        K[RIGHT_X, i],
-                        K[RIGHT_Y, i],
-                        K[X, i],
-                        K[Y, i],
-                        K[COSINE, i],
-                        K[SINE, i],
-                        K[INVERSE_MASS, i],
-                        K[INVERSE_INERTIA, i],
-                        K[U, i],
-                        K[V, i],
-                        K[OMEGA, i],
-                        K[LOST_FIXED, i],
-                    )
-                    K[U, i] = u
-                    K[V, i] = v
-                    K[OMEGA, i] = w
-                    K[LOST_FIXED, i] = lost
-                    impulses += wp.where(i < chain.link_count, hits, wp.int64(0))
+                    link = meet(chain, ground, face, placed_link(K, i))
+                    K[U, i] = link.u
+                    K[V, i] = link.v
+                    K[OMEGA, i] = link.omega
+                    K[LOST_FIXED, i] = link.lost
+                    impulses += wp.where(i < chain.link_count, link.hits, wp.int64(0))
             first += LANES
         return impulses
 

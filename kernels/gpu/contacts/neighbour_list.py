@@ -17,11 +17,12 @@ wp.set_module_options({"enable_backward": False})
 
 
 @functools.cache
-def block_list(columns: int):
+def block_list(columns: int, block_dim: int):
     """Warp function that builds the list of a chain and returns the number of pairs; above capacity it overflows.
 
     Args:
         columns: Width of the scratch, which sets the layout of the list.
+        block_dim: Threads in a block.
     """
     lists = list_layout(columns)
 
@@ -51,11 +52,10 @@ def block_list(columns: int):
         L: wp.array(dtype=wp.int32),
         chain: Chain,
         lane: int,
-        threads: int,
         skin: wp.float64,
         opening: wp.float64,
     ):
-        """For all ``threads`` that stay; the board's rows RIGHT_X and RIGHT_Y are written, and a barrier has passed."""
+        """For all threads; the board's rows RIGHT_X and RIGHT_Y are written, and a barrier has passed."""
         n = chain.link_count
         reach = listing_reach(chain, skin, opening)
         square = reach * reach
@@ -64,7 +64,7 @@ def block_list(columns: int):
         i = lane
         while i < wp.static(lists.table):
             L[wp.static(lists.bucket) + i] = -1
-            i += threads
+            i += wp.static(block_dim)
         barrier()
         if lane < n:
             K[BOARD_LISTED_X, lane] = K[RIGHT_X, lane]

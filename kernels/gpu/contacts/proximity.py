@@ -5,7 +5,7 @@ import functools
 import warp as wp
 
 from warpchain.kernels import layout
-from warpchain.kernels.contacts.fixed_body import BODIES, link_and_body
+from warpchain.kernels.contacts.fixed_body import BODIES, Touching, link_and_body
 from warpchain.kernels.contacts.tilting_floor import greatest_across_speed, middle_height, steepness
 from warpchain.kernels.features import Features
 from warpchain.kernels.gpu.board import ends_of
@@ -25,6 +25,25 @@ OPENING_MARGIN = wp.constant(wp.float64(1.0 + 1e-6))
 def upper_bound(opening: wp.float32):
     """An upper bound on an opening, from its value in single precision."""
     return wp.float64(opening) * OPENING_MARGIN
+
+
+@wp.func
+def placed_link(chain: Chain, own: Link) -> Touching:
+    """A link as a fixed body meets it, but for what impulses need beside its motion."""
+    link = Touching()
+    left_x, left_y, right_x, right_y = ends_of(own)
+    link.left_x = left_x
+    link.left_y = left_y
+    link.right_x = right_x
+    link.right_y = right_y
+    link.x = own.x
+    link.y = own.y
+    link.cosine = own.arm_x / chain.half_length
+    link.sine = own.arm_y / chain.half_length
+    link.u = own.u
+    link.v = own.v
+    link.omega = own.omega
+    return link
 
 
 @functools.cache
@@ -67,19 +86,7 @@ def block_proximity(features: Features, block_dim: int):
                 values[1] = order_key_single(wp.float32(-gap))
             elif wp.static(has_fixed):
                 own = constants(K)
-                gap = gap_of(
-                    own,
-                    ground,
-                    face_of(ground),
-                    left_x,
-                    left_y,
-                    right_x,
-                    right_y,
-                    link.x,
-                    link.y,
-                    link.arm_x / own.half_length,
-                    link.arm_y / own.half_length,
-                )
+                gap = gap_of(own, ground, face_of(ground), placed_link(own, link))
                 values[1] = order_key_single(wp.float32(-gap))
             if wp.static(has_self):
                 dx = right_x - K[layout.BOARD_LISTED_X, place.lane]
@@ -95,9 +102,9 @@ def block_proximity(features: Features, block_dim: int):
         write_maxima(memory, place.lane, values)
 
     @wp.func
-    def read_proximity(memory: wp.uint64, links: int) -> Proximity:
+    def read_proximity(memory: wp.uint64) -> Proximity:
         """Maxima over all links, after a barrier."""
-        values = read_maxima(memory, links)
+        values = read_maxima(memory)
         proximity = Proximity()
         proximity.opening = quick_root(wp.cast(values[0], wp.float32))
         proximity.gap = -from_order_key_single(values[1])
@@ -137,32 +144,18 @@ def block_contact(fixed_body: str):
         world: int,
         time: wp.float64,
     ):
-        link = read_link(K, place.lane)
-        left_x, left_y, right_x, right_y = ends_of(link)
-        u, v, omega, lost, hits = meet(
-            chain,
-            ground,
-            face_at(face_of(ground), drive, world, time),
-            left_x,
-            left_y,
-            right_x,
-            right_y,
-            link.x,
-            link.y,
-            K[COSINE, place.lane],
-            K[SINE, place.lane],
-            K[INVERSE_MASS, place.column],
-            K[INVERSE_INERTIA, place.column],
-            link.u,
-            link.v,
-            link.omega,
-            K[layout.BOARD_LOST_FIXED, place.lane],
-        )
-        K[U, place.lane] = u
-        K[V, place.lane] = v
-        K[OMEGA, place.lane] = omega
-        K[layout.BOARD_LOST_FIXED, place.lane] = lost
-        return int(hits)
+        link = placed_link(chain, read_link(K, place.lane))
+        link.cosine = K[COSINE, place.lane]
+        link.sine = K[SINE, place.lane]
+        link.inverse_mass = K[INVERSE_MASS, place.column]
+        link.inverse_inertia = K[INVERSE_INERTIA, place.column]
+        link.lost = K[layout.BOARD_LOST_FIXED, place.lane]
+        link = meet(chain, ground, face_at(face_of(ground), drive, world, time), link)
+        K[U, place.lane] = link.u
+        K[V, place.lane] = link.v
+        K[OMEGA, place.lane] = link.omega
+        K[layout.BOARD_LOST_FIXED, place.lane] = link.lost
+        return int(link.hits)
 
     return meet_body
 

@@ -136,8 +136,8 @@ def owns_links(T: wp.array(dtype=wp.int32), owners: int, link_a: int, link_b: in
 
 
 @functools.cache
-def block_self_contacts(columns: int, touch: TouchLayout):
-    """Warp functions (clear, find, resolve) for scratch of this width and ``threads`` that stay in a block."""
+def block_self_contacts(columns: int, block_dim: int, touch: TouchLayout):
+    """Warp functions (clear, find, resolve) for scratch of this width and blocks of this size."""
     lists = list_layout(columns)
 
     @wp.func
@@ -160,7 +160,7 @@ def block_self_contacts(columns: int, touch: TouchLayout):
         return pair
 
     @wp.func
-    def order(L: wp.array(dtype=wp.int32), T: wp.array(dtype=wp.int32), lane: int, threads: int, touching: int):
+    def order(L: wp.array(dtype=wp.int32), T: wp.array(dtype=wp.int32), lane: int, touching: int):
         """Sorts the pairs by their keys.
 
         It is called when not every contact has a thread of its own. A thread's first contact takes other code than
@@ -175,7 +175,7 @@ def block_self_contacts(columns: int, touch: TouchLayout):
                 rank += wp.where(pair_at(L, T, other) < pair, 1, 0)
                 other += 1
             L[wp.static(lists.pending) + rank] = pair
-            k += threads
+            k += wp.static(block_dim)
         barrier()
         k = lane
         while k < touching:
@@ -184,7 +184,7 @@ def block_self_contacts(columns: int, touch: TouchLayout):
                 T[wp.static(touch.pairs) + k] = pair
             else:
                 L[wp.static(lists.touching) + k] = pair
-            k += threads
+            k += wp.static(block_dim)
         barrier()
 
     @wp.func
@@ -194,7 +194,6 @@ def block_self_contacts(columns: int, touch: TouchLayout):
         T: wp.array(dtype=wp.int32),
         chain: Chain,
         lane: int,
-        threads: int,
         pairs: int,
         opening: wp.float64,
     ):
@@ -213,11 +212,11 @@ def block_self_contacts(columns: int, touch: TouchLayout):
                     T[wp.static(touch.pairs) + slot] = pair_key(p, q)
                 else:
                     L[wp.static(lists.touching) + slot] = pair_key(p, q)
-            k += threads
+            k += wp.static(block_dim)
         barrier()
         touching = T[wp.static(touch.touching)]
-        if 2 * touching > threads:
-            order(L, T, lane, threads, touching)
+        if 2 * touching > wp.static(block_dim):
+            order(L, T, lane, touching)
         return touching
 
     @wp.func
@@ -331,7 +330,6 @@ def block_self_contacts(columns: int, touch: TouchLayout):
         F: wp.array2d(dtype=wp.float64),
         chain: Chain,
         lane: int,
-        threads: int,
         touching: int,
     ):
         """Resolves all contacts; the board is written. Returns this thread's impulses and ends with a barrier.
@@ -346,7 +344,7 @@ def block_self_contacts(columns: int, touch: TouchLayout):
         # both halves at once if there is a thread for each contact; contacts of one half have neighbouring threads, so
         # that those resolved in one round are in few warps
         contacts = 2 * touching
-        in_turn = 4 * touching > threads
+        in_turn = 4 * touching > wp.static(block_dim)
         if not in_turn:
             contacts = 4 * touching
         turn = int(0)
@@ -361,7 +359,7 @@ def block_self_contacts(columns: int, touch: TouchLayout):
             left = wp.where(own_key == DONE, 0, 1)
             if own_key != DONE:
                 claim(T, owners, own_a, own_b, own_key)
-            k = lane + threads
+            k = lane + wp.static(block_dim)
             while k < contacts:
                 pair = pair_at(L, T, k >> 1)
                 touches = overlaps(K, T, chain, pair, turn, k & 1)
@@ -371,7 +369,7 @@ def block_self_contacts(columns: int, touch: TouchLayout):
                     key = contact_key(pair, turn, k & 1)
                     link_a, link_b = links_at(key, chain.link_count)
                     claim(T, owners, link_a, link_b, key)
-                k += threads
+                k += wp.static(block_dim)
             while barrier_if_any(T, wp.static(touch.votes), left > 0):
                 if own_key != DONE:
                     if owns_links(T, owners, own_a, own_b, own_key):
@@ -380,7 +378,7 @@ def block_self_contacts(columns: int, touch: TouchLayout):
                         own_key = DONE
                     else:
                         claim(T, next_owners, own_a, own_b, own_key)
-                k = lane + threads
+                k = lane + wp.static(block_dim)
                 while k < contacts:
                     if L[wp.static(lists.pending) + k] != 0:
                         key = contact_key(pair_at(L, T, k >> 1), turn, k & 1)
@@ -391,7 +389,7 @@ def block_self_contacts(columns: int, touch: TouchLayout):
                             L[wp.static(lists.pending) + k] = 0
                         else:
                             claim(T, next_owners, link_a, link_b, key)
-                    k += threads
+                    k += wp.static(block_dim)
                 if lane < chain.link_count:
                     T[natural(last_owners + lane)] = FREE
                 used = owners

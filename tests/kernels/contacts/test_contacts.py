@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from tests.oracle_model import contact_equations, motion_equations
 from tests.oracle_model.circular_loop import circular_loop
-from tests.support.folded_chains import chain_of_angles, folded_chain
+from tests.support.folded_chains import folded_chain
 from tests.support.kernels_under_test import FLOOR, LIST, SELF, SPROCKET, ContactPass, Placed
 from warpchain.inputs.parameters import preset
 
@@ -148,20 +148,3 @@ def test_loss_is_change_of_kinetic_energy(parts):
                 assert fixed_loss == 0
             if speed == 0 or not parts & SPROCKET:
                 assert lost > 0
-
-
-def test_circle_at_the_sprockets_centre_is_left_alone():
-    """A circle exactly at the sprocket's centre has no normal: no impulse, no NaN."""
-    position = chain_of_angles(np.array([0.0, 0.0, np.pi, np.pi]), PAPER.link_length)
-    position[:, 1] += 1.0
-    position[0, 1] = 0.0
-    assert_array_equal(motion_equations.link_ends(position, PAPER)[0][0], [0.0, 0.0])
-    velocity = np.tile([1.0, 2.0, 3.0], (4, 1))
-    expected, counts = contact_equations.resolve_contacts(
-        position, velocity, PAPER, floor=False, sprocket=HUB, self_contact=False
-    )
-    contact_pass = ContactPass([Placed(position, velocity, PAPER)], sprocket_speed=TURNING)
-    (result,) = contact_pass.run(SPROCKET)
-    assert result["sprocket"] == counts["sprocket"]
-    assert np.isfinite(contact_pass.fixed_loss(0))
-    assert_same_velocity(contact_pass.velocity(0), expected)

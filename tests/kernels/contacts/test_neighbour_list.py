@@ -1,15 +1,13 @@
-"""The neighbour list: what it holds, in which order, for how long, and what happens when it is full."""
-
-import itertools
+"""The neighbour list: no contact is missed, whatever the heap, and no run depends on how long a list lasts."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 import warpchain
-from tests.oracle_model import contact_equations, motion_equations
+from tests.oracle_model import contact_equations
 from tests.oracle_model.circular_loop import circular_loop
 from tests.support.folded_chains import chain_of_angles, folded_chain
 from tests.support.kernels_under_test import LIST, SELF, ContactPass, Placed
@@ -17,7 +15,6 @@ from warpchain import Status
 from warpchain.engine.batch import Batch
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import preset
-from warpchain.kernels.contacts.list_layout import list_layout
 
 PAPER = preset("paper")
 SOFT = preset("soft")
@@ -25,38 +22,9 @@ LENGTH = PAPER.link_length
 SKIN = 2e-3
 
 
-def at_rest(position):
-    """A chain without motion, of Table 1's links."""
-    return Placed(position, np.zeros_like(position), PAPER)
-
-
-def pairs_within_reach(position, skin):
-    """Pairs of joints (right ends) closer than 2r + skin + 2|C|, by trying all, in the documented order."""
-    joints = motion_equations.link_ends(position, PAPER)[1]
-    opening = np.linalg.norm(motion_equations.joint_opening(position, PAPER), axis=1).max()
-    gaps = joints[:, None] - joints[None]
-    near = np.linalg.norm(gaps, axis=2) < 2 * PAPER.circle_radius + skin + 2 * opening
-    return sorted(map(tuple, np.argwhere(np.triu(near, 1)).tolist()), key=contact_equations.self_contact_order)
-
-
-def touching_of(pairs, position):
-    """Those of some joint pairs at which circles of two links overlap, sorted."""
-    n = len(position)
-    left, right = motion_equations.link_ends(position, PAPER)
-    circles = [((j, right[j]), ((j + 1) % n, left[(j + 1) % n])) for j in range(n)]
-    touching = [
-        (p, q)
-        for p, q in pairs
-        for a, centre_a in circles[p]
-        for b, centre_b in circles[q]
-        if 2 <= (b - a) % n <= n - 2 and np.hypot(*(centre_b - centre_a)) < 2 * PAPER.circle_radius
-    ]
-    return sorted(set(touching))
-
-
-def doubled_line(n, angle=0.3):
+def doubled_line(n):
     """A chain drawn straight: n/2 links out, n/2 back over them."""
-    return chain_of_angles(np.repeat([angle, angle + np.pi], n // 2), LENGTH)
+    return chain_of_angles(np.repeat([0.3, 0.3 + np.pi], n // 2), LENGTH)
 
 
 def straight_heap(n, angle):
@@ -66,131 +34,56 @@ def straight_heap(n, angle):
     return chain_of_angles(np.concatenate([half, generator.permutation(half) + np.pi]) + angle, LENGTH)
 
 
-LENGTHS = (4, 6, 8, 20, 60, 150, 1000)
 STATES = {
     "loop": lambda n: circular_loop(n, PAPER, 0.0)[0],
-    "crumpled": lambda n: folded_chain(n, n, LENGTH)[0],
-    "flat pile": lambda n: folded_chain(n, n, LENGTH, tilt=0.1 if n <= 60 else 0.6)[0],
     "doubled line": doubled_line,
     "collinear": lambda n: straight_heap(n, 0.0),
     "collinear, upright": lambda n: straight_heap(n, np.pi / 2),
-    "closed joints": lambda n: folded_chain(n, n, LENGTH, opening=0.0)[0],
+    "flat pile": lambda n: folded_chain(n, n, LENGTH, tilt=0.1)[0],
+    "torn": lambda n: folded_chain(n, n, LENGTH, opening=1e-3)[0],
 }
 PLACES = ((0.0, 0.0), (-3.7, -0.9), (-120.0, 40.0), (1e5, -2e5))
 
 
-# --- what the list holds ---
+def assert_collides_as_reference(position, seed, skin=SKIN):
+    """A pass over self-contacts leaves the velocities and the number of impulses of all pairs tried; that number.
+
+    Circles that all but share a centre have a normal of rounding errors, so joints must be open.
+    """
+    velocity = np.random.default_rng(seed).normal(size=position.shape) * [1.0, 1.0, 2 / LENGTH]
+    contact_pass = ContactPass([Placed(position, velocity, PAPER)], skin=skin)
+    (result,) = contact_pass.run(LIST | SELF)
+    assert result["fits"]
+    expected, counts = contact_equations.resolve_contacts(position, velocity, PAPER, floor=False)
+    assert result["self"] == counts["self"]
+    assert_allclose(contact_pass.velocity(0), expected, rtol=0, atol=1e-7 * np.abs(velocity).max())
+    return counts["self"]
 
 
 @pytest.mark.parametrize("state", STATES)
-def test_list_holds_the_pairs_within_reach(state):
-    """It holds all pairs within reach and no others, in the documented order, wherever the chain lies."""
-    for lengths, places in itertools.product((LENGTHS[:-1], LENGTHS[-1:]), PLACES):
-        positions = [STATES[state](n) + np.array([*places, 0.0]) for n in lengths]
-        contact_pass = ContactPass([at_rest(position) for position in positions], skin=SKIN)
-        for world, (position, result) in enumerate(zip(positions, contact_pass.run(LIST), strict=True)):
-            assert result["fits"]
-            assert contact_pass.listed_pairs(world) == pairs_within_reach(position, SKIN)
+def test_no_contact_is_missed(state):
+    """Chains collide as if every pair were tried, in the documented order, wherever they lie."""
+    hits = [
+        assert_collides_as_reference(STATES[state](n) + np.array([*place, 0.0]), n)
+        for n, place in zip((4, 6, 20, 60), PLACES, strict=True)
+    ]
+    assert sum(hits) > 10 or state == "loop"
 
 
 @given(
-    n=st.integers(2, 30).map(lambda half: 2 * half),
+    n=st.integers(2, 20).map(lambda half: 2 * half),
     seed=st.integers(0, 2**32 - 1),
     tilt=st.floats(0.1, 3.2),
-    skin=st.one_of(st.floats(1e-6, 8e-3), st.just(0.1)),
-    opening=st.sampled_from([0.0, 1e-8, 1e-5, 2e-4]),
+    skin=st.floats(1e-6, 8e-3),
+    opening=st.sampled_from([1e-5, 2e-4]),
     place=st.tuples(st.floats(-50, 50), st.floats(-50, 50)),
 )
-@settings(max_examples=100, deadline=None, derandomize=True)
-def test_no_heap_has_another_list(n, seed, tilt, skin, opening, place):
-    """Hypothesis finds no heap whose list differs from that of all pairs, or misses a touching pair."""
-    position = folded_chain(n, seed, LENGTH, tilt=tilt, opening=opening)[0] + [*place, 0.0]
-    contact_pass = ContactPass([at_rest(position)], skin=skin)
-    expected = pairs_within_reach(position, skin)
-    (result,) = contact_pass.run(LIST)
-    fits = len(expected) <= list_layout(contact_pass.columns).capacity
-    assert result["fits"] == fits
-    if fits:
-        assert contact_pass.listed_pairs(0) == expected
-        assert touching_of(expected, position) == contact_equations.touching_pairs(position, PAPER)
-
-
-# --- how long it lasts ---
-
-
-def moved_heap(n, seed, skin, fraction):
-    """A heap before and after a move whose greatest displacement is `fraction` of skin/2 − |C|.
-
-    Two straight arms of two links each join the halves of the heap, which lie across each other. The arms turn, so
-    that the halves are shifted in opposite directions and every joint of one approaches some joints of the other.
-    """
-    generator = np.random.default_rng(seed)
-    half, arm = generator.uniform(-np.pi, np.pi, n // 2 - 2), generator.uniform(-np.pi, np.pi)
-    noise = generator.normal(size=(n, 3)) * [1e-5, 1e-5, 0.0]
-    other_half = generator.permutation(half) + np.pi
-
-    def heap(turn):
-        arms = np.full(2, arm + turn)
-        position = chain_of_angles(np.concatenate([half, arms, other_half, arms + np.pi]), LENGTH)
-        return position - [*position[:, :2].mean(axis=0), 0.0] + noise
-
-    def excess(turn):
-        after = heap(turn)
-        opening = np.linalg.norm(motion_equations.joint_opening(after, PAPER), axis=1).max()
-        return greatest_move(heap(0.0), after) - fraction * (skin / 2 - opening)
-
-    low, high = 0.0, 1.5
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (middle, high) if excess(middle) < 0 else (low, middle)
-    return heap(0.0), heap(low)
-
-
-def greatest_move(before, after):
-    """Greatest displacement of a joint, in m."""
-    return np.linalg.norm(
-        motion_equations.link_ends(after, PAPER)[1] - motion_equations.link_ends(before, PAPER)[1], axis=1
-    ).max()
-
-
-def test_list_stays_complete_while_it_lasts():
-    """A list that is not stale holds every touching pair, and gives the velocities of a fresh one to the bit."""
-    skin = 6e-3
-    moves = [moved_heap(60, seed, skin, 0.99) for seed in range(40)]
-    velocity = np.random.default_rng(0).normal(size=(60, 3)) * [1.0, 1.0, 2 / LENGTH]
-    contact_pass = ContactPass([at_rest(before) for before, _ in moves], skin=skin)
-    contact_pass.run(LIST)
-    moved = [Placed(after, velocity, PAPER) for _, after in moves]
-    contact_pass.place(moved)
-    old = contact_pass.run(SELF)
-    fresh_pass = ContactPass(moved, skin=skin)
-    fresh = fresh_pass.run(LIST | SELF)
-    far_before = 0
-    for world, (before, after) in enumerate(moves):
-        assert old[world]["slack"] > 0
-        touching = contact_equations.touching_pairs(after, PAPER)
-        assert touching_of(contact_pass.listed_pairs(world), after) == touching
-        assert_array_equal(contact_pass.velocity(world), fresh_pass.velocity(world))
-        for kind in ("self", "self_loss", "self_depth"):
-            assert old[world][kind] == fresh[world][kind]
-        joints = motion_equations.link_ends(before, PAPER)[1]
-        gaps = [np.hypot(*(joints[q] - joints[p])) - 2 * PAPER.circle_radius for p, q in touching]
-        far_before += sum(gap > 0.7 * skin for gap in gaps)
-    assert far_before > 20, "the moves are too harmless to show anything"
-
-
-def test_torn_chain_never_trusts_its_list():
-    """If a joint is open by more than skin/2, the list is stale at once, although it was made just now."""
-    position = folded_chain(20, 1, LENGTH, opening=1e-3)[0]
-    contact_pass = ContactPass([at_rest(position)], skin=2e-3)
-    (result,) = contact_pass.run(LIST)
-    assert result["opening"] > 1e-3
-    assert result["displacement"] == 0
-    assert result["slack"] < 0
-    assert contact_pass.listed_pairs(0) == pairs_within_reach(position, 2e-3)
-
-
-# --- a full list ---
+@settings(max_examples=40, deadline=None, derandomize=True)
+def test_no_heap_misses_a_contact(n, seed, tilt, skin, opening, place):
+    """Hypothesis finds no heap that collides otherwise than if every pair were tried."""
+    assert_collides_as_reference(
+        folded_chain(n, seed, LENGTH, tilt=tilt, opening=opening)[0] + [*place, 0.0], seed, skin
+    )
 
 
 # --- whole runs ---

@@ -2,17 +2,16 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from tests.oracle_model import tilting_contacts, tilting_plane
 from tests.oracle_model.tilting_plane import Plane
-from tests.support.kernels_under_test import FLOOR, ContactPass, Placed
 from tests.support.tilted_chains import tilted_heap
 from tests.support.tilting_under_test import floor_pass
 from warpchain.inputs.parameters import preset
 
 PAPER = preset("paper")
-HEAPS = range(300)
+HEAPS = range(150)
 """Seeds; every third heap is almost or exactly upright, every third almost or exactly flat, and a third have h = 0."""
 
 
@@ -47,7 +46,7 @@ def test_pass_equals_reference(passes):
         gap = tilting_plane.floor_gap(state[0], state[2], parameters, half_width=parameters.half_width)
         assert outcome.gap == pytest.approx(gap, abs=1e-15)
         impulses.append(outcome.impulses)
-    assert sum(impulses) > 1000
+    assert sum(impulses) > 500
     assert max(impulses) >= 20
     assert 0 in impulses
 
@@ -66,24 +65,3 @@ def test_pushing_floor_does_the_work_that_is_booked():
         assert before - after == pytest.approx(outcome.loss, abs=1e-12 * (before + after))
         gains += after > before
     assert gains > 20
-
-
-@pytest.mark.parametrize(("half_width", "push_rate"), [(0.0, 0.0), (4e-3, 0.0), (4e-3, 500.0)])
-def test_upright_plane_meets_the_floor_as_the_planar_chain(half_width, push_rate):
-    """In an upright plane at rest the pass is that of the planar kernel, and the plane stays at rest exactly."""
-    touched = 0
-    for seed in range(100):
-        position, velocity, plane, parameters, _ = tilted_heap(seed, PAPER, upright=True)
-        parameters = parameters.with_values({"half_width": half_width})
-        outcome = floor_pass(position, velocity, plane, parameters, push_rate)
-        lifted = position + np.array([0.0, plane.origin[1], 0.0])
-        planar = ContactPass([Placed(lifted, velocity, parameters)], push_rate=push_rate)
-        (expected,) = planar.run(FLOOR)
-        scale = np.abs(velocity).max(axis=0)
-        assert_allclose(outcome.velocity / scale, planar.velocity(0) / scale, rtol=0, atol=1e-13)
-        assert outcome.impulses == expected["floor"]
-        assert outcome.loss == pytest.approx(planar.fixed_loss(0), abs=1e-13)
-        assert outcome.gap == pytest.approx(expected["floor_gap"], abs=1e-15)
-        assert_array_equal(outcome.rates, 0)
-        touched += outcome.impulses
-    assert touched > 200

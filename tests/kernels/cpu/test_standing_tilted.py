@@ -44,12 +44,6 @@ def standing(parameters, tilt):
     return start, mass @ position[:, 1] / mass.sum()
 
 
-def moment(parameters, start):
-    """Moment of inertia about e1 through the plane's origin, by the mass [m²]."""
-    matrix = tilting_plane.plane_mass_matrix(start[0], parameters, half_width=parameters.half_width)
-    return matrix[1, 1] / matrix[0, 0]
-
-
 def let_go(start, parameters, duration, longest_step=None):
     """Times [s] and tilts [rad] of samples until the end, the loop's shape still being what it was."""
     options = Options(method="dp5", tolerance=1e-6, rest_time=100.0)
@@ -63,17 +57,6 @@ def let_go(start, parameters, duration, longest_step=None):
     assert abs(plane.turn[1]) < 0.02
     samples = np.concatenate(rows)
     return samples[:, layout.TIME], np.arcsin(samples[:, layout.PLANE_COLUMN + layout.UP + 2])
-
-
-def test_loop_without_width_tips_over_as_a_pendulum():
-    """A small tilt of a loop with h = 0 grows as cosh λt, with λ² = g × height over the moment from the matrix."""
-    parameters = STIFF.with_values({"half_width": 0.0})
-    start, height = standing(parameters, 1e-3)
-    rate = np.sqrt(parameters.gravity * height / moment(parameters, start))
-    time, tilt = let_go(start, parameters, 3.0 / rate, longest_step=5e-6)
-    assert tilt[-1] > 9e-3
-    # 6e-5, mostly by creep: joints ten times thinner make it 2e-4 and more
-    assert_allclose(tilt, 1e-3 * np.cosh(rate * time), rtol=3e-4)
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -91,8 +74,7 @@ def test_loop_falls_over_if_its_centre_is_beyond_its_rim(half_width, side):
         assert abs(tilt[-1] / tilt[0] - 1) > 0.04
 
 
-@pytest.mark.parametrize("half_width", [4e-3, 6e-3])
-def test_rocking_loses_what_a_rigid_block_loses(half_width):
+def test_rocking_loses_what_a_rigid_block_loses():
     """As it passes from one rim to the other, (I − m h²)/(I + m h²) of the rate stays: Housner's rocking block.
 
     I: about e1 in the middle between the rims. The octagon gives way a little as the floor stops it, and loses more:
@@ -101,9 +83,11 @@ def test_rocking_loses_what_a_rigid_block_loses(half_width):
     Source: G. W. Housner, "The behavior of inverted pendulum structures during earthquakes", Bulletin of the
     Seismological Society of America 53 (1963) 403-417.
     """
-    parameters = STIFF.with_values({"half_width": half_width, "viscous_friction": 10.0})
+    parameters = STIFF.with_values({"viscous_friction": 10.0})
     start, height = standing(parameters, 0.1)
-    inertia = moment(parameters, start)
+    half_width = parameters.half_width
+    matrix = tilting_plane.plane_mass_matrix(start[0], parameters, half_width=half_width)
+    inertia = matrix[1, 1] / matrix[0, 0]  # by the mass, about e1 through the plane's origin
     kept = ((inertia - half_width**2) / (inertia + half_width**2)) ** 2
 
     def lifted(tilt):

@@ -17,7 +17,6 @@ from warpchain.kernels import layout
 from warpchain.kernels.events.release import (
     LEAST_LOAD,
     LOADING_TIME,
-    MOST_CROSSINGS,
     MOST_SLIP,
     SHORTEST_WINDOW,
     load_at,
@@ -168,19 +167,6 @@ def test_a_loop_that_drifts_is_not_released(name: str, size: float, load_factor:
         rate = part * size / crossing(load_factor)
         watched.sample(**{name: USUAL[name] + rate * (watched.time - 5.0)})
         assert math.isfinite(watched.release) == is_released, part
-
-
-def test_a_loop_that_does_not_become_stationary_is_held_under_less() -> None:
-    """A width that never stops growing under load is given up after some crossings, for the root of the load."""
-    watched = Watched(duration=0.5 + 0.5 + float(MOST_CROSSINGS) * (crossing(16.0) + crossing(4.0)))
-    watched.sample(width=WIDTH * (1 + 0.03 * (watched.time - 5.0) / crossing(16.0)))
-    change = watched.time[np.flatnonzero(np.diff(watched.loads))[1:] + 1]
-    assert sorted(set(watched.loads)) == [1.0, 4.0, 16.0]
-    given_up = 0.5 + float(MOST_CROSSINGS) * crossing(16.0)
-    assert given_up <= change[0] <= given_up + crossing(16.0) / 2 + 2 * STEP
-    given_up = change[0] + float(MOST_CROSSINGS) * crossing(4.0)
-    assert len(change) == 1 or given_up <= change[1] <= given_up + crossing(4.0) / 2 + 2 * STEP
-    assert math.isnan(watched.release)
 
 
 def test_a_loop_that_leaves_its_shape_when_free_is_held_under_the_root() -> None:

@@ -105,8 +105,7 @@ def test_a_moving_sprocket_is_the_same_on_both(device: str) -> None:
 
 def test_a_walk_gives_the_same_bits_in_any_batch(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Alone, among others of other lengths, in few or many slots and launches, after whatever ran before."""
-    settings = {"device": device, "method": "os32"}
-    setups = [brief_setup(seed, links=links, **settings) for seed in range(3) for links in (30, 60)]
+    setups = [brief_setup(seed, links=links, device=device) for seed in range(3) for links in (30, 60)]
     together = outcomes(setups)
     assert [outcomes([setup])[0] for setup in setups] == together
     assert outcomes(setups[::-1], slots=2)[::-1] == together
@@ -139,7 +138,7 @@ def content_of(device: str, long: float) -> dict[str, object]:
         "name": "several kernels",
         "seed": 1,
         "preset": "soft",
-        "samples": 20,
+        "samples": 20 if device == "cuda" else 10,
         "scene": scene,
         "options": {"method": "dp5", "rest_time": 100.0, "device": device},
         "blocks": [
@@ -174,10 +173,11 @@ def broken_off(source: Path, folder: Path, how: signal.Signals) -> int:
 def test_a_sweep_gives_the_same_bytes_however_it_is_run(device: str, tmp_path: Path) -> None:
     """In this process, by a worker of a GPU, or ended by Ctrl-C or killed and begun again; its series are a walk's."""
     content = content_of(device, long=1.0 if device == "cuda" else 0.04)
+    samples = content["samples"]
     source = tmp_path / "sweep.yaml"
     source.write_text(yaml.safe_dump(content, sort_keys=False))
     whole = sweep(source, tmp_path / "whole")
-    assert whole.summary() == {"time_limit": 60, "not_steady": 20, "at_rest": 0, "missing": 0}
+    assert whole.summary() == {"time_limit": 3 * samples, "not_steady": samples, "at_rest": 0, "missing": 0}
     assert whole.blocks["leaning"].greatest_tilt.max() > 0.1004
     expected = data_of(tmp_path / "whole")
     with gpu_workers(1) as executor:
@@ -213,17 +213,6 @@ def test_flights_agree_with_scipy(name: str, method: str, within: float) -> None
     assert flight.losses["joint_friction"] > 1e-4
 
 
-@pytest.mark.usefixtures("gpu", "cpu")
-def test_simulations_agree_with_the_cpu() -> None:
-    """The same call with another device: the same statuses, samples at the same times, and nearly the same motion."""
-    position, velocity = heap(12, 3)
-    position[:, 1] += 0.1
-    motions = [simulate("soft", position, velocity, duration=0.01, device=device) for device in ("cuda", "cpu")]
-    assert motions[0].status == motions[1].status
-    assert np.array_equal(motions[0].time, motions[1].time)
-    assert np.allclose(motions[0].position[:4], motions[1].position[:4], rtol=0, atol=1e-6)
-
-
 @pytest.mark.usefixtures("gpu")
 def test_a_walk_comes_to_rest_and_its_ledger_closes() -> None:
     """Spun up, released, walked and at rest: the distance is that of such chains, no energy is unaccounted for."""
@@ -234,22 +223,3 @@ def test_a_walk_comes_to_rest_and_its_ledger_closes() -> None:
     at_release = energy["kinetic_at_release"] + energy["potential_at_release"]
     assert abs(energy["residual"]) < 5e-4 * at_release
     assert found.impulses["floor"] > 1000
-
-
-@pytest.mark.usefixtures("gpu")
-def test_the_last_moments_on_the_sprocket_are_kept() -> None:
-    """Frames before the release carry the joints' forces: the mean tension is ρ v² and the weight's share, to 3 %."""
-    links = 40
-    kept = {"record_before": 0.2, "steady_time": 0.25}  # a loop is recorded from when it bears its own loads
-    found = walk(links=links, preset="soft", start="spinning", walk_limit=0.02, **kept, device="cuda")
-    before = found.before_release
-    assert before is not None and len(before.frame_time) == pytest.approx(100, abs=2)
-    steps = before.frame_joints - np.roll(before.frame_joints, 1, axis=1)
-    length = np.hypot(steps[..., 0], steps[..., 1])
-    np.testing.assert_allclose(length, SOFT.link_length, rtol=2e-3)
-    tension = float(np.mean(np.sum(before.frame_forces * steps, axis=2) / length))
-    density = (SOFT.inner_mass + SOFT.outer_mass) / 2 / SOFT.link_length
-    speed = 2 * np.pi * 15.0 * (SOFT.sprocket_radius + SOFT.circle_radius)
-    hanging = density * SOFT.gravity * links / 2 * SOFT.link_length / 4
-    assert tension == pytest.approx(density * speed**2 + hanging, rel=0.03)
-    assert np.abs(before.frame_moments).max() > SOFT.coulomb_friction

@@ -220,8 +220,8 @@ def compiles_for_gpus(folder: Path, features: Features, block_dim: int) -> None:
     assert 0 < max(shared) <= SHARED_MEMORY
 
 
-@pytest.mark.parametrize("fixed_body", ["sprocket", "terrain"])
-def test_a_kernel_compiles_for_gpus(tmp_path: Path, fixed_body: str) -> None:
-    """The kernels of the drive and of a profile compile for sm_80 and sm_90."""
-    features = Features("os32", layout.padded_width(60), fixed_body, True)
+@pytest.mark.parametrize(("fixed_body", "moves"), [("sprocket", False), ("terrain", False), ("floor", True)])
+def test_a_kernel_compiles_for_gpus(tmp_path: Path, fixed_body: str, moves: bool) -> None:
+    """The kernels of the drive, of a profile, and of a floor with a moving sprocket compile for sm_80 and sm_90."""
+    features = Features("os32", layout.padded_width(60), fixed_body, True, moving_sprocket=moves)
     compiles_for_gpus(tmp_path, features, 64)
