@@ -141,14 +141,11 @@ def explained(block: Block, start: int) -> Numbers:
 
 
 def through(block: Block) -> Numbers:
-    """What it does to Δx, by start, if links pass through one another; cells in front."""
+    """What it does to Δx if links pass through one another, cell by cell."""
     table = at_rest(block)
     touching = block.axes["self_contact"].tolist()
     on, off = touching.index(True), touching.index(False)
-    return {
-        start: plain(paired(table[:, :, number, off], table[:, :, number, on]))
-        for number, start in enumerate(block.axes["start"].tolist())
-    }
+    return plain(paired(table[:, :, off], table[:, :, on]))
 
 
 # --- what the paper leaves open ---
@@ -223,6 +220,8 @@ def compared(effect: Effect) -> Numbers:
 
 # --- further sentences ---
 
+FRICTION: Final = 0.27
+"""Of the floor, in Table 1."""
 OWN_LENGTH: Final = "links_of_12_7_mm"
 LENGTHS: Final = {"links_of_11_mm": 11.0, "links_of_15_mm": 15.0, "links_of_18_mm": 18.0}
 """Blocks with links of other lengths [mm], with the masses and inertias of their length."""
@@ -240,10 +239,10 @@ def more(blocks: Mapping[str, Block]) -> Numbers:
     values = block.axes["floor_friction"].tolist()
     slid = at_rest(block, "walk_time") - at_rest(block, "collapsed_at")
     for number, value in enumerate(values):
-        if value != 0.27:
+        if value != FRICTION:
             content["sliding"][f"{value:g}"] = {
-                "time": plain(paired(slid[:, :, number], slid[:, :, values.index(0.27)])),
-                "dx": plain(paired(at_rest(block)[:, :, number], at_rest(block)[:, :, values.index(0.27)])),
+                "time": plain(paired(slid[:, :, number], slid[:, :, values.index(FRICTION)])),
+                "dx": plain(paired(at_rest(block)[:, :, number], at_rest(block)[:, :, values.index(FRICTION)])),
             }
     block = blocks["undamped_joints"]
     values = block.axes["joint_damping"].tolist()
@@ -251,7 +250,6 @@ def more(blocks: Mapping[str, Block]) -> Numbers:
         if value != 1000:
             effect = paired(at_rest(block)[:, :, number], at_rest(block)[:, :, values.index(1000)])
             content["undamped"][f"{value:g}"] = plain(effect)
-    content["distributions"] = distributions(blocks["tolerances"])
     return content
 
 

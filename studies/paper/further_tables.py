@@ -46,17 +46,14 @@ def strands_table(numbers: Numbers) -> str:
 
 
 def through_table(numbers: Numbers) -> str:
-    """What it does to Δx if links pass through one another, by start and links: means over the frequencies."""
-    content = numbers["paper_through"]
-    rows = []
-    for start, found in content["through"].items():
-        effect = effect_of(found)
-        row = [start]
-        for place in range(len(content["cells"]["links"])):
-            part = summary(_rows(effect, slice(place, place + 1)))
-            row.append(percent(part.mean, part.half_width))
-        rows.append(row)
-    return table(["start", *(f"{links} links" for links in content["cells"]["links"])], rows)
+    """What it does to Δx if links pass through one another, cell by cell."""
+    cells, rows = numbers["paper_through"]["cells"], []
+    for start, name in (("sprocket", "paper_through"), ("ellipse", "paper_through_ellipse")):
+        effect = effect_of(numbers[name]["through"])
+        for links, values, widths in zip(cells["links"], effect.relative, effect.half_width, strict=True):
+            texts = (percent(float(value), float(width)) for value, width in zip(values, widths, strict=True))
+            rows.append([start, f"{links} links", *texts])
+    return table(["from", "", *(f"{frequency:g} Hz" for frequency in cells["frequency"])], rows)
 
 
 def open_table(numbers: Numbers) -> str:
@@ -100,10 +97,11 @@ def rest_table(numbers: Numbers) -> str:
                 _with_error(found["mean"], found["error"]),
                 _with_error(*short),
                 _with_error(*long),
-                f"{found['chi2']:.1f} of {found['cells']}, {found['p']:.2g}",
+                f"{int(effect.pairs[effect.known].sum())} in {found['cells']}",
+                f"{found['chi2']:.1f}, {found['p']:.2g}",
             ]
         )
-    return table(["Δx", "all cells", "60 and 120 links", "150 and 180 links", "χ² of no difference, p"], rows)
+    return table(["Δx", "all cells", "120 links", "150 and 180 links", "pairs, cells", "χ² of no difference, p"], rows)
 
 
 def lengths_table(numbers: Numbers) -> str:
@@ -156,9 +154,16 @@ def distributions_table(numbers: Numbers) -> str:
             f"{each['distance']:.2f}",
             f"{each['p']:.2f}",
         ]
-        for each in numbers["paper_more"]["more"]["distributions"]
+        for each in numbers["paper_distributions"]["distributions"]
     ]
     return table(["cell", "Δx at 1e-6 / m", "at 1e-9 / m", "greatest distance", "p"], rows)
+
+
+def undamped_text(numbers: Numbers) -> str:
+    """What little or no damping of the joints does to Δx, in words."""
+    found = numbers["paper_more"]["more"]["undamped"]
+    effects = {value: summary(effect_of(each)) for value, each in found.items()}
+    return ", ".join(f"b = {value}: {percent(each.mean, each.half_width)}" for value, each in effects.items())
 
 
 def _rows(effect: Effect, rows: slice) -> Effect:

@@ -71,11 +71,11 @@ def sliding(numbers: Numbers) -> Finding:
 
 def same_distributions(numbers: Numbers) -> Finding:
     """Δx is distributed alike at both tolerances."""
-    found = numbers["paper_more"]["more"]["distributions"]
+    found = numbers["paper_distributions"]["distributions"]
     alike = sum(each["p"] > 0.05 for each in found)
-    least = min(each["p"] for each in found)
+    least, walks = min(each["p"] for each in found), found[0]["walks"][0]
     text = (
-        f"in {alike} of {len(found)} cells of 100 walks Kolmogorov's and Smirnov's test tells no difference at 5 %, "
+        f"in {alike} of {len(found)} cells of {walks} walks the test of Kolmogorov and Smirnov sees no difference, "
         f"the least p is {least:.2f}; means and standard deviations in the [table](#the-last-sentences)"
     )
     return Finding(text, share(alike, len(found)))

@@ -37,6 +37,7 @@ def page(numbers: Numbers) -> str:
     """
     parts = {
         "claims": claims_table(numbers),
+        "count": str(len(CLAIMS)),
         "verdicts": verdict_counts(numbers),
         "reasons": reasons(numbers),
         "distances": distances_table(numbers),
@@ -48,6 +49,7 @@ def page(numbers: Numbers) -> str:
         "lengths": tables.lengths_table(numbers),
         "sliding": tables.sliding_table(numbers),
         "distributions": tables.distributions_table(numbers),
+        "undamped": tables.undamped_text(numbers),
         "thresholds": thresholds_table(numbers),
         "figure5": figure5_table(),
         "separations": separations_tables(),

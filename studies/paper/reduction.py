@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from studies.paper.further import (
     CELLS,
     at_rest,
+    distributions,
     left_open,
     more,
     plain,
@@ -36,13 +37,17 @@ DIGITS: Final = 4
 WHOLE: Final[dict[str, tuple[str, Callable[[Mapping[str, Block]], Any]]]] = {
     "paper_strands": ("strands", lambda blocks: strands(blocks["start"])),
     "paper_through": ("through", lambda blocks: through(blocks["main"])),
+    "paper_through_ellipse": ("through", lambda blocks: through(blocks["main"])),
     "paper_open": ("left_open", left_open),
     "paper_rest": ("rest_and_hold", lambda blocks: rest_and_hold(blocks["main"])),
     "paper_more": ("more", more),
+    "paper_distributions": ("distributions", lambda blocks: distributions(blocks["main"])),
 }
 """Sweeps that one function reduces: name → key of its numbers, and the function."""
 SWEEPS: Final = ("paper_claims", "paper_joints", "paper_tolerance", "paper_shapes", *WHOLE)
 """Sweeps that the page is made of."""
+CUT_SHORT: Final = ("paper_rest",)
+"""Sweeps that need not be complete: pairs of walks are compared, and counted."""
 
 DEFAULTS: Final = {"clearance": 0.01, "phase": 0.0}
 """Scene of a walk that is not told otherwise: height of the release [m] and part of a loop period."""
@@ -56,7 +61,7 @@ def reduced(result: SweepResult) -> Numbers:
     """
     if result.name not in SWEEPS:
         raise InputError(f"{result.name}: no sweep of this page; give folders of {', '.join(SWEEPS)}")
-    if result.missing_count:
+    if result.missing_count and result.name not in CUT_SHORT:
         raise InputError(f"{result.name}: {result.missing_count} walks are missing; run the sweep to its end")
     content: Numbers = {
         "sweep": content_digest(result.sweep),

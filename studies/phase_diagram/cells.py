@@ -1,4 +1,4 @@
-"""Reduces parts of the sweep ``phase_diagram`` to statistics of its cells: results/cells.csv and endings.csv."""
+"""Reduces parts of the sweep ``phase_diagram`` to statistics of its cells: the rows of results/cells.csv."""
 
 import csv
 import json
@@ -18,8 +18,6 @@ Cell = tuple[int, float]
 """Links, frequency [Hz]."""
 
 CSV: Final = Path(__file__).parent / "results" / "cells.csv"
-ENDINGS: Final = CSV.with_name("endings.csv")
-"""How walks end, from parts of their own."""
 MISSING: Final = -1
 """Status of a walk that is not there yet, and any integer that is not known."""
 MOST_ENERGY_ERROR: Final = 0.05
@@ -31,7 +29,7 @@ AVERAGED: Final = ("bounces", "walk_time", "hold_time", "collapsed_at")
 """Columns of the sweep of which the file has means over the walks at rest. NaNs are left out."""
 COLUMNS: Final = (
     *("status", "dx", "steps_accepted", "steps_rejected", "energy_error", "flight_before_collapse"),
-    *("bounces_before_collapse", "bounces_before_strands_met", "strands_met_at", *AVERAGED),
+    *("bounces_before_collapse", *AVERAGED),
 )
 """Columns of the sweep that are needed."""
 
@@ -77,7 +75,7 @@ def reduced(links: int, frequency: float, walks: Mapping[str, Array]) -> dict[st
     """Statistics of one cell: a row of the file. NaN where there are too few walks."""
     status = walks["status"]
     rest = status == Status.AT_REST
-    dx = walks["dx"][rest].astype(float)
+    dx, codes = walks["dx"][rest].astype(float), endings(walks)[rest]
     count = len(dx)
     attempts = (_known(walks["steps_accepted"]) + _known(walks["steps_rejected"]))[status != MISSING]
     deciles = np.quantile(dx, [0.1, 0.5, 0.9]) if count else np.full(3, np.nan)
@@ -88,6 +86,8 @@ def reduced(links: int, frequency: float, walks: Mapping[str, Array]) -> dict[st
         "missing": int((status == MISSING).sum()),
         "at_rest": count,
         **{code.label: int((status == code).sum()) for code in FAILURES},
+        "told": int((codes != Ending.UNKNOWN).sum()),
+        "flight_told": int(np.isfinite(walks["flight_before_collapse"][rest]).sum()),
         "inaccurate": int((walks["energy_error"][rest] > MOST_ENERGY_ERROR).sum()),
         "dx_mean": _mean(dx),
         "dx_sd": _sd(dx),
@@ -96,25 +96,10 @@ def reduced(links: int, frequency: float, walks: Mapping[str, Array]) -> dict[st
         **{f"{name}_mean": _mean(_known(walks[name])[rest]) for name in AVERAGED},
         "bounces_sd": _sd(_known(walks["bounces"])[rest]),
         "attempts_mean": _mean(attempts),
-    }
-    return row
-
-
-def reduced_endings(links: int, frequency: float, walks: Mapping[str, Array]) -> dict[str, float]:
-    """How the walks of one cell ended, and how far those of each ending went: a row of the file of endings."""
-    rest = walks["status"] == Status.AT_REST
-    dx, codes = walks["dx"][rest].astype(float), endings(walks)[rest]
-    met = walks["bounces_before_strands_met"][rest]
-    return {
-        "links": links,
-        "frequency": frequency,
-        "told": int((codes != Ending.UNKNOWN).sum()),
-        "flight_told": int(np.isfinite(walks["flight_before_collapse"][rest]).sum()),
-        "strands_met_at_mean": _mean(walks["strands_met_at"][rest].astype(float)),
-        "met_by_second": int(((met >= 0) & (met <= 2)).sum()),
         **{way.label: int((codes == way).sum()) for way in WAYS},
         **{f"dx_{way.label}": _mean(dx[codes == way]) for way in WAYS},
     }
+    return row
 
 
 def _known(values: Array) -> Array:

@@ -25,9 +25,6 @@ COLORS: Final = {
     Ending.FIRST: "#000000",
     Ending.SECOND: "#0072B2",
     Ending.LATER: "#56B4E9",
-    Ending.FOLDED_AT_FIRST: "#D55E00",
-    Ending.FOLDED_AT_SECOND: "#E69F00",
-    Ending.FOLDED_LATER: "#F0E442",
 }
 """Of the ways of ending; those of Okabe and Ito."""
 
@@ -68,7 +65,7 @@ class Grid:
         return image
 
 
-def draw_maps(cells: Mapping[str, Array], ends: Mapping[str, Array], path: Path) -> None:
+def draw_maps(cells: Mapping[str, Array], path: Path) -> None:
     """Mean of Δx, its spread, bounces, and ways of ending with their shares; dots: share of walks that failed."""
     grid = Grid(cells)
     walks = np.maximum(cells["walks"], 1)
@@ -94,7 +91,7 @@ def draw_maps(cells: Mapping[str, Array], ends: Mapping[str, Array], path: Path)
         else:
             grid.map(axes, values, f"{title}: too few walks")
         draw_failed(axes, np.nan_to_num(grid.table(failed)))
-    draw_endings(lower_right, Grid(ends), ends)
+    draw_endings(lower_right, grid, cells)
     draw_failed(lower_right, np.nan_to_num(grid.table(failed)), color="white", rim=INK)  # red is one of its colours
     save_figure(figure, path)
 

@@ -1,8 +1,7 @@
 """Ways in which walks end: where and when the loop was lost, from the columns of a sweep.
 
 Every walk that is at rest has one ending. Its loop collapses when it first encloses less than half of its area at the
-release; `bounces_before_collapse` says in which bounce, counted from 1. A loop whose strands met in an earlier bounce
-had folded there, and walked on. Strands are links 16 or more apart along the chain; creases of fewer do not count.
+release; `bounces_before_collapse` says in which bounce, counted from 1.
 """
 
 from collections.abc import Mapping
@@ -27,9 +26,6 @@ class Ending(IntEnum):
     FIRST = 2
     SECOND = 3
     LATER = 4
-    FOLDED_AT_FIRST = 5
-    FOLDED_AT_SECOND = 6
-    FOLDED_LATER = 7
 
     @property
     def label(self) -> str:
@@ -48,10 +44,7 @@ _MEANINGS: Final[dict[Ending, str]] = {
     Ending.IN_FLIGHT: "collapsed in flight",
     Ending.FIRST: "collapsed in its first bounce",
     Ending.SECOND: "collapsed in its second bounce",
-    Ending.LATER: "collapsed in a later bounce, its strands apart before it",
-    Ending.FOLDED_AT_FIRST: "strands met by its first bounce, it collapsed in the third or later",
-    Ending.FOLDED_AT_SECOND: "strands met in its second bounce, it collapsed in the third or later",
-    Ending.FOLDED_LATER: "strands met in a later bounce than the second, it collapsed in one after that",
+    Ending.LATER: "collapsed in a later bounce",
 }
 
 
@@ -59,23 +52,19 @@ def endings(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.int8]:
     """The ending of each walk, as codes of `Ending`.
 
     Args:
-        columns: of a sweep by name, such as those of a block: `status`, `collapsed_at`, `bounces_before_collapse`,
-            `flight_before_collapse` and `bounces_before_strands_met`, of one shape.
+        columns: of a sweep by name, such as those of a block: `status`, `collapsed_at`, `bounces_before_collapse` and
+            `flight_before_collapse`, of one shape.
 
     Returns:
         Codes of the shape of the columns.
     """
-    collapse, contact = columns["bounces_before_collapse"], columns["bounces_before_strands_met"]
-    touched = contact >= 0
+    collapse = columns["bounces_before_collapse"]
     cases = (
         (columns["status"] != Status.AT_REST, Ending.UNKNOWN),
         (np.isnan(columns["collapsed_at"]), Ending.KEPT),
         ((collapse == 0) | (columns["flight_before_collapse"] > IN_FLIGHT), Ending.IN_FLIGHT),
         (collapse == 1, Ending.FIRST),
         (collapse == 2, Ending.SECOND),
-        (~touched | (contact >= collapse), Ending.LATER),
-        (contact <= 1, Ending.FOLDED_AT_FIRST),
-        (contact == 2, Ending.FOLDED_AT_SECOND),
     )
-    codes = np.select([case for case, _ in cases], [code for _, code in cases], Ending.FOLDED_LATER)
+    codes = np.select([case for case, _ in cases], [code for _, code in cases], Ending.LATER)
     return codes.astype(np.int8)

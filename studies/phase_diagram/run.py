@@ -2,7 +2,6 @@
 
     python -m studies.phase_diagram.run                    # results/*.csv → figures and tables of the page
     python -m studies.phase_diagram.run FOLDER…            # parts of the sweep phase_diagram → results/cells.csv, first
-    python -m studies.phase_diagram.run --endings FOLDER   # walks that know when strands meet → results/endings.csv
     python -m studies.phase_diagram.run --scaling FOLDER   # the sweep scaling → results/scaling.csv, first
 
 Parts are folders of ``warpchain sweep``. They have other seeds; they may be unfinished, and their grids may differ.
@@ -17,35 +16,27 @@ import typer
 import warpchain
 from studies.common import run_study, write_tables
 from studies.phase_diagram import candidates, cells, drawing, scales
-from studies.phase_diagram.tables import TABLES, table_of_endings
+from studies.phase_diagram.tables import TABLES
 
 FOLDER: Final = Path(__file__).parent
 
 
-def make(
-    parts: Annotated[list[str] | None, typer.Argument()] = None,
-    endings: list[str] | None = None,
-    scaling: str | None = None,
-) -> None:
+def make(parts: Annotated[list[str] | None, typer.Argument()] = None, scaling: str | None = None) -> None:
     """Reduce the sweeps that are given into the committed files; then draw and write all that is in them."""
     if parts:
         walks = cells.walks_by_cell([warpchain.load(path) for path in parts])
         cells.write_csv([cells.reduced(*cell, columns) for cell, columns in walks.items()], cells.CSV)
-    if endings:
-        walks = cells.walks_by_cell([warpchain.load(path) for path in endings])
-        cells.write_csv([cells.reduced_endings(*cell, columns) for cell, columns in walks.items()], cells.ENDINGS)
     if scaling is not None:
         cells.write_csv(scales.reduced(warpchain.load(scaling)), scales.CSV)
-    found, ends = cells.read_csv(), cells.read_csv(cells.ENDINGS)
+    found = cells.read_csv()
     varied, curve = scales.Cells(cells.read_rows(scales.CSV)), scales.Curve(found)
     tables = {name: render(found) for name, render in TABLES.items()} | {
-        "endings": table_of_endings(ends),
         "scales": scales.table(varied, curve),
         "candidates": candidates.table(found, varied),
         "walking time": candidates.walking_time(found),
     }
     write_tables(FOLDER / "README.md", tables)
-    drawing.draw_maps(found, ends, FOLDER / "figures" / "maps.png")
+    drawing.draw_maps(found, FOLDER / "figures" / "maps.png")
     drawing.draw_laws(found, FOLDER / "figures" / "laws.png")
     scales.draw(varied, curve, FOLDER / "figures" / "scales.png")
 

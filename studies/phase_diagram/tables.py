@@ -13,7 +13,7 @@ from studies.phase_diagram.endings import Ending
 
 Array = NDArray[Any]
 
-FEW: Final = 20
+FEW: Final = 100
 """Walks that each of two groups has in a cell in which they are compared, at least."""
 
 
@@ -44,17 +44,16 @@ def chosen(values: Array) -> Array:
     return known[np.unique(np.linspace(0, len(known) - 1, 6).round().astype(int))]
 
 
-def over_others(cells: Mapping[str, Array], ways: Sequence[Ending], others: Sequence[Ending] | None = None) -> Array:
+def over_others(cells: Mapping[str, Array], ways: Sequence[Ending]) -> Array:
     """Mean Δx of walks that ended in some ways over that of the others of their cell; NaN where either are few.
 
     Args:
         cells: Columns of the file.
         ways: How the walks ended.
-        others: How those ended that they are compared with; None: in any other way.
     """
     numbers = {way: cells[way.label] for way in WAYS}
     distances = {way: number * np.nan_to_num(cells[f"dx_{way.label}"]) for way, number in numbers.items()}
-    rest = [way for way in WAYS if way not in ways] if others is None else others
+    rest = [way for way in WAYS if way not in ways]
     (walks, dx), (walks_of_rest, dx_of_rest) = (
         (sum(numbers[way] for way in group), sum(distances[way] for way in group)) for group in (ways, rest)
     )
@@ -90,14 +89,8 @@ def table_of_endings(cells: Mapping[str, Array]) -> str:
         percent = "not recorded" if way is Ending.IN_FLIGHT and not flights else f"{100 * share:.2g} %"
         rows.append([way.meaning, percent, f"{np.sum(most == number)}", *texts])
     text = f"{counts.sum():,.0f} walks of which this is known; a collapse in flight is known of {flights:,} of them."
-    early = over_others(cells, [Ending.FOLDED_AT_FIRST, Ending.FOLDED_AT_SECOND], [Ending.FOLDED_LATER])
-    touched = (
-        "Walks whose strands met by their second bounce, over those whose strands first met in a later one: "
-        f"{text_of_ratios(early[inside]) or 'too few'} in the paper's range, "
-        f"{text_of_ratios(early[~inside]) or 'too few'} elsewhere."
-    )
     head = ("way of ending", "share", "cells where it is the most frequent", "Δx, paper's range", "elsewhere")
-    return "\n\n".join([table(head, rows), text, touched])
+    return "\n\n".join([table(head, rows), text])
 
 
 def table_of_failures(cells: Mapping[str, Array]) -> str:
@@ -123,6 +116,7 @@ def span(values: Array) -> str:
 TABLES: Final[Mapping[str, Callable[[Mapping[str, Array]], str]]] = {
     "cells": table_of_cells,
     "failures": table_of_failures,
+    "endings": table_of_endings,
     "scaling": laws.table,
 }
-"""Tables of the page that are of the cells alone, by the names of their markers."""
+"""Tables of the page by the names of their markers."""

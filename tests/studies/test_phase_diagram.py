@@ -28,33 +28,25 @@ SWEEP: dict[str, Any] = {
 @pytest.mark.parametrize(
     ("columns", "ending"),
     [
-        ((-1, NAN, -1, NAN, -1), Ending.UNKNOWN),
-        ((Status.NOT_STEADY, NAN, -1, NAN, -1), Ending.UNKNOWN),
-        ((Status.TIME_LIMIT, 0.5, 3, 0.0, 2), Ending.UNKNOWN),
-        ((Status.AT_REST, NAN, -1, NAN, -1), Ending.KEPT),
-        ((Status.AT_REST, NAN, -1, NAN, 4), Ending.KEPT),
-        ((Status.AT_REST, 0.03, 0, NAN, -1), Ending.IN_FLIGHT),
-        ((Status.AT_REST, 0.5, 1, 0.011, 1), Ending.IN_FLIGHT),
-        ((Status.AT_REST, 0.5, 1, 0.009, 1), Ending.FIRST),
-        ((Status.AT_REST, 0.5, 1, 0.0, -1), Ending.FIRST),
-        ((Status.AT_REST, 0.5, 2, 0.0, 1), Ending.SECOND),
-        ((Status.AT_REST, 0.5, 7, 0.0, -1), Ending.LATER),
-        ((Status.AT_REST, 0.5, 7, 0.0, 7), Ending.LATER),
-        ((Status.AT_REST, 0.5, 7, 0.0, 8), Ending.LATER),
-        ((Status.AT_REST, 0.5, 7, 0.0, 0), Ending.FOLDED_AT_FIRST),
-        ((Status.AT_REST, 0.5, 3, 0.0, 1), Ending.FOLDED_AT_FIRST),
-        ((Status.AT_REST, 0.5, 3, 0.0, 2), Ending.FOLDED_AT_SECOND),
-        ((Status.AT_REST, 0.5, 7, 0.0, 6), Ending.FOLDED_LATER),
+        ((-1, NAN, -1, NAN), Ending.UNKNOWN),
+        ((Status.NOT_STEADY, NAN, -1, NAN), Ending.UNKNOWN),
+        ((Status.TIME_LIMIT, 0.5, 3, 0.0), Ending.UNKNOWN),
+        ((Status.AT_REST, NAN, -1, NAN), Ending.KEPT),
+        ((Status.AT_REST, 0.03, 0, NAN), Ending.IN_FLIGHT),
+        ((Status.AT_REST, 0.5, 1, 0.011), Ending.IN_FLIGHT),
+        ((Status.AT_REST, 0.5, 1, 0.009), Ending.FIRST),
+        ((Status.AT_REST, 0.5, 1, 0.0), Ending.FIRST),
+        ((Status.AT_REST, 0.5, 2, 0.0), Ending.SECOND),
+        ((Status.AT_REST, 0.5, 7, 0.0), Ending.LATER),
     ],
 )
-def test_every_case_has_its_ending(columns: tuple[int, float, int, float, int], ending: Ending) -> None:
-    """Status first, then where the loop collapsed, then in which bounce its strands had met before."""
+def test_every_case_has_its_ending(columns: tuple[int, float, int, float], ending: Ending) -> None:
+    """Status first, then where the loop collapsed, then in which bounce."""
     names = (
         "status",
         "collapsed_at",
         "bounces_before_collapse",
         "flight_before_collapse",
-        "bounces_before_strands_met",
     )
     assert endings({name: np.array([value]) for name, value in zip(names, columns, strict=True)}).tolist() == [ending]
 
@@ -80,8 +72,7 @@ def test_parts_are_reduced_together(tmp_path: Path) -> None:
     assert both["dx_se"] == pytest.approx(dx.std(ddof=1) / math.sqrt(8))
     assert (both["walks"], both["at_rest"], both["time_limit"], both["missing"]) == (10, 8, 2, 2)
     assert both["bounces_mean"] == 7
-    ends = cells.reduced_endings(60, 15.0, walks[60, 15.0])
-    assert ends["in_flight"] == 8 and ends["dx_in_flight"] == pytest.approx(dx.mean())
+    assert both["in_flight"] == 8 and both["dx_in_flight"] == pytest.approx(dx.mean())
     failed = cells.reduced(90, 15.0, walks[90, 15.0])
     assert (failed["at_rest"], failed["not_steady"]) == (0, 12)
     assert math.isnan(failed["dx_mean"]) and math.isnan(failed["dx_sd"]) and math.isnan(failed["dx_50"])
