@@ -41,6 +41,8 @@ FOLDS: Final = 8
 """Parts of a bank; each is held out once."""
 NEAR: Final = 0.5
 """Chains count as alike within so many standard deviations of the bank."""
+FEW: Final = 16.0
+"""With so many alike (chains times draws) errors are half theirs, half those of all."""
 EDGE: Final = 2.0
 """An answer so many standard deviations off the middle of the bank, where few chains are, is refused …"""
 IDENTIFIED: Final = 0.8
@@ -324,5 +326,6 @@ def _widths(residuals: Array, found: Array, at: Array, but: NDArray[np.bool_] | 
     """
     squares = (at**2).sum(axis=1)[:, None] + (found**2).sum(axis=1) - 2 * at @ found.T
     weights = np.exp(-squares / (2 * NEAR**2)) * (1.0 if but is None else ~but)
-    nearby: Array = weights @ residuals**2 / (weights.sum(axis=1, keepdims=True) + 1e-300)
-    return np.asarray(np.sqrt(np.maximum(nearby, (residuals**2).mean(axis=0))))
+    common = (residuals**2).mean(axis=0)
+    nearby = (weights @ residuals**2 + FEW * common) / (weights.sum(axis=1, keepdims=True) + FEW)
+    return np.asarray(np.sqrt(np.maximum(nearby, common)))
