@@ -62,6 +62,7 @@ def corner(answer: films.Posterior, truth: Mapping[str, float] | None = None) ->
             panel.set_xlabel(f"{SYMBOLS[answer.names[column]]}{across}")
         if column == 0 and row:
             panel.set_ylabel(f"{SYMBOLS[answer.names[row]]}{up}")
+        panel.locator_params(axis="x", nbins=3)
         panel.tick_params(labelsize="x-small", labelleft=column == 0 and row > 0, labelbottom=row == count - 1)
         tidy(panel)
     return figure

@@ -15,7 +15,10 @@ CAMERA = films.Camera()
 
 @pytest.mark.parametrize("count", [1, 4])
 def test_intervals_hold_of_chains_that_the_bank_does_not_have(count: int) -> None:
-    """Of 150 hidden chains 68 and 95 % lie inside, within three standard deviations of such a count."""
+    """Of 150 hidden chains 68 and 95 % lie inside, within three standard deviations of such a count, or more.
+
+    Of two parameters that films show, 9 % of the chains lie more than 2 σ off, at the edge of the bank.
+    """
     bank, hidden = made_bank(160, seed=1), made_bank(150, seed=2)
     inside = np.zeros((2, 3))
     refused = 0
@@ -26,9 +29,9 @@ def test_intervals_hold_of_chains_that_the_bank_does_not_have(count: int) -> Non
             refused += 1
             continue
         inside += np.abs(answer.mean - truth) < np.outer([1, 1.96], answer.sigma)
-    assert refused < 12
+    assert refused < 25
     share = inside / (150 - refused)
-    assert (share[0] > 0.56).all() and (share[0] < 0.8).all()
+    assert (share[0] > 0.56).all() and (share[0] < 0.85).all()
     assert (share[1] > 0.89).all()
     assert ((answer.coverage[1] > 0.9) & (answer.coverage[0] > 0.6)).all()
 
@@ -85,6 +88,29 @@ def test_other_measurements_condition_the_gaussian() -> None:
     assert after.mean == pytest.approx(covariance @ (precision @ answer.mean + [400 * 4.2, 0]))
     with pytest.raises(InputError, match="mass: not in the posterior; give one of circle_radius"):
         answer.given(mass=(1.0, 0.1))
+
+
+def test_errors_are_those_of_chains_alike() -> None:
+    """On rough floors speeds of these loops were misread: the radius is known less there than on smooth ones."""
+    bank, random = made_bank(160, seed=1), np.random.default_rng(5)
+    rough = (bank.values[:, 0] > 0.27)[:, None, None]
+    misread = dataclasses.replace(bank, speed=bank.speed * (1 + 0.01 * rough * random.normal(size=bank.speed.shape)))
+
+    def sigma(friction: float) -> float:
+        chain = int(np.abs(bank.values[:, 0] - friction).argmin())
+        (film,) = films_of(bank, chain, 1, CAMERA, 0)
+        return float(misread.posterior([dataclasses.replace(film, outline=None)]).sigma[1])
+
+    assert sigma(0.31) > 1.1 * sigma(0.23)
+
+
+def test_an_answer_at_the_edge_of_the_bank_is_refused() -> None:
+    """Friction 2.2 standard deviations off the middle, where few chains are; the line has the parameter's name."""
+    film = motion(0.38).seen(CAMERA, np.zeros(8), np.random.default_rng(0))
+    with pytest.raises(
+        InputError, match=r"outside of the bank, floor_friction 0\.3\d* is at the edge; .* a bank about it"
+    ):
+        made_bank(160, seed=1).posterior([film])
 
 
 def test_films_outside_of_the_bank_are_refused() -> None:

@@ -39,6 +39,14 @@ PENALTIES: Final = 10.0 ** np.arange(-6, 1.5, 0.5)
 """Of the ridge regression; the one with the smallest residuals on held-out chains is taken, for each parameter."""
 FOLDS: Final = 8
 """Parts of a bank; each is held out once."""
+NEAR: Final = 0.5
+"""Chains count as alike within so many standard deviations of the bank."""
+FEW: Final = 16.0
+"""With so many alike (chains times draws) errors are half theirs, half those of all."""
+EDGE: Final = 2.0
+"""An answer so many standard deviations off the middle of the bank, where few chains are, is refused …"""
+IDENTIFIED: Final = 0.8
+"""… if its error is smaller than so many of them."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -151,18 +159,26 @@ class Bank:
             (at, len(group), all(film.outline is not None for film in group), all(film.speed for film in group))
             for at, group in groups.items()
         )
-        fitted, residuals, furthest = _regression(self, design, camera, draws)
+        fitted, residuals, sizes, furthest = _regression(self, design, camera, draws)
         mean, distance = fitted(_features(design, lambda at, number: groups[at][number])[None])
-        lower, upper = self.values.min(axis=0), self.values.max(axis=0)
-        if distance[0] > furthest or np.any((mean[0] < lower) | (mean[0] > upper)):
+        middle, prior = self.values.mean(axis=0), self.values.std(axis=0)
+        found = np.tile(self.values, (draws, 1)) - residuals
+        sigma, common = _widths(residuals, found / prior, mean / prior)[0], np.sqrt((residuals**2).mean(axis=0))
+        edge = np.abs(mean[0] - middle) > np.where(sigma < IDENTIFIED * prior, EDGE * prior, np.inf)
+        if distance[0] > furthest or edge.any():
             far = f"{distance[0] / furthest:.2g} times as far from its middle as its furthest chain"
-            raise InputError(f"films: outside of the bank, {far}; check unit, floor, release, or give a wider bank")
-        sizes = np.abs(residuals) / np.sqrt((residuals**2).mean(axis=0))
+            thin = " and ".join(
+                f"{name} {value:.3g}" for name, value in zip(self.names[edge], mean[0, edge], strict=True)
+            )
+            where = f"{thin} is at the edge" if edge.any() else far
+            raise InputError(
+                f"films: outside of the bank, {where}; check unit, floor, release, or give a bank about it"
+            )
         return Posterior(
             names=tuple(self.names),
             mean=mean[0],
-            covariance=residuals.T @ residuals / len(residuals),
-            prior_sigma=self.values.std(axis=0),
+            covariance=residuals.T @ residuals / len(residuals) * np.outer(sigma / common, sigma / common),
+            prior_sigma=prior,
             coverage=np.array([(sizes < 1).mean(axis=0), (sizes < 1.96).mean(axis=0)]),
             films=len(films),
             chains=len(self.values),
@@ -186,7 +202,7 @@ class Bank:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Posterior:
-    """Parameters of a chain: a Gaussian, whose width is that of the errors on chains of the bank that were held out.
+    """Parameters of a chain: a Gaussian, with the errors that held-out chains of the bank have, above all those alike.
 
     Attributes:
         names: of the parameters.
@@ -231,7 +247,7 @@ class Posterior:
             value = f"{self.mean[k]:.4g} ± {self.sigma[k]:.2g}{unit}"
             share = f"{100 * self.sigma[k] / self.mean[k]:.1f} %"
             covers = " and ".join(f"{100 * inside:.0f} %" for inside in self.coverage[:, k])
-            known = ", as before the film" if self.sigma[k] > 0.8 * self.prior_sigma[k] else ""
+            known = ", as before the film" if self.sigma[k] > IDENTIFIED * self.prior_sigma[k] else ""
             lines.append(f"{name:18} {value:30} {share:>7}; {covers}{known}")
         return "\n".join(lines)
 
@@ -249,11 +265,12 @@ def _features(design: _Design, film_at: Callable[[int, int], Film]) -> Array:
 
 
 @lru_cache(16)
-def _regression(bank: Bank, design: _Design, camera: Camera, draws: int) -> tuple[_Fitted, Array, float]:
+def _regression(bank: Bank, design: _Design, camera: Camera, draws: int) -> tuple[_Fitted, Array, Array, float]:
     """Ridge regression of the parameters on the films of a chain.
 
     Returns:
-        What was fitted; residuals of each chain in each draw, fitted without that chain; and the greatest distance.
+        What was fitted; residuals of each chain in each draw, fitted without that chain; their sizes relative to the
+        errors that the other chains would have given; and the greatest distance.
     """
     random, repetitions = np.random.default_rng(0), bank.speed.shape[2]
 
@@ -293,4 +310,22 @@ def _regression(bank: Bank, design: _Design, camera: Camera, draws: int) -> tupl
     squares = [(held_out(penalty * width)[0] ** 2).mean(axis=0) for penalty in PENALTIES]
     best = PENALTIES[np.argmin(squares, axis=0)]
     residuals, distances = held_out(best)
-    return lambda features: whole(features, best), residuals, float(distances.max())
+    found, same = (values - residuals) / values.std(axis=0), chains[:, None] == chains
+    sizes = np.abs(residuals) / _widths(residuals, found, found, same)
+    return lambda features: whole(features, best), residuals, sizes, float(distances.max())
+
+
+def _widths(residuals: Array, found: Array, at: Array, but: NDArray[np.bool_] | None = None) -> Array:
+    """Errors at some places, (m, p): those of chains nearby, and at least those of all.
+
+    Args:
+        residuals: of all chains, (k, p).
+        found: where these were found, in standard deviations of the bank, (k, p).
+        at: the places, likewise, (m, p).
+        but: chains that do not count, (m, k).
+    """
+    squares = (at**2).sum(axis=1)[:, None] + (found**2).sum(axis=1) - 2 * at @ found.T
+    weights = np.exp(-squares / (2 * NEAR**2)) * (1.0 if but is None else ~but)
+    common = (residuals**2).mean(axis=0)
+    nearby = (weights @ residuals**2 + FEW * common) / (weights.sum(axis=1, keepdims=True) + FEW)
+    return np.asarray(np.sqrt(np.maximum(nearby, common)))

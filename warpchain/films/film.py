@@ -110,7 +110,7 @@ class Film:
     def check(self, camera: Camera) -> None:
         """Refuse a film that is too short, or not as the camera says."""
         first, last, rate = self.time[0], self.time[-1], 1 / float(np.median(np.diff(self.time)))
-        if first > 0.01 - BEFORE or last < CLOCK[-1] + 0.01:
+        if first > 0.02 - BEFORE or last < CLOCK[-1] + 0.01:
             needed = f"−{BEFORE:g} to {CLOCK[-1] + 0.02:g} s"
             raise InputError(f"film: it shows {first:.3f} to {last:.3f} s after the release; give {needed}")
         if abs(rate / camera.fps - 1) > 0.05:
