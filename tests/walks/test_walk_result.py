@@ -24,7 +24,7 @@ from warpchain.walks.walk_result import ENERGIES, WalkResult, load_walk
 
 def test_status_says_what_to_try() -> None:
     """Only rest and a finished simulation are good ends; every failure names a remedy, in one line."""
-    assert [status for status in Status if status.ok] == [Status.AT_REST, Status.FINISHED]
+    assert [status for status in Status if status.ok] == [Status.AT_REST, Status.FINISHED, Status.DISTANCE_LIMIT]
     for status in Status:
         assert re.fullmatch(r"[A-Z][^\n]*\.", status.sentence), status
         assert ("; " in status.sentence) == (not status.ok), status

@@ -51,7 +51,7 @@ def world_bytes(
         faces: Most faces of a floor.
     """
     columns = layout.padded_width(longest)
-    few = CHAIN_DOUBLES + 139  # numbers of a world in model, drive and state, beside these tables
+    few = CHAIN_DOUBLES + 144  # numbers of a world in model, drive and state, beside these tables
     few += layout.PLANE_ROWS + layout.MOTION_ROWS * layout.MOTION_VALUES
     numbers = columns * scratch_rows(options, longest, device) + (6 + layout.LINK_ROWS) * longest + few
     numbers += faces * layout.FACE_VALUES + (faces > 1) * (layout.GROUND_CELLS + 1) * layout.CELL_VALUES
