@@ -70,12 +70,14 @@ def bench(
     from warpchain.files import checked_output, write_whole
     from warpchain.inputs.options import Options, on_gpu
     from warpchain.inputs.scene import Scene, check_links_on_gpu
-    from warpchain.inputs.validation import validated
+    from warpchain.inputs.validation import InputError, validated
 
     where = validated(Options, {"device": device}, "bench").device
     lengths = [validated(Scene, {"links": count}, "bench").links for count in links or (60, 150)]
     for count in lengths:
         check_links_on_gpu(count, where, "bench.links")
+        if count % 2:
+            raise InputError(f"bench.links: {count} is odd; inner and outer links alternate: give an even number")
     if output is not None:
         checked_output(output)
     about, many = machine(where), on_gpu(where)
