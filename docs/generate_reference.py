@@ -83,7 +83,7 @@ def values_of(field: FieldInfo) -> str:
     extra = field.json_schema_extra
     unit = str(extra.get("unit", "1")) if isinstance(extra, dict) else "1"
     if not limits:
-        return f", or a list of numbers in {unit}"
+        return in_unit(", or a list of numbers", unit if unit == "1" else f"in {unit}")
     lower = "[" + limits["ge"] if "ge" in limits else "(" + limits["gt"]
     upper = limits["le"] + "]" if "le" in limits else limits.get("lt", "∞") + ")"
     return (", whole, " if int in kinds else ", ") + in_unit(f"{lower}, {upper}", unit)
@@ -161,7 +161,7 @@ def options_page() -> str:
             Options, {"method": f"a word, see below, or an [integrator](../methods.md#integrators): {integrators}"}
         )
         + "\n## Methods in one word\n\nSuch a word of `method` sets the defaults of these options. On a GPU `standard` "
-        "means `explicit`. A `tolerance` that is given also replaces `soft_tolerance`.\n\n" + "\n".join(words) + "\n"
+        "means `explicit`. A `tolerance` that is given also replaces `soft_tolerance`.\n\n" + listing((f"`{word}`", text) for word, text in words.items())
     )
 
 
