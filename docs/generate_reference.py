@@ -155,8 +155,7 @@ def options_page() -> str:
     integrators = ", ".join(f"`{name}`" for name in METHODS)
     return (
         "# Options\n\nHow a walk is computed; see [methods](../methods.md). A method in one word, such as the default, "
-        "has defaults of its own, see below. Each line has a field with its default, what it may be, and its meaning."
-        "\n\n"
+        "has defaults of its own. Each line has a field with its default, what it may be, and its meaning.\n\n"
         + fields_of(
             Options, {"method": f"a word, see below, or an [integrator](../methods.md#integrators): {integrators}"}
         )
@@ -193,8 +192,8 @@ def sweep_file_page() -> str:
         "\n## Distributions\n\nThe key `all` says what is drawn of the other quantities: `table` (the default) or "
         "`fixed`, nothing. Each quantity takes one of `table`, `fixed`, `{uniform: [lower, upper]}` and "
         "`{gaussian: {mean: …, sigma: …}}`; without `mean` the Gaussian lies about the chain's value. Given values, "
-        "on an axis or not, are exact: `all` does not hold for them. Only a distribution of their own name, such as "
-        "`floor_friction: table`, draws about each. Distributions "
+        "on an axis or not, are exact; only a distribution of their own name, such as `floor_friction: table`, draws "
+        "about each. Distributions "
         f"can be given for every parameter and for {', '.join(numbers)}. `table` draws {', '.join(uniform)}, and by "
         f"the Gaussians of [Table 1](parameters.md), about the chain's value, {', '.join(gaussian)}.\n"
         + "\n## Samplers\n\n"
@@ -231,9 +230,9 @@ def results_page() -> str:
         + "\n## Numbers\n\nFields of `warpchain.WalkResult`, datasets of the file that `save` writes, and columns of "
         "`warpchain.SweepResult`, where each drawn quantity has a column, too; a second name is that of the column. "
         "Losses of energy are positive. "
-        "What a walk of a sweep does not have is NaN, or −1 in columns of whole numbers. `cell_statistics` and figures "
-        "leave such walks out, column by column: `count` is the number of walks that were averaged, `absent` that of "
-        "walks at rest without the quantity. Averages of your own must do so, too.\n\n"
+        "What a walk of a sweep does not have is NaN, or −1 in columns of whole numbers; averages of your own must leave "
+        "such walks out. `cell_statistics` and figures do so: `count` is the number of walks that were averaged, "
+        "`absent` that of walks at rest without the quantity.\n\n"
         + listing(rows)
         + "\n## Arrays\n\nOf a walk, at t samples and f frames of n links, in the same file.\n\n"
         + listing(arrays)
