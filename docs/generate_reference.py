@@ -182,7 +182,7 @@ def sweep_file_page() -> str:
     numbers = [f"`{name}`" for name, field in Scene.model_fields.items() if field.annotation is float]
     return (
         "# Sweep file\n\nA sweep file is a YAML mapping with these keys. A block is such a mapping, too, without "
-        f"{', '.join(only_file)}. An error names the path of the value, such as `sweep.blocks[0].grid.frequency[3]`. "
+        f"{', '.join(only_file)}. "
         "[Sweeps](../sweeps.md) shows how to use it.\n\n"
         + listing(keys)
         + "\n## Grid\n\nEach key is `preset` or a field of scene, options or parameters. Each value is a list, such as "
