@@ -160,7 +160,8 @@ def options_page() -> str:
             Options, {"method": f"a word, see below, or an [integrator](../methods.md#integrators): {integrators}"}
         )
         + "\n## Methods in one word\n\nSuch a word of `method` sets the defaults of these options. On a GPU `standard` "
-        "means `explicit`. A `tolerance` that is given also replaces `soft_tolerance`.\n\n" + listing((f"`{word}`", text) for word, text in words.items())
+        "means `explicit`. A `tolerance` that is given also replaces `soft_tolerance`.\n\n"
+        + listing((f"`{word}`", text) for word, text in words.items())
     )
 
 
@@ -230,8 +231,8 @@ def results_page() -> str:
         + "\n## Numbers\n\nFields of `warpchain.WalkResult`, datasets of the file that `save` writes, and columns of "
         "`warpchain.SweepResult`, where each drawn quantity has a column, too; a second name is that of the column. "
         "Losses of energy are positive. "
-        "What a walk of a sweep does not have is NaN, or −1 in columns of whole numbers; averages of your own must leave "
-        "such walks out. `cell_statistics` and figures do so: `count` is the number of walks that were averaged, "
+        "What a walk of a sweep does not have is NaN, or −1 in columns of whole numbers; averages of your own must "
+        "leave such walks out. `cell_statistics` and figures do so: `count` is the number of walks that were averaged, "
         "`absent` that of walks at rest without the quantity.\n\n"
         + listing(rows)
         + "\n## Arrays\n\nOf a walk, at t samples and f frames of n links, in the same file.\n\n"
