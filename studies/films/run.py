@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from studies.common import run_study, save_figure, table, write_tables
 from studies.films.calibration import CAMERA, Calibration, Wanted, calibrate, set_of_films
-from studies.films.drawing import SYMBOLS, corner, coverage_figure
+from studies.films.drawing import SYMBOLS, corner, coverage_figure, line_figure
 from warpchain import films
 
 FOLDER: Final = Path(__file__).parent
@@ -180,7 +180,7 @@ def main(banks: Path) -> None:
     print(f"\nthe hidden chain\n{answer}\n{films.friction_line(hidden[1])}")
     print(f"with r by calipers\n{answer.given(circle_radius=(4.05e-3, 5e-5))}")
     save_figure(corner(answer), FOLDER / "figures" / "corner.png", dpi=110)
-    save_figure(films.friction_line(hidden[1]).plot(), FOLDER / "figures" / "line.png")
+    save_figure(line_figure(films.friction_line(hidden[1])), FOLDER / "figures" / "line.png")
 
 
 if __name__ == "__main__":

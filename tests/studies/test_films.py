@@ -59,4 +59,5 @@ def test_the_hidden_chain_is_in_its_films() -> None:
     """The committed films are read, their friction line is that of the hidden chain."""
     path = hidden.FOLDER / "60_links_20_Hz.txt"
     line = films.friction_line(films.read(path, links=60, frequency=20.0, unit="mm", speed=7.648))
+    assert drawing.line_figure(line).axes[0].get_legend_handles_labels()[1][0].startswith("$μ$ = ")
     assert abs(line.friction - hidden.CHAIN["floor_friction"]) < 3 * line.error < 0.02
