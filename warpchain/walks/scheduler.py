@@ -13,7 +13,7 @@ from warpchain.engine.kernel_choice import block_threads, features_of, load_kern
 from warpchain.engine.memory import most_worlds
 from warpchain.inputs.floor import body_of
 from warpchain.inputs.options import Options, on_gpu
-from warpchain.inputs.scene import floor_points
+from warpchain.inputs.scene import face_count, floor_points
 from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
@@ -80,7 +80,7 @@ def run_setups(
         links = [setups[place].scene.links for place in places]
         wanted = [] if keeps is None else [keeps[place] for place in places]
         tilts = any(setups[place].scene.plane == "tilting" for place in places)
-        faces = max(len(setups[place].scene.floor) - 1 for place in places)  # "flat": room for a slope
+        faces = max(face_count(setups[place].scene) for place in places)
         waiting = deque(places)
         batches, capacity = _batches(setups[places[0]].options, links, wanted, slots, threads, tilts, faces)
         return Group(waiting, [BatchRun(batch, waiting, begin, watch) for batch in batches], capacity)

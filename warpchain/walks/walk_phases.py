@@ -112,7 +112,8 @@ class WalkRun:
             self._go_on(setup.start)
             return
         from_rest = scene.start == "rest"
-        speed = 2 * math.pi * scene.frequency * joint_radius(scene, parameters)
+        radius = joint_radius(scene, parameters)
+        speed = 2 * math.pi * scene.frequency * radius
         if not self._has_sprocket:
             self._set_chain()
             try:
@@ -126,7 +127,6 @@ class WalkRun:
                 ) from None
             self._release(position, velocity)
             return
-        radius = joint_radius(scene, parameters)
         density = mean_value(self._links.mass) / parameters.link_length
         tension = density * speed**2
         weight = mean_weight(parameters, density, scene.links, radius)
