@@ -387,9 +387,9 @@ def one_line(text: str, kind: str = "") -> str:
     return kind + (text if len(text) <= room else f"{text[: room - 3]}...")
 
 
-def short(number: float) -> str:
-    """A number with at most six digits; `1e9`, not `1e+09`."""
-    mantissa, e, exponent = f"{number:.6g}".partition("e")
+def short(number: float, digits: int = 6) -> str:
+    """A number rounded to some significant digits; `1e9`, not `1e+09`."""
+    mantissa, e, exponent = f"{float(f'{number:.{digits}g}'):.{max(digits, 6)}g}".partition("e")
     return f"{mantissa}e{int(exponent)}" if e else mantissa
 
 
