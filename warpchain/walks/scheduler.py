@@ -108,31 +108,19 @@ def _batches(
     # own slowest walk.
     samples, loads = any(keep.series_every for keep in keeps), any(keep.before > 0 or keep.loads for keep in keeps)
     frame_every = next((keep.frame_every for keep in keeps if keep.frame_every), None)
+    kept: dict[str, Any] = {"keeps_samples": samples, "keeps_loads": loads, "tilts": tilts, "faces": faces}
+    kept["threads"] = threads
     if slots is None and blocks:
-        frames = frame_every is not None
-        slots = most_worlds(
-            longest,
-            options,
-            keeps_samples=samples,
-            keeps_frames=frames,
-            keeps_loads=loads,
-            tilts=tilts,
-            faces=faces,
-            threads=threads,
-        )
+        slots = most_worlds(longest, options, keeps_frames=frame_every is not None, **kept)
     capacity = slots = slots or 1
     if blocks:
         slots = min(slots, len(links))
     worlds = -(-slots // BATCHES_PER_GPU) if blocks else slots
-    kept: dict[str, Any] = {"keeps_samples": samples, "frame_every": frame_every, "keeps_loads": loads, "tilts": tilts}
     intervals = {keep.frame_interval for keep in keeps if keep.frame_interval > 0}
     if len(intervals) > 1:
         raise ValueError(f"keeps: frame intervals {sorted(intervals)} s; walks that run together have one")
-    kept["frame_interval"] = max(intervals, default=0.0)
-    batches = [
-        Batch(min(worlds, slots - first), longest, options, faces=faces, threads=threads, **kept)
-        for first in range(0, slots, worlds)
-    ]
+    kept |= {"frame_every": frame_every, "frame_interval": max(intervals, default=0.0)}
+    batches = [Batch(min(worlds, slots - first), longest, options, **kept) for first in range(0, slots, worlds)]
     return batches, capacity
 
 
