@@ -19,6 +19,7 @@ from typing import Annotated, Any, Final, TypeVar, get_args
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
+from pydantic_core import to_jsonable_python
 
 STRICT: Final = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 """Of models that hold a user's values."""
@@ -385,6 +386,11 @@ def one_line(text: str, kind: str = "") -> str:
         first = longest // 3
         text = f"{where[:first]}...{where[first + 3 - longest :]}{colon}{rest}"
     return kind + (text if len(text) <= room else f"{text[: room - 3]}...")
+
+
+def json_value(value: Any) -> Any:
+    """A value with arrays in it as JSON has it; a number that is not finite is null."""
+    return to_jsonable_python(value, inf_nan_mode="null", fallback=lambda array: array.tolist())
 
 
 def short(number: float, digits: int = 6) -> str:
