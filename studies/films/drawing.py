@@ -68,6 +68,20 @@ def corner(answer: films.Posterior, truth: Mapping[str, float] | None = None) ->
     return figure
 
 
+def line_figure(line: films.FrictionLine) -> Figure:
+    """Way against lift, with the friction line; crosses were not fitted."""
+    figure, used = Figure(figsize=(5.2, 3.4), layout="constrained"), line.time <= line.end
+    axes = figure.subplots()
+    for chosen, style in ((used, "o"), (~used, "x")):
+        axes.plot(1e3 * line.lift[chosen], 1e3 * line.way[chosen], style, color=BLUE, markersize=3.5)
+    ends = 1e3 * np.array([0, line.lift[used].max()])
+    axes.plot(ends, line.friction * ends, color=RED, label=f"$μ$ = {line.friction:.4f} ± {line.error:.4f}")
+    axes.set(xlabel="lift $y - y_0 + g t^2/2$ / mm", ylabel="way $x - x_0$ / mm")
+    axes.legend(frameon=False)
+    tidy(axes, grid="both")
+    return figure
+
+
 def coverage_figure(found: Mapping[str, Calibration]) -> Figure:
     """Share of hidden chains within a number of standard deviations, against that of a Gaussian."""
     figure = Figure(figsize=(9.2, 3.4), layout="constrained")

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from studies.common import run_study, save_figure, table, write_tables
 from studies.films.calibration import CAMERA, Calibration, Wanted, calibrate, set_of_films
-from studies.films.drawing import SYMBOLS, corner, coverage_figure
+from studies.films.drawing import SYMBOLS, corner, coverage_figure, line_figure
+from studies.films.reduce import load
 from warpchain import films
 
 FOLDER: Final = Path(__file__).parent
@@ -124,12 +125,12 @@ def lines_table(banks: Mapping[str, films.Bank]) -> str:
 
 def main(banks: Path) -> None:
     """Calibrate, compare, draw."""
-    bank, long = (films.Bank.load(banks / f"{name}_main.npz") for name in ("film_bank", "film_bank_90"))
+    bank, long = (load(banks / f"{name}_main.npz") for name in ("film_bank", "film_bank_90"))
     truths = {
-        "same": films.Bank.load(banks / "film_truths_same.npz"),
-        "e_t = 0.3": films.Bank.load(banks / "film_truths_tangential.npz"),
-        "links 5 % heavier": films.Bank.load(banks / "film_truths_heavier.npz"),
-        "paper's joints": films.Bank.load(banks / "film_truths_paper_main.npz"),
+        "same": load(banks / "film_truths_same.npz"),
+        "e_t = 0.3": load(banks / "film_truths_tangential.npz"),
+        "links 5 % heavier": load(banks / "film_truths_heavier.npz"),
+        "paper's joints": load(banks / "film_truths_paper_main.npz"),
     }
     found = {
         (kind, name): calibrate(bank, hidden, wanted)
@@ -180,7 +181,7 @@ def main(banks: Path) -> None:
     print(f"\nthe hidden chain\n{answer}\n{films.friction_line(hidden[1])}")
     print(f"with r by calipers\n{answer.given(circle_radius=(4.05e-3, 5e-5))}")
     save_figure(corner(answer), FOLDER / "figures" / "corner.png", dpi=110)
-    save_figure(films.friction_line(hidden[1]).plot(), FOLDER / "figures" / "line.png")
+    save_figure(line_figure(films.friction_line(hidden[1])), FOLDER / "figures" / "line.png")
 
 
 if __name__ == "__main__":

@@ -166,7 +166,7 @@ def test_a_refusal_of_several_lines_is_printed_as_several(command: Command, monk
     def refuse(*_: object) -> None:
         raise InputError("links: 3 is odd;  give an even number", "samples: 0 is less than 1; give 1 or more")
 
-    monkeypatch.setattr(walk_commands, "_setup", refuse)
+    monkeypatch.setattr(walk_commands, "_given_values", refuse)
     answer = command("walk")
     lines = ["error: links: 3 is odd; give an even number", "error: samples: 0 is less than 1; give 1 or more"]
     assert answer.status == 2 and answer.err.splitlines() == lines

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from warpchain.pictures.labels import cell_text, number_text, short_texts
+from warpchain.inputs.validation import short
+from warpchain.pictures.labels import cell_text, short_texts
 
 
 @pytest.mark.parametrize(
@@ -11,7 +12,7 @@ from warpchain.pictures.labels import cell_text, number_text, short_texts
 )
 def test_number_text(value: float, text: str) -> None:
     """Numbers are written as people write them."""
-    assert number_text(value) == text
+    assert short(value) == text
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from studies.common import save_figure
-from studies.films import calibration, drawing, hidden, run
+from studies.films import calibration, drawing, hidden, reduce, run
 from tests.support.made_films import films_of, made_bank
 from warpchain import films
 
@@ -29,6 +29,15 @@ def test_banks_are_joined_by_their_chains(banks: tuple[films.Bank, films.Bank]) 
     both = run.beside(bank, other)
     assert both.experiments.tolist() == [[60, 5], [60, 20], [90, 5], [90, 20]]
     assert len(both.values) == 50 and (both.center[:, :2] == both.center[:, 2:]).all()
+
+
+def test_a_reduced_bank_is_the_same(banks: tuple[films.Bank, films.Bank], tmp_path: Path) -> None:
+    """But for motions, which are kept in single precision."""
+    bank, _ = banks
+    reduce.save(bank, tmp_path / "bank.npz")
+    again = reduce.load(tmp_path / "bank.npz")
+    assert (again.names == bank.names).all() and (again.values == bank.values).all()
+    assert again.center == pytest.approx(bank.center, abs=1e-7) and again.speed == pytest.approx(bank.speed, rel=1e-7)
 
 
 def test_calibration_tells_a_bank_that_knows_from_one_that_does_not(banks: tuple[films.Bank, films.Bank]) -> None:
@@ -59,4 +68,5 @@ def test_the_hidden_chain_is_in_its_films() -> None:
     """The committed films are read, their friction line is that of the hidden chain."""
     path = hidden.FOLDER / "60_links_20_Hz.txt"
     line = films.friction_line(films.read(path, links=60, frequency=20.0, unit="mm", speed=7.648))
+    assert drawing.line_figure(line).axes[0].get_legend_handles_labels()[1][0].startswith("$μ$ = ")
     assert abs(line.friction - hidden.CHAIN["floor_friction"]) < 3 * line.error < 0.02

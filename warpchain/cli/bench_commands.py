@@ -65,11 +65,11 @@ def bench(
     from warpchain.bench.flights import step_costs
     from warpchain.bench.machine import machine
     from warpchain.bench.walk_rate import walk_rate
-    from warpchain.cli.terminal import json_value, status_line
+    from warpchain.cli.terminal import status_line
     from warpchain.files import checked_output, write_whole
     from warpchain.inputs.options import Options, on_gpu
     from warpchain.inputs.scene import Scene, check_links_on_gpu
-    from warpchain.inputs.validation import InputError, validated
+    from warpchain.inputs.validation import InputError, json_value, validated
 
     where = validated(Options, {"device": device}, "bench").device
     lengths = [validated(Scene, {"links": count}, "bench").links for count in links or (60, 150)]
@@ -85,7 +85,7 @@ def bench(
         rate = walk_rate(where, walks or (2000 if many else 32), show)
     record = {
         "machine": about,
-        "steps": [{name: json_value(value) for name, value in asdict(step).items()} for step in steps],
+        "steps": [json_value(asdict(step)) for step in steps],
         "walks": asdict(rate),
     }
     text = json.dumps(record, indent=2, allow_nan=False)

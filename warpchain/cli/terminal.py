@@ -6,12 +6,12 @@ import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from warpchain.engine.tallies import LOST
-from warpchain.inputs.validation import printable
+from warpchain.inputs.validation import json_value, printable
 from warpchain.run.progress_bar import COMPILING, duration_text
 from warpchain.walks.rows import fault_remedies
 from warpchain.walks.walk_result import WalkResult
@@ -57,14 +57,14 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
     if as_json:
         blocks = {
             name: {
-                "axes": {axis: json_value(values) for axis, values in cells.axes.items()},
-                "dx": {key: json_value(getattr(cells, key)) for key in ("mean", "sd", "count", "failed", "missing")},
+                "axes": cells.axes,
+                "dx": {key: getattr(cells, key) for key in ("mean", "sd", "count", "failed", "missing")},
             }
             for name, cells in statistics.items()
         }
         whole = {"name": result.name, "walks": result.walk_count, "statuses": summary}
         whole |= {"inaccurate": result.inaccurate_count, "rate": rate, "time_left": time_left, "blocks": blocks}
-        print(json.dumps(whole, indent=2, allow_nan=False))
+        print(json.dumps(json_value(whole), indent=2, allow_nan=False))
         return
     from rich.console import Console
     from rich.table import Table
@@ -95,14 +95,6 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
         room -= len(table.rows)
     if more := sum(cells.mean.size for cells in statistics.values()) - _MOST_CELLS + room:
         console.print(f"… and {more:,} more cells, which --json lists")
-
-
-def json_value(given: Any) -> Any:
-    """A value or an array as JSON has it; a number that is NaN is null."""
-    values = np.asarray(given).tolist()
-    if isinstance(values, list):
-        return [json_value(part) for part in values]
-    return None if values != values else values
 
 
 def print_walk(result: WalkResult) -> None:

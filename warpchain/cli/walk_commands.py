@@ -50,8 +50,6 @@ _LOADS: Final = (
     "then is explicit: rigid joints have no forces. 60 links take 24 MB a second."
 )
 
-Sections = Mapping[str, Mapping[str, object]]
-
 _Text = str | None
 
 
@@ -83,9 +81,12 @@ def walk(
     from warpchain.cli.terminal import print_walk, progress_text, status_line
     from warpchain.cli.walk_files import try_walk_folder, write_walk
     from warpchain.inputs.distributions import LARGEST_SEED
+    from warpchain.inputs.options import replaced_by
+    from warpchain.inputs.sections import SECTIONS
     from warpchain.inputs.setup import DEFAULT_PRESET, continued, read_setup
     from warpchain.inputs.validation import InputError, checked_whole, printable
     from warpchain.inputs.yaml_files import parse_yaml
+    from warpchain.run.single_walk import complete_setup
     from warpchain.walks.one_walk import run_walk
 
     named = {"links": links, "frequency": frequency, "start": start}
@@ -97,7 +98,8 @@ def walk(
             if value is not None:
                 raise InputError(f"{name}: given together with --like, and a saved walk has its own; leave one out")
         saved, number = _saved(like, index)
-        preset, own = saved.preset, _without_replaced(saved, given["options"])
+        replaced = replaced_by(given["options"])
+        preset, own = saved.preset, {name: getattr(saved, name).model_dump(exclude=replaced) for name in SECTIONS}
     elif config is not None:
         file_preset, own = read_setup(config)
         preset = preset or file_preset
@@ -108,7 +110,7 @@ def walk(
     if like is not None and saved.start is not None:
         setup = continued(saved.start, given)
     else:
-        setup = _setup(preset or DEFAULT_PRESET, own, given, number, record_loads)
+        setup = complete_setup(preset or DEFAULT_PRESET, _over(own, given), number, record_loads)
     interval = _frame_interval(folder, animation, frame_interval, record_loads)
     if folder is not None:
         try_walk_folder(folder, animation)
@@ -179,15 +181,11 @@ def _given_values(named: Mapping[str, str | None], assignments: Sequence[str]) -
     return by_section(values)
 
 
-def _setup(preset: str, own: Mapping[str, Any], given: Sections, seed: int | None, records_loads: bool) -> "Setup":
-    """The setup of a walk: values of the command line over those of a file or a saved walk, and the drawn sample."""
-    from warpchain.run.single_walk import complete_setup
-
+def _over(own: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of the command line over those of a file or a saved walk, by section."""
     sections = {section: own.get(section, {}) for section in given}
-    for section, values in given.items():
-        if isinstance(sections[section], Mapping):  # `complete_setup` refuses anything else
-            sections[section] = {**sections[section], **values}
-    return complete_setup(preset, sections, seed, records_loads)
+    # what is no mapping is refused by `complete_setup`
+    return {name: {**own, **given[name]} if isinstance(own, Mapping) else own for name, own in sections.items()}
 
 
 def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
@@ -213,15 +211,6 @@ def _saved(path: Path, index: str | None) -> tuple["Setup", int | None]:
         raise InputError(f"--like: {path} has many walks; give --index, the number of one, as well")
     block, place = load(path).located(parse_yaml(index, "--index"))
     return block.setup_at(place), block.sweep_at(place).seed
-
-
-def _without_replaced(setup: "Setup", options: Mapping[str, object]) -> dict[str, Any]:
-    """Values of a setup by section, without those that some given options bring anew."""
-    from warpchain.inputs.options import replaced_by
-    from warpchain.inputs.sections import SECTIONS
-
-    replaced = replaced_by(options)
-    return {section: getattr(setup, section).model_dump(exclude=replaced) for section in SECTIONS}
 
 
 def _frame_interval(folder: Path | None, animation: str | None, text: str | None, records_loads: bool) -> Any:

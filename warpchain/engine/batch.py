@@ -351,10 +351,6 @@ class Batch:
             self._gpu.wait(self._done)
             self._done = None
 
-    def listed_pairs(self, world: int) -> int:
-        """Pairs of joints in a world's neighbour list."""
-        return int(self._view(self.lists)[world, list_layout(self.columns).count])
-
     def position(self, world: int) -> Array:
         """(n, 3): x, y [m], θ [rad]."""
         return self._view(self.state.links)[world, :3, : self.links[world]].T.copy()

@@ -7,9 +7,6 @@ not fitted to are the errors. So what films have in common, errors of the camera
 counts as common: more films do not make it smaller.
 """
 
-import io
-import os
-import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -18,7 +15,6 @@ from typing import Any, Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from warpchain.files import write_whole
 from warpchain.films.film import CLOCK, Array, Camera, Film, edges, summary
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.validation import InputError
@@ -183,21 +179,6 @@ class Bank:
             films=len(films),
             chains=len(self.values),
         )
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the bank to a file, whole or not at all, motions in single precision."""
-        image = io.BytesIO()
-        np.savez_compressed(image, **{k: v.astype("f4") if v.ndim > 2 else v for k, v in vars(self).items()})
-        write_whole(path, image.getvalue())
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read what `save` wrote; an `InputError` for another file."""
-        try:
-            with np.load(path) as file:
-                return cls(**{name: file[name] if name == "names" else file[name].astype(float) for name in file.files})
-        except (AttributeError, TypeError, ValueError, zipfile.BadZipFile):
-            raise InputError(f"{os.fspath(path)}: no bank; give a file that Bank.save wrote") from None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -1,14 +1,11 @@
 """The friction of a floor from a film, without any simulation."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from warpchain.films.film import CLOCK, GRAVITY, Array, Camera, Film
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 RELEASE_SPEED: Final = 2e-3
 """Standard deviation of either speed of the centre of mass at the release [m/s]: links pass the sprocket one by one."""
@@ -43,22 +40,6 @@ class FrictionLine:
     def __str__(self) -> str:
         """One line."""
         return f"floor_friction {self.friction:.4f} ± {self.error:.4f}, to {self.end:.3f} s after the release"
-
-    def plot(self) -> "Figure":
-        """Way against lift, with the line; crosses were not fitted."""
-        from warpchain.pictures.inline import InlineFigure
-        from warpchain.pictures.style import tidy
-
-        figure, used = InlineFigure(figsize=(5.2, 3.4), layout="constrained"), self.time <= self.end
-        axes = figure.subplots()
-        for chosen, style in ((used, "o"), (~used, "x")):
-            axes.plot(1e3 * self.lift[chosen], 1e3 * self.way[chosen], style, color="#0072B2", markersize=3.5)
-        ends = 1e3 * np.array([0, self.lift[used].max()])
-        axes.plot(ends, self.friction * ends, color="#D55E00", label=f"$μ$ = {self.friction:.4f} ± {self.error:.4f}")
-        axes.set(xlabel="lift $y - y_0 + g t^2/2$ / mm", ylabel="way $x - x_0$ / mm")
-        axes.legend(frameon=False)
-        tidy(axes, grid="both")
-        return figure
 
 
 def friction_line(film: Film, camera: Camera | None = None) -> FrictionLine:

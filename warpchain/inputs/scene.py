@@ -275,6 +275,11 @@ def floor_points(scene: Scene) -> Array | None:
     return slope_points(scene.slope) if scene.slope != 0 else None
 
 
+def face_count(scene: Scene) -> int:
+    """Number of straight faces of the floor; 1 if it is flat, which a drawn slope may change."""
+    return 1 if scene.floor == "flat" else len(scene.floor) - 1
+
+
 def link_values(scene: Scene, parameters: Parameters) -> LinkValues:
     """What each link and joint of the chain of a walk has of its own."""
     values = alternating(parameters, scene.links)

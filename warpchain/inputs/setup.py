@@ -79,8 +79,7 @@ def combined(preset: str, parameters: Parameters, scene: Scene, options: Options
     Raises:
         InputError: they contradict one another.
     """
-    if scene.plane == "tilting":
-        check_can_tilt(options)
+    _check_can_tilt(scene, options)
     check_scene(scene, parameters)
     check_links_on_gpu(scene.links, options.device, "scene.links")
     interval = options.record_interval
@@ -92,13 +91,9 @@ def combined(preset: str, parameters: Parameters, scene: Scene, options: Options
     return Setup(preset, parameters, scene, options)
 
 
-def check_can_tilt(options: Options) -> None:
-    """Check that the method carries chains whose plane tilts.
-
-    Raises:
-        InputError: it does not.
-    """
-    if not find_method(options.method).can_tilt:
+def _check_can_tilt(scene: Scene, options: Options) -> None:
+    """Check that the method carries chains whose plane tilts, if that of the scene does; else an `InputError`."""
+    if scene.plane == "tilting" and not find_method(options.method).can_tilt:
         raise InputError(
             f"options.method: {shown(options.method)} keeps the plane of a chain fixed; "
             "give explicit or an explicit method, or scene.plane: fixed"
@@ -151,8 +146,7 @@ def continued(state: State, sections: Mapping[str, Mapping[str, object]]) -> Set
     options = validated(Options, {**before.options.model_dump(exclude=replaced_by(given)), **given}, "options")
     scene = validated(Scene, {**vars(before.scene), **sections["scene"]}, "scene")
     parameters = before.parameters.with_values(sections["parameters"]) if sections["parameters"] else before.parameters
-    if scene.plane == "tilting":
-        check_can_tilt(options)
+    _check_can_tilt(scene, options)
     check_links_on_gpu(scene.links, options.device, "start")
     for name in OF_THE_WALK[:2]:
         if (end := getattr(scene, name)) is not None and end < state.time:

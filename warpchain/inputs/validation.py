@@ -19,6 +19,7 @@ from typing import Annotated, Any, Final, TypeVar, get_args
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
+from pydantic_core import to_jsonable_python
 
 STRICT: Final = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 """Of models that hold a user's values."""
@@ -387,9 +388,14 @@ def one_line(text: str, kind: str = "") -> str:
     return kind + (text if len(text) <= room else f"{text[: room - 3]}...")
 
 
-def short(number: float) -> str:
-    """A number with at most six digits; `1e9`, not `1e+09`."""
-    mantissa, e, exponent = f"{number:.6g}".partition("e")
+def json_value(value: Any) -> Any:
+    """A value with arrays in it as JSON has it; a number that is not finite is null."""
+    return to_jsonable_python(value, inf_nan_mode="null", fallback=lambda array: array.tolist())
+
+
+def short(number: float, digits: int = 6) -> str:
+    """A number rounded to some significant digits; `1e9`, not `1e+09`."""
+    mantissa, e, exponent = f"{float(f'{number:.{digits}g}'):.{max(digits, 6)}g}".partition("e")
     return f"{mantissa}e{int(exponent)}" if e else mantissa
 
 

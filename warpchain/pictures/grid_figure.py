@@ -64,7 +64,6 @@ def draw_grid(
     x: str | None = None,
     ax: Axes | None = None,
     figure: Figure | SubFigure | None = None,
-    label: str = "",
 ) -> Figure | SubFigure:
     """Draw a quantity over the grids of one block or several.
 
@@ -78,7 +77,6 @@ def draw_grid(
         x: see there.
         ax: see there.
         figure: see there.
-        label: what is shown, without its unit; by default name and symbol of the quantity.
 
     Raises:
         NothingToShow: no block has an axis of several values, or two for a map, or there is no mean.
@@ -88,7 +86,7 @@ def draw_grid(
     if ax is not None and figure is not None:
         raise ValueError("ax: given together with figure; leave one out")
     panels, left_out = grid_panels(blocks, kind, x)
-    label = with_unit(label or quantity_text(quantity), next(iter(blocks.values())).unit)
+    label = with_unit(quantity_text(quantity), next(iter(blocks.values())).unit)
     if ax is not None and len(panels) > 1:
         raise ValueError(f"ax: this figure has {len(panels)} panels; leave ax out, or give figure")
     alike = len({panel.signature for panel in panels}) == 1

@@ -1,6 +1,5 @@
 """Texts on figures and in tables: numbers, units, quantities, cells, and walks that are in no mean."""
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
@@ -8,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.sections import SECTION_OF, SECTIONS
-from warpchain.inputs.validation import DIMENSIONLESS, field_unit
+from warpchain.inputs.sections import SECTION_OF
+from warpchain.inputs.validation import DIMENSIONLESS, FIELDS, field_unit, short
 
 _SYMBOLS: Final = {"dx": "Δx", "links": "n", "frequency": "ν"}
 """The paper's symbols of what is not in Table 1."""
@@ -25,24 +24,15 @@ _NAMES: Final = {
 COUNTS: Final = ("count", "absent", "failed", "missing")
 """Numbers of walks of a cell: at rest with the quantity, at rest without it, ended otherwise, not computed yet."""
 
-_MOST_DIGITS: Final = 6
-"""Up to so many significant digits, a number is written exactly."""
-
 _EXACT: Final = 17
 """Significant digits that tell any two numbers apart."""
-
-
-def number_text(value: float, digits: int = _MOST_DIGITS) -> str:
-    """A number in its shortest form, 1e-6 and 1e7, not 1e-06 and 1e+07, rounded to some significant digits."""
-    text = f"{float(f'{value:.{digits}g}'):.{max(digits, _MOST_DIGITS)}g}"
-    return re.sub(r"e\+?(-?)0*(?=\d)", r"e\1", text)
 
 
 def value_text(value: Any) -> str:
     """A value of an axis: a number, a name, whether something is on, or null."""
     if value is None:
         return "null"
-    return str(value) if isinstance(value, str | bool | np.bool_) else number_text(value)
+    return str(value) if isinstance(value, str | bool | np.bool_) else short(value)
 
 
 def short_texts(values: Sequence[Any] | NDArray[Any]) -> list[str]:
@@ -53,7 +43,7 @@ def short_texts(values: Sequence[Any] | NDArray[Any]) -> list[str]:
     digits = 2
     while any(float(text) != value for text, value in zip(texts, values, strict=True)) and digits < _EXACT:
         digits += 1
-        texts = [number_text(value, digits) for value in values]
+        texts = [short(value, digits) for value in values]
         if len(set(texts)) == len(texts):
             break
     return texts
@@ -63,7 +53,7 @@ def unit_text(name: str) -> str:
     """Unit of a field of `Parameters`, `Scene` or `Options`; empty for pure numbers, `preset` and `point`."""
     if name not in SECTION_OF:
         return ""
-    unit = field_unit(SECTIONS[SECTION_OF[name]].model_fields[name])
+    unit = field_unit(FIELDS[name])
     return "" if unit == DIMENSIONLESS else unit
 
 

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpchain.inputs.distributions import random_generator
-from warpchain.pictures.labels import cell_text, cell_values, number_text
+from warpchain.inputs.validation import short
+from warpchain.pictures.labels import cell_text, cell_values
 from warpchain.pictures.style import NothingToShow
 from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
@@ -75,7 +76,7 @@ class ToleranceAgreement(NamedTuple):
         """The numbers in one or two sentences."""
         worst, sizes = max(self.cells, key=lambda cell: abs(cell.difference)), np.abs(self.differences)
         text = (
-            f"The same {len(sizes)} walks at tolerances {number_text(self.loose)} and {number_text(self.tight)}: "
+            f"The same {len(sizes)} walks at tolerances {short(self.loose)} and {short(self.tight)}: "
             f"distances of single walks differ by at most {sizes.max():.2%} (median {np.median(sizes):.2%}), means of "
             f"a cell by at most {abs(worst.difference):.2%} ({worst.cell}, {worst.distances.shape[1]} walks, standard "
             f"error {worst.standard_error:.2%})."

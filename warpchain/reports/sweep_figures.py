@@ -16,13 +16,13 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from warpchain.inputs.validation import short
 from warpchain.pictures.labels import (
     COUNTS,
     DISTANCE,
     FREQUENCY,
     cell_values,
     lost_note,
-    number_text,
     quantity_text,
 )
 from warpchain.pictures.style import (
@@ -126,7 +126,7 @@ def tolerance(result: SweepResult) -> Picture:
         NothingToShow: see `tolerance_agreement`.
     """
     agreement = tolerance_agreement(result)
-    cells, loose, tight = agreement.cells, number_text(agreement.loose), number_text(agreement.tight)
+    cells, loose, tight = agreement.cells, short(agreement.loose), short(agreement.tight)
     figure = Figure(figsize=(9.4, max(4.6, 1.8 + 0.34 * len(cells))), layout="constrained")
     left, right = figure.subplots(1, 2)
     distances = np.concatenate([cell.distances for cell in cells], axis=1)

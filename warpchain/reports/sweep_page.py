@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from warpchain.files import checked_output, write_whole
 from warpchain.inputs.sections import SECTIONS
-from warpchain.inputs.validation import InputError
-from warpchain.pictures.labels import axis_symbol, cell_text, cell_values, number_text, unit_text, with_unit
+from warpchain.inputs.validation import InputError, short
+from warpchain.pictures.labels import axis_symbol, cell_text, cell_values, unit_text, with_unit
 from warpchain.reports.html_page import REPORTS, page, picture, table
 from warpchain.status import Status
 from warpchain.store.block_result import BlockResult
@@ -196,7 +196,7 @@ def _walk(result: SweepResult, index: int, device: str | None) -> str:
         parts += [picture(walk.plot("film_strip"), "The walk, drawn to scale.")]
         parts += [picture(walk.plot("height_and_speed"), caption)]
     if planned.drawn:
-        rows = [[name, number_text(value), unit_text(name)] for name, value in planned.drawn.items()]
+        rows = [[name, short(value), unit_text(name)] for name, value in planned.drawn.items()]
         parts.append("<h3>Drawn for this walk</h3>" + table(["name", "value", "unit"], rows))
     return "\n".join(parts)
 
@@ -293,7 +293,7 @@ def _plain(value: object) -> str:
     """A value as in a sweep file."""
     if value is None or isinstance(value, bool):
         return "null" if value is None else str(value).lower()
-    return number_text(value) if isinstance(value, float) else str(value)
+    return short(value) if isinstance(value, float) else str(value)
 
 
 def _meters(length: float) -> str:

@@ -110,18 +110,13 @@ def walk_in_notebook() -> Callable[[Any], None] | None:
     """What shows the progress of a walk as a line in the output of a cell; None where there is no notebook."""
     if not _in_notebook():
         return None
-    handle: Any = None
+    show = _cell_output()
 
-    def show(progress: Any) -> None:
-        nonlocal handle
+    def report(progress: Any) -> None:
         text = f"{progress.phase}: {progress.time:.2f} s, {progress.attempts:,} steps"
-        content = {"text/plain": "compiling kernels" if progress.phase == "compile" else text}
-        if handle is None:
-            handle = importlib.import_module("IPython.display").display(content, raw=True, display_id=True)
-        else:
-            handle.update(content, raw=True)
+        show({"text/plain": "compiling kernels" if progress.phase == "compile" else text})
 
-    return show
+    return report
 
 
 @contextlib.contextmanager
@@ -141,16 +136,24 @@ def _terminal_bar() -> Iterator[OnProgress]:
 
 def _notebook_bar() -> OnProgress:
     """A bar in the output of a cell, which needs no widgets."""
-    display = importlib.import_module("IPython.display").display
-    handle: Any = None
+    show = _cell_output()
 
-    def show(progress: SweepProgress) -> None:
-        nonlocal handle
+    def report(progress: SweepProgress) -> None:
         text = progress_text(progress)
         bar = f'<progress value="{progress.done}" max="{progress.walks}"></progress> {html.escape(text)}'
-        content = {"text/plain": text, "text/html": bar}
+        show({"text/plain": text, "text/html": bar})
+
+    return report
+
+
+def _cell_output() -> Callable[[dict[str, str]], None]:
+    """What shows a content in the output of a cell, in the place of the one before."""
+    handle: Any = None
+
+    def show(content: dict[str, str]) -> None:
+        nonlocal handle
         if handle is None:
-            handle = display(content, raw=True, display_id=True)
+            handle = importlib.import_module("IPython.display").display(content, raw=True, display_id=True)
         else:
             handle.update(content, raw=True)
 

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.tallies import LOST
-from warpchain.inputs.floor import body_of, check_above, checked_profile
+from warpchain.inputs.floor import body_of, check_above
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import Parameters
-from warpchain.inputs.scene import check_links_on_gpu, link_values
+from warpchain.inputs.scene import Scene, check_links_on_gpu, floor_points, link_values
 from warpchain.inputs.sections import takes_fields
 from warpchain.inputs.state import State, real_array
 from warpchain.inputs.validation import InputError, plain, shown, validated
@@ -80,7 +80,7 @@ def simulate(
             raise InputError(f"options.{name}: only a walk has phases in which joints soften; leave it out")
     if not isinstance(gravity, bool):
         raise InputError(f"gravity: {shown(gravity)} is not a truth value; give True or False")
-    points = _checked_floor(floor)
+    points = None if isinstance(floor, bool) else floor_points(validated(Scene, {"floor": floor}, ""))
     state = _checked_state(parameters, position, velocity)
     chain = state.parameters if gravity else state.parameters.with_values({"gravity": 0.0})
     check_links_on_gpu(state.links, options.device, "position")
@@ -242,17 +242,6 @@ def _follow(
         greatest_opening=extremes["opening"],
         greatest_penetration={kind: extremes[kind] for kind in kinds},
     )
-
-
-def _checked_floor(floor: Any) -> Array | None:
-    """Points of the floor [m], None if it is flat or there is none, or an `InputError`."""
-    if isinstance(floor, bool):
-        return None
-    try:
-        profile = checked_profile(floor)
-    except ValueError as problem:
-        raise InputError(f"floor: {problem}") from None
-    return None if profile == "flat" else np.array(profile)
 
 
 def _checked_times(duration: object, times: Sequence[float] | Array | None) -> Array:

@@ -8,6 +8,7 @@ from warpchain.engine.batch import Batch
 from warpchain.engine.devices import gpu_turn
 from warpchain.engine.snapshot import restore, take_snapshot
 from warpchain.inputs.options import on_gpu
+from warpchain.inputs.scene import face_count
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.state import State
 from warpchain.inputs.validation import InputError, plain, shown
@@ -45,7 +46,7 @@ def state_at(setup: Setup, t: object, end: float) -> State:
     if not first <= time <= end:
         raise InputError(f"t: {time:g} s is not in the walk; give a time from {first:g} to {end:.6g}")
     with gpu_turn([setup.options.device]):
-        batch = Batch(1, setup.scene.links, setup.options, faces=len(setup.scene.floor) - 1)  # as the scheduler
+        batch = Batch(1, setup.scene.links, setup.options, faces=face_count(setup.scene))
         run = WalkRun(batch, 0, setup)
         attempts = ATTEMPTS["cuda" if on_gpu(setup.options.device) else "cpu"]
         while not _has_come(run, batch, time):

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from warpchain.engine.tallies import CONTACTS, LOST
 from warpchain.inputs.distributions import DRAWABLE
-from warpchain.inputs.sections import SECTION_OF, SECTIONS
-from warpchain.inputs.validation import field_unit
+from warpchain.inputs.validation import FIELDS, field_unit
 from warpchain.walks.faults import FAULTS, MOST_ENERGY_ERROR, energy_error, faults
 from warpchain.walks.walk_result import NUMBERS, WalkResult
 
@@ -155,7 +154,7 @@ def field_column(name: str) -> Column:
     """
     if name == "preset":
         return Column("<f8", "1", "named set of parameters that others are changed from")
-    field = SECTIONS[SECTION_OF[quantity_of(name)]].model_fields[quantity_of(name)]
+    field = FIELDS[quantity_of(name)]
     meaning = field.description or name
     return Column("<f8", field_unit(field), f"{meaning}; as drawn for the walk" if name.endswith(_DRAWN) else meaning)
 

@@ -13,7 +13,7 @@ from warpchain.engine.kernel_choice import block_threads, features_of, load_kern
 from warpchain.engine.memory import most_worlds
 from warpchain.inputs.floor import body_of
 from warpchain.inputs.options import Options, on_gpu
-from warpchain.inputs.scene import floor_points
+from warpchain.inputs.scene import face_count, floor_points
 from warpchain.inputs.setup import Setup
 from warpchain.kernels import layout
 from warpchain.kernels.features import Features
@@ -80,7 +80,7 @@ def run_setups(
         links = [setups[place].scene.links for place in places]
         wanted = [] if keeps is None else [keeps[place] for place in places]
         tilts = any(setups[place].scene.plane == "tilting" for place in places)
-        faces = max(len(setups[place].scene.floor) - 1 for place in places)  # "flat": room for a slope
+        faces = max(face_count(setups[place].scene) for place in places)
         waiting = deque(places)
         batches, capacity = _batches(setups[places[0]].options, links, wanted, slots, threads, tilts, faces)
         return Group(waiting, [BatchRun(batch, waiting, begin, watch) for batch in batches], capacity)
@@ -108,31 +108,19 @@ def _batches(
     # own slowest walk.
     samples, loads = any(keep.series_every for keep in keeps), any(keep.before > 0 or keep.loads for keep in keeps)
     frame_every = next((keep.frame_every for keep in keeps if keep.frame_every), None)
+    kept: dict[str, Any] = {"keeps_samples": samples, "keeps_loads": loads, "tilts": tilts, "faces": faces}
+    kept["threads"] = threads
     if slots is None and blocks:
-        frames = frame_every is not None
-        slots = most_worlds(
-            longest,
-            options,
-            keeps_samples=samples,
-            keeps_frames=frames,
-            keeps_loads=loads,
-            tilts=tilts,
-            faces=faces,
-            threads=threads,
-        )
+        slots = most_worlds(longest, options, keeps_frames=frame_every is not None, **kept)
     capacity = slots = slots or 1
     if blocks:
         slots = min(slots, len(links))
     worlds = -(-slots // BATCHES_PER_GPU) if blocks else slots
-    kept: dict[str, Any] = {"keeps_samples": samples, "frame_every": frame_every, "keeps_loads": loads, "tilts": tilts}
     intervals = {keep.frame_interval for keep in keeps if keep.frame_interval > 0}
     if len(intervals) > 1:
         raise ValueError(f"keeps: frame intervals {sorted(intervals)} s; walks that run together have one")
-    kept["frame_interval"] = max(intervals, default=0.0)
-    batches = [
-        Batch(min(worlds, slots - first), longest, options, faces=faces, threads=threads, **kept)
-        for first in range(0, slots, worlds)
-    ]
+    kept |= {"frame_every": frame_every, "frame_interval": max(intervals, default=0.0)}
+    batches = [Batch(min(worlds, slots - first), longest, options, **kept) for first in range(0, slots, worlds)]
     return batches, capacity
 
 

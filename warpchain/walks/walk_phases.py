@@ -112,7 +112,8 @@ class WalkRun:
             self._go_on(setup.start)
             return
         from_rest = scene.start == "rest"
-        speed = 2 * math.pi * scene.frequency * joint_radius(scene, parameters)
+        radius = joint_radius(scene, parameters)
+        speed = 2 * math.pi * scene.frequency * radius
         if not self._has_sprocket:
             self._set_chain()
             try:
@@ -126,7 +127,6 @@ class WalkRun:
                 ) from None
             self._release(position, velocity)
             return
-        radius = joint_radius(scene, parameters)
         density = mean_value(self._links.mass) / parameters.link_length
         tension = density * speed**2
         weight = mean_weight(parameters, density, scene.links, radius)
@@ -330,13 +330,10 @@ class WalkRun:
         status = self._batch.status(self._world)
         if not self._released:
             self.drift = self._batch.watched(self._world, layout.DRIFT)
-        if self._first_area is not None and status == Status.FINISHED:
-            set_first_area(self._batch, self._world, self._first_area)
-            self._first_area = None
-            self._batch.resume(self._world, self._walk_end, Status.TIME_LIMIT)
-            return True
-        if self._moves_sprocket and status == Status.FINISHED:
-            self._moves_sprocket = False
+        if self._released and not self.is_released and status == Status.FINISHED:
+            if self._first_area is not None:
+                set_first_area(self._batch, self._world, self._first_area)
+            self._first_area, self._moves_sprocket = None, False
             self._batch.resume(self._world, self._walk_end, Status.TIME_LIMIT)
             return True
         if self._released or status != Status.FINISHED:

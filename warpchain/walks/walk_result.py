@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic_core import to_jsonable_python
 
 from warpchain.engine.tallies import COUNTS, DEPTHS, EXTREMES, IMPULSES, LOST
 from warpchain.files import write_whole
@@ -37,7 +36,7 @@ from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.scene import Scene, contact_radius
 from warpchain.inputs.setup import Setup
 from warpchain.inputs.state import State
-from warpchain.inputs.validation import InputError, validated
+from warpchain.inputs.validation import InputError, json_value, validated
 from warpchain.kernels import layout
 from warpchain.loop.before_release import BEFORE, FIELDS, BeforeRelease
 from warpchain.pictures.walk_shape import Kind
@@ -343,7 +342,7 @@ class WalkResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but time series and frames, for JSON; a number that is not finite is None."""
-        plain: dict[str, Any] = _plain(
+        plain: dict[str, Any] = json_value(
             {
                 "dx": self.dx,
                 "status": self.status.label,
@@ -442,8 +441,3 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
 def _setup_as_dict(setup: Setup) -> dict[str, Any]:
     models = {name: getattr(setup, name).model_dump() for name in ("parameters", "scene", "options")}
     return {"preset": setup.preset, **models}
-
-
-def _plain(value: Any) -> Any:
-    """A value as JSON has it."""
-    return to_jsonable_python(value, inf_nan_mode="null", fallback=lambda array: array.tolist())
