@@ -143,7 +143,8 @@ class State:
         Raises:
             InputError: as of the class; or the number of links is refused.
         """
-        places, rates = (rows_of_links(name, given) for name, given in (("position", position), ("velocity", velocity)))
+        given = (("position", position), ("velocity", velocity))
+        places, rates = (_rows(name, array, 3, "x, y, θ per link") for name, array in given)
         links = len(places)
         if len(rates) != links:
             raise InputError(f"velocity: {len(rates)} rows, but position has {links}; give one row per link each")
@@ -165,9 +166,7 @@ class State:
             InputError: two neighbours are not about a link length apart: the loop is not closed, or lengths are in
                 another unit; or an array or the number of links is refused.
         """
-        places = real_array("joints", joints, "shape (n, 2)")
-        if places.ndim != 2 or places.shape[1] != 2:
-            raise InputError(f"joints: its shape is {places.shape}; give (n, 2), one row x, y per joint")
+        places = _rows("joints", joints, 2, "x, y per joint")
         rates = np.zeros_like(places) if velocity is None else real_array("velocity", velocity, "shape (n, 2)")
         if rates.shape != places.shape:
             raise InputError(f"velocity: its shape is {rates.shape}; give {places.shape}, one row per joint")
@@ -208,11 +207,11 @@ class State:
             )
 
 
-def rows_of_links(name: str, given: object) -> Array:
-    """Positions or velocities as a float64 array of shape (n, 3), or an `InputError`."""
-    array = real_array(name, given, "shape (n, 3)")
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise InputError(f"{name}: its shape is {array.shape}; give (n, 3), one row x, y, θ per link")
+def _rows(name: str, given: object, columns: int, row: str) -> Array:
+    """What is given as a float64 array of shape (n, columns), or an `InputError`."""
+    array = real_array(name, given, f"shape (n, {columns})")
+    if array.ndim != 2 or array.shape[1] != columns:
+        raise InputError(f"{name}: its shape is {array.shape}; give (n, {columns}), one row {row}")
     return array
 
 
