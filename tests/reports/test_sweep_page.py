@@ -45,7 +45,7 @@ def flawed(walk: PlannedWalk) -> float | Status | None:
 
 
 def test_walks_that_ended_as_planned_are_no_failures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """`finished` and `distance_limit` are counted apart in page and table; what plot can't draw, it says, with a way."""
+    """`finished` and `distance_limit` are no failures in page and table; plot says what can be drawn of them."""
     content = FIGURE_6 | {"samples": 1, "blocks": [{"name": "only", "grid": {"frequency": [10, 20]}}]}
     ends = {0: Status.FINISHED, 1: Status.DISTANCE_LIMIT}
     directory = tmp_path / "sweep"
