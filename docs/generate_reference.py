@@ -17,7 +17,7 @@ from warpchain.inputs.distributions import TABLE, Uniform
 from warpchain.inputs.methods import METHODS, METHODS_BY_NEED
 from warpchain.inputs.options import Options
 from warpchain.inputs.parameters import PRESETS, Parameters
-from warpchain.inputs.scene import Scene
+from warpchain.inputs.scene import LISTS, Scene
 from warpchain.inputs.validation import field_unit, spelled
 from warpchain.status import Status
 from warpchain.sweeps.designs import SAMPLERS
@@ -189,7 +189,9 @@ def sweep_file_page() -> str:
         + "\n## Grid\n\nEach key is `preset` or a field of scene, options or parameters. Each value is a list, such as "
         "`[10, 15, 20]`, or a range with both ends: `{from: 5, to: 30, step: 5}` or `{from: 5, to: 30, count: 6}`. The "
         "last axis varies fastest. `null` stands for itself where a field may be null, such as `load_factor: [null, "
-        "1]`; in merged files, xarray and pandas it is NaN.\n"
+        "1]`; in merged files, xarray and pandas it is NaN. "
+        f"{', '.join(f'`{name}`' for name in LISTS)} take lists of their own: for several of them, give blocks, each "
+        "with `scene: {floor: …}`.\n"
         "\n## Distributions\n\nThe key `all` says what is drawn of the other quantities: `table` (the default) or "
         "`fixed`, nothing. Each quantity takes one of `table`, `fixed`, `{uniform: [lower, upper]}` and "
         "`{gaussian: {mean: …, sigma: …}}`; without `mean` the Gaussian lies about the chain's value. Given values, "

@@ -137,7 +137,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
             grid={"links": [40, 60], "frequency": [15, 20], "phase": [0.1, 0.6]},
             samples=samples,
             preset="soft",
-            scene={"start": "spinning", "walk_limit": 0.4},
+            scene={"start": "spinning", "walk_until": 0.4},
             record={"series": {"interval": 0.004}, "frames": {"interval": 0.4}},
             same_samples_along=["links", "frequency", "phase"],
             out=path,

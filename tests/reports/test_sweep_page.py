@@ -44,6 +44,26 @@ def flawed(walk: PlannedWalk) -> float | Status | None:
     return {3: Status.TIME_LIMIT, 13: Status.NOT_FINITE, 17: None}.get(walk.index, distance(walk))
 
 
+def test_walks_that_ended_as_planned_are_no_failures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """`finished` and `distance_limit` are no failures in page and table; plot says what can be drawn of them."""
+    content = FIGURE_6 | {"samples": 1, "blocks": [{"name": "only", "grid": {"frequency": [10, 20]}}]}
+    ends = {0: Status.FINISHED, 1: Status.DISTANCE_LIMIT}
+    directory = tmp_path / "sweep"
+    make_sweep(directory, content, lambda walk: ends[walk.index])
+    write_report(directory, tmp_path / "page.html")
+    document = Document((tmp_path / "page.html").read_text())
+    assert document.texts["failed-walks"].strip().endswith("None.")
+    head, *rows = document.rows["cells"]
+    assert [dict(zip(head, row, strict=True))["failed"] for row in rows] == ["0", "0"]
+    assert [dict(zip(head, row, strict=True))["no Δx"] for row in rows] == ["1", "1"]
+    with pytest.raises(SystemExit) as end:
+        main(["info", str(directory)])
+    assert not end.value.code
+    assert "no Δx" in capsys.readouterr().out
+    with pytest.raises(InputError, match="no walk has this quantity; give another, such as quantity='walk_time'"):
+        load(directory).plot()
+
+
 class Document(HTMLParser):
     """Text of a page by section, rows of its tables, and whether its elements are closed in order."""
 

@@ -7,7 +7,7 @@ import pytest
 from jsonschema import Draft7Validator
 
 from tests.support.sweep_content import UNIFORM, blocks, content
-from warpchain.inputs.scene import OF_LINKS
+from warpchain.inputs.scene import LISTS
 from warpchain.inputs.sections import NAME_OF_SYMBOL, SECTION_OF
 from warpchain.inputs.yaml_files import read_yaml
 from warpchain.sweeps.plan import load_sweep
@@ -21,7 +21,7 @@ def test_it_is_a_schema_that_knows_all_names() -> None:
     """Names and symbols, with what they mean."""
     Draft7Validator.check_schema(SCHEMA.schema)
     axes = SCHEMA.schema["$defs"]["grid"]["properties"]
-    assert set(axes) == {"preset", *SECTION_OF, *NAME_OF_SYMBOL} - {*OF_LINKS}
+    assert set(axes) == {"preset", *SECTION_OF, *NAME_OF_SYMBOL} - {*LISTS}
     assert "friction" in SCHEMA.schema["$defs"]["parameters"]["properties"]["mu_fc"]["description"]
 
 

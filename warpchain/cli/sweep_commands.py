@@ -163,7 +163,9 @@ def plot(
         raise typer.Exit(FAILED)
     if not count:
         name = path if quantity is None else f"--quantity: {quantity}"
-        raise InputError(f"{name}: no walk at rest has a value, or no axis has several values; give another")
+        raise InputError(
+            f"{name}: no walk at rest has a value, or no axis has several values; give another --quantity, as walk_time"
+        )
 
 
 def report(

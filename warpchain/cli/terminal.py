@@ -58,7 +58,7 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
         blocks = {
             name: {
                 "axes": cells.axes,
-                "dx": {key: getattr(cells, key) for key in ("mean", "sd", "count", "failed", "missing")},
+                "dx": {key: getattr(cells, key) for key in ("mean", "sd", "count", "absent", "failed", "missing")},
             }
             for name, cells in statistics.items()
         }
@@ -81,15 +81,15 @@ def print_sweep(result: "SweepResult", as_json: bool, rate: float | None = None)
     for name, cells in statistics.items():
         title = printable(name) if len(statistics) > 1 else None
         table = Table(box=None, pad_edge=False, title=title, title_justify="left")
-        for heading in (*map(printable, cells.axes), "mean Δx / m", "s.d. / m", "at rest", "failed", "missing"):
+        numbers = {"at rest": cells.count} | ({"no Δx": cells.absent} if cells.absent.any() else {})
+        numbers |= {"failed": cells.failed, "missing": cells.missing}
+        for heading in (*map(printable, cells.axes), "mean Δx / m", "s.d. / m", *numbers):
             table.add_column(heading, justify="right")
         for place in itertools.islice(np.ndindex(*cells.mean.shape), room):
             at = (values[index] for values, index in zip(cells.axes.values(), place, strict=True))
             texts = ["null" if value is None else printable(str(value)) for value in at]
             lengths = [f"{array[place]:.4f}" for array in (cells.mean, cells.sd)]
-            table.add_row(
-                *texts, *lengths, *(str(array[place]) for array in (cells.count, cells.failed, cells.missing))
-            )
+            table.add_row(*texts, *lengths, *(str(array[place]) for array in numbers.values()))
         if table.rows:
             console.print(table)
         room -= len(table.rows)

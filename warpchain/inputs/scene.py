@@ -38,6 +38,8 @@ STEEPEST: Final = 80.0
 RIGHT_ANGLE: Final = math.pi / 2
 OF_LINKS: Final = ("link_masses", "link_inertias", "viscous_frictions", "coulomb_frictions")
 """Fields with a number for each link or joint."""
+LISTS: Final = (*OF_LINKS, "release", "floor")
+"""Fields that take lists, so that they are no axes of a sweep."""
 TAP: Final = ("lateral_speed", "tilt", "tilt_rate", "yaw_rate")
 """What a release may give to a plane that tilts. Each is 0 by default: an upright plane that nothing disturbs stays
 upright, so that a scene with a tilting plane alone is the paper's."""

@@ -120,10 +120,11 @@ def grid_panels(
         left_out += len(found) - len(chosen)
     if not panels:
         needed = "two axes of several values" if kind == "map" else "an axis of several values"
-        raise NothingToShow(f"a figure of a grid takes a block with {needed}")
+        raise NothingToShow(f"a figure of a grid takes a block with {needed}; give a sweep that has one")
     if not any(np.isfinite(panel.cells.mean).any() for panel in panels):
-        rested = any(panel.cells.absent.any() for panel in panels)
-        raise NothingToShow("no walk at rest has this quantity" if rested else "no walk has come to rest")
+        if any(panel.cells.absent.any() for panel in panels):
+            raise NothingToShow("no walk has this quantity; give another, such as quantity='walk_time'")
+        raise NothingToShow("no walk has come to rest; let the sweep go on, or see the statuses in summary()")
     return panels, left_out
 
 

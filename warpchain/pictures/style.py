@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from warpchain.files import replacing
+from warpchain.inputs.validation import InputError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,7 +34,7 @@ PICTURE_DPI: Final = 200
 """Resolution of a figure in a file of its own [dots per inch]."""
 
 
-class NothingToShow(ValueError):  # noqa: N818 - no error of the program: the sweep was made for something else
+class NothingToShow(InputError):  # noqa: N818 - no error of the program: the sweep was made for something else
     """A sweep lacks the blocks, or does not have the walks yet, that a figure or a number needs."""
 
 

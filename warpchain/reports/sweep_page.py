@@ -77,8 +77,10 @@ def _tiles(result: SweepResult) -> dict[str, tuple[int, str]]:
     """The numbers at the top of the page, see `page`."""
     counts = result.summary()
     rested, missing = counts[Status.AT_REST.label], counts["missing"]
-    failed = result.walk_count - rested - missing
+    planned = sum(counts.get(status.label, 0) for status in Status if status.ok) - rested
+    failed = result.walk_count - rested - planned - missing
     tiles = {"walks": (result.walk_count, ""), "at rest": (rested, ""), "failed": (failed, "bad" if failed else "")}
+    tiles |= {"ended as planned, not at rest": (planned, "")} if planned else {}
     inaccurate = result.inaccurate_count
     tiles |= {"inaccurate": (inaccurate, "bad")} if inaccurate else {}
     return tiles | ({"not run yet": (missing, "")} if missing else {})
@@ -101,6 +103,7 @@ def _cells(result: SweepResult) -> str:
         head = [with_unit(axis_symbol(name), unit_text(name)) for name in block.axes]
         lengths = {"mean Δx / m": found.mean, "s.d. / m": found.sd, "s.e. / m": found.standard_error}
         counts = {"at rest": found.count, "failed": found.failed}
+        counts |= {"no Δx": found.absent} if found.absent.any() else {}
         counts |= {"not run yet": found.missing} if found.missing.any() else {}
         rows = [
             [
@@ -121,7 +124,7 @@ def _failed(result: SweepResult) -> str:
     for status in Status:
         chosen = [block.columns["status"] == status for block in result.blocks.values()]
         count = sum(int(mask.sum()) for mask in chosen)
-        if status != Status.AT_REST and count:
+        if not status.ok and count:
             parts.append(f"<h3>{status.label}: {count:,}</h3><p>{escape(status.sentence)}</p>")
             parts.append(_walk_table(result, chosen, count))
     return "\n".join(parts) or "<p>None.</p>"

@@ -185,9 +185,9 @@ class SweepResult:
             The figure, that of `ax` if it is given.
 
         Raises:
-            InputError: no block has such a column or axis.
-            ValueError: the kind is unknown, `ax` is given together with `figure` or for several panels, or there is
-                nothing to show: no axis of several values, or no walk at rest.
+            InputError: no block has such a column or axis, or there is nothing to show: no axis of several values, or
+                no walk that has the quantity.
+            ValueError: the kind is unknown, or `ax` is given together with `figure` or for several panels.
         """
         from warpchain.pictures.grid_figure import draw_grid
 

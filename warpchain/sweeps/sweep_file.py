@@ -26,7 +26,7 @@ from pydantic import (
 
 from warpchain.inputs.distributions import DRAWABLE, LARGEST_SEED, TABLE, Distribution, Gaussian, Uniform
 from warpchain.inputs.parameters import PRESETS
-from warpchain.inputs.scene import OF_LINKS
+from warpchain.inputs.scene import LISTS
 from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.validation import (
     FIELDS,
@@ -100,7 +100,7 @@ _TYPES: Final[Mapping[str, Any]] = {
 }
 
 
-_AXES: Final = {name: kind for name, kind in _TYPES.items() if name not in OF_LINKS}
+_AXES: Final = {name: kind for name, kind in _TYPES.items() if name not in LISTS}
 
 
 def _mapping_of(title: str, types: Mapping[str, Any]) -> Any:
@@ -207,12 +207,25 @@ class BlockKeys(BaseModel):
         dict[str, list[Value]],
         _mapping_of(
             "points",
-            {name: Annotated[list[kind], Field(min_length=1, max_length=AXIS_LIMIT)] for name, kind in _TYPES.items()},
+            {name: Annotated[list[kind], Field(min_length=1, max_length=AXIS_LIMIT)] for name, kind in _AXES.items()},
         ),
     ] = Field(
         {},
         description="parameter sets: quantity → its value in each; one more axis, `point`; not in a file with blocks",
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_lists_on_axes(cls, values: Any) -> Any:
+        for key in ("grid", "points"):
+            given = values.get(key) if isinstance(values, dict) else None
+            for name in LISTS if isinstance(given, dict) else ():
+                if name in given:
+                    raise InputError(
+                        f"{key}.{name}: takes a list of its own and is no axis; give blocks, each with "
+                        f"scene: {{{name}: …}}"
+                    )
+        return values
 
     @model_validator(mode="before")
     @classmethod
