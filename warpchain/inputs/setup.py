@@ -13,7 +13,7 @@ from warpchain.inputs.floor import check_above
 from warpchain.inputs.options import LONGEST_DRIVE_INTERVAL, Options, replaced_by
 from warpchain.inputs.parameters import Parameters
 from warpchain.inputs.parameters import preset as parameter_preset
-from warpchain.inputs.scene import Scene, check_links_on_gpu, check_scene, floor_points
+from warpchain.inputs.scene import OF_LINKS, Scene, check_links_on_gpu, check_parity, check_scene, floor_points
 from warpchain.inputs.sections import SECTIONS
 from warpchain.inputs.state import DEFAULT_PRESET, Setup, State
 from warpchain.inputs.validation import InputError, by_name, path_of, shown, suggestion, validated
@@ -22,8 +22,11 @@ from warpchain.kernels.methods.method import find_method
 
 __all__ = ["DEFAULT_PRESET", "Setup", "combined", "continued", "options_beside", "read_setup", "resolve"]
 
-OF_THE_WALK: Final = ("walk_limit", "walk_until", "distance_limit", "floor", "slope")
-"""Fields of the scene that matter after the release."""
+OF_THE_WALK: Final = (
+    *("walk_limit", "walk_until", "distance_limit", "floor", "slope"),
+    *(*OF_LINKS, "mass_gradient", "charm_mass", "charm_inertia", "charm_link", "stiff_joint", "stiff_joint_factor"),
+)
+"""Fields of the scene that matter after the release, and may change there."""
 
 
 def resolve(
@@ -141,21 +144,20 @@ def continued(state: State, sections: Mapping[str, Mapping[str, object]]) -> Set
         InputError: a value is refused, or is one of what comes before the release.
     """
     if early := [name for name in sections["scene"] if name not in OF_THE_WALK]:
-        raise InputError(f"{', '.join(early)}: given together with a state, which lies after the release; leave it out")
+        raise InputError(
+            f"{', '.join(early)}: given together with a state, whose chain is formed and released; leave it out"
+        )
     before, given = state.setup, sections["options"]
     options = validated(Options, {**before.options.model_dump(exclude=replaced_by(given)), **given}, "options")
     scene = validated(Scene, {**vars(before.scene), **sections["scene"]}, "scene")
     parameters = before.parameters.with_values(sections["parameters"]) if sections["parameters"] else before.parameters
     _check_can_tilt(scene, options)
+    check_parity(scene, parameters)
     check_links_on_gpu(scene.links, options.device, "start")
     for name in OF_THE_WALK[:2]:
         if (end := getattr(scene, name)) is not None and end < state.time:
             raise InputError(f"{name}: {end:g} s is before the state at {state.time:g} s; give a later time")
-    if scene.plane == "fixed":
-        check_above(floor_points(scene), state.position, state.parameters.link_length, "start")
     setup = Setup(before.preset, parameters, scene, options)
-    memory = state.memory
-    floors = [(each.floor, each.slope) for each in (scene, before.scene)]
-    if (parameters, options, floors[0]) != (before.parameters, before.options, floors[1]):
-        memory = {name: values for name, values in memory.items() if "/" in name}  # caches are of the former ones
-    return replace(setup, start=replace(state, setup=setup, memory=memory))
+    if scene.plane == "fixed" and not state.is_placed_as_in(setup):  # a moving sprocket may have left it in the floor
+        check_above(floor_points(scene), state.position, state.parameters.link_length, "start")
+    return replace(setup, start=replace(state, setup=setup))

@@ -1,5 +1,6 @@
 """What one walk is: its `Setup`, and the `State` of a chain that it may begin from."""
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
@@ -56,6 +57,14 @@ class Setup:
             return f"{links} from a given state"
         spun = f"{links} at {self.scene.frequency:g} Hz"
         return spun if start is None else f"{spun}, from its state at {start.time:.4g} s"
+
+    @property
+    def fingerprint(self) -> NDArray[np.uint8]:
+        """What tells setups apart that would carry one state on in different ways, as bytes; its limits do not."""
+        limits = {"walk_limit", "walk_until", "distance_limit"}
+        parts = [self.parameters.model_dump_json(), self.options.model_dump_json(exclude_defaults=True)]
+        parts.append(self.scene.model_dump_json(exclude=limits, exclude_defaults=True))
+        return np.frombuffer(hashlib.sha256("\n".join(parts).encode()).digest(), dtype=np.uint8)
 
     def with_drawn(self, drawn: Mapping[str, float]) -> "Setup":
         """A copy with drawn values in place of its own.
@@ -180,6 +189,15 @@ class State:
     def links(self) -> int:
         """Number of links n."""
         return self.setup.scene.links
+
+    def is_placed_as_in(self, setup: Setup) -> bool:
+        """Whether it is where its walk had it, and a setup would carry it on as that walk did."""
+        memory = self.memory
+        return (
+            "setup" in memory
+            and np.array_equal(memory["setup"], setup.fingerprint)
+            and np.array_equal(memory["state/links"][:3, : self.links].T, self.position)
+        )
 
     @property
     def parameters(self) -> Parameters:

@@ -44,8 +44,8 @@ def walk(
         tolerance: Error allowed in a step, absolute (SI units) and relative alike; None: the method's, 1e-6 for an
             integrator, 1e-4 for ``"hybrid"``, and of ``"standard"`` and ``"explicit"`` 3e-3 while joints are soft.
         start: None or ``"rest"``, ``"spinning"`` or ``"ellipse"``; or a :class:`State`, from which the walk goes on to
-            its end, by itself the rest of the same walk to the bit. Beside a state only parameters, options and
-            ``walk_limit`` are taken, and nothing is drawn.
+            its end, by itself the rest of the same walk to the bit. Beside a state only parameters, options, limits
+            of the walk, floors and what its links have of their own are taken, and nothing is drawn.
         setup: ``setup`` of another walk, which is repeated to the bit, whatever was drawn for it. It is complete: no
             other setting is taken beside it, nothing is drawn, and ``seed`` is only noted in the result.
         seed: Draw those parameters, phase and clearance that are not given from their distributions; None: Table 1's
@@ -79,9 +79,12 @@ def walk(
     given.update(settings)
     loads = _truth(record_loads, "record_loads")
     if isinstance(start, State) and setup is None:
-        for name, value in (("preset", preset), ("seed", seed)):
+        for name, value, reason in (
+            ("preset", preset, "which has its parameters; give single ones instead"),
+            ("seed", seed, "for which nothing is drawn; leave it out"),
+        ):
             if value is not None:
-                raise InputError(f"{name}: given together with a state, for which nothing is drawn; leave it out")
+                raise InputError(f"{name}: given together with a state, {reason}")
         del given["start"]
         setup = continued(start, by_section(given))
     elif setup is None:

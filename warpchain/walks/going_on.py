@@ -2,19 +2,20 @@
 
 from warpchain.engine.batch import Batch
 from warpchain.engine.snapshot import CACHES, change, restore, set_frame_marks
-from warpchain.inputs.state import State
+from warpchain.inputs.state import Setup, State
 from warpchain.status import Status
 from warpchain.walks.moving_plane import plane_of_state, state_of_plane
 
 
-def go_on(batch: Batch, world: int, start: State, end: float, frame_interval: float) -> bool:
+def go_on(batch: Batch, world: int, start: State, setup: Setup, end: float, frame_interval: float) -> bool:
     """Let a world whose chain is set go on from a state of a walk, until a time [s]; whether it is as in the walk.
 
     If it is not, it stops at once, and so makes the sample with which its new ledger begins.
     """
-    restore(batch, world, start.memory)
+    is_kept = start.is_placed_as_in(setup)
+    restore(batch, world, {name: part for name, part in start.memory.items() if is_kept or name not in CACHES})
     set_frame_marks(batch, world, frame_interval)
-    if all(name in start.memory for name in CACHES) and _is_at(batch, world, start):
+    if is_kept and _is_at(batch, world, start):
         batch.resume(world, end, Status.TIME_LIMIT)
         return True
     if start.axes is not None:

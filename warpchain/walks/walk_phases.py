@@ -357,6 +357,7 @@ class WalkRun:
         """All that the rest of a walk, or of its outcome, depends on: a `State.memory`."""
         return {
             **take_snapshot(self._batch, self._world),
+            "setup": self.setup.fingerprint,
             **{f"run/{name}": np.array(getattr(self, name)) for name in _OF_THE_RUN},
             "run/counts": np.array([self.drive_counts[name] for name in COUNTS]),
             "run/extremes": np.array([self.drive_extremes[name] for name in EXTREMES]),
@@ -374,7 +375,7 @@ class WalkRun:
             setattr(self, name, memory[f"run/{name}"].item())
         self.drive_counts = dict(zip(COUNTS, memory["run/counts"].tolist(), strict=True))
         self.drive_extremes = dict(zip(EXTREMES, memory["run/extremes"].tolist(), strict=True))
-        if go_on(batch, world, start, self._walk_end, self.recorder.keep.frame_interval):
+        if go_on(batch, world, start, self.setup, self._walk_end, self.recorder.keep.frame_interval):
             self.recorder.go_on(memory["state/last_sample"], start.time)
         else:
             self._first_area = float(memory["state/first_area"])
