@@ -139,6 +139,23 @@ def test_film_strip_shows_the_walk(tmp_path: Path) -> None:
         assert across == pytest.approx(up, rel=1e-6)
 
 
+def test_close_ups_of_one_place_keep_their_subjects() -> None:
+    """Where all moments happen at one place each is in the middle half of its panel, its box within the strip."""
+    joints = make_walk().frame_joints
+    joints = joints - joints.mean(axis=1, keepdims=True) * (1.0, 0.0)
+    strip, *close_ups = film_strip(make_walk(frame_joints=joints)).axes
+    touching = joints[np.flatnonzero(joints[:, :, 1].min(axis=1) < 1.02 * RADIUS)[0]]
+    first, last = touching[np.argmin(touching[:, 1]), 0], np.median(joints[-1, :, 0])
+    for axes, subject in ((close_ups[0], first), (close_ups[-1], last)):
+        left, right = axes.get_xlim()
+        assert abs((subject - left) / (right - left) - 0.5) < 0.25
+    for patch in strip.patches:
+        if not patch.get_fill():
+            (left, low), (right, high) = patch.get_xy(), patch.get_corners()[2]  # type: ignore[attr-defined]
+            (west, south), (east, north) = strip.viewLim.get_points()
+            assert west < left < right < east and south < low < high < north
+
+
 def test_film_strips_of_odd_walks() -> None:
     """A walk that did not rest gets no distance, and its last close-up is the end; one frame is enough."""
     figure = film_strip(make_walk(status=Status.TIME_LIMIT, dx=math.nan, sprocket_height=math.nan))

@@ -4,7 +4,8 @@ Sizes on paper are in inches: constrained layout clips labels of axes with a fix
 would take a third of the time that this figure takes, and every walk has one.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import pairwise, product
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -78,7 +79,9 @@ def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure |
     low, high = walk_box(walk, joints)
     close_ups = [] if tilts else _close_ups(walk)
     for close_up in close_ups:
-        low[0], high[0] = min(low[0], close_up.low[0]), max(high[0], close_up.high[0])
+        margin = 0.1 * (close_up.high[1] - close_up.low[1])
+        low[:2] = np.minimum(low[:2], close_up.low + np.array([-margin, margin]))
+        high[:2] = np.maximum(high[:2], close_up.high + margin)
     size = high - low
     # A chain that stays upright is thin from above and from the front: room for the numbers on the axes.
     broad = max(size[1], size[2]) if tilts else 0.0
@@ -124,11 +127,11 @@ def film_strip(walk: "WalkResult", *, count: int | None = None, figure: Figure |
         _draw_way(axes, walk, center, view)
         tidy(axes)
         axes.set_title(title, fontsize="medium", loc="left")
-    _write_times(side, walk.frame_time[shown], joints[shown, :, :2], colors[shown], 1.2 * radius, 1 / scale)
     for number, close_up in enumerate(close_ups):
         axes = panel(_LEFT + number * close_up_width, _FOOT, close_up_width - 0.1, lower)
         draw_chain(axes, joints[close_up.frame], radius, SIDE, _link_colors(colors[close_up.frame]), edge=0.6)
         _frame_close_up(axes, side, walk, close_up, "abcd"[number], walk.frame_time[close_up.frame])
+    _write_times(side, walk.frame_time[shown], joints[shown, :, :2], colors[shown], 1.2 * radius, 1 / scale)
     style: dict[str, Any] = {"frameon": False, "ncols": 2, "borderaxespad": 0.0, "fontsize": "small"}
     place = (1 - _RIGHT / paper[0], 1 - 0.08 / paper[1])
     figure.legend(*side.get_legend_handles_labels(), loc="upper right", bbox_to_anchor=place, **style)
@@ -156,7 +159,7 @@ def _instants(path: Array, width: float, count: int | None) -> list[int]:
 
 
 def _write_times(axes: Axes, times: Array, joints: Array, colors: Array, gap: float, inch: float) -> None:
-    """Write the time of each chain above its highest joint, one line higher where it would touch an earlier time.
+    """Write the time of each chain above its highest joint, a little aside or higher where it would touch a text.
 
     Args:
         axes: the view from the side.
@@ -166,12 +169,14 @@ def _write_times(axes: Axes, times: Array, joints: Array, colors: Array, gap: fl
         gap: from a joint to the text [m].
         inch: on paper [m].
     """
-    wide, high = 0.42 * inch, 0.15 * inch
-    taken = np.empty((0, 2))
+    wide, high = 0.38 * inch, 0.13 * inch
+    taken = np.array([text.get_position() for text in axes.texts]).reshape(-1, 2)
     for number in range(len(times)):
-        x, y = joints[number, np.argmax(joints[number, :, 1])] + (0.0, gap)
-        while np.any((np.abs(taken[:, 0] - x) < wide) & (np.abs(taken[:, 1] - y) < high)):
-            y += 0.5 * high
+        top = joints[number, np.argmax(joints[number, :, 1])] + (0.0, gap)
+        for lift, aside in product(range(100), (0, 1, -1, 2, -2, 3, -3)):
+            x, y = top + 0.05 * inch * np.array([aside, lift])
+            if not np.any((np.abs(taken[:, 0] - x) < wide) & (np.abs(taken[:, 1] - y) < high)):
+                break
         taken = np.append(taken, [[x, y]], axis=0)
         style: dict[str, Any] = {"color": 0.7 * colors[number], "fontsize": "small", "path_effects": _HALO}
         axes.text(x, y, f"{times[number]:.2f} s", ha="center", va="bottom", zorder=6, **style)
@@ -203,7 +208,7 @@ def _draw_distance(axes: Axes, walk: "WalkResult", low: float, depth: float) -> 
     axes.plot([x, x], [floor, y - 0.6 * depth], color=INK, linewidth=0.8, zorder=4)
     box = {"facecolor": GROUND, "edgecolor": "none", "pad": 2.0}
     text = f"Δx = {walk.dx:.3f} m"
-    axes.text(x.mean(), y.mean(), text, rotation=-slope, ha="center", va="center", bbox=box, zorder=4)
+    axes.text(x.mean(), y.mean(), text, rotation=-slope, ha="center", va="center", bbox=box, zorder=6)
 
 
 @dataclass(frozen=True)
@@ -229,11 +234,11 @@ def _frame_close_up(
         letter, (0.0, 1.0), xycoords="axes fraction", xytext=(0, 6), textcoords="offset points", weight="bold"
     )
     strip.add_patch(Rectangle((x, y), right - x, top - y, fill=False, edgecolor=INK, linewidth=0.8, zorder=5))
-    strip.text(x, top, f" {letter}", ha="left", va="top", weight="bold", zorder=6, path_effects=_HALO)
+    strip.text(x, top, letter, ha="left", va="bottom", weight="bold", zorder=6, path_effects=_HALO)
 
 
 def _close_ups(walk: "WalkResult") -> list[_CloseUp]:
-    """At most four moments in order of time, no frame twice, whose boxes lie side by side.
+    """At most four moments in order of time, no frame twice, whose boxes lie side by side if their spots allow it.
 
     They are the first touch of the floor, the first self-contact, the collapse and the end, as far as they happen. The
     collapse is the last time at which the top of the chain is half as high as at the release.
@@ -257,30 +262,25 @@ def _close_ups(walk: "WalkResult") -> list[_CloseUp]:
         np.array([middle, floor_height(walk, middle)]),
     )
     size = np.array([1.0, 1.0 / _CLOSE_UP_ASPECT]) * _CLOSE_UP_LINKS * walk.setup.parameters.link_length
+    moments = sorted(found.items())
+    middles = _side_by_side(np.array([spot[0] for _, (_, spot) in moments]), size[0])
     close_ups = []
-    for frame, (title, spot) in sorted(found.items()):
-        deepest = floor_line(walk, spot[0] - size[0] / 2, spot[0] + size[0] / 2)[:, 1].min() - 0.1 * size[1]
-        low = np.maximum(spot - size / 2, (-np.inf, deepest))
+    for (frame, (title, spot)), x in zip(moments, middles, strict=True):
+        deepest = floor_line(walk, x - size[0] / 2, x + size[0] / 2)[:, 1].min() - 0.1 * size[1]
+        low = np.array([x, max(spot[1], deepest + size[1] / 2)]) - size / 2
         close_ups.append(_CloseUp(title, frame, low, low + size))
-    return _side_by_side(close_ups)
+    return close_ups
 
 
-def _side_by_side(close_ups: list[_CloseUp]) -> list[_CloseUp]:
-    """Move close-ups that overlap apart, each by half of it; three of one spot would lose it, and stay overlapped."""
-    lows = np.array([close_up.low for close_up in close_ups])
-    size = close_ups[0].high - close_ups[0].low
+def _side_by_side(spots: Array, width: float) -> Array:
+    """Middles of boxes, moved apart where boxes overlap, but at most a sixth of a box off their spots [m]."""
+    middles = spots.copy()
     for _ in range(10):
-        for one in range(len(lows)):
-            for other in range(one):
-                way = lows[one] - lows[other]
-                overlap = size[0] - abs(way[0])
-                if overlap > 0 and abs(way[1]) < size[1]:
-                    shift = 0.5 * overlap * (1 if way[0] >= 0 else -1)
-                    lows[one, 0], lows[other, 0] = lows[one, 0] + shift, lows[other, 0] - shift
-    reach = 0.45 * size[0]
-    wanted = np.array([close_up.low[0] for close_up in close_ups])
-    lows[:, 0] = np.clip(lows[:, 0], wanted - reach, wanted + reach)
-    return [replace(each, low=low, high=low + size) for each, low in zip(close_ups, lows, strict=True)]
+        for left, right in pairwise(np.argsort(spots, kind="stable")):
+            shift = max(0.0, (width - middles[right] + middles[left]) / 2)
+            middles[[left, right]] += (-shift, shift)
+        middles = np.clip(middles, spots - width / 6, spots + width / 6)
+    return middles
 
 
 def _first_meeting(joints: Array, distance: float) -> tuple[int, Array] | None:
