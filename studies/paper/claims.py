@@ -105,8 +105,8 @@ CLAIMS: Final = (
         "`paper_strands`",
         findings.self_collision,
         {
-            verdict: "Slow loops, at 5 Hz, collapse in their first impact; 180 links at 10, 25 and 30 Hz meet themselves a "
-            "bounce earlier more often, 150 links at 15 Hz later than the third "
+            verdict: "Slow loops, at 5 Hz, collapse in their first impact; 180 links at 10, 25 and 30 Hz meet "
+            "themselves a bounce earlier more often, 150 links at 15 Hz later than the third "
             "([when](#when-the-loop-collides-with-itself))."
             for verdict in (PART, DIFFERS)
         },

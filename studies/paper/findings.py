@@ -189,8 +189,9 @@ def cause(numbers: Numbers) -> Finding:
         summary(effect_of(numbers[name]["through"])) for name in ("paper_through", "paper_through_ellipse")
     )
     further = part(_ellipse(numbers), long_chains(numbers))
-    gap, cells = summary(further).mean, numbers["paper_through"]["cells"]["frequency"]
-    among = np.isin(numbers["paper_claims"]["cells"]["frequency"], cells)
+    gap, tried = summary(further).mean, numbers["paper_through"]["cells"]["frequency"]
+    there = further.relative[:, np.isin(numbers["paper_claims"]["cells"]["frequency"], tried)]
+    band = f"{tried[0]:g} to {tried[-1]:g} Hz"
     early = [
         f"{links} links {percent(float(effect.relative), float(effect.half_width))}"
         for links, effect in (
@@ -205,10 +206,9 @@ def cause(numbers: Numbers) -> Finding:
     ]
     text = (
         f"with links that pass through one another 150 and 180 links walk {percent(rest.mean, rest.half_width)} "
-        f"further from the sprocket, in {rest.rises} of {rest.cells} cells ({cells[0]:g} to {cells[-1]:g} Hz), as an ellipse "
+        f"further from the sprocket, in {rest.rises} of {rest.cells} cells ({band}), as an ellipse "
         f"{percent(control.mean, control.half_width)}; an ellipse walks {percent(gap, sign=False)} further than loops "
-        f"from rest, {percent(float(further.relative[:, among].mean()), sign=False)} at {cells[0]:g} to {cells[-1]:g} "
-        "Hz; "
+        f"from rest, {percent(float(there.mean()), sign=False)} at {band}; "
         f"within a cell, strands met by the second bounce against later: {', '.join(early)}"
     )
     closes = Verdict.AGREES if rest.mean - control.mean >= bounds().most * gap else Verdict.PART
@@ -217,26 +217,26 @@ def cause(numbers: Numbers) -> Finding:
 
 def losses(numbers: Numbers) -> Finding:
     """A chain loses most of its energy in collisions."""
-    found = {
-        name: np.array(each, np.float64) for name, each in numbers["paper_claims"]["starts"]["rest"]["losses"].items()
-    }
+    found, ellipse = (_losses(numbers, start) for start in ("rest", "ellipse"))
     collisions = found["floor"] + found["self_contact"]
-    damped = {start: _damped_collisions(numbers, start) for start in ("rest", "ellipse")}
+    damped, as_ellipse = (
+        int((each["floor"] + each["self_contact"] + each["joint_damping"] > each["joint_friction"]).sum())
+        for each in (found, ellipse)
+    )
     means = {name: percent(float(np.nanmean(each)), sign=False) for name, each in found.items()}
     text = (
         f"from the release to rest: floor {means['floor']}, self-contacts {means['self_contact']}, friction of joints "
         f"{means['joint_friction']}, damping of joints {means['joint_damping']}; collisions take more than half in "
         f"{int((collisions > 0.5).sum())} of {collisions.size} cells, with damping of the joints more than friction of "
-        f"the joints in {damped['rest']} (as an ellipse {damped['ellipse']})"
+        f"the joints in {damped} (as an ellipse {as_ellipse})"
     )
     return Finding(text, share(int((collisions > 0.5).sum()), collisions.size))
 
 
-def _damped_collisions(numbers: Numbers, start: str) -> int:
-    """Number of cells in which collisions and damping of the joints take more than friction of the joints."""
-    losses = numbers["paper_claims"]["starts"][start]["losses"]
-    found = {name: np.array(each, np.float64) for name, each in losses.items()}
-    return int((found["floor"] + found["self_contact"] + found["joint_damping"] > found["joint_friction"]).sum())
+def _losses(numbers: Numbers, start: str) -> dict[str, np.ndarray]:
+    """Shares of the energy at the release that each loss takes, (links, frequencies)."""
+    tables = numbers["paper_claims"]["starts"][start]["losses"]
+    return {name: np.array(each, np.float64) for name, each in tables.items()}
 
 
 def delay(numbers: Numbers) -> Finding:
@@ -347,7 +347,10 @@ def small(names: Mapping[str, str], kind: str) -> Check:
             above += sum(exceeding(effect, bound) for _, effect in steps)
             inside += sum(within(effect, bound) for _, effect in steps)
             total += sum(summary(effect).cells for _, effect in steps)
-        text = f"means of all cells at most {', '.join(texts)}; more than {bound:.0%} in {above} of {total} comparisons; shown to be within {bound:.0%} in {inside}"
+        text = (
+            f"means of all cells at most {', '.join(texts)}; more than {bound:.0%} in {above} of {total} comparisons; "
+            f"shown to be within {bound:.0%} in {inside}"
+        )
         return Finding(text.replace("%", " %").replace("  %", " %"), smallness(above, total))
 
     return check
@@ -381,7 +384,8 @@ def waves(numbers: Numbers) -> Finding:
     count = len(gentle[0])
     text = (
         f"a drag of 50/s on fast waves of up to 24 links, in flight alone, changes Δx by {ends[0]}, significantly in "
-        f"{known[0]} of {count} cells ({beyond} against a drag of 1e-9/s); 250/s by {ends[1]}, {known[1]} cells; 50/s in impacts as well by {ends[2]}, "
+        f"{known[0]} of {count} cells ({beyond} against a drag of 1e-9/s); "
+        f"250/s by {ends[1]}, {known[1]} cells; 50/s in impacts as well by {ends[2]}, "
         f"{known[2]} cells"
     )
     return Finding(text, Verdict.PART, is_typed=True)
