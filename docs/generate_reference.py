@@ -83,7 +83,7 @@ def values_of(field: FieldInfo) -> str:
     extra = field.json_schema_extra
     unit = str(extra.get("unit", "1")) if isinstance(extra, dict) else "1"
     if not limits:
-        return f", or a list of numbers in {unit}"
+        return in_unit(", or a list of numbers", unit if unit == "1" else f"in {unit}")
     lower = "[" + limits["ge"] if "ge" in limits else "(" + limits["gt"]
     upper = limits["le"] + "]" if "le" in limits else limits.get("lt", "∞") + ")"
     return (", whole, " if int in kinds else ", ") + in_unit(f"{lower}, {upper}", unit)
@@ -155,13 +155,13 @@ def options_page() -> str:
     integrators = ", ".join(f"`{name}`" for name in METHODS)
     return (
         "# Options\n\nHow a walk is computed; see [methods](../methods.md). A method in one word, such as the default, "
-        "has defaults of its own, see below. Each line has a field with its default, what it may be, and its meaning."
-        "\n\n"
+        "has defaults of its own. Each line has a field with its default, what it may be, and its meaning.\n\n"
         + fields_of(
             Options, {"method": f"a word, see below, or an [integrator](../methods.md#integrators): {integrators}"}
         )
         + "\n## Methods in one word\n\nSuch a word of `method` sets the defaults of these options. On a GPU `standard` "
-        "means `explicit`. A `tolerance` that is given also replaces `soft_tolerance`.\n\n" + "\n".join(words) + "\n"
+        "means `explicit`. A `tolerance` that is given also replaces `soft_tolerance`.\n\n"
+        + listing((f"`{word}`", text) for word, text in words.items())
     )
 
 
@@ -183,7 +183,7 @@ def sweep_file_page() -> str:
     numbers = [f"`{name}`" for name, field in Scene.model_fields.items() if field.annotation is float]
     return (
         "# Sweep file\n\nA sweep file is a YAML mapping with these keys. A block is such a mapping, too, without "
-        f"{', '.join(only_file)}. An error names the path of the value, such as `sweep.blocks[0].grid.frequency[3]`. "
+        f"{', '.join(only_file)}. "
         "[Sweeps](../sweeps.md) shows how to use it.\n\n"
         + listing(keys)
         + "\n## Grid\n\nEach key is `preset` or a field of scene, options or parameters. Each value is a list, such as "
@@ -193,8 +193,8 @@ def sweep_file_page() -> str:
         "\n## Distributions\n\nThe key `all` says what is drawn of the other quantities: `table` (the default) or "
         "`fixed`, nothing. Each quantity takes one of `table`, `fixed`, `{uniform: [lower, upper]}` and "
         "`{gaussian: {mean: …, sigma: …}}`; without `mean` the Gaussian lies about the chain's value. Given values, "
-        "on an axis or not, are exact: `all` does not hold for them. Only a distribution of their own name, such as "
-        "`floor_friction: table`, draws about each. Distributions "
+        "on an axis or not, are exact; only a distribution of their own name, such as `floor_friction: table`, draws "
+        "about each. Distributions "
         f"can be given for every parameter and for {', '.join(numbers)}. `table` draws {', '.join(uniform)}, and by "
         f"the Gaussians of [Table 1](parameters.md), about the chain's value, {', '.join(gaussian)}.\n"
         + "\n## Samplers\n\n"
@@ -231,9 +231,9 @@ def results_page() -> str:
         + "\n## Numbers\n\nFields of `warpchain.WalkResult`, datasets of the file that `save` writes, and columns of "
         "`warpchain.SweepResult`, where each drawn quantity has a column, too; a second name is that of the column. "
         "Losses of energy are positive. "
-        "What a walk of a sweep does not have is NaN, or −1 in columns of whole numbers. `cell_statistics` and figures "
-        "leave such walks out, column by column: `count` is the number of walks that were averaged, `absent` that of "
-        "walks at rest without the quantity. Averages of your own must do so, too.\n\n"
+        "What a walk of a sweep does not have is NaN, or −1 in columns of whole numbers; averages of your own must "
+        "leave such walks out. `cell_statistics` and figures do so: `count` is the number of walks that were averaged, "
+        "`absent` that of walks at rest without the quantity.\n\n"
         + listing(rows)
         + "\n## Arrays\n\nOf a walk, at t samples and f frames of n links, in the same file.\n\n"
         + listing(arrays)

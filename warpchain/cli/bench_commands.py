@@ -58,10 +58,9 @@ def bench(
 ) -> None:
     """Measure steps and errors of each method, and walks a second.
 
-    They stand beside those of SciPy's DOP853. A step is an attempted one of one chain in flight, at Table 1's values
-    and the method's default tolerance. Errors are the greatest of a link's position and velocity after a millisecond,
-    against DOP853 at 1e-10 on a model in NumPy. Walks are those of 60 links at 15 Hz with the default method, kernels
-    loaded before.
+    A step is an attempted one of one chain in flight, at Table 1's values and the method's default tolerance. Errors
+    are the greatest of a link's position and velocity after a millisecond, against SciPy's DOP853 at 1e-10 on a model
+    in NumPy. Walks are those of 60 links at 15 Hz with the default method, kernels loaded before.
     """
     from warpchain.bench.flights import step_costs
     from warpchain.bench.machine import machine

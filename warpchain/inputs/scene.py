@@ -96,8 +96,8 @@ class Scene(Section):
     settle_time: float | None = number_field(
         None,
         "s",
-        "time for the chain to settle on the sprocket at rest; null: 0.1, or 2 if the clearance is measured at the "
-        "chain that hangs there, which swings for longer",
+        "time for the chain to settle on the sprocket at rest; null: 0.1, or 2 if the clearance is that of the "
+        "hanging chain",
         ge=0,
         le=LONGEST,
     )
@@ -136,8 +136,8 @@ class Scene(Section):
     )
     release: Annotated[Motion | None, BeforeValidator(checked_motion)] = Field(
         default=None,
-        description="motion of the sprocket from the release on, rows [time in s, x and y in m from its place, "
-        "frequency in Hz], after whose last it vanishes; null: it vanishes at once",
+        description="motion of the sprocket after the release: rows [time in s, x and y in m from its place, "
+        "frequency in Hz]; it vanishes after the last, or at once (null)",
     )
     floor: Annotated[Literal["flat"] | Points, BeforeValidator(checked_profile)] = Field(
         default="flat",

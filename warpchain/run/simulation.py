@@ -55,7 +55,7 @@ def simulate(
         duration: Simulated time [s], from time 0, which is that of the state.
         times: Instants of the trajectory [s], rising, in [0, duration]; steps land on them exactly. Default: 101
             instants evenly spread.
-        floor: Whether there is a floor at y = 0, or one like ``floor`` of a scene: points [[x, y], …] [m].
+        floor: Whether there is a floor at y = 0, or one like ``floor`` of a scene: points ``[[x, y], …]`` [m].
         gravity: Whether gravity acts.
         self_contact: Whether links touch one another.
         method: A key of ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
