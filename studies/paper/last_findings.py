@@ -31,7 +31,8 @@ def nonlinear(numbers: Numbers) -> Finding:
         for name, terms in zip(("from rest", "as an ellipse"), found.values(), strict=True)
     ]
     text = (
-        f"linear terms of all that is drawn explain {'; '.join(texts)} of the variance in a cell (fitted to one half "
+        f"linear terms of all that is drawn, with the same coefficients in all cells, "
+        f"explain {'; '.join(texts)} of the variance in a cell (fitted to one half "
         "of the samples, judged by the other)"
     )
     fails = [Verdict.AGREES if terms["linear"] < bounds().most else Verdict.DIFFERS for terms in found.values()]
@@ -73,9 +74,11 @@ def same_distributions(numbers: Numbers) -> Finding:
     """Δx is distributed alike at both tolerances."""
     found = numbers["paper_distributions"]["distributions"]
     alike = sum(each["p"] > 0.05 for each in found)
+    cells = ", ".join(f"{each['links']} × {each['frequency']:g} Hz" for each in found)
     least, walks = min(each["p"] for each in found), found[0]["walks"][0]
     text = (
-        f"in {alike} of {len(found)} cells of {walks} walks the test of Kolmogorov and Smirnov sees no difference, "
-        f"the least p is {least:.2f}; means and standard deviations in the [table](#the-last-sentences)"
+        f"in {alike} of {len(found)} cells ({cells}) of {walks} walks the test of Kolmogorov and Smirnov sees no "
+        f"difference, the least p is {least:.2f}; means and standard deviations in the [table](#the-last-sentences); "
+        "not tried with longer chains"
     )
     return Finding(text, share(alike, len(found)))

@@ -129,7 +129,7 @@ def ellipses_text(numbers: Numbers) -> str:
     links, frequencies = (np.array(content["cells"][name]) for name in ("links", "frequency"))
     means = np.array(content["starts"]["ellipse"]["mean"], np.float64)[links >= 90][:, frequencies >= 10]
     difference = np.abs(means / means.mean(axis=0) - 1)
-    return f"{percent(float(np.nanmax(difference)), sign=False)} from 10 Hz on"
+    return f"±{percent(float(np.nanmax(difference)), sign=False)} of their mean from 10 Hz on"
 
 
 def impacts_table(numbers: Numbers) -> str:
@@ -220,7 +220,12 @@ def walks_text(numbers: Numbers) -> str:
     failed = ", ".join(f"{count} {name}" for name, count in total.items() if name != "at_rest" and count)
     inaccurate = sum(content["inaccurate"] for content in numbers.values())
     rest = f"{total.total():,} walks: {total['at_rest']:,} at rest" + (f", {failed}" if failed else "")
-    return f"{rest}; {inaccurate} with an energy error above 5 %"
+    missing = "".join(
+        f"; {content['walks']['missing']:,} more of `{name}` were not run"
+        for name, content in numbers.items()
+        if content["walks"].get("missing")
+    )
+    return f"{rest}; {inaccurate} with an energy error above 5 %{missing}"
 
 
 def _symbol(name: str) -> str:

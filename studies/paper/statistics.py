@@ -139,6 +139,12 @@ def exceeding(effect: Effect, bound: float) -> int:
     return int((np.abs(effect.relative[known]) - effect.half_width[known] > bound).sum())
 
 
+def within(effect: Effect, bound: float) -> int:
+    """Number of cells whose effect is within a bound, up and down, with its whole interval."""
+    known = effect.known
+    return int((np.abs(effect.relative[known]) + effect.half_width[known] <= bound).sum())
+
+
 def by_chance(cells: int) -> int:
     """Number of cells that a test at 95 % calls significant by chance alone; in 95 % of all cases not more."""
     return int(binom.ppf(_TAIL, cells, 1 - CONFIDENCE)) if cells else 0
