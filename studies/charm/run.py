@@ -38,17 +38,15 @@ def distances(block: Block) -> str:
     rows = []
     for place in np.ndindex(cells.mean.shape):
         values = [axis[index] for axis, index in zip(block.axes.values(), place, strict=True)]
-        rows.append(
-            (
-                *(f"{value:g}" for value in values[:-1]),
-                f"{1e3 * values[-1]:g}",
-                f"{cells.mean[place]:.3f} ± {cells.standard_error[place]:.3f}",
-                f"{cells.sd[place]:.3f}",
-                f"{means['walk_time'][place]:.2f}",
-                f"{means['bounces'][place]:.1f}",
-                f"{rest[place].mean():.0%}",
-            )
+        numbers = (
+            f"{cells.mean[place]:.3f} ± {cells.standard_error[place]:.3f}",
+            f"{cells.sd[place]:.3f}",
+            f"{means['walk_time'][place]:.2f}",
+            f"{means['bounces'][place]:.1f}",
         )
+        shown = numbers if rest[place].any() else ("–",) * len(numbers)
+        cell = *(f"{value:g}" for value in values[:-1]), f"{1e3 * values[-1]:g}"
+        rows.append((*cell, *shown, f"{rest[place].mean():.0%}"))
     names = [name.replace("frequency", "ν / Hz") for name in block.axes][:-1]
     return table((*names, "charm / g", "Δx / m", "σ / m", "t / s", "bounces", "at rest"), rows)
 
