@@ -15,7 +15,7 @@ from tests.support.made_sweeps import make_sweep
 from tests.support.made_walks import assert_same
 from tests.support.sweep_content import blocks, content
 from warpchain.cli.main import main
-from warpchain.inputs.validation import InputError
+from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.run.sweep_run import sweep
 from warpchain.store.merged_file import merge as merge_folders
 from warpchain.store.sweep_result import load
@@ -114,6 +114,8 @@ def test_parts_of_one_grid_are_the_whole(tmp_path: Path, monkeypatch: pytest.Mon
     for links, frequency, sample in itertools.product((30, 44), (5, 15), (0, 7)):
         at = {"links": links, "frequency": frequency, "sample": sample}
         assert_same(both.series(**at), whole.series(**at))
+    with pytest.warns(InputWarning, match=r"two\.h5: 12 of 36 walks are missing"):
+        merge_folders(["part-1", "part-2"], "two.h5")
     assert merge(Path("part-1"), Path("all.h5"), Path("twice.h5")) == 2
-    with pytest.raises(InputError, match=r"holds part 1/3 of its sweep, not 2/3"):
+    with pytest.raises(InputError, match=r"holds part 1/3 of its sweep, not 2/3; give --part 1/3"):
         sweep("tiny.yaml", "part-1", seed=11, samples=9, part="2/3")

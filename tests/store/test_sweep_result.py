@@ -13,7 +13,7 @@ import xarray
 
 from tests.support.synthetic_sweep import SHARD_SIZE, SWEEP, run, synthetic_rows, synthetic_sweep, write
 from warpchain.cli.main import main
-from warpchain.inputs.validation import InputError
+from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.status import Status
 from warpchain.store.folder import SweepFolder
 from warpchain.store.manifest import Manifest
@@ -21,6 +21,7 @@ from warpchain.store.merged_file import merge
 from warpchain.store.sweep_result import SweepResult, load
 from warpchain.sweeps.plan import load_sweep
 from warpchain.walks.rows import COLUMNS, STORED_COLUMNS, drawn_column, missing_rows
+from warpchain.walks.walk_result import load_walk
 
 SINGLE = synthetic_sweep(
     {
@@ -167,10 +168,19 @@ def test_statistics_are_over_walks_at_rest(tmp_path: Path) -> None:
         load(tmp_path).statistics("bounce")
 
 
+def test_a_sweep_is_no_saved_walk(tmp_path: Path, single: Path) -> None:
+    """Its folder and its merged file are refused as one, with the command that saves one of its walks."""
+    with pytest.warns(InputWarning, match="20 of .* walks are missing"):
+        merge(single, tmp_path / "merged.h5")
+    for path in (single, tmp_path / "merged.h5"):
+        with pytest.raises(InputError, match=r"sweep.*, not .*--like SWEEP --index I -o DIR"):
+            load_walk(path)
+
+
 def test_no_sweep_no_result(tmp_path: Path, single: Path) -> None:
     """A folder without a sweep, or none at all, is named; a bad shard is no missing one."""
-    for nothing in (tmp_path, tmp_path / "none"):
-        with pytest.raises(InputError, match=f"{nothing}: no sweep in this folder"):
+    for nothing, problem in ((tmp_path, "no sweep in this folder"), (tmp_path / "none", "is not there")):
+        with pytest.raises(InputError, match=f"{nothing}: {problem}"):
             load(nothing)
     with pytest.raises(InputError, match=r"sweep\.json: not an HDF5 file; give a folder of a sweep"):
         load(single / "sweep.json")

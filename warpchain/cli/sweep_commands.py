@@ -81,18 +81,22 @@ def sweep(
         if device not in (None, "cuda"):
             raise InputError(f"--device: {device} is given together with --gpus; give cuda, or leave one out")
         device = "cuda"
-    with _executor(gpus, scheduler) as executor:
-        result = run(
-            source,
-            folder,
-            device=device,
-            executor=executor,
-            workers=workers or gpus,
-            fresh=fresh,
-            part=part,
-            seed=seed,
-            samples=samples,
-        )
+    try:
+        with _executor(gpus, scheduler) as executor:
+            result = run(
+                source,
+                folder,
+                device=device,
+                executor=executor,
+                workers=workers or gpus,
+                fresh=fresh,
+                part=part,
+                seed=seed,
+                samples=samples,
+            )
+    except KeyboardInterrupt:
+        print(f"the same command{', without --fresh,' if fresh else ''} goes on with the sweep", file=sys.stderr)
+        raise
     print_sweep(result, as_json)
     _note_failures(result)
 

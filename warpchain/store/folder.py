@@ -233,9 +233,11 @@ def _continued(folder: Path, sweep: Sweep, manifest: Manifest) -> Manifest:
             f"{NUMERICS_VERSION}; use the version that began it, give another folder, or start anew with fresh"
         )
     if found.part != manifest.part:
+        own = "{}/{}".format(*found.part)
+        remedy = f"give --part {own}" if found.part[1] > 1 else "leave --part out"
         raise InputError(
-            f"{folder}: holds part {found.part[0]}/{found.part[1]} of its sweep, not {manifest.part[0]}/"
-            f"{manifest.part[1]}; give another folder"
+            f"{folder}: holds part {own} of its sweep, not {manifest.part[0]}/{manifest.part[1]}; {remedy}, or "
+            "another folder"
         )
     digest = found.sweep.digest()  # by this version, which may know of more fields than that which began the folder
     if digest == manifest.digest:

@@ -220,6 +220,8 @@ def read_manifest(directory: Folder) -> Manifest:
         with open_regular(path) as file:
             text = file.read(MOST_BYTES + 1)
     except (FileNotFoundError, NotADirectoryError):
+        if not os.path.exists(directory):
+            raise InputError(f"{directory}: is not there; give the folder of a sweep, or a merged file") from None
         there = "a saved walk, no sweep" if (Path(directory) / "walk.h5").exists() else "no sweep"
         raise InputError(f"{directory}: {there} in this folder; give the folder of one, or a merged file") from None
     if len(text) > MOST_BYTES:

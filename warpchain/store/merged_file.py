@@ -12,6 +12,7 @@ one behind the other along `sample`; `seed` has the seed of each, and `index` th
 """
 
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -23,7 +24,7 @@ from numpy.typing import NDArray
 
 from warpchain.files import Kind, checked_output, given_path, write_whole
 from warpchain.hdf5_files import hdf5_image, kind_of_hdf5
-from warpchain.inputs.validation import InputError
+from warpchain.inputs.validation import InputError, InputWarning
 from warpchain.store.block_result import Origin
 from warpchain.store.manifest import Folder
 from warpchain.store.sweep_result import KIND, WANTED, SweepResult, load
@@ -40,7 +41,7 @@ def merge(sources: Folder | Sequence[Folder], path: str | os.PathLike[str]) -> N
     Args:
         sources: the folder of the sweep, or several, or merged files, whose sweeps differ in nothing but seed, samples
             and names; their samples are put together. Those of the same seed have different walks of one sweep.
-        path: the file.
+        path: the file. An `InputWarning` says how many walks are missing in it, if any are.
 
     Raises:
         OSError: a folder cannot be read, or the file cannot be written, or is there already and no merged file.
@@ -54,6 +55,13 @@ def merge(sources: Folder | Sequence[Folder], path: str | os.PathLike[str]) -> N
         _check_fit(results)
     image = hdf5_image(KIND, partial(_fill, results=list(results.values())))
     write_whole(target, image, _MERGED)
+    if missing := sum(result.missing_count for result in results.values()):
+        walks = sum(result.walk_count for result in results.values())
+        warnings.warn(
+            f"{path}: {missing:,} of {walks:,} walks are missing; merge again with all parts, once they have run",
+            InputWarning,
+            stacklevel=2,
+        )
 
 
 def _overlaid(folders: Sequence[Folder], results: Sequence[SweepResult]) -> dict[Folder, SweepResult]:

@@ -219,12 +219,10 @@ class BlockKeys(BaseModel):
     def _without_lists_on_axes(cls, values: Any) -> Any:
         for key in ("grid", "points"):
             given = values.get(key) if isinstance(values, dict) else None
-            for name in LISTS if isinstance(given, dict) else ():
-                if name in given:
-                    raise InputError(
-                        f"{key}.{name}: takes a list of its own and is no axis; give blocks, each with "
-                        f"scene: {{{name}: …}}"
-                    )
+            if isinstance(given, dict) and (name := next((name for name in LISTS if name in given), None)):
+                raise InputError(
+                    f"{key}.{name}: takes a list of its own and is no axis; give blocks, each with scene: {{{name}: …}}"
+                )
         return values
 
     @model_validator(mode="before")

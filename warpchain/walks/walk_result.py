@@ -55,6 +55,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 KIND: Final = "warpchain walk"
+WANTED: Final = "give a saved walk; of a sweep, `warpchain walk --like SWEEP --index I -o DIR` saves one"
 
 _SINCE_FLOOR: Final = "time since the last impulse on the floor; NaN if there was none"
 _FIXED: Final = "if the plane is fixed"
@@ -414,9 +415,12 @@ def load_walk(path: str | os.PathLike[str]) -> WalkResult:
         DamagedFileError: the file is damaged or cut short. It is an `InputError`.
     """
     if os.path.isdir(path):
-        path = os.path.join(path, "walk.h5")
+        record = os.path.join(path, "walk.h5")
+        if not os.path.exists(record) and os.path.exists(os.path.join(path, "sweep.json")):
+            raise InputError(f"{path}: the folder of a sweep, not of a saved walk; {WANTED}")
+        path = record
     remedy = "run the walk again, or fetch another copy of the file"
-    with reading_hdf5(path, KIND, remedy, "give a file written by WalkResult.save") as file:
+    with reading_hdf5(path, KIND, remedy, WANTED) as file:
         given = json.loads(file.attrs["setup"])
         try:
             setup = Setup(
