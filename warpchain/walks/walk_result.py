@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 KIND: Final = "warpchain walk"
-WANTED: Final = "give a saved walk; of a sweep, `warpchain walk --like SWEEP --index I -o DIR` saves one"
+WANTED: Final = "give a saved walk; `walk --like SWEEP --index I` saves one"
 
 _SINCE_FLOOR: Final = "time since the last impulse on the floor; NaN if there was none"
 _FIXED: Final = "if the plane is fixed"
