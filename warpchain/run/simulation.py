@@ -37,7 +37,7 @@ def simulate(
     duration: float | None = None,
     *,
     times: Sequence[float] | Array | None = None,
-    floor: bool | Sequence[Sequence[float]] | Array = True,
+    floor: bool | Sequence[Sequence[float]] | Array | None = None,
     gravity: bool = True,
     self_contact: bool = True,
     method: str = "rkf78",
@@ -49,13 +49,14 @@ def simulate(
 
     Args:
         parameters: Of the chain, or the name of a preset; or a :class:`State`, which has positions and velocities, too.
-        position: (n, 3): x, y [m] and θ [rad] of each link's centre; n even, at least 4. Link i's right end meets
+        position: (n, 3): x, y [m] and θ [rad] of each link's centre; n as of :class:`State`. Link i's right end meets
             link i + 1's left end, the last link's the first one's. Links 0, 2, … are inner ones.
         velocity: (n, 3): their rates [m/s, m/s, rad/s].
         duration: Simulated time [s], from time 0, which is that of the state.
         times: Instants of the trajectory [s], rising, in [0, duration]; steps land on them exactly. Default: 101
             instants evenly spread.
-        floor: Whether there is a floor at y = 0, or one like ``floor`` of a scene: points ``[[x, y], …]`` [m].
+        floor: True (at y = 0), False (none) or points ``[[x, y], …]`` [m] like ``floor`` of a scene; None: that of the
+            state's scene, for arrays at y = 0.
         gravity: Whether gravity acts.
         self_contact: Whether links touch one another.
         method: A key of ``warpchain.inputs.methods.METHODS``, such as ``"dp5"``.
@@ -80,8 +81,10 @@ def simulate(
             raise InputError(f"options.{name}: only a walk has phases in which joints soften; leave it out")
     if not isinstance(gravity, bool):
         raise InputError(f"gravity: {shown(gravity)} is not a truth value; give True or False")
-    points = None if isinstance(floor, bool) else floor_points(validated(Scene, {"floor": floor}, ""))
     state = _checked_state(parameters, position, velocity)
+    points = None
+    if not isinstance(floor, bool):
+        points = floor_points(state.setup.scene if floor is None else validated(Scene, {"floor": floor}, ""))
     chain = state.parameters if gravity else state.parameters.with_values({"gravity": 0.0})
     check_links_on_gpu(state.links, options.device, "position")
     instants = _checked_times(end, times)
@@ -90,7 +93,7 @@ def simulate(
             f"times: {len(instants)} instants of {state.links} links are too many; "
             f"give at most {MOST_PLACES // state.links}"
         )
-    if points is not None:
+    if floor is not False and not (floor is None and state.is_placed_as_in(state.setup)):
         check_above(points, state.position, chain.link_length, "position")
     with gpu_turn([options.device]):
         body = "none" if floor is False else body_of(points)
