@@ -155,6 +155,16 @@ class Chains:
         options = validated(Options, {"soften_drive": False, **settings, "method": method, "device": device}, "options")
         if options.soften_drive:
             raise InputError("options.soften_drive: there is no sprocket; leave it out")
+        if not isinstance(floor := plain(floor, "floor"), bool):
+            raise InputError(
+                f"floor: {shown(floor)} is not a truth value; give True or False (simulate takes profiles)"
+            )
+        if not all(isinstance(each, Parameters) for each in parameters):
+            raise InputError(f"parameters: {shown(parameters)} are not a row of Parameters; give those of each chain")
+        if np.ndim(position) == 3 and len(parameters) != len(position):
+            raise InputError(
+                f"parameters: {len(parameters)} of {len(position)} chains in position; give those of each chain"
+            )
         shape = (len(parameters), *np.shape(position)[1:2], 3)
         for name, given in (("position", position), ("velocity", velocity)):
             if np.shape(given) != shape or len(shape) != 3 or not np.all(np.isfinite(given)):
@@ -179,12 +189,15 @@ class Chains:
 
     def motions(self, chains: Sequence[int] | NDArray[np.integer[Any]] | None = None) -> tuple[Array, Array]:
         """Place and angle of the links of all chains, or of some numbers, (W, n, 3); and their rates."""
-        return self._batch.motions(range(len(self.status)) if chains is None else list(chains), self._links)
+        return self._batch.motions(self._numbers(chains), self._links)
 
     def set_velocity(self, chains: Sequence[int] | NDArray[np.integer[Any]], velocity: Array) -> None:
-        """Give some chains, by their numbers, other velocities, (chains, n, 3)."""
-        if len(chains):
-            self._batch.set_velocities(list(chains), velocity)
+        """Give some chains, by their numbers, other velocities, (chains, n, 3); an `InputError` if they do not fit."""
+        numbers, rates = self._numbers(chains), real_array("velocity", velocity, "shape (chains, n, 3)")
+        if rates.shape != (shape := (len(numbers), self._links, 3)) or not np.all(np.isfinite(rates)):
+            raise InputError(f"velocity: its shape is {rates.shape}; give finite numbers of shape {shape}")
+        if numbers:
+            self._batch.set_velocities(numbers, rates)
 
     def run(
         self,
@@ -196,17 +209,37 @@ class Chains:
         """Carry on all chains that can go on, or those of some numbers.
 
         Args:
-            until: Time [s].
+            until: Time [s], not before that of any of them.
             chains: Numbers of the chains; None: all.
             to_rest: Whether a chain that comes to rest on the floor stays there, AT_REST; others end with TIME_LIMIT.
+
+        Raises:
+            InputError: A number or the time is refused.
         """
-        status, wanted = self.status, range(len(self.status)) if chains is None else chains
-        going = [int(world) for world in wanted if status[world] == Status.FINISHED]
+        status = self.status
+        going = [world for world in self._numbers(chains) if status[world] == Status.FINISHED]
+        now = max((self._batch.time(world) for world in going), default=0.0)
+        until = plain(until, "until")
+        if isinstance(until, bool) or not isinstance(until, int | float) or not now <= until < LONGEST:
+            raise InputError(
+                f"until: {shown(until)} is no time from now on; give a number of seconds, at least {now:g}"
+            )
         if going:
             with gpu_turn([self._batch.options.device]):
                 self._batch.resume(going, until, Status.TIME_LIMIT if to_rest else Status.FINISHED)
                 self._batch.run(going, self._features)
         self.time = until
+
+    def _numbers(self, chains: Sequence[int] | NDArray[np.integer[Any]] | None) -> list[int]:
+        """Numbers of chains, by default all, or an `InputError`."""
+        count = len(self.status)
+        numbers = np.arange(count) if chains is None else np.asarray(chains)
+        if numbers.size == 0:
+            return []
+        if numbers.ndim != 1 or numbers.dtype.kind not in "iu" or numbers.min() < 0 or numbers.max() >= count:
+            raise InputError(f"chains: {shown(chains)} are not numbers of chains; give some of 0 to {count - 1}")
+        found: list[int] = numbers.tolist()
+        return found
 
 
 def _follow(
