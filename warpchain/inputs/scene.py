@@ -402,8 +402,8 @@ def check_scene(scene: Scene, parameters: Parameters) -> None:
     highest = scene.clearance + scene.links * parameters.link_length / 2  # of the sprocket's lowest point
     if scene.release and floor_points(scene) is None and (lowest := min(row[2] for row in scene.release)) < -highest:
         raise InputError(
-            f"scene.release: y = {lowest:g} m takes the sprocket through the floor, which is at most {highest:g} m below; "
-            "give a higher one"
+            f"scene.release: y = {lowest:g} m takes the sprocket through the floor, at most {highest:g} m "
+            "below it; give a higher place"
         )
     if joint_radius(scene, parameters) < LEAST_SPROCKET * parameters.link_length:
         raise InputError(
